@@ -45,7 +45,6 @@ pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
 /// A missing file, a directory that is not one log, or a bag of another format.
 pub fn check_log_path(path: &Path) -> Result<(), Failure> {
     let shown = path.display();
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     if !path.exists() {
         return Err(Failure::failed(format!("{shown}: no such file{}", log_hint(path))));
     }
@@ -58,36 +57,7 @@ pub fn check_log_path(path: &Path) -> Result<(), Failure> {
         };
         return Err(Failure::failed(format!("{shown} is a directory; {hint}")));
     }
-    match extension {
-        "db3" => Err(Failure::failed(conversion(path))),
-        _ => Ok(()),
-    }
-}
-
-fn conversion(path: &Path) -> String {
-    let shown = path.display();
-    let why = "is a ROS 2 bag in SQLite, which is not read; convert it";
-    format!("{shown} {why}:\n{}", converter(path))
-}
-
-/// Returns the command that makes an MCAP log of a bag: `rosbags-convert`, of `pip install
-/// rosbags`. Bags older than ROS 2 Iron hold no message definitions; the tool takes them from the
-/// named distribution, and `mcap convert` cannot work without them.
-pub fn converter(path: &Path) -> String {
-    let stem = path.with_extension("");
-    let (shown, stem) = (path.display(), stem.display());
-    if path.extension().is_some_and(|extension| extension == "bag") {
-        return format!(
-            "  rosbags-convert --src {shown} --dst {stem} --dst-storage mcap --dst-typestore \
-             ros2_humble"
-        );
-    }
-    let folder = path.parent().filter(|folder| folder.join("metadata.yaml").exists());
-    let source = folder.unwrap_or(path).display();
-    format!(
-        "  rosbags-convert --src {source} --src-typestore ros2_humble --dst {stem}-mcap \
-         --dst-storage mcap"
-    )
+    Ok(())
 }
 
 /// Returns the MCAP files of a folder, by name.
@@ -127,19 +97,6 @@ mod tests {
         assert!(hint.contains("did you mean") && hint.contains("depth-ekf.toml"), "{hint}");
         let hint = config_hint(&home.path().join("zzzzzzzz.toml"));
         assert!(hint.contains("there are: depth-ekf, other"), "{hint}");
-    }
-
-    #[test]
-    fn bags_of_other_formats_get_the_line_that_converts_them() {
-        let home = tempfile::tempdir().unwrap();
-        let path = home.path().join("b.db3");
-        fs::write(&path, "x").unwrap();
-        let failure = check_log_path(&path).unwrap_err();
-        assert!(failure.message.contains("--src-typestore ros2_humble"), "{}", failure.message);
-        // A ROS 1 bag is read as it is.
-        let path = home.path().join("a.bag");
-        fs::write(&path, "x").unwrap();
-        assert!(check_log_path(&path).is_ok());
     }
 
     #[test]

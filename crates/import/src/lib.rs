@@ -15,7 +15,6 @@ use clap::{Args, ValueEnum};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_app::signals::Signals;
-use tagalong_app::suggest::converter;
 
 use self::sequence::Sequence;
 
@@ -30,8 +29,6 @@ pub enum Kind {
     Mot,
     /// A folder of JPEG or PNG images, in the order of their names.
     Images,
-    /// A ROS 1 bag, or a ROS 2 bag in SQLite: prints the command that converts it.
-    Bag,
 }
 
 /// Arguments of `tagalong import`.
@@ -103,10 +100,6 @@ pub fn import(args: &ImportArgs) -> Outcome {
     if !path.exists() {
         return Err(Failure::failed(format!("{}: no such file or folder", path.display())));
     }
-    // A bag is not converted here, so it needs no output file.
-    if args.kind == Kind::Bag {
-        return converted(path, args.format);
-    }
     let log = args.output.clone().unwrap_or_else(|| default_log(args));
     let signals = Signals::listen()?;
     spare(&log, args.overwrite)?;
@@ -132,25 +125,12 @@ pub fn import(args: &ImportArgs) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// Prints the command that converts a bag.
-fn converted(bag: &Path, format: Format) -> Outcome {
-    let commands = converter(bag);
-    print(&match format {
-        Format::Text => format!("{commands}\n"),
-        Format::Json => {
-            let lines: Vec<&str> = commands.lines().map(str::trim).collect();
-            format!("{:#}\n", serde_json::json!({ "commands": lines }))
-        }
-    })?;
-    Ok(Ended::Well)
-}
-
 fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     let sequence = match args.kind {
         Kind::Tum => tum::read(args)?,
         Kind::Kitti => kitti::read(args)?,
         Kind::Mot => folders::mot(args)?,
-        Kind::Images | Kind::Bag => folders::images(args)?,
+        Kind::Images => folders::images(args)?,
     };
     if sequence.moments.is_empty() {
         return Err(Failure::failed(format!("{} has no images", args.path.display())));

@@ -32,7 +32,7 @@ pub struct LegScan {
 /// # Errors
 /// A log that cannot be opened, that is damaged, or that has not as many annotations as scans.
 pub fn read_leg_scans(path: &Path, limits: &Limits) -> Result<Vec<LegScan>, LogError> {
-    let mut walker = LogWalker::new(open_file(path)?, limits)
+    let mut walker = LogWalker::at(path, open_file(path)?, limits)
         .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
     let (mut scans, mut legs, mut unreadable) = (Vec::new(), Vec::new(), 0);
     while let Some(message) = walker.next() {

@@ -15,6 +15,7 @@
 
 mod bag;
 pub mod camera_info;
+mod database;
 mod error;
 pub mod images;
 mod input;

@@ -9,6 +9,8 @@ use crate::LogError;
 
 /// File of a rosbag2 folder that lists its parts.
 const METADATA: &str = "metadata.yaml";
+/// Endings of the files of a rosbag2 folder.
+const KINDS: [&str; 2] = ["mcap", "db3"];
 /// Largest part of the metadata that is read, bytes. A list of 10,000 parts fits.
 const MAX_METADATA: u64 = 1 << 20;
 
@@ -21,8 +23,8 @@ pub struct LogFiles {
 
 impl LogFiles {
     /// Finds the files of a log: a file itself, or the parts of a folder. A folder is one log if it
-    /// holds a `metadata.yaml`, a single MCAP file, or files `NAME_0.mcap`, `NAME_1.mcap`, ... of
-    /// one name.
+    /// holds a `metadata.yaml`, a single `.mcap` or `.db3`, or files `NAME_0.mcap`, `NAME_1.mcap`, ...
+    /// of one name. Where a folder has both kinds, those of MCAP are read.
     ///
     /// # Errors
     /// [`LogError::Open`] for a path that cannot be read; [`LogError::NotAFile`] for a pipe, a
@@ -32,7 +34,7 @@ impl LogFiles {
         if !std::fs::metadata(path).map_err(failed)?.is_dir() {
             return Ok(Self { parts: vec![path.to_owned()], missing: Vec::new() });
         }
-        let mut parts = mcap_files(path).map_err(failed)?;
+        let mut parts = parts_in(path).map_err(failed)?;
         // The order of a directory depends on the file system.
         parts.sort_by_key(|part| part_number(part));
         let listed = listed_parts(&path.join(METADATA));
@@ -43,7 +45,11 @@ impl LogFiles {
             return Err(LogError::NotAFile {
                 path: path.to_owned(),
                 kind: "a folder, and not one log",
-                remedy: if parts.is_empty() { ": it holds no .mcap" } else { " of those in it" },
+                remedy: if parts.is_empty() {
+                    ": it holds no .mcap and no .db3"
+                } else {
+                    " of those in it"
+                },
             });
         }
         // Only names count: metadata may come from another machine.
@@ -72,7 +78,7 @@ pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
     let kind = std::fs::metadata(path).map_err(failed)?;
     let refused = |kind, remedy| LogError::NotAFile { path: path.to_owned(), kind, remedy };
     if kind.is_dir() {
-        return Err(refused("a directory", " (the .mcap in it)"));
+        return Err(refused("a directory", " (the .mcap or .db3 in it)"));
     }
     if !kind.is_file() {
         return Err(refused("a pipe or a device", "; a pipe can be written to a file first"));
@@ -80,9 +86,15 @@ pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
     File::open(path).map_err(failed)
 }
 
-fn mcap_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+/// Returns the files of the first kind of [`KINDS`] of which there are any.
+fn parts_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let files = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path());
-    Ok(files.filter(|path| path.extension().is_some_and(|it| it == "mcap")).collect())
+    let files: Vec<PathBuf> = files.collect();
+    let of = |kind: &&str| -> Vec<PathBuf> {
+        let has_kind = |path: &&PathBuf| path.extension().is_some_and(|it| it == *kind);
+        files.iter().filter(has_kind).cloned().collect()
+    };
+    Ok(KINDS.iter().map(of).find(|parts| !parts.is_empty()).unwrap_or_default())
 }
 
 /// Splits `NAME_12.mcap` into its name and its number; a name without a number is number 0.
@@ -101,7 +113,7 @@ fn part_number(part: &Path) -> (u64, PathBuf) {
     (name_and_number(part).1, part.to_owned())
 }
 
-/// Returns the MCAP files that the metadata lists under `relative_file_paths`; `None` without
+/// Returns the files that the metadata lists under `relative_file_paths`; `None` without
 /// metadata. A list of names is all that is read of it, so this is no YAML parser.
 fn listed_parts(metadata: &Path) -> Option<Vec<String>> {
     let mut text = String::new();
@@ -110,7 +122,12 @@ fn listed_parts(metadata: &Path) -> Option<Vec<String>> {
     let items = lines.skip(1).map_while(|line| line.strip_prefix("- "));
     // Older recorders write the folder before the name.
     let names = items.filter_map(|item| item.trim_matches(['"', '\'']).rsplit('/').next());
-    Some(names.filter(|name| name.ends_with(".mcap")).map(str::to_owned).collect())
+    Some(
+        names
+            .filter(|name| KINDS.iter().any(|kind| name.ends_with(kind)))
+            .map(str::to_owned)
+            .collect(),
+    )
 }
 
 #[cfg(test)]
@@ -138,6 +155,17 @@ mod tests {
     }
 
     #[test]
+    fn a_folder_of_databases_is_a_log_and_one_of_both_kinds_is_its_mcap() {
+        let bag = folder(&["walk_1.db3", "walk_0.db3"]);
+        assert_eq!(names(&LogFiles::of(bag.path()).unwrap()), ["walk_0.db3", "walk_1.db3"]);
+        let text = "  relative_file_paths:\n    - walk_0.db3\n    - walk_2.db3\n";
+        fs::write(bag.path().join(METADATA), text).unwrap();
+        assert_eq!(LogFiles::of(bag.path()).unwrap().missing(), ["walk_2.db3"]);
+        let both = folder(&["walk_0.db3", "walk_0.mcap"]);
+        assert_eq!(names(&LogFiles::of(both.path()).unwrap()), ["walk_0.mcap"]);
+    }
+
+    #[test]
     fn a_part_that_the_metadata_lists_and_that_is_not_there_is_named() {
         let bag = folder(&["walk_0.mcap", "other.mcap"]);
         let text = "rosbag2_bagfile_information:\n  relative_file_paths:\n    - bag/walk_0.mcap\n    \
@@ -154,6 +182,6 @@ mod tests {
         let error = LogFiles::of(logs.path()).unwrap_err().to_string();
         assert!(error.contains("not one log") && error.contains("of those in it"), "{error}");
         let error = LogFiles::of(folder(&["a.txt"]).path()).unwrap_err().to_string();
-        assert!(error.contains("holds no .mcap"), "{error}");
+        assert!(error.contains("holds no .mcap and no .db3"), "{error}");
     }
 }

@@ -156,7 +156,7 @@ impl Scan {
         let mut hash = Sha256::new();
         for part in parts {
             let file = Hashing { reader: open_file(&part.path)?, hash, bytes: 0 };
-            let mut walker = LogWalker::new(file, limits)
+            let mut walker = LogWalker::at(&part.path, file, limits)
                 .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?
                 .knowing(part.channels.iter().cloned());
             while let Some(message) = walker.next() {

@@ -82,7 +82,7 @@ impl TruthFrame {
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
     let (mut frames, mut present) = (Vec::new(), false);
     for part in LogFiles::of(path)?.parts() {
-        let mut walker = LogWalker::new(open_file(part)?, limits)
+        let mut walker = LogWalker::at(part, open_file(part)?, limits)
             .map_err(|source| LogError::NotMcap { path: part.clone(), source })?;
         while let Some(message) = walker.next() {
             if message.channel.topic == TRUTH_TOPIC {

@@ -1,13 +1,15 @@
 use std::io::Read;
+use std::path::Path;
 use std::sync::Arc;
 
 use crate::Limits;
 use crate::bag::{self, Bag};
+use crate::database::{self, Database};
 use crate::mcap::{Mcap, NotMcap};
 use crate::walk::{Channel, Counters, LOSSES, Message, Source, Walk};
 
-/// Robust reader of an MCAP file or of a ROS 1 bag, which trusts nothing in it. The container is
-/// told apart by its first bytes.
+/// Robust reader of an MCAP file, of a ROS 1 bag or of a rosbag2 database, which trusts nothing in
+/// it. The container is told apart by its first bytes.
 ///
 /// The file is read once from front to back through a small buffer, so that a pipe of any length
 /// can be read, and a file that shrinks meanwhile is only a truncated file. The index at its end is
@@ -24,6 +26,7 @@ pub struct LogWalker<R> {
 enum Container {
     Mcap(Mcap),
     Bag(Bag),
+    Database(Box<Database>),
 }
 
 impl<R: Read> LogWalker<R> {
@@ -32,17 +35,43 @@ impl<R: Read> LogWalker<R> {
     /// # Errors
     /// [`NotMcap`] if the file starts as neither container does.
     pub fn new(reader: R, limits: &Limits) -> Result<Self, NotMcap> {
+        Self::begin(None, reader, limits)
+    }
+
+    /// Starts a walk through a file of this path. A database is read by its path, front to back
+    /// by the number of each message; of `reader` no more than the first bytes are read then.
+    ///
+    /// # Errors
+    /// [`NotMcap`] if the file starts as no container does, or is another database.
+    pub fn at(path: &Path, reader: R, limits: &Limits) -> Result<Self, NotMcap> {
+        Self::begin(Some(path), reader, limits)
+    }
+
+    fn begin(path: Option<&Path>, reader: R, limits: &Limits) -> Result<Self, NotMcap> {
         let mut source = Source::new(reader);
-        let mut magic = [0; 13];
-        let got = source.fill(&mut magic[..8]);
-        // The magic of a bag is longer than that of MCAP, and no more may be read of the latter.
-        let may_be_bag = magic[..got] == bag::MAGIC[..8];
-        let is_bag = may_be_bag && source.fill(&mut magic[8..]) == 5 && magic[..] == *bag::MAGIC;
-        let container = match is_bag {
-            true => Container::Bag(Bag::default()),
-            false => Container::Mcap(Mcap::behind(&magic[..got])?),
+        let mut magic = [0; 8];
+        let got = source.fill(&mut magic);
+        // Other magics are longer than that of MCAP, and no more may be read of the latter.
+        let mut is = |whole: &[u8]| {
+            let mut rest = vec![0; whole.len() - 8];
+            magic[..got] == whole[..8] && {
+                source.fill(&mut rest);
+                rest == whole[8..]
+            }
         };
-        Ok(Self { walk: Walk::new(source, limits), container })
+        let container = if is(bag::MAGIC) {
+            Container::Bag(Bag::default())
+        } else if is(database::MAGIC) {
+            let path = path.ok_or_else(|| NotMcap("a database is read by its path".into()))?;
+            Container::Database(Box::new(Database::open(path)?))
+        } else {
+            Container::Mcap(Mcap::behind(&magic[..got])?)
+        };
+        let mut walk = Walk::new(source, limits);
+        if let Container::Database(database) = &container {
+            database.learn_topics(&mut walk);
+        }
+        Ok(Self { walk, container })
     }
 
     /// Adds the channels of an earlier walk through the same file. The index of an MCAP file
@@ -70,6 +99,7 @@ impl<R: Read> LogWalker<R> {
                 (Container::Mcap(mcap), false) => mcap.step_in_buffer(walk),
                 (Container::Bag(bag), true) => bag.step_in_file(walk),
                 (Container::Bag(_), false) => bag::step_in_buffer(walk),
+                (Container::Database(database), _) => database.step(walk),
             }
         }
         walk.located.is_some()
@@ -102,7 +132,10 @@ impl<R: Read> LogWalker<R> {
 
     /// Returns the number of bytes of the file consumed so far.
     pub fn position(&self) -> u64 {
-        self.walk.source.position()
+        match &self.container {
+            Container::Database(database) => database.position(),
+            Container::Mcap(_) | Container::Bag(_) => self.walk.source.position(),
+        }
     }
 
     /// Returns the reader, behind the buffered part of the file.

@@ -351,7 +351,7 @@ fn what_is_no_log_is_refused_in_one_line() {
     assert!(open(b"").contains("it is empty"));
     assert!(open(b"#ROSBAG V1.2\n").contains("ROS 1 bag"));
     assert!(open(b"#ROSBAG V2.0\n").contains("no images"));
-    assert!(open(b"SQLite format 3\0").contains("SQLite bag"));
+    assert!(open(b"SQLite format 3\0").contains("rosbag2 database"));
     assert!(open(b"hello, this is text").contains("starts with"));
     assert!(open(&MAGIC).contains("no images"));
     assert!(open(&[MAGIC, MAGIC].concat()).contains("no images"));

@@ -18,7 +18,6 @@ const STAGE: &str = "target/rehearsal";
 /// Lines with this in them are not run, for a reason. Tidy checks their options.
 const LEFT_OUT: &[(&str, &str)] = &[
     ("contrast", "needs the plugin of the walk-through, whose own trial runs it"),
-    ("import bag", "needs another data set"),
     ("import kitti", "needs another data set"),
     ("import mot", "needs another data set"),
     ("import tum", "needs another data set"),

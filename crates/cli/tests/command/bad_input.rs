@@ -167,7 +167,6 @@ fn a_closed_pipe_is_a_quiet_end_for_every_command_that_prints() {
         "reproduce",
         "eval --truth good.people.csv --tracks good.people.csv",
         "--help",
-        "import bag old.bag",
     ];
     for line in lines {
         let output = unread(own_plugin().args(line.split(' ')).current_dir(home.path()));
@@ -190,7 +189,6 @@ fn json_is_printed_by_every_command_that_prints_data() {
         "doctor nearest.toml good.mcap",
         "run nearest.toml good.mcap -o json-out",
         "reproduce",
-        "import bag old.bag",
         "simulate scene.toml -o json.mcap",
     ];
     for line in lines {

@@ -36,7 +36,7 @@ fn lay_out(home: &Path) {
     write("empty.mcap", "");
     write("words.mcap", "these are only words, and a lot of them, but no log\n");
     write("old.bag", "#ROSBAG V1.2\n");
-    write("bag.db3", "SQLite format 3");
+    write("bag.db3", "SQLite format 3\0");
     fs::create_dir_all(home.join("full")).unwrap();
     write("full/precious.txt", "keep me");
     fs::create_dir_all(home.join("logs")).unwrap();
@@ -76,7 +76,7 @@ fn mistakes() -> Vec<Mistake> {
         m("an empty log", "run nearest.toml empty.mcap", 1, &["empty.mcap"]),
         m("a log of words", "run nearest.toml words.mcap", 1, &["words.mcap"]),
         m("an old ROS 1 bag", "run nearest.toml old.bag", 1, &["rosbag fix"]),
-        m("a SQLite bag", "inspect bag.db3", 1, &["--src bag.db3 --src-typestore ros2_humble"]),
+        m("a database that is no bag", "inspect bag.db3", 1, &["bag.db3", "rosbag2 database"]),
         m("no depth", "run nearest.toml no-depth.mcap", 1, &["depth"]),
         m("a log that does not fit", "check nearest.toml no-depth.mcap", 1, &["depth"]),
         m("results in a full folder", "run nearest.toml good.mcap -o full", 2, &["--overwrite"]),

@@ -238,9 +238,6 @@ fn describe_start(start: &[u8]) -> String {
         [b'#', b'R', b'O', b'S', ..] => {
             "it is a ROS 1 bag of another version than 2.0; convert it with `rosbag fix`".into()
         }
-        [b'S', b'Q', b'L', b'i', ..] => {
-            "it is a SQLite bag; convert it with `ros2 bag convert` to storage `mcap`".into()
-        }
         _ => format!("it starts with {start:02x?}"),
     }
 }

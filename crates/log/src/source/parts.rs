@@ -88,7 +88,7 @@ impl Messages for PartsWalker {
 }
 
 fn open_part(part: &LogPart, limits: &Limits) -> Result<LogWalker<File>, LogError> {
-    let walker = LogWalker::new(open_file(&part.path)?, limits)
+    let walker = LogWalker::at(&part.path, open_file(&part.path)?, limits)
         .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?;
     Ok(walker.knowing(part.channels.iter().cloned()))
 }

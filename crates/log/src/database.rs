@@ -1,0 +1,193 @@
+//! Reader of a rosbag2 database (`.db3`). See [`crate::LogWalker`] for the rules.
+//!
+//! Messages come in the order in which they were stored, one query each. Nothing but the two tables
+//! that a recorder writes is read: a view or a virtual table of their names would run what the file
+//! says. Definitions of messages are not needed, so bags without them are read as others are.
+//!
+//! Source: `rosbag2_storage_sqlite3`, schema versions 1 to 4.
+
+use std::io::Read;
+use std::path::Path;
+
+use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Row};
+
+use crate::mcap::NotMcap;
+use crate::walk::{Channel, Located, Walk};
+
+/// First bytes of a database.
+pub(crate) const MAGIC: &[u8] = b"SQLite format 3\0";
+
+/// Length of the data is asked first, so that a huge message is never in memory.
+const NEXT: &str = "SELECT id, topic_id, timestamp, length(data), \
+    CASE WHEN length(data) <= ?2 THEN data END \
+    FROM messages WHERE id > ?1 ORDER BY id LIMIT 1";
+const TOPICS: &str = "SELECT id, name, type, serialization_format FROM topics ORDER BY id";
+const TABLES: &str = "SELECT count(*) FROM sqlite_master WHERE type = 'table' \
+    AND name IN ('topics', 'messages') AND sql LIKE 'CREATE TABLE%'";
+
+/// Memory of the reader of a database.
+pub(crate) struct Database {
+    connection: Connection,
+    /// Id of the last message.
+    last: i64,
+    /// Id of the last message of the file.
+    end: i64,
+    /// Size of the file, bytes ...
+    bytes: u64,
+    /// ... and what its header claims.
+    claimed: u64,
+}
+
+/// Row of the table of messages.
+struct Stored {
+    topic: i64,
+    time_ns: i64,
+    length: u64,
+    /// `None` if it is longer than the limit.
+    data: Option<Vec<u8>>,
+}
+
+impl Database {
+    /// Opens a file for reading.
+    ///
+    /// # Errors
+    /// A file that is no database of messages.
+    pub(crate) fn open(path: &Path) -> Result<Self, NotMcap> {
+        let failed = |why: rusqlite::Error| NotMcap(format!("as a rosbag2 database: {why}"));
+        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let connection = Connection::open_with_flags(path, flags).map_err(failed)?;
+        connection.pragma_update(None, "trusted_schema", false).map_err(failed)?;
+        let tables: i64 = connection.query_row(TABLES, [], |row| row.get(0)).map_err(failed)?;
+        if tables != 2 {
+            let why = "a database without the tables `topics` and `messages` of rosbag2";
+            return Err(NotMcap(why.to_owned()));
+        }
+        let end = connection
+            .query_row("SELECT max(id) FROM messages", [], |row| row.get::<_, Option<i64>>(0))
+            // Damage is met again, and counted, when the messages are read.
+            .unwrap_or_default();
+        let bytes = std::fs::metadata(path).map_or(0, |about| about.len());
+        let claimed = claimed_size(path).unwrap_or(0);
+        Ok(Self { connection, last: i64::MIN, end: end.unwrap_or(0), bytes, claimed })
+    }
+
+    /// Adds the channels.
+    pub(crate) fn learn_topics<R: Read>(&self, walk: &mut Walk<R>) {
+        let Self { bytes, claimed, .. } = self;
+        // SQLite reads zeros behind the end of a file, so this is not met later on.
+        if bytes < claimed {
+            walk.fault("truncated", || {
+                format!("{bytes} of {claimed} bytes are there; the last messages may be incomplete")
+            });
+        }
+        let found = self.topics(&walk.limits.schema_bytes);
+        let found = found.unwrap_or_else(|why| {
+            walk.fault("damaged_records", || format!("the table of topics: {why}"));
+            Vec::new()
+        });
+        for topic in found {
+            match topic {
+                Some(channel) => walk.learn(channel),
+                None => walk.fault("damaged_records", || "a topic is malformed".to_owned()),
+            }
+        }
+    }
+
+    fn topics(&self, longest: &u64) -> rusqlite::Result<Vec<Option<Channel>>> {
+        let mut statement = self.connection.prepare(TOPICS)?;
+        let rows = statement.query_map([], |row| Ok(channel(row, *longest).ok()))?;
+        rows.collect()
+    }
+
+    /// Reads one message.
+    pub(crate) fn step<R: Read>(&mut self, walk: &mut Walk<R>) {
+        let (id, stored) = match self.next(walk.limits.record_bytes) {
+            // A damaged page may hold any number, also one that would be met again for ever.
+            Ok(Some((id, _))) if id <= self.last => return self.end(walk, "numbers out of order"),
+            Ok(Some(found)) => found,
+            Ok(None) => return walk.ended = true,
+            // There is no way to find the messages behind a damaged page.
+            Err(why) => return self.end(walk, &why.to_string()),
+        };
+        self.last = id;
+        let Some(stored) = stored else {
+            return walk.fault("damaged_records", || format!("message {id} is malformed"));
+        };
+        let Some(data) = stored.data else {
+            let length = stored.length;
+            return walk.fault("oversized_records", || format!("a message of {length} bytes"));
+        };
+        let topic = u32::try_from(stored.topic).unwrap_or(u32::MAX);
+        let Some(channel) = walk.channel_of(topic) else { return };
+        walk.buffer = data;
+        let (time, data) = (stored.time_ns.max(0) as u64, 0..walk.buffer.len());
+        walk.deliver(Located { channel, log_time: time, publish_time: time, sequence: 0, data });
+    }
+
+    fn end<R: Read>(&self, walk: &mut Walk<R>, why: &str) {
+        let after = self.last.max(0);
+        walk.fault("truncated", || {
+            format!("after message {after}: {why}; what came before is used")
+        });
+        walk.ended = true;
+    }
+
+    /// Returns the next message by its id, without contents if these are of wrong types.
+    fn next(&self, longest: u64) -> rusqlite::Result<Option<(i64, Option<Stored>)>> {
+        let mut statement = self.connection.prepare_cached(NEXT)?;
+        let longest = i64::try_from(longest).unwrap_or(i64::MAX);
+        let row = |row: &Row<'_>| Ok((row.get(0)?, stored(row).ok()));
+        statement.query_row((self.last, longest), row).optional()
+    }
+
+    /// Returns about how many bytes of the file have been read.
+    pub(crate) fn position(&self) -> u64 {
+        let part = self.last.max(0) as f64 / self.end.max(1) as f64;
+        (part.min(1.0) * self.bytes as f64) as u64
+    }
+}
+
+/// Returns the size that the header of a database gives: pages, and bytes of each.
+fn claimed_size(path: &Path) -> std::io::Result<u64> {
+    let mut header = [0; 32];
+    std::fs::File::open(path)?.read_exact(&mut header)?;
+    let page = match u16::from_be_bytes([header[16], header[17]]) {
+        // Does not fit in 16 bits.
+        1 => 65_536,
+        size => u64::from(size),
+    };
+    let pages = u32::from_be_bytes([header[28], header[29], header[30], header[31]]);
+    Ok(page * u64::from(pages))
+}
+
+fn stored(row: &Row<'_>) -> rusqlite::Result<Stored> {
+    let length: Option<i64> = row.get(3)?;
+    Ok(Stored {
+        topic: row.get(1)?,
+        time_ns: row.get(2)?,
+        length: length.unwrap_or(0).max(0) as u64,
+        // An empty message is stored as NULL by some recorders.
+        data: match length {
+            None => Some(Vec::new()),
+            Some(_) => row.get(4)?,
+        },
+    })
+}
+
+/// Reads a row of the table of topics. Names are bounded, because all of them are kept.
+fn channel(row: &Row<'_>, longest: u64) -> rusqlite::Result<Channel> {
+    let text = |at: usize| -> rusqlite::Result<String> {
+        let text: String = row.get(at)?;
+        match text.len() as u64 <= longest {
+            true => Ok(text),
+            false => Err(rusqlite::Error::InvalidQuery),
+        }
+    };
+    Ok(Channel {
+        id: row.get(0)?,
+        topic: text(1)?,
+        schema_name: text(2)?,
+        schema_encoding: "ros2msg".into(),
+        encoding: text(3)?,
+    })
+}

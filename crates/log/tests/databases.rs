@@ -1,0 +1,223 @@
+//! rosbag2 databases (`.db3`): written here from MCAP logs, and a real one; damaged and hostile ones.
+#![allow(clippy::unwrap_used, reason = "a failing test may panic")]
+
+mod common;
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use common::LogWriter;
+use proptest::prelude::*;
+use rusqlite::Connection;
+use tagalong_log::msgs::{CameraInfo, Header};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogWalker};
+
+/// Message by topic, type, time and bytes.
+type Told = (String, String, u64, Vec<u8>);
+
+const TABLES: &str = "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, \
+    type TEXT NOT NULL, serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL); \
+    CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, \
+    timestamp INTEGER NOT NULL, data BLOB NOT NULL); \
+    CREATE INDEX timestamp_idx ON messages (timestamp ASC);";
+
+fn log() -> Vec<u8> {
+    let mut writer = LogWriter::plain();
+    let info = CameraInfo {
+        header: Header::new(common::at(0.0), "colour"),
+        width: 16,
+        height: 12,
+        k: [20.0, 0.0, 7.5, 0.0, 20.0, 5.5, 0.0, 0.0, 1.0],
+        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        ..CameraInfo::default()
+    };
+    writer.message("/camera/color/camera_info", common::at(0.0), &info);
+    for tenth in 0..9 {
+        writer.colour(common::at(0.1 * f64::from(tenth)));
+    }
+    writer.finish()
+}
+
+fn told(mut walker: LogWalker<impl std::io::Read>) -> (Vec<Told>, Vec<&'static str>, bool) {
+    let mut all = Vec::new();
+    while let Some(m) = walker.next() {
+        assert!(all.len() < 10_000, "a walk that does not end");
+        let channel = m.channel;
+        let (topic, kind) = (channel.topic.clone(), channel.schema_name.clone());
+        assert_eq!(channel.encoding, "cdr");
+        all.push((topic, kind, m.log_time, m.data.to_vec()));
+    }
+    assert!(walker.next().is_none(), "a walk that has ended stays ended");
+    (all, walker.counters().keys().copied().collect(), walker.data_lost())
+}
+
+fn in_mcap(bytes: &[u8]) -> Vec<Told> {
+    told(LogWalker::new(bytes, &Limits::default()).unwrap()).0
+}
+
+/// Writes the messages as `ros2 bag record -s sqlite3` does.
+fn store(messages: &[Told], path: &Path) -> Connection {
+    let database = Connection::open(path).unwrap();
+    database.execute_batch(TABLES).unwrap();
+    let mut topics: Vec<&str> = Vec::new();
+    for (topic, kind, time, data) in messages {
+        let known = topics.iter().position(|name| name == topic);
+        let id = known.unwrap_or_else(|| {
+            topics.push(topic);
+            let row = (topics.len() as i64, topic, kind, "cdr", "");
+            database.execute("INSERT INTO topics VALUES (?, ?, ?, ?, ?)", row).unwrap();
+            topics.len() - 1
+        }) + 1;
+        let sql = "INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)";
+        database.execute(sql, (id as i64, *time as i64, data)).unwrap();
+    }
+    database
+}
+
+/// A database in a folder of its own.
+struct Stored {
+    _folder: tempfile::TempDir,
+    path: PathBuf,
+    messages: Vec<Told>,
+}
+
+impl Stored {
+    fn new(change: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("walk_0.db3");
+        let messages = in_mcap(&log());
+        store(&messages, &path).execute_batch(change).unwrap();
+        Self { _folder: folder, path, messages }
+    }
+
+    fn walk(&self) -> Result<(Vec<Told>, Vec<&'static str>, bool), String> {
+        let file = File::open(&self.path).unwrap();
+        let walker = LogWalker::at(&self.path, file, &Limits::default());
+        walker.map(told).map_err(|error| error.to_string())
+    }
+}
+
+#[test]
+fn a_database_tells_what_the_mcap_file_tells() {
+    let stored = Stored::new("");
+    let (messages, counters, lost) = stored.walk().unwrap();
+    assert_eq!((messages, lost), (stored.messages, false), "{counters:?}");
+}
+
+/// Equal frames are tracked equally.
+#[test]
+fn a_database_makes_the_frames_of_the_mcap_file() {
+    let stored = Stored::new("");
+    let mcap = stored.path.with_extension("mcap");
+    std::fs::write(&mcap, log()).unwrap();
+    let input = InputSettings { base_frame: "colour".into(), ..InputSettings::default() };
+    let inputs = Inputs::NONE.require(Input::Colour);
+    let frames = |path: &Path| {
+        let mut source = FrameSource::open(path, &input, &Limits::default(), inputs).unwrap();
+        let mut all = Vec::new();
+        while let Some(item) = source.next_frame() {
+            let frame = item.frame;
+            all.push((frame.stamp, frame.colour().unwrap().clone(), frame.camera.clone()));
+        }
+        all
+    };
+    let of_database = frames(&stored.path);
+    assert_eq!(of_database.len(), 9);
+    assert_eq!(of_database, frames(&mcap));
+}
+
+#[test]
+fn a_real_database_tells_what_its_mcap_file_tells() {
+    let Some(path) = tagalong_testdata::find("mcap/klintan-real-cdr/sample.db3") else { return };
+    let walker = LogWalker::at(&path, File::open(&path).unwrap(), &Limits::default()).unwrap();
+    let (messages, counters, lost) = told(walker);
+    assert!(!lost && messages.len() == 5, "{} {counters:?}", messages.len());
+    let mcap = std::fs::read(path.with_file_name("sample-none.mcap")).unwrap();
+    // Old recorders leave out `msg`. The MCAP file is in the order of recording times, which the database does not keep.
+    let sorted = |mut all: Vec<Told>| {
+        all.sort();
+        all
+    };
+    let (found, expected) = (sorted(messages), sorted(in_mcap(&mcap)));
+    for ((topic, kind, time, data), expected) in found.iter().zip(&expected) {
+        let kind = kind.replace('/', "/msg/");
+        assert_eq!((topic, &kind, *time), (&expected.0, &expected.1, expected.2));
+        // Too long to be printed.
+        assert!(*data == expected.3, "{topic}: {} and {} bytes", data.len(), expected.3.len());
+    }
+    assert_eq!(found.len(), expected.len());
+}
+
+#[test]
+fn what_cannot_be_used_is_counted_and_passed_over() {
+    let cases = [
+        ("UPDATE messages SET topic_id = 77 WHERE id = 3", "unknown_channel_messages"),
+        ("UPDATE messages SET topic_id = -1 WHERE id = 3", "unknown_channel_messages"),
+        ("UPDATE messages SET data = 'words' WHERE id = 3", "damaged_records"),
+        ("UPDATE messages SET timestamp = 'noon' WHERE id = 3", "damaged_records"),
+        ("UPDATE messages SET data = zeroblob(300000000) WHERE id = 3", "oversized_records"),
+    ];
+    for (change, name) in cases {
+        let stored = Stored::new(change);
+        let (messages, counters, lost) = stored.walk().unwrap();
+        assert!(lost && counters.contains(&name), "{change}: {counters:?}");
+        let mut expected = stored.messages.clone();
+        expected.remove(2);
+        assert_eq!(messages, expected, "{change}");
+    }
+    let stored = Stored::new("INSERT INTO topics VALUES (70000, '/a', 'b', 'cdr', '')");
+    let (messages, counters, lost) = stored.walk().unwrap();
+    assert!(lost && counters.contains(&"damaged_records"), "{counters:?}");
+    assert_eq!(messages, stored.messages);
+}
+
+#[test]
+fn a_view_in_place_of_a_table_is_not_run() {
+    let views = [
+        "ALTER TABLE messages RENAME TO real; CREATE VIEW messages AS SELECT * FROM real",
+        "DROP TABLE messages",
+        "DROP TABLE topics",
+    ];
+    for change in views {
+        let error = Stored::new(change).walk().unwrap_err();
+        assert!(error.contains("without the tables"), "{change}: {error}");
+    }
+}
+
+#[test]
+fn a_database_without_its_path_is_named() {
+    let error = LogWalker::new(&b"SQLite format 3\0abc"[..], &Limits::default()).err().unwrap();
+    assert!(error.to_string().contains("by its path"), "{error}");
+}
+
+#[test]
+fn a_file_cut_anywhere_is_said_to_be_cut() {
+    let stored = Stored::new("");
+    let bytes = std::fs::read(&stored.path).unwrap();
+    for end in (0..bytes.len()).step_by(512) {
+        std::fs::write(&stored.path, &bytes[..end]).unwrap();
+        if let Ok((messages, counters, lost)) = stored.walk() {
+            assert!(lost, "{end}: {counters:?}");
+            // SQLite fills the page of the cut with zeros: what it held cannot be told from them.
+            assert!(messages.len() <= stored.messages.len(), "{end}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn damaged_bytes_are_survived(
+        hits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..12),
+    ) {
+        let stored = Stored::new("");
+        let mut bytes = std::fs::read(&stored.path).unwrap();
+        for (at, value) in hits {
+            let at = 16 + at.index(bytes.len() - 16);
+            bytes[at] = value;
+        }
+        std::fs::write(&stored.path, &bytes).unwrap();
+        let _ = stored.walk();
+    }
+}
