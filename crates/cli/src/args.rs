@@ -13,7 +13,7 @@ use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
 use tagalong_webcams::TriangulateArgs;
 
-use crate::commands::EvalArgs;
+use crate::commands::{EvalArgs, ModelArgs};
 use crate::demo::DemoArgs;
 use crate::run::RunArgs;
 
@@ -120,6 +120,9 @@ pub enum Command {
     /// Measures the position of a coloured hat with fixed cameras in a log
     #[command(after_help = TRIANGULATE_HELP)]
     Triangulate(TriangulateArgs),
+    /// Says what a neural network in an ONNX file is, and how to use it
+    #[command(after_help = MODEL_HELP)]
+    Model(ModelArgs),
     /// Lists the contents of a log, and the inputs that a pipeline could use
     #[command(after_help = INSPECT_HELP)]
     Inspect {
@@ -133,6 +136,17 @@ pub enum Command {
         format: Format,
     },
 }
+
+const MODEL_HELP: &str = "\
+Prints inputs and outputs of the file, the family of detectors that its outputs have the shapes of,
+and the part of a config that runs it, which is TOML as it stands. Exit code 1: no config can use the
+file; the reason is printed.
+
+Examples:
+  tagalong model yolox_s.onnx
+  tagalong model yolox_s.onnx > people.toml && tagalong run people.toml robot.mcap
+  tagalong model yolov8n-dynamic.onnx --size 320 320
+  tagalong model yolox_s.onnx --format json | jq -r .family";
 
 const DEMO_HELP: &str = "\
 Needs no file, and half a minute.

@@ -5,6 +5,7 @@ mod config;
 mod eval;
 mod inspect;
 mod list;
+mod model;
 mod shell;
 
 pub use check::check;
@@ -12,4 +13,5 @@ pub use config::{config, schema};
 pub use eval::{EvalArgs, eval};
 pub use inspect::inspect;
 pub use list::list;
+pub use model::{ModelArgs, model};
 pub use shell::{completions, man};

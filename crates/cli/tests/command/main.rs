@@ -15,6 +15,7 @@ mod import;
 mod inputs;
 mod missing_topics;
 mod mistakes;
+mod model;
 mod recorded;
 mod rooms;
 mod runs;
