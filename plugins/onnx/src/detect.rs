@@ -79,7 +79,7 @@ impl Onnx {
             return Ok(nobody);
         };
         // Frames are numbered from 1, and the first one is not to be waited for.
-        if frame.index.saturating_sub(1) % self.config.every != 0 {
+        if !frame.index.saturating_sub(1).is_multiple_of(self.config.every) {
             return Ok(nobody);
         }
         let answers = frame.derived::<Answers>()?;
