@@ -1,5 +1,6 @@
 //! Hand-weighted networks of all families against the outputs of onnxruntime (`make_models.py`),
 //! and files that are refused.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -113,6 +114,26 @@ fn truncated_files_are_refused() {
         let why = refusal(&whole[..end], &Choices::default(), &Limits::default());
         assert!(!why.is_empty(), "{end}");
     }
+}
+
+/// Files with single bytes changed load or are refused; the process survives all of them.
+#[test]
+fn files_with_changed_bytes_are_survived() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("network.onnx");
+    let (mut refused, mut random) = (0, 1_u64);
+    for round in 0..400 {
+        let name = ["yolox.onnx", "rt-detr.onnx", "movenet.onnx", "nanodet.onnx"][round % 4];
+        let mut bytes = fs::read(path(name)).unwrap();
+        for _ in 0..3 {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let at = (random >> 33) as usize % bytes.len();
+            bytes[at] = (random >> 24) as u8;
+        }
+        fs::write(&file, bytes).unwrap();
+        refused += usize::from(inspect(&file, None, &Limits::default()).is_err());
+    }
+    assert!((1..400).contains(&refused), "{refused}");
 }
 
 #[test]
