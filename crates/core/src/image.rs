@@ -134,7 +134,8 @@ impl DepthImage {
         let (left, right) = (face.x as usize, face.right() as usize);
         let rows = face.y as usize..face.bottom() as usize;
         let mut readings: Vec<f32> = rows
-            .flat_map(|y| self.row(y)[left..right.max(left)].iter().copied())
+            // A face on the right of the image starts beyond the row.
+            .flat_map(|y| self.row(y).get(left..right).unwrap_or_default().iter().copied())
             .filter(|metres| metres.is_finite())
             .collect();
         // The median ignores the background that shows beside a narrow face.
@@ -165,6 +166,15 @@ fn is_reading(metres: f32) -> bool {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_face_outside_of_the_image_has_no_depth() {
+        let depth = DepthImage::filled(40, 30, 2.0);
+        for (x, y) in [(60.0, 0.0), (-60.0, 0.0), (0.0, 60.0), (0.0, -60.0), (60.0, 60.0)] {
+            assert_eq!(depth.face_m(&Rect::new(x, y, 40.0, 40.0)), None, "{x}, {y}");
+        }
+        assert_eq!(depth.face_m(&Rect::new(0.0, 0.0, 40.0, 40.0)), Some(2.0));
+    }
 
     /// Collects all readings and sorts them.
     fn slow_surface_m(depth: &DepthImage, of: &Rect) -> Option<f64> {
