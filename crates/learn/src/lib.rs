@@ -11,6 +11,8 @@ mod adam;
 pub mod boost;
 mod calibrate;
 pub mod conv;
+#[cfg(feature = "dense")]
+pub mod dense;
 mod folds;
 mod held_out;
 mod logistic;
