@@ -15,6 +15,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("vision", &[]),
     ("learn", &[]),
     ("filtering", &[]),
+    ("steering", &[]),
     ("stereo", &["vision"]),
     ("odometry", &[]),
     ("assignment", &[]),
@@ -93,7 +94,7 @@ const ARROWS: &[(&str, &[&str])] = &[
 const WORDS: &[&str] = &["stats", "geometry", "core", "config"];
 
 /// Crates that a plugin may depend on.
-const OF_PLUGINS: &[&str] = &["vision", "learn", "assignment", "filtering"];
+const OF_PLUGINS: &[&str] = &["vision", "learn", "assignment", "filtering", "steering"];
 
 /// Crates that the tests of any crate may depend on in addition.
 const FOR_TESTS: &[&str] =
