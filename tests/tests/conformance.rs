@@ -3,10 +3,10 @@
 use tagalong_config::Registry;
 use tagalong_conformance::Suite;
 
-/// Detectors that discover the simulated person in a depth or colour image. A freshly generated
+/// Detectors that discover the simulated person in an image or a laser scan. A freshly generated
 /// detector finds no people and is not listed; a working one is listed, so that it has to keep
 /// working.
-const DISCOVER: &[&str] = &["depth-net", "depth-template"];
+const DISCOVER: &[&str] = &["depth-net", "depth-template", "laser-legs"];
 
 /// Detectors that find the simulated person near a track.
 const FOLLOW: &[&str] = &["depth-net", "depth-template"];

@@ -1,15 +1,24 @@
 //! Simulated scenes: people made of ellipsoids on a floor in front of a wall, ray cast into the
-//! depth and the colour image of a camera.
+//! depth and the colour image of a camera, and into the scan of a laser at the height of their legs.
 //!
 //! The proportions are those of the head-and-shoulder template measured by Jafari et al. (ICRA
 //! 2014).
 
 use std::sync::Arc;
 
-use nalgebra::{Point2, Point3, Rotation3, Vector3};
-use tagalong_core::{DepthImage, Images, RgbImage};
+use nalgebra::{Isometry3, Point2, Point3, Rotation3, Vector3};
+use tagalong_core::{DepthImage, Images, LaserScan, RgbImage};
 use tagalong_geometry::Camera;
 use tagalong_stats::{RandomSource, SplitMix64};
+
+/// Height of the laser scanner above the floor, m: that of shins.
+pub const SCANNER_HEIGHT_M: f64 = 0.3;
+/// Range of the laser scanner, m.
+pub const SCANNER_RANGE_M: f64 = 10.0;
+/// Number of rays of a scan: one for each quarter of a degree.
+const RAYS: u32 = 721;
+/// Standard deviation of a range, m.
+const SCANNER_SIGMA_M: f64 = 0.005;
 
 /// A person standing on the floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,6 +73,31 @@ impl World {
         }
         self.add_noise(&mut depth);
         Images { colour: Some(Arc::new(colour)), depth: Some(Arc::new(depth)), ..Images::default() }
+    }
+
+    /// Measures the scan of a laser at the origin of the robot, [`SCANNER_HEIGHT_M`] above the floor,
+    /// half of the circle ahead. Rays that meet nothing within [`SCANNER_RANGE_M`] are left out.
+    pub fn scan(&self) -> LaserScan {
+        let shapes: Vec<Ellipsoid> = self.people.iter().flat_map(body).collect();
+        let eye = Vector3::new(0.0, 0.0, SCANNER_HEIGHT_M);
+        // Another stream of numbers than that of the depth image.
+        let mut random = self.noise_seed.map(|seed| SplitMix64::new(!seed));
+        let mut reflection = |ray: u32| {
+            let angle = (f64::from(ray) / f64::from(RAYS - 1) - 0.5) * std::f64::consts::PI;
+            let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
+            let noise_m = random.as_mut().map_or(0.0, |random| SCANNER_SIGMA_M * random.normal());
+            let hit = self.cast(&shapes, eye, direction);
+            let range_m =
+                hit.map(|hit| hit.depth_m).filter(|range_m| *range_m < SCANNER_RANGE_M)?;
+            Some((ray, Point3::from(eye + direction * (range_m + noise_m))))
+        };
+        let (rays, points): (Vec<u32>, Vec<_>) = (0..RAYS).filter_map(&mut reflection).unzip();
+        LaserScan {
+            robot_from_scanner: Isometry3::from_parts(eye.into(), Default::default()),
+            increment_rad: std::f64::consts::PI / f64::from(RAYS - 1),
+            points: points.into(),
+            rays: rays.into(),
+        }
     }
 
     fn cast(&self, shapes: &[Ellipsoid], eye: Vector3<f64>, ray: Vector3<f64>) -> Option<Hit> {
@@ -220,6 +254,23 @@ mod tests {
         let (left, right) = ((0..640).find(near).unwrap(), (0..640).rfind(near).unwrap());
         let width = (right - left) as f64 / square.width;
         assert!((0.75..1.0).contains(&width), "shoulders take {width} of the square");
+    }
+
+    #[test]
+    fn the_scan_shows_two_legs_in_front_of_the_wall() {
+        let scan = World::with(&[Figure::at(2.0, 0.4)]).scan();
+        let near = scan.points.iter().zip(&*scan.rays).filter(|(point, _)| point.x < 3.0);
+        let (points, rays): (Vec<Point3<f64>>, Vec<u32>) = near.unzip();
+        let legs = rays.chunk_by(|a, b| b - a == 1).count();
+        assert_eq!(legs, 2, "with a gap between them: {rays:?}");
+        for point in &points {
+            assert!((point.xy() - Point2::new(2.0, 0.4)).norm() < 0.25, "{point}");
+            assert!((point.z - SCANNER_HEIGHT_M).abs() < 1e-12);
+        }
+        let wall = World::with(&[]).scan();
+        assert!(wall.points.iter().all(|point| (point.x - 5.0).abs() < 1e-9));
+        assert!(wall.points.len() > 400 && wall.points.len() < RAYS as usize, "its end is far");
+        assert!(World::default().scan().points.is_empty());
     }
 
     #[test]

@@ -56,10 +56,10 @@ pub(crate) fn moving_frame(
     Frame::new(index, stamp, Arc::clone(camera), motion, images)
 }
 
-/// Renders a frame of people in front of a wall.
+/// Renders a frame of people in front of a wall, with a laser scan of it.
 pub(crate) fn drawn(index: u64, camera: &Arc<Camera>, people: &[Figure]) -> Frame {
     let world = World { noise_seed: Some(index), ..World::with(people) };
-    frame(index, camera, world.draw(camera))
+    frame(index, camera, world.draw(camera)).with_laser(Some(world.scan()))
 }
 
 /// Returns frames without useful content, with their names.

@@ -27,7 +27,7 @@ pub struct Images {
 impl Images {
     /// Returns the images as data of sensors, with the camera that took them; the right camera of a
     /// stereo pair is its copy beside it.
-    fn taken_by(self, camera: &Arc<Camera>) -> Sensors {
+    pub fn taken_by(self, camera: &Arc<Camera>) -> Sensors {
         let Self { colour, grey, depth, right } = self;
         let taken = |sensors: Sensors| match right {
             Some(image) => sensors.with(CameraImage { camera: beside(camera, &image), image }),

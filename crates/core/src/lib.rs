@@ -25,7 +25,6 @@
 //!   `Context`. Same log, same config, same seed: same bytes.
 
 mod associator;
-mod command_history;
 mod control;
 mod detection;
 mod detector;
@@ -45,10 +44,9 @@ mod track;
 mod visualisation;
 
 pub use associator::{Association, Associations, Associator, Gate};
-pub use command_history::CommandHistory;
 pub use control::{Command, Controller, Reason, Scene, Twist, WheelSpeeds};
 pub use detection::Detection;
-pub use detector::{Detector, Likelihood, Query, ScoreCalibration, Verifier};
+pub use detector::{Detector, Likelihood, Query, Verifier};
 pub use error::{Error, Result};
 pub use external::ExternalDetection;
 pub use filter::{Estimate, Evidence, Filter, FilterRequirements, Matched, Person, Update};

@@ -4,6 +4,7 @@
 //! ([`mirrored`], [`shifted`]). Boosted trees are grown here, too ([`boost`]), and experiments run
 //! on all cores ([`side_by_side`]). Small convolutional networks are made of the layers of [`conv`],
 //! forwards and backwards, trained by the steps of [`Adam`] and written as a [`NetworkFile`].
+//! Verifiers calibrate the log-odds of their models by a [`ScoreCalibration`].
 //!
 //! The features are defined by the plugins.
 
@@ -11,10 +12,13 @@ mod adam;
 pub mod boost;
 mod calibrate;
 pub mod conv;
+#[cfg(feature = "dense")]
+pub mod dense;
 mod folds;
 mod held_out;
 mod logistic;
 mod parallel;
+mod score;
 mod variants;
 mod weights;
 
@@ -24,6 +28,7 @@ pub use folds::{CALIBRATION, Use, parts, use_of};
 pub use held_out::{accepted, area};
 pub use logistic::{Example, logistic};
 pub use parallel::side_by_side;
+pub use score::ScoreCalibration;
 pub use tagalong_stats::mix;
 pub use variants::{mirrored, shifted};
 pub use weights::NetworkFile;

@@ -1,8 +1,11 @@
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 
 use crate::LogError;
+use crate::sensors::{SENSORS, SensorType};
 
 /// Settings of the input from a log. Topics that are not named are found by message type and
 /// encoding.
@@ -25,6 +28,9 @@ pub struct InputSettings {
     /// Topic of detections that another program recorded (`vision_msgs` Detection2DArray or
     /// Detection3DArray), for `recorded-detections`.
     pub detections_topic: Option<String>,
+    /// Topics of further sensors, by the names of their inputs.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub topics: BTreeMap<String, String>,
     /// Topic of the right images of a stereo pair.
     pub right_topic: Option<String>,
     /// Topic of the right camera's calibration, which holds the baseline.
@@ -68,6 +74,7 @@ impl Default for InputSettings {
             odometry_topic: None,
             laser_topic: None,
             detections_topic: None,
+            topics: BTreeMap::new(),
             right_topic: None,
             right_info_topic: None,
             pair_tolerance_s: 0.03,
@@ -89,8 +96,20 @@ impl InputSettings {
     /// # Errors
     /// [`LogError::Settings`], which names the key.
     pub fn check(&self) -> Result<(), LogError> {
-        check_settings(self).map_err(|error| LogError::Settings(error.to_string()))
+        check_settings(self).map_err(|error| LogError::Settings(error.to_string()))?;
+        self.topics.keys().try_for_each(|name| check_sensor(name))
     }
+}
+
+/// Checks that the table of sensors has one of this name whose topic has no key of its own.
+fn check_sensor(name: &str) -> Result<(), LogError> {
+    let keys: Vec<String> = SENSORS.iter().map(SensorType::key).collect();
+    let wanted = format!("topics.{name}");
+    if keys.contains(&wanted) {
+        return Ok(());
+    }
+    let hint = keys.join(", ");
+    Err(LogError::Settings(format!("`{wanted}`: no sensor of that name is read; sensors: {hint}")))
 }
 
 /// Pose of the camera: above the robot's origin, looking forward.
@@ -106,4 +125,22 @@ pub struct MountSettings {
     /// Roll, degrees; positive if its right side is raised.
     #[schemars(range(min = -180.0, max = 180.0))]
     pub roll_deg: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn topics_of_sensors_that_are_not_read_are_refused() {
+        let of = |name: &str| {
+            let topics = [(name.to_owned(), "/sonar".to_owned())].into();
+            InputSettings { topics, ..InputSettings::default() }.check()
+        };
+        let refusal = of("sonar").unwrap_err().to_string();
+        assert!(refusal.contains("`topics.sonar`: no sensor of that name"), "{refusal}");
+        assert!(refusal.contains("laser_topic, detections_topic"), "{refusal}");
+        assert!(of("laser").is_err(), "it has a key of its own");
+        assert!(InputSettings::default().check().is_ok());
+    }
 }

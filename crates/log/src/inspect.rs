@@ -60,7 +60,8 @@ pub struct Inspection {
     pub skew: Option<Skew>,
     /// Transforms: each frame with its parent.
     pub transforms: BTreeMap<String, String>,
-    /// Inputs that a pipeline could use: `colour`, `depth`, `right`, `odometry`, `laser`.
+    /// Inputs that a pipeline could use: `colour`, `depth`, `right`, `odometry`, `laser`, and
+    /// the names of further sensors.
     pub usable: Vec<&'static str>,
     /// Reason for which no frames can be made, if so.
     pub unusable: Option<String>,
@@ -157,7 +158,8 @@ impl Inspection {
             ("odometry", &facts.odometry_topic),
             ("laser", &facts.laser_topic),
         ];
-        self.usable = usable.iter().filter(|(_, t)| t.is_some()).map(|(name, _)| *name).collect();
+        let found = usable.iter().filter(|(_, t)| t.is_some()).map(|(name, _)| *name);
+        self.usable = found.chain(facts.sensor_topics.keys().copied()).collect();
         let stamps = |topic: &Option<String>| {
             topic.as_ref().and_then(|topic| scan.topics.get(topic)).map(|topic| &topic.stamps[..])
         };

@@ -7,7 +7,7 @@ use tagalong_core::LaserScan as CoreScan;
 
 use crate::log_files::open_file;
 use crate::msgs::{LaserScan, PoseArray, decode};
-use crate::source::{scan_is_sane, scan_seen_from};
+use crate::sensors::laser::{is_sane, seen_from};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
@@ -39,7 +39,7 @@ pub fn read_leg_scans(path: &Path, limits: &Limits) -> Result<Vec<LegScan>, LogE
         let channel = message.channel;
         let is_scan = channel.schema_name.ends_with("/LaserScan");
         if is_scan {
-            match decode::<LaserScan>(message.data).ok().filter(scan_is_sane) {
+            match decode::<LaserScan>(message.data).ok().filter(is_sane) {
                 Some(scan) => scans.push((channel.topic.clone(), core_scan(&scan))),
                 None => unreadable += 1,
             }
@@ -68,7 +68,7 @@ pub fn read_leg_scans(path: &Path, limits: &Limits) -> Result<Vec<LegScan>, LogE
 }
 
 fn core_scan(scan: &LaserScan) -> CoreScan {
-    scan_seen_from(scan, &Isometry3::identity(), &Isometry2::identity())
+    seen_from(scan, &Isometry3::identity(), &Isometry2::identity())
 }
 
 fn places(poses: &PoseArray) -> Vec<Point2<f64>> {

@@ -10,9 +10,8 @@ use tagalong_core::Stamp;
 
 use crate::images::{Content, content_of_encoding, content_of_format};
 use crate::log_files::{LogFiles, open_file};
-use crate::msgs::{
-    CameraInfo, CompressedImage, Header, Image, LaserScan, Odometry, TFMessage, decode,
-};
+use crate::msgs::{CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, decode};
+use crate::sensors::SensorType;
 use crate::tf::TfBuffer;
 use crate::walk::{Channel, Counters, Message};
 use crate::walker::LogWalker;
@@ -29,9 +28,8 @@ pub(crate) enum Type {
     CameraInfo,
     Tf,
     Odometry,
-    LaserScan,
-    Detections2D,
-    Detections3D,
+    /// Messages of an entry in [`crate::sensors::SENSORS`].
+    Sensor,
     Other,
 }
 
@@ -45,9 +43,7 @@ impl Type {
             ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
             ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Self::Tf,
             ("nav_msgs", "Odometry") => Self::Odometry,
-            ("sensor_msgs", "LaserScan") => Self::LaserScan,
-            ("vision_msgs", "Detection2DArray") => Self::Detections2D,
-            ("vision_msgs", "Detection3DArray") => Self::Detections3D,
+            _ if SensorType::of_message(schema).is_some() => Self::Sensor,
             _ => Self::Other,
         }
     }
@@ -288,10 +284,10 @@ impl Gathering {
             Type::Image => topic.take_image(message.data, unit),
             Type::CompressedImage => topic.take_compressed(message.data),
             Type::Odometry => topic.take_odometry(message.data),
-            Type::LaserScan => topic.take_laser(message.data),
+            Type::Sensor => topic.take_sensor(message.data),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
             Type::Tf => self.take_tf(&channel.topic, message.data),
-            Type::Detections2D | Type::Detections3D | Type::Other => Some(()),
+            Type::Other => Some(()),
         };
         if done.is_none() {
             self.topic(&channel.topic, "", "").undecodable += 1;
@@ -356,9 +352,9 @@ impl Topic {
         Some(())
     }
 
-    fn take_laser(&mut self, data: &[u8]) -> Option<()> {
-        let scan: LaserScan = decode(data).ok()?;
-        self.take_header(scan.header);
+    fn take_sensor(&mut self, data: &[u8]) -> Option<()> {
+        let header = (SensorType::of_message(&self.schema)?.header)(data).ok()?;
+        header.into_iter().for_each(|header| self.take_header(header));
         Some(())
     }
 

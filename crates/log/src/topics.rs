@@ -1,10 +1,13 @@
 //! Choice of the topics of a log: colour images, depth images, and so on.
 
+use std::collections::BTreeMap;
+
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
 
 use crate::images::Content;
 use crate::scan::{Scan, Topic, Type};
+use crate::sensors::{SENSORS, SensorType};
 use crate::{InputSettings, LogError};
 
 /// Topics that are read.
@@ -17,8 +20,8 @@ pub(crate) struct Chosen {
     pub(crate) depth_info: Option<String>,
     pub(crate) right_info: Option<String>,
     pub(crate) odometry: Option<String>,
-    pub(crate) laser: Option<String>,
-    pub(crate) detections: Option<String>,
+    /// Topics of the sensors beside the images.
+    pub(crate) sensors: BTreeMap<Input, String>,
 }
 
 impl Chosen {
@@ -27,8 +30,21 @@ impl Chosen {
         let Self { colour, depth, right, colour_info, depth_info, right_info, .. } = self;
         [colour, depth, right, colour_info, depth_info, right_info]
             .into_iter()
-            .chain([&self.odometry, &self.laser, &self.detections])
-            .any(|chosen| chosen.as_deref() == Some(topic))
+            .chain([&self.odometry])
+            .flatten()
+            .chain(self.sensors.values())
+            .any(|chosen| chosen == topic)
+    }
+
+    /// Returns the topic of a sensor beside the images.
+    pub(crate) fn sensor(&self, input: Input) -> Option<&str> {
+        self.sensors.get(&input).map(String::as_str)
+    }
+
+    /// Returns the topics of the inputs that core does not define, by name.
+    pub(crate) fn named_sensors(&self) -> BTreeMap<&'static str, String> {
+        let named = self.sensors.iter().filter(|(input, _)| is_named(input));
+        named.map(|(input, topic)| (input.name(), topic.clone())).collect()
     }
 }
 
@@ -45,38 +61,33 @@ pub(crate) fn choose(
     input: &InputSettings,
     inputs: Inputs,
 ) -> Result<Chosen, LogError> {
-    let images = &[Type::Image, Type::CompressedImage][..];
-    let infos = &[Type::CameraInfo][..];
-    let detections = &[Type::Detections2D, Type::Detections3D][..];
-    let named = |key, topic: &Option<String>, types| named(scan, key, topic.as_deref(), types);
-    let colour = named("colour_topic", &input.colour_topic, images)?
+    let named = |key, topic: &Option<String>, fits: fn(&Topic) -> bool| {
+        named(scan, key, topic.as_deref(), fits)
+    };
+    let colour = named("colour_topic", &input.colour_topic, is_image)?
         .or_else(|| best(scan, |name, topic| colour_rank(name, topic, false)));
     let depth = match inputs.uses(Input::Depth) || colour.is_none() {
         true => {
-            named("depth_topic", &input.depth_topic, images)?.or_else(|| best(scan, depth_rank))
+            named("depth_topic", &input.depth_topic, is_image)?.or_else(|| best(scan, depth_rank))
         }
         false => None,
     };
     let right = match inputs.uses(Input::Right) {
-        true => named("right_topic", &input.right_topic, images)?
+        true => named("right_topic", &input.right_topic, is_image)?
             .or_else(|| best(scan, |name, topic| colour_rank(name, topic, true))),
         false => None,
     };
     // The settings may name the right images as the colour topic.
     let right = right.filter(|topic| Some(topic) != colour.as_ref());
-    let laser = match inputs.uses(Input::Laser) {
-        true => named("laser_topic", &input.laser_topic, &[Type::LaserScan])?
-            .or_else(|| best(scan, laser_rank)),
-        false => None,
-    };
-    let detections = match inputs.uses(Input::Detections) {
-        true => named("detections_topic", &input.detections_topic, detections)?,
-        false => None,
-    };
-    let odometry = named("odometry_topic", &input.odometry_topic, &[Type::Odometry])?
+    let mut sensors = BTreeMap::new();
+    for sensor in SENSORS.iter().filter(|sensor| inputs.uses(sensor.input)) {
+        let topic = choose_sensor(scan, sensor, input)?;
+        sensors.extend(topic.map(|topic| (sensor.input, topic)));
+    }
+    let odometry = named("odometry_topic", &input.odometry_topic, is_odometry)?
         .or_else(|| best(scan, odometry_rank));
     let info = |key, wanted: &Option<String>, image: &Option<String>| {
-        Ok::<_, LogError>(named(key, wanted, infos)?.or_else(|| info_of(scan, image.as_deref()?)))
+        Ok::<_, LogError>(named(key, wanted, is_info)?.or_else(|| info_of(scan, image.as_deref()?)))
     };
     let chosen = Chosen {
         colour_info: info("colour_info_topic", &input.colour_info_topic, &colour)?,
@@ -86,56 +97,92 @@ pub(crate) fn choose(
         depth,
         right,
         odometry,
-        laser,
-        detections,
+        sensors,
     };
     check(scan, &chosen, inputs)?;
     Ok(chosen)
 }
 
+/// Returns the topic of a sensor: the one that the settings name, else that of the highest rank.
+fn choose_sensor(
+    scan: &Scan,
+    sensor: &SensorType,
+    input: &InputSettings,
+) -> Result<Option<String>, LogError> {
+    let fits = |topic: &Topic| is_of(sensor, topic);
+    let named = named(scan, &sensor.key(), named_topic(sensor, input), fits)?;
+    let rank = |name: &str, topic: &Topic| {
+        sensor.rank.filter(|_| is_of(sensor, topic)).map(|rank| rank(name))
+    };
+    Ok(named.or_else(|| best(scan, rank)))
+}
+
+/// Returns the topic that the settings name for a sensor.
+pub(crate) fn named_topic<'a>(sensor: &SensorType, input: &'a InputSettings) -> Option<&'a str> {
+    match sensor.input {
+        Input::Laser => input.laser_topic.as_deref(),
+        Input::Detections => input.detections_topic.as_deref(),
+        other => input.topics.get(other.name()).map(String::as_str),
+    }
+}
+
+/// Requirement of a pipeline or of the frames, with the topics that could meet it.
+struct Requirement<'a> {
+    lacks: bool,
+    wanted: &'a str,
+    key: String,
+    /// Message types in words.
+    types: String,
+    fits: Box<dyn Fn(&Topic) -> bool + 'a>,
+}
+
+/// Checks that there is a topic for each required input, and one that makes the frames.
 fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
-    if let Some(Input::Named(name)) = inputs.of(Usage::Required).find(is_named) {
+    let is_unknown = |input: &Input| !SENSORS.iter().any(|sensor| sensor.input == *input);
+    let mut unknown = inputs.of(Usage::Required).filter(is_named).filter(is_unknown);
+    if let Some(input) = unknown.next() {
+        let name = input.name();
         return Err(missing(scan, format!("input `{name}`"), UNREADABLE.to_owned()));
     }
+    let is_blind = chosen.colour.is_none() && chosen.depth.is_none();
     let lacks = |input, topic: &Option<String>| inputs.requires(input) && topic.is_none();
-    let wanted = [
-        (lacks(Input::Colour, &chosen.colour), "colour images", "colour_topic", COLOUR),
-        (lacks(Input::Depth, &chosen.depth), "depth images", "depth_topic", DEPTH),
-        (
-            lacks(Input::Right, &chosen.right),
-            "right images of a stereo pair",
-            "right_topic",
-            COLOUR,
-        ),
-        (lacks(Input::Laser, &chosen.laser), "laser scans", "laser_topic", LASER),
-        (
-            lacks(Input::Detections, &chosen.detections),
-            "recorded detections that `detections_topic` under [input] names",
-            "detections_topic",
-            DETECTIONS,
-        ),
-        (
-            chosen.colour.is_none() && chosen.depth.is_none() && chosen.laser.is_none(),
-            "images at all",
-            "colour_topic",
-            COLOUR,
-        ),
+    let image = |lacks, wanted, key: &str, types: &str| Requirement {
+        lacks,
+        wanted,
+        key: key.to_owned(),
+        types: types.to_owned(),
+        fits: Box::new(is_image),
+    };
+    let lacks_right = lacks(Input::Right, &chosen.right);
+    let images = [
+        image(lacks(Input::Colour, &chosen.colour), "colour images", "colour_topic", COLOUR),
+        image(lacks(Input::Depth, &chosen.depth), "depth images", "depth_topic", DEPTH),
+        image(lacks_right, "right images of a stereo pair", "right_topic", COLOUR),
     ];
-    match wanted.into_iter().find(|(missing, ..)| *missing) {
+    let sensors = SENSORS.iter().map(|sensor| Requirement {
+        lacks: inputs.requires(sensor.input) && chosen.sensor(sensor.input).is_none(),
+        wanted: sensor.wanted,
+        key: sensor.key(),
+        types: sensor.messages.join(" or "),
+        fits: Box::new(|topic| is_of(sensor, topic)),
+    });
+    let has_no_clock = is_blind && chosen.sensor(Input::Laser).is_none();
+    let any = image(has_no_clock, "images at all", "colour_topic", COLOUR);
+    match images.into_iter().chain(sensors).chain([any]).find(|required| required.lacks) {
         None => Ok(()),
-        Some((_, what, key, kinds)) => {
-            let types = match key {
-                "laser_topic" => &[Type::LaserScan][..],
-                "detections_topic" => &[Type::Detections2D, Type::Detections3D],
-                _ => &[Type::Image, Type::CompressedImage],
-            };
-            let fitting = scan.topics.iter().find(|(_, topic)| types.contains(&topic.kind));
-            let hint = fitting.map(|(name, topic)| {
-                let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
-                format!("; if {name} ({kind}) is meant, name it as `{key}` under [input]")
-            });
-            Err(missing(scan, format!("{what} ({kinds})"), hint.unwrap_or_default()))
-        }
+        Some(required) => Err(required.error(scan)),
+    }
+}
+
+impl Requirement<'_> {
+    /// Returns the error of a log that lacks the topic, with the first topic that could be meant.
+    fn error(&self, scan: &Scan) -> LogError {
+        let Self { wanted, key, types, fits, .. } = self;
+        let hint = scan.topics.iter().find(|(_, topic)| fits(topic)).map(|(name, topic)| {
+            let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
+            format!("; if {name} ({kind}) is meant, name it as `{key}` under [input]")
+        });
+        missing(scan, format!("{wanted} ({types})"), hint.unwrap_or_default())
     }
 }
 
@@ -149,8 +196,6 @@ const UNREADABLE: &str = ", because no topic is read for it: a program that adds
                           otherwise leave out the plugin that requires it";
 const COLOUR: &str = "sensor_msgs/Image with colour, mono, bayer or yuv pixels of 8 bits, or \
                       sensor_msgs/CompressedImage with jpeg or png";
-const LASER: &str = "sensor_msgs/LaserScan";
-const DETECTIONS: &str = "vision_msgs/Detection2DArray or Detection3DArray";
 const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, or sensor_msgs/CompressedImage \
                      with compressedDepth";
 
@@ -162,18 +207,31 @@ fn is_image(topic: &Topic) -> bool {
     matches!(topic.kind, Type::Image | Type::CompressedImage)
 }
 
+fn is_info(topic: &Topic) -> bool {
+    topic.kind == Type::CameraInfo
+}
+
+fn is_odometry(topic: &Topic) -> bool {
+    topic.kind == Type::Odometry
+}
+
+/// Returns true for a topic with messages of this sensor, in an encoding that can be read.
+fn is_of(sensor: &SensorType, topic: &Topic) -> bool {
+    topic.kind == Type::Sensor && sensor.reads(&topic.schema)
+}
+
 /// Returns a topic that the settings name.
 fn named(
     scan: &Scan,
     key: &str,
     name: Option<&str>,
-    types: &[Type],
+    fits: impl Fn(&Topic) -> bool,
 ) -> Result<Option<String>, LogError> {
     let Some(name) = name else { return Ok(None) };
-    if scan.topics.get(name).is_some_and(|topic| types.contains(&topic.kind)) {
+    if scan.topics.get(name).is_some_and(&fits) {
         return Ok(Some(name.to_owned()));
     }
-    let fitting = scan.topics.iter().filter(|(_, topic)| types.contains(&topic.kind));
+    let fitting = scan.topics.iter().filter(|(_, topic)| fits(topic));
     let near = nearest(name, fitting.map(|(name, _)| name.as_str()));
     let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
     Err(missing(scan, format!("topic `{name}` fit for `{key}` of [input]"), hint))
@@ -223,11 +281,6 @@ fn depth_rank(name: &str, topic: &Topic) -> Option<i32> {
 fn odometry_rank(name: &str, topic: &Topic) -> Option<i32> {
     let filtered = has(name, &["filtered", "fused"]);
     (topic.kind == Type::Odometry).then(|| i32::from(!has(name, &["visual"])) + i32::from(filtered))
-}
-
-fn laser_rank(name: &str, topic: &Topic) -> Option<i32> {
-    let rank = 2 * i32::from(name.ends_with("/scan")) - i32::from(has(name, &["rear", "back"]));
-    (topic.kind == Type::LaserScan).then_some(rank)
 }
 
 /// Returns the calibration of an image topic: its `camera_info` sibling, else the only one with the

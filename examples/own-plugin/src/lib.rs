@@ -1,7 +1,8 @@
 //! A verifier that judges people by the contrast of their image: a person has some, a blank wall
-//! has none. Beside it stand an associator and a track manager, the two kinds of plugin that decide
-//! which tracks there are.
+//! has none. Beside it stand a detector, and an associator and a track manager, the two kinds of
+//! plugin that decide which tracks there are.
 
+pub mod band;
 pub mod nearest;
 pub mod patient;
 
@@ -15,6 +16,8 @@ pub const NAME: &str = "own-contrast";
 
 /// Registers the plugins.
 pub fn register(registry: &mut Registry) {
+    registry
+        .detector("own-band", "things as wide as a person", |config, _| Ok(band::OwnBand(config)));
     registry.associator("own-nearest", "nearest pairs first", |config, _| {
         Ok(nearest::OwnNearest(config))
     });

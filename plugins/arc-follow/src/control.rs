@@ -1,14 +1,13 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::Vector2;
-use tagalong_core::{CommandHistory, Controller, EgoMotion, Scene, Track, Twist, WheelSpeeds};
+use tagalong_core::{Controller, EgoMotion, Scene, Track, Twist, WheelSpeeds};
+use tagalong_steering::{CommandHistory, coasting_weight, step_s};
 
 use crate::aim::Aim;
 use crate::config::{Config, MOST, Path};
 use crate::trail::Trail;
 
-/// A longer pause between frames counts as this one, s.
-const LONGEST_STEP_S: f64 = 0.5;
 /// Bearing from which on the robot turns towards the person, wherever they went, rad.
 const IN_VIEW_RAD: f64 = 0.4;
 
@@ -61,7 +60,7 @@ impl ArcFollow {
         // The trail is followed only towards a person ahead and beyond the stand-off.
         let goes_after = aim.range_m > self.config.stand_off_m && aim.bearing.abs() < IN_VIEW_RAD;
         let way = self.way(scene, target, &to_come).filter(|_| goes_after);
-        let trust = self.trust(target);
+        let trust = coasting_weight(target.unseen_s, self.config.max_unseen_s);
         self.turning = self.turn_in_place(&aim);
         let speed_mps = self.ramped(self.wanted_speed(&aim, max), dt).min(trust * max);
         let (towards, gain) = match way.filter(|_| speed_mps > 0.0) {
@@ -94,12 +93,6 @@ impl ArcFollow {
         self.speed_mps = 0.0;
         self.trail = Trail::default();
         Twist::STOP
-    }
-
-    /// Returns the weight of a target that is coasting: 1, then less, then 0.
-    fn trust(&self, target: &Track) -> f64 {
-        let left = 2.0 * (1.0 - target.unseen_s / self.config.max_unseen_s);
-        if left > 0.0 { left.min(1.0) } else { 0.0 }
     }
 
     /// Whether to turn on the spot, and which way. It goes on the way it began,
@@ -171,11 +164,6 @@ impl ArcFollow {
         // Both by the same factor, so that the curvature stays.
         twist.scaled(scale)
     }
-}
-
-/// Time since the frame before, s.
-fn step_s(motion: &EgoMotion) -> f64 {
-    if motion.dt > 0.0 { motion.dt.min(LONGEST_STEP_S) } else { 0.0 }
 }
 
 fn is_sensible(number: f64) -> bool {

@@ -1,14 +1,11 @@
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{
-    CommandHistory, Controller, EgoMotion, Input, Inputs, Scene, Track, Twist, WheelSpeeds,
-};
+use tagalong_core::{Controller, EgoMotion, Input, Inputs, Scene, Track, Twist, WheelSpeeds};
+use tagalong_steering::{CommandHistory, coasting_weight, step_s};
 
 use crate::around::NearestObstacles;
 use crate::config::{Config, MOST};
 use crate::plan::{PlanningInput, Walker, plan};
 
-/// A longer pause between frames counts as this one, s.
-const LONGEST_STEP_S: f64 = 0.5;
 /// Distance within which points belong to a person, m.
 const PERSON_M: f64 = 0.45;
 /// The person is never nearer than this to the law that turns, m.
@@ -30,9 +27,7 @@ impl Controller for ClearFollow {
     }
 
     fn command(&mut self, scene: &Scene<'_>) -> Twist {
-        let motion = &scene.frame.motion;
-        // After a long pause the speed must not jump.
-        let dt = if motion.dt > 0.0 { motion.dt.min(LONGEST_STEP_S) } else { 0.0 };
+        let dt = step_s(&scene.frame.motion);
         self.history.age(dt);
         self.look(scene);
         let twist = self.steer(scene, dt);
@@ -88,7 +83,8 @@ impl ClearFollow {
         // The command acts only after the latency, so the plan starts where the robot will be then.
         let to_come = self.history.forecast(wheels);
         let person = walker(target, &to_come)?;
-        let nominal = self.nominal(&person, self.trust(target), max_mps);
+        let trust = coasting_weight(target.unseen_s, self.config.max_unseen_s);
+        let nominal = self.nominal(&person, trust, max_mps);
         let others = scene.tracks.iter().filter(|track| track.id != target.id);
         let others: Vec<Walker> = others.filter_map(|track| walker(track, &to_come)).collect();
         let things: Vec<_> = self.around.places().map(|at| to_come.apply_to_point(at)).collect();
@@ -128,12 +124,6 @@ impl ClearFollow {
         // At a speed that is not reached yet the whole detour would turn too sharply.
         let share = if planned.linear_mps > 0.0 { speed_mps / planned.linear_mps } else { 1.0 };
         Twist::new(speed_mps, nominal.angular_rps + detour * share.min(1.0))
-    }
-
-    /// Returns the weight of a target that is coasting: 1, then less, then 0.
-    fn trust(&self, target: &Track) -> f64 {
-        let left = 2.0 * (1.0 - target.unseen_s / self.config.max_unseen_s);
-        if left > 0.0 { left.min(1.0) } else { 0.0 }
     }
 }
 

@@ -1,5 +1,6 @@
 use tagalong_config::{Context, check_settings};
-use tagalong_core::{Detection, Frame, Input, Inputs, Result, ScoreCalibration, Verifier};
+use tagalong_core::{Detection, Frame, Input, Inputs, Result, Verifier};
+use tagalong_learn::ScoreCalibration;
 
 use crate::{BUILT_IN, FloorMap, Model, VerifierConfig};
 

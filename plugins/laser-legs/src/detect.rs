@@ -115,9 +115,13 @@ impl Detector for LaserLegs {
     fn detect(
         &mut self,
         frame: &Frame,
-        _: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
+        // It only discovers: which of the people is tracked, it cannot tell.
+        if matches!(query, Query::Track(_)) {
+            return Ok(Vec::new());
+        }
         let scan = frame.scan()?;
         let beams = Beams::new(scan, 1);
         let is_needed = self.config.free_log_odds > 0.0;

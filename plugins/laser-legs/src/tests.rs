@@ -68,7 +68,7 @@ const LEGS: [([f64; 2], f64); 2] = [([2.0, 0.15], 0.06), ([2.0, -0.15], 0.06)];
 fn the_plugin_conforms() {
     let mut registry = Registry::default();
     register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
+    let failures = tagalong_conformance::Suite::new(&registry).must_discover(NAME).check_all();
     assert!(failures.is_empty(), "{failures:?}");
 }
 

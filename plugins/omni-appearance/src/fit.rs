@@ -12,6 +12,7 @@
 //! gradient of all samples, and all steps are taken.
 
 use nalgebra::{DMatrix, DVector};
+use tagalong_learn::dense::NormalEquations;
 use tagalong_learn::mix;
 
 use crate::Network;
@@ -117,13 +118,12 @@ impl Fit {
         let mut lowest = samples.cost(&network, &weights);
         for _ in 0..self.steps {
             let (jacobian, errors) = linearised(&network, &samples.inputs, &samples.targets);
-            let normal = jacobian.tr_mul(&jacobian);
+            let normal = NormalEquations::new(&jacobian);
             let gradient = jacobian.tr_mul(&errors) + decay * &weights;
             let before = lowest;
             for _ in 0..TRIES {
-                let mut damped = normal.clone();
-                (0..weights.len()).for_each(|i| damped[(i, i)] += decay + damping);
-                let Some(step) = damped.cholesky().map(|c| c.solve(&gradient)) else { break };
+                let penalties = vec![decay + damping; weights.len()];
+                let Some(step) = normal.solve(&penalties, &gradient) else { break };
                 let next = &weights - step;
                 let tried = with_weights(&network, &next);
                 let reached = samples.cost(&tried, &next);

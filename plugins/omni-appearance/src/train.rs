@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{DMatrix, DVector, Point3};
 use tagalong_config::{Example, Fitted, Trainer};
 use tagalong_core::{Detection, Error, Frame, Funnel, Result};
+use tagalong_learn::dense::NormalEquations;
 use tagalong_learn::mix;
 
 use crate::fit::mean_and_scale;
@@ -308,10 +309,10 @@ fn ridge(samples: &[Sample], weight: f64) -> Ridge {
         i => (terms[row][i - 1] - mean[i - 1]) / scale[i - 1],
     });
     let y = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.distance_m));
-    let mut normal = x.transpose() * &x;
     // The constant term is not shrunk: it is the mean distance.
-    (1..6).for_each(|i| normal[(i, i)] += weight * samples.len() as f64);
-    let solved = normal.cholesky().map(|c| c.solve(&(x.transpose() * y)));
+    let mut penalties = [weight * samples.len() as f64; 6];
+    penalties[0] = 0.0;
+    let solved = NormalEquations::new(&x).solve(&penalties, &x.tr_mul(&y));
     let array = |values: &[f64]| std::array::from_fn(|i| values[i]);
     Ridge {
         weights: std::array::from_fn(|i| solved.as_ref().map_or(0.0, |w| w[i])),

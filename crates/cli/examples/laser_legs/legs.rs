@@ -49,7 +49,16 @@ impl Detector for Legs {
         Capabilities { inputs, discovers: true, ..Capabilities::default() }
     }
 
-    fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
+    fn detect(
+        &mut self,
+        frame: &Frame,
+        query: &Query<'_>,
+        _: &mut Funnel,
+    ) -> Result<Vec<Detection>> {
+        // It only discovers, and finds no tracked person again.
+        if matches!(query, Query::Track(_)) {
+            return Ok(Vec::new());
+        }
         let legs = self.legs(frame.scan()?);
         let [least, most] = self.0.stride_m;
         let pairs =

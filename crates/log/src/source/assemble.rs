@@ -4,27 +4,27 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    DepthImage, EgoMotion, Frame, Images, Input, LaserScan as Scan, RightImage, Stamp, planar_pose,
+    DepthImage, EgoMotion, Frame, Images, Input, RightImage, Sensors, Stamp, planar_pose,
 };
 use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole};
 use tagalong_vision::Unwrapping;
 
 use super::LogFrame;
 use super::intake::Intake;
-use super::laser::{is_sane, seen_from};
 use super::mount::robot_frame;
-use super::pairing::Payload;
 use super::plan::Plan;
-use super::recorded::recorded;
-use super::tally::Tally;
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size};
 use crate::images::{
     ImageError, Pixels, decode_compressed, decode_raw, size_of_compressed, size_of_raw,
 };
 use crate::msgs::{CompressedImage, Image, LaserScan, decode};
 use crate::odometry::{PoseAt, unknown_motion};
+use crate::pairing::Payload;
 use crate::register::Registration;
 use crate::scan::Type;
+use crate::sensors::Moment;
+use crate::sensors::laser::{is_sane, lose_scan, seen_from};
+use crate::tally::Tally;
 
 /// State that is carried from frame to frame.
 pub(super) struct Assembler {
@@ -66,13 +66,13 @@ impl Assembler {
     ) -> Option<LogFrame> {
         // Counted before anything can fail, so that the index does not depend on the inputs.
         self.index += 1;
+        let tolerance_s = plan.input.pair_tolerance_s;
+        intake.pair_sensors(image.stamp, next, tolerance_s);
         if plan.is_of_scans() {
             return self.assemble_scan(plan, image, intake, tally);
         }
-        let tolerance_s = plan.input.pair_tolerance_s;
         let depth = intake.depth.take(image.stamp, next, tolerance_s);
         let right = intake.right.take(image.stamp, next, tolerance_s);
-        let detections = intake.detections.take(image.stamp, next, tolerance_s);
         if plan.has_second_depth() && depth.is_none() {
             tally.count("colour_without_depth");
         }
@@ -98,11 +98,8 @@ impl Assembler {
         if lacks {
             return None;
         }
-        let recorded = recorded(plan, detections, intake, tally);
-        let laser = self.laser(plan, image.stamp, intake, tally);
-        let mut item = self.finish(plan, image.stamp, camera, images, intake, tally);
-        item.frame = item.frame.with_recorded(recorded).with_laser(laser);
-        Some(item)
+        let sensors = images.taken_by(&camera);
+        Some(self.finish(plan, image.stamp, camera, sensors, intake, tally))
     }
 
     /// Makes a frame of a laser scan alone; `None` if it is damaged or its pose is unknown, which
@@ -115,7 +112,7 @@ impl Assembler {
         tally: &mut Tally,
     ) -> Option<LogFrame> {
         let Some(sweep) = decode::<LaserScan>(&scan.data).ok().filter(is_sane) else {
-            tally.lose("laser_scans_invalid", || "a laser scan has no angles or ranges".into());
+            lose_scan(tally);
             return None;
         };
         let Some(pose) = plan.mount.at(&intake.tf, scan.stamp) else {
@@ -127,10 +124,9 @@ impl Assembler {
             self.camera = Some(Arc::new(camera));
         }
         let camera = Arc::clone(self.camera.as_ref()?);
-        let mut item = self.finish(plan, scan.stamp, camera, Images::default(), intake, tally);
-        let scan = seen_from(&sweep, &pose, &Isometry2::identity());
-        item.frame = item.frame.with_laser(Some(scan));
-        Some(item)
+        let seen = seen_from(&sweep, &pose, &Isometry2::identity());
+        let sensors = Sensors::default().with(seen);
+        Some(self.finish(plan, scan.stamp, camera, sensors, intake, tally))
     }
 
     /// Decodes the image that makes the frame, as far as it is used; returns it with the size of
@@ -287,22 +283,27 @@ impl Assembler {
         self.registration.as_ref()?.apply(seen).map(Arc::new)
     }
 
-    /// Returns the points of the laser scan in the robot frame at the time of the image.
-    fn laser(&self, plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut Tally) -> Option<Scan> {
-        plan.chosen.laser.as_ref()?;
-        let Some(scan) = intake.laser.near(stamp) else {
-            tally.count("frames_without_laser");
-            return None;
+    /// Returns the sensors of a frame with those beside the images.
+    fn sense(
+        &self,
+        plan: &Plan,
+        stamp: Stamp,
+        camera: &Arc<Camera>,
+        sensors: Sensors,
+        intake: &Intake,
+        tally: &mut Tally,
+    ) -> Sensors {
+        let odom_from_robot = |stamp| self.pose_at(plan, stamp, intake).pose;
+        let moment = |topic| Moment {
+            topic,
+            stamp,
+            camera,
+            robot_frame: robot_frame(&plan.scan, &plan.input),
+            tf: &intake.tf,
+            odom_from_robot: &odom_from_robot,
         };
-        let robot = robot_frame(&plan.scan, &plan.input);
-        let then = scan.header.stamp();
-        let Some(mount) = intake.tf.lookup(robot, &scan.header.frame_id, then) else {
-            tally.count("laser_scans_without_pose");
-            tally.note("tf does not connect the laser scanner with the robot: it is not used");
-            return None;
-        };
-        let pose = |stamp| self.pose_at(plan, stamp, intake).pose;
-        Some(seen_from(scan, &mount, &(pose(stamp).inverse() * pose(then))))
+        let each = intake.sensors.iter();
+        each.fold(sensors, |all, (topic, sensor)| sensor.add_to(all, &moment(topic), tally))
     }
 
     fn finish(
@@ -310,17 +311,19 @@ impl Assembler {
         plan: &Plan,
         stamp: Stamp,
         camera: Arc<Camera>,
-        images: Images,
+        sensors: Sensors,
         intake: &Intake,
         tally: &mut Tally,
     ) -> LogFrame {
+        // Before `previous` is this frame: without odometry it gives the pose.
+        let sensors = self.sense(plan, stamp, &camera, sensors, intake, tally);
         let here = self.pose_at(plan, stamp, intake);
         let odom_jumped = self.has_jumped(plan, stamp, intake, tally);
         let (motion, known) = self.motion(plan, stamp, here, odom_jumped, tally);
         self.previous = Some((stamp, here));
         tally.count("frames");
         LogFrame {
-            frame: Frame::new(self.index, stamp, camera, motion, images),
+            frame: Frame::of_sensors(self.index, stamp, camera, motion, sensors),
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
             odom_jumped,

@@ -1,15 +1,16 @@
 //! Frames from messages of any source.
 
+use tagalong_core::Input;
 use tagalong_geometry::Camera;
 
 use super::assemble::Assembler;
 use super::intake::Intake;
 use super::mount::robot_frame;
 use super::plan::Plan;
-use super::tally::Tally;
 use super::{LogFacts, LogFrame};
 use crate::camera_info::CalibrationError;
 use crate::scan::Type;
+use crate::tally::Tally;
 use crate::walk::{Channel, Message};
 
 /// Sequence of messages.
@@ -119,7 +120,8 @@ impl Assembly {
             depth_topic: chosen.depth.clone(),
             right_topic: chosen.right.clone(),
             odometry_topic: chosen.odometry.clone(),
-            laser_topic: chosen.laser.clone(),
+            laser_topic: chosen.sensor(Input::Laser).map(str::to_owned),
+            sensor_topics: chosen.named_sensors(),
             calibration_topic: self.plan.calibration_topic().cloned(),
             camera_frame: scan.frame_of(self.plan.primary()).map(str::to_owned),
             robot_frame: robot_frame(scan, &self.plan.input).to_owned(),

@@ -1,17 +1,15 @@
 //! Distribution of the messages of a log to the parts of a frame.
 
-use tagalong_core::planar_pose;
+use tagalong_core::{Stamp, planar_pose};
 
-use super::laser::Scans;
-use super::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
 use super::plan::Plan;
-use super::tally::Tally;
 use crate::InputSettings;
-use crate::msgs::{
-    CameraInfo, CdrError, CompressedImage, Header, Image, LaserScan, Odometry, TFMessage, decode,
-};
+use crate::msgs::{CameraInfo, CdrError, CompressedImage, Image, Odometry, TFMessage, decode};
 use crate::odometry::PoseBuffer;
+use crate::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
 use crate::scan::{Scan, Type, is_static};
+use crate::sensors::{SENSORS, SensorReader};
+use crate::tally::Tally;
 use crate::tf::TfBuffer;
 use crate::topics::Chosen;
 use crate::walk::Message;
@@ -25,8 +23,8 @@ pub(super) struct Intake {
     pub(super) frames: Reorder,
     pub(super) depth: Waiting,
     pub(super) right: Waiting,
-    pub(super) detections: Waiting,
-    pub(super) laser: Scans,
+    /// Topics of the sensors beside the images, with their readers.
+    pub(super) sensors: Vec<(String, Box<dyn SensorReader>)>,
     pub(super) tf: TfBuffer,
     pub(super) poses: PoseBuffer,
 }
@@ -44,8 +42,7 @@ impl Intake {
             frames: Reorder::new(input.reorder_frames),
             depth: Waiting::default(),
             right: Waiting::default(),
-            detections: Waiting::default(),
-            laser: Scans::default(),
+            sensors: readers(scan, chosen, primary),
             tf,
             poses: PoseBuffer::default(),
         }
@@ -60,10 +57,8 @@ impl Intake {
             payload(message).map(|image| self.depth.push(image))
         } else if topic == self.chosen.right.as_ref() {
             payload(message).map(|image| self.right.push(image))
-        } else if topic == self.chosen.detections.as_ref() {
-            headed(message).map(|detections| self.detections.push(detections))
-        } else if topic == self.chosen.laser.as_ref() {
-            decode(message.data).map(|scan| self.take_scan(scan, tally))
+        } else if let Some(reader) = self.reader(&message.channel.topic) {
+            reader.take(message, tally)
         } else if topic == self.chosen.odometry.as_ref() {
             decode(message.data).map(|odometry| self.take_odometry(&odometry, tally))
         } else if topic == self.chosen.colour_info.as_ref() {
@@ -90,7 +85,7 @@ impl Intake {
                 if let Some(newest) = newest {
                     self.depth.set_aside(newest);
                     self.right.set_aside(newest);
-                    self.detections.set_aside(newest);
+                    self.sensors.iter_mut().for_each(|(_, sensor)| sensor.set_aside(newest));
                 }
             }
         }
@@ -105,10 +100,15 @@ impl Intake {
         }
     }
 
-    fn take_scan(&mut self, scan: LaserScan, tally: &mut Tally) {
-        if !self.laser.push(scan) {
-            tally.lose("laser_scans_invalid", || "a laser scan has no angles or ranges".into());
-        }
+    /// Returns the reader of a topic, if it is one of a sensor.
+    fn reader(&mut self, topic: &str) -> Option<&mut dyn SensorReader> {
+        let (_, reader) = self.sensors.iter_mut().find(|(name, _)| name == topic)?;
+        Some(reader.as_mut())
+    }
+
+    /// Selects the messages of the sensors for a frame.
+    pub(super) fn pair_sensors(&mut self, stamp: Stamp, next: Option<Stamp>, tolerance_s: f64) {
+        self.sensors.iter_mut().for_each(|(_, sensor)| sensor.pair(stamp, next, tolerance_s));
     }
 
     fn take_tf(&mut self, tf: &TFMessage, topic: &str, tally: &mut Tally) {
@@ -139,11 +139,11 @@ impl Intake {
     /// skipped.
     pub(super) fn pop_newest(&mut self, plan: &Plan) -> (Option<Popped>, u64) {
         let near = plan.input.pair_tolerance_s;
-        let Self { frames, depth, right, detections, chosen, .. } = self;
+        let Self { frames, depth, right, sensors, chosen, .. } = self;
         frames.pop_newest(|stamp| {
             (!plan.has_second_depth() || depth.has(stamp, near))
                 && (chosen.right.is_none() || right.has(stamp, near))
-                && (chosen.detections.is_none() || detections.has(stamp, near))
+                && sensors.iter().all(|(_, sensor)| sensor.is_ready(stamp, near))
         })
     }
 
@@ -153,26 +153,25 @@ impl Intake {
         if self.frames.is_flushed() {
             self.depth.restore();
             self.right.restore();
-            self.detections.restore();
+            self.sensors.iter_mut().for_each(|(_, sensor)| sensor.restore());
         }
     }
 }
 
-/// Reads the header of a message that begins with one.
-fn headed(message: &Message<'_>) -> Result<Payload, CdrError> {
-    let header: Header = decode(message.data)?;
-    Ok(Payload { stamp: header.stamp(), frame_id: header.frame_id, data: message.data.to_vec() })
+/// Creates the readers of the chosen topics; the topic that makes the frames has none.
+fn readers(scan: &Scan, chosen: &Chosen, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
+    let topics = SENSORS.iter().filter_map(|sensor| Some((sensor, chosen.sensor(sensor.input)?)));
+    let others = topics.filter(|(_, topic)| *topic != primary);
+    let schema = |topic: &str| scan.topics.get(topic).map_or("", |topic| &topic.schema);
+    others.map(|(sensor, topic)| (topic.to_owned(), (sensor.reader)(schema(topic)))).collect()
 }
 
 /// Returns the stamp, the frame and the bytes of an image or a scan.
 fn payload(message: &Message<'_>) -> Result<Payload, CdrError> {
-    if Type::of(&message.channel.schema_name) == Type::LaserScan {
-        return headed(message);
-    }
-    let header = if Type::of(&message.channel.schema_name) == Type::Image {
-        decode::<Image<'_>>(message.data)?.header
-    } else {
-        decode::<CompressedImage<'_>>(message.data)?.header
+    let header = match Type::of(&message.channel.schema_name) {
+        Type::Image => decode::<Image<'_>>(message.data)?.header,
+        Type::CompressedImage => decode::<CompressedImage<'_>>(message.data)?.header,
+        _ => decode(message.data)?,
     };
-    Ok(Payload { stamp: header.stamp(), frame_id: header.frame_id, data: message.data.to_vec() })
+    Ok(Payload::new(header, message.data))
 }

@@ -12,6 +12,8 @@ use super::assembly::{Assembly, Messages};
 use super::plan::{plan, tally_of};
 use super::{LogFacts, LogFrame};
 use crate::scan::{Gathering, Type};
+use crate::sensors::SensorType;
+use crate::topics::named_topic;
 use crate::walk::{Channel, Message};
 use crate::{InputSettings, Inputs, Limits, LogError};
 
@@ -78,16 +80,17 @@ impl Listening {
         true
     }
 
-    /// Returns true for an announced topic with messages that frames can be made of. Detections are
-    /// used only if the settings name their topic, because Tagalong's own output has the same type.
+    /// Returns true for an announced topic with messages that frames can be made of. Some
+    /// sensors are used only if the settings name their topic: detections, because Tagalong's own
+    /// output has the same type.
     pub fn wants(&self, topic: &str) -> bool {
-        let kind = self.channels.get(topic).map(|channel| Type::of(&channel.schema_name));
-        match kind {
-            None | Some(Type::Other) => false,
-            Some(Type::Detections2D | Type::Detections3D) => {
-                self.input.detections_topic.as_deref() == Some(topic)
-            }
-            Some(_) => true,
+        let Some(channel) = self.channels.get(topic) else { return false };
+        match Type::of(&channel.schema_name) {
+            Type::Other => false,
+            Type::Sensor => SensorType::of_message(&channel.schema_name).is_some_and(|sensor| {
+                sensor.rank.is_some() || named_topic(sensor, &self.input) == Some(topic)
+            }),
+            _ => true,
         }
     }
 

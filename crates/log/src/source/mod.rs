@@ -3,21 +3,16 @@
 mod assemble;
 mod assembly;
 mod intake;
-mod laser;
 mod live;
 mod mount;
-mod pairing;
 mod parts;
 mod plan;
-mod recorded;
-mod tally;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use assembly::{Assembly, Messages};
-pub(crate) use laser::{is_sane as scan_is_sane, seen_from as scan_seen_from};
 pub use live::{Listening, LiveSource};
 use nalgebra::Isometry2;
 use parts::PartsWalker;
@@ -60,6 +55,9 @@ pub struct LogFacts {
     pub odometry_topic: Option<String>,
     /// Topic of a laser scanner's scans.
     pub laser_topic: Option<String>,
+    /// Topics of the sensors that other crates define, by the names of their inputs.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub sensor_topics: BTreeMap<&'static str, String>,
     /// Frame id of the images.
     pub camera_frame: Option<String>,
     /// Topic of the calibration of the frames.

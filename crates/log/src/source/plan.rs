@@ -8,9 +8,9 @@ use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 
 use super::assembly::{Assembly, Messages};
 use super::mount::{Mount, robot_frame};
-use super::tally::Tally;
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::scan::Scan;
+use crate::tally::Tally;
 use crate::topics::{Chosen, choose, missing};
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
@@ -118,7 +118,7 @@ impl Plan {
 
 fn primary(chosen: &Chosen) -> &str {
     let images = chosen.colour.as_ref().or(chosen.depth.as_ref());
-    images.or(chosen.laser.as_ref()).map_or("", String::as_str)
+    images.map(String::as_str).or(chosen.sensor(Input::Laser)).unwrap_or_default()
 }
 
 /// Returns the counters and remarks of the first pass.

@@ -16,6 +16,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("learn", &[]),
     ("network", &[]),
     ("filtering", &[]),
+    ("steering", &[]),
     ("stereo", &["vision"]),
     ("odometry", &[]),
     ("assignment", &[]),
@@ -95,7 +96,7 @@ const ARROWS: &[(&str, &[&str])] = &[
 const WORDS: &[&str] = &["stats", "geometry", "core", "config"];
 
 /// Crates that a plugin may depend on.
-const OF_PLUGINS: &[&str] = &["vision", "learn", "network", "assignment", "filtering"];
+const OF_PLUGINS: &[&str] = &["vision", "learn", "network", "assignment", "filtering", "steering"];
 
 /// Crates that the tests of any crate may depend on in addition.
 const FOR_TESTS: &[&str] =

@@ -8,6 +8,13 @@ use crate::workspace::Workspace;
 /// Headings that the README of a plugin must have, as beginnings.
 const README_PARTS: &[&str] = &["**Source**", "**Needs**", "## Where we differ from the paper"];
 
+/// What the README of a generated plugin says until its author writes something there.
+const PLACEHOLDERS: &[&str] = &[
+    "Say in a paragraph what the method is",
+    "authors, *title*, where and when",
+    "| what it says | what is done instead",
+];
+
 /// Plugins that a config has without naming them.
 const DEFAULTS: &[&str] = &["associate-hungarian", "manage-m-of-n"];
 
@@ -40,9 +47,16 @@ fn readme_gaps(workspace: &Workspace, folder: &str) -> Vec<String> {
     let Ok(text) = workspace.read(format!("{folder}/README.md")) else {
         return vec![format!("{folder} has no README.md")];
     };
-    let lacks = |part: &&&str| !text.lines().any(|line| line.starts_with(**part));
-    let gaps = README_PARTS.iter().filter(lacks);
-    gaps.map(|part| format!("{folder}/README.md has no part `{part}`")).collect()
+    gaps(&text).into_iter().map(|gap| format!("{folder}/README.md {gap}")).collect()
+}
+
+/// Returns the parts that a README lacks, and the lines of the template that it still has.
+fn gaps(readme: &str) -> Vec<String> {
+    let lacks = |part: &&&str| !readme.lines().any(|line| line.starts_with(**part));
+    let missing = README_PARTS.iter().filter(lacks).map(|part| format!("has no part `{part}`"));
+    let unfilled = PLACEHOLDERS.iter().filter(|text| readme.contains(**text));
+    let unfilled = unfilled.map(|text| format!("still says `{text}`, as the template does"));
+    missing.chain(unfilled).collect()
 }
 
 /// The names after `plugin =` in all shipped configs.
@@ -72,6 +86,26 @@ fn collect_plugins(value: &toml::Value, used: &mut BTreeSet<String>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Checks the README of every template: it has all parts, and nothing in them yet.
+    #[test]
+    fn the_readme_of_a_template_has_to_be_filled_in() {
+        let templates = concat!(env!("CARGO_MANIFEST_DIR"), "/templates");
+        let folders = std::fs::read_dir(templates).unwrap().map(|entry| entry.unwrap().path());
+        let readmes = folders
+            .filter(|folder| folder.is_dir())
+            .map(|folder| std::fs::read_to_string(folder.join("README.md.txt")).unwrap());
+        let readmes: Vec<String> = readmes.collect();
+        assert_eq!(readmes.len(), 6, "one for each kind of plugin");
+        for readme in &readmes {
+            let gaps = gaps(readme);
+            assert_eq!(gaps.len(), PLACEHOLDERS.len(), "{gaps:?}");
+            assert!(gaps.iter().all(|gap| gap.starts_with("still says")), "{gaps:?}");
+        }
+        let filled = PLACEHOLDERS.iter().fold(readmes[0].clone(), |text, p| text.replace(p, "x"));
+        assert!(gaps(&filled).is_empty());
+        assert_eq!(gaps("**Source**: us\n**Needs**: a camera\n").len(), 1);
+    }
 
     #[test]
     fn plugins_are_found_wherever_a_config_names_them() {

@@ -4,12 +4,30 @@ use std::collections::VecDeque;
 
 use tagalong_core::Stamp;
 
+use crate::msgs::{CdrError, Header, decode};
+use crate::walk::Message;
+
 /// Undecoded message of an image.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Payload {
-    pub(super) stamp: Stamp,
-    pub(super) frame_id: String,
-    pub(super) data: Vec<u8>,
+pub(crate) struct Payload {
+    pub(crate) stamp: Stamp,
+    pub(crate) frame_id: String,
+    pub(crate) data: Vec<u8>,
+}
+
+impl Payload {
+    /// Keeps a message that begins with a header, without decoding the rest.
+    ///
+    /// # Errors
+    /// A message without a header.
+    pub(crate) fn of_headed(message: &Message<'_>) -> Result<Self, CdrError> {
+        Ok(Self::new(decode(message.data)?, message.data))
+    }
+
+    /// Keeps a message with this header.
+    pub(crate) fn new(header: Header, data: &[u8]) -> Self {
+        Self { stamp: header.stamp(), frame_id: header.frame_id, data: data.to_vec() }
+    }
 }
 
 /// Maximum number of images kept of a second stream; older ones are not near any image to come.
@@ -21,7 +39,7 @@ const MIN_WAITING: usize = 4;
 
 /// Images of a second stream (depth, right) that wait for their partner.
 #[derive(Debug, Default)]
-pub(super) struct Waiting {
+pub(crate) struct Waiting {
     images: VecDeque<Payload>,
     aside: VecDeque<Payload>,
     /// Number of images dropped without a partner.
@@ -29,7 +47,7 @@ pub(super) struct Waiting {
 }
 
 impl Waiting {
-    pub(super) fn push(&mut self, payload: Payload) {
+    pub(crate) fn push(&mut self, payload: Payload) {
         let place = self.images.partition_point(|old| old.stamp <= payload.stamp);
         self.images.insert(place, payload);
         while self.is_overfull() {
@@ -46,7 +64,7 @@ impl Waiting {
 
     /// Takes the image nearest to `stamp` if it is within the tolerance and not nearer to the next
     /// image of the other stream. Images older than the tolerance are dropped.
-    pub(super) fn take(
+    pub(crate) fn take(
         &mut self,
         stamp: Stamp,
         next: Option<Stamp>,
@@ -67,7 +85,7 @@ impl Waiting {
 
     /// Returns true if [`Waiting::take`] would find an image for the newest image of the other
     /// stream.
-    pub(super) fn has(&self, stamp: Stamp, tolerance_s: f64) -> bool {
+    pub(crate) fn has(&self, stamp: Stamp, tolerance_s: f64) -> bool {
         self.images.iter().any(|image| image.stamp.seconds_since(stamp).abs() <= tolerance_s)
     }
 
@@ -80,14 +98,14 @@ impl Waiting {
 
     /// Keeps, after a jump of the clock, the images older than `stamp`, which are hence of the new
     /// time, for [`Waiting::restore`].
-    pub(super) fn set_aside(&mut self, stamp: Stamp) {
+    pub(crate) fn set_aside(&mut self, stamp: Stamp) {
         let first_old = self.images.partition_point(|image| image.stamp < stamp);
         let old = self.images.split_off(first_old);
         self.aside = std::mem::replace(&mut self.images, old);
     }
 
     /// Drops the rest of the old time and continues with the images that were set aside.
-    pub(super) fn restore(&mut self) {
+    pub(crate) fn restore(&mut self) {
         if !self.aside.is_empty() {
             self.unpaired += self.images.len() as u64;
             self.images = std::mem::take(&mut self.aside);
@@ -95,7 +113,7 @@ impl Waiting {
     }
 
     /// Removes all images at the end; returns the number without a partner since the last call.
-    pub(super) fn leave(&mut self) -> u64 {
+    pub(crate) fn leave(&mut self) -> u64 {
         let left = self.images.len() + self.aside.len();
         self.images.clear();
         self.aside.clear();
@@ -104,11 +122,11 @@ impl Waiting {
 }
 
 /// Image with the stamp of the next one.
-pub(super) type Popped = (Payload, Option<Stamp>);
+pub(crate) type Popped = (Payload, Option<Stamp>);
 
 /// Result of the arrival of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Arrival {
+pub(crate) enum Arrival {
     /// The image waits for its turn.
     Queued,
     /// The stamp is that of another image.
@@ -125,7 +143,7 @@ pub(super) enum Arrival {
 
 /// Queue that orders a stream of images by stamp.
 #[derive(Debug)]
-pub(super) struct Reorder {
+pub(crate) struct Reorder {
     window: usize,
     queue: VecDeque<Payload>,
     ready: VecDeque<Payload>,
@@ -134,11 +152,11 @@ pub(super) struct Reorder {
 }
 
 impl Reorder {
-    pub(super) fn new(window: usize) -> Self {
+    pub(crate) fn new(window: usize) -> Self {
         Self { window, queue: VecDeque::new(), ready: VecDeque::new(), suspect: None, last: None }
     }
 
-    pub(super) fn push(&mut self, payload: Payload) -> Arrival {
+    pub(crate) fn push(&mut self, payload: Payload) -> Arrival {
         let taken = |stamp: Stamp| {
             self.last == Some(stamp)
                 || self.queue.iter().any(|queued| queued.stamp == stamp)
@@ -179,7 +197,7 @@ impl Reorder {
 
     /// Returns the next image in order, if no earlier one can follow (or the log has ended), with
     /// the stamp of the next one.
-    pub(super) fn pop(&mut self, ended: bool) -> Option<Popped> {
+    pub(crate) fn pop(&mut self, ended: bool) -> Option<Popped> {
         if let Some(payload) = self.ready.pop_front() {
             return Some((payload, self.ready.front().map(|next| next.stamp)));
         }
@@ -194,7 +212,7 @@ impl Reorder {
     /// Returns the newest complete image, without waiting for earlier ones; without a complete one,
     /// the image that has waited longest, once more than the window wait. Also returns the number
     /// of older images that were dropped.
-    pub(super) fn pop_newest(
+    pub(crate) fn pop_newest(
         &mut self,
         is_complete: impl Fn(Stamp) -> bool,
     ) -> (Option<Popped>, u64) {
@@ -205,17 +223,17 @@ impl Reorder {
     }
 
     /// Returns true if no images from before a jump are left.
-    pub(super) fn is_flushed(&self) -> bool {
+    pub(crate) fn is_flushed(&self) -> bool {
         self.ready.is_empty()
     }
 
     /// Returns the newest stamp that was delivered.
-    pub(super) fn last(&self) -> Option<Stamp> {
+    pub(crate) fn last(&self) -> Option<Stamp> {
         self.last
     }
 
     /// Drops an image held back as suspect, at the end of the log; returns true if there was one.
-    pub(super) fn drop_suspect(&mut self) -> bool {
+    pub(crate) fn drop_suspect(&mut self) -> bool {
         self.suspect.take().is_some()
     }
 }

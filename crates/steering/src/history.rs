@@ -1,6 +1,6 @@
 use std::collections::VecDeque;
 
-use crate::{DiffDrive, EgoMotion, WheelSpeeds};
+use tagalong_core::{DiffDrive, EgoMotion, WheelSpeeds};
 
 /// Largest number of remembered commands, at any frame rate.
 const MOST: usize = 256;

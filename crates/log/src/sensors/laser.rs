@@ -4,9 +4,27 @@ use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
 use nalgebra::{Isometry2, Isometry3, Point3, UnitQuaternion, Vector3};
-use tagalong_core::{LaserScan as Scan, Stamp};
+use tagalong_core::{Input, LaserScan as Scan, Sensors, Stamp};
 
-use crate::msgs::LaserScan;
+use super::{Moment, SensorReader, SensorType};
+use crate::msgs::{CdrError, LaserScan, decode};
+use crate::tally::Tally;
+use crate::walk::Message;
+
+/// Entry of laser scanners.
+pub(super) const ENTRY: SensorType = SensorType {
+    input: Input::Laser,
+    messages: &["sensor_msgs/LaserScan"],
+    wanted: "laser scans",
+    rank: Some(rank),
+    header: |data| decode::<LaserScan>(data).map(|scan| Some(scan.header)),
+    reader: |_| Box::<Scans>::default(),
+};
+
+fn rank(topic: &str) -> i32 {
+    let is_rear = topic.contains("rear") || topic.contains("back");
+    2 * i32::from(topic.ends_with("/scan")) - i32::from(is_rear)
+}
 
 /// Maximum time between a scan and an image, s.
 const NEAR_S: f64 = 0.25;
@@ -17,13 +35,42 @@ const MAX_RAYS: usize = 65_536;
 
 /// Scans of the last seconds, in the order of arrival.
 #[derive(Default)]
-pub(super) struct Scans {
+struct Scans {
     scans: VecDeque<LaserScan>,
+}
+
+impl SensorReader for Scans {
+    fn take(&mut self, message: &Message<'_>, tally: &mut Tally) -> Result<(), CdrError> {
+        if !self.push(decode(message.data)?) {
+            lose_scan(tally);
+        }
+        Ok(())
+    }
+
+    fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
+        let Some(scan) = self.near(moment.stamp) else {
+            tally.count("frames_without_laser");
+            return sensors;
+        };
+        let then = scan.header.stamp();
+        let Some(mount) = moment.tf.lookup(moment.robot_frame, &scan.header.frame_id, then) else {
+            tally.count("laser_scans_without_pose");
+            tally.note("tf does not connect the laser scanner with the robot: it is not used");
+            return sensors;
+        };
+        let pose = moment.odom_from_robot;
+        sensors.with(seen_from(scan, &mount, &(pose(moment.stamp).inverse() * pose(then))))
+    }
+}
+
+/// Counts a scan without angles or ranges as lost.
+pub(crate) fn lose_scan(tally: &mut Tally) {
+    tally.lose("laser_scans_invalid", || "a laser scan has no angles or ranges".into());
 }
 
 impl Scans {
     /// Adds a scan; returns false if its angles or ranges are invalid.
-    pub(super) fn push(&mut self, scan: LaserScan) -> bool {
+    fn push(&mut self, scan: LaserScan) -> bool {
         if !is_sane(&scan) {
             return false;
         }
@@ -35,7 +82,7 @@ impl Scans {
     }
 
     /// Returns the scan nearest to an image in time, if it is near enough.
-    pub(super) fn near(&self, image: Stamp) -> Option<&LaserScan> {
+    fn near(&self, image: Stamp) -> Option<&LaserScan> {
         let off_s = |scan: &&LaserScan| scan.header.stamp().seconds_since(image).abs();
         let nearest = self.scans.iter().min_by(|a, b| off_s(a).total_cmp(&off_s(b)));
         nearest.filter(|scan| off_s(scan) <= NEAR_S)

@@ -1,0 +1,110 @@
+//! Algebra of large matrices for trainers, by `faer` and on one thread, so that a fit has the same
+//! bytes on any number of them. Processors with other vector instructions may round otherwise,
+//! which is why pipelines do without it. Small matrices of fixed size are `nalgebra`'s.
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::solvers::{Llt, Solve};
+use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
+use nalgebra::{DMatrix, DVector};
+
+/// Normal equations of a least-squares fit, of which only the penalties and the right side change
+/// between solutions.
+///
+/// ```
+/// # use nalgebra::{DMatrix, DVector};
+/// # use tagalong_learn::dense::NormalEquations;
+/// let rows = DMatrix::from_row_slice(3, 2, &[1.0, 0.0, 1.0, 1.0, 1.0, 2.0]);
+/// let targets = DVector::from_vec(vec![1.0, 3.0, 5.0]);
+/// let fitted = NormalEquations::new(&rows).solve(&[0.0, 0.0], &rows.tr_mul(&targets)).unwrap();
+/// assert!((fitted[0] - 1.0).abs() < 1e-12 && (fitted[1] - 2.0).abs() < 1e-12);
+/// ```
+#[derive(Clone, Debug)]
+pub struct NormalEquations {
+    /// Products of the columns.
+    gram: Mat<f64>,
+}
+
+impl NormalEquations {
+    /// Multiplies the columns of the design matrix, which has a row for each sample.
+    pub fn new(rows: &DMatrix<f64>) -> Self {
+        let (count, columns) = rows.shape();
+        let design = MatRef::from_column_major_slice(rows.as_slice(), count, columns);
+        let mut gram = Mat::zeros(columns, columns);
+        matmul(&mut gram, Accum::Replace, design.transpose(), design, 1.0, Par::Seq);
+        Self { gram }
+    }
+
+    /// Returns the weights that minimise the squared errors plus, for each weight, its penalty
+    /// times its square. `right` is the transposed design matrix times the targets. `None` if the
+    /// equations are not positive definite.
+    pub fn solve(&self, penalties: &[f64], right: &DVector<f64>) -> Option<DVector<f64>> {
+        let mut normal = self.gram.clone();
+        for (i, penalty) in penalties.iter().enumerate() {
+            normal[(i, i)] += penalty;
+        }
+        let factors = Llt::new(normal.as_ref(), Side::Lower).ok()?;
+        let solved =
+            factors.solve(MatRef::from_column_major_slice(right.as_slice(), right.len(), 1));
+        let weights = DVector::from_iterator(right.len(), solved.col(0).iter().copied());
+        weights.iter().all(|weight| weight.is_finite()).then_some(weights)
+    }
+}
+
+/// Returns the scalar products of all pairs of vectors, a row for each of `a` and a column for each
+/// of `b`. Both hold one vector of `length` numbers after the other.
+pub fn scalar_products(a: &[f32], b: &[f32], length: usize) -> Vec<f32> {
+    let (rows, columns) = (a.len() / length, b.len() / length);
+    let left = MatRef::from_row_major_slice(&a[..rows * length], rows, length);
+    let right = MatRef::from_row_major_slice(&b[..columns * length], columns, length);
+    let mut products = vec![0.0; rows * columns];
+    let out = MatMut::from_row_major_slice_mut(&mut products, rows, columns);
+    matmul(out, Accum::Replace, left, right.transpose(), 1.0, Par::Seq);
+    products
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers between -1 and 1 without a pattern.
+    fn number(seed: usize) -> f64 {
+        crate::mix(seed as u64) as f64 / u64::MAX as f64 * 2.0 - 1.0
+    }
+
+    /// The slow reference: the equations written out, and solved by `nalgebra`.
+    #[test]
+    fn weights_are_those_of_the_normal_equations() {
+        let rows = DMatrix::from_fn(50, 7, |row, column| number(row * 7 + column));
+        let right = rows.transpose() * DVector::from_fn(50, |row, _| number(1000 + row));
+        let penalties = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 9.0];
+        let fitted = NormalEquations::new(&rows).solve(&penalties, &right).unwrap();
+        let diagonal = DMatrix::from_diagonal(&DVector::from_column_slice(&penalties));
+        let expected = (rows.transpose() * &rows + diagonal).lu().solve(&right).unwrap();
+        assert!((fitted - expected).norm() < 1e-12);
+    }
+
+    #[test]
+    fn equations_without_one_solution_have_none() {
+        let rows = DMatrix::from_fn(9, 2, |row, _| row as f64);
+        let (normal, right) = (NormalEquations::new(&rows), DVector::from_vec(vec![1.0, 1.0]));
+        assert_eq!(normal.solve(&[-1.0, -1.0], &right), None);
+        assert!(normal.solve(&[1.0, 1.0], &right).is_some());
+        assert_eq!(normal.solve(&[f64::NAN, 1.0], &right), None);
+    }
+
+    #[test]
+    fn products_are_those_of_the_definition() {
+        let vectors = |count: usize, seed: usize| -> Vec<f32> {
+            (0..count * 33).map(|k| number(seed + k) as f32).collect()
+        };
+        let (a, b) = (vectors(5, 1), vectors(4, 9000));
+        let products = scalar_products(&a, &b, 33);
+        assert_eq!(products.len(), 20);
+        for (k, product) in products.iter().enumerate() {
+            let (row, column) = (&a[33 * (k / 4)..][..33], &b[33 * (k % 4)..][..33]);
+            let expected: f32 = row.iter().zip(column).map(|(a, b)| a * b).sum();
+            assert!((product - expected).abs() < 1e-5, "{k}");
+        }
+        assert!(scalar_products(&[], &b, 33).is_empty());
+    }
+}
