@@ -84,12 +84,12 @@ pub struct Truth {
     pub floor_m: Option<[f64; 2]>,
     /// Whether it counts.
     pub role: Role,
-    /// How the camera sees the person, where that is annotated.
+    /// View of the person from the camera, where that is annotated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<View>,
 }
 
-/// How the camera sees a person.
+/// View of a person from the camera.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct View {
     /// Fraction that shows, 0 to 1.

@@ -24,7 +24,7 @@ impl RtenNetwork {
     /// Reads the bytes of an ONNX file.
     ///
     /// # Errors
-    /// Bytes that [`Survey::of`] refuses, operators that the runtime does not know, weights in
+    /// Bytes that the survey refuses, operators that the runtime does not know, weights in
     /// another file, and tensors that are too large; the message is a sentence.
     pub fn from_onnx(bytes: Vec<u8>, limits: &Limits) -> Result<Self, String> {
         let survey = Survey::of(&bytes, limits)?;

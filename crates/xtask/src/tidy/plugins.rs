@@ -8,7 +8,7 @@ use crate::workspace::Workspace;
 /// Headings that the README of a plugin must have, as beginnings.
 const README_PARTS: &[&str] = &["**Source**", "**Needs**", "## Where we differ from the paper"];
 
-/// What the README of a generated plugin says until its author writes something there.
+/// Text of the README of a generated plugin until its author writes something there.
 const PLACEHOLDERS: &[&str] = &[
     "Say in a paragraph what the method is",
     "authors, *title*, where and when",
