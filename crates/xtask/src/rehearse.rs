@@ -21,6 +21,8 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("import kitti", "needs another data set"),
     ("import mot", "needs another data set"),
     ("import tum", "needs another data set"),
+    ("yolox_s.onnx", "needs a network of the user"),
+    ("people.toml", "needs a network of the user"),
     ("../shared", "needs the annotated logs"),
     ("benches/rooms.toml", "needs the annotated logs"),
     ("LOG.people.csv", "needs an annotated log"),
