@@ -42,7 +42,7 @@ pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
 /// Refuses a path that cannot be a log, with a remedy.
 ///
 /// # Errors
-/// A missing file, a directory that is not one log, or a bag of another format.
+/// A missing file, or a directory that is not one log.
 pub fn check_log_path(path: &Path) -> Result<(), Failure> {
     let shown = path.display();
     if !path.exists() {

@@ -80,7 +80,7 @@ impl Database {
                 format!("{bytes} of {claimed} bytes are there; the last messages may be incomplete")
             });
         }
-        let found = self.topics(&walk.limits.schema_bytes);
+        let found = self.topics(walk.limits.schema_bytes);
         let found = found.unwrap_or_else(|why| {
             walk.fault("damaged_records", || format!("the table of topics: {why}"));
             Vec::new()
@@ -93,9 +93,9 @@ impl Database {
         }
     }
 
-    fn topics(&self, longest: &u64) -> rusqlite::Result<Vec<Option<Channel>>> {
+    fn topics(&self, longest: u64) -> rusqlite::Result<Vec<Option<Channel>>> {
         let mut statement = self.connection.prepare(TOPICS)?;
-        let rows = statement.query_map([], |row| Ok(channel(row, *longest).ok()))?;
+        let rows = statement.query_map([], |row| Ok(channel(row, longest).ok()))?;
         rows.collect()
     }
 

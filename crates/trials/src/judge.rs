@@ -4,7 +4,7 @@ use tagalong_eval::{
     Clear, Comparison, Frame, Match, Prepared, Region, Report, Role, Sequence, SetDistance,
     Similarity, Tally, Truth, View,
 };
-use tagalong_geometry::Rect;
+use tagalong_geometry::{Camera, Rect};
 use tagalong_pipeline::FrameReport;
 
 use crate::{Moment, Run, Trial, TrialError};
@@ -63,7 +63,7 @@ impl Judge {
     /// Returns the frame; where places are compared, frames without a place do not count.
     fn frame(&self, trial: &Trial, moment: &Moment, report: &FrameReport) -> Frame {
         let by_box = self.similarity == Similarity::Iou;
-        let truths = moment.truth.iter().map(|person| self.truth(person));
+        let truths = moment.truth.iter().map(|person| self.truth(person, &trial.camera));
         Frame {
             stamp_ns: moment.stamp.nanos() as i64,
             truths: truths.filter(|t| !by_box || t.region.is_some()).collect(),
@@ -81,8 +81,9 @@ impl Judge {
         reports.filter(|r| !by_box || r.region.is_some()).collect()
     }
 
-    fn truth(&self, person: &tagalong_sim::Truth) -> Truth {
+    fn truth(&self, person: &tagalong_sim::Truth, camera: &Camera) -> Truth {
         let head = person.head_in_robot;
+        let in_camera = camera.robot_from_camera.inverse_transform_point(&head);
         // Beyond the range both the person and reports on it are left out.
         let far = head.x.hypot(head.y) > self.max_range_m;
         Truth {
@@ -90,7 +91,10 @@ impl Judge {
             region: person.upper_body.as_ref().map(region),
             floor_m: Some([head.x, head.y]),
             role: if person.ignore || far { Role::Ignored } else { Role::Counts },
-            view: Some(View { visible: person.visible_fraction, distance_m: head.coords.norm() }),
+            view: Some(View {
+                visible: person.visible_fraction,
+                distance_m: in_camera.coords.norm(),
+            }),
         }
     }
 }
