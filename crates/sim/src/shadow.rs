@@ -3,6 +3,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::lanes::{LANES, Vectors};
 use crate::seen::SolidView;
 use crate::shape::Shape;
 use crate::sight::{before, between};
@@ -11,40 +12,88 @@ use crate::sight::{before, between};
 const CELLS: usize = 16;
 
 /// Objects around a lamp that cast shadows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Shadows {
-    lamp: Point3<f64>,
-    /// Six faces of rows of cells.
-    cells: Vec<Vec<SolidView>>,
+    solids: Vec<SolidView>,
+    /// Numbers of solids, cell by cell.
+    numbers: Vec<u32>,
+    /// Six faces of rows of cells: where the numbers of each cell end.
+    ends: Vec<u32>,
 }
 
 impl Shadows {
     /// The shadows that some solids throw.
     pub fn new<'a>(
         lamp: Point3<f64>,
-        solids: impl Iterator<Item = (usize, &'a Shape)> + Clone,
+        solids: impl Iterator<Item = (Option<u16>, &'a Shape)> + Clone,
     ) -> Self {
-        let mut cells = Vec::with_capacity(6 * CELLS * CELLS);
+        let seen = solids.clone().map(|(_, solid)| solid.seen_from(&lamp)).collect();
+        let mut shadows = Self { solids: seen, ..Self::default() };
         for face in 0..6 {
             let sights = before(solids.clone(), &lamp, &on_face(face, 0.0, 0.0));
-            for row in 0..CELLS {
-                let edge = |row| [on_face(face, -1.0, line(row)), on_face(face, 1.0, line(row))];
-                let strip = between(&sights, edge(row), edge(row + 1));
-                for column in 0..CELLS {
-                    let edge = |c| [on_face(face, line(c), -1.0), on_face(face, line(c), 1.0)];
-                    let cell = between(strip.iter().copied(), edge(column), edge(column + 1));
-                    cells.push(cell.iter().map(|sight| sight.seen).collect());
+            let row = |row| [on_face(face, -1.0, line(row)), on_face(face, 1.0, line(row))];
+            let column = |c| [on_face(face, line(c), -1.0), on_face(face, line(c), 1.0)];
+            // Most solids are on one face only.
+            let sights = between(&sights, row(0), row(CELLS));
+            let sights = between(sights, column(0), column(CELLS));
+            for above in 0..CELLS {
+                let strip = between(sights.iter().copied(), row(above), row(above + 1));
+                for left in 0..CELLS {
+                    let cell = between(strip.iter().copied(), column(left), column(left + 1));
+                    shadows.numbers.extend(cell.iter().map(|sight| sight.number));
+                    shadows.ends.push(shadows.numbers.len() as u32);
                 }
             }
         }
-        Self { lamp, cells }
+        shadows
     }
 
-    /// True if something stands between the lamp and a point.
-    pub fn on(&self, point: &Point3<f64>) -> bool {
-        let ray = point - self.lamp;
-        self.cells[cell(&ray)].iter().any(|seen| seen.meet(&ray).is_some_and(|t| t < 1.0))
+    /// True if something stands in the way from the lamp to a point.
+    pub fn on(&self, way: &Vector3<f64>) -> bool {
+        let mut numbers = self.within(cell(way)).iter();
+        numbers.any(|n| self.solids[*n as usize].meet(way).is_some_and(|t| t < 1.0))
     }
+
+    /// Closes the `open` ways from the lamp in which something stands.
+    pub fn darken(&self, ways: &Vectors, open: &mut [bool; LANES]) {
+        let cells: [usize; LANES] = std::array::from_fn(|lane| cell(&ways.at(lane)));
+        let mut left = *open;
+        while let Some(lane) = left.iter().position(|left| *left) {
+            let together: [bool; LANES] =
+                std::array::from_fn(|other| left[other] && cells[other] == cells[lane]);
+            let barred = barred(&self.solids, self.within(cells[lane]), ways, &together);
+            for other in 0..LANES {
+                open[other] &= !(together[other] && barred[other] != 0);
+                left[other] &= !together[other];
+            }
+        }
+    }
+
+    /// The numbers of the solids in a cell.
+    fn within(&self, cell: usize) -> &[u32] {
+        let start = cell.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.numbers[start as usize..self.ends[cell] as usize]
+    }
+}
+
+/// Returns one for each way in which some of the numbered solids stand, until none of the ways of
+/// interest is left.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn barred(
+    solids: &[SolidView],
+    numbers: &[u32],
+    ways: &Vectors,
+    interest: &[bool; LANES],
+) -> [u64; LANES] {
+    let mut barred = [0; LANES];
+    for number in numbers {
+        solids[*number as usize].bar(ways, 1.0, &mut barred);
+        let open = (0..LANES).filter(|lane| interest[*lane] && barred[*lane] == 0).count();
+        if open == 0 {
+            break;
+        }
+    }
+    barred
 }
 
 /// Where a line between cells runs on a face, -1 to 1.
@@ -107,11 +156,11 @@ mod tests {
             points in prop::collection::vec(prop::array::uniform3(-4.0..4.0f64), 200),
         ) {
             let lamp = Point3::new(0.3, -0.2, 0.5);
-            let shadows = Shadows::new(lamp, solids.iter().enumerate());
+            let shadows = Shadows::new(lamp, solids.iter().map(|solid| (None, solid)));
             for point in points.into_iter().map(Point3::from) {
                 let way = point - lamp;
                 let barred = solids.iter().any(|s| s.meet(&lamp, &way).is_some_and(|t| t < 1.0));
-                prop_assert_eq!(shadows.on(&point), barred);
+                prop_assert_eq!(shadows.on(&way), barred);
             }
         }
     }
