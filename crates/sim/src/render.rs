@@ -5,7 +5,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
 use tagalong_core::Image;
-use tagalong_geometry::Camera;
+use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
 
 use crate::lanes::{LANES, Lanes, Vectors, points, product};
 use crate::parallel::in_pieces;
@@ -185,14 +185,19 @@ fn meet_any(solids: &[SolidView], rays: &Vectors) -> [u64; LANES] {
     met
 }
 
-/// Turns rays of depth one from the camera's axes to those of the world.
+/// Rays of depth one of a lens without distortion, in the axes that `turn` leads to, from a column
+/// on, some columns apart, of a row.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn turned(turn: &Matrix3<f64>, rays: &Vectors) -> Vectors {
-    let mut turned = Vectors::ZERO;
+fn straight_rays(lens: &Pinhole, turn: &Matrix3<f64>, [left, step, row]: [usize; 3]) -> Vectors {
+    let mut rays = Vectors::ZERO;
+    let (left, step, y) = (left as f64, step as f64, (row as f64 - lens.cy) / lens.fy);
     for lane in 0..LANES {
-        turned.set(lane, &product(turn, &rays.at(lane)));
+        // Columns are whole numbers, so that this is exact.
+        let column = left + step * lane as f64;
+        let ray = Vector3::new((column - lens.cx) / lens.fx, y, 1.0);
+        rays.set(lane, &product(turn, &ray));
     }
-    turned
+    rays
 }
 
 /// Where a camera stands and looks.
@@ -215,12 +220,18 @@ impl<'a> Eye<'a> {
 
     /// Rays of a row, from this column on, `step` columns apart.
     fn rays(&self, left: usize, step: usize, row: usize) -> Vectors {
-        let mut rays = Vectors::ZERO;
-        for lane in 0..LANES {
-            let column = (left + lane * step) as f64;
-            rays.set(lane, &self.camera.ray(Point2::new(column, row as f64)));
+        match &self.camera.lens {
+            Lens::Pinhole(lens) if lens.distortion == Distortion::None => {
+                straight_rays(lens, &self.world_from_camera, [left, step, row])
+            }
+            _ => {
+                let mut rays = Vectors::ZERO;
+                for lane in 0..LANES {
+                    rays.set(lane, &self.ray((left + lane * step) as f64, row as f64));
+                }
+                rays
+            }
         }
-        turned(&self.world_from_camera, &rays)
     }
 
     /// The ray through the upper left corner of a pixel.
@@ -250,7 +261,6 @@ mod tests {
 
     use nalgebra::Rotation3;
     use proptest::prelude::*;
-    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
     use crate::material::Material;

@@ -293,8 +293,10 @@ impl DepthRow {
         }
         let [columns, rows] = &self.off;
         for (x, here) in seen.row(y).iter().enumerate() {
-            let near = seen.get(x as i64 + i64::from(columns[x]), y as i64 + i64::from(rows[x]));
-            let hit = near.as_ref().unwrap_or(here);
+            let column = x.wrapping_add_signed(columns[x] as isize);
+            let row = y.wrapping_add_signed(rows[x] as isize);
+            let inside = column < seen.width() && row < seen.height();
+            let hit = if inside { &seen.pixels()[row * seen.width() + column] } else { here };
             (self.t[x], self.infrared[x], self.facing[x]) = (hit.t, hit.infrared, hit.facing);
         }
     }

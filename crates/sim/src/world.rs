@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::lanes::{LANES, Lanes, Vectors, dot};
 use crate::material::{Colour, Material};
-use crate::shadow::Shadows;
+use crate::shadow::{self, Shadows};
 use crate::shape::{Shape, Surface};
 
 /// Solids that belong together.
@@ -61,7 +61,7 @@ impl Stage {
     }
 
     fn shadows(&self) -> &[Shadows] {
-        self.shadows.get_or_init(|| shadows(&self.lamps, &self.objects))
+        self.shadows.get_or_init(|| shadows(shadow::FINE, &self.lamps, &self.objects))
     }
 }
 
@@ -175,15 +175,16 @@ impl World {
 
     /// Returns the shadows around each lamp: those of the stage, and those of people.
     fn shadows(&self) -> impl Iterator<Item = [&Shadows; 2]> {
-        let people = self.shadows.get_or_init(|| shadows(&self.stage.lamps, &self.people));
+        let people =
+            self.shadows.get_or_init(|| shadows(shadow::COARSE, &self.stage.lamps, &self.people));
         self.stage.shadows().iter().zip(people).map(|(stage, people)| [stage, people])
     }
 }
 
 /// Returns the shadows that objects throw, for each lamp.
-fn shadows(lamps: &[Lamp], objects: &[Object]) -> Vec<Shadows> {
+fn shadows(side: usize, lamps: &[Lamp], objects: &[Object]) -> Vec<Shadows> {
     let casters = objects.iter().filter(|object| object.casts_shadow).flat_map(Object::solids);
-    lamps.iter().map(|lamp| Shadows::new(lamp.at, casters.clone())).collect()
+    lamps.iter().map(|lamp| Shadows::new(side, lamp.at, casters.clone())).collect()
 }
 
 /// Illuminance by the light from everywhere, of surfaces with these normals.
