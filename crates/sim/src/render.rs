@@ -263,7 +263,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::material::Material;
+    use crate::material::{Material, Pattern};
     use crate::shape::Form;
     use crate::world::{Lamp, Object, Stage};
 
@@ -274,7 +274,17 @@ mod tests {
             _ => Form::Capsule { length: 1.0, first: 0.3, second: 0.1 },
         };
         let turn = Rotation3::from_euler_angles(turn, 2.0 * turn, 0.3);
-        Shape::new(form, Point3::from(at), turn, Material::plain([0.1 * turn.angle(); 3]))
+        let patterns = [
+            Pattern::Plain,
+            Pattern::Stripes(0.1),
+            Pattern::Checks(0.13),
+            Pattern::Mottled(0.05),
+            Pattern::Planks(0.12),
+            Pattern::Print(0.3, 0.8),
+        ];
+        let pattern = patterns[(turn.angle() * 100.0) as usize % patterns.len()];
+        let material = Material::patterned([0.1 * turn.angle(); 3], [0.7, 0.3, 0.2], pattern);
+        Shape::new(form, Point3::from(at), turn, material)
     }
 
     #[test]
