@@ -127,12 +127,14 @@ impl LaserSettings {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use nalgebra::Rotation3;
 
     use super::*;
     use crate::material::Material;
     use crate::shape::{Form, Shape};
-    use crate::world::Object;
+    use crate::world::{Object, Stage};
 
     const FOUR: LaserSettings = LaserSettings {
         rays: 4,
@@ -151,7 +153,7 @@ mod tests {
             Shape::new(form, at, Rotation3::identity(), Material::plain([0.5; 3]))
         };
         let objects = vec![Object::new(places.iter().map(ball).collect(), Some(1), true)];
-        World::new(objects, Vec::new(), 100.0)
+        World::new(&Arc::new(Stage::new(objects, Vec::new(), 100.0)), Vec::new())
     }
 
     #[test]

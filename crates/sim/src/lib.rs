@@ -39,6 +39,7 @@
 mod behaviour;
 mod body;
 mod gait;
+mod lanes;
 mod laser;
 mod material;
 mod mirror;

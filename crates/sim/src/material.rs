@@ -3,6 +3,7 @@
 
 use nalgebra::Vector3;
 
+use crate::lanes::{LANES, Lanes, Vectors};
 use crate::random::uniform_at;
 
 /// Red, green and blue reflectance, 0 to 1, linear in light.
@@ -69,12 +70,9 @@ impl Material {
         match self.pattern {
             Pattern::Plain => self.colour,
             Pattern::Stripes(period) => self.blend(part(own.z / period) > 0.5),
-            Pattern::Checks(side) => {
-                let cells = own.map(|v| floor(v / side));
-                self.blend((cells.x ^ cells.y ^ cells.z) & 1 == 1)
-            }
+            Pattern::Checks(side) => self.blend(odd(own, side) == 1),
             Pattern::Mottled(size) => mixed(self.colour, self.second, clouds(own, size)),
-            Pattern::Planks(width) => self.planks(own, width),
+            Pattern::Planks(width) => mixed(self.colour, self.second, plank(own, width)),
             Pattern::Head { half, hairline } => self.head(&own.component_div(&half), hairline),
             Pattern::Print(half_width, half_height) => {
                 self.print(own.y / half_width, own.z / half_height)
@@ -82,16 +80,42 @@ impl Material {
         }
     }
 
-    fn blend(&self, second: bool) -> Colour {
-        if second { self.second } else { self.colour }
+    /// Returns red, green and blue at points in the solid's own axes, of which only the `wanted`
+    /// ones count.
+    pub fn colours(&self, own: &Vectors, wanted: &[bool; LANES]) -> [Lanes; 3] {
+        let tones = match self.pattern {
+            Pattern::Plain => return self.colour.map(|c| [c; LANES]),
+            // A tone of one would not be the second colour to the last bit.
+            Pattern::Checks(side) => return self.chequered(own, side),
+            Pattern::Mottled(size) => mottles(own, size),
+            Pattern::Planks(width) => planks(own, width),
+            Pattern::Stripes(_) | Pattern::Head { .. } | Pattern::Print(..) => {
+                return self.colours_one_by_one(own, wanted);
+            }
+        };
+        let tint = |c: usize| tones.map(|tone| between(self.colour[c], self.second[c], tone));
+        [tint(0), tint(1), tint(2)]
     }
 
-    fn planks(&self, own: &Vector3<f64>, width: f64) -> Colour {
-        let row = floor(own.y / width) as u64;
-        let board = floor(own.x / (8.0 * width) + uniform_at(11, row)) as u64;
-        let tone = uniform_at(row, board);
-        let grain = clouds(&Vector3::new(own.x * 0.1, own.y, 0.0), 0.15 * width);
-        mixed(self.colour, self.second, 0.6 * tone + 0.4 * grain)
+    fn chequered(&self, own: &Vectors, side: f64) -> [Lanes; 3] {
+        let odd = checks(own, side);
+        let tint = |c: usize| odd.map(|odd| if odd == 1 { self.second[c] } else { self.colour[c] });
+        [tint(0), tint(1), tint(2)]
+    }
+
+    /// Small things have so few pixels that vectors would not gain anything.
+    fn colours_one_by_one(&self, own: &Vectors, wanted: &[bool; LANES]) -> [Lanes; 3] {
+        let mut colours = [[0.0; LANES]; 3];
+        for lane in (0..LANES).filter(|lane| wanted[*lane]) {
+            let colour = self.at(&own.at(lane));
+            (colours[0][lane], colours[1][lane], colours[2][lane]) =
+                (colour[0], colour[1], colour[2]);
+        }
+        colours
+    }
+
+    fn blend(&self, second: bool) -> Colour {
+        if second { self.second } else { self.colour }
     }
 
     /// `n` is the point on the unit ball: x forward, y left, z up.
@@ -154,43 +178,125 @@ pub fn scaled(colour: Colour, by: f64) -> Colour {
 }
 
 fn mixed(a: Colour, b: Colour, part: f64) -> Colour {
-    [0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * part)
+    [0, 1, 2].map(|i| between(a[i], b[i], part))
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn checks(own: &Vectors, side: f64) -> [i64; LANES] {
+    let mut checks = [0; LANES];
+    for lane in 0..LANES {
+        checks[lane] = odd(&own.at(lane), side);
+    }
+    checks
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn mottles(own: &Vectors, size: f64) -> Lanes {
+    let mut tones = [0.0; LANES];
+    for lane in 0..LANES {
+        tones[lane] = clouds(&own.at(lane), size);
+    }
+    tones
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn planks(own: &Vectors, width: f64) -> Lanes {
+    let mut tones = [0.0; LANES];
+    for lane in 0..LANES {
+        tones[lane] = plank(&own.at(lane), width);
+    }
+    tones
+}
+
+// Without branches, so that loops over lanes become vector instructions. Whole numbers wrap
+// instead of being checked for an overflow, which would be a branch.
+
+/// One where the squares along all axes add up to an odd number, zero elsewhere.
+#[inline(always)]
+fn odd(own: &Vector3<f64>, side: f64) -> i64 {
+    (floor(own.x / side) ^ floor(own.y / side) ^ floor(own.z / side)) & 1
+}
+
+/// Tone of a floor board, 0 to 1.
+#[inline(always)]
+fn plank(own: &Vector3<f64>, width: f64) -> f64 {
+    let row = floor(own.y / width) as u64;
+    let board = floor(own.x / (8.0 * width) + uniform_at(11, row)) as u64;
+    let tone = uniform_at(row, board);
+    // Boards lie flat: their grain has no height.
+    let (x, y, size) = (own.x * 0.1, own.y, 0.15 * width);
+    let fine = 2.3 / size;
+    let grain = 0.65 * flat_noise(x / size, y / size) + 0.35 * flat_noise(x * fine, y * fine);
+    0.6 * tone + 0.4 * grain
 }
 
 /// Value noise of two octaves, 0 to 1.
+#[inline(always)]
 fn clouds(own: &Vector3<f64>, size: f64) -> f64 {
-    0.65 * value_noise(&(own / size)) + 0.35 * value_noise(&(own * (2.3 / size)))
+    let fine = 2.3 / size;
+    let coarse = value_noise(own.x / size, own.y / size, own.z / size);
+    0.65 * coarse + 0.35 * value_noise(own.x * fine, own.y * fine, own.z * fine)
 }
 
-/// The largest whole number that is not larger. `f64::floor` calls a function
-/// where the processor need not have an instruction for it.
+/// Adding this number leaves no digits behind the point: half of those of a mantissa are above it.
+const WHOLE: f64 = 6_755_399_441_055_744.0;
+
+/// The largest whole number that is not larger, of numbers below 2^51. `f64::floor` calls a
+/// function where the processor need not have an instruction for it, and conversions to 64 bits
+/// are no vector instructions before AVX-512.
+#[inline(always)]
 fn floor(value: f64) -> i64 {
-    let towards_zero = value as i64;
-    towards_zero - i64::from(value < towards_zero as f64)
+    let shifted = value + WHOLE;
+    let nearest = (shifted.to_bits() as i64).wrapping_sub(WHOLE.to_bits() as i64);
+    nearest.wrapping_sub(i64::from(shifted - WHOLE > value))
 }
 
 /// Returns the part of a number above its [`floor`].
+#[inline(always)]
 fn part(value: f64) -> f64 {
-    value - floor(value) as f64
+    let whole = (value + WHOLE) - WHOLE;
+    value - if whole > value { whole - 1.0 } else { whole }
 }
 
+#[inline(always)]
 fn smooth(part: f64) -> f64 {
     part * part * (3.0 - 2.0 * part)
 }
 
 /// Random values at the corners of a grid, smoothly joined.
-fn value_noise(p: &Vector3<f64>) -> f64 {
-    let cell = p.map(floor);
-    let part = p.map(|v| smooth(part(v)));
-    let corner = |i: u64| {
-        let at = |axis: usize| cell[axis] + ((i >> axis) & 1) as i64;
-        // Large primes spread neighbouring cells over the keys (Teschner et al., VMV 2003).
-        let key = at(0).wrapping_mul(73_856_093) ^ at(1).wrapping_mul(19_349_663);
-        uniform_at(3, (key ^ at(2).wrapping_mul(83_492_791)) as u64)
-    };
-    let along = |axis: usize, a: f64, b: f64| a + (b - a) * part[axis];
-    let edge = |i: u64| along(0, corner(i), corner(i + 1));
-    along(2, along(1, edge(0), edge(2)), along(1, edge(4), edge(6)))
+#[inline(always)]
+fn value_noise(x: f64, y: f64, z: f64) -> f64 {
+    let (below, above) = (floor(z), floor(z).wrapping_add(1));
+    between(layer(x, y, below), layer(x, y, above), smooth(part(z)))
+}
+
+/// As [`value_noise`] in the plane `z = 0`, where the layer above has no weight.
+#[inline(always)]
+fn flat_noise(x: f64, y: f64) -> f64 {
+    layer(x, y, 0)
+}
+
+/// Values of one layer of the grid.
+#[inline(always)]
+fn layer(x: f64, y: f64, layer: i64) -> f64 {
+    let (column, row) = (floor(x), floor(y));
+    let (along, across) = (smooth(part(x)), smooth(part(y)));
+    let (next_column, next_row) = (column.wrapping_add(1), row.wrapping_add(1));
+    let near = between(corner(column, row, layer), corner(next_column, row, layer), along);
+    let far = between(corner(column, next_row, layer), corner(next_column, next_row, layer), along);
+    between(near, far, across)
+}
+
+#[inline(always)]
+fn between(a: f64, b: f64, part: f64) -> f64 {
+    a + (b - a) * part
+}
+
+/// Large primes spread neighbouring cells over the keys (Teschner et al., VMV 2003).
+#[inline(always)]
+fn corner(column: i64, row: i64, layer: i64) -> f64 {
+    let key = column.wrapping_mul(73_856_093) ^ row.wrapping_mul(19_349_663);
+    uniform_at(3, (key ^ layer.wrapping_mul(83_492_791)) as u64)
 }
 
 #[cfg(test)]

@@ -298,7 +298,7 @@ impl Count {
 fn within_reach<'a>(
     world: &'a World,
     rays: &[(usize, Point3<f64>, Vector3<f64>)],
-) -> Vec<(usize, &'a Shape)> {
+) -> Vec<(Option<u16>, &'a Shape)> {
     let Some((_, eye, _)) = rays.get(rays.len() / 2) else { return Vec::new() };
     let axis = rays.iter().map(|ray| ray.2).sum::<Vector3<f64>>();
     let Some(axis) = axis.try_normalize(1e-3) else { return world.solids().collect() };
@@ -342,13 +342,15 @@ fn rim_m(mirror: &ConicalMirror) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use nalgebra::Rotation3;
     use proptest::prelude::*;
 
     use super::*;
     use crate::material::Material;
     use crate::shape::Form;
-    use crate::world::Object;
+    use crate::world::{Object, Stage};
 
     fn settings() -> CameraSettings {
         let mirror = MirrorSettings {
@@ -418,8 +420,8 @@ mod tests {
                 ball(Point3::new(range * sine, range * cosine, -0.04 * f64::from(i)), 0.2)
             })
             .collect();
-        let objects = vec![Object::new(balls.clone(), Some(3), true)];
-        let world = World::new(objects, Vec::new(), 100.0);
+        let people = vec![Object::new(balls.clone(), Some(3), true)];
+        let world = World::new(&Arc::new(Stage::new(Vec::new(), Vec::new(), 100.0)), people);
         let image = camera.draw(&world, &Isometry3::identity(), 2);
         let mut met = 0;
         for (at, hit) in image.pixels().iter().enumerate() {

@@ -5,15 +5,17 @@
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
 use tagalong_core::Image;
-use tagalong_geometry::Camera;
+use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
 
+use crate::lanes::{LANES, Lanes, Vectors, points, product};
 use crate::parallel::in_pieces;
+use crate::seen::{Met, SolidView};
 use crate::shape::Shape;
 use crate::sight::{SightedSolid, before, between};
 use crate::world::{Hit, World};
 
 /// Side of a tile, pixels.
-const TILE: usize = 16;
+const TILE: usize = LANES;
 
 /// Renders the world as seen by a camera without any noise: for each pixel the surface that its ray
 /// meets, where `t` is the depth along the optical axis in metres.
@@ -62,10 +64,9 @@ impl WorldCamera<'_> {
             let edge = |x: usize| [eye.corner(x, top), eye.corner(x, top + rows)];
             let tile = between(strip.iter().copied(), edge(left), edge(right));
             for row in 0..rows {
-                for column in left..right {
-                    let ray = eye.ray(column as f64, (top + row) as f64);
-                    pixels[row * width + column] = self.look(&tile, &eye.at, &ray);
-                }
+                let rays = eye.rays(left, 1, top + row);
+                let pixels = &mut pixels[row * width..][left..right];
+                self.look(&tile, &eye.at, &rays, pixels);
             }
         }
     }
@@ -94,11 +95,10 @@ impl WorldCamera<'_> {
         for row in (top..bottom).step_by(step) {
             let eye = self.eye(row);
             let alone: Vec<_> = shapes.iter().map(|shape| shape.seen_from(&eye.at)).collect();
-            for column in (left..right).step_by(step) {
-                let ray = eye.ray(column as f64, row as f64);
-                if !alone.iter().any(|seen| seen.meet(&ray).is_some()) {
-                    continue;
-                }
+            let columns = || (left..right).step_by(step);
+            let groups = columns().step_by(LANES);
+            let met = groups.flat_map(|first| meet_any(&alone, &eye.rays(first, step, row)));
+            for (column, _) in columns().zip(met).filter(|(_, met)| *met != 0) {
                 whole += 1;
                 let there = image.pixels()[row * image.width() + column].person;
                 if there == Some(person) {
@@ -117,32 +117,87 @@ impl WorldCamera<'_> {
         Visibility { fraction, bounds_px: bounds, occluder }
     }
 
-    fn look(&self, tile: &[&SightedSolid], eye: &Point3<f64>, ray: &Vector3<f64>) -> Hit {
-        first(tile, ray).map_or(Hit::NOTHING, |(t, sight)| {
-            self.world.hit(t, sight.object, sight.shape, (eye, ray), self.lit)
-        })
+    /// Renders neighbouring pixels of a row.
+    fn look(
+        &self,
+        tile: &[&SightedSolid<'_>],
+        eye: &Point3<f64>,
+        rays: &Vectors,
+        pixels: &mut [Hit],
+    ) {
+        let met = first(tile, rays);
+        let points = points(eye, rays, &met.t);
+        let mut left: [bool; LANES] =
+            std::array::from_fn(|lane| lane < pixels.len() && met.number[lane] != Met::NONE);
+        // All pixels of a solid together, which are most of the row.
+        while let Some(lane) = left.iter().position(|left| *left) {
+            let number = met.number[lane];
+            let wanted = std::array::from_fn(|lane| left[lane] && met.number[lane] == number);
+            self.shade(tile[number as usize], (&points, rays, &met.t), &wanted, pixels);
+            left.iter_mut().zip(wanted).for_each(|(left, done)| *left &= !done);
+        }
+    }
+
+    /// Renders the `wanted` ones of some pixels, whose rays meet a solid at these points.
+    fn shade(
+        &self,
+        SightedSolid { shape, person, .. }: &SightedSolid<'_>,
+        (points, rays, t): (&Vectors, &Vectors, &Lanes),
+        wanted: &[bool; LANES],
+        pixels: &mut [Hit],
+    ) {
+        let surface = shape.surface(points, rays);
+        let light = if self.lit {
+            self.world.light(&shape.material, points, &surface, wanted)
+        } else {
+            [[0.0; LANES]; 3]
+        };
+        for (lane, pixel) in pixels.iter_mut().enumerate().filter(|(lane, _)| wanted[*lane]) {
+            *pixel = Hit {
+                t: t[lane],
+                light: [light[0][lane], light[1][lane], light[2][lane]],
+                infrared: shape.material.infrared,
+                facing: surface.facing[lane],
+                person: *person,
+            };
+        }
     }
 }
 
-/// The first solid that a ray of depth one meets, of solids that are sorted.
-fn first<'s, 'a>(
-    sights: &[&'s SightedSolid<'a>],
-    ray: &Vector3<f64>,
-) -> Option<(f64, &'s SightedSolid<'a>)> {
-    let mut best = None;
-    let mut best_t = f64::INFINITY;
-    for sight in sights {
-        if sight.nearest > best_t {
+/// The first solid that each ray of depth one meets, by its place among solids that are sorted.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn first(sights: &[&SightedSolid<'_>], rays: &Vectors) -> Met {
+    let mut met = Met::NOTHING;
+    for (number, sight) in (0..).zip(sights) {
+        if !met.reaches(sight.nearest) {
             break;
         }
-        if let Some(t) = sight.seen.meet(ray)
-            && t < best_t
-        {
-            best_t = t;
-            best = Some((t, *sight));
-        }
+        sight.seen.shorten(rays, sight.nearest, number, &mut met);
     }
-    best
+    met
+}
+
+/// One for each ray that meets some of these solids.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn meet_any(solids: &[SolidView], rays: &Vectors) -> [u64; LANES] {
+    let mut met = [0; LANES];
+    solids.iter().for_each(|solid| solid.bar(rays, f64::INFINITY, &mut met));
+    met
+}
+
+/// Rays of depth one of a lens without distortion, in the axes that `turn` leads to, from a column
+/// on, some columns apart, of a row.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn straight_rays(lens: &Pinhole, turn: &Matrix3<f64>, [left, step, row]: [usize; 3]) -> Vectors {
+    let mut rays = Vectors::ZERO;
+    let (left, step, y) = (left as f64, step as f64, (row as f64 - lens.cy) / lens.fy);
+    for lane in 0..LANES {
+        // Columns are whole numbers, so that this is exact.
+        let column = left + step * lane as f64;
+        let ray = Vector3::new((column - lens.cx) / lens.fx, y, 1.0);
+        rays.set(lane, &product(turn, &ray));
+    }
+    rays
 }
 
 /// Where a camera stands and looks.
@@ -161,6 +216,22 @@ impl<'a> Eye<'a> {
 
     fn ray(&self, column: f64, row: f64) -> Vector3<f64> {
         self.world_from_camera * self.camera.ray(Point2::new(column, row))
+    }
+
+    /// Rays of a row, from this column on, `step` columns apart.
+    fn rays(&self, left: usize, step: usize, row: usize) -> Vectors {
+        match &self.camera.lens {
+            Lens::Pinhole(lens) if lens.distortion == Distortion::None => {
+                straight_rays(lens, &self.world_from_camera, [left, step, row])
+            }
+            _ => {
+                let mut rays = Vectors::ZERO;
+                for lane in 0..LANES {
+                    rays.set(lane, &self.ray((left + lane * step) as f64, row as f64));
+                }
+                rays
+            }
+        }
     }
 
     /// The ray through the upper left corner of a pixel.
@@ -186,14 +257,15 @@ pub struct Visibility {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use nalgebra::Rotation3;
     use proptest::prelude::*;
-    use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
-    use crate::material::Material;
+    use crate::material::{Material, Pattern};
     use crate::shape::Form;
-    use crate::world::{Lamp, Object};
+    use crate::world::{Lamp, Object, Stage};
 
     fn shape(form: usize, at: [f64; 3], turn: f64) -> Shape {
         let form = match form {
@@ -202,7 +274,17 @@ mod tests {
             _ => Form::Capsule { length: 1.0, first: 0.3, second: 0.1 },
         };
         let turn = Rotation3::from_euler_angles(turn, 2.0 * turn, 0.3);
-        Shape::new(form, Point3::from(at), turn, Material::plain([0.1 * turn.angle(); 3]))
+        let patterns = [
+            Pattern::Plain,
+            Pattern::Stripes(0.1),
+            Pattern::Checks(0.13),
+            Pattern::Mottled(0.05),
+            Pattern::Planks(0.12),
+            Pattern::Print(0.3, 0.8),
+        ];
+        let pattern = patterns[(turn.angle() * 100.0) as usize % patterns.len()];
+        let material = Material::patterned([0.1 * turn.angle(); 3], [0.7, 0.3, 0.2], pattern);
+        Shape::new(form, Point3::from(at), turn, material)
     }
 
     #[test]
@@ -210,7 +292,8 @@ mod tests {
         let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 23.5, cy: 17.0, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 50, 40, 0.2, 0.0, 0.0);
         let balls = [-0.4, 0.5].map(|y| shape(0, [1.2, y, 0.2], 0.3));
-        let world = World::new(vec![Object::new(balls.to_vec(), None, true)], vec![], 100.0);
+        let balls = vec![Object::new(balls.to_vec(), None, true)];
+        let world = World::new(&Arc::new(Stage::new(balls, vec![], 100.0)), vec![]);
         let pose = |part: f64| Isometry3::rotation(Vector3::z() * 0.2 * part);
         let rolling =
             WorldCamera { world: &world, camera: &camera, pose: &pose, lit: true }.draw(2);
@@ -235,7 +318,9 @@ mod tests {
                 Object::new(vec![shape(form, at, turn)], Some(i as u16), true)
             });
             let lamp = Lamp { at: Point3::new(0.0, 1.0, 2.5), lux_at_1m: 500.0 };
-            let world = World::new(objects.collect(), vec![lamp], 100.0);
+            let mut objects: Vec<Object> = objects.collect();
+            let people = objects.split_off(objects.len() / 2);
+            let world = World::new(&Arc::new(Stage::new(objects, vec![lamp], 100.0)), people);
             let pose = Isometry3::rotation(Vector3::z() * yaw);
             let image = draw(&world, &camera, &pose, 2);
             let eye = Eye::new(&camera, &pose);

@@ -3,6 +3,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::lanes::{LANES, Lanes, Vectors, dot, product};
+
 /// A solid as it is seen from one point.
 #[derive(Clone, Copy, Debug)]
 pub struct SolidView {
@@ -81,15 +83,113 @@ impl SolidView {
         Self { turn: *turn, start: *eye, solid: Solid::Capsule(capsule) }
     }
 
-    /// The smallest positive number of lengths of the ray after which it enters.
+    /// Returns the smallest positive number of lengths of the ray after which it enters.
     pub fn meet(&self, ray: &Vector3<f64>) -> Option<f64> {
-        let step = self.turn * ray;
         let t = match &self.solid {
-            Solid::Ball { tangent2 } => enter_ball(&self.start, &step, *tangent2),
-            Solid::Block => enter_block(&self.start, &step),
-            Solid::Capsule(capsule) => capsule.enter(&self.start, &step),
+            Solid::Ball { tangent2 } => self.meet_ball(*tangent2, ray),
+            Solid::Block => self.meet_block(ray),
+            Solid::Capsule(capsule) => self.meet_capsule(capsule, ray),
         };
-        t.filter(|t| *t > 1e-6)
+        (t < f64::INFINITY).then_some(t)
+    }
+
+    /// Shortens the way `t` of each ray that meets this solid, with the number `number`, before the
+    /// end of its way; nothing of it is closer to the eye than `nearest`.
+    #[inline(always)]
+    pub fn shorten(&self, rays: &Vectors, nearest: f64, number: u64, met: &mut Met) {
+        match &self.solid {
+            Solid::Ball { tangent2 } => {
+                for lane in 0..LANES {
+                    let t = self.meet_ball(*tangent2, &rays.at(lane));
+                    met.shorten(lane, t, nearest, number);
+                }
+            }
+            Solid::Block => {
+                for lane in 0..LANES {
+                    let t = self.meet_block(&rays.at(lane));
+                    met.shorten(lane, t, nearest, number);
+                }
+            }
+            Solid::Capsule(capsule) => {
+                for lane in 0..LANES {
+                    let t = self.meet_capsule(capsule, &rays.at(lane));
+                    met.shorten(lane, t, nearest, number);
+                }
+            }
+        }
+    }
+
+    /// Sets `barred` to one for each ray that meets this solid within `reach` lengths of it.
+    #[inline(always)]
+    pub fn bar(&self, rays: &Vectors, reach: f64, barred: &mut [u64; LANES]) {
+        match &self.solid {
+            Solid::Ball { tangent2 } => {
+                for lane in 0..LANES {
+                    let t = self.meet_ball(*tangent2, &rays.at(lane));
+                    barred[lane] |= u64::from(t < reach);
+                }
+            }
+            Solid::Block => {
+                for lane in 0..LANES {
+                    let t = self.meet_block(&rays.at(lane));
+                    barred[lane] |= u64::from(t < reach);
+                }
+            }
+            Solid::Capsule(capsule) => {
+                for lane in 0..LANES {
+                    let t = self.meet_capsule(capsule, &rays.at(lane));
+                    barred[lane] |= u64::from(t < reach);
+                }
+            }
+        }
+    }
+
+    // Without branches, so that loops over lanes become vector instructions; infinite for a ray
+    // that passes by.
+
+    #[inline(always)]
+    fn meet_ball(&self, tangent2: f64, ray: &Vector3<f64>) -> f64 {
+        ahead(enter_ball(&self.start, &product(&self.turn, ray), tangent2))
+    }
+
+    #[inline(always)]
+    fn meet_block(&self, ray: &Vector3<f64>) -> f64 {
+        ahead(enter_block(&self.start, &product(&self.turn, ray)))
+    }
+
+    #[inline(always)]
+    fn meet_capsule(&self, capsule: &Capsule, ray: &Vector3<f64>) -> f64 {
+        ahead(capsule.enter(&self.start, &product(&self.turn, ray)))
+    }
+}
+
+/// How far each ray goes, and the number of the solid that it meets there.
+#[derive(Clone, Copy, Debug)]
+pub struct Met {
+    /// Lengths of the ray; infinite where it meets nothing.
+    pub t: Lanes,
+    /// Number of the solid; [`Met::NONE`] where the ray meets nothing.
+    pub number: [u64; LANES],
+}
+
+impl Met {
+    /// Number of no solid.
+    pub const NONE: u64 = u64::MAX;
+    /// Rays that have met nothing yet.
+    pub const NOTHING: Self = Self { t: [f64::INFINITY; LANES], number: [Self::NONE; LANES] };
+
+    /// Returns true if some ray goes farther than `nearest`.
+    #[inline(always)]
+    pub fn reaches(&self, nearest: f64) -> bool {
+        let far: u64 = self.t.iter().fold(0, |far, t| far | u64::from(*t >= nearest));
+        far != 0
+    }
+
+    #[inline(always)]
+    fn shorten(&mut self, lane: usize, t: f64, nearest: f64, number: u64) {
+        let nearer = (t < self.t[lane]) & (nearest <= self.t[lane]);
+        self.t[lane] = if nearer { t } else { self.t[lane] };
+        self.number[lane] = if nearer { number } else { self.number[lane] };
     }
 }
 
@@ -97,47 +197,52 @@ fn divided(turn: &Matrix3<f64>, half: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::from_diagonal(&half.map(f64::recip)) * turn
 }
 
-fn enter_ball(start: &Vector3<f64>, step: &Vector3<f64>, tangent2: f64) -> Option<f64> {
-    let a = step.norm_squared();
-    let b = start.dot(step);
+/// Leaves out ways that lead back, and those to the surface on which the eye lies.
+#[inline(always)]
+fn ahead(t: f64) -> f64 {
+    if t > 1e-6 { t } else { f64::INFINITY }
+}
+
+#[inline(always)]
+fn enter_ball(start: &Vector3<f64>, step: &Vector3<f64>, tangent2: f64) -> f64 {
+    let a = dot(step, step);
+    let b = dot(start, step);
     let root = b * b - a * tangent2;
-    (root >= 0.0).then(|| (-b - root.sqrt()) / a)
+    let t = (-b - root.sqrt()) / a;
+    if root >= 0.0 { t } else { f64::INFINITY }
 }
 
 /// Slabs: Kay & Kajiya 1986.
-fn enter_block(start: &Vector3<f64>, step: &Vector3<f64>) -> Option<f64> {
-    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
-    for axis in 0..3 {
-        let inverse = 1.0 / step[axis];
-        let (a, b) = ((-1.0 - start[axis]) * inverse, (1.0 - start[axis]) * inverse);
-        enter = enter.max(a.min(b));
-        leave = leave.min(a.max(b));
-    }
-    (enter <= leave).then_some(enter)
+#[inline(always)]
+fn enter_block(start: &Vector3<f64>, step: &Vector3<f64>) -> f64 {
+    let along = |start: f64, step: f64| {
+        let inverse = 1.0 / step;
+        let (a, b) = ((-1.0 - start) * inverse, (1.0 - start) * inverse);
+        (a.min(b), a.max(b))
+    };
+    let (x, y, z) = (along(start.x, step.x), along(start.y, step.y), along(start.z, step.z));
+    let enter = f64::NEG_INFINITY.max(x.0).max(y.0).max(z.0);
+    let leave = f64::INFINITY.min(x.1).min(y.1).min(z.1);
+    if enter <= leave { enter } else { f64::INFINITY }
 }
 
 impl Capsule {
-    fn enter(&self, start: &Vector3<f64>, step: &Vector3<f64>) -> Option<f64> {
-        let a = self.cosine2 * step.xy().norm_squared() - self.sine * self.sine * step.z * step.z;
-        let b = self.cosine2 * start.xy().dot(&step.xy()) + self.sine * step.z * self.reach;
+    #[inline(always)]
+    fn enter(&self, start: &Vector3<f64>, step: &Vector3<f64>) -> f64 {
+        let across = step.x * step.x + step.y * step.y;
+        let a = self.cosine2 * across - self.sine * self.sine * step.z * step.z;
+        let off = start.x * step.x + start.y * step.y;
+        let b = self.cosine2 * off + self.sine * step.z * self.reach;
         let root = b * b - a * self.mantle;
-        if a.abs() > 1e-12 {
-            // The mantle goes on without end and has the balls inside of it.
-            if root < 0.0 {
-                return None;
-            }
-            let t = (-b - root.sqrt()) / a;
-            let z = start.z + t * step.z;
-            if (self.ends[0]..=self.ends[1]).contains(&z) {
-                return Some(t);
-            }
-        }
-        let far = start - Vector3::new(0.0, 0.0, self.length);
-        let balls =
-            (enter_ball(start, step, self.tangent2[0]), enter_ball(&far, step, self.tangent2[1]));
-        match balls {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        }
+        let t = (-b - root.sqrt()) / a;
+        let z = start.z + t * step.z;
+        let slanted = a.abs() > 1e-12;
+        let on_mantle = slanted & (z >= self.ends[0]) & (z <= self.ends[1]);
+        let far = Vector3::new(start.x, start.y, start.z - self.length);
+        let near = enter_ball(start, step, self.tangent2[0]);
+        let balls = near.min(enter_ball(&far, step, self.tangent2[1]));
+        let t = if on_mantle { t } else { balls };
+        // The mantle goes on without end and has the balls inside of it.
+        if slanted & (root < 0.0) { f64::INFINITY } else { t }
     }
 }

@@ -1,6 +1,9 @@
 //! Sensors: from the surfaces that rays meet to camera images with exposure, blur and noise, and to
 //! the depth of a structured-light camera.
 
+use std::ops::Range;
+use std::sync::LazyLock;
+
 use tagalong_core::{DepthImage, GreyImage, Image, RgbImage};
 
 use crate::material::luma;
@@ -56,20 +59,19 @@ impl Exposure {
     /// A colour image.
     pub fn colour(&mut self, seen: &Image<Hit>, moment: &Moment) -> RgbImage {
         let factor = self.adapt(seen);
-        let film = Film::new(seen, moment, factor, self.threads);
-        let channel = |c: usize| film.expose(c as u64, |hit| hit.light[c]);
-        let [red, green, blue] = [channel(0), channel(1), channel(2)];
-        RgbImage::from_fn(seen.width(), seen.height(), |x, y| {
-            let at = y * seen.width() + x;
-            [red[at], green[at], blue[at]]
-        })
+        let film = Film::new(seen, moment, factor);
+        let mut image = RgbImage::filled(seen.width(), seen.height(), [0; 3]);
+        film.expose(self.threads, image.pixels_mut(), |hit| hit.light, |pixel| pixel);
+        image
     }
 
     /// A grey image.
     pub fn grey(&mut self, seen: &Image<Hit>, moment: &Moment) -> GreyImage {
         let factor = self.adapt(seen);
-        let pixels = Film::new(seen, moment, factor, self.threads).expose(0, |hit| luma(hit.light));
-        GreyImage::from_fn(seen.width(), seen.height(), |x, y| pixels[y * seen.width() + x])
+        let film = Film::new(seen, moment, factor);
+        let mut image = GreyImage::filled(seen.width(), seen.height(), 0);
+        film.expose(self.threads, image.pixels_mut(), |hit| [luma(hit.light)], |[pixel]| pixel);
+        image
     }
 
     /// Adapts to the light within some images; returns the factor on light.
@@ -93,81 +95,141 @@ struct Film<'a> {
     factor: f64,
     /// Variance of the read noise, and that of the shot noise of a white pixel.
     noise: [f64; 2],
-    curve: Vec<u8>,
-    threads: usize,
 }
 
 impl<'a> Film<'a> {
-    fn new(seen: &'a Image<Hit>, moment: &'a Moment, factor: f64, threads: usize) -> Self {
+    fn new(seen: &'a Image<Hit>, moment: &'a Moment, factor: f64) -> Self {
         // Below the base light a camera raises its gain, and the noise with it.
         let gain = (TARGET / factor / BASE_LIGHT).recip().clamp(1.0, 16.0);
         let noise = [(READ_NOISE * gain).powi(2), SHOT_NOISE * SHOT_NOISE * gain];
-        Self { seen, moment, factor, noise, curve: gamma_curve(), threads }
+        Self { seen, moment, factor, noise }
     }
 
-    /// One channel: lens blur, motion blur, vignetting, noise, gamma.
-    fn expose(&self, channel: u64, light: impl Fn(&Hit) -> f64) -> Vec<u8> {
+    /// All channels: lens blur, motion blur, vignetting, noise, gamma.
+    fn expose<const CHANNELS: usize, P: Send>(
+        &self,
+        threads: usize,
+        pixels: &mut [P],
+        light: impl Fn(&Hit) -> [f64; CHANNELS] + Sync,
+        pixel: impl Fn([u8; CHANNELS]) -> P + Sync,
+    ) {
         let width = self.seen.width();
-        let sharp: Vec<f32> =
-            self.seen.pixels().iter().map(|hit| (light(hit) * self.factor) as f32).collect();
-        let soft = soften(&smear(&sharp, width, self.moment.smear_px), width);
-        let mut pixels = vec![0; soft.len()];
-        in_pieces(&mut pixels, STRIP_ROWS * width, self.threads, |number, strip| {
-            let first = number * STRIP_ROWS * width;
-            for ((at, pixel), light) in (first..).zip(strip).zip(&soft[first..]) {
-                *pixel = self.develop(*light, at, channel);
+        in_pieces(pixels, STRIP_ROWS * width, threads, |number, strip| {
+            let rows = number * STRIP_ROWS..number * STRIP_ROWS + strip.len() / width;
+            let across = self.blurred_across(&rows, &light);
+            let mut levels = [(); CHANNELS].map(|()| vec![0; width]);
+            let mut soft = vec![0.0; width];
+            for (row, strip) in rows.clone().zip(strip.chunks_mut(width)) {
+                for ((channel, levels), across) in (0..).zip(&mut levels).zip(&across) {
+                    self.blur_along(row, rows.start, across, &mut soft);
+                    self.develop(&soft, row, channel, levels);
+                }
+                for (x, to) in strip.iter_mut().enumerate() {
+                    *to = pixel(levels.each_ref().map(|levels| CURVE[usize::from(levels[x])]));
+                }
             }
         });
-        pixels
     }
 
-    fn develop(&self, light: f32, at: usize, channel: u64) -> u8 {
+    /// The channels of some rows and of those above and below, blurred along the rows.
+    fn blurred_across<const CHANNELS: usize>(
+        &self,
+        rows: &Range<usize>,
+        light: impl Fn(&Hit) -> [f64; CHANNELS],
+    ) -> [Vec<f32>; CHANNELS] {
         let (width, height) = (self.seen.width(), self.seen.height());
-        let (cx, cy) = (0.5 * width as f32, 0.5 * height as f32);
-        let (dx, dy) = ((at % width) as f32 - cx, (at / width) as f32 - cy);
+        let rows = rows.start.saturating_sub(1)..height.min(rows.end + 1);
+        let mut across = [(); CHANNELS].map(|()| Vec::with_capacity(rows.len() * width));
+        let mut sharp = [(); CHANNELS].map(|()| vec![0.0; width]);
+        let mut smeared = vec![0.0; width];
+        for row in rows {
+            for (x, hit) in self.seen.row(row).iter().enumerate() {
+                for (sharp, light) in sharp.iter_mut().zip(light(hit)) {
+                    sharp[x] = (light * self.factor) as f32;
+                }
+            }
+            for (sharp, across) in sharp.iter().zip(&mut across) {
+                smear(sharp, self.moment.smear_px, &mut smeared);
+                soften_across(&smeared, across);
+            }
+        }
+        across
+    }
+
+    /// The other half of the blur of a lens; the border stays. `top` is the row after the first one
+    /// in `across`, which is missing at the upper border.
+    fn blur_along(&self, row: usize, top: usize, across: &[f32], soft: &mut [f32]) {
+        let width = soft.len();
+        let at = (row - top.saturating_sub(1)) * width;
+        let here = &across[at..at + width];
+        if row == 0 || row + 1 == self.seen.height() {
+            soft.copy_from_slice(here);
+            return;
+        }
+        let (above, below) = (&across[at - width..at], &across[at + width..at + 2 * width]);
+        weigh(above, here, below, soft);
+    }
+
+    fn develop(&self, soft: &[f32], row: usize, channel: u64, levels: &mut [u16]) {
+        let seed = self.moment.seed ^ (channel << 48);
+        develop(self, soft, row, seed, levels);
+    }
+}
+
+/// Brightness of a row in 12 bits: vignetting and noise.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn develop(film: &Film<'_>, soft: &[f32], row: usize, seed: u64, levels: &mut [u16]) {
+    let (width, height) = (film.seen.width(), film.seen.height());
+    let (cx, cy) = (0.5 * width as f32, 0.5 * height as f32);
+    let dy = row as f32 - cy;
+    let (gain, [read, shot]) = (film.moment.gain, film.noise);
+    let first = (row * width) as u64;
+    // A counter of 32 bits, because wider ones are no vector instruction to convert.
+    let mut x = 0_i32;
+    for (light, level) in soft.iter().zip(levels) {
+        let dx = x as f32 - cx;
         // Light falls with the square of the distance from the centre, near enough to cos^4.
         let corner = VIGNETTING * (dx * dx + dy * dy) / (cx * cx + cy * cy);
-        let dimmed = f64::from(light * (1.0 - corner)) * self.moment.gain;
-        let sigma = (self.noise[0] + self.noise[1] * dimmed).sqrt();
-        let noisy = dimmed + sigma * normal_at(self.moment.seed ^ (channel << 48), at as u64);
-        self.curve[(noisy.clamp(0.0, 1.0) * 4095.0) as usize]
+        let dimmed = f64::from(light * (1.0 - corner)) * gain;
+        let sigma = (read + shot * dimmed).sqrt();
+        let noisy = dimmed + sigma * normal_at(seed, first.wrapping_add(x as u64));
+        *level = (noisy.clamp(0.0, 1.0) * 4095.0) as i32 as u16;
+        x = x.wrapping_add(1);
     }
 }
 
 /// 12-bit linear light to 8 bit.
-fn gamma_curve() -> Vec<u8> {
-    (0..4096).map(|i| (255.0 * (f64::from(i) / 4095.0).powf(1.0 / 2.2)).round() as u8).collect()
-}
+static CURVE: LazyLock<[u8; 4096]> = LazyLock::new(|| {
+    std::array::from_fn(|i| (255.0 * (i as f64 / 4095.0).powf(1.0 / 2.2)).round() as u8)
+});
 
-/// The blur of a camera that turns: a running mean along the rows.
-fn smear(values: &[f32], width: usize, by_px: f64) -> Vec<f32> {
+/// The blur of a camera that turns: a running mean along a row.
+fn smear(row: &[f32], by_px: f64, to: &mut [f32]) {
     let reach = (0.5 * by_px.abs()).round() as usize;
     if reach == 0 {
-        return values.to_vec();
+        to.copy_from_slice(row);
+        return;
     }
-    let blur = |row: &[f32]| -> Vec<f32> {
-        let mean = |x: usize| {
-            let part = &row[x.saturating_sub(reach)..(x + reach + 1).min(width)];
-            part.iter().sum::<f32>() / part.len() as f32
-        };
-        (0..width).map(mean).collect()
-    };
-    values.chunks(width).flat_map(blur).collect()
+    for (x, to) in to.iter_mut().enumerate() {
+        let part = &row[x.saturating_sub(reach)..(x + reach + 1).min(row.len())];
+        *to = part.iter().sum::<f32>() / part.len() as f32;
+    }
 }
 
-/// The blur of a lens: weights 1 2 1 both ways; the border stays.
-fn soften(values: &[f32], width: usize) -> Vec<f32> {
-    let mut across = values.to_vec();
-    for (to, from) in across.chunks_mut(width).zip(values.chunks(width)) {
-        for x in 1..width.saturating_sub(1) {
-            to[x] = 0.25 * (from[x - 1] + 2.0 * from[x] + from[x + 1]);
-        }
+/// One half of the blur of a lens: weights 1 2 1 along a row; the border stays.
+fn soften_across(row: &[f32], to: &mut Vec<f32>) {
+    let from = to.len();
+    to.extend_from_slice(row);
+    let (Some(inner), true) = (to.get_mut(from + 1..), row.len() > 2) else { return };
+    weigh(row, &row[1..], &row[2..], &mut inner[..row.len() - 2]);
+}
+
+/// Mean of three rows with the weights 1 2 1.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn weigh(before: &[f32], here: &[f32], after: &[f32], to: &mut [f32]) {
+    for (((to, before), here), after) in to.iter_mut().zip(before).zip(here).zip(after) {
+        *to = 0.25 * (before + 2.0 * here + after);
     }
-    let mut both = across.clone();
-    for at in width..values.len().saturating_sub(width) {
-        both[at] = 0.25 * (across[at - width] + 2.0 * across[at] + across[at + width]);
-    }
-    both
 }
 
 /// A structured-light depth camera.
@@ -186,50 +248,111 @@ impl DepthSensor {
     /// light returned, or in the shadow of the projector, which stands to the right.
     pub fn measure(&self, seen: &Image<Hit>, seed: u64, threads: usize) -> DepthImage {
         let mut depth = DepthImage::filled(seen.width(), seen.height(), f32::NAN);
-        in_pieces(depth.pixels_mut(), seen.width(), threads, |y, row| {
-            self.measure_row(seen, seed, y, row);
+        let width = seen.width();
+        in_pieces(depth.pixels_mut(), STRIP_ROWS * width, threads, |number, strip| {
+            let mut row = DepthRow::new(width);
+            for (y, depth) in (number * STRIP_ROWS..).zip(strip.chunks_mut(width)) {
+                row.look(seen, seed, y);
+                row.measure(self, seed, y);
+                row.cast_shadows(self);
+                depth.copy_from_slice(&row.depth_m);
+            }
         });
         depth
     }
+}
 
-    fn measure_row(&self, seen: &Image<Hit>, seed: u64, y: usize, row: &mut [f32]) {
-        // From right to left, because the projector stands to the right of the camera: near
-        // surfaces shadow the pixels to their left.
-        let mut leftmost = f64::INFINITY;
-        for x in (0..row.len()).rev() {
-            let key = (y * row.len() + x) as u64;
-            let hit = jittered(seen, x, y, seed, key);
-            let lit_from = x as f64 - self.focal_px * self.baseline_m / hit.t;
-            let shadowed = lit_from > leftmost + 1.0;
-            leftmost = leftmost.min(lit_from);
-            if !shadowed && self.returns(&hit, x, y, seed) {
-                row[x] = self.quantised(hit.t, seed, key) as f32;
-            }
+/// One row of a depth image in work.
+struct DepthRow {
+    /// Columns and rows that each pixel is displaced by.
+    off: [Vec<i32>; 2],
+    /// Of the surfaces seen: depth, reflectance in the near infrared, cosine to the normal.
+    t: Vec<f64>,
+    infrared: Vec<f64>,
+    facing: Vec<f64>,
+    depth_m: Vec<f32>,
+}
+
+impl DepthRow {
+    fn new(width: usize) -> Self {
+        let numbers = || vec![0.0; width];
+        Self {
+            off: [vec![0; width], vec![0; width]],
+            t: numbers(),
+            infrared: numbers(),
+            facing: numbers(),
+            depth_m: vec![f32::NAN; width],
         }
     }
 
-    fn returns(&self, hit: &Hit, x: usize, y: usize, seed: u64) -> bool {
-        let light = hit.infrared * hit.facing.max(0.0) / (hit.t * hit.t);
-        // The matcher decides for patches of 9 x 9 dots: holes have a size.
-        let patch = ((y / 4) << 20 | (x / 4)) as u64;
-        let coarse = 0.5 + uniform_at(seed ^ 0x51, patch);
-        let fine = 0.75 + 0.5 * uniform_at(seed ^ 0x52, (y << 20 | x) as u64);
-        (self.range_m[0]..=self.range_m[1]).contains(&hit.t) && light > LEAST_RETURN * coarse * fine
+    /// Takes the surfaces near each pixel: measured edges are displaced.
+    fn look(&mut self, seen: &Image<Hit>, seed: u64, y: usize) {
+        let first = (y * seen.width()) as u64;
+        for (salt, off) in [0x54, 0x55].into_iter().zip(&mut self.off) {
+            jitter(seed ^ salt, first, off);
+        }
+        let [columns, rows] = &self.off;
+        for (x, here) in seen.row(y).iter().enumerate() {
+            let column = x.wrapping_add_signed(columns[x] as isize);
+            let row = y.wrapping_add_signed(rows[x] as isize);
+            let inside = column < seen.width() && row < seen.height();
+            let hit = if inside { &seen.pixels()[row * seen.width() + column] } else { here };
+            (self.t[x], self.infrared[x], self.facing[x]) = (hit.t, hit.infrared, hit.facing);
+        }
     }
 
-    fn quantised(&self, depth_m: f64, seed: u64, key: u64) -> f64 {
-        // Structured light measures disparities, so depth has steps that grow with its square.
-        let steps = STEPS_PER_PX * self.focal_px * self.baseline_m;
-        let disparity = steps / depth_m + normal_at(seed ^ 0x53, key) / 6.0;
-        steps / disparity.round().max(1.0)
+    fn measure(&mut self, sensor: &DepthSensor, seed: u64, y: usize) {
+        measure(self, sensor, seed, y as u64);
+    }
+
+    /// Removes the readings in the shadow of the projector.
+    fn cast_shadows(&mut self, sensor: &DepthSensor) {
+        let steps = sensor.focal_px * sensor.baseline_m;
+        // From right to left, because the projector stands to the right of the camera: near
+        // surfaces shadow the pixels to their left.
+        let mut leftmost = f64::INFINITY;
+        for (x, (t, depth_m)) in self.t.iter().zip(&mut self.depth_m).enumerate().rev() {
+            let lit_from = x as f64 - steps / t;
+            if lit_from > leftmost + 1.0 {
+                *depth_m = f32::NAN;
+            }
+            leftmost = leftmost.min(lit_from);
+        }
     }
 }
 
-/// Returns a surface seen near a pixel: measured edges are displaced.
-fn jittered(seen: &Image<Hit>, x: usize, y: usize, seed: u64, key: u64) -> Hit {
-    let off = |salt: u64| (EDGE_JITTER_PX * normal_at(seed ^ salt, key)).round() as i64;
-    let near = seen.get(x as i64 + off(0x54), y as i64 + off(0x55));
-    near.unwrap_or_else(|| seen.pixels()[y * seen.width() + x])
+/// Whole pixels that the places of readings are off by.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn jitter(seed: u64, first: u64, off: &mut [i32]) {
+    let mut key = first;
+    for off in off {
+        *off = (EDGE_JITTER_PX * normal_at(seed, key)).round() as i32;
+        key = key.wrapping_add(1);
+    }
+}
+
+/// Depths without the shadow of the projector; NaN where too little light returns.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn measure(row: &mut DepthRow, sensor: &DepthSensor, seed: u64, y: u64) {
+    let width = row.depth_m.len();
+    let first = y.wrapping_mul(width as u64);
+    let [nearest, farthest] = sensor.range_m;
+    // Structured light measures disparities, so depth has steps that grow with its square.
+    let steps = STEPS_PER_PX * sensor.focal_px * sensor.baseline_m;
+    let (t, infrared, facing) = (&row.t[..width], &row.infrared[..width], &row.facing[..width]);
+    for (x, depth_m) in row.depth_m.iter_mut().enumerate() {
+        let (t, x64) = (t[x], x as u64);
+        let facing = if facing[x] > 0.0 { facing[x] } else { 0.0 };
+        let light = infrared[x] * facing / (t * t);
+        // The matcher decides for patches of 9 x 9 dots: holes have a size.
+        let coarse = 0.5 + uniform_at(seed ^ 0x51, (y >> 2) << 20 | x64 >> 2);
+        let fine = 0.75 + 0.5 * uniform_at(seed ^ 0x52, y << 20 | x64);
+        let returns = (t >= nearest) & (t <= farthest) & (light > LEAST_RETURN * coarse * fine);
+        let disparity = steps / t + normal_at(seed ^ 0x53, first.wrapping_add(x64)) / 6.0;
+        let whole = disparity.round();
+        let measured = (steps / if whole > 1.0 { whole } else { 1.0 }) as f32;
+        *depth_m = if returns { measured } else { f32::NAN };
+    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 
+use crate::lanes::{LANES, Lanes, Vectors, dot, product, transposed_product};
 use crate::material::Material;
 use crate::seen::SolidView;
 
@@ -133,35 +134,109 @@ impl Shape {
     /// The outward normal in the world at a point of the surface in own axes.
     pub fn normal(&self, own: &Vector3<f64>) -> Vector3<f64> {
         let normal = match self.form {
-            Form::Ellipsoid(half) => unit(own.zip_map(&half, |at, half| at / (half * half))),
+            Form::Ellipsoid(half) => ellipsoid_normal(own, &half),
             Form::Block(half) => block_normal(own, &half),
             Form::Capsule { length, first, second } => {
-                let sine = (first - second) / length;
-                let cosine = (1.0 - sine * sine).sqrt();
-                let nearest = (own.z - own.xy().norm() * sine / cosine).clamp(0.0, length);
-                unit(own - Vector3::new(0.0, 0.0, nearest))
+                capsule_normal(own, length, (first - second) / length)
             }
         };
         self.world_from_own * normal
     }
+
+    /// Returns the surface at points of it, which rays meet.
+    pub fn surface(&self, points: &Vectors, rays: &Vectors) -> Surface {
+        surface(self, points, rays)
+    }
 }
 
-fn unit(vector: Vector3<f64>) -> Vector3<f64> {
-    let length = vector.norm();
+/// The surface of a solid at some points of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// The points in the solid's own axes, m.
+    pub own: Vectors,
+    /// Outward normals in the world.
+    pub normal: Vectors,
+    /// Cosines between the normals and the ways back.
+    pub facing: Lanes,
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn surface(of: &Shape, points: &Vectors, rays: &Vectors) -> Surface {
+    match of.form {
+        Form::Ellipsoid(half) => surface_with(of, points, rays, |own| ellipsoid_normal(own, &half)),
+        Form::Block(half) => surface_with(of, points, rays, |own| block_normal(own, &half)),
+        Form::Capsule { length, first, second } => {
+            let sine = (first - second) / length;
+            surface_with(of, points, rays, |own| capsule_normal(own, length, sine))
+        }
+    }
+}
+
+#[inline(always)]
+fn surface_with(
+    of: &Shape,
+    points: &Vectors,
+    rays: &Vectors,
+    normal: impl Fn(&Vector3<f64>) -> Vector3<f64>,
+) -> Surface {
+    let mut surface = Surface { own: Vectors::ZERO, normal: Vectors::ZERO, facing: [0.0; LANES] };
+    let turn = of.world_from_own.matrix();
+    for lane in 0..LANES {
+        let ray = rays.at(lane);
+        let own = transposed_product(turn, &(points.at(lane) - of.origin.coords));
+        let normal = product(turn, &normal(&own));
+        surface.own.set(lane, &own);
+        surface.normal.set(lane, &normal);
+        surface.facing[lane] = -dot(&normal, &ray) / dot(&ray, &ray).sqrt();
+    }
+    surface
+}
+
+// Without branches, so that loops over lanes become vector instructions.
+
+#[inline(always)]
+fn ellipsoid_normal(own: &Vector3<f64>, half: &Vector3<f64>) -> Vector3<f64> {
+    unit(&Vector3::new(
+        own.x / (half.x * half.x),
+        own.y / (half.y * half.y),
+        own.z / (half.z * half.z),
+    ))
+}
+
+/// The normal of a capsule whose mantle slopes with this sine.
+#[inline(always)]
+fn capsule_normal(own: &Vector3<f64>, length: f64, sine: f64) -> Vector3<f64> {
+    let cosine = (1.0 - sine * sine).sqrt();
+    let across = (own.x * own.x + own.y * own.y).sqrt();
+    let nearest = own.z - across * sine / cosine;
+    let nearest = if nearest < 0.0 { 0.0 } else { nearest };
+    let nearest = if nearest > length { length } else { nearest };
+    unit(&Vector3::new(own.x, own.y, own.z - nearest))
+}
+
+#[inline(always)]
+fn unit(vector: &Vector3<f64>) -> Vector3<f64> {
+    let length = dot(vector, vector).sqrt();
     // At the centre there is no normal; any direction is as good.
-    if length > 1e-12 { vector / length } else { Vector3::z() }
+    let known = length > 1e-12;
+    Vector3::new(
+        if known { vector.x / length } else { 0.0 },
+        if known { vector.y / length } else { 0.0 },
+        if known { vector.z / length } else { 1.0 },
+    )
 }
 
 /// The normal of the side that a point lies on.
+#[inline(always)]
 fn block_normal(own: &Vector3<f64>, half: &Vector3<f64>) -> Vector3<f64> {
     let (x, y, z) = (own.x.abs() / half.x, own.y.abs() / half.y, own.z.abs() / half.z);
-    if x >= y && x >= z {
-        Vector3::new(own.x.signum(), 0.0, 0.0)
-    } else if y >= z {
-        Vector3::new(0.0, own.y.signum(), 0.0)
-    } else {
-        Vector3::new(0.0, 0.0, own.z.signum())
-    }
+    let on_x = (x >= y) & (x >= z);
+    let on_y = !on_x & (y >= z);
+    Vector3::new(
+        if on_x { own.x.signum() } else { 0.0 },
+        if on_y { own.y.signum() } else { 0.0 },
+        if on_x | on_y { 0.0 } else { own.z.signum() },
+    )
 }
 
 #[cfg(test)]

@@ -11,8 +11,10 @@ const SLACK_M: f64 = 1e-6;
 
 /// A solid before an eye.
 pub struct SightedSolid<'a> {
-    /// The object that it belongs to.
-    pub object: usize,
+    /// Its number among all solids.
+    pub number: u32,
+    /// The person that it belongs to, if it does.
+    pub person: Option<u16>,
     /// The solid.
     pub shape: &'a Shape,
     /// As rays meet it.
@@ -34,17 +36,17 @@ impl SightedSolid<'_> {
 /// All solids that are not behind an eye that looks along the unit vector
 /// `forward`, nearest first.
 pub fn before<'a>(
-    solids: impl Iterator<Item = (usize, &'a Shape)>,
+    solids: impl Iterator<Item = (Option<u16>, &'a Shape)>,
     eye: &Point3<f64>,
     forward: &Vector3<f64>,
 ) -> Vec<SightedSolid<'a>> {
-    let sight = |(object, shape): (usize, &'a Shape)| {
+    let sight = |(number, (person, shape)): (u32, (Option<u16>, &'a Shape))| {
         let way = shape.origin - eye;
         let nearest = forward.dot(&way) - shape.extent(&-forward);
-        SightedSolid { object, shape, seen: shape.seen_from(eye), nearest, way }
+        SightedSolid { number, person, shape, seen: shape.seen_from(eye), nearest, way }
     };
     let ahead = |sight: &SightedSolid| sight.reaches(forward);
-    let mut sights: Vec<_> = solids.map(sight).filter(ahead).collect();
+    let mut sights: Vec<_> = (0..).zip(solids).map(sight).filter(ahead).collect();
     sights.sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
     sights
 }

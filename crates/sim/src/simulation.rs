@@ -24,7 +24,7 @@ use crate::sensor::{DepthSensor, Exposure, Moment};
 use crate::shape::Shape;
 use crate::split::{SUBJECTS, Split};
 use crate::webcam::Webcam;
-use crate::world::{self, Hit, Lamp, Object, World};
+use crate::world::{self, Hit, Object, Stage, World};
 
 mod walkers;
 
@@ -148,8 +148,7 @@ pub struct Simulation {
     /// The mirror above the camera, if it is a panorama camera.
     mirror: Option<MirrorCamera>,
     webcams: Vec<Webcam>,
-    fixed: Vec<Object>,
-    lamps: Vec<Lamp>,
+    stage: Arc<Stage>,
     pieces: Vec<Furniture>,
     obstacles: Vec<Obstacle>,
     walkers: Vec<Walker>,
@@ -186,8 +185,11 @@ impl Simulation {
             camera,
             mirror,
             webcams: scene.webcams.iter().map(|webcam| Webcam::new(webcam, threads)).collect(),
-            fixed,
-            lamps: room::lamps(&scene.room, &scene.light),
+            stage: Arc::new(Stage::new(
+                fixed,
+                room::lamps(&scene.room, &scene.light),
+                scene.light.lux * scene.light.ambient,
+            )),
             walkers: walkers(scene, &obstacles, &mut stream(3)),
             pieces,
             obstacles,
@@ -251,7 +253,7 @@ impl Simulation {
         });
         let things = rays.map(|(height_m, angle)| {
             let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            world::distance(&self.fixed, &Point3::new(robot.x, robot.y, height_m), &ray)
+            world::distance(&self.stage.objects, &Point3::new(robot.x, robot.y, height_m), &ray)
         });
         Clearance { people_m: least(&mut { people }), things_m: least(&mut { things }) }
     }
@@ -388,16 +390,15 @@ impl Simulation {
 
     /// Everything there is now, and how many solids of each person are upper body.
     fn world(&self) -> (World, Vec<usize>) {
-        let mut objects = self.fixed.clone();
+        let mut people = Vec::new();
         let mut uppers = Vec::new();
         for (walker, id) in self.present() {
             let skeleton = Skeleton::new(&walker.person.build, &walker.stance);
             let (shapes, upper) = walker.person.shapes(&skeleton);
-            objects.push(Object::new(shapes, Some(id), true));
+            people.push(Object::new(shapes, Some(id), true));
             uppers.push(upper);
         }
-        let light = &self.scene.light;
-        (World::new(objects, self.lamps.clone(), light.lux * light.ambient), uppers)
+        (World::new(&self.stage, people), uppers)
     }
 
     /// The robot's body in the world while a part of the image is taken, from the
@@ -521,7 +522,7 @@ impl Simulation {
         pose: &Isometry3<f64>,
         sight: impl Fn((u16, &[Shape]), &Skeleton) -> (Option<Rect>, Visibility),
     ) -> Vec<Truth> {
-        let people = world.objects.iter().filter_map(|o| Some((o.person?, o)));
+        let people = world.people.iter().filter_map(|o| Some((o.person?, o)));
         let walkers = self.present().map(|(walker, _)| walker).zip(uppers);
         let truth = people.zip(walkers).map(|((id, object), (walker, upper))| {
             let skeleton = Skeleton::new(&walker.person.build, &walker.stance);

@@ -1,12 +1,13 @@
 //! The visible world at one moment, and the casting of single rays into it.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Point3, Vector3};
 
-use crate::material::Colour;
-use crate::shadow::Shadows;
-use crate::shape::Shape;
+use crate::lanes::{LANES, Lanes, Vectors, dot};
+use crate::material::{Colour, Material};
+use crate::shadow::{self, Shadows};
+use crate::shape::{Shape, Surface};
 
 /// Solids that belong together.
 #[derive(Clone, Debug)]
@@ -24,6 +25,11 @@ impl Object {
     pub fn new(shapes: Vec<Shape>, person: Option<u16>, casts_shadow: bool) -> Self {
         Self { shapes, person, casts_shadow }
     }
+
+    /// The solids with the person to whom they belong.
+    fn solids(&self) -> impl Iterator<Item = (Option<u16>, &Shape)> + Clone {
+        self.shapes.iter().map(|shape| (self.person, shape))
+    }
 }
 
 /// A lamp: a point that shines on all sides.
@@ -35,17 +41,39 @@ pub struct Lamp {
     pub lux_at_1m: f64,
 }
 
-/// Everything at one moment, in the coordinates of the world.
+/// Everything that never moves, in the coordinates of the world.
 #[derive(Clone, Debug, Default)]
-pub struct World {
-    /// Room, furniture and people.
+pub struct Stage {
+    /// Room and furniture.
     pub objects: Vec<Object>,
     /// Lamps; all of them cast shadows.
     pub lamps: Vec<Lamp>,
     /// Light from everywhere, lx.
     pub ambient_lux: f64,
-    /// One for each lamp, made when they are first asked for: the world does not
-    /// change after that.
+    /// One for each lamp, made when they are first asked for.
+    shadows: OnceLock<Vec<Shadows>>,
+}
+
+impl Stage {
+    /// Things that stay where they are.
+    pub fn new(objects: Vec<Object>, lamps: Vec<Lamp>, ambient_lux: f64) -> Self {
+        Self { objects, lamps, ambient_lux, shadows: OnceLock::new() }
+    }
+
+    fn shadows(&self) -> &[Shadows] {
+        self.shadows.get_or_init(|| shadows(shadow::FINE, &self.lamps, &self.objects))
+    }
+}
+
+/// Everything at one moment, in the coordinates of the world.
+#[derive(Clone, Debug, Default)]
+pub struct World {
+    /// Everything that never moves, the same at every moment.
+    pub stage: Arc<Stage>,
+    /// The people.
+    pub people: Vec<Object>,
+    /// Shadows of people, one for each lamp, made when they are first asked for: the world does
+    /// not change after that.
     shadows: OnceLock<Vec<Shadows>>,
 }
 
@@ -65,94 +93,144 @@ pub struct Hit {
 }
 
 impl World {
-    /// A moment's world.
-    pub fn new(objects: Vec<Object>, lamps: Vec<Lamp>, ambient_lux: f64) -> Self {
-        Self { objects, lamps, ambient_lux, shadows: OnceLock::new() }
+    /// People on a stage.
+    pub fn new(stage: &Arc<Stage>, people: Vec<Object>) -> Self {
+        Self { stage: Arc::clone(stage), people, shadows: OnceLock::new() }
     }
 
-    /// All solids with the index of their object.
-    pub(crate) fn solids(&self) -> impl Iterator<Item = (usize, &Shape)> + Clone {
-        let numbered = self.objects.iter().enumerate();
-        numbered.flat_map(|(index, object)| object.shapes.iter().map(move |shape| (index, shape)))
+    /// All solids with the person to whom they belong, if they do.
+    pub(crate) fn solids(&self) -> impl Iterator<Item = (Option<u16>, &Shape)> + Clone {
+        self.stage.objects.iter().chain(&self.people).flat_map(Object::solids)
     }
 
     /// Returns the distance to the first solid in a direction of length one, m; infinite where
     /// there is none.
     pub(crate) fn distance(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
-        distance(&self.objects, eye, ray)
+        distance(self.stage.objects.iter().chain(&self.people), eye, ray)
     }
 
     /// The first of some solids that a ray meets: for rays that have no eye in
     /// common, and the reference for those that have.
     pub(crate) fn first<'a>(
         &'a self,
-        solids: impl Iterator<Item = (usize, &'a Shape)>,
+        solids: impl Iterator<Item = (Option<u16>, &'a Shape)>,
         eye: &Point3<f64>,
         ray: &Vector3<f64>,
     ) -> Hit {
         let per_length = 1.0 / ray.norm_squared();
-        let meet = |(object, shape): (usize, &'a Shape)| {
+        let meet = |(person, shape): (Option<u16>, &'a Shape)| {
             // The bounding ball is cheap, and most solids miss most rays.
             let near = shape.near(eye, ray, per_length);
-            Some((near.then(|| shape.meet(eye, ray)).flatten()?, object, shape))
+            Some((near.then(|| shape.meet(eye, ray)).flatten()?, person, shape))
         };
         let first = solids.filter_map(meet).min_by(|a, b| a.0.total_cmp(&b.0));
-        first
-            .map_or(Hit::NOTHING, |(t, object, shape)| self.hit(t, object, shape, (eye, ray), true))
+        first.map_or(Hit::NOTHING, |(t, person, shape)| self.hit(t, person, shape, (eye, ray)))
     }
 
-    /// Returns the surface of a solid that a ray from an eye meets after `t` lengths of it; without
-    /// light on it unless it is to be `lit`.
-    pub(crate) fn hit(
+    /// Returns the surface of a solid that a ray from an eye meets after `t` lengths of it.
+    fn hit(
         &self,
         t: f64,
-        object: usize,
+        person: Option<u16>,
         of: &Shape,
         (eye, ray): (&Point3<f64>, &Vector3<f64>),
-        lit: bool,
     ) -> Hit {
         let at = eye + ray * t;
         let own = of.own(&at);
         let normal = of.normal(&own);
-        let light =
-            if lit { scaled_light(of.material.at(&own), self.lux(&at, &normal)) } else { [0.0; 3] };
-        Hit {
-            t,
-            light,
-            infrared: of.material.infrared,
-            facing: -normal.dot(ray) / ray.norm(),
-            person: self.objects[object].person,
-        }
+        let light = scaled_light(of.material.at(&own), self.lux(&at, &normal));
+        let facing = -normal.dot(ray) / ray.norm();
+        Hit { t, light, infrared: of.material.infrared, facing, person }
     }
 
     /// Illuminance of a point with this normal.
     fn lux(&self, at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
         // Floors are lit by the ceiling, undersides by the floor, which is darker.
-        let ambient = self.ambient_lux * (0.75 + 0.25 * normal.z);
-        let lamps = self.lamps.iter().zip(self.shadows());
+        let ambient = self.stage.ambient_lux * (0.75 + 0.25 * normal.z);
+        let lamps = self.stage.lamps.iter().zip(self.shadows());
         lamps.fold(ambient, |sum, (lamp, shadows)| sum + lamp.on(shadows, at, normal))
     }
 
-    fn shadows(&self) -> &[Shadows] {
-        let casters = || self.solids().filter(|(object, _)| self.objects[*object].casts_shadow);
-        self.shadows
-            .get_or_init(|| self.lamps.iter().map(|l| Shadows::new(l.at, casters())).collect())
+    /// Returns the light towards the eye in each colour from points of the surface of a solid, of
+    /// which only the `wanted` ones count.
+    pub(crate) fn light(
+        &self,
+        of: &Material,
+        points: &Vectors,
+        surface: &Surface,
+        wanted: &[bool; LANES],
+    ) -> [Lanes; 3] {
+        let mut lux = ambient(self.stage.ambient_lux, &surface.normal);
+        for (lamp, shadows) in self.stage.lamps.iter().zip(self.shadows()) {
+            let beams = shine(lamp, points, &surface.normal);
+            let lit = |lane: usize| wanted[lane] && beams.lux[lane] != 0.0;
+            let mut open = std::array::from_fn(lit);
+            shadows.iter().for_each(|shadows| shadows.darken(&beams.ways, &mut open));
+            for lane in 0..LANES {
+                lux[lane] += if open[lane] { beams.lux[lane] } else { 0.0 };
+            }
+        }
+        of.colours(&surface.own, wanted).map(|colour| std::array::from_fn(|i| colour[i] * lux[i]))
     }
+
+    /// Returns the shadows around each lamp: those of the stage, and those of people.
+    fn shadows(&self) -> impl Iterator<Item = [&Shadows; 2]> {
+        let people =
+            self.shadows.get_or_init(|| shadows(shadow::COARSE, &self.stage.lamps, &self.people));
+        self.stage.shadows().iter().zip(people).map(|(stage, people)| [stage, people])
+    }
+}
+
+/// Returns the shadows that objects throw, for each lamp.
+fn shadows(side: usize, lamps: &[Lamp], objects: &[Object]) -> Vec<Shadows> {
+    let casters = objects.iter().filter(|object| object.casts_shadow).flat_map(Object::solids);
+    lamps.iter().map(|lamp| Shadows::new(side, lamp.at, casters.clone())).collect()
+}
+
+/// Illuminance by the light from everywhere, of surfaces with these normals.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn ambient(lux: f64, normals: &Vectors) -> Lanes {
+    normals.z.map(|z| lux * (0.75 + 0.25 * z))
+}
+
+/// Ways from a lamp to some points, and the illuminance there if nothing is in the way.
+struct Beams {
+    ways: Vectors,
+    lux: Lanes,
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn shine(lamp: &Lamp, points: &Vectors, normals: &Vectors) -> Beams {
+    let mut beams = Beams { ways: Vectors::ZERO, lux: [0.0; LANES] };
+    for lane in 0..LANES {
+        let (way, lux) = lamp.beam(&points.at(lane), &normals.at(lane));
+        beams.ways.set(lane, &way);
+        beams.lux[lane] = lux;
+    }
+    beams
 }
 
 impl Lamp {
     /// Illuminance of a point with this normal, lx.
-    fn on(&self, shadows: &Shadows, at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+    fn on(&self, shadows: [&Shadows; 2], at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        let (way, lux) = self.beam(&at.coords, normal);
+        let dark = lux == 0.0 || shadows.iter().any(|shadows| shadows.on(&way));
+        if dark { 0.0 } else { lux }
+    }
+
+    /// Returns the way to a point with this normal, and its illuminance if nothing is in the way,
+    /// lx; zero where it faces away. Without branches, for loops over lanes.
+    #[inline(always)]
+    fn beam(&self, at: &Vector3<f64>, normal: &Vector3<f64>) -> (Vector3<f64>, f64) {
         // A start a little off the surface, which would otherwise shade itself.
         let start = at + normal * 1e-3;
-        let way = self.at - start;
-        let square = way.norm_squared();
-        let cosine = normal.dot(&way) / square.sqrt();
-        if cosine <= 0.0 || shadows.on(&start) {
-            return 0.0;
-        }
+        let way = self.at.coords - start;
+        let square = dot(&way, &way);
+        let cosine = dot(normal, &way) / square.sqrt();
         // A lamp is not a point: close to it the light does not grow without end.
-        self.lux_at_1m * cosine / square.max(0.25)
+        let square = if square > 0.25 { square } else { 0.25 };
+        let lux = self.lux_at_1m * cosine / square;
+        (start - self.at.coords, if cosine > 0.0 { lux } else { 0.0 })
     }
 }
 
@@ -164,8 +242,12 @@ impl Hit {
 
 /// Returns the distance to the first solid of some objects in a direction of length one, m;
 /// infinite where there is none.
-pub(crate) fn distance(objects: &[Object], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
-    let solids = objects.iter().flat_map(|object| &object.shapes);
+pub(crate) fn distance<'a>(
+    objects: impl IntoIterator<Item = &'a Object>,
+    eye: &Point3<f64>,
+    ray: &Vector3<f64>,
+) -> f64 {
+    let solids = objects.into_iter().flat_map(|object| &object.shapes);
     let met = solids.filter(|shape| shape.near(eye, ray, 1.0)).filter_map(|s| s.meet(eye, ray));
     met.fold(f64::INFINITY, f64::min)
 }

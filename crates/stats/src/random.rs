@@ -125,6 +125,7 @@ impl RandomSource for XorShift64 {
 
 /// Returns the first number of [`SplitMix64`] from this seed: it looks random, and different seeds
 /// have different numbers.
+#[inline]
 pub fn mix(seed: u64) -> u64 {
     let z = seed.wrapping_add(GAMMA);
     let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -134,6 +135,7 @@ pub fn mix(seed: u64) -> u64 {
 
 /// Returns the number of [`SplitMix64`] at an index, counted from 0, without those before it: for
 /// noise and textures that any thread computes in any order.
+#[inline]
 pub fn number_at(seed: u64, index: u64) -> u64 {
     mix(seed.wrapping_add(index.wrapping_mul(GAMMA)))
 }
