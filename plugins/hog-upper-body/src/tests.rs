@@ -314,7 +314,7 @@ proptest! {
 
     #[test]
     fn a_grid_has_all_windows_with_their_square_in_the_image(
-        width in 60..200usize, height in 60..200usize, side in 16.0..60.0f64,
+        width in 80..200usize, height in 80..200usize, side in 16.0..60.0f64,
     ) {
         let grid = Grid::new((width, height), side);
         let is_inside = |square: &Rect| {
