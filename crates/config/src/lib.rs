@@ -4,14 +4,17 @@
 //!   reads it from TOML and refuses unknown keys and numbers out of range, with their place.
 //! * [`Registry`]: the plugins of a program. A plugin crate has a `register` function that the
 //!   program calls.
+//! * [`OrAuto`]: a setting that is one of several words, or `auto`.
 //! * [`ConfigError`]: a mistake with its place in the text.
 
 mod names;
+mod or_auto;
 mod registry;
 mod settings;
 mod trainer;
 
 pub use names::nearest;
+pub use or_auto::OrAuto;
 pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use settings::{
     ConfigError, Settings, Value, check_settings, commented_defaults, parse_settings,

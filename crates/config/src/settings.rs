@@ -220,9 +220,44 @@ impl fmt::Display for Shown {
 /// the nearest valid one.
 pub fn parse_settings<T: Settings>(value: Option<Value<'_>>) -> Result<T, ConfigError> {
     let Some(value) = value else { return Ok(T::default()) };
-    let settings = T::deserialize(toml::de::ValueDeserializer::from(value.clone()))?;
+    let settings = T::deserialize(toml::de::ValueDeserializer::from(value.clone()))
+        .map_err(|error| at_its_key::<T>(error, &value))?;
     check_settings(&settings).map_err(|error| ConfigError::at_key(&error, &value))?;
     Ok(settings)
+}
+
+/// Returns the error at the key that it is about.
+///
+/// Serde forgets the places within flattened structs and the names that they allow, so each key
+/// is read alone, as if the others were left out, and the schema has the names.
+fn at_its_key<T: Settings>(error: toml::de::Error, value: &Value<'_>) -> ConfigError {
+    let DeValue::Table(table) = value.get_ref() else { return error.into() };
+    if error.span().is_some_and(|span| span != value.span()) {
+        return error.into();
+    }
+    let is_wrong = |(key, entry): (&Spanned<_>, &Value<'_>)| {
+        let alone = [(key.clone(), entry.clone())].into_iter().collect();
+        let alone = Spanned::new(value.span(), DeValue::Table(alone));
+        let read = T::deserialize(toml::de::ValueDeserializer::from(alone));
+        read.is_err_and(|why| why.message() == error.message())
+    };
+    let wrong = table.iter().find(|(key, entry)| is_wrong((key, entry)));
+    let Some((key, entry)) = wrong else { return error.into() };
+    match error.message().starts_with("unknown field") {
+        true => {
+            let message = format!("{}, expected one of {}", error.message(), names_of::<T>());
+            ConfigError { message: with_suggestion(&message), span: Some(key.span()) }
+        }
+        false => ConfigError { span: Some(entry.span()), ..error.into() },
+    }
+}
+
+/// Returns the keys of `T`, quoted.
+fn names_of<T: Settings>() -> String {
+    let schema = schemars::schema_for!(T).to_value();
+    let declared = schema["properties"].as_object().into_iter().flat_map(|keys| keys.keys());
+    let quoted: Vec<String> = declared.map(|key| format!("`{key}`")).collect();
+    quoted.join(", ")
 }
 
 /// Adds "did you mean" to serde's "unknown field `a`, expected one of `b`, `c`".
@@ -423,6 +458,42 @@ mod tests {
         let placed = ConfigError::new("wrong").or_at(Some(1..2));
         assert_eq!(placed.span, Some(1..2));
         assert_eq!(placed.or_at(Some(5..6)).span, Some(1..2));
+    }
+
+    #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    struct Joined {
+        own: u32,
+        #[serde(flatten)]
+        shared: Shared,
+    }
+
+    #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+    #[serde(default)]
+    struct Shared {
+        /// Height, m.
+        #[schemars(range(min = 0.0, max = 3.0))]
+        height_m: f64,
+    }
+
+    #[test]
+    fn flattened_settings_are_read_and_refused_like_all_others() {
+        let parse = |text| parse_settings::<Joined>(Some(DeValue::parse(text).unwrap()));
+        let read = parse("{ own = 2, height_m = 1 }").unwrap();
+        assert_eq!((read.own, read.shared.height_m), (2, 1.0));
+        let shown = |text| parse(text).unwrap_err().render("a.toml", text);
+        let unknown = shown("{ own = 2, hight_m = 1.0 }");
+        assert!(unknown.contains("a.toml:1:12: unknown field `hight_m`, expected one of `own`"));
+        assert!(unknown.contains("did you mean `height_m`?\n"), "{unknown}");
+        assert!(unknown.ends_with("           ^^^^^^^"), "{unknown}");
+        let kind = shown("{ own = 2, height_m = 'tall' }");
+        assert!(kind.contains("a.toml:1:23: invalid type: string \"tall\""), "{kind}");
+        let range = shown("{ own = 2, height_m = 4.0 }");
+        assert!(range.contains("a.toml:1:23: `height_m` must lie between 0 and 3"), "{range}");
+        let own = shown("{ own = -2, height_m = 1.0 }");
+        assert!(own.contains("a.toml:1:9: invalid value: integer `-2`"), "{own}");
+        let defaults = commented_defaults::<Joined>();
+        assert!(defaults.ends_with("own = 0\n# Height, m.\nheight_m = 0.0\n"), "{defaults}");
     }
 
     #[derive(Serialize, Deserialize, JsonSchema, Clone)]

@@ -1,8 +1,9 @@
-//! Image arithmetic that several plugins share.
+//! Image arithmetic that several plugins share, and the way from boxes of people to positions.
 //!
 //! Each fast kernel has a slow, obvious reference in its tests.
 
 mod appearance;
+mod boxes;
 mod gallery;
 pub mod ground;
 mod integral;
@@ -15,6 +16,7 @@ mod sketch;
 mod upright;
 
 pub use appearance::{Appearance, AppearanceDifference};
+pub use boxes::{BoxSettings, BoxedBody, is_shown, log_odds_of};
 pub use gallery::Gallery;
 pub use integral::Integral;
 pub use islands::islands;

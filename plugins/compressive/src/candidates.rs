@@ -1,4 +1,4 @@
-//! Which boxes are looked at.
+//! Boxes of a search, and of the examples beside a person.
 
 use tagalong_geometry::Rect;
 
@@ -17,7 +17,7 @@ impl Pixels {
     }
 }
 
-/// Offsets in a disc, nearest rows first come first, every `step` pixels.
+/// Returns the offsets in a disc, row by row, every `step` pixels.
 pub(crate) fn disc(radius: f64, step: i64) -> impl Iterator<Item = (i64, i64)> {
     let step = step.max(1);
     let reach = (radius.max(0.0) as i64 / step).min(200);
@@ -26,8 +26,7 @@ pub(crate) fn disc(radius: f64, step: i64) -> impl Iterator<Item = (i64, i64)> {
     (-reach..=reach).flat_map(places).filter(inside)
 }
 
-/// `count` offsets spread evenly over a ring: a spiral in steps of the golden
-/// angle.
+/// Returns `count` offsets spread evenly over a ring: a spiral in steps of the golden angle.
 pub(crate) fn ring(from: f64, to: f64, count: usize) -> impl Iterator<Item = (i64, i64)> {
     const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
     (0..count).map(move |i| {
@@ -76,6 +75,25 @@ mod tests {
             let quarter = all.iter().filter(|(x, y)| (*x > 0.0) == right && (*y > 0.0) == below);
             let quarter = quarter.count();
             assert!((85..115).contains(&quarter), "{quarter} of {count}");
+        }
+    }
+
+    /// Offsets so large that whole pixels hardly matter.
+    #[test]
+    fn a_ring_turns_by_the_golden_angle_from_its_inner_to_its_outer_radius() {
+        let all: Vec<(f64, f64)> = ring(1e5, 2e5, 60).map(|(x, y)| (x as f64, y as f64)).collect();
+        let radii: Vec<f64> = all.iter().map(|(x, y)| x.hypot(*y)).collect();
+        assert!(radii.is_sorted());
+        // The first and last have half a step to the edges: a 120th of the area.
+        let at = |part: f64| 1e5 * (1.0 + part * 3.0).sqrt();
+        assert!((radii[0] - at(0.5 / 60.0)).abs() < 1.0, "{}", radii[0]);
+        assert!((radii[59] - at(59.5 / 60.0)).abs() < 1.0, "{}", radii[59]);
+        // (3 - sqrt 5) half turns.
+        let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+        for (index, (x, y)) in all.iter().enumerate() {
+            let turned = golden * index as f64 - y.atan2(*x);
+            let off = (turned / std::f64::consts::TAU).fract();
+            assert!(off.abs().min(1.0 - off.abs()) < 1e-4, "{index}: {off}");
         }
     }
 

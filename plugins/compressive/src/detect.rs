@@ -356,7 +356,7 @@ impl Hunt<'_> {
         false
     }
 
-    /// By how much the best box beats all that are elsewhere.
+    /// Returns the confidence of the best box above that of all boxes elsewhere.
     fn lead(&self, best: Scored) -> f32 {
         let far = OTHER_MODE * self.target.scaled.size().0 as f64;
         let elsewhere = self.scratch.coarse.iter().filter(|other| {
@@ -459,7 +459,7 @@ impl Detector for Compressive {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Point3, SMatrix, Vector2};
-    use tagalong_core::{Estimate, Person};
+    use tagalong_core::{EgoMotion, Estimate, GreyImage, Images, Person, Stamp};
     use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
@@ -576,5 +576,52 @@ mod tests {
         let mut funnel = Funnel::default();
         Dropped { outside: 5, nearer: 3, farther: 1 }.count(&mut funnel);
         assert_eq!((funnel.count("box: outside"), funnel.count("box: depth")), (5, 4));
+    }
+
+    #[test]
+    fn the_lead_is_over_boxes_half_a_width_away_in_any_direction() {
+        let (config, features) = (Config::default(), Features::draw(10, 4, 1));
+        let grey = Some(Arc::new(GreyImage::filled(320, 240, 90)));
+        let images = Images { grey, ..Images::default() };
+        let frame =
+            Frame::new(1, Stamp::default(), Arc::new(camera()), EgoMotion::at_rest(0.1), images);
+        let view = FrameImages::of(&frame).unwrap();
+        let mut target = Target::new(10);
+        target.fit_to(&features, &view, &Rect::new(100.0, 80.0, 40.0, 50.0)).unwrap();
+        let lead = |others: &[(i64, i64, f32)]| {
+            let scored = |(x, y, confidence): &(i64, i64, f32)| Scored {
+                x: *x,
+                y: *y,
+                confidence: *confidence,
+            };
+            let coarse = others.iter().map(scored).collect();
+            let mut scratch = Scratch { coarse, ..Scratch::default() };
+            let hunt = Hunt {
+                config: &config,
+                view: &view,
+                target: &target,
+                scratch: &mut scratch,
+                expected_m: None,
+            };
+            hunt.lead(Scored { x: 100, y: 80, confidence: 5.0 })
+        };
+        let none = f32::INFINITY;
+        // Half a width is 20 pixels, along the columns, along the rows, and across both.
+        for (x, y, expected) in [
+            (120, 80, 1.0),
+            (119, 80, none),
+            (80, 80, 1.0),
+            (81, 80, none),
+            (100, 100, 1.0),
+            (100, 99, none),
+            (100, 60, 1.0),
+            (112, 96, 1.0),
+            (112, 95, none),
+            (88, 64, 1.0),
+        ] {
+            assert_eq!(lead(&[(x, y, 4.0)]), expected, "{x}, {y}");
+        }
+        let several = [(105, 80, 4.9), (140, 80, 2.0), (60, 80, 3.5), (100, 40, 3.0)];
+        assert_eq!(lead(&several), 1.5, "over the best of those elsewhere");
     }
 }

@@ -44,7 +44,7 @@ impl DepthNet {
         (detection.is_sane() && region.width > 0.0).then_some(detection)
     }
 
-    /// Returns the likeliest peak near a track; ties go to the nearer one.
+    /// Returns the nearest peak within reach of a track.
     fn near<'a>(&self, track: &Track, found: &'a [Peak]) -> Option<&'a Peak> {
         let expected = track.estimate.person.position.xy();
         let cost = |peak: &Peak| peak.distance_m(&expected.coords.into());

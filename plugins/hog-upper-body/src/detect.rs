@@ -375,4 +375,67 @@ mod tests {
         let unknown_above = |above: f64| if above < 0.0 { 2.9 } else { f32::NAN };
         assert_eq!(is_head(unknown_above), (true, 0));
     }
+
+    /// Only columns of the object above a square count that lie over its middle half.
+    #[test]
+    fn a_head_ends_where_most_columns_above_it_are_of_something_else() {
+        let (camera, config) = (camera(), Config::default());
+        let square = camera.upper_body(&Point3::new(3.0, 0.0, 1.5));
+        // The object between two columns and two rows, in sides of the square; the rest is far.
+        let goes_on = |columns: [f64; 2], above: [f64; 2]| {
+            let depth = DepthImage::from_fn(640, 480, |x, y| {
+                let x = (x as f64 + 0.5 - square.x) / square.width;
+                let y = (square.y - y as f64 - 0.5) / square.height;
+                let is_object = x > columns[0] && x < columns[1] && y > above[0] && y < above[1];
+                if is_object { 2.9 } else { 5.0 }
+            });
+            let mut lattice = Lattice::default();
+            let proposer = Proposer::new(&config, &camera, Some(&depth), &mut lattice, None);
+            proposer.goes_on_above(&depth, &square, 2.9)
+        };
+        let all = [-9.0, 9.0];
+        // Read at 0.25, 0.375, 0.5, 0.625 and 0.75 of the width: three of five are most.
+        assert!(goes_on([0.2, 0.53], all) && !goes_on([0.2, 0.47], all));
+        assert!(goes_on([0.47, 0.8], all) && !goes_on([0.53, 0.8], all));
+        assert!(!goes_on([0.3, 0.59], all) && goes_on([0.35, 0.65], all));
+        assert!(!goes_on([-9.0, 0.22], all) && !goes_on([0.78, 9.0], all));
+        // A quarter of the square above it.
+        assert!(goes_on(all, [0.22, 0.28]));
+        assert!(!goes_on(all, [-9.0, 0.22]) && !goes_on(all, [0.28, 9.0]));
+    }
+
+    /// Returns true if windows with a square of `side` pixels are proposed before a wall.
+    fn is_proposed(config: &Config, side: f64, metres: f64) -> bool {
+        let (camera, depth) = (camera(), DepthImage::filled(640, 480, metres as f32));
+        let mut lattice = Lattice::default();
+        let mut proposer = Proposer::new(config, &camera, Some(&depth), &mut lattice, None);
+        let (grid, mut wanted) = (Grid::new((640, 480), side), Vec::new());
+        proposer.propose(&grid, &mut wanted);
+        let all = grid.windows(|_| Some(None)).count();
+        assert!(wanted.is_empty() || wanted.len() == all, "{side} {metres}");
+        assert_eq!(proposer.unfit as usize, all - wanted.len());
+        let is_told = |window: &Wanted| window.depth_m == Some(f64::from(metres as f32));
+        assert!(wanted.iter().all(is_told));
+        !wanted.is_empty()
+    }
+
+    #[test]
+    fn windows_are_proposed_at_the_depth_of_a_person_of_their_size() {
+        // Neither the height of heads nor their upper end is tested.
+        let config = Config {
+            size_tolerance: 1.25,
+            above_m: 0.0,
+            min_head_height_m: -99.0,
+            max_head_height_m: 99.0,
+            ..Config::default()
+        };
+        let side = 525.0 * UPPER_BODY_SIDE_M / 3.0;
+        let near = |metres: f64| is_proposed(&config, side, metres);
+        assert!(near(3.0) && near(2.42) && near(3.74));
+        assert!(!near(2.38) && !near(3.76));
+        let narrow = Config { min_depth_m: 2.8, max_depth_m: 3.2, ..config.clone() };
+        let near = |metres: f64| is_proposed(&narrow, side, metres);
+        assert!(near(2.81) && near(3.19) && !near(2.79) && !near(3.21));
+        assert!(is_proposed(&config, 2.0 * side, 1.5) && !is_proposed(&config, 2.0 * side, 3.0));
+    }
 }

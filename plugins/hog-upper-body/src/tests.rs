@@ -279,6 +279,75 @@ proptest! {
     }
 }
 
+/// Returns a sample pixel by pixel: a triangle as wide as the step, or as a pixel.
+fn slow_sample(image: &GreyImage, (x, y): (f64, f64), step: f64) -> f64 {
+    let reach = step.max(1.0);
+    let (mut sum, mut total) = (0.0, 0.0);
+    for row in -60..160_i64 {
+        for column in -60..160_i64 {
+            let near =
+                |at: i64, centre: f64| (1.0 - (at as f64 + 0.5 - centre).abs() / reach).max(0.0);
+            let weight = near(column, x) * near(row, y);
+            let (right, bottom) = (image.width() as i64 - 1, image.height() as i64 - 1);
+            let value = image.row(row.clamp(0, bottom) as usize)[column.clamp(0, right) as usize];
+            sum += weight * f64::from(value);
+            total += weight;
+        }
+    }
+    sum / total
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn samples_are_those_of_the_slow_reference(
+        step in 0.4..4.0f64, x in -40.0..60.0f64, y in -40.0..50.0f64,
+    ) {
+        let image = noise(57, 43, 8);
+        for (index, value) in resampled(&image, (x, y), step, 1).iter().enumerate().step_by(7) {
+            let (i, j) = ((index % 10) as f64 + 0.5, (index / 10) as f64 + 0.5);
+            let slow = slow_sample(&image, (x + i * step, y + j * step), step);
+            prop_assert!((f64::from(*value) - slow).abs() < 0.02, "{index}: {value} {slow}");
+        }
+    }
+
+    #[test]
+    fn a_grid_has_all_windows_with_their_square_in_the_image(
+        width in 80..200usize, height in 80..200usize, side in 16.0..60.0f64,
+    ) {
+        let grid = Grid::new((width, height), side);
+        let is_inside = |square: &Rect| {
+            let (right, bottom) = (width as f64 + 1e-9, height as f64 + 1e-9);
+            square.x > -1e-9 && square.y > -1e-9 && square.right() < right && square.bottom() < bottom
+        };
+        let (columns, rows) = (grid.columns.clone(), grid.rows.clone());
+        for (x, y, is) in [
+            (columns.start, rows.start, true),
+            (columns.end - 1, rows.end - 1, true),
+            (columns.start - 1, rows.start, false),
+            (columns.start, rows.start - 1, false),
+            (columns.end, rows.start, false),
+            (columns.start, rows.end, false),
+        ] {
+            let square = grid.square(x, y);
+            prop_assert_eq!(is_inside(&square), is, "{} {}: {:?}", x, y, square);
+            prop_assert_eq!((square.width, square.height), (side, side));
+            // The window begins at its cell, of 8 pixels of the resampled image.
+            let (window, cell) = (crate::window_of(&square), side / (0.5 * WINDOW_PX as f64) * 8.0);
+            prop_assert!((window.x - x as f64 * cell).abs() < 1e-9);
+            prop_assert!((window.y - y as f64 * cell).abs() < 1e-9);
+            prop_assert!((window.width - 2.0 * side).abs() < 1e-9);
+        }
+        let mut order = Vec::new();
+        let some = grid.windows(|square| (square.x > 10.0).then_some(Some(2.0)));
+        order.extend(some.map(|window| (window.y, window.x)));
+        prop_assert!(order.is_sorted());
+        let expected = columns.filter(|x| grid.square(*x, 0).x > 10.0).count() * rows.count();
+        prop_assert_eq!(order.len(), expected);
+    }
+}
+
 #[cfg(feature = "train")]
 mod training {
     use tagalong_config::{Example, Trainer};

@@ -2,11 +2,10 @@ use std::time::Duration;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::check_settings;
+use tagalong_config::{OrAuto, check_settings};
 use tagalong_core::{Error, Result};
-use tagalong_network::{Choices, Family, Limits, Preparation};
-
-use crate::choices::{Body, Channels, FamilyChoice, Placing};
+use tagalong_network::{Choices, Colours, Family, Fit, Limits, Preparation};
+use tagalong_vision::BoxSettings;
 
 /// Settings of `onnx`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -16,7 +15,7 @@ pub struct Config {
     pub model: String,
     /// Family of the network: `auto` (by the file), `yolox`, `yolov8`, `yolov10`, `rt-detr`,
     /// `rf-detr`, `nanodet`, `rtmdet` or `movenet`.
-    pub family: FamilyChoice,
+    pub family: OrAuto<Family>,
     /// Columns and rows of the input where the file leaves them open, for example `[640, 640]`,
     /// which is also taken for an empty list.
     pub size: Vec<usize>,
@@ -36,10 +35,10 @@ pub struct Config {
     #[schemars(range(min = 1, max = 1000))]
     pub every: u64,
     /// Order of the channels: `auto` (that of the family), `rgb` or `bgr`.
-    pub colours: Channels,
+    pub colours: OrAuto<Colours>,
     /// Place of the image in the input: `auto` (that of the family), `stretch`, `centre` or
     /// `top-left`, the latter two with the aspect ratio of the image.
-    pub fit: Placing,
+    pub fit: OrAuto<Fit>,
     /// Value of padded pixels, 0 to 255; -1: that of the family.
     #[schemars(range(min = -1.0, max = 255.0))]
     pub padding: f64,
@@ -49,28 +48,9 @@ pub struct Config {
     /// Three deviations in the order of the channels, by which they are divided; empty: those of
     /// the family.
     pub deviation: Vec<f32>,
-    /// Box that is tracked: `full`, the upper body of the person in the box; `full-box`, the box.
-    pub body: Body,
-    /// Assumed height of a person whose whole body is in a box, m.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub height_m: f64,
-    /// Standard deviation of the position of a box, pixels.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub sigma_px: f64,
-    /// Standard deviation of the depth of a face read from the depth image, m.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub sigma_depth_m: f64,
-    /// Standard deviation of a distance that is computed from the size of the box alone, as a
-    /// fraction of the distance.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub sigma_distance: f64,
-    /// A search near a track accepts boxes of uncertain distance that overlap the expected box by
-    /// this much (IoU), and ...
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub near_overlap: f64,
-    /// ... positions within this distance on the floor, m.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub near_m: f64,
+    /// Boxes to detections with a position.
+    #[serde(flatten)]
+    pub boxes: BoxSettings,
     /// Threads of the network.
     #[schemars(range(min = 1, max = 256))]
     pub threads: usize,
@@ -93,25 +73,19 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             model: String::new(),
-            family: FamilyChoice::Auto,
+            family: OrAuto::Auto,
             size: Vec::new(),
             classes: Vec::new(),
             discover_score: 0.5,
             track_score: 0.2,
             suppress_iou: 0.6,
             every: 1,
-            colours: Channels::Auto,
-            fit: Placing::Auto,
+            colours: OrAuto::Auto,
+            fit: OrAuto::Auto,
             padding: -1.0,
             mean: Vec::new(),
             deviation: Vec::new(),
-            body: Body::Full,
-            height_m: 1.7,
-            sigma_px: 4.0,
-            sigma_depth_m: 0.1,
-            sigma_distance: 0.2,
-            near_overlap: 0.3,
-            near_m: 0.8,
+            boxes: BoxSettings::default(),
             threads: 1,
             deadline_s: 5.0,
             max_file_mb: 512,
@@ -138,7 +112,7 @@ impl Config {
 
     pub(crate) fn choices(&self) -> Choices {
         let size = <[usize; 2]>::try_from(&self.size[..]).ok();
-        Choices { family: self.family.family(), size, classes: self.classes.clone() }
+        Choices { family: self.family.chosen(), size, classes: self.classes.clone() }
     }
 
     pub(crate) fn limits(&self) -> Limits {
@@ -155,14 +129,14 @@ impl Config {
     /// Returns the preparation of images: that of the family, but for what is set.
     pub(crate) fn preparation(&self, family: Family) -> Result<Preparation> {
         let mut preparation = family.preparation();
-        if let Some(colours) = self.colours.colours()
+        if let Some(colours) = self.colours.chosen()
             && colours != preparation.colours
         {
             preparation.colours = colours;
             preparation.mean.reverse();
             preparation.deviation.reverse();
         }
-        if let Some(fit) = self.fit.fit() {
+        if let Some(fit) = self.fit.chosen() {
             preparation.fit = fit;
         }
         if self.padding >= 0.0 {

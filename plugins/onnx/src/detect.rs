@@ -3,17 +3,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, Derived, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Query, Result,
-    RgbImage, Track,
+    RgbImage,
 };
-use tagalong_geometry::{FaceDepth, ImageBox, PointEstimate, Rect, UPPER_BODY_SIDE_M};
 use tagalong_network::{PersonNetwork, Preparation, ScoredBox};
+use tagalong_vision::log_odds_of;
 
 use crate::NAME;
-use crate::choices::Body;
 use crate::config::Config;
-
-/// Distance of probabilities from 0 and 1 at least.
-const SURE: f64 = 1e-3;
 
 /// Network with the preparation of its images.
 struct Loaded {
@@ -101,44 +97,6 @@ impl Onnx {
             }
         })
     }
-
-    fn detection(&self, frame: &Frame, person: &ScoredBox) -> Option<Detection> {
-        let camera = &*frame.camera;
-        let (upper_body, PointEstimate { position, covariance }) =
-            self.located(frame, &person.rect)?;
-        let image = match self.config.body {
-            Body::Full => ImageBox::upper_body(upper_body),
-            Body::FullBox => ImageBox::full_body(person.rect),
-        };
-        let inside = image.rect.clipped(camera.width, camera.height).area() > 0.0;
-        let score = log_odds(person.score.into());
-        let detection = Detection { image: Some(image), position, covariance, score, source: NAME };
-        (inside && detection.is_sane()).then_some(detection)
-    }
-
-    /// Returns the upper-body square and the head position of the person in a box: from the depth
-    /// image where that shows the face, otherwise from the size of the box.
-    fn located(&self, frame: &Frame, whole: &Rect) -> Option<(Rect, PointEstimate)> {
-        let (camera, config) = (&*frame.camera, &self.config);
-        let by_height = whole.upper_body_of_standing(config.height_m);
-        let measured = frame.depth().ok().and_then(|depth| depth.face_m(&by_height));
-        let face =
-            FaceDepth::by_size(camera, UPPER_BODY_SIDE_M, by_height.width, config.sigma_distance)
-                .or_measured(measured, config.sigma_depth_m);
-        let sane = face.depth_m.is_finite() && face.depth_m > 0.05;
-        sane.then(|| (by_height, camera.locate_head(&by_height, face, config.sigma_px)))
-    }
-
-    /// Returns a score of the fit of a detection to a track; `None` if it is not near.
-    fn fit(&self, track: &Track, detection: &Detection) -> Option<f64> {
-        let overlap = detection.rect().map_or(0.0, |rect| track.estimate.region.iou(&rect));
-        let away_m = (track.estimate.person.position.xy() - detection.position.xy()).norm();
-        // The distance by size alone may be far off on the floor, so overlap is enough for such a
-        // box.
-        let guessed = detection.covariance.diagonal().xy().max() > 0.25 * self.config.near_m;
-        let near = away_m <= self.config.near_m || guessed && overlap >= self.config.near_overlap;
-        near.then_some(overlap - away_m)
-    }
 }
 
 impl Loaded {
@@ -163,12 +121,6 @@ fn load(config: &Config, context: &Context) -> Result<Loaded> {
     let network = network.map_err(|why| Error::Model { path: config.model.clone(), why })?;
     let preparation = config.preparation(network.family())?;
     Ok(Loaded { network, preparation })
-}
-
-fn log_odds(probability: f64) -> f64 {
-    // The log-odds of 0 and 1 are infinite.
-    let sure = probability.clamp(SURE, 1.0 - SURE);
-    (sure / (1.0 - sure)).ln()
 }
 
 impl Detector for Onnx {
@@ -199,19 +151,16 @@ impl Detector for Onnx {
                 funnel.drop_at("network: score", person.rect);
                 continue;
             }
-            match self.detection(frame, person) {
+            let score = log_odds_of(person.score.into());
+            match self.config.boxes.detection(frame, &person.rect, score, NAME) {
                 Some(detection) => found.push(detection),
                 None => funnel.drop_at("outside", person.rect),
             }
         }
-        // The best fit comes first, because the search is for one person.
-        if let Query::Track(track) = search {
-            let fits = found.into_iter().filter_map(|d| Some((self.fit(track, &d)?, d)));
-            let mut near: Vec<(f64, Detection)> = fits.collect();
-            near.sort_by(|a, b| b.0.total_cmp(&a.0));
-            found = near.into_iter().map(|(_, detection)| detection).collect();
-        }
-        Ok(found)
+        Ok(match search {
+            Query::Track(track) => self.config.boxes.near(track, found),
+            Query::Discover { .. } => found,
+        })
     }
 
     fn remembers(&self) -> bool {

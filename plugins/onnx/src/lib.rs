@@ -4,13 +4,11 @@
 //! eight families of detectors. Its boxes of whole people become upper-body squares with a place:
 //! by depth where that shows the face, otherwise by the size of the box.
 
-mod choices;
 mod config;
 mod detect;
 #[cfg(test)]
 mod tests;
 
-pub use choices::{Body, Channels, FamilyChoice, Placing};
 pub use config::Config;
 pub use detect::Onnx;
 use tagalong_config::Registry;

@@ -2,13 +2,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Matrix5, Vector2, Vector3};
-use tagalong_config::{Context, Registry};
+use tagalong_config::{Context, OrAuto, Registry, parse_settings};
 use tagalong_core::{
     DepthImage, Detection, Detector, DiffDrive, EgoMotion, Estimate, Frame, Funnel, GreyImage,
     Images, Person, Query, RgbImage, Stamp, Track, TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect};
 use tagalong_network::{Colours, Family, Fit};
+use tagalong_vision::{BoxSettings, BoxedBody};
 
 use super::*;
 
@@ -31,6 +32,12 @@ fn context() -> Context {
 
 fn config(family: Family) -> Config {
     Config { model: format!("{family}.onnx"), ..Config::default() }
+}
+
+/// Returns the settings for boxes that enclose this.
+fn of_boxes(body: BoxedBody, family: Family) -> Config {
+    let boxes = BoxSettings { body, ..BoxSettings::default() };
+    Config { boxes, ..config(family) }
 }
 
 fn detector(config: Config) -> Onnx {
@@ -74,7 +81,7 @@ fn it_conforms() {
 #[test]
 fn every_family_finds_the_person_and_the_place() {
     for family in Family::ALL {
-        let mut whole = detector(Config { body: Body::FullBox, ..config(family) });
+        let mut whole = detector(of_boxes(BoxedBody::FullBox, family));
         let found = detect(&mut whole, &frame(1, 240));
         assert_eq!(found.len(), 1, "{family}");
         let image = found[0].image.unwrap();
@@ -162,10 +169,10 @@ fn a_config_without_a_model_says_so_in_the_funnel() {
 fn the_preparation_is_that_of_the_family_but_for_the_settings() {
     let prepare = |config: Config| config.preparation(Family::NanoDet).unwrap();
     assert_eq!(prepare(Config::default()), Family::NanoDet.preparation());
-    let rgb = prepare(Config { colours: Channels::Rgb, ..Config::default() });
+    let rgb = prepare(Config { colours: OrAuto::Chosen(Colours::Rgb), ..Config::default() });
     assert_eq!((rgb.colours, rgb.mean), (Colours::Rgb, [123.675, 116.28, 103.53]));
     let own = prepare(Config {
-        fit: Placing::TopLeft,
+        fit: OrAuto::Chosen(Fit::TopLeft),
         padding: 0.0,
         mean: vec![1.0, 2.0, 3.0],
         deviation: vec![4.0; 3],
@@ -173,6 +180,28 @@ fn the_preparation_is_that_of_the_family_but_for_the_settings() {
     });
     assert_eq!((own.fit, own.padding, own.colours), (Fit::TopLeft, 0.0, Colours::Bgr));
     assert_eq!((own.mean, own.deviation), ([1.0, 2.0, 3.0], [4.0; 3]));
+}
+
+#[test]
+fn settings_of_boxes_and_words_stand_beside_the_others() {
+    let text =
+        "{ family = 'rt-detr', colours = 'auto', fit = 'top-left', height_m = 1.6, every = 2 }";
+    let read = |text: &str| {
+        let value = toml::de::DeValue::parse(text).unwrap();
+        parse_settings::<Config>(Some(value)).map_err(|error| error.message)
+    };
+    let expected = Config {
+        family: OrAuto::Chosen(Family::RtDetr),
+        fit: OrAuto::Chosen(Fit::TopLeft),
+        boxes: BoxSettings { height_m: 1.6, ..BoxSettings::default() },
+        every: 2,
+        ..Config::default()
+    };
+    assert_eq!(read(text), Ok(expected));
+    let why = read("{ hight_m = 1.6 }").unwrap_err();
+    assert!(why.contains("did you mean `height_m`?"), "{why}");
+    let why = read("{ family = 'yolov9' }").unwrap_err();
+    assert!(why.contains("did you mean `yolov8`?"), "{why}");
 }
 
 fn message(config: Config) -> String {
@@ -185,7 +214,7 @@ fn bad_files_are_named_with_the_reason() {
     assert!(why.starts_with("model file `none.onnx`: cannot be read"), "{why}");
     let why = message(Config { model: "yolox.json".into(), ..Config::default() });
     assert!(why.contains("`yolox.json`: it is truncated or no ONNX file"), "{why}");
-    let wrong = Config { family: FamilyChoice::RfDetr, ..config(Family::Yolox) };
+    let wrong = Config { family: OrAuto::Chosen(Family::RfDetr), ..config(Family::Yolox) };
     assert!(message(wrong).contains("is not of the family rf-detr"));
     let small = Config { max_operators: 2, ..config(Family::Yolox) };
     assert!(message(small).contains("raise `max_operators`"));

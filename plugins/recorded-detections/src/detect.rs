@@ -2,16 +2,14 @@ use nalgebra::Matrix3;
 use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, Detection, Detector, ExternalDetection, Frame, Funnel, Input, Inputs, Query,
-    Result, Track,
+    Result,
 };
-use tagalong_geometry::{FaceDepth, ImageBox, PointEstimate, Rect, UPPER_BODY_SIDE_M};
+use tagalong_geometry::ImageBox;
+use tagalong_vision::{is_shown, log_odds_of};
 
 use crate::NAME;
 use crate::boxes::{Boxes, read};
-use crate::config::{Body, Config, ScoreScale};
-
-/// Distance of probabilities from 0 and 1 at least.
-const SURE: f64 = 1e-3;
+use crate::config::{Config, ScoreScale};
 
 /// Detector that returns recorded detections, with a position for each box.
 pub struct RecordedDetections {
@@ -47,69 +45,26 @@ impl RecordedDetections {
     }
 
     fn detection(&self, frame: &Frame, recorded: &ExternalDetection) -> Option<Detection> {
-        let camera = &*frame.camera;
-        let (image, position, covariance) = match (recorded.head, recorded.region) {
-            (Some(head), region) => {
-                let variance = self.config.sigma_position_m.powi(2);
-                let region = region.unwrap_or_else(|| camera.upper_body(&head));
-                (ImageBox::upper_body(region), head, Matrix3::identity() * variance)
-            }
-            (None, Some(region)) => {
-                let upper_body = self.upper_body(&region);
-                let PointEstimate { position, covariance } = self.located(frame, &upper_body)?;
-                let image = match self.config.body {
-                    Body::FullBox => ImageBox::full_body(region),
-                    Body::Full | Body::Upper => ImageBox::upper_body(upper_body),
-                };
-                (image, position, covariance)
-            }
-            (None, None) => return None,
-        };
-        let inside = image.rect.clipped(camera.width, camera.height).area() > 0.0;
         let score = self.log_odds(recorded.score);
-        let detection = Detection { image: Some(image), position, covariance, score, source: NAME };
-        (inside && detection.is_sane()).then_some(detection)
-    }
-
-    fn upper_body(&self, region: &Rect) -> Rect {
-        match self.config.body {
-            Body::Upper => *region,
-            Body::Full | Body::FullBox => region.upper_body_of_standing(self.config.height_m),
-        }
-    }
-
-    /// Returns the head position for an upper-body square, with its covariance: from the depth
-    /// image where that shows the face, otherwise from the size of the square.
-    fn located(&self, frame: &Frame, region: &Rect) -> Option<PointEstimate> {
-        let (camera, config) = (&*frame.camera, &self.config);
-        let measured = frame.depth().ok().and_then(|depth| depth.face_m(region));
-        let face =
-            FaceDepth::by_size(camera, UPPER_BODY_SIDE_M, region.width, config.sigma_distance)
-                .or_measured(measured, config.sigma_depth_m);
-        let sane = face.depth_m.is_finite() && face.depth_m > 0.05;
-        sane.then(|| camera.locate_head(region, face, config.sigma_px))
+        let Some(head) = recorded.head else {
+            return self.config.boxes.detection(frame, &recorded.region?, score, NAME);
+        };
+        let region = recorded.region.unwrap_or_else(|| frame.camera.upper_body(&head));
+        let detection = Detection {
+            image: Some(ImageBox::upper_body(region)),
+            position: head,
+            covariance: Matrix3::identity() * self.config.sigma_position_m.powi(2),
+            score,
+            source: NAME,
+        };
+        is_shown(&frame.camera, &detection).then_some(detection)
     }
 
     fn log_odds(&self, score: f64) -> f64 {
         match self.config.score {
             ScoreScale::LogOdds => score,
-            ScoreScale::Probability => {
-                // The log-odds of 0 and 1 are infinite.
-                let sure = score.clamp(SURE, 1.0 - SURE);
-                (sure / (1.0 - sure)).ln()
-            }
+            ScoreScale::Probability => log_odds_of(score),
         }
-    }
-
-    /// Returns a score of the fit of a detection to a track; `None` if it is not near.
-    fn fit(&self, track: &Track, detection: &Detection) -> Option<f64> {
-        let overlap = detection.rect().map_or(0.0, |seen| track.estimate.region.iou(&seen));
-        let away_m = (track.estimate.person.position.xy() - detection.position.xy()).norm();
-        // The distance by size alone may be far off on the floor, so overlap is enough for such a
-        // box.
-        let guessed = detection.covariance.diagonal().xy().max() > 0.25 * self.config.near_m;
-        let near = away_m <= self.config.near_m || guessed && overlap >= self.config.near_overlap;
-        near.then_some(overlap - away_m)
     }
 }
 
@@ -141,13 +96,9 @@ impl Detector for RecordedDetections {
                 None => funnel.drop_at("outside", recorded.region.unwrap_or_default()),
             }
         }
-        // The best fit comes first, because the search is for one person.
-        if let Query::Track(track) = search {
-            let mut near: Vec<(f64, Detection)> =
-                found.into_iter().filter_map(|d| Some((self.fit(track, &d)?, d))).collect();
-            near.sort_by(|a, b| b.0.total_cmp(&a.0));
-            found = near.into_iter().map(|(_, detection)| detection).collect();
-        }
-        Ok(found)
+        Ok(match search {
+            Query::Track(track) => self.config.boxes.near(track, found),
+            Query::Discover { .. } => found,
+        })
     }
 }

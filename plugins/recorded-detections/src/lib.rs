@@ -12,7 +12,7 @@ mod detect;
 #[cfg(test)]
 mod tests;
 
-pub use config::{Body, Config, ScoreScale};
+pub use config::{Config, ScoreScale};
 pub use detect::RecordedDetections;
 use tagalong_config::Registry;
 

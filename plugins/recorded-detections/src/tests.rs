@@ -7,6 +7,7 @@ use tagalong_core::{
     Funnel, Images, Input, Person, Query, Stamp, Track, TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect};
+use tagalong_vision::{BoxSettings, BoxedBody};
 
 use super::*;
 
@@ -26,6 +27,10 @@ fn frame(index: u64, depth_m: Option<f32>) -> Frame {
 fn context(folder: &std::path::Path) -> Context {
     let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
     Context { seed: 1, base_dir: folder.to_owned(), wheels }
+}
+
+fn with_boxes(boxes: BoxSettings) -> Config {
+    Config { boxes, ..Config::default() }
 }
 
 fn of_file(text: &str, config: Config) -> tagalong_core::Result<RecordedDetections> {
@@ -73,9 +78,9 @@ fn a_whole_body_becomes_an_upper_body_with_a_place() {
 #[test]
 fn a_whole_body_can_be_tracked_as_the_box_that_it_is() {
     let text = whole_body(Point3::new(3.0, 0.4, 1.585));
-    let config = |body| Config { body, ..Config::default() };
-    let mut square = of_file(&text, config(Body::Full)).unwrap();
-    let mut whole = of_file(&text, config(Body::FullBox)).unwrap();
+    let config = |body| with_boxes(BoxSettings { body, ..BoxSettings::default() });
+    let mut square = of_file(&text, config(BoxedBody::Full)).unwrap();
+    let mut whole = of_file(&text, config(BoxedBody::FullBox)).unwrap();
     let (square, whole) = (
         detect(&mut square, &frame(2, None)).remove(0),
         detect(&mut whole, &frame(2, None)).remove(0),
@@ -174,7 +179,7 @@ fn mistakes_are_named_by_file_and_line() {
     let config = Config { path: "none.txt".into(), ..Config::default() };
     let error = RecordedDetections::new(config, &context("nowhere".as_ref())).err().unwrap();
     assert!(error.to_string().contains("none.txt"), "{error}");
-    let wrong = Config { height_m: 0.0, ..Config::default() };
+    let wrong = with_boxes(BoxSettings { height_m: 0.0, ..BoxSettings::default() });
     assert!(RecordedDetections::new(wrong, &context(".".as_ref())).is_err());
     assert_eq!(Rect::default().area(), 0.0);
 }
@@ -258,7 +263,8 @@ fn a_square_of_head_and_shoulders_is_taken_as_it_is() {
     let head = Point3::new(3.0, 0.4, 1.585);
     let square = camera().upper_body(&head);
     let text = format!("1,-1,{},{},{},{},0.9", square.x, square.y, square.width, square.height);
-    let mut detector = of_file(&text, Config { body: Body::Upper, ..Config::default() }).unwrap();
+    let upper = BoxSettings { body: BoxedBody::Upper, ..BoxSettings::default() };
+    let mut detector = of_file(&text, with_boxes(upper)).unwrap();
     let found = detect(&mut detector, &frame(1, None)).remove(0);
     assert_eq!(found.rect().unwrap(), square);
     assert!((found.position - head).norm() < 1e-3, "{}", found.position);
@@ -295,10 +301,16 @@ fn the_depth_is_that_of_the_face_alone() {
 #[test]
 fn each_setting_that_cannot_work_is_named() {
     for (key, config) in [
-        ("height_m", Config { height_m: f64::INFINITY, ..Config::default() }),
-        ("sigma_px", Config { sigma_px: 0.0, ..Config::default() }),
-        ("sigma_depth_m", Config { sigma_depth_m: -1.0, ..Config::default() }),
-        ("sigma_distance", Config { sigma_distance: f64::NAN, ..Config::default() }),
+        ("height_m", with_boxes(BoxSettings { height_m: f64::INFINITY, ..BoxSettings::default() })),
+        ("sigma_px", with_boxes(BoxSettings { sigma_px: 0.0, ..BoxSettings::default() })),
+        (
+            "sigma_depth_m",
+            with_boxes(BoxSettings { sigma_depth_m: -1.0, ..BoxSettings::default() }),
+        ),
+        (
+            "sigma_distance",
+            with_boxes(BoxSettings { sigma_distance: f64::NAN, ..BoxSettings::default() }),
+        ),
         ("sigma_position_m", Config { sigma_position_m: 0.0, ..Config::default() }),
     ] {
         let error = RecordedDetections::new(config, &context(".".as_ref())).err().unwrap();

@@ -25,8 +25,9 @@ impl Pattern {
         }))
     }
 
-    fn at(self, x: usize, y: usize) -> usize {
-        self.0[y % 2][x % 2]
+    /// Returns the colours of the first two pixels of a row and of the next one.
+    fn rows(self, y: usize) -> [[usize; 2]; 2] {
+        [self.0[y % 2], self.0[(y + 1) % 2]]
     }
 }
 
@@ -36,33 +37,32 @@ pub(super) fn interpolate(rows: &Rows<'_>, pattern: Pattern) -> RgbImage {
     let inner = |at: usize, size: usize| at.clamp(1, size.max(3) - 2);
     let mut pixels = Vec::with_capacity(width * height);
     for y in 0..height {
-        for x in 0..width {
-            pixels.push(colours(rows, pattern, inner(x, width), inner(y, height)));
-        }
+        let y = inner(y, height);
+        // An image of one or two rows has no neighbours on one side.
+        let lines = [y - 1, y, y + 1].map(|y| rows.row(y.min(height - 1)));
+        let colours = pattern.rows(y);
+        pixels.extend((0..width).map(|x| colours_at(lines, colours, inner(x, width))));
     }
     exact(width, height, pixels)
 }
 
-/// Returns the colours of a pixel from itself and its neighbours.
-fn colours(rows: &Rows<'_>, pattern: Pattern, x: usize, y: usize) -> [u8; 3] {
-    // An image of one or two rows has no neighbours on one side.
-    let value =
-        |x: usize, y: usize| u16::from(rows.row(y.min(rows.height - 1))[x.min(rows.width - 1)]);
-    let beside = (value(x - 1, y) + value(x + 1, y)).div_ceil(2);
-    let above = (value(x, y - 1) + value(x, y + 1)).div_ceil(2);
-    let corners =
-        [value(x - 1, y - 1), value(x + 1, y - 1), value(x - 1, y + 1), value(x + 1, y + 1)];
-    let around = [value(x - 1, y), value(x + 1, y), value(x, y - 1), value(x, y + 1)];
-    let fourth = |values: [u16; 4]| (values.iter().sum::<u16>() + 2) / 4;
-    let own = pattern.at(x, y);
+/// Returns the colours of a pixel of the middle one of three rows from itself and its neighbours.
+/// `pattern` has the colours of the middle row and of the lower one.
+fn colours_at([upper, middle, lower]: [&[u8]; 3], pattern: [[usize; 2]; 2], x: usize) -> [u8; 3] {
+    // The same holds for an image of one or two columns.
+    let right = (x + 1).min(middle.len() - 1);
+    let columns = [x - 1, x.min(right), right];
+    let [above, own, below] = [upper, middle, lower].map(|row| columns.map(|x| u16::from(row[x])));
+    let fourth = |values: [u16; 4]| ((values.iter().sum::<u16>() + 2) / 4) as u8;
+    let [colour, beside] = [pattern[0][x % 2], pattern[0][(x + 1) % 2]];
     let mut out = [0; 3];
-    out[own] = value(x, y) as u8;
-    if own == GREEN {
-        out[pattern.at(x + 1, y)] = beside as u8;
-        out[pattern.at(x, y + 1)] = above as u8;
+    out[colour] = own[1] as u8;
+    if colour == GREEN {
+        out[beside] = (own[0] + own[2]).div_ceil(2) as u8;
+        out[pattern[1][x % 2]] = (above[1] + below[1]).div_ceil(2) as u8;
     } else {
-        out[GREEN] = fourth(around) as u8;
-        out[pattern.at(x + 1, y + 1)] = fourth(corners) as u8;
+        out[GREEN] = fourth([own[0], own[2], above[1], below[1]]);
+        out[pattern[1][(x + 1) % 2]] = fourth([above[0], above[2], below[0], below[2]]);
     }
     out
 }

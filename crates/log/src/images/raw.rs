@@ -6,12 +6,15 @@ use super::{ImageError, Pixels, bayer, check_size, is_deep, metres, metres_of_fl
 use crate::Limits;
 use crate::msgs::Image;
 
+/// Bytes of a pixel of a decoded colour image.
+const DECODED_BYTES: u64 = 3;
+
 /// Returns the columns and rows of an uncompressed image.
 ///
 /// # Errors
 /// [`ImageError`]: a size of 0 or beyond the limits.
 pub fn size_of_raw(image: &Image<'_>, limits: &Limits) -> Result<(usize, usize), ImageError> {
-    check_size(image.width.into(), image.height.into(), 3, limits)?;
+    check_size(image.width.into(), image.height.into(), DECODED_BYTES, limits)?;
     Ok((image.width as usize, image.height as usize))
 }
 
@@ -27,25 +30,16 @@ pub fn decode_raw(
     depth_unit_m: Option<f64>,
     limits: &Limits,
 ) -> Result<Pixels, ImageError> {
-    size_of_raw(image, limits)?;
-    if let Some(order) = yuv::Order::of(&image.encoding) {
-        return yuv::decode(image, order).map(Pixels::Colour);
-    }
-    if let Some(pattern) = bayer::Pattern::of(&image.encoding) {
-        let rows = Rows::new(image, image.height as usize, image.width as usize)?;
-        return Ok(Pixels::Colour(bayer::interpolate(&rows, pattern)));
-    }
-    let bytes_per_pixel = match image.encoding.as_str() {
-        "mono8" | "8UC1" => 1,
-        "16UC1" | "mono16" => 2,
-        "rgb8" | "bgr8" | "8UC3" => 3,
-        "rgba8" | "bgra8" | "32FC1" => 4,
-        deep if is_deep(deep) => return Err(ImageError::Deep(deep.to_owned())),
-        other => return Err(ImageError::Encoding(other.to_owned())),
+    let layout = Layout::of(&image.encoding)?;
+    check_size(image.width.into(), image.height.into(), layout.bytes_per_pixel(), limits)?;
+    let rows = |bytes: usize| Rows::new(image, image.height as usize, image.width as usize * bytes);
+    let rows = match layout {
+        Layout::Yuv(order) => return yuv::decode(image, order).map(Pixels::Colour),
+        Layout::Bayer(pattern) => {
+            return Ok(Pixels::Colour(bayer::interpolate(&rows(1)?, pattern)));
+        }
+        Layout::Packed(bytes) => rows(bytes as usize)?,
     };
-    check_size(image.width.into(), image.height.into(), bytes_per_pixel, limits)?;
-    let rows =
-        Rows::new(image, image.height as usize, image.width as usize * bytes_per_pixel as usize)?;
     let big = image.is_bigendian != 0;
     let pixels = match image.encoding.as_str() {
         "rgb8" => Pixels::Colour(rows.plane(|p: [u8; 3]| p)),
@@ -70,6 +64,41 @@ pub fn decode_raw(
         }
     };
     Ok(pixels)
+}
+
+/// Layout of the bytes of an encoding.
+enum Layout {
+    Yuv(yuv::Order),
+    Bayer(bayer::Pattern),
+    /// Pixels one after the other, of as many bytes each.
+    Packed(u64),
+}
+
+impl Layout {
+    fn of(encoding: &str) -> Result<Self, ImageError> {
+        if let Some(order) = yuv::Order::of(encoding) {
+            return Ok(Self::Yuv(order));
+        }
+        if let Some(pattern) = bayer::Pattern::of(encoding) {
+            return Ok(Self::Bayer(pattern));
+        }
+        Ok(Self::Packed(match encoding {
+            "mono8" | "8UC1" => 1,
+            "16UC1" | "mono16" => 2,
+            "rgb8" | "bgr8" | "8UC3" => 3,
+            "rgba8" | "bgra8" | "32FC1" => 4,
+            deep if is_deep(deep) => return Err(ImageError::Deep(deep.to_owned())),
+            other => return Err(ImageError::Encoding(other.to_owned())),
+        }))
+    }
+
+    /// Returns the bytes of a pixel in the message or decoded, whichever are more.
+    fn bytes_per_pixel(&self) -> u64 {
+        match self {
+            Self::Packed(bytes) => DECODED_BYTES.max(*bytes),
+            Self::Yuv(_) | Self::Bayer(_) => DECODED_BYTES,
+        }
+    }
 }
 
 /// Rows of an image with a checked layout.

@@ -70,11 +70,8 @@ impl DepthNetTrainer {
     ) -> Result<Net> {
         let mut adam = Adam::default();
         let Training { batch, decay, real_share, .. } = self.training;
-        let from_real = match (simulated.is_empty(), real.is_empty()) {
-            (_, true) => 0,
-            (true, false) => batch,
-            _ => (real_share * batch as f64).round() as usize,
-        };
+        let from_real =
+            if real.is_empty() { 0 } else { (real_share * batch as f64).round() as usize };
         let mut draws = Draws(mix(self.seed ^ 0x5eed));
         for step in 0..steps {
             let few: Vec<(usize, u64)> = (0..batch)
@@ -275,4 +272,185 @@ pub(crate) fn start(seed: u64) -> Net {
         bias[0] = RARE;
     }
     net
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::Point3;
+    use tagalong_conformance::figure::{Figure, World};
+    use tagalong_core::{EgoMotion, Stamp};
+    use tagalong_geometry::{Camera, Distortion, Pinhole};
+
+    use super::*;
+
+    /// Adds a frame with a person 2.5 m away, or with none.
+    fn add(trainer: &mut DepthNetTrainer, is_person: bool, room: Option<&str>, group: u64) {
+        let lens =
+            Pinhole { fx: 125.0, fy: 125.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 160, 120, 1.2, 0.0, 0.0));
+        let figures = if is_person { vec![Figure::at(2.5, 0.4)] } else { Vec::new() };
+        let images = World::with(&figures).draw(&camera);
+        let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
+        let head = Point3::new(2.5, 0.4, 1.6);
+        let person = AnnotatedPerson { head, counts: true, visible: 1.0 };
+        trainer.add_frame(&frame, &vec![person; figures.len()], room, group).unwrap();
+    }
+
+    fn trainer(training: Training) -> DepthNetTrainer {
+        DepthNetTrainer::new(training, 3).unwrap()
+    }
+
+    fn values(net: &Net) -> Vec<f32> {
+        net.parts().into_iter().flatten().copied().collect()
+    }
+
+    /// Returns the largest difference of two networks relative to the largest value.
+    fn apart(a: &[f32], b: &[f32]) -> f32 {
+        let largest = |values: &mut dyn Iterator<Item = f32>| values.fold(0.0, f32::max);
+        let most = largest(&mut a.iter().map(|value| value.abs()));
+        largest(&mut a.iter().zip(b).map(|(a, b)| (a - b).abs())) / most
+    }
+
+    #[test]
+    fn the_gradient_of_a_batch_is_a_mean_over_cells_of_people_or_over_frames() {
+        let mut trainer = trainer(Training::default());
+        add(&mut trainer, true, None, 0);
+        add(&mut trainer, false, None, 1);
+        let net = start(5);
+        let gradient = |batch: &[(usize, u64)]| values(&trainer.gradient(&net, batch).unwrap());
+        let (person, empty) = ((0, 11), (1, 12));
+        let alone = [gradient(&[person]), gradient(&[empty])];
+        assert!(apart(&alone[0], &gradient(&[person; 2])) < 1e-4);
+        assert!(apart(&alone[1], &gradient(&[empty; 5])) < 1e-4, "in four parts of unlike size");
+        // Both together: the sum of their slopes over the cells of the person.
+        let (_, targets) = trainer.samples[0].varied(&mut Draws(person.1));
+        let cells = targets.places().len() as f32;
+        assert!(cells > 2.0, "{cells}");
+        let sum: Vec<f32> =
+            alone[0].iter().zip(&alone[1]).map(|(person, empty)| person + empty / cells).collect();
+        assert!(apart(&sum, &gradient(&[person, empty])) < 1e-3);
+    }
+
+    #[test]
+    fn a_batch_has_the_share_of_real_frames_that_is_set() {
+        let training = |real_share| Training { batch: 5, real_share, ..Training::default() };
+        // Real frames are empty, simulated ones have a person, so the networks differ.
+        let of = |real_share: f64, real: bool| {
+            let mut trainer = trainer(training(real_share));
+            add(&mut trainer, true, None, 0);
+            add(&mut trainer, false, real.then_some("a room"), 1);
+            let (simulated, real): (Chosen, Chosen) = (vec![0], vec![1; usize::from(real)]);
+            values(&trainer.trained(start(1), 3, [&simulated, &real], 0.01, &mut |_| {}).unwrap())
+        };
+        assert_eq!(of(0.0, true), of(1.0, false), "without real frames the share is nothing");
+        assert_ne!(of(0.0, true), of(0.2, true));
+        assert_ne!(of(0.2, true), of(1.0, true));
+        assert_eq!(of(0.2, true), of(0.22, true), "both are one frame of five");
+    }
+
+    /// The first step has the rate 0, and the second of two the largest one.
+    #[test]
+    fn further_training_goes_by_half_the_rate() {
+        let mut trainer = trainer(Training { real_steps: 2, batch: 1, ..Training::default() });
+        add(&mut trainer, true, None, 0);
+        let (rate, begun) = (trainer.training.rate, start(2));
+        let step = |net: Net| apart_by(&values(&begun), &values(&net));
+        let all = vec![0];
+        let none = Chosen::new();
+        let mut steps = |_: f64| {};
+        let whole = trainer.trained(begun.clone(), 2, [&all, &none], rate, &mut steps).unwrap();
+        let mut progress = |_: f64| {};
+        let mut steps = Steps::new(&trainer.training, 0, &mut progress);
+        let half = trainer.further(begun.clone(), [&all, &none], &mut steps).unwrap();
+        let ratio = step(half) / step(whole);
+        assert!((ratio - 0.5).abs() < 0.01, "{ratio}");
+    }
+
+    fn apart_by(a: &[f32], b: &[f32]) -> f32 {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn a_tenth_of_the_simulated_scenes_is_for_testing() {
+        let short = Training { steps: 1, real_steps: 1, batch: 1, ..Training::default() };
+        let mut trainer = trainer(short);
+        for group in 0..20 {
+            add(&mut trainer, true, None, group);
+        }
+        let fitted = trainer.fit(&mut |_| {}).unwrap();
+        let test = fitted.figures["simulated, never seen"].as_table().unwrap();
+        assert_eq!(test["frames"].as_integer(), Some(2));
+        assert_eq!(test["people"].as_integer(), Some(2));
+        // Those of group 9 and 19 never enter a batch.
+        let seen = trainer.chosen(|sample| sample.group % 10 != 9);
+        assert_eq!(seen.len(), 18);
+        let begun = trainer.begun(&seen, &mut Steps::new(&trainer.training, 0, &mut |_| {}));
+        let weights = values(&finished(begun.unwrap(), &Score::default()).net);
+        assert_eq!(weights, values(&Model::from_text(&fitted.model).unwrap().net));
+    }
+
+    #[test]
+    fn weights_are_rounded_and_the_slope_is_above_zero() {
+        let model = finished(start(7), &Score::default());
+        let steps = values(&model.net).into_iter().map(|value| value * STEPS);
+        assert!(steps.into_iter().all(|step| (step - step.round()).abs() < 1e-2));
+        assert!(apart_by(&values(&model.net), &values(&start(7))) <= 0.51 / STEPS);
+        assert!(model.slope >= 1e-3);
+        // A network with answers that are wrong is not turned round.
+        let wrong: Vec<(f64, bool, f64)> =
+            (0..40).map(|k| (f64::from(k) - 20.0, k < 20, 0.0)).collect();
+        assert_eq!(finished(start(7), &Score::of(wrong)).slope, 1e-3);
+    }
+
+    #[test]
+    fn a_model_without_a_room_is_calibrated_by_the_others() {
+        // Answers that are spread more need a smaller slope.
+        let answers = |scale: f64| {
+            let answer = |k: i32| (scale * f64::from(k - 20), k * 7 % 40 < k, 0.0);
+            Score::of((0..40).map(answer).collect())
+        };
+        let fold = |room: &str, scale: f64| Fold {
+            room: room.into(),
+            net: start(1),
+            score: answers(scale),
+        };
+        let slope = |text: &str| Model::from_text(text).unwrap().slope;
+        let of = |scale: f64| finished(start(1), &answers(scale)).slope;
+        let both = models_without(vec![fold("a", 0.1), fold("b", 0.3)], &answers(0.5));
+        assert_eq!([slope(&both[0].1), slope(&both[1].1)], [of(0.3), of(0.1)]);
+        assert!(of(0.1) > 2.0 * of(0.3), "{} {}", of(0.1), of(0.3));
+        let single = models_without(vec![fold("a", 0.1)], &answers(0.5));
+        assert_eq!(slope(&single[0].1), of(0.5), "by those in simulation");
+    }
+
+    #[test]
+    fn the_first_weights_keep_the_signal_and_expect_few_people() {
+        let net = start(3);
+        for ((part, inputs), name) in net.parts().into_iter().zip(Net::INPUTS).zip(Net::PARTS) {
+            if inputs == 0 {
+                let expected = if name == "last_bias" { RARE } else { 0.0 };
+                assert_eq!(part[0], expected, "{name}");
+                assert!(part[1..].iter().all(|value| *value == 0.0), "{name}");
+                continue;
+            }
+            let squares = part.iter().map(|value| value * value).sum::<f32>() / part.len() as f32;
+            assert!((squares * inputs as f32 / 2.0 - 1.0).abs() < 0.3, "{name}: {squares}");
+        }
+        assert_ne!(values(&net), values(&start(4)));
+    }
+
+    #[test]
+    fn progress_counts_the_steps_of_every_training() {
+        let mut told = Vec::new();
+        let training = Training { steps: 6, real_steps: 2, ..Training::default() };
+        let mut progress = |part: f64| told.push(part);
+        let mut steps = Steps::new(&training, 2, &mut progress);
+        for (count, part) in [(6, 0.5), (6, 1.0), (2, 1.0), (2, 0.5), (2, 1.0), (2, 1.0)] {
+            steps.tell(count, part);
+        }
+        let twelfths: Vec<f64> = told.iter().map(|part| (part * 12.0).round()).collect();
+        assert_eq!(twelfths, [3.0, 6.0, 8.0, 9.0, 10.0, 12.0]);
+    }
 }

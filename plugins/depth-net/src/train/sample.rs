@@ -222,4 +222,138 @@ mod tests {
         assert_eq!((depth.width(), depth.height()), (320, 240));
         assert!((centre / STEP_M - (centre / STEP_M).round()).abs() < 1e-2);
     }
+
+    /// Returns the variations of an image of one depth by some seeds.
+    fn degraded(metres: f32) -> Vec<DepthImage> {
+        let vary = |seed: u64| {
+            let mut depth = DepthImage::filled(120, 90, metres);
+            degrade(&mut depth, &mut Draws(mix(seed)));
+            depth
+        };
+        (0..200).map(vary).collect()
+    }
+
+    /// Returns the readings of an image.
+    fn readings(depth: &DepthImage) -> Vec<f64> {
+        let pixels = depth.pixels().iter().filter(|metres| metres.is_finite());
+        pixels.map(|metres| f64::from(*metres)).collect()
+    }
+
+    #[test]
+    fn noise_grows_with_the_square_of_depth() {
+        for metres in [1.0, 2.0] {
+            let sigmas = degraded(metres).iter().map(readings).collect::<Vec<_>>();
+            let of = |values: &Vec<f64>| {
+                let off: Vec<f64> = values.iter().map(|v| v - f64::from(metres)).collect();
+                let mean = off.iter().sum::<f64>() / off.len() as f64;
+                assert!(mean.abs() < 0.001, "noise has no direction: {mean}");
+                (off.iter().map(|v| v * v).sum::<f64>() / off.len() as f64).sqrt()
+            };
+            let sigmas: Vec<f64> = sigmas.iter().filter(|v| v.len() > 1000).map(of).collect();
+            // Up to 4 mm at 1 m, in half of the images.
+            let most = 0.004 * f64::from(metres * metres);
+            let largest = sigmas.iter().copied().fold(0.0, f64::max);
+            assert!((0.9 * most..1.05 * most).contains(&largest), "{metres} m: {largest}");
+            let still = sigmas.iter().filter(|sigma| **sigma < 1e-9).count();
+            assert!((70..130).contains(&still), "{still} of 200");
+        }
+    }
+
+    #[test]
+    fn readings_are_lost_here_and_there_in_blocks_and_far_away() {
+        let lost = |metres: f32| -> Vec<f64> {
+            let share = |depth: &DepthImage| 1.0 - readings(depth).len() as f64 / (120.0 * 90.0);
+            degraded(metres).iter().map(share).collect()
+        };
+        let (near, far) = (lost(2.9), lost(6.0));
+        let whole = |shares: &[f64]| shares.iter().filter(|share| **share < 1e-9).count();
+        let none_left = |shares: &[f64]| shares.iter().filter(|share| **share > 1.0 - 1e-9).count();
+        // Nothing within 3 m is too far; a fifth of the cameras ends before 5.5 m.
+        assert_eq!(none_left(&near), 0);
+        assert!((20..65).contains(&none_left(&far)), "{}", none_left(&far));
+        // Half of the images keep all: 0.7 have no single holes, and 0.7 no blocks.
+        assert!((75..125).contains(&whole(&near)), "{}", whole(&near));
+        assert!(near.iter().any(|share| *share > 0.3) && near.iter().all(|share| *share < 0.95));
+    }
+
+    #[test]
+    fn a_hole_is_a_block_within_the_image() {
+        let blocks = degraded(2.0).into_iter().filter(|depth| {
+            let pixels = depth.pixels();
+            let holes = pixels.iter().filter(|metres| metres.is_nan()).count();
+            // A single block has no hole without one beside it; single holes are scattered.
+            let beside = |k: usize| pixels[k].is_nan() && pixels[k + 1].is_nan();
+            let pairs = (0..pixels.len() - 1).filter(|k| beside(*k)).count();
+            holes > 0 && 10 * pairs > 7 * holes
+        });
+        let sizes: Vec<[usize; 2]> = blocks
+            .map(|depth| {
+                let row_of = |y: usize| depth.row(y).iter().filter(|m| m.is_nan()).count();
+                let widest = (0..90).map(row_of).max().unwrap_or(0);
+                [widest, (0..90).filter(|y| row_of(*y) > 0).count()]
+            })
+            .collect();
+        assert!(sizes.len() > 20, "{}", sizes.len());
+        let largest = |k: usize| sizes.iter().map(|size| size[k]).max().unwrap_or(0);
+        assert!(largest(0) > 49 && largest(1) > 49, "several blocks: {sizes:?}");
+        assert!(sizes.iter().any(|[wide, high]| *wide < 50 && *high < 50), "{sizes:?}");
+    }
+
+    #[test]
+    fn a_cut_image_shows_the_same_points() {
+        let sample = sample();
+        let (mut shifted, mut whole, mut shortest) = (0, 0, usize::MAX);
+        for seed in 0..100 {
+            let (camera, image) = cut(sample.camera.clone(), sample.depth(), &mut Draws(mix(seed)));
+            assert_eq!((camera.height, camera.width), (image.height(), 320));
+            let pixel = |camera: &Camera| camera.project(&Point3::new(2.5, 0.4, 1.2)).unwrap();
+            let top = (pixel(&sample.camera).y - pixel(&camera).y).round() as usize;
+            for y in [0, image.height() - 1] {
+                let same = |a: &f32, b: &f32| a == b || a.is_nan() && b.is_nan();
+                let depth = sample.depth();
+                assert!(image.row(y).iter().zip(depth.row(y + top)).all(|(a, b)| same(a, b)));
+            }
+            shifted += usize::from(top > 0);
+            whole += usize::from(image.height() == 240);
+            shortest = shortest.min(image.height());
+        }
+        // A third loses rows above; 0.65 x 0.85 lose none.
+        assert!((20..50).contains(&shifted) && (40..70).contains(&whole), "{shifted} {whole}");
+        assert!((36..130).contains(&shortest), "15 % are left at the least: {shortest}");
+    }
+
+    #[test]
+    fn a_misjudged_camera_is_tilted_and_lifted_a_little() {
+        let pose = sample().camera.robot_from_camera;
+        let mut draws = Draws(9);
+        let wrong: Vec<Isometry3<f64>> = (0..500).map(|_| misjudged(&pose, &mut draws)).collect();
+        let sigma = |values: &dyn Fn(&Isometry3<f64>) -> f64| {
+            (wrong.iter().map(|w| values(w).powi(2)).sum::<f64>() / wrong.len() as f64).sqrt()
+        };
+        let turn = |w: &Isometry3<f64>| (w.rotation * pose.rotation.inverse()).scaled_axis();
+        for axis in [0, 1] {
+            assert!((sigma(&|w| turn(w)[axis]) / TILT_RAD - 1.0).abs() < 0.1, "{axis}");
+        }
+        assert!(sigma(&|w| turn(w).z) < 1e-9, "its heading is known");
+        let off = |w: &Isometry3<f64>| w.translation.vector - pose.translation.vector;
+        assert!((sigma(&|w| off(w).z) / HEIGHT_M - 1.0).abs() < 0.1);
+        assert!(sigma(&|w| off(w).xy().norm()) < 1e-12);
+    }
+
+    #[test]
+    fn numbers_that_look_random_are_spread_as_they_say() {
+        let mut draws = Draws(3);
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let normal: Vec<f64> = (0..4000).map(|_| draws.normal()).collect();
+        let squares: Vec<f64> = normal.iter().map(|v| v * v).collect();
+        assert!(mean(&normal).abs() < 0.05 && (mean(&squares) - 1.0).abs() < 0.06);
+        let between: Vec<f64> = (0..4000).map(|_| draws.between(2.0, 6.0)).collect();
+        assert!((mean(&between) - 4.0).abs() < 0.06);
+        assert!(between.iter().all(|v| (2.0..6.0).contains(v)));
+        let below: Vec<usize> = (0..400).map(|_| draws.below(3)).collect();
+        assert!([0, 1, 2].iter().all(|k| below.contains(k)) && below.iter().all(|k| *k < 3));
+        assert_eq!(draws.below(0), 0);
+        let yes = (0..4000).filter(|_| draws.chance(0.2)).count();
+        assert!((700..900).contains(&yes), "{yes}");
+    }
 }

@@ -63,6 +63,12 @@ impl Score {
         }
     }
 
+    /// Returns the score of some peaks: log-odds, whether it is a person, and how far off, m.
+    #[cfg(test)]
+    pub(super) fn of(found: Vec<(f64, bool, f64)>) -> Self {
+        Self { frames: 1, people: found.len(), found }
+    }
+
     /// Joins the answers of several scores.
     pub fn all(scores: &[&Self]) -> Self {
         Self {
@@ -114,7 +120,90 @@ impl Score {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::Point3;
+    use tagalong_config::AnnotatedPerson;
+    use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Stamp};
+    use tagalong_geometry::{Camera, Distortion, Pinhole};
+
     use super::*;
+
+    /// Returns a sample of a wall 3 m away with people; each is a place, whether it counts, and
+    /// the visible part.
+    fn sample(people: &[([f64; 2], bool, f64)]) -> Sample {
+        let lens =
+            Pinhole { fx: 120.0, fy: 120.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 320, 240, 1.1, 0.0, 0.0));
+        let depth = Some(Arc::new(DepthImage::filled(320, 240, 3.0)));
+        let images = Images { depth, ..Images::default() };
+        let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
+        let person = |([x, y], counts, visible): &([f64; 2], bool, f64)| AnnotatedPerson {
+            head: Point3::new(*x, *y, 1.6),
+            counts: *counts,
+            visible: *visible,
+        };
+        let people: Vec<AnnotatedPerson> = people.iter().map(person).collect();
+        Sample::new(&frame, &people, None, 0).unwrap()
+    }
+
+    /// Returns the score of an answer with a peak of these log-odds at each place, and none
+    /// elsewhere.
+    fn score(sample: &Sample, found: &[([f64; 2], f32)]) -> Score {
+        let map = FloorMap::new(&sample.camera, &sample.depth());
+        let mut pass = Pass::default();
+        pass.answer.values.as_chunks_mut::<4>().0.iter_mut().for_each(|cell| cell[0] = -9.0);
+        for ([x, y], logit) in found {
+            let [row, column] = [(x - 0.2) / 0.1, (y + 3.2) / 0.1].map(|at| at as usize);
+            let centre = FloorMap::centre(row, column);
+            let off = [(x - centre.x) as f32, (y - centre.y) as f32];
+            *pass.answer.at_mut(row, column) = [*logit, off[0], off[1], 0.1];
+        }
+        let mut score = Score::default();
+        score.add(&map, &pass, sample);
+        score
+    }
+
+    const HERE: [f64; 2] = [3.0, 0.0];
+
+    #[test]
+    fn a_peak_finds_the_nearest_person_within_its_reach_once() {
+        let people = sample(&[(HERE, true, 1.0), ([3.0, 0.7], true, 1.0)]);
+        let found = score(&people, &[([3.0, 0.1], 2.0), ([3.0, 0.75], 1.0)]);
+        assert_eq!((found.frames, found.people), (1, 2));
+        let off: Vec<f64> = found.found.iter().map(|(.., off)| (off * 1e3).round()).collect();
+        assert_eq!((off, found.at(0.0)), (vec![100.0, 50.0], (1.0, 0.0)));
+        // Both peaks are near the first person, and each person is found once; the second peak is
+        // too near to be false.
+        let twice = score(&people, &[([3.2, -0.2], 2.0), ([2.7, -0.2], 1.0)]);
+        assert_eq!(twice.at(0.0), (0.5, 0.0));
+        assert_eq!(twice.answers(), [(2.0, true)]);
+        // Half a metre away is neither found nor false.
+        let beside = score(&people, &[([3.0, -0.5], 2.0)]);
+        assert_eq!((beside.at(0.0), beside.found.len()), ((0.0, 0.0), 0));
+        let wrong = score(&people, &[([3.0, -0.7], 2.0), ([3.0, -1.5], -3.0)]);
+        assert_eq!((wrong.at(0.0), wrong.at(-4.0)), ((0.0, 1.0), (0.0, 2.0)));
+        assert!(score(&people, &[([3.0, 0.0], -4.5)]).found.is_empty(), "too low to be counted");
+    }
+
+    #[test]
+    fn people_count_if_they_are_near_and_seen() {
+        let counted = |at: [f64; 2], counts: bool, visible: f64| {
+            let sample = sample(&[(at, counts, visible)]);
+            let found = score(&sample, &[(at, 2.0)]);
+            // A peak at a person that does not count is neither found nor false.
+            assert_eq!(found.found.len(), found.people, "{at:?}");
+            found.people
+        };
+        assert_eq!(counted(HERE, true, 1.0), 1);
+        assert_eq!(counted(HERE, true, VISIBLE), 1);
+        assert_eq!(counted(HERE, true, VISIBLE - 0.01), 0, "hidden for the most part");
+        assert_eq!(counted(HERE, false, 1.0), 0, "not to be counted");
+        assert_eq!(counted([4.0, 0.0], true, 1.0), 0, "behind the wall");
+        assert_eq!(counted([3.0, 3.0], true, 1.0), 1, "4.2 m away");
+        let far = sample(&[([3.05, 4.1], true, 1.0)]);
+        assert_eq!(score(&far, &[]).people, 0, "5.1 m away");
+    }
 
     #[test]
     fn recall_and_false_people_depend_on_the_threshold() {

@@ -327,6 +327,7 @@ fn rounded(value: f64) -> toml::Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ROUND;
 
     #[test]
     fn whoever_is_found_may_be_as_far_behind_as_one_was_behind_the_others() {
@@ -345,5 +346,68 @@ mod tests {
         // The second, the first and none of the others is the limit.
         assert_eq!([missed(1e-3), missed(1e-5), missed(1e-2)], [0.5, 0.75, 0.0]);
         assert_eq!(miss_rate(&[], 1000, 1e-3, -1.0), 0.0);
+    }
+
+    /// Two rounds of trees: the first gives -1 or, for a first number below a half, -3, and the
+    /// second one gives -1 to all.
+    fn trees() -> Model {
+        let tree = |yes: f32| crate::Tree {
+            numbers: [0; 3],
+            below: [0.5; 3],
+            values: [yes, yes, -0.125, -0.125],
+        };
+        let rounds = [[tree(-0.375); ROUND], [tree(-0.125); ROUND]].concat();
+        Model { machine: Machine::Trees(Trees::new(rounds, HOPELESS)), slope: 1.0, offset: 0.0 }
+    }
+
+    fn numbers(first: f32) -> Vec<f32> {
+        let mut numbers = vec![0.0; crate::trees::CHANNEL_NUMBERS];
+        numbers[0] = first;
+        numbers
+    }
+
+    #[test]
+    fn trees_reject_as_early_as_the_people_of_the_calibration_allow() {
+        let least = |people: Vec<(Use, Vec<f32>)>| {
+            let mut trainer = HogTrainer::new(Kind::Trees, Training::default(), 1).unwrap();
+            trainer.people = people;
+            let mut model = trees();
+            trainer.hurry(&mut model);
+            let Machine::Trees(trees) = model.machine else { return Vec::new() };
+            trees.least
+        };
+        let good = (Use::Calibration, numbers(1.0));
+        let late = (Use::Calibration, numbers(0.0));
+        assert_eq!(least(vec![]), [HOPELESS; 2], "nothing is known");
+        assert_eq!(least(vec![good.clone(); 3]), [-1.0, -2.0]);
+        // One of them is 2 behind the others after each round, and another may be, too.
+        assert_eq!(least(vec![good.clone(), good.clone(), late]), [-5.0, -6.0]);
+        let other = (Use::Figures, numbers(0.0));
+        assert_eq!(least(vec![good.clone(), good, other]), [-1.0, -2.0]);
+        let mut model =
+            Model { machine: Machine::Linear { weights: vec![], bias: 0.0 }, ..trees() };
+        let before = model.clone();
+        let trainer = HogTrainer::new(Kind::Linear, Training::default(), 1).unwrap();
+        trainer.hurry(&mut model);
+        assert_eq!(model, before, "a weighted sum has no rounds");
+    }
+
+    /// One round that ends far below a near miss for some: they are not found anyway.
+    #[test]
+    fn people_that_are_missed_anyway_do_not_hold_the_trees_up() {
+        let tree =
+            crate::Tree { numbers: [0; 3], below: [0.5; 3], values: [-2.0, -2.0, -0.125, -0.125] };
+        let mut model = Model {
+            machine: Machine::Trees(Trees::new(vec![tree; ROUND], HOPELESS)),
+            slope: 1.0,
+            offset: 0.0,
+        };
+        let mut trainer = HogTrainer::new(Kind::Trees, Training::default(), 1).unwrap();
+        let person = |first: f32| (Use::Calibration, numbers(first));
+        trainer.people = vec![person(1.0), person(1.0), person(0.0)];
+        assert!(-16.0 < trainer.near_miss(), "the sum of the last one");
+        trainer.hurry(&mut model);
+        let Machine::Trees(trees) = model.machine else { panic!("trees stay trees") };
+        assert_eq!(trees.least, [-1.0]);
     }
 }
