@@ -6,11 +6,13 @@
 //!   program calls.
 //! * [`ConfigError`]: a mistake with its place in the text.
 
+mod exported;
 mod names;
 mod registry;
 mod settings;
 mod trainer;
 
+pub use exported::{ExportedNetwork, NamedTensor};
 pub use names::nearest;
 pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use settings::{

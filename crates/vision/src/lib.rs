@@ -3,6 +3,7 @@
 //! Each fast kernel has a slow, obvious reference in its tests.
 
 mod appearance;
+mod describer;
 mod gallery;
 pub mod ground;
 mod integral;
@@ -15,6 +16,7 @@ mod sketch;
 mod upright;
 
 pub use appearance::{Appearance, AppearanceDifference};
+pub use describer::{Describer, Embedder};
 pub use gallery::Gallery;
 pub use integral::Integral;
 pub use islands::islands;

@@ -32,9 +32,6 @@ pub struct Config {
     /// families that leave it open (`yolox`, `yolov8`, `nanodet`).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub suppress_iou: f64,
-    /// The network runs on every n-th frame, and nothing is found in the others.
-    #[schemars(range(min = 1, max = 1000))]
-    pub every: u64,
     /// Order of the channels: `auto` (that of the family), `rgb` or `bgr`.
     pub colours: Channels,
     /// Place of the image in the input: `auto` (that of the family), `stretch`, `centre` or
@@ -99,7 +96,6 @@ impl Default for Config {
             discover_score: 0.5,
             track_score: 0.2,
             suppress_iou: 0.6,
-            every: 1,
             colours: Channels::Auto,
             fit: Placing::Auto,
             padding: -1.0,

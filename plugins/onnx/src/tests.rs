@@ -144,13 +144,6 @@ fn a_weak_box_is_the_person_of_a_confirmed_track_alone() {
 }
 
 #[test]
-fn the_network_runs_on_every_nth_frame() {
-    let mut third = detector(Config { every: 3, ..config(Family::Yolox) });
-    let counts: Vec<usize> = (1..8).map(|k| detect(&mut third, &frame(k, 240)).len()).collect();
-    assert_eq!(counts, [1, 0, 0, 1, 0, 0, 1]);
-}
-
-#[test]
 fn a_config_without_a_model_says_so_in_the_funnel() {
     let (mut funnel, frame) = (Funnel::default(), frame(1, 240));
     let mut none = Onnx::new(Config::default(), &context()).unwrap();
@@ -198,7 +191,6 @@ fn each_setting_that_cannot_work_is_named() {
         ("size", Config { size: vec![640, 0], ..Config::default() }),
         ("mean", Config { mean: vec![1.0], ..Config::default() }),
         ("deviation", Config { deviation: vec![0.0; 3], ..Config::default() }),
-        ("every", Config { every: 0, ..Config::default() }),
         ("discover_score", Config { discover_score: 1.5, ..Config::default() }),
         ("deadline_s", Config { deadline_s: 0.0, ..Config::default() }),
     ] {
