@@ -274,7 +274,7 @@ mod tests {
     #[test]
     fn the_place_of_the_image_is_named_where_it_matters() {
         let config = "model = 'yellow.onnx'\ncolours = 'rgb'\nmean = [0.0, 0.0, 0.0]\n\
-                      deviation = [1.0, 1.0, 1.0]\nfit = 'centre'";
+                      deviation = [1.0, 1.0, 1.0]\nfit = 'centre'\ndiscover_score = 0.9";
         let found = preparations(config, &[frame(384, 288)], false).unwrap();
         assert_eq!(found.now.found, 0, "{found:?}");
         let best = found.best.unwrap();

@@ -100,7 +100,8 @@ fn depth_beats_the_size_of_the_box() {
 
 #[test]
 fn grey_images_do_as_well() {
-    let grey = Some(Arc::new(GreyImage::from_fn(384, 384, |x, y| image(240).row(y)[x][0])));
+    let bright = image(240);
+    let grey = Some(Arc::new(GreyImage::from_fn(384, 384, |x, y| bright.row(y)[x][0])));
     let found = detect(
         &mut detector(config(Family::YoloV8)),
         &frame_of(1, Images { grey, ..Images::default() }),
