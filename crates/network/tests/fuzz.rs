@@ -7,8 +7,12 @@
 //! The mutations are seeded (`TAGALONG_FUZZ_SEED`) and know the encoding: bytes, numbers, pieces of
 //! other files, lengths that are corrected afterwards. The file under test lies at
 //! `TAGALONG_FUZZ_FILE` (by default in the folder for temporary files), so that one that ends the
-//! process is still there; what was found goes into `tests/corpus` and stays survived.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and tells its count")]
+//! process is still there, and those that take too long are kept beside it; what was found goes into `tests/corpus` and stays survived.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may fail, and tells its count"
+)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -205,7 +209,12 @@ fn fuzz(seed: u64, is_over: impl Fn(u64) -> bool) -> BTreeMap<&'static str, u64>
             bytes = mutate(&bytes, other, &mut random, 0);
         }
         fs::write(&path, &bytes).unwrap();
-        *counts.entry(outcome(&path)).or_default() += 1;
+        let found = outcome(&path);
+        let count = counts.entry(found).or_default();
+        *count += 1;
+        if found == "late" {
+            fs::copy(&path, path.with_extension(format!("late-{count}.onnx"))).unwrap();
+        }
     }
     counts
 }
