@@ -7,7 +7,8 @@
 //!
 //! A file is not trusted: its bytes are surveyed before the runtime reads them, [`Limits`] bound
 //! its size, its operators and its tensors, and each call runs in a thread that is given up at a
-//! deadline. That is no sandbox: a file made to do harm may still use up the memory, so take
+//! deadline. A call that is given up keeps its thread until it ends; a network has one thread, and
+//! every call until then is late as well. That is no sandbox: a file made to do harm may still use up the memory, so take
 //! networks from where you would take a program.
 
 mod decode;
