@@ -139,14 +139,17 @@ pub enum Command {
 
 const MODEL_HELP: &str = "\
 Prints inputs and outputs of the file, the family of detectors that its outputs have the shapes of,
-and the part of a config that runs it, which is TOML as it stands. Exit code 1: no config can use the
-file; the reason is printed.
+or that it is for re-identification, and the part of a config that runs it, which is TOML as it
+stands. Exit code 1: no config can use the file; the reason is printed. With `--export` it writes the
+network of a plugin as a file instead.
 
 Examples:
   tagalong model yolox_s.onnx
   tagalong model yolox_s.onnx > people.toml && tagalong run people.toml robot.mcap
   tagalong model yolov8n-dynamic.onnx --size 320 320
-  tagalong model yolox_s.onnx --format json | jq -r .family";
+  tagalong model yolox_s.onnx --format json | jq -r .family
+  tagalong model osnet_x0_25.onnx        # the section [appearance] that it belongs into
+  tagalong model --export depth-net depth-net.onnx";
 
 const DEMO_HELP: &str = "\
 Needs no file, and half a minute.

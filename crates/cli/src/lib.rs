@@ -74,7 +74,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Reproduce(args) => tagalong_experiments::reproduce::reproduce(args, registry),
         Command::Trials(args) => tagalong_experiments::trials::trials(args, registry),
         Command::Train(args) => tagalong_training::train(args, registry),
-        Command::Model(args) => commands::model(args),
+        Command::Model(args) => commands::model(args, registry),
         Command::Inspect { log, config, format } => {
             commands::inspect(log, config.as_deref(), *format)
         }

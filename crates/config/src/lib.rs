@@ -7,12 +7,14 @@
 //! * [`OrAuto`]: a setting that is one of several words, or `auto`.
 //! * [`ConfigError`]: a mistake with its place in the text.
 
+mod exported;
 mod names;
 mod or_auto;
 mod registry;
 mod settings;
 mod trainer;
 
+pub use exported::{ExportedNetwork, NamedTensor};
 pub use names::nearest;
 pub use or_auto::OrAuto;
 pub use registry::{Context, Kind, PluginInfo, Registry};

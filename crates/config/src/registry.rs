@@ -2,7 +2,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::{ConfigError, Settings, Trainer, Value, commented_defaults, nearest, parse_settings};
+use crate::{
+    ConfigError, ExportedNetwork, Settings, Trainer, Value, commented_defaults, nearest,
+    parse_settings,
+};
 use tagalong_core::{
     Associator, Controller, Detector, DiffDrive, Error, Filter, Result, TrackManager, Verifier,
 };
@@ -137,6 +140,7 @@ impl PluginInfo {
 pub struct Registry {
     plugins: BTreeMap<&'static str, PluginInfo>,
     trainers: BTreeMap<&'static str, Build<Box<dyn Trainer>>>,
+    exporters: BTreeMap<&'static str, Build<ExportedNetwork>>,
 }
 
 impl Registry {
@@ -236,6 +240,20 @@ impl Registry {
     ) {
         let previous = self.trainers.insert(name, boxed(build, |trainer| Box::new(trainer)));
         assert!(previous.is_none(), "two trainers for `{name}`");
+    }
+
+    /// Registers the export of a plugin's network as an ONNX file, under the name of the plugin; `C`
+    /// are the settings of the plugin.
+    ///
+    /// # Panics
+    /// If there is an exporter of this name already.
+    pub fn exporter<C: Settings>(
+        &mut self,
+        name: &'static str,
+        export: impl Fn(C, &Context) -> Result<ExportedNetwork> + Send + Sync + 'static,
+    ) {
+        let previous = self.exporters.insert(name, boxed(export, |network| network));
+        assert!(previous.is_none(), "two exporters for `{name}`");
     }
 
     fn add<C: Settings>(
@@ -382,6 +400,26 @@ impl Registry {
         match self.trainers.get(name) {
             Some(build) => build(config, context),
             None => Err(self.untrainable(name)),
+        }
+    }
+
+    /// Exports the network of a plugin with these settings.
+    ///
+    /// # Errors
+    /// A plugin without a network (lists those that have one), or bad settings.
+    pub fn export(
+        &self,
+        name: &str,
+        config: Option<Value<'_>>,
+        context: &Context,
+    ) -> std::result::Result<ExportedNetwork, ConfigError> {
+        match self.exporters.get(name) {
+            Some(export) => export(config, context),
+            None => {
+                let list = self.exporters.keys().copied().collect::<Vec<_>>().join(", ");
+                let message = format!("`{name}` has no network to export; available: {list}");
+                Err(ConfigError::new(message))
+            }
         }
     }
 

@@ -12,6 +12,7 @@ use tagalong_vision::registration::{EdgeOverlap, OverlapSettings};
 
 use super::alternatives::Alternative;
 use super::coverage::Coverage;
+use super::preparations::Preparations;
 use super::trial::Trial;
 
 /// Number of measured frames, spread over those that are read.
@@ -50,6 +51,8 @@ pub struct Evidence {
     pub fitting: Vec<&'static str>,
     /// Result of other settings, where they were tried.
     pub alternatives: Vec<Alternative>,
+    /// Preparations of the images of neural networks, where the pipeline has one.
+    pub preparations: Vec<Preparations>,
 }
 
 impl Evidence {

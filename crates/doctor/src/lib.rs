@@ -3,7 +3,8 @@
 //! A `visit` passes a log through a pipeline and measures both; the `checks` turn the
 //! measurements into findings. `scenery` holds things that come and go in depth, whatever a
 //! pipeline makes of them, and `coverage` compares them with its tracks. Where those disagree,
-//! `alternatives` tries other settings on the same frames. Without a config, `comparison`
+//! `alternatives` tries other settings on the same frames, and `preparations` other colours, scales
+//! and places of the images of a neural network. Without a config, `comparison`
 //! visits the log with each built-in pipeline that fits it.
 
 mod alternatives;
@@ -13,6 +14,7 @@ mod coverage;
 mod diagnosis;
 mod evidence;
 mod finding;
+mod preparations;
 mod present;
 mod print;
 pub mod remedies;

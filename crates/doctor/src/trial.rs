@@ -145,6 +145,11 @@ impl<T> Spread<T> {
         self.kept.extend(make());
     }
 
+    /// Returns the kept items by value.
+    pub fn into_kept(self) -> Vec<T> {
+        self.kept
+    }
+
     /// Returns the kept items.
     pub fn kept(&self) -> &[T] {
         &self.kept

@@ -14,7 +14,7 @@ use super::coverage::Coverage;
 use super::evidence::{Driven, Evidence, Reading, Samples};
 use super::scenery::{Scenery, Views};
 use super::trial::Trial;
-use super::{Trying, alternatives, checks};
+use super::{Trying, alternatives, checks, preparations};
 
 /// A pipeline after its pass over a log.
 pub struct Visit {
@@ -72,6 +72,7 @@ impl Visit {
             changed: None,
             fitting: Vec::new(),
             alternatives: Vec::new(),
+            preparations: Vec::new(),
         };
         let mut views = Views::of(expected);
         if let Some(frames) = found.frames {
@@ -91,6 +92,7 @@ impl Visit {
             self.evidence.fitting = found.iter().map(|other| other.choice.config).collect();
             return;
         }
+        self.evidence.preparations = preparations::tried(self, when, scope, registry);
         let is_wanted = match when {
             Trying::Never => false,
             Trying::Always => true,

@@ -3,6 +3,7 @@ use tagalong_core::{
     WheelSpeeds,
 };
 use tagalong_tracking::{Guarded, StepError};
+use tagalong_vision::Describer;
 
 use crate::command_limiter::{Aim, CommandLimiter, ObstacleMemory, Wish};
 use crate::target_lock::{Search, TargetLock};
@@ -35,13 +36,19 @@ pub struct Steered {
 }
 
 impl Steering {
-    /// Creates the steering by a controller, which is called `name` in reports.
-    pub fn new(name: String, controller: Box<dyn Controller>, settings: FollowSettings) -> Self {
+    /// Creates the steering by a controller, which is called `name` in reports. The target lock
+    /// knows people by the describer.
+    pub fn new(
+        name: String,
+        controller: Box<dyn Controller>,
+        settings: FollowSettings,
+        describer: Describer,
+    ) -> Self {
         let FollowSettings { robot, command_limiter, collision_monitor, target } = settings;
         Self {
             controller: Guarded::new(name, controller),
             search_settings: target.search.clone(),
-            lock: TargetLock::new(target),
+            lock: TargetLock::new(target, describer),
             search: Search::default(),
             obstacles: ObstacleMemory::default(),
             limiter: CommandLimiter::new(
@@ -102,7 +109,7 @@ impl Steering {
     /// frame that was processed.
     ///
     /// # Errors
-    /// The controller panicked.
+    /// The controller panicked, or the network that describes people failed.
     pub fn steer(
         &mut self,
         frame: &Frame,
@@ -114,6 +121,7 @@ impl Steering {
         self.limiter.check_odometry(&frame.motion);
         let settled = self.is_settled();
         let lock = self.lock.update(frame, motion, tracks, settled);
+        let lock = lock.map_err(|error| StepError::of_stage("[appearance]", frame, error))?;
         let followed = self.lock.followed();
         let target = tracks.iter().find(|track| Some(track.id) == followed);
         let twist = self.ask(frame, tracks, target)?;

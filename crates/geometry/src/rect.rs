@@ -95,6 +95,15 @@ impl Rect {
         Self::new(self.centre().x - 0.5 * side, self.y - above, side, side)
     }
 
+    /// Returns the box of a whole standing person of the given height, in metres, if this rectangle
+    /// is the upper-body square: half as wide as high, as the images that people are recognised in.
+    pub fn standing_of_upper_body(&self, height_m: f64) -> Self {
+        let px_per_m = self.height / UPPER_BODY_SIDE_M;
+        let above = (HEAD_BELOW_TOP_M - HALF_HEAD_M) * px_per_m;
+        let height = height_m * px_per_m;
+        Self::new(self.centre().x - 0.25 * height, self.y + above, 0.5 * height, height)
+    }
+
     /// Returns true if all four numbers are finite and the size is not negative.
     pub fn is_sane(&self) -> bool {
         [self.x, self.y, self.width, self.height].iter().all(|v| v.is_finite())
@@ -186,6 +195,10 @@ mod tests {
         assert!((upper.width - 57.0).abs() < 1e-9 && upper.width == upper.height, "{upper:?}");
         assert!((upper.centre().x - 130.0).abs() < 1e-9, "{upper:?}");
         assert!((upper.y - 47.5).abs() < 1e-9, "2.5 cm of air above the head: {upper:?}");
+        let again = upper.standing_of_upper_body(1.7);
+        let off = [again.y - whole.y, again.height - whole.height, again.width - 85.0];
+        assert!(off.iter().all(|off| off.abs() < 1e-9), "{again:?}");
+        assert_eq!(again.centre().x, whole.centre().x);
     }
 
     #[test]

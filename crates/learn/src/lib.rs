@@ -3,7 +3,8 @@
 //! [`accepted`]) and log-odds ([`platt`], [`logistic`]), and each picture yields variants
 //! ([`mirrored`], [`shifted`]). Boosted trees are grown here, too ([`boost`]), and experiments run
 //! on all cores ([`side_by_side`]). Small convolutional networks are made of the layers of [`conv`],
-//! forwards and backwards, trained by the steps of [`Adam`] and written as a [`NetworkFile`].
+//! forwards and backwards, trained by the steps of [`Adam`] and written as a [`NetworkFile`], or as
+//! an ONNX file for other programs ([`onnx`]).
 //! Verifiers calibrate the log-odds of their models by a [`ScoreCalibration`].
 //!
 //! The features are defined by the plugins.
@@ -17,6 +18,7 @@ pub mod dense;
 mod folds;
 mod held_out;
 mod logistic;
+pub mod onnx;
 mod parallel;
 mod score;
 mod variants;

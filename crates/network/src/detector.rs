@@ -7,16 +7,27 @@ use tagalong_core::RgbImage;
 
 use crate::decode::{Wanted, decode, suppress};
 use crate::family::{OutputShape, recognise};
-use crate::runtime::RtenNetwork;
+use crate::network::rten;
 use crate::worker::Worker;
-use crate::{Element, Family, InputSize, Limits, Network, Port, Preparation, ScoredBox, Tensor};
+use crate::{
+    Element, Family, InputSize, Limits, Network, Port, Preparation, Runtime, ScoredBox, Tensor,
+};
 
 /// Columns and rows of an input that the file leaves open.
-const USUAL_SIZE: usize = 640;
+pub(crate) const USUAL_SIZE: [usize; 2] = [640, 640];
 /// Most columns and rows of an input.
 const MAX_SIDE: usize = 4096;
 /// Name of the input for the size of the image.
 const SIZES: &str = "orig_target_sizes";
+
+/// Columns and rows of an input, where the file leaves them open.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OpenSize {
+    /// The choice of the caller, which a fixed size contradicts.
+    pub chosen: Option<[usize; 2]>,
+    /// Size without a choice.
+    pub usual: [usize; 2],
+}
 
 /// Choices that a file does not make.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,7 +55,7 @@ pub struct About {
 
 impl About {
     /// Describes a network, and runs it once.
-    fn of(network: &mut impl Network, size: Option<[usize; 2]>) -> Self {
+    fn of(network: &mut impl Network, size: OpenSize) -> Self {
         let (inputs, outputs) = (network.inputs().to_vec(), network.outputs().to_vec());
         let image = image_port(&inputs).and_then(|image| input_size(&inputs[image], size));
         let run = image.clone().and_then(|input| first_run(network, input));
@@ -80,15 +91,17 @@ fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, String> {
     fs::read(path).map_err(|why| format!("cannot be read: {why}"))
 }
 
-fn start(
+/// Reads a network and runs it once, in a thread of its own.
+pub(crate) fn start(
     path: &Path,
-    size: Option<[usize; 2]>,
+    size: OpenSize,
     limits: &Limits,
+    runtime: Runtime,
 ) -> Result<(Worker, About), String> {
     let bytes = read(path, limits)?;
     let own = *limits;
-    let load = move || RtenNetwork::from_onnx(bytes, &own);
-    let about = move |network: &mut RtenNetwork| Ok(About::of(network, size));
+    let load = move || runtime(bytes, &own);
+    let about = move |network: &mut Box<dyn Network>| Ok(About::of(network, size));
     Worker::start(load, about, limits.load_deadline)
 }
 
@@ -97,7 +110,8 @@ fn start(
 /// # Errors
 /// A file that cannot be read or is beyond the limits; the message is a sentence about the file.
 pub fn inspect(path: &Path, size: Option<[usize; 2]>, limits: &Limits) -> Result<About, String> {
-    start(path, size, limits).map(|(_, about)| about)
+    let size = OpenSize { chosen: size, usual: USUAL_SIZE };
+    start(path, size, limits, rten).map(|(_, about)| about)
 }
 
 /// Returns the index of the input that takes the image.
@@ -114,7 +128,7 @@ fn image_port(inputs: &[Port]) -> Result<usize, String> {
     }
 }
 
-fn input_size(port: &Port, chosen: Option<[usize; 2]>) -> Result<InputSize, String> {
+fn input_size(port: &Port, size: OpenSize) -> Result<InputSize, String> {
     let [batch, first, second, last] = port.shape[..] else {
         return Err(format!("its input {port} is no image"));
     };
@@ -127,14 +141,16 @@ fn input_size(port: &Port, chosen: Option<[usize; 2]>) -> Result<InputSize, Stri
     if port.element == Element::Other {
         return Err(format!("its input {port} must be f32, integers or bytes: export it so"));
     }
-    let side = |fixed: Option<usize>, chosen: Option<usize>| match (fixed, chosen) {
-        (Some(fixed), Some(chosen)) if fixed != chosen => {
-            Err(format!("its input {port} has a fixed size: remove `size`"))
+    let side = |fixed: Option<usize>, axis: usize| {
+        let chosen = size.chosen.map(|size| size[axis]);
+        match fixed.zip(chosen) {
+            Some((fixed, chosen)) if fixed != chosen => {
+                Err(format!("its input {port} has a fixed size: remove `size`"))
+            }
+            _ => Ok(fixed.or(chosen).unwrap_or(size.usual[axis])),
         }
-        (fixed, chosen) => Ok(fixed.or(chosen).unwrap_or(USUAL_SIZE)),
     };
-    let width = side(width, chosen.map(|size| size[0]))?;
-    let height = side(height, chosen.map(|size| size[1]))?;
+    let (width, height) = (side(width, 0)?, side(height, 1)?);
     if [width, height].iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
         return Err(format!("its input is {width} x {height} pixels; a side has 1 to {MAX_SIDE}"));
     }
@@ -178,7 +194,21 @@ impl PersonNetwork {
     /// A file that [`inspect`] refuses, outputs of another family than the chosen one or of none,
     /// and classes that the network does not have; the message is a sentence about the file.
     pub fn load(path: &Path, choices: &Choices, limits: &Limits) -> Result<Self, String> {
-        let (worker, about) = start(path, choices.size, limits)?;
+        Self::load_with(rten, path, choices, limits)
+    }
+
+    /// Reads a file as [`Self::load`] does, for another runtime.
+    ///
+    /// # Errors
+    /// Those of [`Self::load`].
+    pub fn load_with(
+        runtime: Runtime,
+        path: &Path,
+        choices: &Choices,
+        limits: &Limits,
+    ) -> Result<Self, String> {
+        let size = OpenSize { chosen: choices.size, usual: USUAL_SIZE };
+        let (worker, about) = start(path, size, limits, runtime)?;
         let input = about.input.clone()?;
         let shapes = about.run.clone()?;
         let family = match choices.family {

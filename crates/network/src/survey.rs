@@ -16,6 +16,17 @@ const MAX_SIZES: usize = 16;
 const GROWING: [&str; 8] =
     ["ConstantOfShape", "Expand", "Tile", "Range", "Pad", "Resize", "Upsample", "OneHot"];
 
+/// Attributes that make the output of an operator larger, or its loops longer, with the largest
+/// numbers that networks have in them.
+const BOUNDED: [(&str, u64); 6] = [
+    ("pads", 256),
+    ("output_padding", 256),
+    ("strides", 4096),
+    ("dilations", 4096),
+    ("kernel_shape", 4096),
+    ("output_shape", 16_384),
+];
+
 /// Operators and constants of an ONNX file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Survey {
@@ -138,14 +149,25 @@ impl<'a> Operator<'a> {
     }
 
     fn add_attribute(&mut self, attribute: &'a [u8]) -> Result<(), String> {
+        let (mut name, mut largest) = ("", 0);
         for field in Fields(attribute) {
             match field? {
+                (1, Content::Bytes(text)) => name = std::str::from_utf8(text).unwrap_or_default(),
+                (3 | 8, Content::Number(number)) => largest = largest.max(magnitude(number)),
+                (8, Content::Bytes(packed)) => {
+                    largest = varints(packed)?.into_iter().map(magnitude).fold(largest, u64::max);
+                }
                 (5, Content::Bytes(tensor)) => self.constants.push(Constant::of(tensor)?),
                 (6 | 11, Content::Bytes(graph)) => self.graphs.push(graph),
                 _ => {}
             }
         }
-        Ok(())
+        match BOUNDED.iter().find(|(bounded, most)| *bounded == name && largest > *most) {
+            Some((_, most)) => Err(format!(
+                "the `{name}` of an operator has the number {largest}; at most {most} may be there"
+            )),
+            None => Ok(()),
+        }
     }
 }
 
@@ -189,6 +211,11 @@ impl Constant {
         constant.size = (!numbers.is_empty()).then(|| above_one.product());
         Ok(constant)
     }
+}
+
+/// Returns the magnitude of an integer that is written as unsigned.
+fn magnitude(number: u64) -> u64 {
+    (number as i64).unsigned_abs()
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -327,6 +354,23 @@ mod tests {
         assert!(make("Expand", &[-1, 1 << 40]).is_err());
         // The ends of a slice are often the largest integer there is.
         assert!(make("Slice", &[i64::MAX]).is_ok());
+    }
+
+    #[test]
+    fn attributes_that_ask_for_huge_outputs_are_refused() {
+        let with = |name: &str, numbers: &[u8]| {
+            let attribute = [field(1, name.as_bytes()), numbers.to_vec()].concat();
+            let parts = [field(2, b"y"), field(4, b"AveragePool"), field(5, &attribute)].concat();
+            survey(&field(1, &parts))
+        };
+        // 256 and 257, as a number by itself and in a packed list, and the least negative number.
+        assert!(with("pads", &[8 << 3, 0x80, 2]).is_ok());
+        let why = with("pads", &[8 << 3, 0x81, 2]).unwrap_err();
+        assert!(why.contains("`pads` of an operator has the number 257"), "{why}");
+        assert!(with("pads", &field(8, &[0, 0x81, 2, 0])).is_err());
+        let least = [[8 << 3].as_slice(), &[0x80; 9], &[1]].concat();
+        assert!(with("pads", &least).is_err());
+        assert!(with("axis", &[3 << 3, 0x81, 2]).is_ok());
     }
 
     #[test]

@@ -1,7 +1,8 @@
 """Writes the hand-weighted networks of these tests, and the outputs of onnxruntime beside them.
 
-Each finds an upright bright blob of 16 x 32 pixels in an image of 64 x 64, with the inputs and
-outputs of one family of detectors.
+Each detector finds an upright bright blob of 16 x 32 pixels in an image of 64 x 64, with the inputs
+and outputs of one family. The networks for re-identification return the mean colours of eight parts
+of an image of 128 x 256.
 
     pip install onnx onnxruntime numpy
     python make_models.py
@@ -173,9 +174,9 @@ FAMILIES = {
 }
 
 
-def scene():
-    """The image of the tests, in red, green and blue: also `scene` in network.rs."""
-    y, x, c = np.meshgrid(np.arange(SIDE), np.arange(SIDE), np.arange(3), indexing="ij")
+def scene(width=SIDE, height=SIDE):
+    """The image of the tests, in red, green and blue: also `scene` in the tests."""
+    y, x, c = np.meshgrid(np.arange(height), np.arange(width), np.arange(3), indexing="ij")
     blob = (x >= 32) & (x < 48) & (y >= 16) & (y < 48)
     return np.where(blob, 230 + 10 * c, (x + 2 * y + 7 * c) % 40).astype(np.float32)
 
@@ -209,18 +210,74 @@ def write(family, build):
     if family == "rt-detr":
         inputs += [helper.make_tensor_value_info("orig_target_sizes", TensorProto.INT64, [1, 2])]
         feeds["orig_target_sizes"] = np.array([[SIDE, SIDE]], np.int64)
-    body = helper.make_graph(graph.nodes, family, inputs, outputs, graph.constants)
+    save(family, graph, inputs, outputs, feeds)
+
+
+def write_yellow():
+    """Writes a network of the family of YOLOv8 that finds yellow, in RGB from 0 to 255: as if it
+    were exported with its normalisation left out and another fit."""
+    graph = Graph()
+    weights = np.array([1, 1, -1], np.float32).reshape(1, 3, 1, 1) / (2 * 255)
+    yellow = graph.add("Conv", "images", graph.constant(weights), kernel_shape=[1, 1])
+    pool = graph.add("AveragePool", yellow, kernel_shape=[32, 16], strides=[16, 16],
+                     pads=[0, 0, 16, 0], count_include_pad=1)
+    margin = graph.add("Mul", graph.add("Sub", pool, graph.constant(0.7)), graph.constant(40))
+    scores = graph.reshape(graph.add("Sigmoid", margin), [1, 1, 16])
+    columns = graph.add("Concat", graph.constant(CENTRES.T[None]), scores, axis=1)
+    graph.add("Concat", graph.zeros(1, 5, 64), columns, graph.zeros(1, 5, 4), axis=2,
+              outputs=["output0"])
+    inputs = [helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, SIDE, SIDE])]
+    outputs = [helper.make_tensor_value_info("output0", TensorProto.FLOAT, [1, 5, 84])]
+    save("yellow", graph, inputs, outputs)
+
+
+def save(name, graph, inputs, outputs, feeds=None):
+    """Writes a network, and its outputs for an input if there is one."""
+    body = helper.make_graph(graph.nodes, name, inputs, outputs, graph.constants)
     model = helper.make_model(body, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
     onnx.checker.check_model(model)
-    (FOLDER / f"{family}.onnx").write_bytes(model.SerializeToString())
+    (FOLDER / f"{name}.onnx").write_bytes(model.SerializeToString())
+    if feeds is None:
+        return
     session = onnxruntime.InferenceSession(model.SerializeToString())
-    results = session.run(list(shapes), feeds)
-    numbers = {name: {"shape": list(result.shape),
-                      "values": [float(f"{value:.7g}") for value in result.ravel()]}
-               for name, result in zip(shapes, results)}
-    (FOLDER / f"{family}.json").write_text(json.dumps(numbers) + "\n")
+    names = [output.name for output in outputs]
+    numbers = {output: {"shape": list(result.shape),
+                        "values": [float(f"{value:.7g}") for value in result.ravel()]}
+               for output, result in zip(names, session.run(names, feeds))}
+    (FOLDER / f"{name}.json").write_text(json.dumps(numbers) + "\n")
+
+
+def colours_of_parts(graph, mean):
+    """Mean colours of four rows of two parts: [1, 24]."""
+    pool = graph.add("AveragePool", "images", kernel_shape=[64, 64], strides=[64, 64])
+    return graph.reshape(graph.add("Sub", pool, graph.constant(mean)), [1, 24])
+
+
+def osnet(graph):
+    graph.add("Identity", colours_of_parts(graph, 0), outputs=["output"])
+    return [1, 24], (lambda image: (image - IMAGENET[0]) / IMAGENET[1])
+
+
+def omz(graph):
+    pads = graph.constant([0, 0, 0, 232], np.int64)
+    graph.add("Pad", colours_of_parts(graph, 128), pads, outputs=["output"])
+    return [1, 256], (lambda image: image[:, :, ::-1])
+
+
+def write_embedding(name, build):
+    """Writes a network for re-identification and its vector of an image."""
+    graph = Graph()
+    shape, prepare = build(graph)
+    image = prepare(scene(128, 256))
+    feed = np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32)
+    inputs = [helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, 256, 128])]
+    outputs = [helper.make_tensor_value_info("output", TensorProto.FLOAT, shape)]
+    save(name, graph, inputs, outputs, {"images": feed})
 
 
 if __name__ == "__main__":
     for family, build in FAMILIES.items():
         write(family, build)
+    write_embedding("osnet", osnet)
+    write_embedding("omz", omz)
+    write_yellow()

@@ -19,6 +19,7 @@ use crate::preprocessors::preprocessors;
 use crate::settings::{PipelineSettings, PluginSettings};
 use tagalong_following::{CommandLimiterSettings, RobotSettings, Steering};
 use tagalong_stats::mix;
+use tagalong_vision::Describer;
 
 mod checks;
 mod document;
@@ -36,7 +37,7 @@ use resolve::resolve;
 pub use suits::Suits;
 pub use tune::{Tunable, check_tuning, with_values};
 
-const OWN: [&str; 12] = [
+const OWN: [&str; 13] = [
     "seed",
     "without",
     "robot",
@@ -45,6 +46,7 @@ const OWN: [&str; 12] = [
     "clock",
     "merge",
     "occlusion",
+    "appearance",
     "reidentification",
     "target",
     "command_limiter",
@@ -157,7 +159,8 @@ impl Pipeline {
         // These checks span several sections, so they follow the construction of all of them.
         check_detectors(&detectors, &places)?;
         check_weighing(&filter, &detectors, filter_span)?;
-        let steering = builder.steering(root.remove("controller"))?;
+        let describer = builder.describer(&root)?;
+        let steering = builder.steering(root.remove("controller"), &describer)?;
         let plugins: Vec<Declared<'_>> = detectors
             .iter()
             .map(|slot| (&*slot.settings.plugin, slot.plugin.plugin().capabilities().inputs))
@@ -178,12 +181,21 @@ impl Pipeline {
         let run = RunSettings { seed, robot, tune, suits, document: document.clone() };
         let odometry = settings.odometry.clone().map(VisualOdometry::new);
         let preprocessors = preprocessors(stereo, odometry);
-        let parts = Parts { preprocessors, detectors, verifiers, associator, filter, manager };
+        let parts = Parts {
+            preprocessors,
+            detectors,
+            verifiers,
+            associator,
+            filter,
+            manager,
+            describer: describer.clone(),
+        };
         let pipeline = Self {
             inputs,
             tracker: Tracker::new(parts, settings.tracker()),
             settings,
             steering,
+            describer,
             resolved,
             failed: None,
             base_dir: base_dir.to_owned(),
@@ -375,7 +387,21 @@ impl Builder<'_> {
         Ok(Guarded::new(section.settings.plugin, plugin))
     }
 
-    fn steering(&self, value: Option<Value<'_>>) -> Result<Option<Steering>, ConfigError> {
+    /// Builds the description of people; `root` has the place of its section.
+    fn describer(&self, root: &DeTable<'_>) -> Result<Describer, ConfigError> {
+        let settings = &self.settings.appearance;
+        settings.describer(self.base_dir).map_err(|error| {
+            let section = root.get("appearance").and_then(|value| value.get_ref().as_table());
+            let span = section.and_then(|table| table.get("model")).map(Spanned::span);
+            ConfigError { message: format!("[appearance] {error}"), span }
+        })
+    }
+
+    fn steering(
+        &self,
+        value: Option<Value<'_>>,
+        describer: &Describer,
+    ) -> Result<Option<Steering>, ConfigError> {
         let Some(value) = value else { return Ok(None) };
         let mut section = Section::<PluginSettings>::new("controller", value)?;
         let config = section.config.take();
@@ -389,7 +415,8 @@ impl Builder<'_> {
             return Err(ConfigError { message, span: section.span_of("plugin") });
         }
         let name = section.settings.plugin;
-        Ok(Some(Steering::new(name, plugin, self.settings.following())))
+        let settings = self.settings.following();
+        Ok(Some(Steering::new(name, plugin, settings, describer.clone())))
     }
 }
 

@@ -29,9 +29,11 @@
 //! | `too many detections`, `no track numbers left` | an excess over a limit |
 //! | `support of an unknown track`, `estimate of an unknown track` | a filter's unknown track |
 //! | `nis not finite` | a filter's invalid innovation |
+//! | `appearance: no vector` | a person that the network of `[appearance]` did not describe in time |
 //! | `command not finite` | a controller's command; the robot stops |
 //! | `track: ...` | a track, by the reason for which it ended |
 
+mod appearance;
 mod config;
 mod pipeline;
 mod preprocessors;
@@ -40,6 +42,7 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
+pub use appearance::{AppearanceSettings, ConventionChoice};
 pub use config::{
     DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, RunSettings, Suits, Tunable,
     check_tuning, flattened, with_values,

@@ -7,6 +7,7 @@ use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 
 use crate::{FrameReport, Orders, PipelineSettings};
 use tagalong_following::{Steered, Steering};
+use tagalong_vision::Describer;
 
 /// Tracker, with the controller that drives the robot after one of its tracks.
 pub struct Pipeline {
@@ -14,6 +15,7 @@ pub struct Pipeline {
     pub(crate) inputs: Inputs,
     pub(crate) tracker: Tracker,
     pub(crate) steering: Option<Steering>,
+    pub(crate) describer: Describer,
     pub(crate) resolved: String,
     pub(crate) failed: Option<u64>,
     /// Folder against which relative paths of the config are resolved.
@@ -162,6 +164,7 @@ impl Pipeline {
             self.steer(completed.as_ref().unwrap_or(frame), &mut report)?;
             report.timings.push((STAGES[8], start.elapsed().as_secs_f64() * 1e3));
         }
+        report.funnel.drop_many("appearance: no vector", self.describer.take_missing());
         Ok(report)
     }
 

@@ -7,6 +7,8 @@ use tagalong_following::{
 use tagalong_odometry::OdometrySettings;
 use tagalong_stereo::StereoSettings;
 
+use crate::AppearanceSettings;
+
 use tagalong_tracking::{
     ClockSettings, MergeSettings, OcclusionSettings, ReidentificationSettings, TrackerSettings,
 };
@@ -38,6 +40,8 @@ pub struct PipelineSettings {
     pub merge: MergeSettings,
     /// Test for people hidden behind others.
     pub occlusion: OcclusionSettings,
+    /// Network that describes people by their appearance.
+    pub appearance: AppearanceSettings,
     /// Recognition of people by their appearance.
     pub reidentification: ReidentificationSettings,
     /// Choice and confirmation of the person to follow.

@@ -1,3 +1,4 @@
+mod appearance;
 mod clock;
 mod commands;
 pub(crate) mod doubles;

@@ -37,6 +37,11 @@ pub enum StepError {
 }
 
 impl StepError {
+    /// Creates the error of a stage that is no plugin, by the name of its section in a config.
+    pub fn of_stage(section: &str, frame: &Frame, error: Error) -> Self {
+        Self::Plugin { plugin: section.to_owned(), frame: frame.index, error }
+    }
+
     /// Distinguishes an image that no plugin declares from one that the log lacks; `frame` is the
     /// original frame, including the images that were withheld.
     pub fn blame_declaration(self, frame: &Frame) -> Self {

@@ -7,6 +7,7 @@ use tagalong_core::{
     Initiation, Likelihood, Observation, ObservedTrack, Query, Track, TrackId, TrackManager,
     Unassociated, Update, Verifier,
 };
+use tagalong_vision::Describer;
 
 use crate::clock::{Clock, Tick};
 use crate::detections::{DetectionSet, PendingDetection};
@@ -45,6 +46,8 @@ pub struct Parts {
     pub filter: Guarded<dyn Filter>,
     /// The track manager.
     pub manager: Guarded<dyn TrackManager>,
+    /// Description of people by their appearance.
+    pub describer: Describer,
 }
 
 /// Tracker: the plugins, and their tracks.
@@ -83,11 +86,12 @@ struct Posterior {
 impl Tracker {
     /// Creates a tracker without tracks.
     pub fn new(parts: Parts, settings: TrackerSettings) -> Self {
-        let Parts { preprocessors, detectors, verifiers, associator, filter, manager } = parts;
+        let Parts { preprocessors, detectors, verifiers, associator, filter, manager, describer } =
+            parts;
         let requires_box = filter.plugin().requirements().image_box;
         Self {
             clock: Clock::new(settings.clock.clone()),
-            reidentifier: Reidentifier::new(settings.reidentification.clone()),
+            reidentifier: Reidentifier::new(settings.reidentification.clone(), describer),
             settings,
             preprocessors,
             search: SearchStage { detectors, verifiers, requires_box, shared: None },
@@ -137,6 +141,7 @@ impl Tracker {
         self.learn(frame, &report.tracks)?;
         report.motion = motion.unwrap_or(report.motion);
         let people = self.reidentifier.update(frame, &report.motion, &report.tracks);
+        let people = people.map_err(|error| StepError::of_stage("[appearance]", frame, error))?;
         log.timed(STAGES[7], ());
         self.frames += 1;
         self.last.clone_from(&report.tracks);
@@ -305,6 +310,8 @@ impl Tracker {
         detections.merge(&self.settings.merge);
         let (open, found) = (detections.undecided(), detections.undecided_detections());
         let appearance = self.reidentifier.compare(frame, predicted, &found);
+        let appearance =
+            appearance.map_err(|error| StepError::of_stage("[appearance]", frame, error))?;
         let gate = &Gate { appearance: &appearance, ..*gate };
         let mut answer = self
             .associator

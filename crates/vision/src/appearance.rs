@@ -1,7 +1,10 @@
-//! Appearance of a person: colours of upper body and legs, and directions of edges.
+//! Appearance of a person: colours of upper body and legs, and directions of edges; or the vector
+//! of a network.
+
+use std::sync::Arc;
 
 use nalgebra::Point3;
-use tagalong_core::{Estimate, Frame};
+use tagalong_core::Frame;
 use tagalong_geometry::{HEAD_BELOW_TOP_M, Rect, UPPER_BODY_SIDE_M};
 
 /// Bins of hues.
@@ -40,9 +43,11 @@ pub struct Appearance {
     torso: Option<Histogram<COLOURS>>,
     legs: Option<Histogram<COLOURS>>,
     texture: Option<Histogram<EDGES>>,
+    /// Vector of length 1, in place of all histograms.
+    vector: Option<Arc<[f32]>>,
 }
 
-/// Hellinger distances between two appearances, 0 to 1.
+/// Distances between two appearances, 0 to 1: of Hellinger, and for vectors 1 minus the cosine.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AppearanceDifference {
     /// Colours of the upper body.
@@ -51,12 +56,14 @@ pub struct AppearanceDifference {
     pub legs: Option<f64>,
     /// Directions of edges on the upper body.
     pub texture: Option<f64>,
+    /// Vectors of a network.
+    pub vector: Option<f64>,
 }
 
 impl AppearanceDifference {
     /// Returns the mean of the known parts; `None` if there are none.
     pub fn mean(&self) -> Option<f64> {
-        let known = [self.torso, self.legs, self.texture];
+        let known = [self.torso, self.legs, self.texture, self.vector];
         let (sum, count) =
             known.iter().flatten().fold((0.0, 0), |(sum, count), d| (sum + d, count + 1));
         (count > 0).then(|| sum / f64::from(count))
@@ -64,28 +71,29 @@ impl AppearanceDifference {
 }
 
 impl Appearance {
-    /// Returns the appearance of a tracked person.
-    pub fn of(estimate: &Estimate, frame: &Frame) -> Self {
-        Self::at(&estimate.region, &estimate.person.position, frame)
-    }
-
-    /// Returns the appearance of a person with the upper body in a region of the image, pixels, and
+    /// Returns the appearance of a person by colours and edges, with the upper body in a region of the image, pixels, and
     /// the head at a position, robot frame, m.
-    pub fn at(upper_body: &Rect, head: &Point3<f64>, frame: &Frame) -> Self {
+    pub(crate) fn at(upper_body: &Rect, head: &Point3<f64>, frame: &Frame) -> Self {
         let torso = Patch::of(upper_body, head, frame, TORSO);
         Self {
             height_m: head.z,
             torso: torso.colours(),
             legs: Patch::of(upper_body, head, frame, LEGS).colours(),
             texture: torso.edges(),
+            vector: None,
         }
+    }
+
+    /// Returns the appearance of a person by the vector of a network alone, of length 1.
+    pub(crate) fn of_vector(height_m: f64, vector: Option<Arc<[f32]>>) -> Self {
+        Self { height_m, torso: None, legs: None, texture: None, vector }
     }
 
     /// Returns the appearance of a person whose upper body has the colour of one bin, or of none:
     /// for tests of what remembers appearances.
     pub fn in_one_colour(height_m: f64, colour: Option<usize>) -> Self {
         let torso = colour.map(|bin| std::array::from_fn(|i| f64::from(i == bin)));
-        Self { height_m, torso, legs: None, texture: None }
+        Self { height_m, torso, legs: None, texture: None, vector: None }
     }
 
     /// Returns the distances to another appearance; of parts that one of them lacks, `None`.
@@ -94,8 +102,20 @@ impl Appearance {
             torso: both(&self.torso, &other.torso),
             legs: both(&self.legs, &other.legs),
             texture: both(&self.texture, &other.texture),
+            vector: self
+                .vector
+                .as_deref()
+                .zip(other.vector.as_deref())
+                .map(|(a, b)| cosine_distance(a, b)),
         }
     }
+}
+
+/// Returns 1 minus the cosine of the angle between two vectors of length 1, at most 1.
+fn cosine_distance(a: &[f32], b: &[f32]) -> f64 {
+    let cosine: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+    // Vectors of two people may point away from each other; they are no less than different.
+    (1.0 - f64::from(cosine)).clamp(0.0, 1.0)
 }
 
 fn both<const N: usize>(a: &Option<Histogram<N>>, b: &Option<Histogram<N>>) -> Option<f64> {
@@ -341,6 +361,17 @@ mod tests {
     }
 
     #[test]
+    fn vectors_differ_by_their_angle() {
+        let looks = |x: f32, y: f32| Appearance::of_vector(1.6, Some(Arc::new([x, y])));
+        let difference = |other: Appearance| looks(1.0, 0.0).difference(&other).mean().unwrap();
+        assert_eq!(difference(looks(1.0, 0.0)), 0.0);
+        assert!((difference(looks(0.6, 0.8)) - 0.4).abs() < 1e-6);
+        assert_eq!([difference(looks(0.0, 1.0)), difference(looks(-1.0, 0.0))], [1.0; 2]);
+        let coloured = Appearance::in_one_colour(1.6, Some(1));
+        assert_eq!(looks(1.0, 0.0).difference(&coloured).mean(), None);
+    }
+
+    #[test]
     fn the_mean_difference_is_that_of_what_is_known() {
         let none = AppearanceDifference::default();
         assert_eq!(none.mean(), None);
@@ -354,7 +385,7 @@ mod tests {
 
         use nalgebra::{Point3, Vector2};
         use tagalong_conformance::target;
-        use tagalong_core::{DepthImage, EgoMotion, Images, RgbImage, Stamp};
+        use tagalong_core::{DepthImage, EgoMotion, Estimate, Images, RgbImage, Stamp};
         use tagalong_geometry::{Camera, Distortion, Pinhole};
 
         use super::*;
@@ -388,6 +419,10 @@ mod tests {
             Frame::new(1, Stamp::default(), Arc::new(camera()), motion, images)
         }
 
+        fn looks_of(estimate: &Estimate, frame: &Frame) -> Appearance {
+            Appearance::at(&estimate.region, &estimate.person.position, frame)
+        }
+
         fn dressed(x: usize, y: usize) -> [u8; 3] {
             match (x, y) {
                 (143..=176, 85..125) => RED,
@@ -403,7 +438,7 @@ mod tests {
 
         #[test]
         fn a_shirt_and_trousers_are_looked_at_and_nothing_beside_them() {
-            let looks = Appearance::of(&person(0.0), &frame(dressed, None));
+            let looks = looks_of(&person(0.0), &frame(dressed, None));
             assert!((share(&looks.torso, 0) - 1.0).abs() < 1e-9, "{looks:?}");
             assert!((share(&looks.legs, 8) - 1.0).abs() < 1e-9, "{looks:?}");
             assert_eq!(looks.height_m, 1.6);
@@ -411,7 +446,7 @@ mod tests {
                 (144..=175, 86..124) | (146..=173, 151..189) => GREEN,
                 _ => RED,
             };
-            let looks = Appearance::of(&person(0.0), &frame(naked, None));
+            let looks = looks_of(&person(0.0), &frame(naked, None));
             let part = share(&looks.torso, 0);
             assert!((0.01..0.3).contains(&part), "nor is less looked at: {part}");
             let part = share(&looks.legs, 0);
@@ -429,7 +464,7 @@ mod tests {
                 })
             };
             let striped = |x: usize, _: usize| if (155..165).contains(&x) { RED } else { GREEN };
-            let looks = |metres| Appearance::of(&person(0.0), &frame(striped, Some(depth(metres))));
+            let looks = |metres| looks_of(&person(0.0), &frame(striped, Some(depth(metres))));
             assert!((share(&looks(2.0).torso, 0) - 1.0).abs() < 1e-9);
             assert!(looks(2.4).torso.is_some() && looks(1.75).torso.is_some());
             assert!(looks(2.45).torso.is_none() && looks(1.7).torso.is_none());
@@ -440,12 +475,17 @@ mod tests {
         fn who_is_half_outside_of_the_image_is_not_looked_at() {
             let plain = frame(|_, _| RED, None);
             // A metre to the left is 96 pixels: the shirt reaches 17 to both sides.
-            assert!(Appearance::of(&person(1.6), &plain).torso.is_some());
-            assert!(Appearance::of(&person(1.7), &plain).torso.is_none());
-            let seen = Appearance::of(&person(0.0), &plain);
+            assert!(looks_of(&person(1.6), &plain).torso.is_some());
+            assert!(looks_of(&person(1.7), &plain).torso.is_none());
+            let seen = looks_of(&person(0.0), &plain);
             assert_eq!(
                 seen.difference(&seen),
-                AppearanceDifference { torso: Some(0.0), legs: Some(0.0), texture: Some(0.0) }
+                AppearanceDifference {
+                    torso: Some(0.0),
+                    legs: Some(0.0),
+                    texture: Some(0.0),
+                    vector: None
+                }
             );
         }
 
@@ -455,7 +495,7 @@ mod tests {
             let across = frame(|x, _| grey(16 * (x % 8)), None);
             let down = frame(|_, y| grey(16 * (y % 8)), None);
             let [across, down, even] = [across, down, frame(|_, _| GREEN, None)]
-                .map(|frame| Appearance::of(&person(0.0), &frame).texture.unwrap());
+                .map(|frame| looks_of(&person(0.0), &frame).texture.unwrap());
             assert!(across[0] > 0.99, "{across:?}");
             assert!(down[4] > 0.99, "{down:?}");
             assert!(even[EDGES - 1] > 0.99, "{even:?}");
@@ -470,7 +510,7 @@ mod tests {
                 EgoMotion::at_rest(0.1),
                 Images::default(),
             );
-            let looks = Appearance::of(&person(0.0), &bare);
+            let looks = looks_of(&person(0.0), &bare);
             assert_eq!((looks.torso, looks.legs, looks.texture), (None, None, None));
         }
     }

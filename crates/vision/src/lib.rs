@@ -4,6 +4,7 @@
 
 mod appearance;
 mod boxes;
+mod describer;
 mod gallery;
 pub mod ground;
 mod integral;
@@ -17,6 +18,7 @@ mod upright;
 
 pub use appearance::{Appearance, AppearanceDifference};
 pub use boxes::{BoxSettings, BoxedBody, is_shown, log_odds_of};
+pub use describer::{Describer, Embedder};
 pub use gallery::Gallery;
 pub use integral::Integral;
 pub use islands::islands;

@@ -10,10 +10,13 @@
 //! The detector `depth-net` discovers people and finds tracked ones again. The verifier
 //! `depth-net-verifier` returns the log-odds of the same map at a candidate's place.
 //!
+//! `tagalong model --export depth-net FILE.onnx` writes the network as an ONNX file.
+//!
 //! With the feature `train` the plugin also offers a trainer ([`train`]).
 
 mod config;
 mod detect;
+mod export;
 mod map;
 mod model;
 mod net;
@@ -50,6 +53,7 @@ pub fn register(registry: &mut Registry) {
         "log-odds of depth-net at the place of a candidate",
         DepthNetVerifier::new,
     );
+    registry.exporter(NAME, export::export);
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {
         train::DepthNetTrainer::new(config.training, context.seed)

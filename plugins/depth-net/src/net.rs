@@ -9,7 +9,7 @@ const JOINED: usize = WIDE + FloorMap::COARSE;
 /// Channels of the answer: log-odds, two offsets of the place, and the height.
 const ANSWER: usize = 4;
 /// Height of a head to which the answer is relative, m.
-const HEAD_M: f32 = 1.5;
+pub(crate) const HEAD_M: f32 = 1.5;
 /// Log-odds of a network that has learned nothing: people are rare.
 #[cfg(feature = "train")]
 pub(crate) const RARE: f32 = -4.0;
@@ -18,12 +18,12 @@ pub(crate) const RARE: f32 = -4.0;
 /// neighbours up to 0.8 m away, and a weighted sum for each cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Net {
-    first: Conv<{ FloorMap::FINE }, WIDE, 3>,
-    second: Conv<JOINED, WIDE, 3, 1>,
-    third: Conv<WIDE, WIDE, 3, 1, 2>,
-    fourth: Conv<WIDE, WIDE, 3, 1, 2>,
-    fifth: Conv<WIDE, WIDE, 3, 1>,
-    last: Conv<WIDE, ANSWER, 1, 1>,
+    pub(crate) first: Conv<{ FloorMap::FINE }, WIDE, 3>,
+    pub(crate) second: Conv<JOINED, WIDE, 3, 1>,
+    pub(crate) third: Conv<WIDE, WIDE, 3, 1, 2>,
+    pub(crate) fourth: Conv<WIDE, WIDE, 3, 1, 2>,
+    pub(crate) fifth: Conv<WIDE, WIDE, 3, 1>,
+    pub(crate) last: Conv<WIDE, ANSWER, 1, 1>,
 }
 
 /// Values of the layers for one map.

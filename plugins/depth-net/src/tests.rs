@@ -1,11 +1,12 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use tagalong_config::Registry;
+use tagalong_config::{NamedTensor, Registry};
 use tagalong_conformance::{Suite, context};
 use tagalong_core::{
     Detection, Detector, EgoMotion, Error, Frame, Funnel, Images, Query, Stamp, Verifier,
 };
+use tagalong_network::{Limits, Network, RtenNetwork, Tensor};
 use tagalong_sim::{Event, Scene, Simulation, Truth};
 
 use crate::{Config, DepthNet, DepthNetVerifier, NAME, VerifierConfig};
@@ -252,5 +253,32 @@ mod training {
     fn without_simulated_rooms_there_is_nothing_to_begin_with() {
         let mut trainer = DepthNetTrainer::new(Training::default(), 1).unwrap();
         assert!(trainer.fit(&mut |_| {}).unwrap_err().to_string().contains("simulated"));
+    }
+}
+
+/// The exported network, run by `tagalong-network`, on a map of noise and on that of a room.
+#[test]
+fn the_exported_network_has_the_same_answers() {
+    let network = crate::export::export(Config::default(), &context()).unwrap();
+    let mut runtime = RtenNetwork::from_onnx(network.onnx, &Limits::default()).unwrap();
+    let names: Vec<&str> = runtime.inputs().iter().map(|port| port.name.as_str()).collect();
+    assert_eq!(names, ["fine", "coarse", "in_view"]);
+    let (frame, _) = room(1.0, NEAR_AND_FAR);
+    let model = crate::Model::from_text(crate::BUILT_IN).unwrap();
+    let map = model.look(&frame).unwrap().0;
+    for sample in [network.sample, crate::export::named(&model, &map)] {
+        let (inputs, outputs): (Vec<_>, Vec<_>) =
+            sample.into_iter().partition(|tensor| tensor.is_input);
+        let tensor = |tensor: NamedTensor| Tensor::new(tensor.shape, tensor.values).unwrap();
+        let inputs: Vec<Tensor> = inputs.into_iter().map(tensor).collect();
+        let found = runtime.run(&inputs).unwrap();
+        for (found, expected) in found.iter().zip(outputs) {
+            assert_eq!(found.shape(), expected.shape);
+            let likely = expected.values.iter().any(|value| *value > 1.0);
+            assert!(likely, "{}: nothing to compare", expected.name);
+            for (found, expected) in found.values().iter().zip(&expected.values) {
+                assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1.0));
+            }
+        }
     }
 }

@@ -31,9 +31,6 @@ pub struct Config {
     /// families that leave it open (`yolox`, `yolov8`, `nanodet`).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub suppress_iou: f64,
-    /// The network runs on every n-th frame, and nothing is found in the others.
-    #[schemars(range(min = 1, max = 1000))]
-    pub every: u64,
     /// Order of the channels: `auto` (that of the family), `rgb` or `bgr`.
     pub colours: OrAuto<Colours>,
     /// Place of the image in the input: `auto` (that of the family), `stretch`, `centre` or
@@ -79,7 +76,6 @@ impl Default for Config {
             discover_score: 0.5,
             track_score: 0.2,
             suppress_iou: 0.6,
-            every: 1,
             colours: OrAuto::Auto,
             fit: OrAuto::Auto,
             padding: -1.0,

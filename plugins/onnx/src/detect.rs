@@ -3,9 +3,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, Derived, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Query, Result,
-    RgbImage,
 };
-use tagalong_network::{PersonNetwork, Preparation, ScoredBox};
+use tagalong_network::{PersonNetwork, Preparation, Runtime, ScoredBox, rten, with_colours};
 use tagalong_vision::log_odds_of;
 
 use crate::NAME;
@@ -42,15 +41,6 @@ impl Derived for Answers {
     }
 }
 
-/// Grey image of a frame as one of three equal colours.
-struct GreyAsColour(RgbImage);
-
-impl Derived for GreyAsColour {
-    fn derive(frame: &Frame) -> Result<Self> {
-        Ok(Self(frame.grey()?.map(|value| [value; 3])))
-    }
-}
-
 impl Onnx {
     /// Creates a detector, and reads its file and runs it once if the settings name one.
     ///
@@ -58,11 +48,19 @@ impl Onnx {
     /// [`Error::Settings`] for settings outside their ranges, [`Error::Model`] for a file that
     /// cannot be read, is beyond the limits, or is of no family.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
+        Self::with_runtime(rten, config, context)
+    }
+
+    /// Creates a detector whose network another runtime runs.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn with_runtime(runtime: Runtime, config: Config, context: &Context) -> Result<Self> {
         config.check()?;
         let mark = format!("{:?} {config:?}", context.base_dir).into();
         let loaded = match config.model.is_empty() {
             true => None,
-            false => Some(load(&config, context)?),
+            false => Some(load(runtime, &config, context)?),
         };
         Ok(Self { config, loaded, mark })
     }
@@ -74,10 +72,6 @@ impl Onnx {
             funnel.drop_many("no model", 1);
             return Ok(nobody);
         };
-        // Frames are numbered from 1, and the first one is not to be waited for.
-        if !frame.index.saturating_sub(1).is_multiple_of(self.config.every) {
-            return Ok(nobody);
-        }
         let answers = frame.derived::<Answers>()?;
         let mut known = answers.0.lock().unwrap_or_else(PoisonError::into_inner);
         let answer = match known.iter().find(|(mark, _)| *mark == self.mark) {
@@ -101,23 +95,17 @@ impl Onnx {
 
 impl Loaded {
     fn answer(&mut self, frame: &Frame, least: f64, config: &Config) -> Result<Answer> {
-        let grey: Arc<GreyAsColour>;
-        let image = match frame.colour() {
-            Ok(colour) => colour,
-            Err(_) => {
-                grey = frame.derived::<GreyAsColour>()?;
-                &grey.0
-            }
-        };
-        let found = self.network.find(image, &self.preparation, least as f32, config.suppress_iou);
-        let found = found.map_err(|why| Error::Model { path: config.model.clone(), why })?;
+        let (least, iou) = (least as f32, config.suppress_iou);
+        let find = |image: &_| self.network.find(image, &self.preparation, least, iou);
+        let found = with_colours(frame, find)?
+            .map_err(|why| Error::Model { path: config.model.clone(), why })?;
         Ok(found.map_or(Answer::Late, |people| Answer::People(people.into())))
     }
 }
 
-fn load(config: &Config, context: &Context) -> Result<Loaded> {
+fn load(runtime: Runtime, config: &Config, context: &Context) -> Result<Loaded> {
     let path = context.base_dir.join(&config.model);
-    let network = PersonNetwork::load(&path, &config.choices(), &config.limits());
+    let network = PersonNetwork::load_with(runtime, &path, &config.choices(), &config.limits());
     let network = network.map_err(|why| Error::Model { path: config.model.clone(), why })?;
     let preparation = config.preparation(network.family())?;
     Ok(Loaded { network, preparation })

@@ -3,6 +3,7 @@
 mod check;
 mod config;
 mod eval;
+mod export;
 mod inspect;
 mod list;
 mod model;

@@ -7,10 +7,15 @@ use serde_json::{Value, json};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::serialize::to_json;
+use tagalong_config::Registry;
 use tagalong_core::RgbImage;
+use tagalong_geometry::Rect;
 use tagalong_network::{
-    About, Choices, Colours, Family, Fit, InputSize, Limits, PersonNetwork, Port, inspect,
+    About, Choices, Colours, EmbeddingNetwork, Family, Fit, InputSize, Limits, PersonNetwork, Port,
+    Preparation, inspect,
 };
+
+use super::export::Export;
 
 /// Calls of which the fastest is told.
 const CALLS: usize = 3;
@@ -20,6 +25,17 @@ const CALLS: usize = 3;
 pub struct ModelArgs {
     /// The ONNX file.
     file: PathBuf,
+    /// Write the network of this plugin into the file, and its card beside it, instead of reading
+    /// the file.
+    #[arg(long, value_name = "PLUGIN", conflicts_with_all = ["size", "format"])]
+    export: Option<String>,
+    /// Model file of the plugin whose network is exported [default: the built-in one].
+    #[arg(long, value_name = "MODEL", requires = "export")]
+    weights: Option<PathBuf>,
+    /// Write an input of the exported network, and the outputs that the plugin computes for it, into
+    /// this file as JSON, so that another program can be compared.
+    #[arg(long, value_name = "JSON", requires = "export")]
+    sample: Option<PathBuf>,
     /// Columns and rows of the input, if the file leaves them open.
     #[arg(long, value_names = ["COLUMNS", "ROWS"], num_args = 2)]
     size: Option<Vec<usize>>,
@@ -28,8 +44,21 @@ pub struct ModelArgs {
     format: Format,
 }
 
-/// Network of a known family.
-struct Known<'a> {
+/// Network that a config can name.
+enum Known<'a> {
+    Detector(KnownDetector<'a>),
+    Embedding(KnownEmbedding),
+}
+
+/// Network for re-identification.
+struct KnownEmbedding {
+    network: EmbeddingNetwork,
+    numbers: usize,
+    call_ms: f64,
+}
+
+/// Detector of a known family.
+struct KnownDetector<'a> {
     about: &'a About,
     family: Family,
     input: InputSize,
@@ -39,8 +68,13 @@ struct Known<'a> {
 /// Runs `tagalong model FILE`.
 ///
 /// # Errors
-/// A file that is refused (its cause and remedy), or whose outputs no decoder reads.
-pub fn model(args: &ModelArgs) -> Outcome {
+/// A file that is refused (its cause and remedy), or whose outputs no decoder reads; an export of
+/// a plugin without a network, or to a file that cannot be written.
+pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
+    if let Some(plugin) = &args.export {
+        let (weights, sample) = (args.weights.as_deref(), args.sample.as_deref());
+        return Export { plugin, file: &args.file, weights, sample }.run(registry);
+    }
     let size = args.size.as_deref().and_then(|size| <[usize; 2]>::try_from(size).ok());
     let shown = args.file.display();
     let refused = |why: String| Failure::failed(format!("{shown}: {why}"));
@@ -60,26 +94,33 @@ fn known<'a>(
     size: Option<[usize; 2]>,
     limits: &Limits,
 ) -> Result<Known<'a>, String> {
+    if let Ok((numbers, _)) = about.embedding() {
+        let mut network = EmbeddingNetwork::load(file, None, limits)?;
+        let InputSize { width, height, .. } = network.input();
+        let image = RgbImage::filled(width, height, [114; 3]);
+        let whole = Rect::new(0.0, 0.0, width as f64, height as f64);
+        let call_ms = fastest_ms(|| network.embed(&image, &whole).map(drop))?;
+        return Ok(Known::Embedding(KnownEmbedding { network, numbers, call_ms }));
+    }
     let (family, input) = (about.family()?, about.input.clone()?);
     let choices = Choices { size, ..Choices::default() };
     // A network without the usual class of people is known all the same.
     let call_ms = match PersonNetwork::load(file, &choices, limits) {
-        Ok(mut network) => fastest_call_ms(&mut network, family, input)?,
+        Ok(mut network) => {
+            let image = RgbImage::filled(input.width, input.height, [114; 3]);
+            fastest_ms(|| network.find(&image, &family.preparation(), 0.5, 0.5).map(drop))?
+        }
         Err(_) => 0.0,
     };
-    Ok(Known { about, family, input, call_ms })
+    Ok(Known::Detector(KnownDetector { about, family, input, call_ms }))
 }
 
-fn fastest_call_ms(
-    network: &mut PersonNetwork,
-    family: Family,
-    input: InputSize,
-) -> Result<f64, String> {
-    let image = RgbImage::filled(input.width, input.height, [114; 3]);
+/// Returns the time of the fastest of some calls.
+fn fastest_ms(mut call: impl FnMut() -> Result<(), String>) -> Result<f64, String> {
     let mut fastest = f64::INFINITY;
     for _ in 0..CALLS {
         let start = Instant::now();
-        network.find(&image, &family.preparation(), 0.5, 0.5)?;
+        call()?;
         fastest = fastest.min(1e3 * start.elapsed().as_secs_f64());
     }
     Ok(fastest)
@@ -99,30 +140,51 @@ fn as_text(file: &Path, about: &About, known: Option<&Known<'_>>) -> String {
         let shapes: Vec<String> = shapes.iter().map(ToString::to_string).collect();
         let _ = writeln!(out, "# a call   {}", shapes.join(", "));
     }
-    if let Some(known) = known {
-        known.describe(&mut out);
-        known.write_config(file, &mut out);
+    match known {
+        Some(Known::Detector(known)) => {
+            known.describe(&mut out);
+            known.write_config(file, &mut out);
+        }
+        Some(Known::Embedding(known)) => known.describe(file, &mut out),
+        None => {}
     }
     out
 }
 
-impl Known<'_> {
+/// Writes the preparation of the image of a network.
+fn describe_input(input: InputSize, preparation: &Preparation, out: &mut String) {
+    let colours = match preparation.colours {
+        Colours::Rgb => "RGB",
+        Colours::Bgr => "BGR",
+    };
+    let fit = match preparation.fit {
+        Fit::Stretch => "stretched to it".to_owned(),
+        Fit::Centre => format!("centred, padded with {}", preparation.padding),
+        Fit::TopLeft => format!("at the top left, padded with {}", preparation.padding),
+    };
+    let (mean, deviation) = (preparation.mean, preparation.deviation);
+    let _ = writeln!(out, "# image    {} x {} pixels, {fit}", input.width, input.height);
+    let _ = writeln!(out, "# colours  {colours}, mean {mean:?}, deviation {deviation:?}");
+}
+
+impl KnownEmbedding {
+    fn describe(&self, file: &Path, out: &mut String) {
+        let (convention, name) = (self.network.convention(), json!(file.to_string_lossy()));
+        let numbers = self.numbers;
+        let _ = writeln!(out, "# kind     re-identification: a person is {numbers} numbers");
+        describe_input(self.network.input(), &convention.preparation(), out);
+        let _ = writeln!(out, "# time     {:.1} ms a person, on one thread", self.call_ms);
+        let _ = write!(out, "\n[appearance]\nmodel = {name}    # relative to this config\n");
+        let _ = writeln!(out, "convention = \"{}\"", convention.name());
+        let _ = write!(out, "\n[reidentification]\nremember_s = 60.0\nassociation_weight = 4.0\n");
+    }
+}
+
+impl KnownDetector<'_> {
     fn describe(&self, out: &mut String) {
         let Self { family, input, .. } = self;
-        let preparation = family.preparation();
-        let colours = match preparation.colours {
-            Colours::Rgb => "RGB",
-            Colours::Bgr => "BGR",
-        };
-        let fit = match preparation.fit {
-            Fit::Stretch => "stretched to it".to_owned(),
-            Fit::Centre => format!("centred, padded with {}", preparation.padding),
-            Fit::TopLeft => format!("at the top left, padded with {}", preparation.padding),
-        };
-        let (mean, deviation) = (preparation.mean, preparation.deviation);
         let _ = writeln!(out, "# family   {family} ({})", family.networks());
-        let _ = writeln!(out, "# image    {} x {} pixels, {fit}", input.width, input.height);
-        let _ = writeln!(out, "# colours  {colours}, mean {mean:?}, deviation {deviation:?}");
+        describe_input(*input, &family.preparation(), out);
         let _ = writeln!(out, "# people   class {} (`classes` if not)", family.person_class());
         if self.call_ms > 0.0 {
             let _ = writeln!(out, "# time     {:.1} ms a call, on one thread", self.call_ms);
@@ -147,11 +209,22 @@ fn as_json(about: &About, known: Option<&Known<'_>>) -> Value {
     let ports = |ports: &[Port]| -> Vec<Value> {
         ports.iter().map(|port| json!({ "name": port.name, "shape": port.shape })).collect()
     };
+    let detector = match known {
+        Some(Known::Detector(known)) => Some(known),
+        _ => None,
+    };
+    let embedding = match known {
+        Some(Known::Embedding(known)) => Some(known),
+        _ => None,
+    };
+    let input = detector.map(|known| known.input).or(embedding.map(|known| known.network.input()));
+    let call_ms = detector.map(|known| known.call_ms).or(embedding.map(|known| known.call_ms));
     json!({
         "inputs": ports(&about.inputs),
         "outputs": ports(&about.outputs),
-        "family": known.map(|known| known.family.name()),
-        "size": known.map(|known| [known.input.width, known.input.height]),
-        "call_ms": known.map(|known| known.call_ms),
+        "family": detector.map(|known| known.family.name()),
+        "vector": embedding.map(|known| known.numbers),
+        "size": input.map(|input| [input.width, input.height]),
+        "call_ms": call_ms,
     })
 }

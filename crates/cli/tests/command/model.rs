@@ -33,6 +33,29 @@ fn a_network_is_described_by_the_config_that_runs_it() {
 }
 
 #[test]
+fn a_network_for_reidentification_is_described_by_its_section() {
+    let home = tempfile::tempdir().unwrap();
+    fs::copy(network("omz.onnx"), home.path().join("reid.onnx")).unwrap();
+    let told = tagalong().args(["model", "reid.onnx"]).current_dir(home.path()).output().unwrap();
+    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
+    let section = text(&told.stdout);
+    for part in [
+        "re-identification: a person is 256 numbers",
+        "128 x 256 pixels, stretched",
+        "BGR",
+        "ms a person",
+        "[appearance]\nmodel = \"reid.onnx\"",
+    ] {
+        assert!(section.contains(part), "{part}: {section}");
+    }
+    let plugins = "[[detectors]]\nplugin = \"depth-template\"\n[filter]\nplugin = \"ekf\"\n";
+    fs::write(home.path().join("people.toml"), format!("{plugins}{section}")).unwrap();
+    let check =
+        tagalong().args(["check", "people.toml"]).current_dir(home.path()).output().unwrap();
+    assert_eq!(code(&check), 0, "{}", text(&check.stderr));
+}
+
+#[test]
 fn a_description_is_also_json() {
     let file = network("movenet.onnx");
     let told = tagalong().arg("model").arg(file).args(["--format", "json"]).output().unwrap();
@@ -67,4 +90,60 @@ fn files_that_are_no_networks_are_refused_by_name() {
         let why = text(&told.stderr);
         assert!(why.contains(name) && why.contains(part), "{why}");
     }
+}
+
+#[test]
+fn the_shipped_network_is_the_one_that_the_export_writes() {
+    let home = tempfile::tempdir().unwrap();
+    let export = ["model", "--export", "depth-net", "net.onnx", "--sample", "net.json"];
+    let told = tagalong().args(export).current_dir(home.path()).output().unwrap();
+    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
+    let models: PathBuf =
+        [env!("CARGO_MANIFEST_DIR"), "..", "..", "configs", "models"].iter().collect();
+    for (written, shipped) in
+        [("net.onnx", "depth-net.onnx"), ("net.onnx.card.toml", "depth-net.onnx.card.toml")]
+    {
+        let same =
+            fs::read(home.path().join(written)).unwrap() == fs::read(models.join(shipped)).unwrap();
+        let renew = "tagalong model --export depth-net configs/models/depth-net.onnx";
+        assert!(same, "{shipped} is another one: run `{renew}`");
+    }
+    let card = fs::read_to_string(home.path().join("net.onnx.card.toml")).unwrap();
+    let card: toml::Table = card.parse().unwrap();
+    assert!(card["inputs"]["fine"].as_str().unwrap().starts_with("[1, 11, 128, 128]"));
+    let sample = fs::read_to_string(home.path().join("net.json")).unwrap();
+    let sample: serde_json::Value = serde_json::from_str(&sample).unwrap();
+    assert_eq!(sample["outputs"]["head"]["shape"], serde_json::json!([1, 3, 64, 64]));
+    let told = tagalong().args(["model", "net.onnx"]).current_dir(home.path()).output().unwrap();
+    assert_eq!(code(&told), 1, "it takes no image");
+    assert!(text(&told.stdout).contains("`fine` [1, 11, 128, 128]"), "{}", text(&told.stdout));
+}
+
+#[test]
+fn an_export_takes_the_weights_of_a_model_file() {
+    let home = tempfile::tempdir().unwrap();
+    let models = "../../configs/models";
+    let other = format!("{models}/depth-net.without-lab2.toml");
+    let file = home.path().join("net.onnx");
+    let export = |weights: &str| {
+        let told = tagalong()
+            .args(["model", "--export", "depth-net", "--weights", weights])
+            .arg(&file)
+            .output()
+            .unwrap();
+        (code(&told), text(&told.stderr))
+    };
+    assert_eq!(export(&other).0, 0);
+    let shipped = fs::read(format!("{models}/depth-net.onnx")).unwrap();
+    assert_ne!(fs::read(&file).unwrap(), shipped);
+    let (code, why) = export("none.toml");
+    assert!(code == 2 && why.contains("none.toml"), "{why}");
+}
+
+#[test]
+fn plugins_without_a_network_export_none() {
+    let told = tagalong().args(["model", "--export", "ekf", "net.onnx"]).output().unwrap();
+    assert_eq!(code(&told), 2);
+    let why = text(&told.stderr);
+    assert!(why.contains("`ekf` has no network to export; available: depth-net"), "{why}");
 }

@@ -15,6 +15,7 @@ mod needs;
 mod odometry;
 mod people;
 mod pose;
+mod preparation;
 mod rate;
 mod reading;
 mod registration;
@@ -50,6 +51,7 @@ pub const ALL: &[Check] = &[
     suits::suits,
     laser::laser,
     odometry::odometry,
+    preparation::preparation,
     people::people,
     still::still,
     missed::missed,

@@ -9,8 +9,9 @@ use super::Followed;
 const RIDGE: f64 = 1.0;
 /// Smallest weight that is divided by.
 const LEAST: f64 = 1e-3;
-/// A weight and an offset for each of torso, legs, texture and height, and a weight for the rivals.
-const FEATURES: usize = 9;
+/// A weight and an offset for each of torso, legs, texture, vector and height, and a weight for the
+/// rivals.
+const FEATURES: usize = 11;
 
 /// Fits the settings of the lock's probabilities to the true identities.
 pub fn looks(results: &[Followed]) -> LooksSettings {
@@ -22,12 +23,31 @@ pub fn looks(results: &[Followed]) -> LooksSettings {
             weight: 1.0,
         })
         .collect();
-    let [torso, torso_0, legs, legs_0, texture, texture_0, height, height_0, rivals] =
-        logistic(&examples, RIDGE);
+    let [
+        torso,
+        torso_0,
+        legs,
+        legs_0,
+        texture,
+        texture_0,
+        vector,
+        vector_0,
+        height,
+        height_0,
+        rivals,
+    ] = logistic(&examples, RIDGE);
+    // Colours have no weight where a network describes people, and the other way round: such a term
+    // keeps its default.
+    let usual = LooksSettings::default();
+    let known = |weight: f64, offset: f64, usual: [f64; 2]| match weight == 0.0 && offset == 0.0 {
+        true => usual,
+        false => term(weight, offset),
+    };
     LooksSettings {
-        torso: term(torso, torso_0),
-        legs: term(legs, legs_0),
-        texture: term(texture, texture_0),
+        torso: known(torso, torso_0, usual.torso),
+        legs: known(legs, legs_0, usual.legs),
+        texture: known(texture, texture_0, usual.texture),
+        vector: known(vector, vector_0, usual.vector),
         height: term(height, height_0),
         rivals: rounded(rivals),
     }
@@ -36,11 +56,12 @@ pub fn looks(results: &[Followed]) -> LooksSettings {
 /// Returns the features of an example; an unknown difference has no weight and no offset.
 fn features(differences: &Differences) -> [f64; FEATURES] {
     let of = |difference: Option<f64>| difference.map_or([0.0; 2], |d| [-d, 1.0]);
-    let [torso, legs, texture] = [differences.torso, differences.legs, differences.texture].map(of);
+    let Differences { torso, legs, texture, vector, .. } = *differences;
+    let [torso, legs, texture, vector] = [torso, legs, texture, vector].map(of);
     let height = [-differences.height_m, 1.0];
     let rivals = differences.rivals.unwrap_or(0.0);
     let mut all = [rivals; FEATURES];
-    all[..FEATURES - 1].copy_from_slice([torso, legs, texture, height].as_flattened());
+    all[..FEATURES - 1].copy_from_slice([torso, legs, texture, vector, height].as_flattened());
     all
 }
 
@@ -90,6 +111,7 @@ mod tests {
                 torso,
                 legs: Some(f64::from(k % 7) / 10.0),
                 texture: None,
+                vector: None,
                 height_m: 0.02 * f64::from(k % 3),
                 rivals: None,
             };
@@ -101,6 +123,8 @@ mod tests {
         let [even, weight] = found.torso;
         assert!((even - 0.25).abs() < 0.03 && (weight - 10.0).abs() < 0.5, "{found:?}");
         assert!(found.legs[1].abs() < 0.3 && found.rivals == 0.0, "{found:?}");
+        let usual = LooksSettings::default();
+        assert_eq!((found.texture, found.vector), (usual.texture, usual.vector), "never visible");
         let text = toml(&found).unwrap();
         let read: toml::Table = toml::from_str(&text).unwrap();
         assert!(read["target"]["looks"]["torso"].is_array(), "{text}");

@@ -1,8 +1,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{EgoMotion, Frame, Person, Track, TrackId};
-use tagalong_vision::Appearance;
+use tagalong_core::{EgoMotion, Frame, Person, Result, Track, TrackId};
+use tagalong_vision::{Appearance, Describer};
 
 use super::memory::{Differences, Memory};
 use super::settings::TargetSettings;
@@ -108,6 +108,7 @@ pub(crate) struct LastSeen {
 /// Target lock; see the [module](super).
 pub(crate) struct TargetLock {
     settings: TargetSettings,
+    describer: Describer,
     state: LockState,
     why: &'static str,
     since_s: f64,
@@ -131,7 +132,7 @@ pub(crate) struct TargetLock {
 }
 
 impl TargetLock {
-    pub(crate) fn new(settings: TargetSettings) -> Self {
+    pub(crate) fn new(settings: TargetSettings, describer: Describer) -> Self {
         Self {
             state: LockState::Initial,
             why: "nobody was chosen yet",
@@ -147,20 +148,21 @@ impl TargetLock {
             others: BTreeSet::new(),
             standing: Vec::new(),
             settings,
+            describer,
         }
     }
 
     /// Chooses this track anew, and forgets the previous target.
     pub(crate) fn choose(&mut self, track: TrackId) {
         let settings = TargetSettings { track: Some(track.0), ..self.settings.clone() };
-        *self = Self::new(settings);
+        *self = Self::new(settings, self.describer.clone());
     }
 
     /// Discards all positions after a jump of the clock: a remembered person is lost, otherwise a
     /// target is chosen anew.
     pub(crate) fn reset(&mut self) {
         if !self.settings.remember {
-            *self = Self::new(self.settings.clone());
+            *self = Self::new(self.settings.clone(), self.describer.clone());
         } else if self.state.follows() {
             self.lose("the clock jumped");
         }
@@ -198,15 +200,18 @@ impl TargetLock {
     }
 
     /// Takes in a frame; `tracks` are near to far, `may_choose` allows the choice of a target.
+    ///
+    /// # Errors
+    /// The network that describes people fails.
     pub(crate) fn update(
         &mut self,
         frame: &Frame,
         motion: &EgoMotion,
         tracks: &[Track],
         may_choose: bool,
-    ) -> LockReport {
+    ) -> Result<LockReport> {
         self.move_along(motion);
-        let looks = self.looks(frame, tracks);
+        let looks = self.looks(frame, tracks)?;
         let likeness = self.likeness(&looks);
         let log_odds = likeness.iter().map(|(like, odds)| (like.track, *odds)).collect();
         match self.state {
@@ -218,13 +223,13 @@ impl TargetLock {
         // Others are noted before the appearance is learned, with the state of this frame.
         self.tell_apart(tracks);
         self.learn(tracks, looks);
-        LockReport {
+        Ok(LockReport {
             state: self.state,
             why: self.why,
             since_s: self.since_s,
             belief: self.followed().map(|_| probability(self.belief)),
             likeness: likeness.into_iter().map(|(like, _)| like).collect(),
-        }
+        })
     }
 
     fn move_along(&mut self, motion: &EgoMotion) {
@@ -242,10 +247,10 @@ impl TargetLock {
     }
 
     /// Returns the appearance of all tracks that are seen whole.
-    fn looks(&self, frame: &Frame, tracks: &[Track]) -> BTreeMap<TrackId, Appearance> {
+    fn looks(&self, frame: &Frame, tracks: &[Track]) -> Result<BTreeMap<TrackId, Appearance>> {
         let whole = |track: &&Track| track.confirmed && track.seen && !track.occluded;
         let all = tracks.iter().filter(|track| self.settings.remember && whole(track));
-        all.map(|track| (track.id, Appearance::of(&track.estimate, frame))).collect()
+        all.map(|track| Ok((track.id, self.describer.of(&track.estimate, frame)?))).collect()
     }
 
     /// Returns the similarity of all tracks to the person, with the log-odds.
@@ -520,6 +525,10 @@ mod tests {
         TargetSettings { looks, ..TargetSettings::default() }
     }
 
+    fn new_lock(settings: TargetSettings) -> TargetLock {
+        TargetLock::new(settings, Describer::default())
+    }
+
     fn somebody(id: u32, x: f64, y: f64) -> Track {
         let track = target(x, y, Vector2::zeros());
         Track { id: TrackId(id), seen: true, confirmed: true, occluded: false, ..track }
@@ -533,7 +542,7 @@ mod tests {
 
     /// An eighth of a second later.
     fn step(lock: &mut TargetLock, tracks: &[Track]) -> LockReport {
-        lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.125), tracks, true)
+        lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.125), tracks, true).unwrap()
     }
 
     fn steps(lock: &mut TargetLock, count: usize, track: &Track) -> Vec<LockState> {
@@ -542,7 +551,7 @@ mod tests {
 
     /// A person 1.6 m tall, seen in twenty frames and missed in `frames` after that.
     fn missed(frames: usize) -> (TargetLock, Vec<LockState>) {
-        let mut lock = TargetLock::new(settings());
+        let mut lock = new_lock(settings());
         steps(&mut lock, 20, &tall(1.6));
         let states = steps(&mut lock, frames, &Track { seen: false, ..tall(1.6) });
         (lock, states)
@@ -550,7 +559,7 @@ mod tests {
 
     #[test]
     fn the_person_is_known_well_after_fifteen_sightings() {
-        let states = steps(&mut TargetLock::new(settings()), 16, &tall(1.6));
+        let states = steps(&mut new_lock(settings()), 16, &tall(1.6));
         assert!(states[..14].iter().all(|state| *state == LockState::Training), "{states:?}");
         assert_eq!(states[14..], [LockState::Locked; 2]);
     }
@@ -589,7 +598,7 @@ mod tests {
     #[test]
     fn somebody_who_came_near_may_have_been_taken_for_the_person() {
         let states = |away_m: f64| {
-            let mut lock = TargetLock::new(settings());
+            let mut lock = new_lock(settings());
             steps(&mut lock, 20, &tall(1.6));
             let other = somebody(2, 2.0, away_m);
             step(&mut lock, &[tall(1.6), other.clone()]);
@@ -604,7 +613,7 @@ mod tests {
     #[test]
     fn in_front_is_what_the_settings_say() {
         let chosen = |track: Track| {
-            let mut lock = TargetLock::new(settings());
+            let mut lock = new_lock(settings());
             step(&mut lock, &[track]);
             lock.followed().is_some()
         };
@@ -615,14 +624,15 @@ mod tests {
         assert!(at(44.0, 2.0) && at(-44.0, 2.0) && !at(46.0, 2.0) && !at(-46.0, 2.0));
         assert!(at(30.0, 4.9) && !at(30.0, 5.1));
         assert!(!chosen(Track { confirmed: false, ..somebody(1, 2.0, 0.0) }));
-        let mut lock = TargetLock::new(settings());
-        lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.1), &[somebody(1, 2.0, 0.0)], false);
+        let mut lock = new_lock(settings());
+        lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.1), &[somebody(1, 2.0, 0.0)], false)
+            .unwrap();
         assert_eq!(lock.state(), LockState::Initial, "not yet");
     }
 
     #[test]
     fn nobody_is_farther_than_they_can_have_walked() {
-        let mut lock = TargetLock::new(settings());
+        let mut lock = new_lock(settings());
         assert!(lock.is_in_reach(&somebody(1, 99.0, 0.0)), "seen nowhere before");
         let (place, velocity) = (Point2::new(1.0, 1.0), Vector2::zeros());
         lock.last = Some(LastSeen { place, velocity, ago_s: 1.0 });
@@ -637,7 +647,7 @@ mod tests {
 
     #[test]
     fn what_stood_beside_the_person_is_another_for_a_minute() {
-        let mut lock = TargetLock::new(settings());
+        let mut lock = new_lock(settings());
         lock.note_other(&somebody(7, 3.0, 0.0));
         let mut walks = somebody(8, 5.0, 0.0);
         walks.estimate.person.velocity.x = 0.5;
@@ -657,7 +667,7 @@ mod tests {
         lock.reset();
         assert_eq!((lock.state(), lock.why), (LockState::Lost, "the clock jumped"));
         assert_eq!(lock.last_seen(), None);
-        let mut lock = TargetLock::new(TargetSettings { remember: false, ..settings() });
+        let mut lock = new_lock(TargetSettings { remember: false, ..settings() });
         steps(&mut lock, 3, &tall(1.6));
         lock.reset();
         assert_eq!(lock.state(), LockState::Initial);

@@ -35,6 +35,7 @@ impl Memory {
             torso: own.torso,
             legs: own.legs,
             texture: own.texture,
+            vector: own.vector,
             height_m: (looks.height_m - height_m).abs(),
             rivals: other.and_then(|other| Some(other.mean()? - own.mean()?)),
         })
@@ -42,7 +43,7 @@ impl Memory {
 }
 
 /// Differences of an appearance from the remembered person: Hellinger distances, 0 to 1, of the
-/// visible parts, and the height of the head.
+/// visible parts, or the distance of vectors, and the height of the head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Differences {
     /// Colours of the upper body.
@@ -51,6 +52,8 @@ pub struct Differences {
     pub legs: Option<f64>,
     /// Directions of edges on the upper body.
     pub texture: Option<f64>,
+    /// Vectors of a network: 1 minus the cosine, in place of the three above.
+    pub vector: Option<f64>,
     /// Height of the head, m.
     pub height_m: f64,
     /// Excess of the distance to the others' appearance over that to the person's.
@@ -66,6 +69,7 @@ impl Differences {
         say(self.torso, settings.torso)
             + say(self.legs, settings.legs)
             + say(self.texture, settings.texture)
+            + say(self.vector, settings.vector)
             + say(Some(self.height_m), settings.height)
             + settings.rivals * self.rivals.unwrap_or(0.0)
     }
@@ -115,16 +119,24 @@ mod tests {
             torso: [0.2, 10.0],
             legs: [0.3, 4.0],
             texture: [0.4, 2.0],
+            vector: [0.3, 8.0],
             height: [0.1, 20.0],
             rivals: 3.0,
         };
-        let none =
-            Differences { torso: None, legs: None, texture: None, height_m: 0.1, rivals: None };
+        let none = Differences {
+            torso: None,
+            legs: None,
+            texture: None,
+            vector: None,
+            height_m: 0.1,
+            rivals: None,
+        };
         for (differences, log_odds) in [
             (none, 0.0),
             (Differences { torso: Some(0.5), ..none }, -3.0),
             (Differences { legs: Some(0.05), ..none }, 1.0),
             (Differences { texture: Some(0.9), ..none }, -1.0),
+            (Differences { vector: Some(0.05), ..none }, 2.0),
             (Differences { height_m: 0.15, ..none }, -1.0),
             (Differences { rivals: Some(0.5), ..none }, 1.5),
             (Differences { torso: Some(0.1), legs: Some(0.8), ..none }, -1.0),

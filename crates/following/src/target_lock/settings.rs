@@ -95,6 +95,10 @@ pub struct LooksSettings {
     pub legs: [f64; 2],
     /// Directions of edges on the upper body, likewise.
     pub texture: [f64; 2],
+    /// Vectors of the network of `[appearance]`, which take the place of the three above: the
+    /// neutral distance (1 minus the cosine), and the weight of one below it. Not fitted, because no
+    /// network is shipped: fit it to yours with `tagalong follow --fit`.
+    pub vector: [f64; 2],
     /// Height of the head: the neutral difference, m, and the weight of one metre below it.
     pub height: [f64; 2],
     /// Weight of being nearer to the person's appearance than to those of others seen beside them.
@@ -108,6 +112,7 @@ impl Default for LooksSettings {
             torso: [0.166, 12.566],
             legs: [0.472, 4.394],
             texture: [0.267, 7.819],
+            vector: [0.35, 12.0],
             height: [-0.045, 7.009],
             rivals: 5.49,
         }

@@ -58,6 +58,7 @@ fn check_target(settings: &PipelineSettings) -> Result<()> {
         ("looks.torso", looks.torso),
         ("looks.legs", looks.legs),
         ("looks.texture", looks.texture),
+        ("looks.vector", looks.vector),
         ("looks.height", looks.height),
     ];
     match weighted.iter().find(|(_, [_, weight])| *weight < 0.0) {

@@ -14,6 +14,8 @@ const STEERING: Inputs =
 const ODOMETRY: Inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
 /// Inputs of `[reidentification]`.
 const REIDENTIFICATION: Inputs = Inputs::NONE.accept(Input::Colour).accept(Input::Depth);
+/// Inputs of the network of `[appearance]`.
+const APPEARANCE: Inputs = Inputs::NONE.require(Input::Colour);
 /// Inputs of `[stereo]`, which leaves a frame with depth unchanged.
 const STEREO: Inputs =
     Inputs::NONE.require(Input::Colour).require(Input::Right).accept(Input::Depth);
@@ -35,8 +37,12 @@ pub(super) fn declared_inputs(
     let steering = has_controller.then_some(("[collision_monitor]", STEERING));
     let remembers = settings.reidentification.remember_s > 0.0;
     let people = remembers.then_some(("[reidentification]", REIDENTIFICATION));
+    let compares = remembers || has_controller && settings.target.remember;
+    let described = settings.appearance.has_network() && compares;
+    let looks = described.then_some(("[appearance]", APPEARANCE));
+    let plugins = plugins.iter().copied();
     let users: Vec<Declared<'_>> =
-        plugins.iter().copied().chain(odometry).chain(steering).chain(people).collect();
+        plugins.chain(odometry).chain(steering).chain(people).chain(looks).collect();
     // The pipeline computes depth from the pair; that of the log is used where it is there.
     let has_stereo = settings.stereo.is_some();
     let of_log = |inputs: Inputs| if has_stereo { inputs.relax(Input::Depth) } else { inputs };

@@ -16,9 +16,9 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point2;
-use tagalong_core::{Detection, EgoMotion, Frame, Track, TrackId};
-use tagalong_geometry::{Extent, Rect};
-use tagalong_vision::Appearance;
+use tagalong_core::{Detection, EgoMotion, Frame, Result, Track, TrackId};
+use tagalong_geometry::Extent;
+use tagalong_vision::{Appearance, Describer};
 
 use person::{Identity, Person};
 pub use settings::ReidentificationSettings;
@@ -55,6 +55,7 @@ impl People {
 /// The stage.
 pub(crate) struct Reidentifier {
     settings: ReidentificationSettings,
+    describer: Describer,
     /// Identity of each track.
     tracks: BTreeMap<TrackId, Identity>,
     /// People without a track.
@@ -62,48 +63,56 @@ pub(crate) struct Reidentifier {
 }
 
 impl Reidentifier {
-    pub(crate) fn new(settings: ReidentificationSettings) -> Self {
-        Self { settings, tracks: BTreeMap::new(), absent: Vec::new() }
+    pub(crate) fn new(settings: ReidentificationSettings, describer: Describer) -> Self {
+        Self { settings, describer, tracks: BTreeMap::new(), absent: Vec::new() }
     }
 
     /// Takes in a frame, and returns the numbers of the people.
-    pub(crate) fn update(&mut self, frame: &Frame, motion: &EgoMotion, tracks: &[Track]) -> People {
+    ///
+    /// # Errors
+    /// The network that describes people fails.
+    pub(crate) fn update(
+        &mut self,
+        frame: &Frame,
+        motion: &EgoMotion,
+        tracks: &[Track],
+    ) -> Result<People> {
         if self.settings.remember_s == 0.0 {
-            return People::default();
+            return Ok(People::default());
         }
         self.predict(motion);
         self.release_ended(tracks);
         self.note_rivals(tracks);
-        self.add_appearances(frame, tracks);
+        self.add_appearances(frame, tracks)?;
         self.tell_apart(tracks);
         let given_up = self.recognise(tracks);
         self.note_reported(tracks);
         let numbers = self.tracks.iter().map(|(id, identity)| (*id, identity.person.number));
         let numbers = numbers.filter(|(id, number)| id != number).collect();
-        People { numbers, given_up }
+        Ok(People { numbers, given_up })
     }
 
     /// Returns the log-likelihood ratios of the appearances of tracks and detections, for the
     /// associator; none if positions alone decide.
+    ///
+    /// # Errors
+    /// The network that describes people fails.
     pub(crate) fn compare(
         &self,
         frame: &Frame,
         tracks: &[Track],
         detections: &[Detection],
-    ) -> Vec<Vec<f64>> {
+    ) -> Result<Vec<Vec<f64>>> {
         let weight = self.settings.association_weight;
         // Between one track and one detection there is nothing to choose.
         if weight == 0.0
             || self.settings.remember_s == 0.0
             || tracks.len().max(detections.len()) < 2
         {
-            return Vec::new();
+            return Ok(Vec::new());
         }
-        let seen: Vec<Option<Appearance>> = detections
-            .iter()
-            .map(|detection| upper_body(detection).map(|region| (region, &detection.position)))
-            .map(|at| at.map(|(region, head)| Appearance::at(region, head, frame)))
-            .collect();
+        let seen = detections.iter().map(|detection| self.describe(frame, detection));
+        let seen = seen.collect::<Result<Vec<Option<Appearance>>>>()?;
         let ratio = |known: Option<&Identity>, seen: &Option<Appearance>| {
             let difference =
                 known.zip(seen.as_ref()).and_then(|(known, seen)| known.difference(seen));
@@ -114,7 +123,15 @@ impl Reidentifier {
             let known = self.tracks.get(&track.id);
             seen.iter().map(|seen| ratio(known, seen)).collect()
         };
-        tracks.iter().map(row).collect()
+        Ok(tracks.iter().map(row).collect())
+    }
+
+    /// Returns the appearance of a detection; `None` without a box that shows one.
+    fn describe(&self, frame: &Frame, detection: &Detection) -> Result<Option<Appearance>> {
+        let Some(image) = &detection.image else { return Ok(None) };
+        let is_shown = image.extent == Extent::UpperBody || self.describer.takes_whole_people();
+        let describe = || self.describer.at(&image.rect, &detection.position, frame);
+        is_shown.then(describe).transpose()
     }
 
     /// Takes in a jump of the clock, which ended all tracks.
@@ -183,7 +200,7 @@ impl Reidentifier {
     }
 
     /// Adds the appearances of this frame of all tracks that are seen, and near to no other.
-    fn add_appearances(&mut self, frame: &Frame, tracks: &[Track]) {
+    fn add_appearances(&mut self, frame: &Frame, tracks: &[Track]) -> Result<()> {
         for track in tracks.iter().filter(|track| track.seen && !track.occluded) {
             let is_near = |other: &Track| {
                 other.id != track.id && (place(other) - place(track)).norm() < self.settings.alone_m
@@ -195,12 +212,13 @@ impl Reidentifier {
             if covered || tracks.iter().any(is_near) {
                 continue;
             }
-            let appearance = Appearance::of(&track.estimate, frame);
+            let appearance = self.describer.of(&track.estimate, frame)?;
             // An appearance without pixels differs from nothing, so that any person would fit it.
             if appearance.difference(&appearance).mean().is_some() {
                 identity.add(appearance);
             }
         }
+        Ok(())
     }
 
     /// Decides who is who among tracks that were near to each other.
@@ -323,11 +341,6 @@ impl Reidentifier {
             }
         }
     }
-}
-
-fn upper_body(detection: &Detection) -> Option<&Rect> {
-    let image = detection.image.as_ref()?;
-    (image.extent == Extent::UpperBody).then_some(&image.rect)
 }
 
 fn place(track: &Track) -> Point2<f64> {

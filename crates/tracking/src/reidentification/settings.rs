@@ -11,7 +11,7 @@ pub struct ReidentificationSettings {
     #[schemars(range(min = 0.0))]
     pub remember_s: f64,
     /// Largest difference of two appearances of one person: the mean of the Hellinger distances of
-    /// the visible parts.
+    /// the visible parts, or 1 minus the cosine of the vectors of `[appearance]`.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub max_difference: f64,
     /// Every other remembered person must differ by this much more.

@@ -45,14 +45,14 @@ struct Scene {
 impl Scene {
     fn new() -> Self {
         let settings = ReidentificationSettings { remember_s: 30.0, ..Default::default() };
-        Self { stage: Reidentifier::new(settings) }
+        Self { stage: Reidentifier::new(settings, Describer::default()) }
     }
 
     /// Shows some frames, and returns the numbers of the tracks in the last one.
     fn show(&mut self, frames: usize, image: &Frame, tracks: &[Track]) -> Vec<u32> {
         let mut numbers = Vec::new();
         for _ in 0..frames {
-            let people = self.stage.update(image, &EgoMotion::at_rest(DT_S), tracks);
+            let people = self.stage.update(image, &EgoMotion::at_rest(DT_S), tracks).unwrap();
             let number = |id| people.numbers.get(id).unwrap_or(id).0;
             numbers = tracks.iter().map(|track| number(&track.id)).collect();
         }
@@ -113,7 +113,9 @@ fn tracks_that_changed_over_change_their_numbers_back() {
 
 #[test]
 fn without_memory_each_track_has_its_number() {
-    let mut scene = Scene { stage: Reidentifier::new(ReidentificationSettings::default()) };
+    let mut scene = Scene {
+        stage: Reidentifier::new(ReidentificationSettings::default(), Describer::default()),
+    };
     let red = frame(RED, BLUE);
     scene.show(30, &red, &[track(1, 0.8, 1.6)]);
     scene.show(50, &red, &[]);
@@ -151,7 +153,8 @@ fn a_detection_that_looks_like_the_person_of_a_track_speaks_for_it() {
     let tracks = [track(1, 0.8, 1.7), track(2, -0.8, 1.7)];
     scene.show(3, &frame(RED, BLUE), &tracks);
     let detections = [detection(0.8), detection(-0.8)];
-    let compare = |scene: &Scene, image: &Frame| scene.stage.compare(image, &tracks, &detections);
+    let compare =
+        |scene: &Scene, image: &Frame| scene.stage.compare(image, &tracks, &detections).unwrap();
     assert!(compare(&scene, &frame(RED, BLUE)).is_empty(), "positions alone decide by default");
     scene.stage.settings.association_weight = 5.0;
     let [same, changed] = [frame(RED, BLUE), frame(BLUE, RED)].map(|image| compare(&scene, &image));
@@ -161,9 +164,10 @@ fn a_detection_that_looks_like_the_person_of_a_track_speaks_for_it() {
     for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         assert_eq!(changed[row][column], same[row][1 - column], "the colours changed places");
     }
-    let stranger = scene.stage.compare(&frame(RED, BLUE), &[track(9, 0.8, 1.7)], &detections);
+    let stranger =
+        scene.stage.compare(&frame(RED, BLUE), &[track(9, 0.8, 1.7)], &detections).unwrap();
     assert_eq!(stranger, [[0.0, 0.0]], "nothing is known of a new track");
     let whole = Detection { image: None, ..detection(0.8) };
-    let unseen = scene.stage.compare(&frame(RED, BLUE), &tracks, &[whole]);
+    let unseen = scene.stage.compare(&frame(RED, BLUE), &tracks, &[whole]).unwrap();
     assert_eq!(unseen, [[0.0], [0.0]], "without an image box there is no appearance");
 }

@@ -22,7 +22,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("assignment", &[]),
     ("tracking", &["vision"]),
     ("following", &["tracking", "vision"]),
-    ("pipeline", &["stereo", "odometry", "tracking", "following"]),
+    ("pipeline", &["stereo", "odometry", "tracking", "following", "network", "vision"]),
     ("log", &["vision"]),
     ("sim", &[]),
     ("triangulate", &[]),

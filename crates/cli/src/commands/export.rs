@@ -1,0 +1,78 @@
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value, json};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_config::{Context, NamedTensor, Registry};
+use tagalong_core::DiffDrive;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Paths of an export.
+pub(super) struct Export<'a> {
+    /// Plugin of the network.
+    pub(super) plugin: &'a str,
+    /// The ONNX file; its card is written beside it.
+    pub(super) file: &'a Path,
+    /// Model file of the plugin; without one its built-in model is taken.
+    pub(super) weights: Option<&'a Path>,
+    /// File for a sample of inputs and outputs.
+    pub(super) sample: Option<&'a Path>,
+}
+
+impl Export<'_> {
+    /// Writes the network of a plugin as an ONNX file, and its card.
+    ///
+    /// # Errors
+    /// A plugin without a network, a model that it refuses (exit code 2), a file that cannot be
+    /// written.
+    pub(super) fn run(&self, registry: &Registry) -> Outcome {
+        let text = self.settings()?.to_string();
+        let table = DeTable::parse(&text).map_err(Failure::usage)?;
+        let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
+        let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
+        let context = Context { seed: 0, base_dir: PathBuf::from("."), wheels };
+        let network = registry.export(self.plugin, Some(value), &context);
+        let network = network.map_err(|error| Failure::usage(error.message))?;
+        let card = card_of(self.file);
+        write(self.file, &network.onnx)?;
+        write(&card, network.card.as_bytes())?;
+        let mut written = vec![self.file.display().to_string(), card.display().to_string()];
+        if let Some(sample) = self.sample {
+            write(sample, as_json(&network.sample).to_string().as_bytes())?;
+            written.push(sample.display().to_string());
+        }
+        print(&format!("written: {}\n", written.join(", ")))?;
+        Ok(Ended::Well)
+    }
+
+    /// Returns the settings of the plugin: the model file alone.
+    fn settings(&self) -> Result<toml::Table, Failure> {
+        let Some(weights) = self.weights else { return Ok(toml::Table::new()) };
+        let path = std::path::absolute(weights).map_err(Failure::failed)?;
+        Ok(toml::Table::from_iter([("model".to_owned(), path.display().to_string().into())]))
+    }
+}
+
+/// Returns the path of the card of a file.
+fn card_of(file: &Path) -> PathBuf {
+    let mut name = file.file_name().unwrap_or_default().to_owned();
+    name.push(".card.toml");
+    file.with_file_name(name)
+}
+
+fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
+    fs::write(path, content)
+        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
+}
+
+fn as_json(sample: &[NamedTensor]) -> Value {
+    let part = |is_input: bool| -> Map<String, Value> {
+        let tensors = sample.iter().filter(|tensor| tensor.is_input == is_input);
+        let entry = |tensor: &NamedTensor| {
+            (tensor.name.to_owned(), json!({ "shape": tensor.shape, "values": tensor.values }))
+        };
+        tensors.map(entry).collect()
+    };
+    json!({ "inputs": part(true), "outputs": part(false) })
+}
