@@ -10,6 +10,8 @@ use crate::Limits;
 
 /// Deepest nesting of graphs within operators.
 const MAX_DEPTH: usize = 8;
+/// Deepest nesting of messages: three for each graph, and those of the type of a tensor.
+const MAX_MESSAGES: usize = 3 * MAX_DEPTH + 16;
 /// Most numbers of a constant that can be a size: no operator has a shape of more.
 const MAX_SIZES: usize = 16;
 /// Operators whose output is as large as the numbers in a constant input ask for.
@@ -45,6 +47,7 @@ impl Survey {
     /// Bytes that are no ONNX file, a file that ends early, and one beyond the limits; the message
     /// is a sentence with the remedy.
     pub fn of(bytes: &[u8], limits: &Limits) -> Result<Self, String> {
+        check_encoding(bytes, Part::Model, 0)?;
         let mut survey = Self::default();
         let mut graphs = 0;
         for field in Fields(bytes) {
@@ -119,6 +122,67 @@ impl Survey {
         self.values.extend(operator.outputs);
         Ok(())
     }
+}
+
+/// Kind of message in a file, by `onnx.proto`.
+#[derive(Clone, Copy)]
+enum Part {
+    Model,
+    Graph,
+    Node,
+    Attribute,
+    Tensor,
+    Sparse,
+    ValueInfo,
+    Type,
+    TensorType,
+    Nested,
+    Map,
+    Shape,
+    Function,
+    /// A message that holds no other.
+    Leaf,
+}
+
+impl Part {
+    /// Returns the kind of message that a field of this one holds; `None` for a field without one.
+    fn within(self, field: u64) -> Option<Self> {
+        Some(match (self, field) {
+            (Self::Model, 7) | (Self::Attribute, 6 | 11) => Self::Graph,
+            (Self::Model, 25) => Self::Function,
+            (Self::Model, 8 | 14) | (Self::Graph, 14 | 16) | (Self::Node, 9) => Self::Leaf,
+            (Self::Graph, 1) | (Self::Function, 7) => Self::Node,
+            (Self::Graph, 5) | (Self::Attribute, 5 | 10) | (Self::Sparse, 1 | 2) => Self::Tensor,
+            (Self::Graph, 11..=13) | (Self::Function, 12) => Self::ValueInfo,
+            (Self::Graph, 15) | (Self::Attribute, 22 | 23) => Self::Sparse,
+            (Self::Node, 5) | (Self::Function, 11) => Self::Attribute,
+            (Self::ValueInfo, 2) | (Self::Attribute, 14 | 15) => Self::Type,
+            (Self::Type, 1 | 8) => Self::TensorType,
+            (Self::Type, 4 | 9) => Self::Nested,
+            (Self::Type, 5) => Self::Map,
+            (Self::Nested, 1) | (Self::Map, 2) => Self::Type,
+            (Self::TensorType, 2) => Self::Shape,
+            (Self::Tensor, 3 | 13 | 16) | (Self::Shape, 1) => Self::Leaf,
+            (Self::Function, 9 | 14) | (Self::ValueInfo, 4) => Self::Leaf,
+            _ => return None,
+        })
+    }
+}
+
+/// Refuses a message with damaged fields, or with groups, at any depth: a reader that skips over
+/// groups need not come to an end in a damaged one.
+fn check_encoding(message: &[u8], part: Part, depth: usize) -> Result<(), String> {
+    if depth > MAX_MESSAGES {
+        return Err(format!("its messages are nested more than {MAX_MESSAGES} deep"));
+    }
+    for field in Fields(message) {
+        if let (number, Content::Bytes(content)) = field?
+            && let Some(inner) = part.within(number)
+        {
+            check_encoding(content, inner, depth + 1)?;
+        }
+    }
+    Ok(())
 }
 
 /// Operator of a graph, in pieces.
@@ -371,6 +435,24 @@ mod tests {
         let least = [[8 << 3].as_slice(), &[0x80; 9], &[1]].concat();
         assert!(with("pads", &least).is_err());
         assert!(with("axis", &[3 << 3, 0x81, 2]).is_ok());
+    }
+
+    #[test]
+    fn damage_is_found_in_every_message() {
+        let graph = node("Relu", "x", "y");
+        let version = |content: &[u8]| [field(7, &graph), field(8, content)].concat();
+        let survey = |bytes: &[u8]| Survey::of(bytes, &Limits::default());
+        assert!(survey(&version(&[2 << 3, 17])).is_ok());
+        // A group, and a field that ends early, in the version of the operators.
+        assert!(survey(&version(&[2 << 3 | 3, 17])).unwrap_err().contains("truncated"));
+        assert!(survey(&version(&[1 << 3 | 2, 17])).is_err());
+        // A size of an input: value, type, tensor, shape, size.
+        let input = |size: &[u8]| {
+            let tensor = field(1, &field(2, &field(1, size)));
+            field(7, &[graph.clone(), field(11, &field(2, &tensor))].concat())
+        };
+        assert!(survey(&input(&[1 << 3, 64])).is_ok());
+        assert!(survey(&input(&[1 << 3 | 4, 64])).is_err());
     }
 
     #[test]

@@ -7,7 +7,8 @@
 //! The mutations are seeded (`TAGALONG_FUZZ_SEED`) and know the encoding: bytes, numbers, pieces of
 //! other files, lengths that are corrected afterwards. The file under test lies at
 //! `TAGALONG_FUZZ_FILE` (by default in the folder for temporary files), so that one that ends the
-//! process is still there, and those that take too long are kept beside it; what was found goes into `tests/corpus` and stays survived.
+//! process is still there, and those that take too long are kept beside it. Files that did harm go
+//! into `tests/corpus`, and stay survived.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,

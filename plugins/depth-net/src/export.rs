@@ -89,7 +89,7 @@ fn graph(model: &Model) -> OnnxGraph {
     graph
 }
 
-/// Cuts off what is below zero, and all cells out of view; returns the name of the result.
+/// Cuts off sums below zero, and all cells out of view; returns the name of the result.
 fn rectified(graph: &mut OnnxGraph, sums: &str) -> String {
     let (positive, result) = (format!("{sums}.positive"), format!("{sums}.in_view"));
     graph.operator("Relu", &[sums], &positive, &[]);

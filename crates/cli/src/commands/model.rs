@@ -47,7 +47,7 @@ pub struct ModelArgs {
 /// Network that a config can name.
 enum Known<'a> {
     Detector(KnownDetector<'a>),
-    Embedding(KnownEmbedding),
+    Embedding(Box<KnownEmbedding>),
 }
 
 /// Network for re-identification.
@@ -100,7 +100,8 @@ fn known<'a>(
         let image = RgbImage::filled(width, height, [114; 3]);
         let whole = Rect::new(0.0, 0.0, width as f64, height as f64);
         let call_ms = fastest_ms(|| network.embed(&image, &whole).map(drop))?;
-        return Ok(Known::Embedding(KnownEmbedding { network, numbers, call_ms }));
+        let known = KnownEmbedding { network, numbers, call_ms };
+        return Ok(Known::Embedding(Box::new(known)));
     }
     let (family, input) = (about.family()?, about.input.clone()?);
     let choices = Choices { size, ..Choices::default() };

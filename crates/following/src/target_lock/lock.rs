@@ -4,7 +4,7 @@ use nalgebra::{Point2, Vector2};
 use tagalong_core::{EgoMotion, Frame, Person, Result, Track, TrackId};
 use tagalong_vision::{Appearance, Describer};
 
-use super::memory::{Differences, Memory};
+use super::memory::{Differences, Memory, logit, probability};
 use super::settings::TargetSettings;
 
 /// Bound of the log-odds: no single look is certain.
@@ -489,14 +489,6 @@ impl TargetLock {
             }
         }
     }
-}
-
-fn probability(log_odds: f64) -> f64 {
-    1.0 / (1.0 + (-log_odds).exp())
-}
-
-fn logit(probability: f64) -> f64 {
-    (probability / (1.0 - probability)).ln()
 }
 
 #[cfg(test)]
