@@ -51,7 +51,7 @@ pub struct Config {
     pub depth_proposals: bool,
     /// With depth: adds the log-odds of the depth channel, if the model has one.
     pub depth_channel: bool,
-    /// Two windows that overlap by more (IoU) belong to one person ...
+    /// Two windows that overlap by more (IoU of the squares, or of whole bodies) belong to one person ...
     #[schemars(range(min = 0.0, max = 1e6))]
     pub overlap: f64,
     /// ... unless they are farther apart than this in depth, m.
@@ -108,6 +108,9 @@ impl Default for Config {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
+    /// Trees: false alarms in annotated rooms and, for upper bodies, the people there are examples
+    /// beside those of photographs; off: rooms teach the depth channel alone.
+    pub rooms: bool,
     /// Linear: penalty of a training error, of windows with people ...
     pub person_penalty: f64,
     /// ... and of windows without.
@@ -131,6 +134,7 @@ pub struct Training {
 impl Default for Training {
     fn default() -> Self {
         Self {
+            rooms: false,
             person_penalty: 0.02,
             other_penalty: 0.01,
             epochs: 40,

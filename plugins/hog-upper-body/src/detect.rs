@@ -215,7 +215,7 @@ impl Detector for HogUpperBody {
         funnel.drop_many("window: head height", proposer.out_of_place);
         funnel.drop_many("window: gradients", looked_at - windows.len() as u64);
         let all = windows.len();
-        merge(windows, config.overlap, config.apart_m);
+        merge(windows, model.coverage, config.overlap, config.apart_m);
         funnel.drop_many("window: beside a better one", (all - windows.len()) as u64);
         let mut found: Vec<Detection> =
             self.windows.iter().filter_map(|window| self.detection(camera, window)).collect();

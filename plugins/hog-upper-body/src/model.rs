@@ -2,6 +2,7 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_geometry::{Rect, UPPER_BODY_SIDE_M};
 
 use crate::Spans;
 use crate::channels::Channels;
@@ -46,6 +47,23 @@ impl Coverage {
             // The person is 12 cells tall, with a cell above and one below.
             Self::WholeBody => 14,
         }
+    }
+}
+
+/// Height of a standing person in sides of the upper-body square, and width by height.
+const STANDING_SIDES: f64 = 1.7 / UPPER_BODY_SIDE_M;
+const STANDING_WIDTH: f64 = 0.41;
+
+impl Coverage {
+    /// Returns the box of the part of a person by the upper-body square: for whole bodies, a
+    /// standing person of 1.7 m.
+    pub fn person(self, square: &Rect) -> Rect {
+        if self == Self::UpperBody {
+            return *square;
+        }
+        let height = STANDING_SIDES * square.height;
+        let width = STANDING_WIDTH * height;
+        Rect::new(square.centre().x - 0.5 * width, square.y, width, height)
     }
 }
 

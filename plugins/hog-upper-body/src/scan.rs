@@ -253,8 +253,8 @@ pub fn window_numbers(image: &GreyImage, square: &Rect, layout: impl Into<Layout
 
 /// Keeps the best of each group of windows, best first: a window that overlaps a better one by more
 /// than `overlap` is removed, unless the two are `apart_m` or more apart in depth. Two people one
-/// behind the other both stay.
-pub fn merge(windows: &mut Vec<Window>, overlap: f64, apart_m: f64) {
+/// behind the other both stay. The overlap is that of the parts of people which the windows show.
+pub fn merge(windows: &mut Vec<Window>, coverage: Coverage, overlap: f64, apart_m: f64) {
     windows.sort_by(|a, b| b.sum.total_cmp(&a.sum));
     let mut kept = 0;
     for at in 0..windows.len() {
@@ -264,7 +264,8 @@ pub fn merge(windows: &mut Vec<Window>, overlap: f64, apart_m: f64) {
                 (Some(a), Some(b)) => (a - b).abs() >= apart_m,
                 _ => false,
             };
-            !apart && window.region.iou(&better.region) > overlap
+            !apart
+                && coverage.person(&window.region).iou(&coverage.person(&better.region)) > overlap
         };
         if !windows[..kept].iter().any(is_same) {
             windows[kept] = window;

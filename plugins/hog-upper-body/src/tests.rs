@@ -212,13 +212,26 @@ fn two_people_one_behind_the_other_both_stay() {
     };
     let merged = |a: Option<f64>, b: Option<f64>| {
         let mut windows = vec![window(0.0, a, 1.0), window(5.0, b, 2.0)];
-        merge(&mut windows, 0.4, 0.4);
+        merge(&mut windows, Coverage::UpperBody, 0.4, 0.4);
         windows
     };
     assert_eq!(merged(Some(2.0), Some(2.1)).len(), 1);
     assert_eq!(merged(Some(2.0), Some(2.6)).len(), 2);
     assert_eq!(merged(None, Some(2.6)).len(), 1);
     assert_eq!(merged(None, None)[0].sum, 2.0);
+}
+
+#[test]
+fn whole_bodies_side_by_side_are_told_apart_by_their_boxes() {
+    let at =
+        |y: f64, sum: f32| Window { region: Rect::new(0.0, y, 50.0, 50.0), depth_m: None, sum };
+    let left = |coverage: Coverage| {
+        let mut windows = vec![at(0.0, 2.0), at(25.0, 1.0)];
+        merge(&mut windows, coverage, 0.4, 0.4);
+        windows.len()
+    };
+    // The squares have a third in common, the bodies seven tenths.
+    assert_eq!([Coverage::UpperBody, Coverage::WholeBody].map(left), [2, 1]);
 }
 
 #[test]

@@ -190,7 +190,7 @@ impl HogTrainer {
             if picture.use_ == Use::Fit && (picture.room != 0) == in_rooms {
                 let mut windows = search(&mut scanner, &picture.grey, self.near_miss());
                 windows.retain(|window| picture.is_false(&window.region));
-                merge(&mut windows, MINED_OVERLAP, 1.0);
+                merge(&mut windows, Coverage::UpperBody, MINED_OVERLAP, 1.0);
                 let worst = windows.iter().take(mined_per_picture);
                 mined.extend(worst.map(|w| (w.sum, index, w.region)));
             }
@@ -215,7 +215,7 @@ impl HogTrainer {
         for picture in self.pictures.iter().filter(is_wanted) {
             let mut windows = search(&mut scanner, &picture.grey, self.near_miss());
             if merged {
-                merge(&mut windows, MINED_OVERLAP, 1.0);
+                merge(&mut windows, Coverage::UpperBody, MINED_OVERLAP, 1.0);
             }
             sums.extend(windows.iter().map(|w| (f64::from(w.sum), false)));
         }
@@ -347,17 +347,20 @@ impl Trainer for HogTrainer {
         let (mut without, mut in_rooms) = (Vec::new(), toml::Table::new());
         if !self.rooms.is_empty() {
             let of_photographs = model;
-            self.add_room_people();
-            mined.push(self.mine(&of_photographs, true));
+            if self.training.rooms {
+                self.add_room_people();
+                mined.push(self.mine(&of_photographs, true));
+            }
             for room in 1..=self.rooms.len() {
-                let (name, left_out) = (self.rooms[room - 1].clone(), self.without(room));
+                let (name, left_out) =
+                    (self.rooms[room - 1].clone(), self.without(room, &of_photographs));
                 let rows = [("photographs only", &of_photographs), ("left out", &left_out)];
                 in_rooms.extend(rows.map(|(row, model)| {
                     (format!("{name}: {row}"), rooms::figures(&self.missed_in(model, room)))
                 }));
                 without.push((name, left_out.to_text().map_err(Error::Other)?));
             }
-            model = self.without(NO_ROOM);
+            model = self.without(NO_ROOM, &of_photographs);
         }
         progress(1.0);
         let mut figures = self.figures(&model, &mined);

@@ -75,9 +75,13 @@ impl HogTrainer {
     }
 
     /// Fits a model to photographs and to all rooms but one, whose number may be that of none.
-    pub(super) fn without(&self, room: usize) -> Model {
-        let mut model = self.machine(self.training.mining_rounds, &|other| other != room);
-        self.finish(&mut model);
+    /// Unless rooms are asked for, they teach depth alone.
+    pub(super) fn without(&self, room: usize, of_photographs: &Model) -> Model {
+        let mut model = of_photographs.clone();
+        if self.training.rooms {
+            model = self.machine(self.training.mining_rounds, &|other| other != room);
+            self.finish(&mut model);
+        }
         model.depth = self.depth_without(room);
         model
     }
@@ -89,7 +93,7 @@ impl HogTrainer {
         let frames: Vec<&Picture> = frames.collect();
         for Picture { grey, people, .. } in &frames {
             let mut windows = search(&mut scanner, grey, self.near_miss());
-            merge(&mut windows, MINED_OVERLAP, 1.0);
+            merge(&mut windows, Coverage::UpperBody, MINED_OVERLAP, 1.0);
             let mut free: Vec<&Known> = people.iter().filter(|known| known.counts).collect();
             count += free.len();
             for window in &windows {
