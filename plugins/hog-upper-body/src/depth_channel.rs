@@ -80,7 +80,9 @@ pub(crate) fn depth_numbers(depth: &DepthImage, square: &Rect, surface_m: f64) -
     let reading = |x: usize, y: usize| depth.get(at(window.x, x), at(window.y, y));
     let cell = |column: usize, row: usize| {
         let taps = (0..TAPS * TAPS).map(|k| (TAPS * column + k % TAPS, TAPS * row + k / TAPS));
-        let nearest = taps.filter_map(|(x, y)| reading(x, y)).fold(f32::INFINITY, f32::min);
+        // Cameras write 0 where they measured nothing.
+        let measured = taps.filter_map(|(x, y)| reading(x, y)).filter(|metres| *metres > 0.0);
+        let nearest = measured.fold(f32::INFINITY, f32::min);
         match nearest.is_finite() {
             true => (f64::from(nearest) - surface_m).clamp(-MOST_M, MOST_M) as f32,
             false => MISSING,
