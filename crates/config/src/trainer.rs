@@ -47,6 +47,11 @@ pub trait Trainer: Send {
     /// [`tagalong_core::Error::MissingImage`] if the frame lacks an input that the plugin needs.
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()>;
 
+    /// Returns true if a trainer of photographs also learns from whole frames of annotated rooms.
+    fn learns_from_rooms(&self) -> bool {
+        false
+    }
+
     /// Adds a whole frame with all people in it, for the model of a detector. `room` is the name of
     /// a real room, of which all frames are held out together; `None` for a simulated one, where
     /// `group` is the number of the scene.

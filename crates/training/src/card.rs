@@ -116,13 +116,18 @@ pub struct WindowCard {
 }
 
 impl WindowCard {
-    /// Returns a card; `folders` are those of the data that were read.
-    pub fn new(args: &TrainArgs, folders: &[&str], photographs: usize, fit: toml::Table) -> Self {
+    /// Returns a card; `sources` are the folders and logs that were read.
+    pub fn new(
+        args: &TrainArgs,
+        sources: Vec<String>,
+        photographs: usize,
+        fit: toml::Table,
+    ) -> Self {
         Self {
             plugin: args.plugin.clone(),
             quick: args.quick,
             seed: args.seed,
-            trained_on: folders.iter().map(ToString::to_string).collect(),
+            trained_on: sources,
             photographs,
             fit,
         }

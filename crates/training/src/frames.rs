@@ -48,18 +48,10 @@ const TRUNK_IN_BOX: [f64; 4] = [0.25, 0.1, 0.5, 0.5];
 pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome {
     let args = session.args;
     let scenes = args.scenes.unwrap_or(SCENES[usize::from(args.quick)]);
-    session.bar.set_message("simulating rooms");
-    session.bar.set_length(scenes);
-    for group in 0..scenes {
-        let number = args.seed.wrapping_mul(1000) % 1_000_000 + group;
-        show_scene(number, group, trainer)?;
-        session.bar.inc(1);
-    }
+    show_scenes(session, scenes, trainer)?;
     session.bar.set_message("reading logs");
-    for (room, log) in ROOMS {
-        if let Some(data) = &args.data {
-            show_log(&data.join("logs"), log, room, trainer)?;
-        }
+    if let Some(data) = &args.data {
+        show_rooms(data, trainer)?;
     }
     session.bar.set_message("fitting");
     session.bar.set_position(0);
@@ -71,12 +63,50 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     let path = session.model.with_extension("card.toml");
     let card = card(args, scenes, &fitted.figures)?;
     write(&path, &card)?;
-    for (room, model) in &fitted.without {
-        write(&without(&session.model, room), model)?;
-    }
+    write_left_out(&session.model, &fitted.without)?;
     print(&card)?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)
+}
+
+/// Passes the frames of so many simulated rooms to a trainer.
+///
+/// # Errors
+/// Those of the trainer.
+pub(super) fn show_scenes(
+    session: &Session<'_>,
+    scenes: u64,
+    trainer: &mut dyn Trainer,
+) -> Result<(), Failure> {
+    session.bar.set_message("simulating rooms");
+    session.bar.set_length(scenes);
+    for group in 0..scenes {
+        let number = session.args.seed.wrapping_mul(1000) % 1_000_000 + group;
+        show_scene(number, group, trainer)?;
+        session.bar.inc(1);
+    }
+    Ok(())
+}
+
+/// Passes the annotated frames of all real rooms in a folder of data to a trainer.
+///
+/// # Errors
+/// A log or an annotation that cannot be read, and those of the trainer.
+pub(super) fn show_rooms(data: &Path, trainer: &mut dyn Trainer) -> Result<(), Failure> {
+    ROOMS.into_iter().try_for_each(|(room, log)| show_log(&data.join("logs"), log, room, trainer))
+}
+
+/// Returns the names of the logs of [`show_rooms`], as on cards.
+pub(super) fn room_logs() -> impl Iterator<Item = String> {
+    ROOMS.into_iter().map(|(_, log)| format!("logs/{log}.mcap"))
+}
+
+/// Writes the models that have not seen a room beside the one that has seen all.
+///
+/// # Errors
+/// A file that cannot be written: exit code 1.
+pub(super) fn write_left_out(model: &Path, left_out: &[(String, String)]) -> Result<(), Failure> {
+    left_out.iter().try_for_each(|(room, text)| write(&without(model, room), text))
 }
 
 /// Returns the path of the model that has not seen a room.
@@ -188,7 +218,7 @@ fn of_box(region: &Region, frame: &Frame) -> Option<AnnotatedPerson> {
 fn card(args: &TrainArgs, scenes: u64, figures: &toml::Table) -> Result<String, Failure> {
     let mut sources = vec![format!("{scenes} simulated rooms")];
     if args.data.is_some() {
-        sources.extend(ROOMS.map(|(_, log)| format!("logs/{log}.mcap")));
+        sources.extend(room_logs());
     }
     let mut card = toml::Table::new();
     card.insert("plugin".into(), NAME.into());

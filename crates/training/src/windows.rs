@@ -4,15 +4,18 @@
 use std::path::Path;
 
 use super::card::WindowCard;
-use super::faces;
 use super::photos::{Take, photos};
 use super::session::{Session, write};
+use super::{faces, frames};
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_config::{Example, Trainer};
 use tagalong_core::{Detection, Frame};
 
 /// Folders of the data that are read.
 const FOLDERS: [&str; 3] = ["people/inria-64x128", "people/head-shoulder-50", "negatives"];
+
+/// Simulated rooms without `--scenes`, and in a quick training.
+const SCENES: [u64; 2] = [150, 12];
 
 /// Passes all photographs to the trainer, which holds out some of them by itself.
 pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome {
@@ -25,10 +28,19 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
         trainer.add(frame, candidate, example).map_err(Failure::failed)
     };
-    let (folders, shown) = match session.args.plugin.as_str() {
+    let (folders, shown): (&[&str], usize) = match session.args.plugin.as_str() {
         faces::NAME => (&faces::FOLDERS[..], faces::visit(data, share, &mut show)?),
         _ => (&FOLDERS[..], visit(data, share, &mut show)?),
     };
+    let mut sources: Vec<String> = folders.iter().map(ToString::to_string).collect();
+    if trainer.learns_from_rooms() {
+        let scenes = session.args.scenes.unwrap_or(SCENES[usize::from(session.args.quick)]);
+        frames::show_scenes(session, scenes, trainer)?;
+        sources.push(format!("{scenes} simulated rooms, depth"));
+        session.bar.set_message("reading logs");
+        frames::show_rooms(data, trainer)?;
+        sources.extend(frames::room_logs());
+    }
     session.bar.set_message("fitting");
     session.bar.set_position(0);
     session.bar.set_length(1000);
@@ -36,8 +48,9 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     let fitted = trainer.fit(tell).map_err(Failure::failed)?;
     session.bar.finish_and_clear();
     write(&session.model, &fitted.model)?;
+    frames::write_left_out(&session.model, &fitted.without)?;
     let path = session.model.with_extension("card.toml");
-    let card = WindowCard::new(session.args, folders, shown, fitted.figures);
+    let card = WindowCard::new(session.args, sources, shown, fitted.figures);
     let text = card.to_text()?;
     write(&path, &text)?;
     print(&text)?;

@@ -18,7 +18,7 @@ fn main() {
     let (mut scanner, mut windows) = (Scanner::new(&model), Vec::new());
     // OpenCV does not scan windows that extend beyond the image.
     let is_inside = |square: &Rect| {
-        let window = window_of(square);
+        let window = window_of(square, model.coverage);
         let is_inside = window.x.min(window.y) >= 0.0
             && window.right() <= width as f64
             && window.bottom() <= height as f64;
@@ -34,7 +34,7 @@ fn main() {
         let propose =
             |grid: &Grid, wanted: &mut Vec<Wanted>| wanted.extend(grid.windows(is_inside));
         scanner.scan(&image, sides, least, propose, &mut windows);
-        merge(&mut windows, 0.4, 0.4);
+        merge(&mut windows, model.coverage, 0.4, 0.4);
     }
     println!(
         "{} people, {} windows a run",

@@ -1,9 +1,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
-use tagalong_core::Result;
+use tagalong_core::{Error, Result};
 
-use crate::Kind;
+use crate::{Coverage, Kind};
 
 /// Settings of `hog-upper-body`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -11,8 +11,11 @@ use crate::Kind;
 pub struct Config {
     /// Machine that classifies windows: `trees`, or `linear` as in P2.
     pub machine: Kind,
-    /// Model file, relative to the config; the file states its machine. Empty: the built-in model
-    /// of the chosen machine.
+    /// Part of a person that windows show: `upper-body`, or `whole-body`, which machine `linear`
+    /// does not know.
+    pub coverage: Coverage,
+    /// Model file, relative to the config; the file states its machine and the part.
+    /// Empty: the built-in model of the chosen ones.
     pub model: String,
     /// Windows with lower log-odds are dropped.
     pub min_score: f64,
@@ -46,7 +49,9 @@ pub struct Config {
     pub max_head_height_m: f64,
     /// Scans only windows that depth and geometry allow; off: all windows.
     pub depth_proposals: bool,
-    /// Two windows that overlap by more (IoU) belong to one person ...
+    /// With depth: adds the log-odds of the depth channel, if the model has one.
+    pub depth_channel: bool,
+    /// Two windows that overlap by more (IoU of the squares, or of whole bodies) belong to one person ...
     #[schemars(range(min = 0.0, max = 1e6))]
     pub overlap: f64,
     /// ... unless they are farther apart than this in depth, m.
@@ -73,6 +78,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             machine: Kind::default(),
+            coverage: Coverage::default(),
             model: String::new(),
             min_score: 0.0,
             max_score: 6.0,
@@ -86,6 +92,7 @@ impl Default for Config {
             min_head_height_m: 0.8,
             max_head_height_m: 2.1,
             depth_proposals: true,
+            depth_channel: false,
             overlap: 0.4,
             apart_m: 0.4,
             near: 0.5,
@@ -101,6 +108,9 @@ impl Default for Config {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
+    /// Trees: false alarms in annotated rooms and, for upper bodies, the people there are examples
+    /// beside those of photographs; off: rooms teach the depth channel alone.
+    pub rooms: bool,
     /// Linear: penalty of a training error, of windows with people ...
     pub person_penalty: f64,
     /// ... and of windows without.
@@ -124,6 +134,7 @@ pub struct Training {
 impl Default for Training {
     fn default() -> Self {
         Self {
+            rooms: false,
             person_penalty: 0.02,
             other_penalty: 0.01,
             epochs: 40,
@@ -140,6 +151,11 @@ impl Default for Training {
 impl Config {
     /// Refuses settings outside their ranges.
     pub(crate) fn check(&self) -> Result<()> {
-        check_settings(self)
+        check_settings(self)?;
+        if self.machine == Kind::Linear && self.coverage == Coverage::WholeBody {
+            let why = "machine `linear` has windows of upper bodies only; take `trees`".into();
+            return Err(Error::Settings { key: "coverage".into(), why });
+        }
+        Ok(())
     }
 }

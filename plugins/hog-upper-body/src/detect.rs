@@ -7,10 +7,13 @@ use tagalong_core::{
 use tagalong_geometry::{Camera, FaceDepth, ImageBox, PointEstimate, Rect, UPPER_BODY_SIDE_M};
 
 use crate::lattice::Lattice;
-use crate::{Config, Grid, Kind, Model, NAME, Scanner, Wanted, Window, merge};
+use crate::{
+    Config, Coverage, DepthTrees, Grid, Kind, Model, NAME, Scanner, Wanted, Window, merge,
+};
 
 /// Models that are compiled into the program.
 const TREES: &str = include_str!("../../../configs/models/hog-upper-body.toml");
+const WHOLE_BODIES: &str = include_str!("../../../configs/models/hog-whole-body.toml");
 const LINEAR: &str = include_str!("../../../configs/models/hog-upper-body-linear.toml");
 
 /// Distance above the square at which depth is read to test for the end of a head, in sides; the
@@ -38,7 +41,11 @@ impl HogUpperBody {
     /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         config.check()?;
-        let built_in = if config.machine == Kind::Linear { LINEAR } else { TREES };
+        let built_in = match (config.machine, config.coverage) {
+            (Kind::Linear, _) => LINEAR,
+            (Kind::Trees, Coverage::UpperBody) => TREES,
+            (Kind::Trees, Coverage::WholeBody) => WHOLE_BODIES,
+        };
         let model = context.model(&config.model, built_in, Model::from_text)?;
         let (scanner, lattice) = (Scanner::new(&model), Lattice::default());
         Ok(Self { config, model, scanner, lattice, windows: Vec::new() })
@@ -63,7 +70,11 @@ impl HogUpperBody {
 }
 
 /// Returns the sizes of a search, pixels; near a track, those similar to its own.
-fn sides(config: &Config, camera: &Camera, near: Option<Rect>) -> impl Iterator<Item = f64> {
+pub(crate) fn sides(
+    config: &Config,
+    camera: &Camera,
+    near: Option<Rect>,
+) -> impl Iterator<Item = f64> {
     let most = config.max_side * camera.width.min(camera.height) as f64;
     let step = config.scale_step;
     std::iter::successors(Some(config.min_side_px), move |side| Some(side * step))
@@ -71,8 +82,16 @@ fn sides(config: &Config, camera: &Camera, near: Option<Rect>) -> impl Iterator<
         .filter(move |side| near.is_none_or(|near| ALIKE.contains(&(side / near.width.max(1.0)))))
 }
 
+/// Adds the log-odds of their depth to the sums of windows.
+fn add_depth(channel: &DepthTrees, depth: &DepthImage, model: &Model, windows: &mut [Window]) {
+    for window in windows {
+        let Some(depth_m) = window.depth_m else { continue };
+        window.sum += (channel.log_odds(depth, &window.region, depth_m) / model.slope) as f32;
+    }
+}
+
 /// Selector of the windows to scan, with the number of windows that each test rejects.
-struct Proposer<'a> {
+pub(crate) struct Proposer<'a> {
     config: &'a Config,
     camera: &'a Camera,
     depth: Option<&'a DepthImage>,
@@ -85,7 +104,7 @@ struct Proposer<'a> {
 }
 
 impl<'a> Proposer<'a> {
-    fn new(
+    pub(crate) fn new(
         config: &'a Config,
         camera: &'a Camera,
         depth: Option<&'a DepthImage>,
@@ -97,7 +116,7 @@ impl<'a> Proposer<'a> {
     }
 
     /// Adds the windows of one size that are to be scanned.
-    fn propose(&mut self, grid: &Grid, wanted: &mut Vec<Wanted>) {
+    pub(crate) fn propose(&mut self, grid: &Grid, wanted: &mut Vec<Wanted>) {
         match self.depth {
             Some(depth) => self.propose_by_depth(depth, grid, wanted),
             None => wanted.extend(grid.windows(|square| self.is_near(square).then_some(None))),
@@ -179,17 +198,24 @@ impl Detector for HogUpperBody {
         };
         let Self { config, model, scanner, lattice, windows } = self;
         let mut proposer = Proposer::new(config, camera, depth, lattice, near);
-        let (sides, least) = (sides(config, camera, near), model.sum_at(config.min_score));
+        let channel = model.depth.as_ref().filter(|_| config.depth_channel).zip(depth);
+        // A window below the limit stays as long as its depth may lift it above.
+        let lift = channel.map_or(0.0, |_| DepthTrees::most());
+        let (sides, least) = (sides(config, camera, near), model.sum_at(config.min_score - lift));
         let before = scanner.looked_at();
         windows.clear();
         scanner.scan(grey, sides, least, |grid, wanted| proposer.propose(grid, wanted), windows);
+        if let Some((channel, depth)) = channel {
+            add_depth(channel, depth, model, windows);
+            windows.retain(|window| model.log_odds(window.sum) >= config.min_score);
+        }
         let looked_at = scanner.looked_at() - before;
         funnel.drop_many("window: size and depth", proposer.unfit);
         funnel.drop_many("window: goes on above", proposer.goes_on);
         funnel.drop_many("window: head height", proposer.out_of_place);
         funnel.drop_many("window: gradients", looked_at - windows.len() as u64);
         let all = windows.len();
-        merge(windows, config.overlap, config.apart_m);
+        merge(windows, model.coverage, config.overlap, config.apart_m);
         funnel.drop_many("window: beside a better one", (all - windows.len()) as u64);
         let mut found: Vec<Detection> =
             self.windows.iter().filter_map(|window| self.detection(camera, window)).collect();

@@ -15,6 +15,7 @@
 
 mod channels;
 mod config;
+mod depth_channel;
 mod detect;
 mod gradients;
 mod hog;
@@ -32,9 +33,10 @@ mod trees;
 
 pub use channels::Channels;
 pub use config::{Config, Training};
+pub use depth_channel::DepthTrees;
 pub use detect::HogUpperBody;
 pub use hog::Blocks;
-pub use model::{Field, Kind, Machine, Model, NUMBERS};
+pub use model::{Coverage, Field, Kind, Layout, Machine, Model, NUMBERS};
 pub use resample::resampled;
 pub use scan::{Grid, Scanner, Wanted, Window, merge, window_numbers, window_of};
 pub use spans::Spans;
@@ -53,6 +55,7 @@ pub fn register(registry: &mut Registry) {
     );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {
-        train::HogTrainer::new(config.machine, config.training, context.seed)
+        let layout = Layout { kind: config.machine, coverage: config.coverage };
+        train::HogTrainer::new(layout, config.training, context.seed)
     });
 }

@@ -2,9 +2,11 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_geometry::{Rect, UPPER_BODY_SIDE_M};
 
 use crate::Spans;
 use crate::channels::Channels;
+use crate::depth_channel::DepthTrees;
 use crate::hog::{BLOCK, Blocks};
 use crate::trees::{self, Trees};
 
@@ -24,6 +26,61 @@ pub enum Kind {
     /// Finer cells and boosted trees: fewer errors.
     #[default]
     Trees,
+}
+
+/// Part of a person that a window shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Coverage {
+    /// Head, trunk and hips: people whose legs are hidden or outside of the image are found.
+    #[default]
+    UpperBody,
+    /// Head to feet: fewer false alarms among people who stand free. For trees only.
+    WholeBody,
+}
+
+impl Coverage {
+    /// Returns the number of rows of cells, of 8 pixels, in a window.
+    pub(crate) const fn rows(self) -> usize {
+        match self {
+            Self::UpperBody => SIDE + 1,
+            // The person is 12 cells tall, with a cell above and one below.
+            Self::WholeBody => 14,
+        }
+    }
+}
+
+/// Height of a standing person in sides of the upper-body square, and width by height.
+const STANDING_SIDES: f64 = 1.7 / UPPER_BODY_SIDE_M;
+const STANDING_WIDTH: f64 = 0.41;
+
+impl Coverage {
+    /// Returns the box of the part of a person by the upper-body square: for whole bodies, a
+    /// standing person of 1.7 m.
+    pub fn person(self, square: &Rect) -> Rect {
+        if self == Self::UpperBody {
+            return *square;
+        }
+        let height = STANDING_SIDES * square.height;
+        let width = STANDING_WIDTH * height;
+        Rect::new(square.centre().x - 0.5 * width, square.y, width, height)
+    }
+}
+
+/// Layout of the values of a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Layout {
+    /// Kind of the machine that they are for.
+    pub kind: Kind,
+    /// Part of a person that the window shows.
+    pub coverage: Coverage,
+}
+
+impl From<Kind> for Layout {
+    /// Returns the layout of an upper body.
+    fn from(kind: Kind) -> Self {
+        Self { kind, coverage: Coverage::UpperBody }
+    }
 }
 
 /// Machine that classifies windows.
@@ -66,14 +123,15 @@ impl Field {
         }
     }
 
-    /// Returns the values of the window that begins at cell (x, y), of 8 pixels.
-    pub fn numbers(&self, x: usize, y: usize) -> Vec<f32> {
+    /// Returns the values of the window that begins at cell (x, y), of 8 pixels; that of blocks
+    /// shows an upper body.
+    pub fn numbers(&self, (x, y): (usize, usize), coverage: Coverage) -> Vec<f32> {
         match self {
             Self::Blocks(blocks) => {
                 let rows = (y..y + SIDE).map(|y| &blocks.from(x, y)[..SIDE * BLOCK]);
                 rows.flatten().copied().collect()
             }
-            Self::Channels(channels) => (2 * y..2 * y + trees::CELLS)
+            Self::Channels(channels) => (2 * y..2 * (y + coverage.rows()))
                 .flat_map(|y| &channels.from(2 * x, y)[..trees::CELLS * crate::channels::DEPTH])
                 .copied()
                 .collect(),
@@ -86,10 +144,38 @@ impl Field {
 pub struct Model {
     /// The machine.
     pub machine: Machine,
+    /// Part of a person that its windows show.
+    pub coverage: Coverage,
     /// Log-odds per unit of the sum.
     pub slope: f64,
     /// Log-odds at the sum 0.
     pub offset: f64,
+    /// Trees over depth, if the model has them.
+    pub depth: Option<DepthTrees>,
+}
+
+/// Content of the depth channel in a model file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DepthFile {
+    slope: f64,
+    offset: f64,
+    /// Trees, little-endian numbers in base64.
+    numbers: String,
+}
+
+impl From<&DepthTrees> for DepthFile {
+    fn from(depth: &DepthTrees) -> Self {
+        let numbers = BASE64_STANDARD.encode(trees::to_bytes(&depth.trees.trees));
+        Self { slope: depth.slope, offset: depth.offset, numbers }
+    }
+}
+
+impl DepthFile {
+    fn trees(&self) -> Result<DepthTrees, String> {
+        let bytes = BASE64_STANDARD.decode(&self.numbers).map_err(|error| error.to_string())?;
+        DepthTrees::from_bytes(&bytes, self.slope, self.offset)
+    }
 }
 
 /// Content of a model file.
@@ -98,6 +184,8 @@ pub struct Model {
 struct ModelFile {
     format: String,
     machine: Kind,
+    #[serde(default, skip_serializing_if = "is_upper_body")]
+    coverage: Coverage,
     /// Bias of a linear machine; for trees, the sum below which a window is rejected, for each
     /// round.
     levels: Vec<f32>,
@@ -105,9 +193,21 @@ struct ModelFile {
     offset: f64,
     /// Little-endian numbers in base64: weights, or trees.
     numbers: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    depth: Option<DepthFile>,
+}
+
+// Files from before there were whole bodies do not state the part.
+fn is_upper_body(coverage: &Coverage) -> bool {
+    *coverage == Coverage::UpperBody
 }
 
 impl Model {
+    /// Returns the layout of its windows.
+    pub fn layout(&self) -> Layout {
+        Layout { kind: self.kind(), coverage: self.coverage }
+    }
+
     /// Returns the kind of machine.
     pub fn kind(&self) -> Kind {
         match self.machine {
@@ -149,10 +249,12 @@ impl Model {
         let kept = ModelFile {
             format: FORMAT.into(),
             machine: self.kind(),
+            coverage: self.coverage,
             levels,
             slope: self.slope,
             offset: self.offset,
             numbers: BASE64_STANDARD.encode(bytes),
+            depth: self.depth.as_ref().map(DepthFile::from),
         };
         toml::to_string(&kept).map_err(|why| format!("the model is no TOML: {why}"))
     }
@@ -167,7 +269,8 @@ impl Model {
             return Err(format!("its format is `{}`, expected `{FORMAT}`", kept.format));
         }
         let bytes = BASE64_STANDARD.decode(&kept.numbers).map_err(|error| error.to_string())?;
-        let ModelFile { machine, levels, slope, offset, .. } = kept;
+        let depth = kept.depth.as_ref().map(DepthFile::trees).transpose()?;
+        let ModelFile { machine, coverage, levels, slope, offset, .. } = kept;
         let finite =
             levels.iter().all(|level| level.is_finite()) && slope.is_finite() && offset.is_finite();
         if !finite || slope <= 0.0 {
@@ -176,10 +279,13 @@ impl Model {
             );
         }
         let machine = match machine {
+            Kind::Linear if coverage == Coverage::WholeBody => {
+                return Err("a linear machine has no windows of whole bodies".into());
+            }
             Kind::Linear => Machine::Linear { weights: weights(&bytes)?, bias: bias(&levels)? },
-            Kind::Trees => Machine::Trees(trees::from_bytes(&bytes, levels)?),
+            Kind::Trees => Machine::Trees(trees::from_bytes(&bytes, levels, coverage)?),
         };
-        Ok(Self { machine, slope, offset })
+        Ok(Self { machine, coverage, slope, offset, depth })
     }
 }
 

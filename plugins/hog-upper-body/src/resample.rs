@@ -180,11 +180,11 @@ fn add_scaled(to: &mut [f32], from: &[u8], scale: f32) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to += scale * f32::from(*from));
 }
 
-/// Resamples as `Resampler::fill`, once: `cells` by `cells` cells of 8 samples, and one more sample
+/// Resamples as `Resampler::fill`, once: columns and rows of cells of 8 samples, and one more sample
 /// on each side.
-pub fn resampled(image: &GreyImage, origin: (f64, f64), step: f64, cells: usize) -> Vec<f32> {
-    let (side, mut out) = (cells * CELL + 2, Vec::new());
-    let spans = Spans::whole(side, side);
-    Resampler::default().fill(image, origin, step, (side, side), &spans, &mut out);
+pub fn resampled(image: &GreyImage, origin: (f64, f64), step: f64, cells: [usize; 2]) -> Vec<f32> {
+    let ([width, height], mut out) = (cells.map(|cells| cells * CELL + 2), Vec::new());
+    let spans = Spans::whole(width, height);
+    Resampler::default().fill(image, origin, step, (width, height), &spans, &mut out);
     out
 }

@@ -8,7 +8,7 @@ use tagalong_vision::islands;
 
 use crate::hog::CELL;
 use crate::judge::Judge;
-use crate::model::{Field, Kind, Model, SIDE};
+use crate::model::{Coverage, Field, Kind, Layout, Model, SIDE};
 use crate::resample::{Resampler, resampled};
 use crate::spans::Spans;
 
@@ -34,6 +34,14 @@ const fn around_px(kind: Kind) -> usize {
     around(kind) * CELL + 1
 }
 
+impl Layout {
+    /// Returns the numbers of columns and rows of cells that are resampled for one window.
+    pub(crate) const fn cells(self) -> [usize; 2] {
+        let around = 2 * around(self.kind);
+        [SIDE + 1 + around, self.coverage.rows() + around]
+    }
+}
+
 /// A scanned window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
@@ -49,8 +57,8 @@ pub struct Window {
 #[derive(Clone, Debug)]
 pub struct Scanner {
     judge: Judge,
-    /// Kind of the model's machine.
-    kind: Kind,
+    /// Layout of the model's windows.
+    layout: Layout,
     resampler: Resampler,
     pixels: Vec<f32>,
     wanted: Vec<Wanted>,
@@ -75,7 +83,7 @@ impl Scanner {
     pub fn new(model: &Model) -> Self {
         Self {
             judge: Judge::new(model),
-            kind: model.kind(),
+            layout: model.layout(),
             resampler: Resampler::default(),
             pixels: Vec::new(),
             wanted: Vec::new(),
@@ -102,7 +110,7 @@ impl Scanner {
     ) {
         let mut wanted = std::mem::take(&mut self.wanted);
         // Islands that are this far apart share no pixels.
-        let gap = (SIDE + 1 + 2 * around(self.kind)) as i64;
+        let gap = self.layout.cells().into_iter().max().unwrap_or_default() as i64;
         for side in sides {
             let grid = Grid::new((image.width(), image.height()), side);
             wanted.clear();
@@ -119,12 +127,12 @@ impl Scanner {
 
     /// Computes the features of the machine for wanted windows within bounds.
     fn fill(&mut self, image: &GreyImage, step: f64, wanted: &[Wanted], bounds: Bounds) {
-        let (around, around_px) = (around(self.kind), around_px(self.kind));
-        let side = SIDE + 1 + 2 * around;
+        let around_px = around_px(self.layout.kind);
+        let [wide, tall] = self.layout.cells();
         let [left, top, right, bottom] = bounds;
-        let [across, down] = [right - left, bottom - top].map(|long| long as usize + side);
+        let (across, down) = ((right - left) as usize + wide, (bottom - top) as usize + tall);
         let places = wanted.iter().map(|w| ((w.x - left) as usize, (w.y - top) as usize));
-        self.spans.fill(places, side, down);
+        self.spans.fill(places, (wide, tall), down);
         let start = |cell: i64| ((cell * CELL as i64) as f64 - around_px as f64) * step;
         let (origin, size) = ((start(left), start(top)), [across, down].map(|n| n * CELL + 2));
         let (size, spans) = ((size[0], size[1]), &self.spans);
@@ -141,7 +149,7 @@ impl Scanner {
         least: f32,
         found: &mut Vec<Window>,
     ) {
-        let at = |cell: i64, first: i64| (cell - first) as usize + around(self.kind);
+        let at = |cell: i64, first: i64| (cell - first) as usize + around(self.layout.kind);
         for run in wanted.chunk_by(|a, b| (a.x + 1, a.y) == (b.x, b.y)) {
             self.sums.clear();
             self.sums.resize(run.len(), 0.0);
@@ -212,11 +220,11 @@ fn inside(length: f64, margin: f64) -> Range<i64> {
 }
 
 /// Returns the window of an upper-body square, pixels of the image.
-pub fn window_of(square: &Rect) -> Rect {
+pub fn window_of(square: &Rect, coverage: Coverage) -> Rect {
     let step = square.width / (FILLED * WINDOW_PX as f64);
     let (left, above) = margins();
-    let side = WINDOW_PX as f64 * step;
-    Rect::new(square.x - left * step, square.y - above * step, side, side)
+    let (width, height) = (WINDOW_PX as f64 * step, (coverage.rows() * CELL) as f64 * step);
+    Rect::new(square.x - left * step, square.y - above * step, width, height)
 }
 
 /// Smallest column and row of windows, and largest ones.
@@ -229,21 +237,24 @@ fn bounds(wanted: &[Wanted]) -> Bounds {
     })
 }
 
-/// Returns the values of the window of an upper-body square, for one kind of machine.
-pub fn window_numbers(image: &GreyImage, square: &Rect, kind: Kind) -> Vec<f32> {
+/// Returns the values of the window of an upper-body square, in one layout.
+pub fn window_numbers(image: &GreyImage, square: &Rect, layout: impl Into<Layout>) -> Vec<f32> {
+    let layout = layout.into();
+    let Layout { kind, coverage } = layout;
     let step = square.width.max(1.0) / (FILLED * WINDOW_PX as f64);
-    let (window, margin) = (window_of(square), around_px(kind) as f64 * step);
-    let (origin, cells) = ((window.x - margin, window.y - margin), SIDE + 1 + 2 * around(kind));
-    let (pixels, width) = (resampled(image, origin, step, cells), cells * CELL + 2);
+    let (window, margin) = (window_of(square, coverage), around_px(kind) as f64 * step);
+    let (origin, cells) = ((window.x - margin, window.y - margin), layout.cells());
+    let [width, height] = cells.map(|cells| cells * CELL + 2);
+    let pixels = resampled(image, origin, step, cells);
     let mut field = Field::new(kind);
-    field.fill(&pixels, width, &Spans::whole(width, width));
-    field.numbers(around(kind), around(kind))
+    field.fill(&pixels, width, &Spans::whole(width, height));
+    field.numbers((around(kind), around(kind)), coverage)
 }
 
 /// Keeps the best of each group of windows, best first: a window that overlaps a better one by more
 /// than `overlap` is removed, unless the two are `apart_m` or more apart in depth. Two people one
-/// behind the other both stay.
-pub fn merge(windows: &mut Vec<Window>, overlap: f64, apart_m: f64) {
+/// behind the other both stay. The overlap is that of the parts of people which the windows show.
+pub fn merge(windows: &mut Vec<Window>, coverage: Coverage, overlap: f64, apart_m: f64) {
     windows.sort_by(|a, b| b.sum.total_cmp(&a.sum));
     let mut kept = 0;
     for at in 0..windows.len() {
@@ -253,7 +264,8 @@ pub fn merge(windows: &mut Vec<Window>, overlap: f64, apart_m: f64) {
                 (Some(a), Some(b)) => (a - b).abs() >= apart_m,
                 _ => false,
             };
-            !apart && window.region.iou(&better.region) > overlap
+            !apart
+                && coverage.person(&window.region).iou(&coverage.person(&better.region)) > overlap
         };
         if !windows[..kept].iter().any(is_same) {
             windows[kept] = window;

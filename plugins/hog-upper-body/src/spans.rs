@@ -16,18 +16,19 @@ impl Spans {
         Self(vec![0..across; down])
     }
 
-    /// Computes the spans of squares of `side` cells that begin at `places`, in `rows` rows.
+    /// Computes the spans of rectangles of `wide` by `tall` cells that begin at `places`, in `rows`
+    /// rows.
     pub(crate) fn fill(
         &mut self,
         places: impl Iterator<Item = (usize, usize)>,
-        side: usize,
+        (wide, tall): (usize, usize),
         rows: usize,
     ) {
         self.0.clear();
         self.0.resize(rows, 0..0);
         for (x, y) in places {
-            for span in &mut self.0[y..y + side] {
-                *span = union(span, &(x..x + side));
+            for span in &mut self.0[y..y + tall] {
+                *span = union(span, &(x..x + wide));
             }
         }
     }

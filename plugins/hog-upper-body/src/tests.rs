@@ -8,10 +8,10 @@ use crate::channels::{self, DEPTH};
 use crate::hog::{BINS, BLOCK, CELL};
 use crate::model::SIDE;
 use crate::scan::WINDOW_PX;
-use crate::trees::CHANNEL_NUMBERS;
+use crate::trees::channel_numbers;
 use crate::{
-    Blocks, Channels, Grid, Machine, Model, NUMBERS, Scanner, Spans, Tree, Trees, Wanted, Window,
-    merge, resampled, window_numbers,
+    Blocks, Channels, Coverage, DepthTrees, Grid, Machine, Model, NUMBERS, Scanner, Spans, Tree,
+    Trees, Wanted, Window, merge, resampled, window_numbers,
 };
 
 fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
@@ -94,35 +94,42 @@ fn same(a: f32, b: f32, by: f32) -> bool {
 
 fn linear() -> Model {
     let weights = (0..NUMBERS).map(|i| ((i * 37 % 101) as f32 - 50.0) * 0.02).collect();
-    Model { machine: Machine::Linear { weights, bias: 0.25 }, slope: 1.0, offset: 0.0 }
+    let machine = Machine::Linear { weights, bias: 0.25 };
+    Model { machine, coverage: Coverage::UpperBody, slope: 1.0, offset: 0.0, depth: None }
 }
+
+const TREE: Tree = Tree { numbers: [0, 9, 63], below: [0.5; 3], values: [1.0, 2.0, 3.0, 4.0] };
 
 /// Trees that reject some windows.
 fn trees() -> Model {
+    trees_of(Coverage::UpperBody)
+}
+
+fn trees_of(coverage: Coverage) -> Model {
     let tree = |k: usize| Tree {
-        numbers: [k * 131, k * 57 + 9, k * 733 + 1].map(|n| (n % CHANNEL_NUMBERS) as u16),
+        numbers: [k * 131, k * 57 + 9, k * 733 + 1].map(|n| (n % channel_numbers(coverage)) as u16),
         below: [0.5, 0.12, 0.3],
         values: [0.25, -0.5, 1.0, -0.125],
     };
     let trees = Trees::new((1..30).map(tree).collect(), -11.0);
-    Model { machine: Machine::Trees(trees), slope: 1.0, offset: 0.0 }
+    Model { machine: Machine::Trees(trees), coverage, slope: 1.0, offset: 0.0, depth: None }
 }
 
 #[test]
 fn a_scan_gives_each_window_the_sum_of_its_numbers() {
     let image = noise(160, 130, 4);
-    for model in [linear(), trees()] {
+    for model in [linear(), trees(), trees_of(Coverage::WholeBody)] {
         let mut scanner = Scanner::new(&model);
         let windows = scan(&mut scanner, &image, &[32.0, 45.0], |_| true);
         assert_eq!(scanner.looked_at(), windows.len() as u64);
         assert!(windows.len() > 100, "{}", windows.len());
         // At the edge of the resampled part, cells have other neighbours.
         let inner = |w: &&Window| {
-            let r = crate::window_of(&w.region);
+            let r = crate::window_of(&w.region, model.coverage);
             r.x > 0.0 && r.y > 0.0 && r.right() < 160.0 && r.bottom() < 130.0
         };
         let differs = |window: &&Window| {
-            let numbers = window_numbers(&image, &window.region, model.kind());
+            let numbers = window_numbers(&image, &window.region, model.layout());
             !same(window.sum, model.sum_of(&numbers), 2e-2)
         };
         let inner: Vec<&Window> = windows.iter().filter(inner).collect();
@@ -205,7 +212,7 @@ fn two_people_one_behind_the_other_both_stay() {
     };
     let merged = |a: Option<f64>, b: Option<f64>| {
         let mut windows = vec![window(0.0, a, 1.0), window(5.0, b, 2.0)];
-        merge(&mut windows, 0.4, 0.4);
+        merge(&mut windows, Coverage::UpperBody, 0.4, 0.4);
         windows
     };
     assert_eq!(merged(Some(2.0), Some(2.1)).len(), 1);
@@ -215,8 +222,24 @@ fn two_people_one_behind_the_other_both_stay() {
 }
 
 #[test]
+fn whole_bodies_side_by_side_are_told_apart_by_their_boxes() {
+    let at =
+        |y: f64, sum: f32| Window { region: Rect::new(0.0, y, 50.0, 50.0), depth_m: None, sum };
+    let left = |coverage: Coverage| {
+        let mut windows = vec![at(0.0, 2.0), at(25.0, 1.0)];
+        merge(&mut windows, coverage, 0.4, 0.4);
+        windows.len()
+    };
+    // The squares have a third in common, the bodies seven tenths.
+    assert_eq!([Coverage::UpperBody, Coverage::WholeBody].map(left), [2, 1]);
+}
+
+#[test]
 fn a_model_survives_its_file_and_a_wrong_one_is_refused() {
-    let kept = Model { slope: 3.0, offset: -1.0, ..trees() };
+    let depth = Some(DepthTrees { slope: 0.5, offset: 0.25, ..DepthTrees::new(vec![TREE]) });
+    let kept = Model { slope: 3.0, offset: -1.0, depth, ..trees() };
+    let broken = kept.to_text().unwrap().replace("slope = 0.5", "slope = 0.0");
+    assert!(Model::from_text(&broken).unwrap_err().contains("depth channel"));
     assert_eq!(Model::from_text(&kept.to_text().unwrap()).unwrap(), kept);
     let model = Model { slope: 2.5, offset: -1.5, ..linear() };
     let text = model.to_text().unwrap();
@@ -242,7 +265,7 @@ proptest! {
             let across = square.x - 80.0 - slope * (square.y - 40.0);
             across.abs() < width && ((square.x / 10.0) as usize).is_multiple_of(every)
         };
-        for model in [linear(), trees()] {
+        for model in [linear(), trees(), trees_of(Coverage::WholeBody)] {
             let scan = |part: &dyn Fn(&Rect) -> bool| {
                 scan(&mut Scanner::new(&model), &image, &[40.0, 52.0], part)
             };
@@ -270,7 +293,7 @@ proptest! {
         step in 0.4..4.0f64, x in 20.0..40.0f64, y in 20.0..30.0f64,
     ) {
         let image = GreyImage::from_fn(120, 90, |x, y| (x + y) as u8);
-        let found = resampled(&image, (x, y), step, 1);
+        let found = resampled(&image, (x, y), step, [1, 1]);
         for (index, value) in found.iter().enumerate() {
             let (i, j) = ((index % 10) as f64 + 0.5, (index / 10) as f64 + 0.5);
             let expected = x + i * step - 0.5 + y + j * step - 0.5;
@@ -388,7 +411,7 @@ mod training {
             mined_per_picture: 5,
             ..Training::default()
         };
-        let mut trainer = HogTrainer::new(kind, training, 3).unwrap();
+        let mut trainer = HogTrainer::new(kind.into(), training, 3).unwrap();
         for group in 0..40 {
             for is_person in [true, false] {
                 let frame = frame(picture(is_person, group));
@@ -437,7 +460,7 @@ mod training {
 
     #[test]
     fn people_alone_are_no_training_set() {
-        let mut trainer = HogTrainer::new(Kind::Linear, Training::default(), 3).unwrap();
+        let mut trainer = HogTrainer::new(Kind::Linear.into(), Training::default(), 3).unwrap();
         for group in 0..10 {
             let example = Example { is_person: true, group };
             trainer.add(&frame(picture(true, group)), &at(SQUARE), example).unwrap();
@@ -447,7 +470,7 @@ mod training {
 
     #[test]
     fn settings_that_cannot_work_are_refused() {
-        let of = |training| HogTrainer::new(Kind::Linear, training, 1).is_ok();
+        let of = |training| HogTrainer::new(Kind::Linear.into(), training, 1).is_ok();
         assert!(of(Training::default()));
         assert!(!of(Training { person_penalty: 0.0, ..Training::default() }));
         assert!(!of(Training { other_penalty: f64::INFINITY, ..Training::default() }));

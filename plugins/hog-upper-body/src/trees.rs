@@ -1,12 +1,16 @@
 //! Boosted trees of depth two.
 
 use crate::channels::DEPTH;
-use crate::model::SIDE;
+use crate::model::{Coverage, SIDE};
 
 /// Number of cells along a side of a window.
 pub(crate) const CELLS: usize = 2 * (SIDE + 1);
-/// Number of values of a window.
-pub(crate) const CHANNEL_NUMBERS: usize = CELLS * CELLS * DEPTH;
+
+/// Returns the number of values of a window.
+pub(crate) const fn channel_numbers(coverage: Coverage) -> usize {
+    CELLS * 2 * coverage.rows() * DEPTH
+}
+
 /// Number of trees after which windows may be rejected, and again after as many.
 pub const ROUND: usize = 8;
 /// Number of bytes of a tree in a file.
@@ -93,19 +97,32 @@ pub(crate) fn to_bytes(trees: &[Tree]) -> Vec<u8> {
 ///
 /// # Errors
 /// Bytes that are not trees; the message is one sentence.
-pub(crate) fn from_bytes(bytes: &[u8], least: Vec<f32>) -> Result<Trees, String> {
+pub(crate) fn from_bytes(
+    bytes: &[u8],
+    least: Vec<f32>,
+    coverage: Coverage,
+) -> Result<Trees, String> {
+    let trees = parse(bytes, channel_numbers(coverage))?;
+    if least.len() != trees.len().div_ceil(ROUND) {
+        return Err(format!("it has {} levels for {} trees", least.len(), trees.len()));
+    }
+    Ok(Trees { trees, least })
+}
+
+/// Parses trees that ask for so many `numbers` of a window.
+///
+/// # Errors
+/// Bytes that are not trees; the message is one sentence.
+pub(crate) fn parse(bytes: &[u8], numbers: usize) -> Result<Vec<Tree>, String> {
     let trees: Vec<Tree> = bytes.chunks_exact(BYTES).map(Tree::from_bytes).collect();
     let is_right = |tree: &Tree| {
-        let known = tree.numbers.iter().all(|n| usize::from(*n) < CHANNEL_NUMBERS);
+        let known = tree.numbers.iter().all(|n| usize::from(*n) < numbers);
         known && !tree.below.iter().any(|v| v.is_nan()) && tree.values.iter().all(|v| v.is_finite())
     };
     if trees.is_empty() || !bytes.len().is_multiple_of(BYTES) || !trees.iter().all(is_right) {
         return Err("its trees are broken".into());
     }
-    if least.len() != trees.len().div_ceil(ROUND) {
-        return Err(format!("it has {} levels for {} trees", least.len(), trees.len()));
-    }
-    Ok(Trees { trees, least })
+    Ok(trees)
 }
 
 #[cfg(test)]
@@ -126,8 +143,11 @@ mod tests {
     fn a_tree_that_asks_beyond_the_window_is_refused() {
         let read = |number: usize| {
             let tree = Tree { numbers: [number as u16, 0, 0], ..TREE };
-            from_bytes(&to_bytes(&[tree]), vec![0.0])
+            [Coverage::UpperBody, Coverage::WholeBody]
+                .map(|coverage| from_bytes(&to_bytes(&[tree]), vec![0.0], coverage).is_ok())
         };
-        assert!(read(CHANNEL_NUMBERS - 1).is_ok() && read(CHANNEL_NUMBERS).is_err());
+        let [upper, whole] = [Coverage::UpperBody, Coverage::WholeBody].map(channel_numbers);
+        assert_eq!([read(upper - 1), read(upper)], [[true, true], [false, true]]);
+        assert_eq!([read(whole - 1), read(whole)], [[false, true], [false, false]]);
     }
 }

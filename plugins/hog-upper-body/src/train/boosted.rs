@@ -6,14 +6,22 @@ use tagalong_learn::mix;
 use super::svm::Windows;
 use crate::Tree;
 
-/// Fits `count` trees, each of two questions about some of `numbers` randomly sampled values.
-pub(crate) fn boosted(windows: &Windows, count: usize, numbers: usize, seed: u64) -> Vec<Tree> {
+/// Fits `count` trees to the windows of some rooms, each of two questions about some of `numbers`
+/// randomly sampled values.
+pub(crate) fn boosted(
+    windows: &Windows,
+    of_room: &dyn Fn(usize) -> bool,
+    count: usize,
+    numbers: usize,
+    seed: u64,
+) -> Vec<Tree> {
     let width = windows.width();
-    let mut table = Levels::new(windows.len());
+    let chosen: Vec<usize> = (0..windows.len()).filter(|i| of_room(windows.room[*i])).collect();
+    let mut table = Levels::new(chosen.len());
     for number in 0..width {
-        table.push(windows.numbers.iter().skip(number).step_by(width).copied());
+        table.push(chosen.iter().map(|i| windows.numbers[i * width + number]));
     }
-    let mut boosting = Boosting::new(&table, windows.is_person.iter().copied());
+    let mut boosting = Boosting::new(&table, chosen.iter().map(|i| windows.is_person[*i]));
     let drawn = |tree: usize| -> Vec<usize> {
         let number = |k: usize| mix(mix(seed ^ tree as u64) ^ k as u64) % width as u64;
         (0..numbers).map(|k| number(k) as usize).collect()

@@ -6,13 +6,17 @@
 //! the machine sees neither.
 
 mod boosted;
+mod depth;
+mod rooms;
 mod svm;
 
 use std::sync::Arc;
 
 use boosted::boosted;
+use depth::DepthWindows;
+use rooms::Known;
 use svm::{Windows, separate};
-use tagalong_config::{Example, Fitted, Trainer};
+use tagalong_config::{AnnotatedPerson, Example, Fitted, Trainer};
 use tagalong_core::{Detection, Error, Frame, GreyImage, Result};
 use tagalong_geometry::Rect;
 use tagalong_learn::{
@@ -21,7 +25,8 @@ use tagalong_learn::{
 
 use crate::scan::FILLED;
 use crate::{
-    Grid, Kind, Machine, Model, Scanner, Training, Trees, Wanted, merge, window_numbers, window_of,
+    Coverage, Grid, Kind, Layout, Machine, Model, Scanner, Training, Trees, Wanted, merge,
+    window_numbers, window_of,
 };
 
 /// Smallest upper-body square in the search for false alarms, pixels, and the ratio of the sizes.
@@ -34,6 +39,9 @@ const MINED_OVERLAP: f64 = 0.5;
 const NEAR_MISS: [f32; 2] = [-1.0, -10.0];
 /// Sum below which trees reject a window during the mining.
 const HOPELESS: f32 = -14.0;
+/// Reason for which a layout is refused.
+const NO_WHOLE_BODY: &str =
+    "machine `linear` has windows of upper bodies only: take `trees`, or coverage `upper-body`";
 /// Part of the people with sufficient sums that the final trees may reject early.
 const GIVEN_UP: f64 = 0.01;
 /// Small shifts of a person, as fractions of the square, and its growth.
@@ -42,18 +50,35 @@ const SHIFTS: [(f64, f64, f64); 4] =
 /// Largest part of a person's window that may lie outside the picture: a portrait does not show the
 /// surroundings that a window includes.
 const OUTSIDE: f64 = 0.2;
+/// Number of simulated rooms, and number that no room has.
+const DRAWN: usize = 0;
+const NO_ROOM: usize = usize::MAX;
 /// Rates of false alarms per window at which the miss rate is reported.
 const FALSE_ALARMS: [f64; 3] = [1e-3, 1e-4, 1e-5];
 
+/// Picture in which false alarms are looked for.
+struct Picture {
+    use_: Use,
+    grey: Arc<GreyImage>,
+    /// People in it: a photograph has none.
+    people: Vec<Known>,
+    /// Number of its room; 0 for photographs.
+    room: usize,
+}
+
 /// Trainer that collects windows and pictures, and fits models to them.
 pub struct HogTrainer {
-    kind: Kind,
+    layout: Layout,
     training: Training,
     seed: u64,
     windows: Windows,
     /// Held-out windows of people.
     people: Vec<(Use, Vec<f32>)>,
-    pictures: Vec<(Use, Arc<GreyImage>)>,
+    pictures: Vec<Picture>,
+    /// Windows for the depth channel.
+    depth: DepthWindows,
+    /// Names of the rooms, by their numbers from 1 on.
+    rooms: Vec<String>,
     /// Number of people with too much of their window outside the picture.
     cut_off: usize,
 }
@@ -63,7 +88,10 @@ impl HogTrainer {
     ///
     /// # Errors
     /// [`Error::Settings`] for settings outside their ranges.
-    pub fn new(kind: Kind, training: Training, seed: u64) -> Result<Self> {
+    pub fn new(layout: Layout, training: Training, seed: u64) -> Result<Self> {
+        if layout == (Layout { kind: Kind::Linear, coverage: Coverage::WholeBody }) {
+            return Err(Error::Other(NO_WHOLE_BODY.into()));
+        }
         let penalties = [training.person_penalty, training.other_penalty];
         if !penalties.iter().all(|p| *p > 0.0 && p.is_finite())
             || training.epochs * training.trees == 0
@@ -71,39 +99,48 @@ impl HogTrainer {
             return Err(Error::Other("penalties, `epochs` and `trees` must be positive".into()));
         }
         Ok(Self {
-            kind,
+            layout,
             training,
             seed,
             windows: Windows::default(),
             people: Vec::new(),
             pictures: Vec::new(),
+            depth: DepthWindows::default(),
+            rooms: Vec::new(),
             cut_off: 0,
         })
     }
 
     fn add_person(&mut self, grey: &GreyImage, square: &Rect, use_: Use) {
-        let window = window_of(square);
+        let window = window_of(square, self.layout.coverage);
         let seen = window.clipped(grey.width(), grey.height());
         if seen.area() < (1.0 - OUTSIDE) * window.area() {
             self.cut_off += 1;
             return;
         }
         if use_ != Use::Fit {
-            self.people.push((use_, window_numbers(grey, square, self.kind)));
+            self.people.push((use_, window_numbers(grey, square, self.layout)));
             return;
         }
+        self.add_variants(grey, square, 0);
+    }
+
+    /// Adds a person of a room in small shifts and mirrored; 0 is for photographs.
+    fn add_variants(&mut self, grey: &GreyImage, square: &Rect, room: usize) {
         let mirror = mirrored(grey);
         let flipped = Rect { x: grey.width() as f64 - square.right(), ..*square };
         for shift in SHIFTS {
-            self.windows.add(&window_numbers(grey, &shifted(square, shift), self.kind), true);
-            self.windows.add(&window_numbers(&mirror, &shifted(&flipped, shift), self.kind), true);
+            for (grey, square) in [(grey, square), (&mirror, &flipped)] {
+                let numbers = window_numbers(grey, &shifted(square, shift), self.layout);
+                self.windows.add(&numbers, true, room);
+            }
         }
     }
 
     /// Adds random windows from the pictures without people.
     fn add_chance(&mut self) {
-        for (index, (use_, picture)) in self.pictures.iter().enumerate() {
-            if *use_ != Use::Fit {
+        for (index, Picture { use_, grey: picture, room, .. }) in self.pictures.iter().enumerate() {
+            if *use_ != Use::Fit || *room != 0 {
                 continue;
             }
             let small = FILLED * picture.width().min(picture.height()) as f64;
@@ -119,16 +156,16 @@ impl HogTrainer {
                 let x = part(1) * (picture.width() as f64 - side);
                 let y = part(2) * (picture.height() as f64 - side);
                 let square = Rect::new(x, y, side, side);
-                self.windows.add(&window_numbers(picture, &square, self.kind), false);
+                self.windows.add(&window_numbers(picture, &square, self.layout), false, 0);
             }
         }
     }
 
-    /// Fits the machine of a round; the last one is the best.
-    fn machine(&self, round: usize) -> Model {
+    /// Fits the machine of a round to the windows of some rooms; the last round is the best.
+    fn machine(&self, round: usize, of_room: &dyn Fn(usize) -> bool) -> Model {
         let Training { person_penalty, other_penalty, epochs, trees, numbers, .. } = self.training;
         let rounds_left = self.training.mining_rounds.saturating_sub(round) as u32;
-        let machine = match self.kind {
+        let machine = match self.layout.kind {
             Kind::Linear => {
                 let penalty = [other_penalty, person_penalty];
                 let (weights, bias) = separate(&self.windows, penalty, epochs, self.seed);
@@ -137,22 +174,23 @@ impl HogTrainer {
             Kind::Trees => {
                 // The early machines only select false alarms, for which fewer trees are enough.
                 let count = (trees >> (2 * rounds_left).min(31)).max(16);
-                let trees = boosted(&self.windows, count, numbers, self.seed);
+                let trees = boosted(&self.windows, of_room, count, numbers, self.seed);
                 Machine::Trees(Trees::new(trees, HOPELESS))
             }
         };
-        Model { machine, slope: 1.0, offset: 0.0 }
+        Model { machine, coverage: self.layout.coverage, slope: 1.0, offset: 0.0, depth: None }
     }
 
-    /// Adds the false alarms of the machine; returns their number.
-    fn mine(&mut self, model: &Model) -> usize {
+    /// Adds the false alarms of the machine in photographs or in rooms; returns their number.
+    fn mine(&mut self, model: &Model, in_rooms: bool) -> usize {
         let Training { mined_per_picture, mined_per_round, .. } = self.training;
         let mut scanner = Scanner::new(model);
         let mut mined: Vec<(f32, usize, Rect)> = Vec::new();
-        for (index, (use_, picture)) in self.pictures.iter().enumerate() {
-            if *use_ == Use::Fit {
-                let mut windows = search(&mut scanner, picture, self.near_miss());
-                merge(&mut windows, MINED_OVERLAP, 1.0);
+        for (index, picture) in self.pictures.iter().enumerate() {
+            if picture.use_ == Use::Fit && (picture.room != 0) == in_rooms {
+                let mut windows = search(&mut scanner, &picture.grey, self.near_miss());
+                windows.retain(|window| picture.is_false(&window.region));
+                merge(&mut windows, Coverage::UpperBody, MINED_OVERLAP, 1.0);
                 let worst = windows.iter().take(mined_per_picture);
                 mined.extend(worst.map(|w| (w.sum, index, w.region)));
             }
@@ -160,7 +198,8 @@ impl HogTrainer {
         mined.sort_by(|a, b| b.0.total_cmp(&a.0));
         mined.truncate(mined_per_round);
         for (_, index, square) in &mined {
-            self.windows.add(&window_numbers(&self.pictures[*index].1, square, self.kind), false);
+            let Picture { grey, room, .. } = &self.pictures[*index];
+            self.windows.add(&window_numbers(grey, square, self.layout), false, *room);
         }
         mined.len()
     }
@@ -172,10 +211,11 @@ impl HogTrainer {
         let mut sums: Vec<(f64, bool)> =
             people.map(|(_, numbers)| (sum_of(model, numbers, self.near_miss()), true)).collect();
         let mut scanner = Scanner::new(model);
-        for (_, picture) in self.pictures.iter().filter(|(use_, _)| *use_ == wanted) {
-            let mut windows = search(&mut scanner, picture, self.near_miss());
+        let is_wanted = |picture: &&Picture| picture.use_ == wanted && picture.room == 0;
+        for picture in self.pictures.iter().filter(is_wanted) {
+            let mut windows = search(&mut scanner, &picture.grey, self.near_miss());
             if merged {
-                merge(&mut windows, MINED_OVERLAP, 1.0);
+                merge(&mut windows, Coverage::UpperBody, MINED_OVERLAP, 1.0);
             }
             sums.extend(windows.iter().map(|w| (f64::from(w.sum), false)));
         }
@@ -191,7 +231,7 @@ impl HogTrainer {
         let mut table = toml::Table::from_iter([
             ("windows_of_people".to_owned(), integer(self.count(true))),
             ("windows_of_others".to_owned(), integer(self.count(false))),
-            ("pictures_without_people".to_owned(), integer(self.pictures.len())),
+            ("pictures_without_people".to_owned(), integer(self.photographs())),
             ("mined".to_owned(), mined.iter().map(|n| *n as i64).collect::<Vec<_>>().into()),
             ("people_cut_off".to_owned(), integer(self.cut_off)),
             ("held_out_people".to_owned(), integer(people)),
@@ -207,7 +247,7 @@ impl HogTrainer {
     }
 
     fn near_miss(&self) -> f32 {
-        NEAR_MISS[usize::from(self.kind == Kind::Trees)]
+        NEAR_MISS[usize::from(self.layout.kind == Kind::Trees)]
     }
 
     /// Lets trees reject windows as early as the held-out people allow that would be found (after
@@ -225,8 +265,29 @@ impl HogTrainer {
         }
     }
 
+    /// Lets trees reject windows early, and calibrates the log-odds.
+    fn finish(&self, model: &mut Model) {
+        self.hurry(model);
+        let (sums, _) = self.apart(model, Use::Calibration, true);
+        let Line { slope, offset } = platt(&sums);
+        // A slope of 0 or less would be refused when the model is read.
+        (model.slope, model.offset) = (slope.max(1e-3), offset);
+    }
+
+    /// Returns the number of pictures that are photographs.
+    fn photographs(&self) -> usize {
+        self.pictures.iter().filter(|picture| picture.room == 0).count()
+    }
+
     fn count(&self, people: bool) -> usize {
         self.windows.is_person.iter().filter(|is| **is == people).count()
+    }
+}
+
+impl Picture {
+    /// Returns true if no person of the picture is in a window.
+    fn is_false(&self, window: &Rect) -> bool {
+        !self.people.iter().any(|known| known.is_shown(window))
     }
 }
 
@@ -239,9 +300,32 @@ impl Trainer for HogTrainer {
             return Ok(());
         }
         // A picture comes once for each of its candidates, and is stored once.
-        let is_known = self.pictures.last().is_some_and(|(_, last)| **last == *grey);
+        let is_known = self.pictures.last().is_some_and(|last| *last.grey == *grey);
         if !is_known {
-            self.pictures.push((use_, Arc::new(grey.clone())));
+            let grey = Arc::new(grey.clone());
+            self.pictures.push(Picture { use_, grey, people: Vec::new(), room: 0 });
+        }
+        Ok(())
+    }
+
+    // P2's machine stays that of photographs.
+    fn learns_from_rooms(&self) -> bool {
+        self.layout.kind == Kind::Trees
+    }
+
+    fn add_frame(
+        &mut self,
+        frame: &Frame,
+        people: &[AnnotatedPerson],
+        room: Option<&str>,
+        group: u64,
+    ) -> Result<()> {
+        let (people, room) = (rooms::known(frame, people), self.number_or_drawn(room));
+        self.depth.add(frame, &people, room, group);
+        // Simulated rooms teach depth alone: their textures are not those of real ones.
+        if room != DRAWN {
+            let grey = Arc::new(frame.grey()?.clone());
+            self.pictures.push(Picture { use_: Use::Fit, grey, people, room });
         }
         Ok(())
     }
@@ -252,22 +336,39 @@ impl Trainer for HogTrainer {
             return Err(Error::Other("people and pictures without people: both are needed".into()));
         }
         let rounds = self.training.mining_rounds;
-        let mut model = self.machine(0);
+        let mut model = self.machine(0, &|_| true);
         let mut mined = Vec::new();
         for round in 0..rounds {
             progress((round + 1) as f64 / (rounds + 2) as f64);
-            mined.push(self.mine(&model));
-            model = self.machine(round + 1);
+            mined.push(self.mine(&model, false));
+            model = self.machine(round + 1, &|_| true);
         }
-        self.hurry(&mut model);
-        let (sums, _) = self.apart(&model, Use::Calibration, true);
-        let Line { slope, offset } = platt(&sums);
-        // A slope of 0 or less would be refused when the model is read.
-        model = Model { slope: slope.max(1e-3), offset, ..model };
+        self.finish(&mut model);
+        let (mut without, mut in_rooms) = (Vec::new(), toml::Table::new());
+        if !self.rooms.is_empty() {
+            let of_photographs = model;
+            if self.training.rooms {
+                self.add_room_people();
+                mined.push(self.mine(&of_photographs, true));
+            }
+            for room in 1..=self.rooms.len() {
+                let (name, left_out) =
+                    (self.rooms[room - 1].clone(), self.without(room, &of_photographs));
+                let rows = [("photographs only", &of_photographs), ("left out", &left_out)];
+                in_rooms.extend(rows.map(|(row, model)| {
+                    (format!("{name}: {row}"), rooms::figures(&self.missed_in(model, room)))
+                }));
+                without.push((name, left_out.to_text().map_err(Error::Other)?));
+            }
+            model = self.without(NO_ROOM, &of_photographs);
+        }
         progress(1.0);
-        let figures = self.figures(&model, &mined);
+        let mut figures = self.figures(&model, &mined);
+        if !in_rooms.is_empty() {
+            figures.insert("rooms".into(), in_rooms.into());
+        }
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { model: text, figures, ..Fitted::default() })
+        Ok(Fitted { model: text, figures, without })
     }
 }
 

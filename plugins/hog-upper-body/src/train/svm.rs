@@ -11,12 +11,15 @@ const STILL: f32 = 1e-3;
 pub(crate) struct Windows {
     pub(crate) numbers: Vec<f32>,
     pub(crate) is_person: Vec<bool>,
+    /// Numbers of their rooms; 0 for photographs.
+    pub(crate) room: Vec<usize>,
 }
 
 impl Windows {
-    pub(crate) fn add(&mut self, numbers: &[f32], is_person: bool) {
+    pub(crate) fn add(&mut self, numbers: &[f32], is_person: bool, room: usize) {
         self.numbers.extend_from_slice(numbers);
         self.is_person.push(is_person);
+        self.room.push(room);
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -105,7 +108,7 @@ mod tests {
         for i in 0..200 {
             let shift = if i % 2 == 0 { 0.3 } else { -0.3 };
             let numbers: Vec<f32> = (0..6).map(|_| next() + shift).collect();
-            windows.add(&numbers, i % 2 == 0);
+            windows.add(&numbers, i % 2 == 0, 0);
         }
         let penalty = [0.5, 1.0];
         let (weights, bias) = separate(&windows, penalty, 2000, 1);
