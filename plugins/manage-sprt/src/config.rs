@@ -100,7 +100,7 @@ impl Default for Config {
             look_s: 4.0,
             usual: 0.5,
             miss_log_odds: -0.5,
-            absent_log_odds: -3.0,
+            absent_log_odds: 0.0,
             unverified_log_odds: -1.0,
             still_log_odds: -0.75,
             max_still: -1.5,
