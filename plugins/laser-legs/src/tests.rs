@@ -261,7 +261,7 @@ fn points_on_a_line_have_a_small_circle_around_their_middle() {
         let places: Vec<(u32, [f64; 2])> =
             (0..count).map(|k| (k, [2.0, 0.1 * f64::from(k)])).collect();
         let line = 0..places.len();
-        let found = features(&reflections(&places), &line, &[line.clone()]);
+        let found = features(&reflections(&places), &line, std::slice::from_ref(&line));
         assert_features(&found, &[("radius", radius_m)]);
     }
 }
