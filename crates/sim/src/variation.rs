@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use serde::Deserialize;
 use tagalong_config::ConfigError;
+use tagalong_stats::fingerprint;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue, ValueDeserializer};
 
@@ -334,11 +335,10 @@ fn find<'r, 'a>(root: &'r DeTable<'a>, key: &str) -> Option<&'r Spanned<DeValue<
     })
 }
 
-/// The random numbers of a key (FNV-1a: Fowler, Noll & Vo), far from the small
-/// numbers of the streams that the simulation uses.
+/// Returns the stream of random numbers of a key, far from the small numbers of the streams that
+/// the simulation uses.
 fn stream(key: &str) -> u64 {
-    let mixed = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-    key.bytes().fold(0xcbf2_9ce4_8422_2325, mixed) | 1 << 63
+    fingerprint(key.bytes()) | 1 << 63
 }
 
 impl Written {

@@ -2,7 +2,8 @@
 //!
 //! * [`SplitMix64`], [`ChaCha`], [`XorShift64`]: seeded generators with the same numbers on every
 //!   machine; [`RandomSource`] has the distributions. [`mix`] and [`number_at`] turn keys into
-//!   numbers without a state, for threads that work in any order.
+//!   numbers without a state, for threads that work in any order; [`fingerprint`] turns bytes into
+//!   one.
 //! * [`mean`], [`mean_and_deviation`], [`median`], [`percentile`]: summaries of values.
 //! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`]: how far a figure can
 //!   be trusted; [`paired_gain`], [`sign_flip`], [`holm`]: how far a difference can.
@@ -15,6 +16,6 @@ mod significance;
 mod summary;
 
 pub use intervals::{CONFIDENCE, Interval, clustered_share, draws_interval, mean_interval, wilson};
-pub use random::{ChaCha, RandomSource, SplitMix64, XorShift64, mix, number_at};
+pub use random::{ChaCha, RandomSource, SplitMix64, XorShift64, fingerprint, mix, number_at};
 pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};
 pub use summary::{mean, mean_and_deviation, median, percentile};

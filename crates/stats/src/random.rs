@@ -123,6 +123,19 @@ impl RandomSource for XorShift64 {
     }
 }
 
+/// Returns a number that stands for some bytes (FNV-1a of Fowler, Noll and Vo): the same on every
+/// machine, and another one for nearly all other bytes.
+///
+/// ```
+/// use tagalong_stats::fingerprint;
+/// assert_eq!(fingerprint(*b"foobar"), 0x8594_4171_f739_67e8);
+/// ```
+pub fn fingerprint(bytes: impl IntoIterator<Item = u8>) -> u64 {
+    const PRIME: u64 = 0x0100_0000_01b3;
+    let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(PRIME);
+    bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, step)
+}
+
 /// Returns the first number of [`SplitMix64`] from this seed: it looks random, and different seeds
 /// have different numbers.
 #[inline]

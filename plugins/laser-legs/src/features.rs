@@ -127,7 +127,9 @@ fn circle(points: &[Point2<f64>], middle: &Point2<f64>) -> (f64, f64) {
         normal += row * row.transpose();
         right += row * value;
     }
-    // The addend makes points on a line a large circle, not a singular matrix.
+    // The addend keeps the matrix of points on a line from being singular. Their circle is the one of
+    // the least numbers, a small one around the middle, although a large one would fit a line as
+    // well; the shipped model was fitted to these numbers.
     let fitted = (normal + Matrix3::identity() * 1e-9).cholesky().map(|c| c.solve(&right));
     let Some(fitted) = fitted else { return (STRAIGHT_M, 0.0) };
     let at = fitted.xy();

@@ -254,6 +254,18 @@ fn assert_features(of: &Features, expected: &[(&str, f64)]) {
     }
 }
 
+/// The radius is the root mean square distance from the middle.
+#[test]
+fn points_on_a_line_have_a_small_circle_around_their_middle() {
+    for (count, radius_m) in [(3, 0.081650), (5, 0.141421)] {
+        let places: Vec<(u32, [f64; 2])> =
+            (0..count).map(|k| (k, [2.0, 0.1 * f64::from(k)])).collect();
+        let line = 0..places.len();
+        let found = features(&reflections(&places), &line, std::slice::from_ref(&line));
+        assert_features(&found, &[("radius", radius_m)]);
+    }
+}
+
 /// Three points on a right angle, between two other small things and before a wide one.
 #[test]
 fn each_feature_is_that_of_its_definition() {

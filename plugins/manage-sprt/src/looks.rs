@@ -96,6 +96,8 @@ impl Looks {
     fn close_latest(&mut self, config: &Config) {
         let most = config.max_log_odds;
         if let Some(look) = self.all.get_mut(self.latest) {
+            // In full, although `log_odds` lets it fade during a pause: the settings of the shipped
+            // configs were chosen so, and no track outlives a pause of a few seconds.
             self.past = (self.past + look.news(config)).clamp(-most, most);
             look.counted = look.log_odds(config);
         }

@@ -213,6 +213,48 @@ mod tests {
         assert!(places[0] < 26.0 && places[places.len() - 1] > 38.0, "{places:?}");
     }
 
+    /// Where the scene grows by some hundredths, the surface of the person moves as the answer does.
+    #[test]
+    fn the_map_grows_with_the_answer() {
+        let sample = sample();
+        let distance = |[x, y]: [f64; 2]| x.hypot(y);
+        let mean = |cells: &[[f64; 2]]| {
+            let sum = cells.iter().fold([0.0; 2], |sum, cell| [sum[0] + cell[0], sum[1] + cell[1]]);
+            sum.map(|sum| sum / cells.len() as f64)
+        };
+        let mut pairs = Vec::new();
+        for seed in 0..60 {
+            let (map, targets) = sample.varied(&mut Draws(mix(seed)));
+            let floor =
+                |row: f64, column: f64| [0.2 + 0.1 * (row + 0.5), 0.1 * (column + 0.5) - 3.2];
+            let cells: Vec<[f64; 2]> =
+                targets.places().into_iter().map(|[row, column]| floor(row, column)).collect();
+            if cells.len() < 4 {
+                continue;
+            }
+            let head = mean(&cells);
+            let mut surface = Vec::new();
+            for (row, column) in (0..128).flat_map(|row| (0..128).map(move |column| (row, column)))
+            {
+                let at = floor(row as f64 / 2.0 - 0.25, column as f64 / 2.0 - 0.25);
+                let is_near = distance([at[0] - head[0], at[1] - head[1]]) < 0.4;
+                if is_near && map.fine.at(row, column)[FloorMap::FINE - 1] > 0.3 {
+                    surface.push(at);
+                }
+            }
+            if surface.len() > 3 {
+                pairs.push((distance(head), distance(mean(&surface))));
+            }
+        }
+        assert!(pairs.len() > 30, "{}", pairs.len());
+        let count = pairs.len() as f64;
+        let (x, y) = pairs.iter().fold((0.0, 0.0), |(x, y), pair| (x + pair.0, y + pair.1));
+        let (x, y) = (x / count, y / count);
+        let across: f64 = pairs.iter().map(|pair| (pair.0 - x) * (pair.1 - y)).sum();
+        let along: f64 = pairs.iter().map(|pair| (pair.0 - x).powi(2)).sum();
+        assert!((0.7..1.3).contains(&(across / along)), "{}", across / along);
+    }
+
     #[test]
     fn a_sample_keeps_depth_to_a_millimetre() {
         let sample = sample();

@@ -26,7 +26,11 @@ pub fn fit(samples: &[&Sample], sampler: Sampler, gamma: f64, penalty: f64) -> R
         f64::from(samples[row].patch[column])
     });
     let targets: Array1<bool> = samples.iter().map(|s| s.example.is_person).collect();
-    // The kernel of this library divides by its parameter. Shrinking stays off, the default: with
+    // The Gram matrix is computed by this library, pair by pair, and not by `faer`: in 0.8 its `Fit`
+    // takes rows only, and `fit_c`, which takes a finished kernel, is private, as is the trait of
+    // the solver's kernels. Rows of a factor of the Gram matrix with the linear kernel would cost
+    // more: that matrix has nearly full rank, so they have as many values as there are samples.
+    // The kernel divides by its parameter. Shrinking stays off, the default: with
     // it, weights are returned for the wrong samples.
     let fitted = Svm::<f64, bool>::params()
         .pos_neg_weights(for_people, for_others)
