@@ -37,6 +37,13 @@ pub struct Config {
     /// the head in it), 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub shape_weight: f64,
+    /// Time constant with which the velocity of the box decays, s; 0: it does not. A person who is
+    /// hidden for long walks on for less long than that.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub velocity_decay_s: f64,
+    /// A track that is observed again after frames without a detection is filtered anew over these
+    /// frames, along the straight way between the two observations.
+    pub reupdate: bool,
     /// As printed: the measurement matrix of eq. 8, which contains the time step. The estimate then
     /// lags by the motion of one frame.
     pub compat_printed_measurement: bool,
@@ -56,6 +63,8 @@ impl Default for Config {
             sigma_scale: 0.1,
             sigma_range_m: 0.02,
             shape_weight: 0.3,
+            velocity_decay_s: 0.0,
+            reupdate: false,
             compat_printed_measurement: false,
             compat_printed_ego_motion: false,
         }

@@ -103,7 +103,9 @@ impl State {
     /// Applies the constant-velocity model; the width and the rate of the range are random walks.
     fn walk(&mut self, config: &Config, dt: f64) {
         let mut step = Matrix5::identity();
-        (step[(0, 2)], step[(1, 3)]) = (dt, dt);
+        let (passed, kept) = decayed(config.velocity_decay_s, dt);
+        (step[(0, 2)], step[(1, 3)]) = (passed, passed);
+        (step[(2, 2)], step[(3, 3)]) = (kept, kept);
         let noise = process_noise(config, self.image[4], dt);
         self.image = step * self.image;
         self.image_covariance = symmetric(step * self.image_covariance * step.transpose() + noise);
@@ -185,6 +187,11 @@ impl State {
         Update { nis: parts.into_iter().flatten().reduce(sum) }
     }
 
+    /// Returns true for a person behind the camera, whose box means nothing.
+    pub(crate) fn is_behind(&self) -> bool {
+        self.behind.is_some()
+    }
+
     /// Updates the box; returns the normalised innovation squared of centre and width.
     fn correct_box(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Option<f64> {
         let dt = if config.compat_printed_measurement { self.step_s } else { 0.0 };
@@ -257,6 +264,16 @@ impl State {
         self.image[4] = self.image[4].max(MIN_WIDTH_PX);
         self.range.x = self.range.x.max(MIN_RANGE_M);
     }
+}
+
+/// Returns the way per unit of velocity in `dt`, s, and the part of the velocity that is left, if it
+/// decays with a time constant (Ornstein-Uhlenbeck process); without one it stays.
+fn decayed(time_constant_s: f64, dt: f64) -> (f64, f64) {
+    if time_constant_s == 0.0 {
+        return (dt, 1.0);
+    }
+    let kept = (-dt / time_constant_s).exp();
+    (time_constant_s * (1.0 - kept), kept)
 }
 
 /// Returns H of eq. 8. In print it contains the time step, although it is applied to a state that
