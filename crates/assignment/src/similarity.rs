@@ -65,7 +65,7 @@ impl Staged {
 }
 
 /// Returns the overlap (IoU) of two boxes that are each enlarged on every side by the fraction
-/// `buffer` of its width and height (C-BIoU: Yang et al., WACV 2023, section 3.1).
+/// `buffer` of its width and height (C-BIoU: Yang et al., WACV 2023).
 ///
 /// ```
 /// use tagalong_assignment::buffered_iou;
@@ -85,8 +85,8 @@ pub fn probability(log_odds: f64) -> f64 {
 }
 
 /// Returns the similarity of a pair that its appearance may raise: the better of the overlap and of
-/// the probability that both look like one person (BoT-SORT: Aharon et al., 2022, eq. 12 and 13,
-/// which take the smaller distance). An appearance that speaks against the pair changes nothing,
+/// the probability that both look like one person (BoT-SORT: Aharon et al., 2022, which takes the
+/// smaller distance). An appearance that speaks against the pair changes nothing,
 /// and one that is unknown neither.
 ///
 /// ```

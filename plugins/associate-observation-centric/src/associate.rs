@@ -51,7 +51,7 @@ impl ObservationCentric {
     }
 
     /// Returns the consistency of the direction toward a detection with that in which the track
-    /// moved between its observations (section 4.1): 0.5 - Δθ / π, 0 for an unknown direction.
+    /// moved between its observations (OCM): 0.5 - Δθ / π, 0 for an unknown direction.
     fn consistency(&self, track: &Track, seen: &Rect) -> f64 {
         let Some((from, moved)) = self.memory.direction(track.id) else { return 0.0 };
         let way = seen.centre() - from.centre();

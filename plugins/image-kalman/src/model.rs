@@ -34,6 +34,8 @@ pub struct State {
     behind: Option<RobotPoint>,
     /// Time since the previous frame, s.
     step_s: f64,
+    /// Box of the detection in this frame, where that is to be reported.
+    observed: Option<Rect>,
 }
 
 /// Parts of a box that do not change as it moves.
@@ -85,12 +87,14 @@ impl State {
             shape: Shape::of(detection, camera).unwrap_or(upper_body),
             behind: None,
             step_s: 0.0,
+            observed: config.observed_boxes.then_some(rect),
         }
     }
 
     /// Predicts forward in time (eq. 7), and into the robot's new frame.
     pub fn predict(&mut self, config: &Config, motion: &EgoMotion, camera: &Camera) {
         self.step_s = motion.dt;
+        self.observed = None;
         // The pixel velocity is that of the old frame, so the time step comes before the change
         // of frame.
         self.walk(config, motion.dt);
@@ -182,6 +186,7 @@ impl State {
             self.shape.blend(&shape, config.shape_weight);
         }
         self.stay_in_range();
+        self.observed = config.observed_boxes.then(|| seen.rect_in(camera));
         let parts = [by_box.map(|nis| (nis, 3)), by_range.map(|nis| (nis, 1))];
         let sum = |a: (f64, u32), b: (f64, u32)| (a.0 + b.0, a.1 + b.1);
         Update { nis: parts.into_iter().flatten().reduce(sum) }
@@ -243,9 +248,10 @@ impl State {
         Estimate {
             person: Person { position: place.position, velocity: place.velocity.xy() },
             covariance: symmetric(covariance),
-            region: match self.behind {
-                Some(_) => Rect::default(),
-                None => Rect::new(left, top, width, height),
+            region: match (self.behind, self.observed) {
+                (Some(_), _) => Rect::default(),
+                (None, Some(observed)) => observed,
+                (None, None) => Rect::new(left, top, width, height),
             },
         }
     }
@@ -289,7 +295,7 @@ fn process_noise(config: &Config, width: f64, dt: f64) -> Matrix5<f64> {
     let mut noise = Matrix5::zeros();
     let axis_noise = white_acceleration(config.acceleration_noise * width.powi(2), dt);
     for axis in 0..2 {
-        noise[(axis, axis)] = axis_noise[(0, 0)];
+        noise[(axis, axis)] = axis_noise[(0, 0)] + (config.position_noise * width).powi(2) * dt;
         noise[(axis + 2, axis + 2)] = axis_noise[(1, 1)];
         noise[(axis, axis + 2)] = axis_noise[(0, 1)];
         noise[(axis + 2, axis)] = axis_noise[(1, 0)];

@@ -1,6 +1,6 @@
 //! Observation-centric re-update: a track that is observed again after a gap is filtered anew over
 //! the gap, as if it had been observed all along the straight way between the two observations
-//! (OC-SORT: Cao et al., CVPR 2023, section 4.2).
+//! (ORU of OC-SORT: Cao et al., CVPR 2023).
 //!
 //! Without it the errors of the velocity that grew in the gap stay after its end.
 

@@ -617,3 +617,35 @@ fn a_velocity_may_decay() {
     let (way_s, left) = after(0.5);
     assert!((way_s - 0.5).abs() < 1e-6 && left < 1e-6, "{way_s} {left}");
 }
+
+#[test]
+fn a_shaking_camera_moves_boxes_and_gives_them_no_velocity() {
+    let after = |position_noise: f64| {
+        let config = Config { position_noise, ..Config::default() };
+        let mut state = State::start(&config, &ahead(4.0).1, &ahead(4.0).0);
+        let (before, width) = (state.image_covariance, state.image[4]);
+        state.predict(&config, &EgoMotion::at_rest(0.1), &camera());
+        (state.image_covariance - before) / width.powi(2)
+    };
+    let (still, shaken) = (after(0.0), after(0.5));
+    for axis in 0..2 {
+        let grown = shaken[(axis, axis)] - still[(axis, axis)];
+        assert!((grown - 0.25 * 0.1).abs() < 1e-9, "{grown}");
+        assert_eq!(shaken[(axis + 2, axis + 2)], still[(axis + 2, axis + 2)]);
+    }
+}
+
+#[test]
+fn the_box_of_a_detection_may_be_reported_as_it_is() {
+    let region = |observed_boxes: bool| {
+        let config = Config { observed_boxes, ..Config::default() };
+        let sightings = sliding(3);
+        let mut state = fed(config.clone(), &sightings, EgoMotion::at_rest(DT_S));
+        let seen = state.estimate(&camera()).region;
+        state.predict(&config, &EgoMotion::at_rest(DT_S), &camera());
+        (seen == sightings[2].rect().unwrap(), state.estimate(&camera()).region)
+    };
+    let (filtered, observed) = (region(false), region(true));
+    assert_eq!((filtered.0, observed.0), (false, true));
+    assert_eq!(filtered.1, observed.1, "what is expected is the filter's in any case");
+}
