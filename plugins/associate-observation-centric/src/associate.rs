@@ -179,10 +179,10 @@ mod tests {
         assert!(failures.is_empty(), "{failures:#?}");
     }
 
-    /// The detection behind the track overlaps its predicted box a little more.
+    /// The detection beside the way of the track overlaps its predicted box a little more.
     #[test]
-    fn a_detection_straight_ahead_goes_before_one_behind() {
-        let detections = [detection(at(11.0, 0.0), 3.0), detection(at(21.5, 0.0), 3.0)];
+    fn a_detection_straight_ahead_goes_before_one_beside_the_way() {
+        let detections = [detection(at(14.0, 10.0), 3.0), detection(at(23.0, 0.0), 3.0)];
         let with = |direction_weight: f64| {
             let mut associator = walking(Config { direction_weight, ..Config::default() });
             pairs(&associator.associate(&[track(1, at(16.0, 0.0))], &detections, &GATE))
