@@ -137,7 +137,7 @@ impl GivenSequence {
         let mut timeline = Timeline::new();
         timeline.add_truths(self.truths.iter().cloned());
         for (frame, report) in &tracks.reports {
-            timeline.frame(*frame).reports.push(report.clone());
+            timeline.frame(*frame).reports.push(*report);
         }
         let SequenceInfo { name, length, rate_hz, .. } = &self.info;
         timeline.into_sequence(name, 1, *length, *rate_hz).0
