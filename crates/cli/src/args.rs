@@ -5,6 +5,7 @@ use clap_complete::Shell;
 use tagalong_app::format::{Format, TableFormat};
 use tagalong_benchmark::BenchArgs;
 use tagalong_doctor::DoctorArgs;
+use tagalong_experiments::boxes::{BoxesArgs, HELP as BOXES_HELP};
 use tagalong_experiments::follow::FollowArgs;
 use tagalong_experiments::reproduce::ReproduceArgs;
 use tagalong_experiments::trials::TrialsArgs;
@@ -111,6 +112,9 @@ pub enum Command {
     /// Compares pipelines on many random variants of the same scenes, in memory
     #[command(after_help = TRIALS_HELP)]
     Trials(TrialsArgs),
+    /// Tracks the boxes of another detector, without images, and compares associations
+    #[command(after_help = BOXES_HELP)]
+    Boxes(BoxesArgs),
     /// Prints the tables of a published system beside ours
     #[command(after_help = REPRODUCE_HELP)]
     Reproduce(ReproduceArgs),

@@ -72,6 +72,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
         Command::Triangulate(args) => tagalong_webcams::triangulate(args),
         Command::Reproduce(args) => tagalong_experiments::reproduce::reproduce(args, registry),
+        Command::Boxes(args) => tagalong_experiments::boxes::boxes(args, registry),
         Command::Trials(args) => tagalong_experiments::trials::trials(args, registry),
         Command::Train(args) => tagalong_training::train(args, registry),
         Command::Model(args) => commands::model(args, registry),

@@ -1,6 +1,7 @@
-//! Experiments on simulated scenes: pipelines compared on many random variants, rides after a person,
-//! and the tables of published systems.
+//! Experiments: pipelines compared on many random variants of simulated scenes, or on given boxes;
+//! rides after a person, and the tables of published systems.
 
+pub mod boxes;
 mod contender;
 pub mod follow;
 pub mod reproduce;

@@ -7,6 +7,7 @@ use tagalong_app::outcome::Failure;
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use super::ImportArgs;
+use super::recorded;
 use super::sequence::{Eye, Sequence, pictures, size, steady, text};
 
 /// Reads a folder of images, with one of depth if the options say so.
@@ -57,11 +58,7 @@ pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
     }
     let detections = args.path.join("det/det.txt");
     if detections.exists() {
-        sequence.notes.push(format!(
-            "the detections of the sequence can be tracked: configs/recorded.toml with \
-             [[detectors]] config = {{ path = \"{}\" }}",
-            detections.display()
-        ));
+        sequence.recorded = Some(recorded::config(&detections)?);
     }
     Ok(sequence)
 }

@@ -5,6 +5,7 @@
 
 mod folders;
 mod kitti;
+mod recorded;
 mod sequence;
 mod tum;
 mod writer;
@@ -138,14 +139,23 @@ fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     Ok(sequence)
 }
 
-/// Writes the truth beside the log, where `eval` and `bench` look for it.
+/// Writes the truth beside the log, where `eval` and `bench` look for it, and the config that tracks
+/// recorded detections.
 fn beside(sequence: &Sequence, log: &Path) -> Result<(), Failure> {
-    for (ending, text) in &sequence.beside {
+    let write = |ending: &str, text: &str| {
         let path = log.with_extension(ending);
         std::fs::write(&path, text).map_err(|error| {
             Failure::failed(format!("cannot write {}: {error}", path.display()))
         })?;
-        say(&format!("truth is in {}", path.display()));
+        Ok::<_, Failure>(path)
+    };
+    for (ending, text) in &sequence.beside {
+        say(&format!("truth is in {}", write(ending, text)?.display()));
+    }
+    if let Some(text) = &sequence.recorded {
+        let config = write("recorded.toml", text)?;
+        let (config, log) = (config.display(), log.display());
+        say(&format!("its detections can be tracked: tagalong run {config} {log}"));
     }
     Ok(())
 }

@@ -73,6 +73,8 @@ pub struct Sequence {
     pub placed: Vec<Placed>,
     /// Files that go beside the log: their ending, and their text.
     pub beside: Vec<(&'static str, String)>,
+    /// Config that tracks the recorded detections of the sequence, where it has some.
+    pub recorded: Option<String>,
     /// Notes for the user.
     pub notes: Vec<String>,
 }

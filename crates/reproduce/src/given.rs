@@ -1,28 +1,13 @@
 //! P2's filter and association alone: given detections on the sequences of MOT15, beside the
 //! published results of SORT with the same boxes.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use tagalong_eval::Tally;
+use tagalong_trials::{Contender, GivenSequence, for_given_boxes};
 
-use cpu_time::ThreadTime;
-use tagalong_core::{EgoMotion, Frame, Images, Stamp};
-use tagalong_eval::formats::mot::{Rules, SequenceInfo, parse_info, parse_truth};
-use tagalong_eval::formats::{FormatError, Timeline};
-use tagalong_eval::{Comparison, Region, Report, Sequence, SetDistance, Similarity, Tally};
-use tagalong_geometry::{Camera, Distortion, Pinhole};
-use tagalong_pipeline::FrameReport;
-use tagalong_trials::Contender;
-
-use crate::lab::read;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Name of the config.
 const RECORDED: &str = "recorded";
-/// Place in the config where the settings of the detector begin ...
-const DETECTOR: &str = "config = { ";
-/// ... and the setting that is inserted there, after the path: the boxes are of whole bodies.
-const BODY: &str = "body = \"full-box\"";
 /// MOTA of SORT, per cent, in the sequences of its validation set (its README); 34.0 in all six
 /// together.
 const SORT: [(&str, f64); 6] = [
@@ -36,13 +21,6 @@ const SORT: [(&str, f64); 6] = [
 const SORT_ALL: f64 = 34.0;
 const COLUMNS: [&str; 5] = ["MOTA, %", "IDF1, %", "HOTA, %", "switches", "frames/s"];
 
-/// A sequence: the annotated people, and the given boxes.
-struct GivenSequence {
-    info: SequenceInfo,
-    truth: String,
-    detections: PathBuf,
-}
-
 /// Results on one sequence.
 struct Tracked {
     name: String,
@@ -54,11 +32,11 @@ struct Tracked {
 
 /// Builds the table.
 pub(crate) fn given(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
-    let config = lab.contender(RECORDED)?;
+    let config = whole_bodies(lab)?;
     let sequences = sequences(lab)?;
     lab.progress.begin(sequences.len(), "sequences of MOT15");
     let track = |given: &GivenSequence| {
-        let tracked = given.track(lab, &config);
+        let tracked = Tracked::new(given, lab, &config);
         lab.progress.step();
         tracked
     };
@@ -107,85 +85,35 @@ fn row(name: &str, all: &[&Tracked]) -> Row {
     Row::ours(format!("{RECORDED}, {name}"), cells)
 }
 
+/// Returns the config for boxes of whole bodies that come with the frames.
+fn whole_bodies(lab: &Lab<'_>) -> Result<Contender, ReproduceError> {
+    let shipped = lab.contender(RECORDED)?;
+    let resolved = shipped.pipeline(lab.registry, 1)?.resolved();
+    Ok(Contender { config: for_given_boxes(&resolved)?, ..shipped })
+}
+
 /// Returns the available sequences of MOT15, in the order of their names.
 fn sequences(lab: &Lab<'_>) -> Result<Vec<GivenSequence>, ReproduceError> {
     let Some(root) = lab.data.as_ref().map(|data| data.join("mot")) else { return Ok(Vec::new()) };
-    let Ok(entries) = fs::read_dir(root.join("gt/MOT15-train")) else { return Ok(Vec::new()) };
-    let mut folders: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    folders.sort();
-    folders.iter().map(|folder| GivenSequence::read(&root, folder)).collect()
+    let truth = root.join("gt/MOT15-train");
+    if !truth.is_dir() {
+        return Ok(Vec::new());
+    }
+    Ok(GivenSequence::read_all(&truth, Some(&root.join("sort-detections")))?)
 }
 
-fn other(error: impl ToString) -> ReproduceError {
-    ReproduceError::Other(error.to_string())
-}
-
-impl GivenSequence {
-    fn read(root: &Path, folder: &Path) -> Result<Self, ReproduceError> {
-        let path = folder.join("seqinfo.ini");
-        let info = parse_info(&read(&path)?, &path.display().to_string()).map_err(other)?;
-        let detections = root.join("sort-detections").join(&info.name).join("det.txt");
-        // Made absolute, because the pipeline resolves paths against the folder of the config.
-        let detections = fs::canonicalize(&detections).unwrap_or(detections);
-        Ok(Self { truth: read(&folder.join("gt/gt.txt"))?, detections, info })
-    }
-
-    fn track(&self, lab: &Lab<'_>, config: &Contender) -> Result<Tracked, ReproduceError> {
-        let with = format!("{DETECTOR}path = {:?}, {BODY}, ", self.detections);
-        let text = config.config.replacen(DETECTOR, &with, 1);
-        let config = Contender { config: text, ..config.clone() };
-        let mut pipeline = config.pipeline(lab.registry, 1)?;
-        let (mut reports, mut worked_ms) = (Vec::new(), 0.0);
-        for frame in self.frames() {
-            // Time of this thread alone, so that other load on the machine does not count.
-            let before = ThreadTime::now();
-            reports.push(pipeline.step(&frame).map_err(other)?);
-            worked_ms += 1e3 * before.elapsed().as_secs_f64();
-        }
-        let comparison = Comparison::from(Similarity::Iou);
-        let sequence = self.against_truth(&reports).map_err(other)?;
-        let tally = Tally::measure(&sequence, &comparison, &SetDistance::default());
-        Ok(Tracked {
-            name: self.info.name.clone(),
-            tally: tally.map_err(other)?,
-            frames: reports.len() as u64,
-            worked_ms,
+impl Tracked {
+    fn new(
+        given: &GivenSequence,
+        lab: &Lab<'_>,
+        config: &Contender,
+    ) -> Result<Self, ReproduceError> {
+        let tracks = given.track(config, lab.registry)?;
+        Ok(Self {
+            name: given.info.name.clone(),
+            tally: given.tally(&tracks)?,
+            frames: given.len() as u64,
+            worked_ms: tracks.worked_ms,
         })
-    }
-
-    /// Returns frames with a stamp each and without images, and a camera with the size of the
-    /// images (a field of view of 53 degrees, at breast height).
-    fn frames(&self) -> impl Iterator<Item = Frame> + use<> {
-        let (width, height) = (self.info.width as usize, self.info.height as usize);
-        let lens = Pinhole {
-            fx: width as f64,
-            fy: width as f64,
-            cx: 0.5 * width as f64,
-            cy: 0.5 * height as f64,
-            distortion: Distortion::None,
-        };
-        let camera = Arc::new(Camera::mounted(lens, width, height, 1.2, 0.0, 0.0));
-        let (dt, length) = (1.0 / self.info.rate_hz, u64::from(self.info.length));
-        (1..=length).map(move |index| {
-            let stamp = Stamp::default().plus_seconds(index as f64 * dt);
-            Frame::new(index, stamp, Arc::clone(&camera), EgoMotion::at_rest(dt), Images::default())
-        })
-    }
-
-    /// Returns truth and reported boxes side by side; predicted boxes do not count, as with SORT.
-    fn against_truth(&self, reports: &[FrameReport]) -> Result<Sequence, FormatError> {
-        let mut timeline = Timeline::new();
-        let truth = parse_truth(&self.truth, "gt.txt", Rules::Mot15)?;
-        timeline.add_truths(truth.iter().map(|row| row.truth(Rules::Mot15)));
-        for report in reports {
-            let seen = report.tracks.iter().filter(|t| t.confirmed && t.seen);
-            timeline.frame(report.index as u32).reports.extend(seen.map(|track| {
-                let r = track.estimate.region;
-                let region = Some(Region::new(r.x, r.y, r.width, r.height));
-                Report { id: i64::from(track.id.0), region, floor_m: None, score: track.score }
-            }));
-        }
-        let SequenceInfo { name, length, rate_hz, .. } = &self.info;
-        Ok(timeline.into_sequence(name, 1, *length, *rate_hz).0)
     }
 }

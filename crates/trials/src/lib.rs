@@ -18,12 +18,16 @@
 //! A [`Ride`] closes the loop: the contender drives the robot, and a [`RideJudge`] measures how
 //! well it stayed with the person.
 //!
+//! A [`GivenSequence`] needs no scene: the boxes of another detector on a recorded sequence, for
+//! comparisons of associations and filters alone.
+//!
 //! The result of a list of scenes depends on the scenes and configs alone, not on the number of
 //! threads.
 
 mod contender;
 mod crossing;
 mod draw;
+mod given;
 mod judge;
 mod occlusion;
 mod parallel;
@@ -35,6 +39,7 @@ mod trial;
 pub use contender::Contender;
 pub use crossing::{Crossing, Failing, Span, crossing};
 pub use draw::{Draw, Drawn, ODOMETRY_SIGMA};
+pub use given::{GivenSequence, GivenTracks, for_given_boxes};
 pub use judge::{Judge, Judged};
 pub use occlusion::{Occlusion, Outcome, occlusions, outcome};
 pub use parallel::{each, in_order};

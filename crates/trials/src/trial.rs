@@ -36,6 +36,9 @@ pub enum TrialError {
     /// The observer could not write the ride down.
     #[error("{0}")]
     Witness(String),
+    /// A sequence with given boxes that cannot be read.
+    #[error("{0}")]
+    Given(String),
     /// A thread that works on trials died.
     #[error("a trial panicked; please report this")]
     Panicked,

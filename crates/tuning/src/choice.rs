@@ -33,6 +33,9 @@ pub enum Objective {
     #[default]
     #[serde(rename = "HOTA")]
     Hota,
+    /// The mean of HOTA and IDF1.
+    #[serde(rename = "HOTA and IDF1")]
+    HotaAndIdf1,
     /// IDF1.
     #[serde(rename = "IDF1")]
     Idf1,
@@ -70,6 +73,7 @@ impl Objective {
     fn of(self, figures: &Figures) -> f64 {
         match self {
             Self::Hota => figures.hota,
+            Self::HotaAndIdf1 => 0.5 * (figures.hota + figures.idf1),
             Self::Idf1 => figures.idf1,
             Self::Mota => figures.mota,
         }

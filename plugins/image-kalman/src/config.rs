@@ -11,6 +11,10 @@ pub struct Config {
     /// Spectral density of the white acceleration of the box, widths²/s³.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub acceleration_noise: f64,
+    /// Random walk of the box beside its velocity, widths per square root of a second: the shaking
+    /// of a camera whose motion is not known.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub position_noise: f64,
     /// Random walk of the width, as a fraction of it per square root of a second.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub scale_noise: f64,
@@ -37,6 +41,16 @@ pub struct Config {
     /// the head in it), 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub shape_weight: f64,
+    /// Time constant with which the velocity of the box decays, s; 0: it does not. A person who is
+    /// hidden for long walks on for less long than that.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub velocity_decay_s: f64,
+    /// A track that is observed again after frames without a detection is filtered anew over these
+    /// frames, along the straight way between the two observations.
+    pub reupdate: bool,
+    /// A track with a detection is reported with the detection's box instead of the filtered one:
+    /// for a detector whose boxes are better than their average over time.
+    pub observed_boxes: bool,
     /// As printed: the measurement matrix of eq. 8, which contains the time step. The estimate then
     /// lags by the motion of one frame.
     pub compat_printed_measurement: bool,
@@ -48,6 +62,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             acceleration_noise: 1.5,
+            position_noise: 0.0,
             scale_noise: 0.3,
             range_noise: 0.5,
             initial_speed: 2.5,
@@ -56,6 +71,9 @@ impl Default for Config {
             sigma_scale: 0.1,
             sigma_range_m: 0.02,
             shape_weight: 0.3,
+            velocity_decay_s: 0.0,
+            reupdate: false,
+            observed_boxes: false,
             compat_printed_measurement: false,
             compat_printed_ego_motion: false,
         }

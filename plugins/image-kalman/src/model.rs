@@ -34,6 +34,8 @@ pub struct State {
     behind: Option<RobotPoint>,
     /// Time since the previous frame, s.
     step_s: f64,
+    /// Box of the detection in this frame, where that is to be reported.
+    observed: Option<Rect>,
 }
 
 /// Parts of a box that do not change as it moves.
@@ -85,12 +87,14 @@ impl State {
             shape: Shape::of(detection, camera).unwrap_or(upper_body),
             behind: None,
             step_s: 0.0,
+            observed: config.observed_boxes.then_some(rect),
         }
     }
 
     /// Predicts forward in time (eq. 7), and into the robot's new frame.
     pub fn predict(&mut self, config: &Config, motion: &EgoMotion, camera: &Camera) {
         self.step_s = motion.dt;
+        self.observed = None;
         // The pixel velocity is that of the old frame, so the time step comes before the change
         // of frame.
         self.walk(config, motion.dt);
@@ -103,7 +107,9 @@ impl State {
     /// Applies the constant-velocity model; the width and the rate of the range are random walks.
     fn walk(&mut self, config: &Config, dt: f64) {
         let mut step = Matrix5::identity();
-        (step[(0, 2)], step[(1, 3)]) = (dt, dt);
+        let (passed, kept) = decayed(config.velocity_decay_s, dt);
+        (step[(0, 2)], step[(1, 3)]) = (passed, passed);
+        (step[(2, 2)], step[(3, 3)]) = (kept, kept);
         let noise = process_noise(config, self.image[4], dt);
         self.image = step * self.image;
         self.image_covariance = symmetric(step * self.image_covariance * step.transpose() + noise);
@@ -180,9 +186,15 @@ impl State {
             self.shape.blend(&shape, config.shape_weight);
         }
         self.stay_in_range();
+        self.observed = config.observed_boxes.then(|| seen.rect_in(camera));
         let parts = [by_box.map(|nis| (nis, 3)), by_range.map(|nis| (nis, 1))];
         let sum = |a: (f64, u32), b: (f64, u32)| (a.0 + b.0, a.1 + b.1);
         Update { nis: parts.into_iter().flatten().reduce(sum) }
+    }
+
+    /// Returns true for a person behind the camera, whose box means nothing.
+    pub(crate) fn is_behind(&self) -> bool {
+        self.behind.is_some()
     }
 
     /// Updates the box; returns the normalised innovation squared of centre and width.
@@ -236,9 +248,10 @@ impl State {
         Estimate {
             person: Person { position: place.position, velocity: place.velocity.xy() },
             covariance: symmetric(covariance),
-            region: match self.behind {
-                Some(_) => Rect::default(),
-                None => Rect::new(left, top, width, height),
+            region: match (self.behind, self.observed) {
+                (Some(_), _) => Rect::default(),
+                (None, Some(observed)) => observed,
+                (None, None) => Rect::new(left, top, width, height),
             },
         }
     }
@@ -259,6 +272,16 @@ impl State {
     }
 }
 
+/// Returns the way per unit of velocity in `dt`, s, and the part of the velocity that is left, if it
+/// decays with a time constant (Ornstein-Uhlenbeck process); without one it stays.
+fn decayed(time_constant_s: f64, dt: f64) -> (f64, f64) {
+    if time_constant_s == 0.0 {
+        return (dt, 1.0);
+    }
+    let kept = (-dt / time_constant_s).exp();
+    (time_constant_s * (1.0 - kept), kept)
+}
+
 /// Returns H of eq. 8. In print it contains the time step, although it is applied to a state that
 /// is already predicted; correctly `dt` is 0.
 fn measurement(dt: f64) -> Matrix3x5 {
@@ -272,7 +295,7 @@ fn process_noise(config: &Config, width: f64, dt: f64) -> Matrix5<f64> {
     let mut noise = Matrix5::zeros();
     let axis_noise = white_acceleration(config.acceleration_noise * width.powi(2), dt);
     for axis in 0..2 {
-        noise[(axis, axis)] = axis_noise[(0, 0)];
+        noise[(axis, axis)] = axis_noise[(0, 0)] + (config.position_noise * width).powi(2) * dt;
         noise[(axis + 2, axis + 2)] = axis_noise[(1, 1)];
         noise[(axis, axis + 2)] = axis_noise[(0, 1)];
         noise[(axis + 2, axis)] = axis_noise[(1, 0)];

@@ -536,3 +536,116 @@ proptest! {
         prop_assert!((found - expected).norm() < 1e-2 * expected.norm(), "{found} {expected}");
     }
 }
+
+/// Returns the velocity after a gap, pixels a frame: a box moves by 4 pixels a frame to frame 10, is
+/// missed, and is seen in frame 20 where it was in frame 10.
+fn after_a_gap(reupdate: bool) -> f64 {
+    let (camera, seen) = ahead(4.0);
+    let config = Config { reupdate, ..Config::default() };
+    let mut filter = ImageKalman::new(config).unwrap();
+    filter.start(TrackId(1), &seen, &camera);
+    let at = |x: f64| {
+        let Rect { width, height, .. } = seen.rect().unwrap();
+        Detection {
+            image: Some(ImageBox::upper_body(Rect::new(x, 100.0, width, height))),
+            ..seen.clone()
+        }
+    };
+    let camera = Arc::new(camera);
+    for index in 1..=20_u32 {
+        let motion = EgoMotion::at_rest(0.1);
+        filter.predict(&motion, &camera);
+        if (11..20).contains(&index) {
+            continue;
+        }
+        let found = at(4.0 * f64::from(index.min(10)));
+        let stamp = Stamp::default();
+        let frame = Frame::new(index.into(), stamp, Arc::clone(&camera), motion, Images::default());
+        let matched = [Matched::certain(TrackId(1), &found)];
+        let evidence =
+            Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+        filter.update(&evidence).unwrap();
+    }
+    let place = filter.estimates(&camera)[&TrackId(1)].region.x;
+    filter.predict(&EgoMotion::at_rest(0.1), &camera);
+    filter.estimates(&camera)[&TrackId(1)].region.x - place
+}
+
+#[test]
+fn a_gap_that_is_filtered_anew_leaves_no_wrong_velocity() {
+    let (with, without) = (after_a_gap(true), after_a_gap(false));
+    assert!(with.abs() < 0.5, "pixels a frame: {with}");
+    assert!(without.abs() > 2.0 * with.abs().max(0.1), "{without} {with}");
+}
+
+#[test]
+fn without_a_gap_nothing_is_filtered_anew() {
+    let (camera, seen) = ahead(4.0);
+    let states = [false, true].map(|reupdate| {
+        let mut filter = ImageKalman::new(Config { reupdate, ..Config::default() }).unwrap();
+        filter.start(TrackId(1), &seen, &camera);
+        let camera = Arc::new(camera.clone());
+        for index in 1..9 {
+            let motion = EgoMotion { turn: 0.01, ..EgoMotion::at_rest(0.1) };
+            filter.predict(&motion, &camera);
+            let stamp = Stamp::default();
+            let frame = Frame::new(index, stamp, Arc::clone(&camera), motion, Images::default());
+            let matched = [Matched::certain(TrackId(1), &seen)];
+            let evidence =
+                Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+            filter.update(&evidence).unwrap();
+        }
+        filter.estimates(&camera)[&TrackId(1)].clone()
+    });
+    assert_eq!(states[0].region, states[1].region);
+}
+
+#[test]
+fn a_velocity_may_decay() {
+    let after = |velocity_decay_s: f64| {
+        let config = Config { velocity_decay_s, ..Config::default() };
+        let mut state = fed(config.clone(), &sliding(30), EgoMotion::at_rest(DT_S));
+        let (place, speed) = (state.image[0], state.image[2]);
+        for _ in 0..100 {
+            state.predict(&config, &EgoMotion::at_rest(0.1), &camera());
+        }
+        ((state.image[0] - place) / speed, state.image[2] / speed)
+    };
+    let (way_s, left) = after(0.0);
+    assert!((way_s - 10.0).abs() < 1e-9 && left == 1.0, "{way_s} {left}");
+    // The whole way of a decaying velocity is the time constant times the velocity.
+    let (way_s, left) = after(0.5);
+    assert!((way_s - 0.5).abs() < 1e-6 && left < 1e-6, "{way_s} {left}");
+}
+
+#[test]
+fn a_shaking_camera_moves_boxes_and_gives_them_no_velocity() {
+    let after = |position_noise: f64| {
+        let config = Config { position_noise, ..Config::default() };
+        let mut state = State::start(&config, &ahead(4.0).1, &ahead(4.0).0);
+        let (before, width) = (state.image_covariance, state.image[4]);
+        state.predict(&config, &EgoMotion::at_rest(0.1), &camera());
+        (state.image_covariance - before) / width.powi(2)
+    };
+    let (still, shaken) = (after(0.0), after(0.5));
+    for axis in 0..2 {
+        let grown = shaken[(axis, axis)] - still[(axis, axis)];
+        assert!((grown - 0.25 * 0.1).abs() < 1e-9, "{grown}");
+        assert_eq!(shaken[(axis + 2, axis + 2)], still[(axis + 2, axis + 2)]);
+    }
+}
+
+#[test]
+fn the_box_of_a_detection_may_be_reported_as_it_is() {
+    let region = |observed_boxes: bool| {
+        let config = Config { observed_boxes, ..Config::default() };
+        let sightings = sliding(3);
+        let mut state = fed(config.clone(), &sightings, EgoMotion::at_rest(DT_S));
+        let seen = state.estimate(&camera()).region;
+        state.predict(&config, &EgoMotion::at_rest(DT_S), &camera());
+        (seen == sightings[2].rect().unwrap(), state.estimate(&camera()).region)
+    };
+    let (filtered, observed) = (region(false), region(true));
+    assert_eq!((filtered.0, observed.0), (false, true));
+    assert_eq!(filtered.1, observed.1, "what is expected is the filter's in any case");
+}

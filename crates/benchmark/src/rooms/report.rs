@@ -135,6 +135,7 @@ impl Report {
         };
         let objective = match self.objective {
             Objective::Hota => "HOTA",
+            Objective::HotaAndIdf1 => "HOTA and IDF1",
             Objective::Idf1 => "IDF1",
             Objective::Mota => "MOTA",
         };

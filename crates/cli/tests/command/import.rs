@@ -146,6 +146,33 @@ fn a_mot_sequence_brings_its_truth() {
     assert!((found[1].frame.stamp.seconds_since(found[0].frame.stamp) - 0.04).abs() < 1e-9);
     let truth = fs::read_to_string(home.path().join("runs/MOT17-99.boxes.csv")).unwrap();
     assert_eq!(truth, "1,1,2,3,10,20,1,1,1\n");
+    assert!(!said.contains("tagalong run"), "there are no detections: {said}");
+}
+
+/// The command that the import prints is run as printed.
+#[test]
+fn detections_of_a_mot_sequence_are_tracked_as_the_import_says() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("MOT17-99");
+    let mut boxes = String::new();
+    for frame in 1..=5 {
+        colour(&folder.join(format!("img1/{frame:06}.jpg")), SMALL, 3);
+        boxes += &format!("{frame},-1,{},3,20,40,0.95\n", 2 + frame);
+    }
+    let ini = "[Sequence]\nname=MOT17-99\nimDir=img1\nframeRate=25\nseqLength=5\n";
+    fs::write(folder.join("seqinfo.ini"), ini).unwrap();
+    fs::create_dir_all(folder.join("det")).unwrap();
+    fs::write(folder.join("det/det.txt"), boxes).unwrap();
+    let (code, said) = import(home.path(), &["mot", "MOT17-99"]);
+    assert_eq!(code, 0, "{said}");
+    let command = said.lines().find_map(|line| line.split("tracked: tagalong ").nth(1)).unwrap();
+    let args: Vec<&str> = command.split_whitespace().collect();
+    assert_eq!(args[0], "run");
+    let done = tagalong().args(&args).current_dir(home.path()).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let tracks = home.path().join("runs/MOT17-99-MOT17-99.recorded/tracks.csv");
+    let tracks = fs::read_to_string(tracks).unwrap();
+    assert!(tracks.lines().filter(|line| !line.starts_with('#')).count() >= 3, "{tracks}");
 }
 
 #[test]

@@ -64,7 +64,18 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("webcams", &["app", "scoring", "log", "sim", "triangulate"]),
     (
         "experiments",
-        &["app", "simulate", "pipeline", "log", "sim", "eval", "trials", "reproduce", "learn"],
+        &[
+            "app",
+            "simulate",
+            "pipeline",
+            "log",
+            "sim",
+            "eval",
+            "trials",
+            "reproduce",
+            "learn",
+            "tuning",
+        ],
     ),
     (
         "cli",

@@ -1,0 +1,331 @@
+//! Given boxes: sequences of the MOTChallenge, tracked in memory and without images.
+//!
+//! Association alone is compared where every tracker gets the very same boxes. A sequence needs its
+//! truth and the boxes of any detector; the images stay where they are, because nothing here looks
+//! at them.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use cpu_time::ThreadTime;
+use tagalong_config::Registry;
+use tagalong_core::{EgoMotion, ExternalDetection, Frame, Images, Stamp};
+use tagalong_eval::formats::mot::{
+    self, Rules, SequenceInfo, parse_info, parse_truth, write_report,
+};
+use tagalong_eval::formats::{FormatError, Timeline};
+use tagalong_eval::{Comparison, Report, Sequence, SetDistance, Similarity, Tally, Truth};
+use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_pipeline::FrameReport;
+
+use crate::{Contender, TrialError};
+
+/// Plugin that reads the boxes, and ...
+const RECORDED: &str = "recorded-detections";
+/// ... the setting by which it tracks whole bodies, as the MOTChallenge annotates them.
+const WHOLE_BODIES: &str = "full-box";
+
+/// A sequence: its annotated people, and the given boxes.
+pub struct GivenSequence {
+    /// Name, length and rate.
+    pub info: SequenceInfo,
+    truths: Vec<(u32, Truth)>,
+    frames: Vec<Frame>,
+}
+
+impl fmt::Debug for GivenSequence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("GivenSequence").field("info", &self.info).finish_non_exhaustive()
+    }
+}
+
+/// Tracks of a sequence.
+#[derive(Clone, Debug, Default)]
+pub struct GivenTracks {
+    /// Confirmed tracks that a box of the frame supports; coasting ones do not count.
+    pub reports: Vec<(u32, Report)>,
+    /// Processor time of all steps, ms.
+    pub worked_ms: f64,
+}
+
+impl GivenSequence {
+    /// Reads a sequence from its folder with `seqinfo.ini` and `gt/gt.txt`, and its boxes from a
+    /// file in the form of `det.txt`.
+    ///
+    /// # Errors
+    /// [`TrialError::Given`] for a file that is missing or wrong.
+    pub fn read(folder: &Path, boxes: &Path) -> Result<Self, TrialError> {
+        let (path, info) = text(folder, "seqinfo.ini")?;
+        let info = parse_info(&info, &path).map_err(given)?;
+        let (path, truth) = text(folder, "gt/gt.txt")?;
+        let rules = Rules::of_truth(&truth, &path).map_err(given)?;
+        let truths = parse_truth(&truth, &path, rules).map_err(given)?;
+        let (path, boxes) = text(boxes, "")?;
+        let frames = frames(&info, given_boxes(&boxes, &path).map_err(given)?);
+        Ok(Self { info, truths: truths.iter().map(|row| row.truth(rules)).collect(), frames })
+    }
+
+    /// Reads all sequences of a folder, in the order of their names. The boxes of `NAME` are
+    /// `BOXES/NAME/det.txt` or `BOXES/NAME.txt`, and without a folder of boxes `NAME/det/det.txt`
+    /// beside the truth.
+    ///
+    /// # Errors
+    /// A folder without sequences, or a file that is missing or wrong.
+    pub fn read_all(folder: &Path, boxes: Option<&Path>) -> Result<Vec<Self>, TrialError> {
+        let shown = folder.display();
+        let entries =
+            fs::read_dir(folder).map_err(|error| given(format!("cannot read {shown}: {error}")))?;
+        let mut folders: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        folders.retain(|folder| folder.join("seqinfo.ini").is_file());
+        folders.sort();
+        if folders.is_empty() {
+            return Err(given(format!("{shown} holds no folder with a seqinfo.ini")));
+        }
+        folders.iter().map(|folder| Self::read(folder, &boxes_of(folder, boxes))).collect()
+    }
+
+    /// Tracks the boxes with a contender. Its detector gets them with the frames, as whole bodies,
+    /// whatever its config says of files.
+    ///
+    /// # Errors
+    /// A config that is wrong, and plugins that fail.
+    pub fn track(
+        &self,
+        contender: &Contender,
+        registry: &Registry,
+    ) -> Result<GivenTracks, TrialError> {
+        let mut pipeline = contender.pipeline(registry, 1)?;
+        let mut tracks = GivenTracks::default();
+        for frame in &self.frames {
+            // Time of this thread alone, so that other load on the machine does not count.
+            let before = ThreadTime::now();
+            let report = pipeline.step(frame).map_err(|error| TrialError::Step {
+                pipeline: contender.name.clone(),
+                seed: 1,
+                error,
+            })?;
+            tracks.worked_ms += 1e3 * before.elapsed().as_secs_f64();
+            tracks.add(&report);
+        }
+        Ok(tracks)
+    }
+
+    /// Scores tracks by the rules of the sequence's truth, IoU 0.5 where a threshold is needed.
+    ///
+    /// # Errors
+    /// Tracks that cannot be scored.
+    pub fn tally(&self, tracks: &GivenTracks) -> Result<Tally, TrialError> {
+        let sequence = self.against_truth(tracks);
+        let comparison = Comparison::from(Similarity::Iou);
+        Ok(Tally::measure(&sequence, &comparison, &SetDistance::default())?)
+    }
+
+    /// Returns the number of its frames.
+    pub fn len(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Returns true for a sequence without frames.
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+
+    fn against_truth(&self, tracks: &GivenTracks) -> Sequence {
+        let mut timeline = Timeline::new();
+        timeline.add_truths(self.truths.iter().cloned());
+        for (frame, report) in &tracks.reports {
+            timeline.frame(*frame).reports.push(*report);
+        }
+        let SequenceInfo { name, length, rate_hz, .. } = &self.info;
+        timeline.into_sequence(name, 1, *length, *rate_hz).0
+    }
+}
+
+impl GivenTracks {
+    /// Formats the tracks as a file of results of the MOTChallenge.
+    pub fn text(&self) -> String {
+        let mut out = Vec::new();
+        for (frame, report) in &self.reports {
+            // Writing to memory does not fail.
+            write_report(&mut out, *frame, report).unwrap_or_default();
+        }
+        String::from_utf8(out).unwrap_or_default()
+    }
+
+    fn add(&mut self, report: &FrameReport) {
+        let seen = report.tracks.iter().filter(|track| track.confirmed && track.seen);
+        self.reports.extend(seen.map(|track| {
+            let Rect { x, y, width, height } = track.estimate.region;
+            let region = Some(tagalong_eval::Region::new(x, y, width, height));
+            let id = i64::from(track.id.0);
+            (report.index as u32, Report { id, region, floor_m: None, score: track.score })
+        }));
+    }
+}
+
+/// Returns a config for given boxes: the detector takes them from the frames instead of a file or a
+/// topic, and as whole bodies. `resolved` is the config with every setting.
+///
+/// # Errors
+/// A config without a detector of recorded boxes.
+pub fn for_given_boxes(resolved: &str) -> Result<String, TrialError> {
+    let mut root: toml::Table = resolved.parse().map_err(given)?;
+    let detectors = root.get_mut("detectors").and_then(toml::Value::as_array_mut);
+    let recorded = detectors
+        .into_iter()
+        .flatten()
+        .filter(|slot| slot.get("plugin").and_then(toml::Value::as_str) == Some(RECORDED));
+    let mut changed = false;
+    for config in recorded.filter_map(|slot| slot.get_mut("config")?.as_table_mut()) {
+        config.insert("path".into(), "".into());
+        config.insert("body".into(), WHOLE_BODIES.into());
+        changed = true;
+    }
+    if !changed {
+        return Err(given(format!("the config has no detector `{RECORDED}`, which reads boxes")));
+    }
+    toml::to_string(&root).map_err(given)
+}
+
+/// Returns the file with the boxes of a sequence.
+fn boxes_of(folder: &Path, boxes: Option<&Path>) -> PathBuf {
+    let name = folder.file_name().unwrap_or_default();
+    let Some(boxes) = boxes else { return folder.join("det/det.txt") };
+    let own_folder = boxes.join(name).join("det.txt");
+    if own_folder.is_file() {
+        return own_folder;
+    }
+    boxes.join(format!("{}.txt", name.to_string_lossy()))
+}
+
+/// Returns the path of a file as messages show it, and its text.
+fn text(folder: &Path, name: &str) -> Result<(String, String), TrialError> {
+    let path = if name.is_empty() { folder.to_owned() } else { folder.join(name) };
+    let shown = path.display().to_string();
+    match fs::read_to_string(&path) {
+        Ok(text) => Ok((shown, text)),
+        Err(error) => Err(given(format!("cannot read {shown}: {error}"))),
+    }
+}
+
+fn given_boxes(
+    text: &str,
+    file: &str,
+) -> Result<BTreeMap<u32, Vec<ExternalDetection>>, FormatError> {
+    let mut boxes: BTreeMap<u32, Vec<ExternalDetection>> = BTreeMap::new();
+    for row in mot::parse(text, file)? {
+        let region = Rect::new(row.region.x, row.region.y, row.region.width, row.region.height);
+        let recorded =
+            ExternalDetection { region: Some(region), head: None, score: row.confidence };
+        boxes.entry(row.frame).or_default().push(recorded);
+    }
+    Ok(boxes)
+}
+
+/// Returns frames with a stamp each and without images, and a camera with the size of the images (a
+/// field of view of 53 degrees, at breast height).
+fn frames(info: &SequenceInfo, mut boxes: BTreeMap<u32, Vec<ExternalDetection>>) -> Vec<Frame> {
+    let (width, height) = (info.width as usize, info.height as usize);
+    let lens = Pinhole {
+        fx: width as f64,
+        fy: width as f64,
+        cx: 0.5 * width as f64,
+        cy: 0.5 * height as f64,
+        distortion: Distortion::None,
+    };
+    let camera = Arc::new(Camera::mounted(lens, width, height, 1.2, 0.0, 0.0));
+    let dt = 1.0 / info.rate_hz;
+    let frame = |index: u32| {
+        let stamp = Stamp::default().plus_seconds(f64::from(index) * dt);
+        let motion = EgoMotion::at_rest(dt);
+        let frame = Frame::new(index.into(), stamp, Arc::clone(&camera), motion, Images::default());
+        frame.with_recorded(Some(boxes.remove(&index).unwrap_or_default()))
+    };
+    (1..=info.length).map(frame).collect()
+}
+
+fn given(error: impl ToString) -> TrialError {
+    TrialError::Given(error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_eval::Role;
+
+    use super::*;
+
+    const INFO: &str = "[Sequence]\nname=Walk-1\nframeRate=10\nseqLength=3\nimWidth=640\n\
+                        imHeight=480\n";
+
+    fn folder() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("Walk-1");
+        fs::create_dir_all(path.join("gt")).unwrap();
+        fs::create_dir_all(path.join("det")).unwrap();
+        fs::write(path.join("seqinfo.ini"), INFO).unwrap();
+        fs::write(path.join("gt/gt.txt"), "1,1,10,10,20,60,1,-1,-1,-1\n").unwrap();
+        fs::write(path.join("det/det.txt"), "2,-1,10,10,20,60,0.9\n").unwrap();
+        folder
+    }
+
+    #[test]
+    fn each_frame_has_its_boxes_and_its_time() {
+        let folder = folder();
+        let all = GivenSequence::read_all(folder.path(), None).unwrap();
+        assert_eq!((all.len(), all[0].len(), all[0].is_empty()), (1, 3, false));
+        let counts: Vec<usize> =
+            all[0].frames.iter().map(|frame| frame.recorded().unwrap().len()).collect();
+        assert_eq!(counts, [0, 1, 0]);
+        let stamps: Vec<u64> = all[0].frames.iter().map(|frame| frame.stamp.nanos()).collect();
+        assert_eq!(stamps, [100_000_000, 200_000_000, 300_000_000]);
+        assert_eq!(all[0].truths[0].1.role, Role::Counts);
+    }
+
+    #[test]
+    fn boxes_may_lie_elsewhere() {
+        let folder = folder();
+        let other = folder.path().join("other");
+        fs::create_dir_all(other.join("Walk-1")).unwrap();
+        let read = || GivenSequence::read_all(folder.path(), Some(&other));
+        assert!(read().unwrap_err().to_string().contains("Walk-1.txt"));
+        fs::write(other.join("Walk-1.txt"), "").unwrap();
+        assert_eq!(read().unwrap()[0].frames[1].recorded().unwrap().len(), 0);
+        fs::write(other.join("Walk-1/det.txt"), "3,-1,1,1,9,9,0.5\n").unwrap();
+        assert_eq!(read().unwrap()[0].frames[2].recorded().unwrap()[0].score, 0.5);
+    }
+
+    #[test]
+    fn a_folder_that_holds_none_is_an_error() {
+        let empty = tempfile::tempdir().unwrap();
+        let error = GivenSequence::read_all(empty.path(), None).unwrap_err();
+        assert!(error.to_string().contains("seqinfo.ini"), "{error}");
+    }
+
+    #[test]
+    fn the_detector_of_a_config_takes_whole_bodies_from_the_frames() {
+        let config = "[[detectors]]\nplugin = 'recorded-detections'\n\
+                      config = { path = 'x/det.txt', body = 'upper', min_score = 0.4 }\n";
+        let root: toml::Table = for_given_boxes(config).unwrap().parse().unwrap();
+        let detector = &root["detectors"][0]["config"];
+        assert_eq!(
+            (detector["path"].as_str(), detector["body"].as_str()),
+            (Some(""), Some("full-box"))
+        );
+        assert_eq!(detector["min_score"].as_float(), Some(0.4));
+        let none = for_given_boxes("[[detectors]]\nplugin = 'other'\n").unwrap_err();
+        assert!(none.to_string().contains("recorded-detections"), "{none}");
+    }
+
+    #[test]
+    fn tracks_are_written_as_the_challenge_reads_them() {
+        let region = Some(tagalong_eval::Region::new(1.0, 2.0, 3.0, 4.0));
+        let report = Report { id: 7, region, floor_m: None, score: 0.5 };
+        let tracks = GivenTracks { reports: vec![(2, report)], ..GivenTracks::default() };
+        let rows = mot::parse_tracks(&tracks.text(), "tracks").unwrap();
+        assert_eq!((rows.len(), rows[0].frame, rows[0].id), (1, 2, 7));
+        assert_eq!(rows[0].region.width, 3.0);
+    }
+}

@@ -1,0 +1,254 @@
+use tagalong_assignment::{
+    ObservationMemory, Staged, best_of, buffered_iou, is_strong, probability,
+};
+use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
+use tagalong_geometry::Rect;
+
+use crate::{Config, Motion};
+
+/// The associator.
+pub struct Buffered {
+    config: Config,
+    memory: ObservationMemory,
+}
+
+/// Enlargement of boxes, and the overlap that they need.
+#[derive(Clone, Copy)]
+struct Reach {
+    buffer: f64,
+    min_overlap: f64,
+}
+
+impl Buffered {
+    /// Creates the associator.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        config.check()?;
+        let memory = ObservationMemory::new(config.motion_frames);
+        Ok(Self { config, memory })
+    }
+
+    fn is_strong(&self, detection: &Detection) -> bool {
+        is_strong(detection, self.config.strong_log_odds)
+    }
+
+    /// Returns the box at which a track is expected.
+    fn expected(&self, track: &Track) -> Rect {
+        let observed = match self.config.motion {
+            Motion::Observed => self.memory.expected(track.id),
+            Motion::Predicted => None,
+        };
+        observed.unwrap_or(track.estimate.region)
+    }
+
+    fn first(&self) -> Reach {
+        Reach { buffer: self.config.buffer, min_overlap: self.config.min_overlap }
+    }
+
+    fn second(&self) -> Reach {
+        Reach { buffer: self.config.second_buffer, min_overlap: self.config.second_overlap }
+    }
+
+    fn weak(&self) -> Reach {
+        Reach { buffer: self.config.second_buffer, min_overlap: self.config.weak_overlap }
+    }
+
+    /// Returns the overlap of the enlarged boxes, if it is enough.
+    fn overlap(&self, track: &Track, detection: &Detection, reach: Reach) -> Option<f64> {
+        let overlap = buffered_iou(&self.expected(track), &detection.rect()?, reach.buffer);
+        (overlap >= reach.min_overlap).then_some(overlap)
+    }
+}
+
+impl Associator for Buffered {
+    fn fits(&self, track: &Track, detection: &Detection, _: &Gate) -> bool {
+        let fits = |reach| self.overlap(track, detection, reach).is_some();
+        if self.is_strong(detection) {
+            fits(self.first()) || fits(self.second())
+        } else {
+            fits(self.weak())
+        }
+    }
+
+    fn associate(
+        &mut self,
+        tracks: &[Track],
+        detections: &[Detection],
+        gate: &Gate,
+    ) -> Associations {
+        self.memory.begin(tracks, gate.dt_s);
+        let this = &*self;
+        let strong = |at: usize| this.is_strong(&detections[at]);
+        let similarity = |reach: Reach| {
+            move |row: usize, column: usize| {
+                let (track, detection) = (&tracks[row], &detections[column]);
+                let overlap = this.overlap(track, detection, reach)?;
+                let overlap = best_of(overlap, gate.appearance_of(row, column));
+                let certainty = probability(detection.score);
+                let counted =
+                    if this.config.weigh_by_score { overlap * certainty } else { overlap };
+                gate.admits(track, detection).then_some(counted)
+            }
+        };
+        let mut staged = Staged::new(tracks.len(), detections.len());
+        for confirmed in [true, false] {
+            let turn =
+                |at: usize| !this.config.confirmed_first || tracks[at].confirmed == confirmed;
+            staged.assign(&staged.open(turn, strong), similarity(this.first()));
+            staged.assign(&staged.open(turn, strong), similarity(this.second()));
+            staged.assign(&staged.open(turn, |at| !strong(at)), similarity(this.weak()));
+        }
+        let spent = staged.left(|at| !strong(at));
+        for (track, given) in tracks.iter().zip(staged.given()) {
+            if let Some(region) = given.and_then(|given| detections[given].rect()) {
+                self.memory.record(track.id, region);
+            }
+        }
+        Associations { spent, ..Associations::one_to_one(staged.given().iter().copied()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+    use tagalong_config::Registry;
+    use tagalong_core::{Estimate, Person, TrackId};
+    use tagalong_geometry::ImageBox;
+
+    use super::*;
+
+    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: -9.0, appearance: &[] };
+
+    fn at(x: f64) -> Rect {
+        Rect::new(x, 0.0, 20.0, 40.0)
+    }
+
+    fn detection(x: f64, score: f64) -> Detection {
+        Detection {
+            image: Some(ImageBox::full_body(at(x))),
+            position: Point3::new(3.0, 0.0, 1.6),
+            covariance: Matrix3::identity() * 0.01,
+            score,
+            source: "test",
+        }
+    }
+
+    fn track(id: u32, x: f64) -> Track {
+        let person = Person { position: Point3::new(3.0, 0.0, 1.6), velocity: Vector2::zeros() };
+        let estimate = Estimate { person, covariance: SMatrix::identity(), region: at(x) };
+        Track {
+            id: TrackId(id),
+            estimate,
+            seen: true,
+            occluded: false,
+            confirmed: true,
+            age: 9,
+            unseen_s: 0.0,
+            score: 2.0,
+        }
+    }
+
+    fn answer(config: &Config, tracks: &[Track], found: &[Detection]) -> Associations {
+        Buffered::new(config.clone()).unwrap().associate(tracks, found, &GATE)
+    }
+
+    fn pairs(answer: &Associations) -> Vec<(usize, usize)> {
+        answer.pairs.iter().map(|pair| (pair.track, pair.detection)).collect()
+    }
+
+    #[test]
+    fn the_promises_of_associators_are_kept() {
+        let mut registry = Registry::default();
+        crate::register(&mut registry);
+        let failures = tagalong_conformance::check_all(&registry);
+        assert!(failures.is_empty(), "{failures:#?}");
+    }
+
+    /// The boxes touch no more; enlarged by 0.6 widths on each side they share 22 of 66 pixels.
+    #[test]
+    fn boxes_that_do_not_overlap_are_enlarged() {
+        let with = |buffer: f64| {
+            let config = Config { buffer, second_buffer: buffer, ..Config::default() };
+            pairs(&answer(&config, &[track(1, 0.0)], &[detection(21.0, 3.0)]))
+        };
+        assert_eq!((with(0.1), with(0.6)), (vec![], vec![(0, 0)]));
+    }
+
+    /// Both detections are within reach of the first track in the second stage; the nearer one goes
+    /// to it in the first stage, the farther one to the other track.
+    #[test]
+    fn the_wider_stage_gets_those_that_are_left() {
+        let config = Config { buffer: 0.1, second_buffer: 0.8, ..Config::default() };
+        let tracks = [track(1, 0.0), track(2, 60.0)];
+        let found = [detection(3.0, 3.0), detection(38.0, 3.0)];
+        assert_eq!(pairs(&answer(&config, &tracks, &found)), [(0, 0), (1, 1)]);
+        let one = Config { second_overlap: 1.5, ..config };
+        assert_eq!(pairs(&answer(&one, &tracks, &found)), [(0, 0)]);
+    }
+
+    /// The track goes 8 pixels a frame; the filter has not noticed.
+    #[test]
+    fn a_track_is_expected_by_the_mean_velocity_of_its_observations() {
+        let after = |motion: Motion| {
+            let config = Config { motion, buffer: 0.0, second_buffer: 0.0, ..Config::default() };
+            let mut associator = Buffered::new(config).unwrap();
+            for frame in 1..=3 {
+                let x = 8.0 * f64::from(frame);
+                associator.associate(&[track(1, x - 8.0)], &[detection(x, 3.0)], &GATE);
+            }
+            associator.associate(&[track(1, 0.0)], &[], &GATE);
+            pairs(&associator.associate(&[track(1, 0.0)], &[detection(40.0, 3.0)], &GATE))
+        };
+        assert_eq!(after(Motion::Observed), [(0, 0)]);
+        assert_eq!(after(Motion::Predicted), []);
+    }
+
+    #[test]
+    fn a_weak_detection_continues_a_track_and_starts_none() {
+        let found = [detection(1.0, 0.1), detection(90.0, 0.1)];
+        let with = |weak_overlap: f64| {
+            let config = Config { weak_overlap, ..Config::default() };
+            let answer = answer(&config, &[track(1, 0.0)], &found);
+            (pairs(&answer), answer.spent)
+        };
+        assert_eq!(with(0.5), (vec![(0, 0)], vec![1]));
+        assert_eq!(with(1.5), (vec![], vec![0, 1]));
+    }
+
+    #[test]
+    fn confirmed_tracks_may_go_first() {
+        let tracks = [track(1, 6.0), Track { confirmed: false, ..track(2, 0.0) }];
+        let with = |confirmed_first: bool| {
+            let config = Config { confirmed_first, ..Config::default() };
+            pairs(&answer(&config, &tracks, &[detection(0.0, 3.0)]))
+        };
+        assert_eq!((with(false), with(true)), (vec![(1, 0)], vec![(0, 0)]));
+    }
+
+    #[test]
+    fn overlap_may_count_by_the_score() {
+        let found = [detection(0.0, 0.5), detection(2.0, 5.0)];
+        let with = |weigh_by_score: bool| {
+            let config = Config { weigh_by_score, ..Config::default() };
+            pairs(&answer(&config, &[track(1, 0.0)], &found))
+        };
+        assert_eq!((with(false), with(true)), (vec![(0, 0)], vec![(0, 1)]));
+    }
+
+    #[test]
+    fn settings_that_cannot_work_are_refused() {
+        for config in [
+            Config { buffer: -0.1, ..Config::default() },
+            Config { min_overlap: 0.0, ..Config::default() },
+            Config { second_buffer: f64::NAN, ..Config::default() },
+            Config { second_overlap: 3.0, ..Config::default() },
+            Config { motion_frames: 0, ..Config::default() },
+            Config { strong_log_odds: f64::NAN, ..Config::default() },
+            Config { weak_overlap: 0.0, ..Config::default() },
+        ] {
+            assert!(Buffered::new(config.clone()).is_err(), "{config:?}");
+        }
+    }
+}
