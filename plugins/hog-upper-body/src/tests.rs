@@ -328,7 +328,7 @@ proptest! {
         step in 0.4..4.0f64, x in -40.0..60.0f64, y in -40.0..50.0f64,
     ) {
         let image = noise(57, 43, 8);
-        for (index, value) in resampled(&image, (x, y), step, 1).iter().enumerate().step_by(7) {
+        for (index, value) in resampled(&image, (x, y), step, [1, 1]).iter().enumerate().step_by(7) {
             let (i, j) = ((index % 10) as f64 + 0.5, (index / 10) as f64 + 0.5);
             let slow = slow_sample(&image, (x + i * step, y + j * step), step);
             prop_assert!((f64::from(*value) - slow).abs() < 0.02, "{index}: {value} {slow}");
@@ -357,7 +357,7 @@ proptest! {
             prop_assert_eq!(is_inside(&square), is, "{} {}: {:?}", x, y, square);
             prop_assert_eq!((square.width, square.height), (side, side));
             // The window begins at its cell, of 8 pixels of the resampled image.
-            let (window, cell) = (crate::window_of(&square), side / (0.5 * WINDOW_PX as f64) * 8.0);
+            let (window, cell) = (crate::window_of(&square, Coverage::UpperBody), side / (0.5 * WINDOW_PX as f64) * 8.0);
             prop_assert!((window.x - x as f64 * cell).abs() < 1e-9);
             prop_assert!((window.y - y as f64 * cell).abs() < 1e-9);
             prop_assert!((window.width - 2.0 * side).abs() < 1e-9);

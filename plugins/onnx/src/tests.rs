@@ -178,8 +178,7 @@ fn the_preparation_is_that_of_the_family_but_for_the_settings() {
 
 #[test]
 fn settings_of_boxes_and_words_stand_beside_the_others() {
-    let text =
-        "{ family = 'rt-detr', colours = 'auto', fit = 'top-left', height_m = 1.6, every = 2 }";
+    let text = "{ family = 'rt-detr', colours = 'auto', fit = 'top-left', height_m = 1.6 }";
     let read = |text: &str| {
         let value = toml::de::DeValue::parse(text).unwrap();
         parse_settings::<Config>(Some(value)).map_err(|error| error.message)
@@ -188,7 +187,6 @@ fn settings_of_boxes_and_words_stand_beside_the_others() {
         family: OrAuto::Chosen(Family::RtDetr),
         fit: OrAuto::Chosen(Fit::TopLeft),
         boxes: BoxSettings { height_m: 1.6, ..BoxSettings::default() },
-        every: 2,
         ..Config::default()
     };
     assert_eq!(read(text), Ok(expected));

@@ -429,6 +429,7 @@ fn rounded(value: f64) -> toml::Value {
 mod tests {
     use super::*;
     use crate::ROUND;
+    use crate::trees::channel_numbers;
 
     #[test]
     fn whoever_is_found_may_be_as_far_behind_as_one_was_behind_the_others() {
@@ -458,11 +459,16 @@ mod tests {
             values: [yes, yes, -0.125, -0.125],
         };
         let rounds = [[tree(-0.375); ROUND], [tree(-0.125); ROUND]].concat();
-        Model { machine: Machine::Trees(Trees::new(rounds, HOPELESS)), slope: 1.0, offset: 0.0 }
+        of_trees(Trees::new(rounds, HOPELESS))
+    }
+
+    fn of_trees(trees: Trees) -> Model {
+        let machine = Machine::Trees(trees);
+        Model { machine, coverage: Coverage::UpperBody, slope: 1.0, offset: 0.0, depth: None }
     }
 
     fn numbers(first: f32) -> Vec<f32> {
-        let mut numbers = vec![0.0; crate::trees::CHANNEL_NUMBERS];
+        let mut numbers = vec![0.0; channel_numbers(Coverage::UpperBody)];
         numbers[0] = first;
         numbers
     }
@@ -470,7 +476,7 @@ mod tests {
     #[test]
     fn trees_reject_as_early_as_the_people_of_the_calibration_allow() {
         let least = |people: Vec<(Use, Vec<f32>)>| {
-            let mut trainer = HogTrainer::new(Kind::Trees, Training::default(), 1).unwrap();
+            let mut trainer = HogTrainer::new(Kind::Trees.into(), Training::default(), 1).unwrap();
             trainer.people = people;
             let mut model = trees();
             trainer.hurry(&mut model);
@@ -488,7 +494,7 @@ mod tests {
         let mut model =
             Model { machine: Machine::Linear { weights: vec![], bias: 0.0 }, ..trees() };
         let before = model.clone();
-        let trainer = HogTrainer::new(Kind::Linear, Training::default(), 1).unwrap();
+        let trainer = HogTrainer::new(Kind::Linear.into(), Training::default(), 1).unwrap();
         trainer.hurry(&mut model);
         assert_eq!(model, before, "a weighted sum has no rounds");
     }
@@ -498,12 +504,8 @@ mod tests {
     fn people_that_are_missed_anyway_do_not_hold_the_trees_up() {
         let tree =
             crate::Tree { numbers: [0; 3], below: [0.5; 3], values: [-2.0, -2.0, -0.125, -0.125] };
-        let mut model = Model {
-            machine: Machine::Trees(Trees::new(vec![tree; ROUND], HOPELESS)),
-            slope: 1.0,
-            offset: 0.0,
-        };
-        let mut trainer = HogTrainer::new(Kind::Trees, Training::default(), 1).unwrap();
+        let mut model = of_trees(Trees::new(vec![tree; ROUND], HOPELESS));
+        let mut trainer = HogTrainer::new(Kind::Trees.into(), Training::default(), 1).unwrap();
         let person = |first: f32| (Use::Calibration, numbers(first));
         trainer.people = vec![person(1.0), person(1.0), person(0.0)];
         assert!(-16.0 < trainer.near_miss(), "the sum of the last one");
