@@ -132,7 +132,7 @@ pub enum Role {
 pub struct DetectorSettings {
     /// The plugin's name.
     pub plugin: String,
-    /// Its roles: `discover`, `follow`, `weigh`.
+    /// Its roles: `discover`, `track`, `weigh`.
     pub roles: Vec<Role>,
     /// It runs on every n-th frame ...
     pub every: u32,

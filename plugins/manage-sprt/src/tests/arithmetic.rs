@@ -229,7 +229,7 @@ fn free_space_at_its_place_counts_more_than_a_miss_until_the_track_is_supported_
     assert_near(after(Observation::Occluded), 3.0);
     assert_eq!(bench.observe(0.1, Observation::Absent), None);
     bench.observe(0.1, Observation::Absent);
-    assert_eq!(bench.observe(0.1, Observation::Absent), Some("track: evidence"));
+    assert_eq!(bench.observe(0.1, Observation::Absent), Some("track: never moved"));
 }
 
 /// However sure the looks were, a miss lowers the log-odds at once.
