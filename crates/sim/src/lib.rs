@@ -36,6 +36,10 @@
 //!
 //! World coordinates have X along the room, Y across it and Z up, in metres.
 
+// Lanes are walked by index, because each step reads and writes several arrays at the same lane;
+// iterators zipped over all of them would hide the arithmetic.
+#![allow(clippy::needless_range_loop)]
+
 mod behaviour;
 mod body;
 mod gait;
