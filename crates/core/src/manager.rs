@@ -44,8 +44,6 @@ pub enum Observation {
     Updated,
     /// The track is visible, and was searched for without success.
     Missed,
-    /// The track is missed, and depth shows free space where the person is expected.
-    Absent,
     /// The detector that found the track last did not run on this frame.
     NotSearched,
     /// The track is occluded by a nearer track.

@@ -33,7 +33,6 @@
 mod clock;
 mod detections;
 mod duplicates;
-mod free_space;
 mod guarded;
 mod half_hidden;
 mod memo;

@@ -143,7 +143,7 @@ fn shown(
 }
 
 /// Returns samples spread evenly over head, shoulders and trunk.
-pub(crate) fn silhouette(region: &Rect) -> impl Iterator<Item = Point2<f64>> {
+fn silhouette(region: &Rect) -> impl Iterator<Item = Point2<f64>> {
     let region = *region;
     let step = 1.0 / SAMPLES as f64;
     let grid = (0..SAMPLES * SAMPLES).map(move |i| {

@@ -94,21 +94,11 @@ pub struct OcclusionSettings {
     /// that. 0: it is not.
     #[schemars(range(min = 0.0))]
     pub body_width_m: f64,
-    /// A missed person is absent if depth shows nothing nearer than this behind the expected
-    /// position, m, and than two standard deviations of its range.
-    #[schemars(range(min = 0.0))]
-    pub free_gap_m: f64,
 }
 
 impl Default for OcclusionSettings {
     fn default() -> Self {
-        Self {
-            min_visible: 0.4,
-            min_gap_m: 0.3,
-            min_gap_sigmas: 3.0,
-            body_width_m: 0.0,
-            free_gap_m: 0.5,
-        }
+        Self { min_visible: 0.4, min_gap_m: 0.3, min_gap_sigmas: 3.0, body_width_m: 0.0 }
     }
 }
 

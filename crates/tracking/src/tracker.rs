@@ -12,7 +12,6 @@ use tagalong_vision::Describer;
 use crate::clock::{Clock, Tick};
 use crate::detections::{DetectionSet, PendingDetection};
 use crate::duplicates::DuplicateFinder;
-use crate::free_space::is_seen_through;
 use crate::half_hidden::inflate_half_hidden;
 use crate::memo::Identities;
 use crate::occlusion::{
@@ -516,11 +515,8 @@ impl Tracker {
         match visibility(region, &person.position, occluders, &frame.camera, settings) {
             Visibility::Hidden => Observation::Occluded,
             Visibility::Outside => Observation::OutOfView,
-            Visibility::Visible if !self.was_searched(due, id) => Observation::NotSearched,
-            Visibility::Visible if is_seen_through(estimate, frame, settings) => {
-                Observation::Absent
-            }
-            Visibility::Visible => Observation::Missed,
+            Visibility::Visible if self.was_searched(due, id) => Observation::Missed,
+            Visibility::Visible => Observation::NotSearched,
         }
     }
 

@@ -38,7 +38,7 @@ impl TrackCount {
         match observation {
             Observation::Detected { log_odds } => self.hit(Some(log_odds), settings),
             Observation::Updated => self.hit(None, settings),
-            Observation::Missed | Observation::Absent => self.miss(dt_s, settings),
+            Observation::Missed => self.miss(dt_s, settings),
             Observation::NotSearched => self.missed_s += dt_s,
             Observation::Occluded => self.clear_misses(),
             Observation::Started | Observation::OutOfView => {}
@@ -94,7 +94,7 @@ impl TrackCount {
             Observation::OutOfView => {
                 (longer_than(settings.left_drop_after_s), "track: left the image")
             }
-            Observation::Missed | Observation::Absent | Observation::NotSearched => {
+            Observation::Missed | Observation::NotSearched => {
                 let long = self.missed_s > settings.drop_after_s
                     || longer_than(settings.occluded_drop_after_s);
                 (long && self.misses >= settings.drop_after_misses, "track: not seen")

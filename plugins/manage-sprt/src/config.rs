@@ -38,10 +38,6 @@ pub struct Config {
     /// Evidence of each of several misses in a row, log-odds.
     #[schemars(range(min = -1e6, max = 0.0))]
     pub miss_log_odds: f64,
-    /// Evidence of each miss in a row in which depth shows free space at the place of the track,
-    /// beside that of the miss, log-odds.
-    #[schemars(range(min = -1e6, max = 0.0))]
-    pub absent_log_odds: f64,
     /// Evidence of a second in which the filter alone supports the track, log-odds per second.
     #[schemars(range(min = -1e6, max = 0.0))]
     pub unverified_log_odds: f64,
@@ -100,7 +96,6 @@ impl Default for Config {
             look_s: 4.0,
             usual: 0.5,
             miss_log_odds: -0.5,
-            absent_log_odds: 0.0,
             unverified_log_odds: -1.0,
             still_log_odds: -0.75,
             max_still: -1.5,

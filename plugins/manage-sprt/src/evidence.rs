@@ -34,8 +34,6 @@ pub(crate) struct Evidence {
     unverified_s: f64,
     missed_s: f64,
     misses: u32,
-    /// Frames in a row in which depth shows free space at its place.
-    absences: u32,
 }
 
 impl Evidence {
@@ -55,7 +53,6 @@ impl Evidence {
             unverified_s: 0.0,
             missed_s: 0.0,
             misses: 0,
-            absences: 0,
         };
         new.confirmed = new.log_odds(config) >= config.confirm_log_odds;
         new
@@ -70,8 +67,7 @@ impl Evidence {
         let looks = self.looks.log_odds(config) - self.clutter;
         let known = (looks + self.motion_log_odds(config)).min(config.max_log_odds);
         let unverified = config.unverified_log_odds * self.unverified_s;
-        let missed = config.miss_log_odds * f64::from(self.misses);
-        known + unverified + missed + config.absent_log_odds * f64::from(self.absences)
+        known + unverified + config.miss_log_odds * f64::from(self.misses)
     }
 
     /// Returns the evidence of the track's motion, or of its absence.
@@ -118,10 +114,9 @@ impl Evidence {
                 self.unverified_s += dt_s;
             }
             Observation::Occluded => self.clear_misses(),
-            Observation::Missed => self.miss(dt_s),
-            Observation::Absent => {
-                self.miss(dt_s);
-                self.absences = self.absences.saturating_add(1);
+            Observation::Missed => {
+                self.missed_s += dt_s;
+                self.misses = self.misses.saturating_add(1);
             }
             Observation::NotSearched => self.missed_s += dt_s,
             Observation::Started | Observation::OutOfView => {}
@@ -143,15 +138,9 @@ impl Evidence {
         self.moved |= self.away >= MOVED_SIGHTINGS && self.looks.places() >= MOVED_PLACES;
     }
 
-    fn miss(&mut self, dt_s: f64) {
-        self.missed_s += dt_s;
-        self.misses = self.misses.saturating_add(1);
-    }
-
     fn clear_misses(&mut self) {
         self.missed_s = 0.0;
         self.misses = 0;
-        self.absences = 0;
     }
 
     /// Returns the test by which the track ends, if it does.
@@ -176,9 +165,7 @@ impl Evidence {
         let (limit_s, test) = match observation {
             Observation::Occluded => (config.occluded_drop_after_s, "track: hidden too long"),
             Observation::OutOfView => (config.left_drop_after_s, "track: left the image"),
-            Observation::Missed | Observation::Absent if self.missed_s > config.drop_after_s => {
-                (0.0, "track: not seen")
-            }
+            Observation::Missed if self.missed_s > config.drop_after_s => (0.0, "track: not seen"),
             Observation::NotSearched => (config.occluded_drop_after_s, "track: not seen"),
             _ => return None,
         };

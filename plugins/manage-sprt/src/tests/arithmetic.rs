@@ -215,23 +215,6 @@ fn misses_count_until_the_track_is_supported_again() {
     assert_near(bench.look(0.1, 3.0, 3.0), 3.3);
 }
 
-#[test]
-fn free_space_at_its_place_counts_more_than_a_miss_until_the_track_is_supported_again() {
-    let config = Config { absent_log_odds: -2.0, end_log_odds: -4.0, ..looks_only() };
-    let mut bench = Bench::new(config, 3.0, 3.0);
-    let mut after = |observation| {
-        bench.observe(0.1, observation);
-        bench.track.score
-    };
-    assert_near(after(Observation::Absent), 0.5);
-    assert_near(after(Observation::Missed), 0.0);
-    assert_near(after(Observation::Absent), -2.5);
-    assert_near(after(Observation::Occluded), 3.0);
-    assert_eq!(bench.observe(0.1, Observation::Absent), None);
-    bench.observe(0.1, Observation::Absent);
-    assert_eq!(bench.observe(0.1, Observation::Absent), Some("track: never moved"));
-}
-
 /// However sure the looks were, a miss lowers the log-odds at once.
 #[test]
 fn misses_count_below_the_bound() {
@@ -344,7 +327,6 @@ fn confirmed_tracks_end_by_the_reason_for_which_they_are_not_seen() {
         (Observation::Occluded, (3.5, "track: hidden too long")),
         (Observation::OutOfView, (2.5, "track: left the image")),
         (Observation::Missed, (1.5, "track: not seen")),
-        (Observation::Absent, (1.5, "track: not seen")),
         (Observation::NotSearched, (3.5, "track: not seen")),
     ] {
         let mut bench = Bench::new(config.clone(), 3.0, 5.0);
