@@ -163,7 +163,7 @@ impl SolidView {
     }
 }
 
-/// How far each ray goes, and the number of the solid that it meets there.
+/// Range of each ray, and the number of the solid that it meets there.
 #[derive(Clone, Copy, Debug)]
 pub struct Met {
     /// Lengths of the ray; infinite where it meets nothing.

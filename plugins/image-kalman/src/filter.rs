@@ -12,7 +12,7 @@ use crate::{Config, State};
 pub struct ImageKalman {
     config: Config,
     states: BTreeMap<TrackId, State>,
-    /// What is needed to filter anew from the last observation of each track on.
+    /// State to filter anew from the last observation of each track on.
     gaps: BTreeMap<TrackId, Gap>,
 }
 
