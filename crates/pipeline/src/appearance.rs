@@ -5,24 +5,11 @@ use std::time::Duration;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_config::OrAuto;
 use tagalong_core::{Error, Frame, Result};
 use tagalong_geometry::Rect;
 use tagalong_network::{Convention, EmbeddingNetwork, Limits, with_colours};
 use tagalong_vision::{Describer, Embedder};
-
-/// Convention of the input of the network.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ConventionChoice {
-    /// That of networks with as many numbers: `omz` for 256, otherwise `osnet`.
-    #[default]
-    Auto,
-    /// Red, green, blue by mean and deviation of ImageNet.
-    #[serde(rename = "osnet")]
-    OsNet,
-    /// Blue, green, red, 0 to 255.
-    Omz,
-}
 
 /// Description of people by a re-identification network, for `[reidentification]`, its
 /// `association_weight` and the target lock. Differences are 1 minus the cosine of two vectors.
@@ -34,7 +21,7 @@ pub struct AppearanceSettings {
     pub model: String,
     /// Convention of its input: `auto` (by the outputs), `osnet` (RGB, mean and deviation of
     /// ImageNet) or `omz` (BGR, 0 to 255).
-    pub convention: ConventionChoice,
+    pub convention: OrAuto<Convention>,
     /// Threads of the network.
     #[schemars(range(min = 1, max = 256))]
     pub threads: usize,
@@ -57,7 +44,7 @@ impl Default for AppearanceSettings {
     fn default() -> Self {
         Self {
             model: String::new(),
-            convention: ConventionChoice::Auto,
+            convention: OrAuto::Auto,
             threads: 1,
             deadline_s: 5.0,
             max_file_mb: 512,
@@ -71,14 +58,6 @@ impl AppearanceSettings {
     /// Returns true if a network describes people.
     pub(crate) fn has_network(&self) -> bool {
         !self.model.is_empty()
-    }
-
-    fn convention(&self) -> Option<Convention> {
-        match self.convention {
-            ConventionChoice::Auto => None,
-            ConventionChoice::OsNet => Some(Convention::OsNet),
-            ConventionChoice::Omz => Some(Convention::Omz),
-        }
     }
 
     fn limits(&self) -> Limits {
@@ -102,7 +81,7 @@ impl AppearanceSettings {
             return Ok(Describer::default());
         }
         let path = base_dir.join(&self.model);
-        let network = EmbeddingNetwork::load(&path, self.convention(), &self.limits());
+        let network = EmbeddingNetwork::load(&path, self.convention.chosen(), &self.limits());
         let network = network.map_err(|why| Error::Model { path: self.model.clone(), why })?;
         let mark = format!("{base_dir:?} {self:?}");
         let embedder = OfNetwork { network, path: self.model.clone() };

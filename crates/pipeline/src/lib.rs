@@ -42,7 +42,7 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use appearance::{AppearanceSettings, ConventionChoice};
+pub use appearance::AppearanceSettings;
 pub use config::{
     DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, RunSettings, Suits, Tunable,
     check_tuning, flattened, with_values,
