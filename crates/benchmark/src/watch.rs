@@ -108,7 +108,7 @@ impl Watch {
         let sequence = assemble(&result.log, truth, shots, self.reports, Rate(1.0));
         result.truth = truth_paths(&sequence, shots);
         score(&sequence, truth, &mut result)?;
-        let size = shots.at(1).map_or((0, 0), |shot| shot.size);
+        let size = shots.at(1).map_or((0, 0), |shot| (shot.camera.width, shot.camera.height));
         let (width, height) = (size.0 as u32, size.1 as u32);
         Ok((result, Recording { sequence, rate_hz: shots.rate_hz(), width, height }))
     }

@@ -2,7 +2,12 @@
 
 use nalgebra::{Matrix3, Point2, Point3};
 
-use crate::{Camera, HEAD_RADIUS_M, Rect};
+use crate::rect::HALF_HEAD_M;
+use crate::{Camera, HEAD_RADIUS_M, Lens, Rect};
+
+/// Heights above the floor at which the top of a head can be, m: from a child who crouches to a
+/// tall person.
+const HEAD_TOPS_M: std::ops::RangeInclusive<f64> = 0.5..=2.2;
 
 /// Position in the robot frame, m, with its covariance, m².
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +85,35 @@ impl Camera {
             covariance: self.covariance(upper_body.centre(), face.head_m(), sigma_px, face.sigma_m),
         }
     }
+
+    /// Returns the centre of the head, in the robot frame, of the person in a box around the whole
+    /// body: its lower border is where the feet touch the floor, its upper border the top of the
+    /// head, at whatever height. `None` if the box reaches the lower border of the image, where the
+    /// feet may be cut off, if no person is as tall as that, and for other lenses than perspective.
+    ///
+    /// ```
+    /// use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+    ///
+    /// let lens =
+    ///     Pinhole { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
+    /// let camera = Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0);
+    /// // Feet 200 rows below the horizon are 3 m away; 1.2 m of height are as many rows there.
+    /// let head = camera.head_above_floor(&Rect::new(270.0, 180.0, 100.0, 260.0)).unwrap();
+    /// assert!((head.x - 3.0).abs() < 1e-9 && (head.z - 1.45).abs() < 0.05);
+    /// ```
+    pub fn head_above_floor(&self, whole_body: &Rect) -> Option<Point3<f64>> {
+        let (column, lowest) = (whole_body.centre().x, whole_body.y + whole_body.height);
+        if !matches!(self.lens, Lens::Pinhole(_)) || lowest >= self.height as f64 - 1.0 {
+            return None;
+        }
+        let eye = self.robot_from_camera.translation.vector;
+        let ray = |row: f64| self.robot_from_camera.rotation * self.ray(Point2::new(column, row));
+        let (to_feet, to_top) = (ray(lowest), ray(whole_body.y));
+        let away_m = (to_feet.z < 0.0).then(|| eye.z / -to_feet.z * to_feet.xy().norm())?;
+        // The head is above the feet, so its ray is followed as far along the floor.
+        let top = eye + to_top * (away_m / to_top.xy().norm());
+        HEAD_TOPS_M.contains(&top.z).then(|| Point3::new(top.x, top.y, top.z - HALF_HEAD_M))
+    }
 }
 
 #[cfg(test)]
@@ -93,6 +127,30 @@ mod tests {
         let lens =
             Pinhole { fx: 500.0, fy: 400.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
         Camera::mounted(lens, 640, 480, 1.2, 0.1, 0.0)
+    }
+
+    #[test]
+    fn a_head_is_found_above_the_feet_whatever_the_posture() {
+        let camera = camera();
+        for (x, y, top) in [(3.0, 0.0, 1.7), (3.2, 0.3, 1.2), (5.0, -0.8, 1.9), (2.5, 0.1, 0.6)] {
+            let [feet, head] = [0.0, top].map(|z| camera.project(&Point3::new(x, y, z)).unwrap());
+            let whole = Rect::new(feet.x - 40.0, head.y, 80.0, feet.y - head.y);
+            let found = camera.head_above_floor(&whole).unwrap();
+            let true_head = Point3::new(x, y, top - HALF_HEAD_M);
+            assert!((found - true_head).norm() < 0.03, "{found} {true_head}");
+        }
+    }
+
+    #[test]
+    fn a_box_that_cannot_stand_on_the_floor_has_no_head() {
+        let camera = camera();
+        let none = |x: f64, y: f64, width: f64, height: f64| {
+            camera.head_above_floor(&Rect::new(x, y, width, height)).is_none()
+        };
+        assert!(none(300.0, 100.0, 80.0, 379.5), "cut off below");
+        assert!(none(300.0, 10.0, 80.0, 100.0), "above the horizon");
+        assert!(none(300.0, 300.0, 20.0, 30.0), "no person is so small");
+        assert!(none(300.0, 0.0, 80.0, 310.0), "no person is so tall");
     }
 
     proptest! {

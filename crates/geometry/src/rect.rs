@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use crate::{HEAD_BELOW_TOP_M, UPPER_BODY_SIDE_M};
 
 /// Distance from the centre of a head to its top, m.
-const HALF_HEAD_M: f64 = 0.115;
+pub(crate) const HALF_HEAD_M: f64 = 0.115;
 
 /// An upright rectangle in an image, in pixels. `x`, `y` is the upper left
 /// corner; it may lie outside the image.

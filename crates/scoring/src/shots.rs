@@ -1,7 +1,9 @@
 use std::path::Path;
+use std::sync::Arc;
 
-use nalgebra::{Isometry2, Isometry3};
+use nalgebra::Isometry2;
 use tagalong_app::outcome::Failure;
+use tagalong_geometry::Camera;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};
 
 use super::Rate;
@@ -13,12 +15,10 @@ pub struct Shot {
     pub number: u32,
     /// Its stamp, ns.
     pub stamp_ns: u64,
-    /// Pose of the camera in the robot frame.
-    pub robot_from_camera: Isometry3<f64>,
+    /// The camera, with its pose in the robot frame.
+    pub camera: Arc<Camera>,
     /// Pose of the robot in the odometry frame.
     pub odom_from_robot: Isometry2<f64>,
-    /// Columns and rows of the image.
-    pub size: (usize, usize),
 }
 
 impl Shot {
@@ -28,9 +28,8 @@ impl Shot {
         Self {
             number: u32::try_from(frame.index).unwrap_or(u32::MAX),
             stamp_ns: frame.stamp.nanos(),
-            robot_from_camera: frame.camera.robot_from_camera,
+            camera: Arc::clone(&frame.camera),
             odom_from_robot: item.odom_from_robot,
-            size: (frame.camera.width, frame.camera.height),
         }
     }
 }
@@ -141,17 +140,25 @@ impl Shots {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Isometry3;
+    use tagalong_geometry::Lens;
+
     use super::*;
 
     fn shots(frames: &[(u32, u64)]) -> Shots {
+        let camera = Arc::new(Camera {
+            lens: Lens::Blind,
+            width: 4,
+            height: 3,
+            robot_from_camera: Isometry3::identity(),
+        });
         let mut shots = Shots::default();
         for &(number, stamp_ns) in frames {
             shots.push(Shot {
                 number,
                 stamp_ns,
-                robot_from_camera: Isometry3::identity(),
+                camera: Arc::clone(&camera),
                 odom_from_robot: Isometry2::identity(),
-                size: (4, 3),
             });
         }
         shots

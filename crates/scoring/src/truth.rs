@@ -7,7 +7,7 @@ use tagalong_app::outcome::Failure;
 use tagalong_eval::formats::mot::{self, SequenceInfo};
 use tagalong_eval::formats::{Timeline, kitti, people};
 use tagalong_eval::{Region, Role, Truth};
-use tagalong_geometry::{HEAD_RADIUS_M, Rect};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
 
 use super::{Shots, odd_labels, read_text, region, without_area};
@@ -40,7 +40,7 @@ pub enum RulesChoice {
 pub struct TruthOptions {
     /// Rules of MOTChallenge text.
     pub rules: RulesChoice,
-    /// True if boxes are of whole standing people: their upper bodies are compared.
+    /// True if boxes are of whole people: their upper bodies are compared.
     pub upper_body: bool,
 }
 
@@ -76,6 +76,8 @@ struct Annotated {
 pub struct TruthFile {
     kind: Kind,
     frames: BTreeMap<u64, Annotated>,
+    /// True if its boxes are cut to upper bodies.
+    whole_bodies: bool,
     /// The `seqinfo.ini` beside it.
     pub info: Option<SequenceInfo>,
     /// Rules that its rows were read with, if it is MOTChallenge text.
@@ -97,14 +99,13 @@ impl TruthFile {
             Kind::Kitti => Self::of_kitti(path)?,
             Kind::Mot => Self::of_mot(path, options.rules)?,
         };
-        if options.upper_body {
-            truth.cut_to_upper_bodies();
-        }
+        truth.whole_bodies = options.upper_body;
         Ok(truth)
     }
 
     fn empty(kind: Kind) -> Self {
-        Self { kind, frames: BTreeMap::new(), info: None, rules: None, notes: Vec::new() }
+        let (frames, notes) = (BTreeMap::new(), Vec::new());
+        Self { kind, frames, whole_bodies: false, info: None, rules: None, notes }
     }
 
     fn add(&mut self, key: u64, truth: Truth, place: TruthPosition) {
@@ -185,15 +186,6 @@ impl TruthFile {
         file
     }
 
-    fn cut_to_upper_bodies(&mut self) {
-        for (truth, _) in self.frames.values_mut().flat_map(|frame| &mut frame.people) {
-            truth.region = truth.region.map(|whole| {
-                let whole = Rect::new(whole.x, whole.y, whole.width, whole.height);
-                region(&whole.upper_body_of_standing(STANDING_HEIGHT_M))
-            });
-        }
-    }
-
     /// Returns true if the rules of KITTI apply.
     pub fn is_kitti(&self) -> bool {
         self.kind == Kind::Kitti
@@ -234,16 +226,34 @@ impl TruthFile {
         }
     }
 
+    /// Returns the box of a person that is compared with those of tracks. The upper body of a
+    /// person whose feet are in the image is where the floor says, crouching or upright; that of
+    /// others is that of a standing person.
+    fn compared(&self, annotated: Region, camera: Option<&Camera>) -> Region {
+        if !self.whole_bodies {
+            return annotated;
+        }
+        let Region { x, y, width, height } = annotated;
+        let whole = Rect::new(x, y, width, height);
+        let on_floor = camera.and_then(|camera| {
+            let head = camera.head_above_floor(&whole)?;
+            Some(camera.upper_body(&head))
+        });
+        region(&on_floor.unwrap_or_else(|| whole.upper_body_of_standing(STANDING_HEIGHT_M)))
+    }
+
     /// Returns the people by the number of the frame, on the floor where that is possible.
     pub fn frames(&self, shots: &Shots) -> BTreeMap<u32, People> {
         let mut all = BTreeMap::new();
         for (key, frame) in &self.frames {
             let Some(number) = self.number(*key, shots) else { continue };
-            let pose = shots.at(number).map(|shot| &shot.robot_from_camera);
-            let people = frame
-                .people
-                .iter()
-                .map(|(truth, place)| Truth { floor_m: place.on_floor(pose), ..*truth });
+            let camera = shots.at(number).map(|shot| &*shot.camera);
+            let pose = camera.map(|camera| &camera.robot_from_camera);
+            let people = frame.people.iter().map(|(truth, place)| Truth {
+                floor_m: place.on_floor(pose),
+                region: truth.region.map(|region| self.compared(region, camera)),
+                ..*truth
+            });
             all.insert(number, (people.collect(), frame.ignore_regions.clone()));
         }
         all
@@ -310,4 +320,43 @@ fn sequence_info(truth: &Path) -> Result<Option<SequenceInfo>, Failure> {
     };
     let text = read_text(&path)?;
     mot::parse_info(&text, &path.display().to_string()).map(Some).map_err(Failure::failed)
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.0, 0.0, 0.0)
+    }
+
+    #[test]
+    fn the_upper_body_of_a_person_who_crouches_is_as_large_as_that_of_one_upright() {
+        let file = TruthFile { whole_bodies: true, ..TruthFile::empty(Kind::Mot) };
+        let whole = |top: f64| {
+            let [feet, head] =
+                [0.0, top].map(|z| camera().project(&Point3::new(3.0, 0.0, z)).unwrap().y);
+            Region { x: 280.0, y: head, width: 80.0, height: feet - head }
+        };
+        let [upright, crouching] =
+            [1.75, 1.1].map(|top| file.compared(whole(top), Some(&camera())));
+        assert!((upright.width - crouching.width).abs() < 1.0, "{upright:?} {crouching:?}");
+        // Without a camera it is that of a small person upright.
+        let guessed = file.compared(whole(1.1), None);
+        assert!(guessed.width < 0.7 * crouching.width, "{guessed:?} {crouching:?}");
+        // Upright the two rules agree.
+        let guessed = file.compared(whole(1.7), None);
+        let on_floor = file.compared(whole(1.7), Some(&camera()));
+        assert!((guessed.width / on_floor.width - 1.0).abs() < 0.06, "{guessed:?} {on_floor:?}");
+    }
+
+    #[test]
+    fn boxes_of_upper_bodies_stay_as_they_are() {
+        let region = Region { x: 1.0, y: 2.0, width: 3.0, height: 4.0 };
+        assert_eq!(TruthFile::empty(Kind::Mot).compared(region, Some(&camera())), region);
+    }
 }

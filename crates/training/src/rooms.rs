@@ -55,7 +55,7 @@ pub fn scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene, Conf
     let seed = split.seed(number)?;
     let mut scene = match (is_room, kind) {
         (true, CameraKind::Rgbd) => colour_room(split, number, look)?,
-        (true, CameraKind::Stereo) => room(seed, (turn % 4) as usize),
+        (true, _) => room(seed, (turn % 4) as usize),
         (false, _) => {
             let text = SUITES[(turn % SUITES.len() as u64) as usize];
             Scene::parse_with(text, &Variant::of_seed(seed))?
