@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::session::TRAIN_LOGS;
+
 /// Arguments of `tagalong train`.
 #[derive(Args, Debug)]
 pub struct TrainArgs {
@@ -34,6 +36,10 @@ pub struct TrainArgs {
     /// those of `depth-ekf` and `stereo-verified` with low thresholds.
     #[arg(long, value_name = "CONFIG")]
     pub proposes: Option<PathBuf>,
+    /// Leaves out an annotated log of a verifier's training data, for a model that has not seen its
+    /// room; may be given several times.
+    #[arg(long, value_name = "LOG", value_parser = clap::builder::PossibleValuesParser::new(TRAIN_LOGS))]
+    pub without: Vec<String>,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

@@ -41,7 +41,7 @@ pub struct Card {
     pub fit: toml::Table,
     /// Scores in held-out rooms.
     pub held_out_rooms: Effect,
-    /// Scores on real logs, each with the model that has not seen its room.
+    /// Scores on held-out logs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out_logs: Option<Effect>,
 }
@@ -69,8 +69,7 @@ impl Card {
     pub fn to_text(&self) -> Result<String, Failure> {
         let text = to_toml("the card", self)?;
         Ok(format!(
-            "# Shares come with 95 % intervals (Wilson), too narrow for sightings, which are not independent.\n\
-             # Held-out logs are those trained on, each with the model that has not seen its room.\n{text}"
+            "# Shares come with 95 % intervals (Wilson), too narrow for sightings, which are not independent.\n{text}"
         ))
     }
 

@@ -1,7 +1,7 @@
 //! Training of detectors on whole frames: simulated depth, and annotated logs of real rooms, each
 //! of which is left out once.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Point2, Point3};
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
@@ -17,13 +17,22 @@ use tagalong_sim::{Split, Truth};
 use tagalong_trials::Draw;
 
 use super::args::TrainArgs;
-use super::real_rooms::{ROOMS, without};
 use super::rooms::ImageTiming;
 use super::session::{Session, write};
 use super::wide_rooms::wide_scene;
 
 /// Name of the detector that is trained on frames.
 pub const NAME: &str = "depth-net";
+
+/// Real rooms, and their logs.
+const ROOMS: [(&str, &str); 6] = [
+    ("um and filinha", "um"),
+    ("um and filinha", "filinha"),
+    ("lab2", "lab2-camera1"),
+    ("lab2", "lab2-camera2"),
+    ("corredor1", "corredor1-camera1"),
+    ("uc3m", "uc3m-single-frames"),
+];
 
 /// Scenes without `--scenes`, and in a quick training.
 const SCENES: [u64; 2] = [400, 12];
@@ -98,6 +107,12 @@ pub(super) fn room_logs() -> impl Iterator<Item = String> {
 /// A file that cannot be written: exit code 1.
 pub(super) fn write_left_out(model: &Path, left_out: &[(String, String)]) -> Result<(), Failure> {
     left_out.iter().try_for_each(|(room, text)| write(&without(model, room), text))
+}
+
+/// Returns the path of the model that has not seen a room.
+fn without(model: &Path, room: &str) -> PathBuf {
+    let stem = model.file_stem().unwrap_or_default().to_string_lossy();
+    model.with_file_name(format!("{stem}.without-{}.toml", room.replace(' ', "-")))
 }
 
 fn show_scene(number: u64, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {

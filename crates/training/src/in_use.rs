@@ -14,18 +14,12 @@ const RGBD: &str = include_str!("../../../configs/depth-ekf.toml");
 const STEREO: &str = include_str!("../../../configs/stereo-verified.toml");
 /// Changes of the config for collecting candidates.
 const PROPOSING: &str = include_str!("proposing.toml");
-/// Detector that proposes beside the one in use, where there is a depth image: people whose heads
-/// are above the image, and furniture of their size.
-const BODIES: &str = "plugin = 'depth-net'\nroles = ['track', 'discover']\n\
-    config = { discover_score = 2.0, track_score = -2.0 }";
 
 /// Config in use, without verifiers and controller.
 pub struct InUse {
     config: Table,
     /// True if candidates are wanted that this config would not propose.
     is_lowered: bool,
-    /// True if [`BODIES`] is among those that propose.
-    has_bodies: bool,
 }
 
 impl InUse {
@@ -36,8 +30,7 @@ impl InUse {
     pub fn of(kind: CameraKind) -> Result<Self, Failure> {
         let text = if kind == CameraKind::Stereo { STEREO } else { RGBD };
         let config = text.parse().map_err(Failure::failed)?;
-        let has_bodies = kind == CameraKind::Rgbd;
-        Ok(Self { config: without_verifiers(config), is_lowered: true, has_bodies })
+        Ok(Self { config: without_verifiers(config), is_lowered: true })
     }
 
     /// Returns the config of a file, with its own thresholds, for any camera.
@@ -48,8 +41,7 @@ impl InUse {
         let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
         let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
         let config = text.parse().map_err(|error: toml::de::Error| wrong(error.to_string()))?;
-        let config = without_verifiers(config);
-        Ok(Self { config, is_lowered: false, has_bodies: false })
+        Ok(Self { config: without_verifiers(config), is_lowered: false })
     }
 
     /// Returns the settings for depth from a pair.
@@ -99,11 +91,6 @@ impl InUse {
             settings.extend(low);
         }
         config.extend(low);
-        let detectors = config.get_mut("detectors").and_then(Value::as_array_mut);
-        if let (true, Some(detectors)) = (self.has_bodies, detectors) {
-            let bodies: Table = BODIES.parse().map_err(Failure::failed)?;
-            detectors.push(bodies.into());
-        }
         Ok(config.to_string())
     }
 }
@@ -152,9 +139,6 @@ mod tests {
                 settings.unwrap_or_else(|| Table::new().into())
             };
             let (plain, low) = (of(in_use.plain()), of(in_use.proposing().unwrap()));
-            let proposing: Table = in_use.proposing().unwrap().parse().unwrap();
-            let detectors = proposing["detectors"].as_array().unwrap().len();
-            assert_eq!(detectors, if kind == CameraKind::Rgbd { 2 } else { 1 }, "{kind:?}");
             let cost = |config: &Value| config.get("discover_cost").and_then(Value::as_float);
             assert!(cost(&low) > cost(&plain).or(Some(0.16)));
             assert_eq!(low.get("even_cost"), plain.get("even_cost"), "{kind:?}");

@@ -3,13 +3,11 @@
 //!
 //! A verifier is trained on the proposals of the detector, since these are its later inputs. The
 //! first model is then applied to new rooms, and candidates that it judges wrongly or with a small
-//! margin are added before the next fit. Beside the model of all data, one is fitted for each real
-//! room that has not seen this room.
+//! margin are added before the next fit.
 
 mod args;
 mod card;
 mod faces;
-mod folds;
 mod frames;
 mod held_out;
 mod in_use;
@@ -19,7 +17,6 @@ mod overlap;
 mod panorama;
 mod photos;
 mod plan;
-mod real_rooms;
 mod rooms;
 mod seen;
 mod session;
@@ -27,11 +24,11 @@ mod wide_rooms;
 mod windows;
 
 pub use args::TrainArgs;
-use tagalong_app::outcome::{Ended, Outcome, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_config::{Kind, Registry};
+use tagalong_core::Verifier;
 
 use self::card::Card;
-use self::folds::Folds;
 use self::session::{Session, write};
 
 /// Runs `tagalong train`.
@@ -56,14 +53,21 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     if is_detector || args.plugin == faces::NAME {
         return windows::train(&session, trainer.as_mut());
     }
-    let mut folds = Folds::new(&session)?;
-    for round in 0..=session.plan.rounds {
-        folds.next_round();
-        session.collect_candidates(round, &mut folds)?;
-        folds.fit(&session, round)?;
-    }
     let mut card = Card::new(args, session.plan.scenes[0], session.sources());
-    (card.rounds, card.fit) = (folds.of_all().rounds.clone(), folds.of_all().figures.clone());
+    let mut doubter: Option<Box<dyn Verifier>> = None;
+    for round in 0..=session.plan.rounds {
+        let counts = session.collect_hard_negatives(round, trainer.as_mut(), doubter)?;
+        session.tell(round, "fitting");
+        session.bar.set_length(1000);
+        let fitted = trainer
+            .fit(&mut |part| session.bar.set_position((1000.0 * part) as u64))
+            .map_err(Failure::failed)?;
+        // Written first: the verifier loads the model from its file.
+        write(&session.model, &fitted.model)?;
+        doubter = Some(session.verifier()?);
+        card.rounds.push(counts);
+        card.fit = fitted.figures;
+    }
     card.held_out_rooms = session.try_rooms()?;
     card.held_out_logs = session.try_logs()?;
     session.bar.finish_and_clear();

@@ -8,8 +8,6 @@ use tagalong_sim::{
 };
 use tagalong_stats::{RandomSource, SplitMix64};
 
-use super::wide_rooms::wide_scene;
-
 /// Furniture with the silhouette of a person.
 const LOOK_ALIKES: [FurnitureKind; 6] = [
     FurnitureKind::CoatStand,
@@ -43,8 +41,7 @@ pub struct ImageTiming {
 }
 
 /// Returns a scene of a split: a random room or the next suite in turn, half of them as colour and
-/// depth, half of them as a stereo pair. Rooms in depth are seen from any height and angle, those
-/// of a stereo pair from that of a service robot.
+/// depth, half of them as a stereo pair.
 ///
 /// # Errors
 /// A number that is no seed.
@@ -53,43 +50,15 @@ pub fn scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene, Conf
     // The camera changes more slowly than the rest, so that every suite gets both kinds.
     let kind = if (turn / 2).is_multiple_of(2) { CameraKind::Rgbd } else { CameraKind::Stereo };
     let seed = split.seed(number)?;
-    let mut scene = match (is_room, kind) {
-        (true, CameraKind::Rgbd) => colour_room(split, number, look)?,
-        (true, _) => room(seed, (turn % 4) as usize),
-        (false, _) => {
-            let text = SUITES[(turn % SUITES.len() as u64) as usize];
-            Scene::parse_with(text, &Variant::of_seed(seed))?
-        }
+    let mut scene = if is_room {
+        room(seed, (turn % 4) as usize)
+    } else {
+        let text = SUITES[(turn % SUITES.len() as u64) as usize];
+        Scene::parse_with(text, &Variant::of_seed(seed))?
     };
     scene.camera.kind = kind;
     (scene.camera.rate_hz, scene.duration_s) = (look.rate_hz, look.duration_s);
     Ok(scene)
-}
-
-/// Returns a room of a split in colour and depth: [`wide_scene`] with walls, floor, light and an
-/// image large enough for patches.
-///
-/// # Errors
-/// A number that is no seed.
-fn colour_room(split: Split, number: u64, look: ImageTiming) -> Result<Scene, ConfigError> {
-    let mut scene = wide_scene(split, number, look)?;
-    let mut chance = SplitMix64::new(scene.seed);
-    let in_colour = CameraSettings { colour: true, width: 512, height: 384, ..scene.camera };
-    scene.about = "candidates for a verifier".into();
-    scene.camera = in_colour;
-    paint(&mut scene, &mut chance);
-    Ok(scene)
-}
-
-/// Chooses walls, floor and light of a room.
-fn paint(scene: &mut Scene, chance: &mut SplitMix64) {
-    scene.room.wallpaper = chance.between(0.0, 1.0) < 0.5;
-    scene.room.floor = chance.pick(&[Floor::Planks, Floor::Tiles, Floor::Carpet]);
-    scene.light = LightSettings {
-        lux: chance.between(80.0, 700.0),
-        lamps: chance.between(1.0, 4.0) as usize,
-        ambient: chance.between(0.2, 0.5),
-    };
 }
 
 /// Returns a room with so many people, all of it in view. Size, light, camera, furniture and the
@@ -99,13 +68,20 @@ fn room(seed: u64, people: usize) -> Scene {
     let (length, width) = (chance.between(7.0, 12.0), chance.between(5.0, 8.0));
     let start = [0.8, width * chance.between(0.3, 0.7)];
     let view = RobotView { start, room: [length, width] };
-    let mut scene = Scene {
+    Scene {
         about: "candidates for a verifier".into(),
         seed,
         room: RoomSettings {
             size_m: [length, width],
             height_m: chance.between(2.5, 3.2),
+            wallpaper: chance.between(0.0, 1.0) < 0.5,
+            floor: chance.pick(&[Floor::Planks, Floor::Tiles, Floor::Carpet]),
             ..RoomSettings::default()
+        },
+        light: LightSettings {
+            lux: chance.between(80.0, 700.0),
+            lamps: chance.between(1.0, 4.0) as usize,
+            ambient: chance.between(0.2, 0.5),
         },
         camera: CameraSettings {
             width: 512,
@@ -126,9 +102,7 @@ fn room(seed: u64, people: usize) -> Scene {
         furniture: (0..6).map(|_| piece(&mut chance, &view)).collect(),
         people: (0..people).map(|_| walker(&mut chance, &view)).collect(),
         ..Scene::default()
-    };
-    paint(&mut scene, &mut chance);
-    scene
+    }
 }
 
 /// View of the robot from its start.
@@ -193,17 +167,5 @@ mod tests {
         };
         assert_eq!(kinds(CameraKind::Rgbd), kinds(CameraKind::Stereo));
         assert_eq!(kinds(CameraKind::Rgbd).len(), 9, "eight suites and the rooms");
-    }
-
-    #[test]
-    fn rooms_in_depth_are_seen_from_any_height() {
-        let scenes = (0..200).map(|number| scene(Split::Train, number, LOOK).unwrap());
-        let is_room = |s: &Scene| s.camera.kind == CameraKind::Rgbd && s.about.contains("verifier");
-        let rooms: Vec<Scene> = scenes.filter(is_room).collect();
-        let count = |is: &dyn Fn(&Scene) -> bool| rooms.iter().filter(|scene| is(scene)).count();
-        assert!(count(&|scene| scene.camera.height_m > 1.6) > 5);
-        assert!(count(&|scene| scene.camera.height_m < 0.8) > 5);
-        assert!(count(&|scene| scene.room.floor == Floor::Tiles) > 5);
-        assert!(rooms.iter().all(|scene| scene.camera.colour && scene.camera.width == 512));
     }
 }

@@ -5,21 +5,28 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::outcome::Failure;
 use tagalong_app::threads::threads;
 use tagalong_config::{ConfigError, Context, Example, Registry, Trainer};
-use tagalong_core::{DiffDrive, Verifier};
+use tagalong_core::{Detection, DiffDrive, Frame, Verifier};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{CameraKind, Split};
 use toml::Spanned;
 use toml::de::DeTable;
 
 use super::args::TrainArgs;
-use super::folds::Folds;
+use super::card::CandidateCounts;
 use super::held_out::{Comparison, Effect, Tally};
 use super::in_use::{InUse, pipeline};
-use super::photos::{fingerprint, photos};
+use super::photos::{self, fingerprint, photos};
 use super::plan::Plan;
-use super::real_rooms::{with_places, without};
 use super::seen::{AnnotatedFrame, Label, in_log, in_scene, label};
 use super::{faces, rooms, seen};
+
+/// Margin below which a judgement is unsure: log-odds.
+const UNSURE: f64 = 1.0;
+
+/// Annotated logs for training ...
+pub const TRAIN_LOGS: [&str; 2] = ["filinha", "um"];
+/// ... and one of another room, which is held out.
+const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 
 /// State of one training.
 pub struct Session<'a> {
@@ -66,12 +73,17 @@ impl<'a> Session<'a> {
     pub fn sources(&self) -> Vec<String> {
         let mut names = vec!["drawn rooms".to_owned()];
         if self.args.data.is_some() {
-            names.extend(with_places().map(|(_, log)| format!("logs/{log}.mcap")));
+            names.extend(self.train_logs().map(|log| format!("logs/{log}.mcap")));
             names.extend(
                 ["people/inria-64x128", "people/head-shoulder-50", "negatives"].map(String::from),
             );
         }
         names
+    }
+
+    /// Returns the annotated logs for training.
+    fn train_logs(&self) -> impl Iterator<Item = &'static str> {
+        TRAIN_LOGS.into_iter().filter(|log| !self.args.without.iter().any(|name| name == log))
     }
 
     fn context(&self) -> Context {
@@ -93,29 +105,51 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// Returns the verifier with a model.
+    /// Returns the verifier with the model of the last round.
     ///
     /// # Errors
     /// A model that the plugin refuses: exit code 2.
-    pub fn verifier(&self, model: &Path) -> Result<Box<dyn Verifier>, Failure> {
-        with_value(&self.with_model(model)?, |value| {
+    pub fn verifier(&self) -> Result<Box<dyn Verifier>, Failure> {
+        with_value(&self.with_model()?, |value| {
             self.registry.build_verifier(&self.args.plugin, value, &self.context())
         })
     }
 
     // An absolute path, because relative ones start at the config's folder.
-    fn with_model(&self, model: &Path) -> Result<toml::Table, Failure> {
-        let absolute = std::path::absolute(model).map_err(Failure::failed)?;
+    fn with_model(&self) -> Result<toml::Table, Failure> {
+        let absolute = std::path::absolute(&self.model).map_err(Failure::failed)?;
         let mut settings = self.settings.clone();
         settings.insert("model".into(), absolute.display().to_string().into());
         Ok(settings)
     }
 
-    /// Shows the candidates of a round to the models.
+    /// Passes candidates to the trainer: all of them in the first round, after that those that the
+    /// verifier judges wrongly or is unsure of.
     ///
     /// # Errors
     /// A plugin that fails, and data that cannot be read: exit code 1.
-    pub fn collect_candidates(&self, round: usize, folds: &mut Folds) -> Result<(), Failure> {
+    pub fn collect_hard_negatives(
+        &self,
+        round: usize,
+        trainer: &mut dyn Trainer,
+        mut doubter: Option<Box<dyn Verifier>>,
+    ) -> Result<CandidateCounts, Failure> {
+        let mut counts = CandidateCounts::default();
+        let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
+            counts.seen += 1;
+            if let Some(verifier) = &mut doubter {
+                let margin = verifier.log_odds(frame, candidate).map_err(Failure::failed)?;
+                let right = if example.is_person { margin } else { -margin };
+                counts.mistakes += u64::from(right < 0.0);
+                // Only mistakes and unsure cases are added: the model is right about the rest.
+                if right >= UNSURE {
+                    return Ok(());
+                }
+            }
+            let count = if example.is_person { &mut counts.people } else { &mut counts.others };
+            *count += 1;
+            trainer.add(frame, candidate, example).map_err(Failure::failed)
+        };
         let numbers = self.plan.numbers(round, self.args.seed);
         self.tell(round, "drawing scenes");
         self.bar.set_length(numbers.end - numbers.start);
@@ -125,21 +159,19 @@ impl<'a> Session<'a> {
             let in_use = self.in_use(scene.camera.kind)?;
             let mut pipeline = pipeline(&in_use.proposing()?, self.registry)?;
             in_scene(&scene, threads(None), in_use.stereo()?, &mut |seen| {
-                propose(&mut pipeline, seen, |_| number, None, folds)
+                propose(&mut pipeline, seen, |_| number, &mut show)
             })?;
             self.bar.inc(1);
         }
-        let Some(data) = &self.args.data else { return Ok(()) };
+        let Some(data) = &self.args.data else { return Ok(counts) };
         self.tell(round, "reading logs and photographs");
         // The logs do not change, so later rounds would repeat their candidates.
         if round == 0 {
             let proposing = self.in_use(CameraKind::Rgbd)?.proposing()?;
-            for (_, log) in with_places() {
+            for log in self.train_logs() {
                 let mut pipeline = pipeline(&proposing, self.registry)?;
                 let group = |who: Option<i64>| fingerprint(&format!("{log} {who:?}"));
-                self.in_log(data, log, &mut |seen| {
-                    propose(&mut pipeline, seen, group, Some(log), folds)
-                })?;
+                self.in_log(data, log, &mut |seen| propose(&mut pipeline, seen, group, &mut show))?;
             }
         }
         // The remainder by 5 marks the held-out groups, so the share is taken from the quotient.
@@ -147,12 +179,10 @@ impl<'a> Session<'a> {
         let photos = photos(data, false);
         self.bar.set_length(photos.len() as u64);
         for photo in photos.iter().filter(|p| p.group / 5 % share == 0) {
-            photo.visit(round as u64, &mut |frame, candidate, example| {
-                folds.see(None, frame, candidate, example)
-            })?;
+            photo.visit(round as u64, &mut show)?;
             self.bar.inc(1);
         }
-        Ok(())
+        Ok(counts)
     }
 
     /// Returns the pipeline that a verifier is trained for.
@@ -168,12 +198,11 @@ impl<'a> Session<'a> {
         in_log(&path.with_extension("mcap"), &path.with_extension("people.csv"), see)
     }
 
-    /// Returns the pipeline in use, without and with the verifier of a model.
-    fn comparison(&self, in_use: &InUse, model: &Path) -> Result<Comparison, Failure> {
-        let verified = in_use.verified(&self.args.plugin, self.with_model(model)?);
+    /// Returns the pipeline in use, without and with the verifier.
+    fn comparison(&self, in_use: &InUse) -> Result<Comparison, Failure> {
+        let verified = in_use.verified(&self.args.plugin, self.with_model()?);
         let configs = [in_use.proposing()?, in_use.plain(), verified];
-        let verifier = self.verifier(model)?;
-        Comparison::new(configs.each_ref().map(String::as_str), verifier, self.registry)
+        Comparison::new(configs.each_ref().map(String::as_str), self.verifier()?, self.registry)
     }
 
     /// Scores the verifier in held-out rooms.
@@ -189,7 +218,7 @@ impl<'a> Session<'a> {
             let scene =
                 rooms::scene(Split::Test, number, self.plan.test_look).map_err(Failure::failed)?;
             let in_use = self.in_use(scene.camera.kind)?;
-            let mut comparison = self.comparison(&in_use, &self.model)?;
+            let mut comparison = self.comparison(&in_use)?;
             tally.next_scene();
             in_scene(&scene, threads(None), in_use.stereo()?, &mut |seen| {
                 comparison.step(seen, &mut tally)
@@ -199,16 +228,15 @@ impl<'a> Session<'a> {
         Ok(tally.effect())
     }
 
-    /// Scores the verifiers on real logs, each with the model that has not seen its room.
+    /// Scores the verifier on held-out logs, if there are data.
     ///
     /// # Errors
     /// As for [`Session::try_rooms`], and a log that cannot be read.
     pub fn try_logs(&self) -> Result<Option<Effect>, Failure> {
         let Some(data) = &self.args.data else { return Ok(None) };
         let mut tally = Tally::default();
-        for (room, log) in with_places() {
-            let model = without(&self.model, room);
-            let mut comparison = self.comparison(&self.in_use(CameraKind::Rgbd)?, &model)?;
+        for log in TEST_LOGS {
+            let mut comparison = self.comparison(&self.in_use(CameraKind::Rgbd)?)?;
             tally.next_scene();
             self.in_log(data, log, &mut |seen| comparison.step(seen, &mut tally))?;
         }
@@ -221,8 +249,7 @@ fn propose(
     pipeline: &mut Pipeline,
     seen: &AnnotatedFrame,
     group: impl Fn(Option<i64>) -> u64,
-    log: Option<&str>,
-    folds: &mut Folds,
+    show: photos::Take<'_>,
 ) -> Result<(), Failure> {
     let report = pipeline.step(&seen.frame).map_err(Failure::failed)?;
     for candidate in &report.candidates {
@@ -231,8 +258,7 @@ fn propose(
             Label::Nobody => (false, None),
             Label::Part | Label::Unclear => continue,
         };
-        let example = Example { is_person, group: group(who) };
-        folds.see(log, &seen.frame, &candidate.detection, example)?;
+        show(&seen.frame, &candidate.detection, Example { is_person, group: group(who) })?;
     }
     Ok(())
 }
