@@ -93,6 +93,8 @@ pub struct Annotated {
     pub truth_sha256: String,
     /// True if the boxes of the truth are whole bodies.
     pub whole_bodies: bool,
+    /// Frames in which people are neither missed nor found.
+    pub unjudged: Vec<u32>,
 }
 
 /// Plans a benchmark.
@@ -321,6 +323,7 @@ fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
         truth_sha256: sha256_of_file(&truth)?,
         truth,
         whole_bodies,
+        unjudged: Vec::new(),
     }))
 }
 

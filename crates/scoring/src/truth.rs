@@ -186,6 +186,18 @@ impl TruthFile {
         file
     }
 
+    /// Makes the people of these frames neither missed nor found: their boxes become regions
+    /// without annotation.
+    #[must_use]
+    pub fn without_judging(mut self, frames: &[u32]) -> Self {
+        for number in frames {
+            let Some(frame) = self.frames.get_mut(&u64::from(*number)) else { continue };
+            let people = frame.people.drain(..);
+            frame.ignore_regions.extend(people.filter_map(|(truth, _)| truth.region));
+        }
+        self
+    }
+
     /// Returns true if the rules of KITTI apply.
     pub fn is_kitti(&self) -> bool {
         self.kind == Kind::Kitti
@@ -352,6 +364,18 @@ mod tests {
         let guessed = file.compared(whole(1.7), None);
         let on_floor = file.compared(whole(1.7), Some(&camera()));
         assert!((guessed.width / on_floor.width - 1.0).abs() < 0.06, "{guessed:?} {on_floor:?}");
+    }
+
+    #[test]
+    fn people_of_frames_that_are_not_judged_are_regions_without_annotation() {
+        let mut file = TruthFile::empty(Kind::Mot);
+        let region = Region { x: 1.0, y: 2.0, width: 3.0, height: 4.0 };
+        let person = Truth { region: Some(region), ..Truth::default() };
+        (1..=3).for_each(|number| file.add(number, person, TruthPosition::Unknown));
+        let frames = file.without_judging(&[2, 9]).frames(&Shots::default());
+        assert_eq!(frames[&1], (vec![person], vec![]));
+        assert_eq!(frames[&2], (vec![], vec![region]));
+        assert_eq!(frames[&3].0.len(), 1);
     }
 
     #[test]

@@ -27,6 +27,15 @@ pub struct Room {
     pub logs: Vec<RoomFile>,
     /// Models that have not seen this room, by the plugin that reads them.
     pub models: BTreeMap<String, RoomFile>,
+    /// Frames of its logs whose annotation does not say where the upper body of a person is.
+    unjudged: BTreeMap<String, Vec<u32>>,
+}
+
+impl Room {
+    /// Returns the frames of a log in which people are not judged.
+    pub fn unjudged(&self, log: &RoomFile) -> &[u32] {
+        self.unjudged.get(&log.name()).map_or(&[], Vec::as_slice)
+    }
 }
 
 /// A file, and where the text names it.
@@ -55,6 +64,8 @@ struct Entry {
     logs: Spanned<Vec<Spanned<PathBuf>>>,
     #[serde(default)]
     models: BTreeMap<String, Spanned<PathBuf>>,
+    #[serde(default)]
+    unjudged: BTreeMap<Spanned<String>, Vec<u32>>,
 }
 
 impl Rooms {
@@ -99,7 +110,14 @@ impl Room {
             let message = format!("room `{name}` has no log");
             return Err(ConfigError { message, span: Some(place) });
         }
-        Ok(Self { name, about: entry.about, logs, models })
+        for file in entry.unjudged.keys() {
+            if !logs.iter().any(|log| log.name() == *file.get_ref()) {
+                let message = format!("room `{name}` has no log called `{}`", file.get_ref());
+                return Err(ConfigError { message, span: Some(file.span()) });
+            }
+        }
+        let unjudged = entry.unjudged.into_iter().map(|(log, all)| (log.into_inner(), all));
+        Ok(Self { name, about: entry.about, logs, models, unjudged: unjudged.collect() })
     }
 }
 
@@ -167,8 +185,20 @@ mod tests {
     }
 
     #[test]
+    fn frames_that_are_not_judged_are_those_of_a_log() {
+        let text = TWO.replace("[\"b.mcap\"]\n", "[\"b.mcap\"]\nunjudged = { b = [8, 9] }\n");
+        let rooms = parse(&text).unwrap().rooms;
+        assert_eq!(rooms[1].unjudged(&rooms[1].logs[0]), [8, 9]);
+        assert!(rooms[0].unjudged(&rooms[0].logs[0]).is_empty());
+    }
+
+    #[test]
     fn mistakes_are_shown_with_their_line() {
         let cases: &[(&str, &[&str])] = &[
+            (
+                "[rooms.A]\nlogs = ['a.mcap']\nunjudged = { b = [1] }",
+                &["rooms.toml:3:14", "has no log called `b`"],
+            ),
             ("[rooms.A]\nlogs = [\"a.mcap\"]", &["1 room", "two are needed"]),
             ("[rooms.A]\nlogs = []\n[rooms.B]\nlogs = ['b']", &["rooms.toml:2:8", "`A` has no"]),
             (

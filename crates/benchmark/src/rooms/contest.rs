@@ -144,8 +144,9 @@ impl Variant {
 
     /// Returns the name of its result on a log: a hash of everything that it depends on.
     pub fn run_hash(&self, log: &Annotated, version: &str) -> String {
-        let Annotated { sha256: log, truth_sha256, whole_bodies, .. } = log;
-        let everything = format!("{version}\n{}\n{log}\n{truth_sha256}\n{whole_bodies}", self.hash);
+        let Annotated { sha256: log, truth_sha256, whole_bodies, unjudged, .. } = log;
+        let truth = format!("{truth_sha256}\n{whole_bodies}\n{unjudged:?}");
+        let everything = format!("{version}\n{}\n{log}\n{truth}", self.hash);
         sha256(everything.as_bytes())[..32].to_owned()
     }
 }

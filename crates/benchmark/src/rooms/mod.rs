@@ -64,7 +64,8 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
                 at(tagalong_config::ConfigError { message: failure.message, span })
             };
             check_log_path(&log.path).map_err(here)?;
-            logs.push(plan::with_truth(&log.path).map_err(here)?);
+            let annotated = plan::with_truth(&log.path).map_err(here)?;
+            logs.push(plan::Annotated { unjudged: room.unjudged(log).to_vec(), ..annotated });
         }
         let models = room.models.into_iter().map(|(plugin, model)| {
             let path = std::path::absolute(&model.path).map_err(Failure::failed)?;

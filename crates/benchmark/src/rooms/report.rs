@@ -11,6 +11,7 @@ use tagalong_tuning::{Choice, Figures, Objective, leave_one_out, mean};
 use super::RoomsArgs;
 use super::contest::{Contestant, Location};
 use super::work::{Desk, Run};
+use crate::plan::Annotated;
 
 /// Everything that the tables show.
 #[derive(Serialize)]
@@ -86,7 +87,7 @@ impl Report {
         let about = |location: &Location| About {
             name: location.name.clone(),
             about: location.about.clone(),
-            logs: location.logs.iter().map(|log| log.name.clone()).collect(),
+            logs: location.logs.iter().map(described).collect(),
         };
         let fitted = contestants
             .iter()
@@ -168,6 +169,15 @@ impl Report {
             rows: self.pipelines.iter().map(row).collect(),
             notes,
         }
+    }
+}
+
+/// Returns the name of a log, and the frames in which people are not judged.
+fn described(log: &Annotated) -> String {
+    let frames: Vec<String> = log.unjudged.iter().map(ToString::to_string).collect();
+    match &frames[..] {
+        [] => log.name.clone(),
+        all => format!("{} without judging frames {}", log.name, all.join(" and ")),
     }
 }
 

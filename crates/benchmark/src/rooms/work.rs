@@ -215,7 +215,7 @@ impl Shift<'_> {
         let (_, log) = logs[first.log];
         self.bar.set_message(log.name.clone());
         let options = TruthOptions { upper_body: log.whole_bodies, ..TruthOptions::default() };
-        let truth = TruthFile::read(&log.truth, options)?;
+        let truth = TruthFile::read(&log.truth, options)?.without_judging(&log.unjudged);
         let mut source = contestants[first.contestant].config.open(&log.log)?;
         let mut lanes: Vec<Lane> =
             pass.iter().map(|run| Lane::new(|| self.pipeline(*run))).collect();
