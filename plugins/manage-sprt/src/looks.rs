@@ -95,12 +95,18 @@ impl Looks {
     /// Makes the latest look part of the past.
     fn close_latest(&mut self, config: &Config) {
         let most = config.max_log_odds;
+        let fade = self.fade(config);
         if let Some(look) = self.all.get_mut(self.latest) {
-            // In full, although `log_odds` lets it fade during a pause: the settings of the shipped
-            // configs were chosen so, and no track outlives a pause of a few seconds.
-            self.past = (self.past + look.news(config)).clamp(-most, most);
-            look.counted = look.log_odds(config);
+            // As much as `log_odds` told last: what faded during a pause does not come back.
+            let told = fade * look.news(config);
+            self.past = (self.past + told).clamp(-most, most);
+            look.counted += told;
         }
+    }
+
+    /// Returns the part of the latest look's news that has not faded.
+    fn fade(&self, config: &Config) -> f64 {
+        (-self.ago_s / config.look_s).exp()
     }
 
     /// Opens a look, and returns its index.
@@ -116,7 +122,7 @@ impl Looks {
 
     /// Returns the evidence of all looks, log-odds.
     pub(crate) fn log_odds(&self, config: &Config) -> f64 {
-        let fade = (-self.ago_s / config.look_s).exp();
+        let fade = self.fade(config);
         let news = self.all.get(self.latest).map_or(0.0, |look| look.news(config));
         self.past + fade * news
     }

@@ -180,21 +180,20 @@ fn a_repeated_look_renews_the_faded_one() {
     assert_near(bench.look(0.0, 3.0, 2.0), 5.0);
 }
 
-/// After a pause of a second: the track was the same all the time, so its last look is not doubted
-/// for the time in which there was none.
+/// What faded during a pause does not come back with a look at another place.
 #[test]
-fn a_look_from_before_a_pause_counts_in_full_with_the_next_one_elsewhere() {
+fn a_look_from_before_a_pause_stays_faded_beside_the_next_one_elsewhere() {
     let mut bench = Bench::new(Config { look_s: 2.0, repeated: 1.0, ..looks_only() }, 3.0, 2.0);
     for _ in 0..10 {
         bench.observe(0.1, Observation::Occluded);
     }
     assert_near(bench.track.score, 2.0 * (-0.5_f64).exp());
-    assert_near(bench.look(0.0, 3.4, 3.0), 5.0);
-    // From then on it fades beside the new one.
+    assert_near(bench.look(0.0, 3.4, 3.0), 2.0 * (-0.5_f64).exp() + 3.0);
+    // It goes on fading beside the new one.
     for _ in 0..10 {
         bench.look(0.1, 3.4, 3.0);
     }
-    assert_near(bench.track.score, 2.0 * (-0.5_f64).exp() + 3.0);
+    assert_near(bench.track.score, 2.0 * (-1.0_f64).exp() + 3.0);
 }
 
 #[test]
