@@ -36,7 +36,7 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     if trainer.learns_from_rooms() {
         let scenes = session.args.scenes.unwrap_or(SCENES[usize::from(session.args.quick)]);
         frames::show_scenes(session, scenes, trainer)?;
-        sources.push(format!("{scenes} simulated rooms, depth"));
+        sources.push(format!("{scenes} simulated rooms"));
         session.bar.set_message("reading logs");
         frames::show_rooms(data, trainer)?;
         sources.extend(frames::room_logs());
