@@ -12,4 +12,4 @@ mod similarity;
 pub use assign::assign;
 pub use observations::{ObservationMemory, Observed};
 pub use pair::{Cost, Fit, Overlap, PairCost, Pairs, assign_fits};
-pub use similarity::{Stage, Staged, best_of, buffered_iou, is_strong, probability};
+pub use similarity::{PrioritySettings, Stage, Staged, best_of, buffered_iou, probability};

@@ -97,8 +97,7 @@ impl ObservationMemory {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Point3, SMatrix};
-    use tagalong_core::{Estimate, Person};
+    use tagalong_conformance::samples::track_in;
 
     use super::*;
 
@@ -107,18 +106,7 @@ mod tests {
     }
 
     fn track(x: f64) -> Track {
-        let person = Person { position: Point3::new(3.0, 0.0, 1.6), velocity: Vector2::zeros() };
-        let estimate = Estimate { person, covariance: SMatrix::identity(), region: at(x) };
-        Track {
-            id: TrackId(1),
-            estimate,
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 1,
-            unseen_s: 0.0,
-            score: 1.0,
-        }
+        track_in(1, at(x))
     }
 
     /// A memory of a track that goes 2 pixels a frame from x = 0, observed in frames 0 to `frames`.

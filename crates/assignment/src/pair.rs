@@ -178,10 +178,10 @@ fn overlap(a: &Rect, b: &Rect, kind: Overlap) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+    use nalgebra::{Matrix3, Point3, SMatrix};
     use proptest::prelude::*;
-    use tagalong_core::{Estimate, Person, TrackId};
-    use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
+    use tagalong_conformance::samples::{detection_at, track_at};
+    use tagalong_geometry::ImageBox;
 
     use super::*;
 
@@ -218,34 +218,10 @@ mod tests {
         assign_fits(&fits, detections.len(), settings.at_gate(), miss_factor)
     }
 
-    fn person(x: f64, y: f64) -> Detection {
-        let lens =
-            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        let position = Point3::new(x, y, 1.6);
-        Detection {
-            image: Some(ImageBox::upper_body(
-                Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
-            )),
-            position,
-            covariance: Matrix3::identity() * 0.01,
-            score: 1.0,
-            source: "test",
-        }
-    }
-
     fn track(position: Point3<f64>, covariance: SMatrix<f64, 5, 5>) -> Track {
-        let person = Person { position, velocity: Vector2::zeros() };
-        let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 10.0, 10.0) };
-        Track {
-            id: TrackId(1),
-            estimate,
-            seen: false,
-            occluded: false,
-            confirmed: true,
-            age: 0,
-            unseen_s: 0.0,
-            score: 1.0,
-        }
+        let mut track = track_at(1, position.x, position.y);
+        (track.estimate.person.position, track.estimate.covariance) = (position, covariance);
+        track
     }
 
     proptest! {
@@ -256,7 +232,7 @@ mod tests {
             let settings = PairCost { gate: 1e9, ..DEFAULT };
             let root = Matrix3::from_iterator(spread);
             let covariance = root * root.transpose() + Matrix3::identity() * 0.01;
-            let detection = Detection { covariance, ..person(3.0, 0.0) };
+            let detection = Detection { covariance, ..detection_at(3.0, 0.0) };
             let prior = SMatrix::<f64, 5, 5>::identity() * 0.04;
             let track = track(detection.position - nalgebra::Vector3::from(off), prior);
             let found = fit(&track, &detection, 0.1, &settings).unwrap();
@@ -271,7 +247,7 @@ mod tests {
     #[test]
     fn a_vague_track_does_not_take_the_detection_of_a_certain_one() {
         let settings = DEFAULT;
-        let detection = person(3.0, 0.0);
+        let detection = detection_at(3.0, 0.0);
         let near = detection.position + nalgebra::Vector3::new(0.25, 0.0, 0.0);
         let certain = track(near, SMatrix::identity() * 0.01);
         let vague = track(near, SMatrix::identity() * 1.0);
@@ -292,7 +268,7 @@ mod tests {
     fn nobody_is_found_outside_the_gate_or_farther_than_they_can_have_walked() {
         let settings = PairCost { gate: 4.0, ..DEFAULT };
         let fits = |off_m: f64, variance: f64, dt_s: f64| {
-            let detection = Detection { covariance: Matrix3::zeros(), ..person(3.0, 0.0) };
+            let detection = Detection { covariance: Matrix3::zeros(), ..detection_at(3.0, 0.0) };
             let at = detection.position - nalgebra::Vector3::new(off_m, 0.0, 0.0);
             let track = track(at, SMatrix::identity() * variance);
             fit(&track, &detection, dt_s, &settings).is_some()
@@ -308,7 +284,7 @@ mod tests {
     #[test]
     fn a_vague_track_takes_its_own_detection_as_well_as_a_certain_one_does() {
         let settings = DEFAULT;
-        let detections = [person(3.0, 0.0), person(5.0, 2.0)];
+        let detections = [detection_at(3.0, 0.0), detection_at(5.0, 2.0)];
         let certain = track(detections[0].position, SMatrix::identity() * 1e-4);
         let off = detections[1].position + nalgebra::Vector3::new(0.9, 0.0, 0.0);
         let vague = track(off, SMatrix::identity() * 0.5);
@@ -322,7 +298,7 @@ mod tests {
     /// The cost of a miss decides if a poor pair is better than none.
     #[test]
     fn a_track_is_rather_left_alone_where_a_miss_is_cheap() {
-        let detection = person(3.0, 0.0);
+        let detection = detection_at(3.0, 0.0);
         let off = detection.position + nalgebra::Vector3::new(0.42, 0.0, 0.0);
         let track = track(off, SMatrix::identity() * 0.01);
         let given = |miss_factor: f64| {
@@ -348,7 +324,7 @@ mod tests {
             let region = Rect::new(x, 0.0, 10.0, 10.0);
             fit(
                 &track,
-                &Detection { image: Some(ImageBox::upper_body(region)), ..person(9.0, 9.0) },
+                &Detection { image: Some(ImageBox::upper_body(region)), ..detection_at(9.0, 9.0) },
                 0.1,
                 &settings,
             )
@@ -360,7 +336,7 @@ mod tests {
         let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
         let detection = Detection {
             image: Some(ImageBox::upper_body(Rect::new(5.0, 0.0, 10.0, 10.0))),
-            ..person(3.0, 0.0)
+            ..detection_at(3.0, 0.0)
         };
         let given = |miss_factor: f64| {
             let (tracks, seen) = (std::slice::from_ref(&track), std::slice::from_ref(&detection));

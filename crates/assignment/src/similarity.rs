@@ -1,5 +1,7 @@
 //! Assignment by similarity, in stages: as several trackers of boxes do it.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use tagalong_core::Detection;
 use tagalong_geometry::Rect;
 
@@ -99,9 +101,35 @@ pub fn best_of(overlap: f64, log_ratio: f64) -> f64 {
     if log_ratio > 0.0 { overlap.max(probability(log_ratio)) } else { overlap }
 }
 
-/// Returns true if a detection is at least as certain as `log_odds`.
-pub fn is_strong(detection: &Detection, log_odds: f64) -> bool {
-    detection.score >= log_odds
+/// Order of detections and tracks in associators of boxes, by score and confirmation; flattened into
+/// their settings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct PrioritySettings {
+    /// Detections from these log-odds on are strong; 0.405 is a probability of 0.6.
+    pub strong_log_odds: f64,
+    /// Tracks that are not confirmed get the detections that confirmed ones leave.
+    pub confirmed_first: bool,
+    /// The overlap counts by the probability of the detection.
+    pub weigh_by_score: bool,
+}
+
+impl Default for PrioritySettings {
+    fn default() -> Self {
+        Self { strong_log_odds: 0.405, confirmed_first: false, weigh_by_score: false }
+    }
+}
+
+impl PrioritySettings {
+    /// Returns true for a strong detection.
+    pub fn is_strong(&self, detection: &Detection) -> bool {
+        detection.score >= self.strong_log_odds
+    }
+
+    /// Returns an overlap with a detection as it counts.
+    pub fn weighed(&self, overlap: f64, detection: &Detection) -> f64 {
+        if self.weigh_by_score { overlap * probability(detection.score) } else { overlap }
+    }
 }
 
 #[cfg(test)]

@@ -231,31 +231,63 @@ pub fn parse_settings<T: Settings>(value: Option<Value<'_>>) -> Result<T, Config
 /// Serde forgets the places within flattened structs and the names that they allow, so each key
 /// is read alone, as if the others were left out, and the schema has the names.
 fn at_its_key<T: Settings>(error: toml::de::Error, value: &Value<'_>) -> ConfigError {
-    let DeValue::Table(table) = value.get_ref() else { return error.into() };
-    if error.span().is_some_and(|span| span != value.span()) {
-        return error.into();
-    }
-    let is_wrong = |(key, entry): (&Spanned<_>, &Value<'_>)| {
-        let alone = [(key.clone(), entry.clone())].into_iter().collect();
-        let alone = Spanned::new(value.span(), DeValue::Table(alone));
+    let is_precise = error.span().is_some_and(|span| !is_place_of_table(value, &span));
+    let fails = |alone: Value<'_>| {
         let read = T::deserialize(toml::de::ValueDeserializer::from(alone));
         read.is_err_and(|why| why.message() == error.message())
     };
-    let wrong = table.iter().find(|(key, entry)| is_wrong((key, entry)));
-    let Some((key, entry)) = wrong else { return error.into() };
+    let wrong = if is_precise { None } else { wrong_key(value, &fails) };
+    let Some(WrongKey { path, key, entry }) = wrong else { return error.into() };
     match error.message().starts_with("unknown field") {
         true => {
-            let message = format!("{}, expected one of {}", error.message(), names_of::<T>());
-            ConfigError { message: with_suggestion(&message), span: Some(key.span()) }
+            let message = format!("{}, expected one of {}", error.message(), names_in::<T>(&path));
+            ConfigError { message: with_suggestion(&message), span: Some(key) }
         }
-        false => ConfigError { span: Some(entry.span()), ..error.into() },
+        false => ConfigError { span: Some(entry), ..error.into() },
     }
 }
 
-/// Returns the keys of `T`, quoted.
-fn names_of<T: Settings>() -> String {
-    let schema = schemars::schema_for!(T).to_value();
-    let declared = schema["properties"].as_object().into_iter().flat_map(|keys| keys.keys());
+/// A key that a config must not have, or not with its value.
+struct WrongKey {
+    /// Keys of the tables that hold it, from the outside to the inside.
+    path: Vec<String>,
+    /// Place of the key.
+    key: ops::Range<usize>,
+    /// Place of its value.
+    entry: ops::Range<usize>,
+}
+
+/// Returns true if a table stands at `span`: serde names it in place of one of its keys.
+fn is_place_of_table(value: &Value<'_>, span: &ops::Range<usize>) -> bool {
+    let DeValue::Table(table) = value.get_ref() else { return false };
+    value.span() == *span || table.values().any(|inner| is_place_of_table(inner, span))
+}
+
+/// Returns the key, as deep in the tables as it can be, that fails alone.
+fn wrong_key<'a>(value: &Value<'a>, fails: &dyn Fn(Value<'a>) -> bool) -> Option<WrongKey> {
+    let DeValue::Table(table) = value.get_ref() else { return None };
+    table.iter().find_map(|(key, entry)| {
+        let with = |entry: Value<'a>| {
+            let alone = [(key.clone(), entry)].into_iter().collect();
+            fails(Spanned::new(value.span(), DeValue::Table(alone)))
+        };
+        if !with(entry.clone()) {
+            return None;
+        }
+        let deeper = wrong_key(entry, &with).map(|mut wrong| {
+            wrong.path.insert(0, key.get_ref().clone().into_owned());
+            wrong
+        });
+        let here = || WrongKey { path: Vec::new(), key: key.span(), entry: entry.span() };
+        Some(deeper.unwrap_or_else(here))
+    })
+}
+
+/// Returns the keys of a table in `T`, quoted.
+fn names_in<T: Settings>(path: &[String]) -> String {
+    let root = schemars::schema_for!(T).to_value();
+    let table = path.iter().fold(&root, |at, key| resolve(&at["properties"][key], &root).1);
+    let declared = table["properties"].as_object().into_iter().flat_map(|keys| keys.keys());
     let quoted: Vec<String> = declared.map(|key| format!("`{key}`")).collect();
     quoted.join(", ")
 }
@@ -375,6 +407,7 @@ fn comment(out: &mut String, text: Option<&str>) {
 #[cfg(test)]
 mod tests {
     use serde::Deserialize;
+    use toml::de::DeTable;
 
     use super::*;
 
@@ -496,6 +529,30 @@ mod tests {
         assert!(defaults.ends_with("own = 0\n# Height, m.\nheight_m = 0.0\n"), "{defaults}");
     }
 
+    #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    struct Outer {
+        plain: u32,
+        joined: Joined,
+    }
+
+    #[test]
+    fn flattened_settings_of_an_inner_table_are_named_with_their_line() {
+        let shown = |line: &str| {
+            let text = format!("plain = 1\n\n[joined]\nown = 2\n{line}\n");
+            let root = DeTable::parse(&text).unwrap();
+            let value = Spanned::new(0..0, DeValue::Table(root.into_inner()));
+            parse_settings::<Outer>(Some(value)).unwrap_err().render("a.toml", &text)
+        };
+        let unknown = shown("hight_m = 1.0");
+        assert!(unknown.contains("a.toml:5:1: unknown field `hight_m`, expected one of `own`"));
+        assert!(unknown.contains("did you mean `height_m`?\n"), "{unknown}");
+        let kind = shown("height_m = 'tall'");
+        assert!(kind.contains("a.toml:5:12: invalid type: string \"tall\""), "{kind}");
+        let range = shown("height_m = 4.0");
+        assert!(range.contains("a.toml:5:12: `joined.height_m` must lie between"), "{range}");
+    }
+
     #[derive(Serialize, Deserialize, JsonSchema, Clone)]
     #[serde(default, deny_unknown_fields)]
     struct Ranges {
@@ -560,7 +617,7 @@ mod tests {
     #[test]
     fn a_number_out_of_its_range_is_shown_at_its_key() {
         let text = "x = { any = 1.0, inner = { deep = 9.0 } }";
-        let mut root = toml::de::DeTable::parse(text).unwrap().into_inner();
+        let mut root = DeTable::parse(text).unwrap().into_inner();
         let error = parse_settings::<Ranges>(root.remove("x")).err().unwrap();
         assert_eq!(error.span.map(|span| &text[span]), Some("9.0"));
     }

@@ -1,12 +1,11 @@
 //! Checks of associators.
 
-use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
-use tagalong_core::{
-    Association, Associations, Associator, Detection, Estimate, Gate, Person, Track, TrackId,
-};
+use nalgebra::{Matrix3, Point3};
+use tagalong_core::{Association, Associations, Associator, Detection, Track};
 use tagalong_stats::{RandomSource, SplitMix64};
 
-use crate::scenes::{DT_S, level, sighting};
+use crate::samples::{GATE, track_at, with_variance};
+use crate::scenes::{level, sighting};
 use crate::subject::{From, Subject};
 use crate::{Check, Verdict, demand};
 
@@ -18,28 +17,13 @@ pub(crate) const CHECKS: &[Check] = &[
     ("far detections are left alone", far_detections),
 ];
 
-const GATE: Gate<'_> = Gate { dt_s: DT_S, start_log_odds: 0.0, appearance: &[] };
-
 fn detection(x: f64, y: f64, random: &mut SplitMix64) -> Detection {
     sighting(&Point3::new(x, y, 1.6), &level(), 0.05, random)
 }
 
 /// Returns a track at a position, with a standard deviation of 0.2 m.
 fn track(id: u32, x: f64, y: f64) -> Track {
-    let position = Point3::new(x, y, 1.6);
-    let person = Person { position, velocity: Vector2::zeros() };
-    let covariance = SMatrix::<f64, 5, 5>::identity() * 0.04;
-    let estimate = Estimate { person, covariance, region: level().upper_body(&position) };
-    Track {
-        id: TrackId(id),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 10,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    with_variance(track_at(id, x, y), 0.04)
 }
 
 /// Returns tracks and detections at random positions, some detections with low scores.

@@ -101,6 +101,20 @@ impl Associations {
 ///         }))
 ///     }
 /// }
+///
+/// # use nalgebra::{Matrix3, SMatrix, zero};
+/// # let person = Person { position: [2.0, 0.0, 1.6].into(), velocity: zero() };
+/// # let (covariance, region) = (SMatrix::identity(), tagalong_geometry::Rect::default());
+/// # let (id, estimate) = (TrackId(1), Estimate { person, covariance, region });
+/// # let (seen, occluded, confirmed, age, unseen_s, score) = (true, false, true, 9, 0.0, 1.0);
+/// # let track = Track { id, estimate, seen, occluded, confirmed, age, unseen_s, score };
+/// # let covariance = Matrix3::identity();
+/// let found = [5.0, 2.5].map(|x| {
+///     let position = [x, 0.0, 1.6].into();
+///     Detection { image: None, position, covariance, score: 1.0, source: "example" }
+/// });
+/// let answer = FirstComer.associate(&[track], &found, &Gate::default());
+/// assert_eq!(answer, Associations::one_to_one([Some(1)]));
 /// ```
 pub trait Associator: Send {
     /// Returns true if the detection may belong to the track. A search near a track takes the best

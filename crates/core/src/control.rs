@@ -154,7 +154,9 @@ pub struct Scene<'a> {
 /// Steers the robot after the target. It cannot fail: when unsure, it stops.
 ///
 /// ```
-/// # use tagalong_core::{Controller, Scene, Twist};
+/// # use nalgebra::{Isometry3, SMatrix, zero};
+/// # use tagalong_core::*;
+/// # use tagalong_geometry::{Camera, Rect};
 /// /// Turns to face the target and never drives.
 /// struct Facing;
 ///
@@ -165,6 +167,21 @@ pub struct Scene<'a> {
 ///         Twist::new(0.0, 0.5 * place.y.atan2(place.x))
 ///     }
 /// }
+///
+/// # let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
+/// # let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, Sensors::default());
+/// # let person = Person { position: [0.0, 2.0, 1.6].into(), velocity: zero() };
+/// # let estimate = Estimate { person, covariance: SMatrix::identity(), region: Rect::default() };
+/// # let (id, seen, occluded, confirmed) = (TrackId(1), true, false, true);
+/// # let (age, unseen_s, score) = (9, 0.0, 1.0);
+/// // The person stands at the robot's left, 2 m away.
+/// let track = Track { id, estimate, seen, occluded, confirmed, age, unseen_s, score };
+/// let tracks = std::slice::from_ref(&track);
+/// let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
+/// let scene = Scene { frame: &frame, target: Some(&track), tracks, wheels, max_speed_mps: 1.0 };
+/// let twist = Facing.command(&scene);
+/// assert!(twist.angular_rps > 0.7 && twist.linear_mps == 0.0);
+/// assert_eq!(Facing.command(&Scene { target: None, ..scene }), Twist::STOP);
 /// ```
 pub trait Controller: Send {
     /// Returns the inputs that the controller itself uses. The command limiter, which checks obstacles for

@@ -176,7 +176,9 @@ pub trait Likelihood: Send + Sync {
 /// Verifies detections (P4, II-C: an SVM on the intensity patch).
 ///
 /// ```
+/// # use nalgebra::{Isometry3, Matrix3};
 /// # use tagalong_core::*;
+/// # use tagalong_geometry::Camera;
 /// /// Doubts heads that are lower or higher than those of people who stand.
 /// struct Upright;
 ///
@@ -190,6 +192,17 @@ pub trait Likelihood: Send + Sync {
 ///         Ok(if is_upright { 0.5 } else { -2.0 })
 ///     }
 /// }
+///
+/// # let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
+/// # let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, Sensors::default());
+/// # let (covariance, source) = (Matrix3::identity(), "example");
+/// let head_at = |z| {
+///     let position = [2.0, 0.0, z].into();
+///     Detection { image: None, position, covariance, score: 1.0, source }
+/// };
+/// assert_eq!(Upright.log_odds(&frame, &head_at(1.7))?, 0.5);
+/// assert_eq!(Upright.log_odds(&frame, &head_at(0.4))?, -2.0);
+/// # Ok::<(), Error>(())
 /// ```
 pub trait Verifier: Send {
     /// Returns the inputs that the verifier uses with its settings; see [`Detector::capabilities`].

@@ -99,6 +99,22 @@ pub struct TrackChanges {
 ///         TrackChanges { ends, ..TrackChanges::default() }
 ///     }
 /// }
+///
+/// # use nalgebra::{Matrix3, SMatrix, zero};
+/// # let (position, covariance) = ([2.0, 0.0, 1.6].into(), Matrix3::identity());
+/// # let detection = Detection { image: None, position, covariance, score: 1.0, source: "example" };
+/// let new = Unassociated { detection: &detection, detector_log_odds: 1.0, discovered: true };
+/// let Initiation::Start(health) = Credulous.initiate(TrackId(1), &new) else { unreachable!() };
+/// assert!(health.confirmed);
+///
+/// # let (covariance, region) = (SMatrix::identity(), tagalong_geometry::Rect::default());
+/// # let estimate = Estimate { person: Person { position, velocity: zero() }, covariance, region };
+/// # let (id, score, unseen_s) = (TrackId(1), health.log_odds, 0.1);
+/// # let track = Track {
+/// #     id, estimate, seen: false, occluded: false, confirmed: true, age: 1, unseen_s, score,
+/// # };
+/// let missed = ObservedTrack { track: &track, observation: Observation::Missed };
+/// assert_eq!(Credulous.manage(&[missed]).ends, [(TrackId(1), "track: missed")]);
 /// ```
 pub trait TrackManager: Send {
     /// Returns the log-odds below which a detection alone starts no track.

@@ -29,7 +29,7 @@ pub use detector::{About, Choices, PersonNetwork, inspect};
 pub use embedding::{Convention, EmbeddingNetwork};
 pub use family::{Family, IMAGENET, OutputShape, recognise};
 pub use grey::with_colours;
-pub use limits::Limits;
+pub use limits::{LimitSettings, Limits};
 pub use network::{Network, Runtime, check_file, rten};
 pub use preparation::{Colours, Fit, InputSize, Placement, Preparation};
 pub use runtime::RtenNetwork;

@@ -1,5 +1,8 @@
 use std::time::Duration;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 /// Limits of a network: a file beyond them is refused, a call beyond its deadline is given up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
@@ -27,5 +30,84 @@ impl Default for Limits {
             load_deadline: Duration::from_secs(60),
             threads: 1,
         }
+    }
+}
+
+/// Limits of a network as a config states them, among the other settings of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct LimitSettings {
+    /// Threads of the network.
+    #[schemars(range(min = 1, max = 256))]
+    pub threads: usize,
+    /// A call that takes longer is given up, and its image has no result, s. Which calls are depends
+    /// on the machine: with a tight deadline two runs may differ.
+    #[schemars(range(min = 1e-3, max = 3600.0))]
+    pub deadline_s: f64,
+    /// Largest file, MB.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub max_file_mb: u64,
+    /// Most operators of a file.
+    #[schemars(range(min = 1, max = 10_000_000))]
+    pub max_operators: usize,
+    /// Largest tensor, MB, as far as it follows from the file.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub max_tensor_mb: usize,
+}
+
+impl Default for LimitSettings {
+    fn default() -> Self {
+        Self {
+            threads: 1,
+            deadline_s: 5.0,
+            max_file_mb: 512,
+            max_operators: 20_000,
+            max_tensor_mb: 512,
+        }
+    }
+}
+
+impl LimitSettings {
+    /// Returns the limits. The settings are within their ranges.
+    pub fn limits(&self) -> Limits {
+        Limits {
+            file_bytes: self.max_file_mb << 20,
+            operators: self.max_operators,
+            // A number of a tensor has four bytes.
+            tensor_values: self.max_tensor_mb << 18,
+            deadline: Duration::from_secs_f64(self.deadline_s),
+            threads: self.threads,
+            ..Limits::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_have_the_same_defaults_as_the_limits() {
+        assert_eq!(LimitSettings::default().limits(), Limits::default());
+    }
+
+    #[test]
+    fn each_setting_is_a_limit() {
+        let settings = LimitSettings {
+            threads: 2,
+            deadline_s: 0.5,
+            max_file_mb: 3,
+            max_operators: 4,
+            max_tensor_mb: 5,
+        };
+        let expected = Limits {
+            threads: 2,
+            deadline: Duration::from_millis(500),
+            file_bytes: 3 * 1024 * 1024,
+            operators: 4,
+            tensor_values: 5 * 1024 * 1024 / 4,
+            ..Limits::default()
+        };
+        assert_eq!(settings.limits(), expected);
     }
 }

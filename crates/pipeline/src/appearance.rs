@@ -1,19 +1,18 @@
 //! `[appearance]`: a network that describes people, for all stages that compare them.
 
 use std::path::Path;
-use std::time::Duration;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::OrAuto;
 use tagalong_core::{Error, Frame, Result};
 use tagalong_geometry::Rect;
-use tagalong_network::{Convention, EmbeddingNetwork, Limits, with_colours};
+use tagalong_network::{Convention, EmbeddingNetwork, LimitSettings, with_colours};
 use tagalong_vision::{Describer, Embedder};
 
 /// Description of people by a re-identification network, for `[reidentification]`, its
 /// `association_weight` and the target lock. Differences are 1 minus the cosine of two vectors.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AppearanceSettings {
     /// ONNX file of a re-identification network, relative to the config. Empty: people are
@@ -22,53 +21,15 @@ pub struct AppearanceSettings {
     /// Convention of its input: `auto` (by the outputs), `osnet` (RGB, mean and deviation of
     /// ImageNet) or `omz` (BGR, 0 to 255).
     pub convention: OrAuto<Convention>,
-    /// Threads of the network.
-    #[schemars(range(min = 1, max = 256))]
-    pub threads: usize,
-    /// A call that takes longer is given up, and that person has no appearance in that frame, s.
-    /// Which calls are depends on the machine: with a tight deadline two runs may differ.
-    #[schemars(range(min = 1e-3, max = 3600.0))]
-    pub deadline_s: f64,
-    /// Largest file, MB.
-    #[schemars(range(min = 1, max = 100_000))]
-    pub max_file_mb: u64,
-    /// Most operators of a file.
-    #[schemars(range(min = 1, max = 10_000_000))]
-    pub max_operators: usize,
-    /// Largest tensor, MB, as far as it follows from the file.
-    #[schemars(range(min = 1, max = 100_000))]
-    pub max_tensor_mb: usize,
-}
-
-impl Default for AppearanceSettings {
-    fn default() -> Self {
-        Self {
-            model: String::new(),
-            convention: OrAuto::Auto,
-            threads: 1,
-            deadline_s: 5.0,
-            max_file_mb: 512,
-            max_operators: 20_000,
-            max_tensor_mb: 512,
-        }
-    }
+    /// Limits of the network; a person without a result has no appearance in that frame.
+    #[serde(flatten)]
+    pub limits: LimitSettings,
 }
 
 impl AppearanceSettings {
     /// Returns true if a network describes people.
     pub(crate) fn has_network(&self) -> bool {
         !self.model.is_empty()
-    }
-
-    fn limits(&self) -> Limits {
-        Limits {
-            file_bytes: self.max_file_mb << 20,
-            operators: self.max_operators,
-            tensor_values: self.max_tensor_mb << 18,
-            deadline: Duration::from_secs_f64(self.deadline_s),
-            threads: self.threads,
-            ..Limits::default()
-        }
     }
 
     /// Returns the describer, and reads the network if there is one.
@@ -81,7 +42,8 @@ impl AppearanceSettings {
             return Ok(Describer::default());
         }
         let path = base_dir.join(&self.model);
-        let network = EmbeddingNetwork::load(&path, self.convention.chosen(), &self.limits());
+        let network =
+            EmbeddingNetwork::load(&path, self.convention.chosen(), &self.limits.limits());
         let network = network.map_err(|why| Error::Model { path: self.model.clone(), why })?;
         let mark = format!("{base_dir:?} {self:?}");
         let embedder = OfNetwork { network, path: self.model.clone() };

@@ -12,6 +12,7 @@ fn it_conforms() {
 
 /// The configs beside them are valid, and select these plugins.
 #[test]
+#[cfg(feature = "program")]
 fn the_program_knows_them() {
     let program = env!("CARGO_BIN_EXE_own-plugin");
     for config in ["own-band.toml", "own-contrast.toml", "own-tracker.toml"] {

@@ -1,6 +1,4 @@
-use tagalong_assignment::{
-    ObservationMemory, Staged, best_of, buffered_iou, is_strong, probability,
-};
+use tagalong_assignment::{ObservationMemory, Staged, best_of, buffered_iou};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 use tagalong_geometry::Rect;
 
@@ -31,7 +29,7 @@ impl Buffered {
     }
 
     fn is_strong(&self, detection: &Detection) -> bool {
-        is_strong(detection, self.config.strong_log_odds)
+        self.config.priority.is_strong(detection)
     }
 
     /// Returns the box at which a track is expected.
@@ -86,16 +84,14 @@ impl Associator for Buffered {
                 let (track, detection) = (&tracks[row], &detections[column]);
                 let overlap = this.overlap(track, detection, reach)?;
                 let overlap = best_of(overlap, gate.appearance_of(row, column));
-                let certainty = probability(detection.score);
-                let counted =
-                    if this.config.weigh_by_score { overlap * certainty } else { overlap };
+                let counted = this.config.priority.weighed(overlap, detection);
                 gate.admits(track, detection).then_some(counted)
             }
         };
         let mut staged = Staged::new(tracks.len(), detections.len());
         for confirmed in [true, false] {
-            let turn =
-                |at: usize| !this.config.confirmed_first || tracks[at].confirmed == confirmed;
+            let confirmed_first = this.config.priority.confirmed_first;
+            let turn = |at: usize| !confirmed_first || tracks[at].confirmed == confirmed;
             staged.assign(&staged.open(turn, strong), similarity(this.first()));
             staged.assign(&staged.open(turn, strong), similarity(this.second()));
             staged.assign(&staged.open(turn, |at| !strong(at)), similarity(this.weak()));
@@ -112,50 +108,26 @@ impl Associator for Buffered {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+    use tagalong_assignment::PrioritySettings;
     use tagalong_config::Registry;
-    use tagalong_core::{Estimate, Person, TrackId};
-    use tagalong_geometry::ImageBox;
+    use tagalong_conformance::samples::{GATE, detection_in, pairs, track_in};
 
     use super::*;
-
-    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: -9.0, appearance: &[] };
 
     fn at(x: f64) -> Rect {
         Rect::new(x, 0.0, 20.0, 40.0)
     }
 
     fn detection(x: f64, score: f64) -> Detection {
-        Detection {
-            image: Some(ImageBox::full_body(at(x))),
-            position: Point3::new(3.0, 0.0, 1.6),
-            covariance: Matrix3::identity() * 0.01,
-            score,
-            source: "test",
-        }
+        Detection { score, ..detection_in(at(x)) }
     }
 
     fn track(id: u32, x: f64) -> Track {
-        let person = Person { position: Point3::new(3.0, 0.0, 1.6), velocity: Vector2::zeros() };
-        let estimate = Estimate { person, covariance: SMatrix::identity(), region: at(x) };
-        Track {
-            id: TrackId(id),
-            estimate,
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 2.0,
-        }
+        track_in(id, at(x))
     }
 
     fn answer(config: &Config, tracks: &[Track], found: &[Detection]) -> Associations {
         Buffered::new(config.clone()).unwrap().associate(tracks, found, &GATE)
-    }
-
-    fn pairs(answer: &Associations) -> Vec<(usize, usize)> {
-        answer.pairs.iter().map(|pair| (pair.track, pair.detection)).collect()
     }
 
     #[test]
@@ -221,7 +193,8 @@ mod tests {
     fn confirmed_tracks_may_go_first() {
         let tracks = [track(1, 6.0), Track { confirmed: false, ..track(2, 0.0) }];
         let with = |confirmed_first: bool| {
-            let config = Config { confirmed_first, ..Config::default() };
+            let priority = PrioritySettings { confirmed_first, ..PrioritySettings::default() };
+            let config = Config { priority, ..Config::default() };
             pairs(&answer(&config, &tracks, &[detection(0.0, 3.0)]))
         };
         assert_eq!((with(false), with(true)), (vec![(1, 0)], vec![(0, 0)]));
@@ -231,7 +204,8 @@ mod tests {
     fn overlap_may_count_by_the_score() {
         let found = [detection(0.0, 0.5), detection(2.0, 5.0)];
         let with = |weigh_by_score: bool| {
-            let config = Config { weigh_by_score, ..Config::default() };
+            let priority = PrioritySettings { weigh_by_score, ..PrioritySettings::default() };
+            let config = Config { priority, ..Config::default() };
             pairs(&answer(&config, &[track(1, 0.0)], &found))
         };
         assert_eq!((with(false), with(true)), (vec![(0, 0)], vec![(0, 1)]));
@@ -239,13 +213,15 @@ mod tests {
 
     #[test]
     fn settings_that_cannot_work_are_refused() {
+        let undefined =
+            PrioritySettings { strong_log_odds: f64::NAN, ..PrioritySettings::default() };
         for config in [
             Config { buffer: -0.1, ..Config::default() },
             Config { min_overlap: 0.0, ..Config::default() },
             Config { second_buffer: f64::NAN, ..Config::default() },
             Config { second_overlap: 3.0, ..Config::default() },
             Config { motion_frames: 0, ..Config::default() },
-            Config { strong_log_odds: f64::NAN, ..Config::default() },
+            Config { priority: undefined, ..Config::default() },
             Config { weak_overlap: 0.0, ..Config::default() },
         ] {
             assert!(Buffered::new(config.clone()).is_err(), "{config:?}");

@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_assignment::PrioritySettings;
 use tagalong_config::check_settings;
 use tagalong_core::Result;
 
@@ -35,16 +36,13 @@ pub struct Config {
     /// Age of the oldest observation of which the mean velocity is taken, frames.
     #[schemars(range(min = 1, max = 1000))]
     pub motion_frames: u32,
-    /// Detections from these log-odds on are strong; 0.405 is a probability of 0.6.
-    pub strong_log_odds: f64,
     /// Smallest overlap of a weak detection and a track that is left, with the second buffer; above
     /// 1 weak detections are not used.
     #[schemars(range(min = 1e-6, max = 2.0))]
     pub weak_overlap: f64,
-    /// Tracks that are not confirmed get the detections that confirmed ones leave.
-    pub confirmed_first: bool,
-    /// The overlap counts by the probability of the detection.
-    pub weigh_by_score: bool,
+    /// Order of detections and tracks.
+    #[serde(flatten)]
+    pub priority: PrioritySettings,
 }
 
 impl Default for Config {
@@ -56,10 +54,8 @@ impl Default for Config {
             second_overlap: 0.3,
             motion: Motion::Observed,
             motion_frames: 5,
-            strong_log_odds: 0.405,
             weak_overlap: 0.5,
-            confirmed_first: false,
-            weigh_by_score: false,
+            priority: PrioritySettings::default(),
         }
     }
 }

@@ -51,44 +51,17 @@ impl Associator for Hungarian {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
     use tagalong_config::Registry;
-    use tagalong_core::{Estimate, Person, TrackId};
-    use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
+    use tagalong_conformance::samples::{
+        GATE, detection_at, detection_in, pairs, track_at, track_in, with_variance,
+    };
+    use tagalong_geometry::Rect;
 
     use super::*;
 
-    fn person(x: f64, y: f64) -> Detection {
-        let lens =
-            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        let position = Point3::new(x, y, 1.6);
-        Detection {
-            image: Some(ImageBox::upper_body(
-                Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
-            )),
-            position,
-            covariance: Matrix3::identity() * 0.01,
-            score: 1.0,
-            source: "test",
-        }
+    fn track(x: f64, y: f64, variance_m2: f64) -> Track {
+        with_variance(track_at(1, x, y), variance_m2)
     }
-
-    fn track(position: Point3<f64>, covariance: SMatrix<f64, 5, 5>) -> Track {
-        let person = Person { position, velocity: Vector2::zeros() };
-        let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 10.0, 10.0) };
-        Track {
-            id: TrackId(1),
-            estimate,
-            seen: false,
-            occluded: false,
-            confirmed: true,
-            age: 0,
-            unseen_s: 0.0,
-            score: 1.0,
-        }
-    }
-
-    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: 0.0, appearance: &[] };
 
     #[test]
     fn the_promises_of_associators_are_kept() {
@@ -101,8 +74,8 @@ mod tests {
     #[test]
     fn pairs_that_are_probably_no_person_are_not_formed() {
         let mut hungarian = Hungarian::new(Config::default()).unwrap();
-        let doubtful = Detection { score: -2.0, ..person(3.0, 0.0) };
-        let at = track(doubtful.position, SMatrix::identity() * 0.01);
+        let doubtful = Detection { score: -2.0, ..detection_at(3.0, 0.0) };
+        let at = track(3.0, 0.0, 0.01);
         let mut pairs = |score: f64| {
             let track = Track { score, ..at.clone() };
             hungarian.associate(&[track], std::slice::from_ref(&doubtful), &GATE).pairs.len()
@@ -113,12 +86,11 @@ mod tests {
     #[test]
     fn appearance_decides_between_detections_that_fit_equally_well() {
         let mut hungarian = Hungarian::new(Config::default()).unwrap();
-        let tracks =
-            [0.1, -0.1].map(|y| track(Point3::new(3.0, y, 1.6), SMatrix::identity() * 0.02));
-        let seen = [person(3.0, 0.11), person(3.0, -0.11)];
+        let tracks = [0.1, -0.1].map(|y| track(3.0, y, 0.02));
+        let seen = [detection_at(3.0, 0.11), detection_at(3.0, -0.11)];
         let mut given = |appearance: &[Vec<f64>]| {
             let answer = hungarian.associate(&tracks, &seen, &Gate { appearance, ..GATE });
-            answer.pairs.iter().map(|pair| pair.detection).collect::<Vec<_>>()
+            pairs(&answer).into_iter().map(|(_, detection)| detection).collect::<Vec<_>>()
         };
         assert_eq!(given(&[]), [0, 1]);
         assert_eq!(given(&[vec![-4.0, 4.0], vec![4.0, -4.0]]), [1, 0]);
@@ -141,29 +113,22 @@ mod tests {
     #[test]
     fn a_pair_fits_within_the_gate_alone() {
         let hungarian = Hungarian::new(Config::default()).unwrap();
-        let track = track(Point3::new(3.0, 0.0, 1.6), SMatrix::identity() * 0.01);
-        assert!(hungarian.fits(&track, &person(3.0, 0.1), &GATE));
-        assert!(!hungarian.fits(&track, &person(3.0, 4.0), &GATE));
+        let track = track(3.0, 0.0, 0.01);
+        assert!(hungarian.fits(&track, &detection_at(3.0, 0.1), &GATE));
+        assert!(!hungarian.fits(&track, &detection_at(3.0, 4.0), &GATE));
     }
 
     /// P2, eq. 10, gives pairs that overlap too little a cost of 0, and minimises.
     #[test]
     fn who_overlaps_is_given_what_overlaps_but_in_print_whatever_does_not() {
         let boxed = |x: f64| Rect::new(x, 0.0, 10.0, 10.0);
-        let at = |x: f64| {
-            let mut track = track(Point3::new(3.0, 0.0, 1.5), SMatrix::identity());
-            track.estimate.region = boxed(x);
-            track
-        };
-        let tracks = [at(0.0), at(50.0)];
-        let seen = [2.0, 51.0]
-            .map(|x| Detection { image: Some(ImageBox::upper_body(boxed(x))), ..person(3.0, 0.0) });
+        let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(50.0))];
+        let seen = [2.0, 51.0].map(|x| detection_in(boxed(x)));
         let given = |compat_printed_cost: bool| {
             let settings = Config { cost: Cost::Overlap, compat_printed_cost, ..Config::default() };
-            let answer = Hungarian::new(settings).unwrap().associate(&tracks, &seen, &GATE);
-            answer.pairs.iter().map(|pair| Some(pair.detection)).collect::<Vec<_>>()
+            pairs(&Hungarian::new(settings).unwrap().associate(&tracks, &seen, &GATE))
         };
-        assert_eq!(given(false), [Some(0), Some(1)]);
-        assert_eq!(given(true), [Some(1), Some(0)]);
+        assert_eq!(given(false), [(0, 0), (1, 1)]);
+        assert_eq!(given(true), [(0, 1), (1, 0)]);
     }
 }

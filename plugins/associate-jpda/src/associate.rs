@@ -91,39 +91,17 @@ impl Associator for Jpda {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
     use tagalong_config::Registry;
-    use tagalong_core::{Estimate, Person, TrackId};
-    use tagalong_geometry::{ImageBox, Rect};
+    use tagalong_conformance::samples::{GATE, detection_at, track_at};
 
     use super::*;
 
-    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: 0.0, appearance: &[] };
-
     fn detection(y: f64) -> Detection {
-        Detection {
-            image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
-            position: Point3::new(3.0, y, 1.6),
-            covariance: Matrix3::identity() * 0.01,
-            score: 2.0,
-            source: "test",
-        }
+        detection_at(3.0, y)
     }
 
     fn track(id: u32, y: f64) -> Track {
-        let person = Person { position: Point3::new(3.0, y, 1.6), velocity: Vector2::zeros() };
-        let covariance = SMatrix::identity() * 0.01;
-        let estimate = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 9.0, 9.0) };
-        Track {
-            id: TrackId(id),
-            estimate,
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 2.0,
-        }
+        track_at(id, 3.0, y)
     }
 
     fn associate(config: Config, tracks: &[Track], detections: &[Detection]) -> Associations {

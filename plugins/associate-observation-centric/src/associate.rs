@@ -1,8 +1,6 @@
 use std::f64::consts::PI;
 
-use tagalong_assignment::{
-    ObservationMemory, Staged, best_of, buffered_iou, is_strong, probability,
-};
+use tagalong_assignment::{ObservationMemory, Staged, best_of, buffered_iou, probability};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 use tagalong_geometry::Rect;
 
@@ -34,7 +32,7 @@ impl ObservationCentric {
 
     /// Returns the overlap of the predicted box and a detection, if it is enough.
     fn overlap(&self, track: &Track, detection: &Detection) -> Option<f64> {
-        let strong = is_strong(detection, self.config.strong_log_odds);
+        let strong = self.config.priority.is_strong(detection);
         let least = if strong { self.config.min_overlap } else { self.config.weak_overlap };
         let overlap = track.estimate.region.iou(&detection.rect()?);
         (overlap >= least).then_some(overlap)
@@ -42,7 +40,7 @@ impl ObservationCentric {
 
     /// Returns the overlap of the last observation and a strong detection, if it is enough.
     fn recovered(&self, track: &Track, detection: &Detection) -> Option<f64> {
-        if !is_strong(detection, self.config.strong_log_odds) {
+        if !self.config.priority.is_strong(detection) {
             return None;
         }
         let last = self.memory.last(track.id)?;
@@ -64,10 +62,9 @@ impl ObservationCentric {
         let (track, detection) = scene.pair(row, column)?;
         let overlap = self.overlap(track, detection)?;
         let overlap = best_of(overlap, scene.gate.appearance_of(row, column));
-        let certainty = probability(detection.score);
-        let counted = if self.config.weigh_by_score { overlap * certainty } else { overlap };
         let consistency = self.consistency(track, &detection.rect()?);
-        Some(counted + self.config.direction_weight * certainty * consistency)
+        let bonus = self.config.direction_weight * probability(detection.score) * consistency;
+        Some(self.config.priority.weighed(overlap, detection) + bonus)
     }
 }
 
@@ -92,8 +89,9 @@ impl Associator for ObservationCentric {
     ) -> Associations {
         self.memory.begin(tracks, gate.dt_s);
         let scene = Scene { tracks, detections, gate };
-        let strong = |at: usize| is_strong(&detections[at], self.config.strong_log_odds);
-        let early = |at: usize| tracks[at].confirmed || !self.config.confirmed_first;
+        let priority = self.config.priority;
+        let strong = |at: usize| priority.is_strong(&detections[at]);
+        let early = |at: usize| tracks[at].confirmed || !priority.confirmed_first;
         let by_prediction = |row, column| self.similarity(&scene, row, column);
         let mut staged = Staged::new(tracks.len(), detections.len());
         staged.assign(&staged.open(early, strong), by_prediction);
@@ -108,53 +106,25 @@ impl Associator for ObservationCentric {
                 self.memory.record(track.id, region);
             }
         }
-        let spent = staged.left(|at| !is_strong(&detections[at], self.config.strong_log_odds));
+        let spent = staged.left(|at| !strong(at));
         Associations { spent, ..Associations::one_to_one(staged.given().iter().copied()) }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+    use tagalong_assignment::PrioritySettings;
     use tagalong_config::Registry;
-    use tagalong_core::{Estimate, Person, TrackId};
-    use tagalong_geometry::ImageBox;
+    use tagalong_conformance::samples::{GATE, detection_in, pairs, track_in};
 
     use super::*;
-
-    const GATE: Gate<'_> = Gate { dt_s: 0.1, start_log_odds: -9.0, appearance: &[] };
 
     fn at(x: f64, y: f64) -> Rect {
         Rect::new(x, y, 20.0, 40.0)
     }
 
     fn detection(region: Rect, score: f64) -> Detection {
-        Detection {
-            image: Some(ImageBox::full_body(region)),
-            position: Point3::new(3.0, 0.0, 1.6),
-            covariance: Matrix3::identity() * 0.01,
-            score,
-            source: "test",
-        }
-    }
-
-    fn track(id: u32, region: Rect) -> Track {
-        let person = Person { position: Point3::new(3.0, 0.0, 1.6), velocity: Vector2::zeros() };
-        let estimate = Estimate { person, covariance: SMatrix::identity(), region };
-        Track {
-            id: TrackId(id),
-            estimate,
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 2.0,
-        }
-    }
-
-    fn pairs(answer: &Associations) -> Vec<(usize, usize)> {
-        answer.pairs.iter().map(|pair| (pair.track, pair.detection)).collect()
+        Detection { score, ..detection_in(region) }
     }
 
     fn associator(config: Config) -> ObservationCentric {
@@ -166,7 +136,7 @@ mod tests {
         let mut associator = associator(config);
         for frame in 1..=3 {
             let region = at(4.0 * f64::from(frame), 0.0);
-            associator.associate(&[track(1, region)], &[detection(region, 3.0)], &GATE);
+            associator.associate(&[track_in(1, region)], &[detection(region, 3.0)], &GATE);
         }
         associator
     }
@@ -185,7 +155,7 @@ mod tests {
         let detections = [detection(at(14.0, 10.0), 3.0), detection(at(23.0, 0.0), 3.0)];
         let with = |direction_weight: f64| {
             let mut associator = walking(Config { direction_weight, ..Config::default() });
-            pairs(&associator.associate(&[track(1, at(16.0, 0.0))], &detections, &GATE))
+            pairs(&associator.associate(&[track_in(1, at(16.0, 0.0))], &detections, &GATE))
         };
         assert_eq!(with(0.0), [(0, 0)]);
         assert_eq!(with(0.2), [(0, 1)]);
@@ -194,13 +164,13 @@ mod tests {
     #[test]
     fn directions_are_compared_as_the_paper_has_them() {
         let associator = walking(Config::default());
-        let toward = |x: f64, y: f64| associator.consistency(&track(1, at(0.0, 0.0)), &at(x, y));
+        let toward = |x: f64, y: f64| associator.consistency(&track_in(1, at(0.0, 0.0)), &at(x, y));
         // The direction is taken from the observation three frames ago, at x = 4.
         assert!((toward(14.0, 0.0) - 0.5).abs() < 1e-9, "straight ahead");
         assert!((toward(-6.0, 0.0) + 0.5).abs() < 1e-9, "straight behind");
         assert!(toward(4.0, 10.0).abs() < 1e-9, "across");
         assert_eq!(toward(4.0, 0.0), 0.0, "from where it was there is no direction");
-        assert_eq!(associator.consistency(&track(2, at(0.0, 0.0)), &at(9.0, 0.0)), 0.0);
+        assert_eq!(associator.consistency(&track_in(2, at(0.0, 0.0)), &at(9.0, 0.0)), 0.0);
     }
 
     /// The prediction ran on, but the person stopped.
@@ -208,14 +178,14 @@ mod tests {
     fn a_track_that_no_detection_overlaps_is_found_where_it_was_last_observed() {
         let there = [detection(at(12.0, 0.0), 3.0)];
         let answer = |config: Config| {
-            pairs(&walking(config).associate(&[track(1, at(60.0, 0.0))], &there, &GATE))
+            pairs(&walking(config).associate(&[track_in(1, at(60.0, 0.0))], &there, &GATE))
         };
         assert_eq!(answer(Config::default()), [(0, 0)]);
         assert_eq!(answer(Config { recovery_overlap: 1.5, ..Config::default() }), []);
         let near = [detection(at(36.0, 0.0), 3.0)];
         let answer = |recovery_buffer: f64| {
             let mut associator = walking(Config { recovery_buffer, ..Config::default() });
-            pairs(&associator.associate(&[track(1, at(80.0, 0.0))], &near, &GATE))
+            pairs(&associator.associate(&[track_in(1, at(80.0, 0.0))], &near, &GATE))
         };
         assert_eq!((answer(0.0), answer(1.0)), (vec![], vec![(0, 0)]));
     }
@@ -225,7 +195,7 @@ mod tests {
         let weak = [detection(at(13.0, 0.0), 0.1), detection(at(90.0, 0.0), 0.1)];
         let answer = |weak_overlap: f64| {
             let config = Config { weak_overlap, ..Config::default() };
-            let answer = walking(config).associate(&[track(1, at(12.0, 0.0))], &weak, &GATE);
+            let answer = walking(config).associate(&[track_in(1, at(12.0, 0.0))], &weak, &GATE);
             (pairs(&answer), answer.spent)
         };
         assert_eq!(answer(0.5), (vec![(0, 0)], vec![1]));
@@ -234,10 +204,12 @@ mod tests {
 
     #[test]
     fn confirmed_tracks_may_go_first() {
-        let tracks = [track(1, at(6.0, 0.0)), Track { confirmed: false, ..track(2, at(0.0, 0.0)) }];
+        let tracks =
+            [track_in(1, at(6.0, 0.0)), Track { confirmed: false, ..track_in(2, at(0.0, 0.0)) }];
         let found = [detection(at(0.0, 0.0), 3.0)];
         let answer = |confirmed_first: bool| {
-            let config = Config { confirmed_first, ..Config::default() };
+            let priority = PrioritySettings { confirmed_first, ..PrioritySettings::default() };
+            let config = Config { priority, ..Config::default() };
             pairs(&associator(config).associate(&tracks, &found, &GATE))
         };
         assert_eq!((answer(false), answer(true)), (vec![(1, 0)], vec![(0, 0)]));
@@ -247,8 +219,9 @@ mod tests {
     fn overlap_may_count_by_the_score() {
         let found = [detection(at(0.0, 0.0), 0.5), detection(at(2.0, 0.0), 5.0)];
         let answer = |weigh_by_score: bool| {
-            let config = Config { weigh_by_score, ..Config::default() };
-            pairs(&associator(config).associate(&[track(1, at(0.0, 0.0))], &found, &GATE))
+            let priority = PrioritySettings { weigh_by_score, ..PrioritySettings::default() };
+            let config = Config { priority, ..Config::default() };
+            pairs(&associator(config).associate(&[track_in(1, at(0.0, 0.0))], &found, &GATE))
         };
         assert_eq!((answer(false), answer(true)), (vec![(0, 0)], vec![(0, 1)]));
     }
@@ -259,7 +232,7 @@ mod tests {
         let appearance = [vec![-2.0, 4.0]];
         let answer = |gate: &Gate| {
             let mut associator = associator(Config::default());
-            pairs(&associator.associate(&[track(1, at(1.0, 0.0))], &found, gate))
+            pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, gate))
         };
         assert_eq!(answer(&GATE), [(0, 0)]);
         assert_eq!(answer(&Gate { appearance: &appearance, ..GATE }), [(0, 1)]);
@@ -267,13 +240,15 @@ mod tests {
 
     #[test]
     fn settings_that_cannot_work_are_refused() {
+        let undefined =
+            PrioritySettings { strong_log_odds: f64::NAN, ..PrioritySettings::default() };
         for config in [
             Config { min_overlap: 0.0, ..Config::default() },
             Config { direction_weight: -0.1, ..Config::default() },
             Config { direction_frames: 0, ..Config::default() },
             Config { recovery_overlap: f64::NAN, ..Config::default() },
             Config { recovery_buffer: -0.1, ..Config::default() },
-            Config { strong_log_odds: f64::NAN, ..Config::default() },
+            Config { priority: undefined, ..Config::default() },
             Config { weak_overlap: 3.0, ..Config::default() },
         ] {
             assert!(ObservationCentric::new(config.clone()).is_err(), "{config:?}");

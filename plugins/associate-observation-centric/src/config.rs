@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_assignment::PrioritySettings;
 use tagalong_config::check_settings;
 use tagalong_core::Result;
 
@@ -24,16 +25,13 @@ pub struct Config {
     /// Each side of a box is enlarged by this fraction of it in the stage for tracks that are left.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub recovery_buffer: f64,
-    /// Detections from these log-odds on are strong; 0.405 is a probability of 0.6.
-    pub strong_log_odds: f64,
     /// Smallest overlap of a predicted box and a weak detection; above 1 weak detections are not
     /// used.
     #[schemars(range(min = 1e-6, max = 2.0))]
     pub weak_overlap: f64,
-    /// Tracks that are not confirmed get the detections that confirmed ones leave.
-    pub confirmed_first: bool,
-    /// The overlap counts by the probability of the detection.
-    pub weigh_by_score: bool,
+    /// Order of detections and tracks.
+    #[serde(flatten)]
+    pub priority: PrioritySettings,
 }
 
 impl Default for Config {
@@ -44,10 +42,8 @@ impl Default for Config {
             direction_frames: 3,
             recovery_overlap: 0.3,
             recovery_buffer: 0.0,
-            strong_log_odds: 0.405,
             weak_overlap: 0.5,
-            confirmed_first: false,
-            weigh_by_score: false,
+            priority: PrioritySettings::default(),
         }
     }
 }

@@ -1,10 +1,8 @@
-use std::time::Duration;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{OrAuto, check_settings};
 use tagalong_core::{Error, Result};
-use tagalong_network::{Choices, Colours, Family, Fit, Limits, Preparation};
+use tagalong_network::{Choices, Colours, Family, Fit, LimitSettings, Preparation};
 use tagalong_vision::BoxSettings;
 
 /// Settings of `onnx`.
@@ -48,22 +46,9 @@ pub struct Config {
     /// Boxes to detections with a position.
     #[serde(flatten)]
     pub boxes: BoxSettings,
-    /// Threads of the network.
-    #[schemars(range(min = 1, max = 256))]
-    pub threads: usize,
-    /// A call that takes longer is given up, and its frame has no detections, s. Which calls are
-    /// depends on the machine: with a tight deadline two runs may differ.
-    #[schemars(range(min = 1e-3, max = 3600.0))]
-    pub deadline_s: f64,
-    /// Largest file, MB.
-    #[schemars(range(min = 1, max = 100_000))]
-    pub max_file_mb: u64,
-    /// Most operators of a file.
-    #[schemars(range(min = 1, max = 10_000_000))]
-    pub max_operators: usize,
-    /// Largest tensor, MB, as far as it follows from the file.
-    #[schemars(range(min = 1, max = 100_000))]
-    pub max_tensor_mb: usize,
+    /// Limits of the network.
+    #[serde(flatten)]
+    pub limits: LimitSettings,
 }
 
 impl Default for Config {
@@ -82,11 +67,7 @@ impl Default for Config {
             mean: Vec::new(),
             deviation: Vec::new(),
             boxes: BoxSettings::default(),
-            threads: 1,
-            deadline_s: 5.0,
-            max_file_mb: 512,
-            max_operators: 20_000,
-            max_tensor_mb: 512,
+            limits: LimitSettings::default(),
         }
     }
 }
@@ -109,17 +90,6 @@ impl Config {
     pub(crate) fn choices(&self) -> Choices {
         let size = <[usize; 2]>::try_from(&self.size[..]).ok();
         Choices { family: self.family.chosen(), size, classes: self.classes.clone() }
-    }
-
-    pub(crate) fn limits(&self) -> Limits {
-        Limits {
-            file_bytes: self.max_file_mb << 20,
-            operators: self.max_operators,
-            tensor_values: self.max_tensor_mb << 18,
-            deadline: Duration::from_secs_f64(self.deadline_s),
-            threads: self.threads,
-            ..Limits::default()
-        }
     }
 
     /// Returns the preparation of images: that of the family, but for what is set.

@@ -105,7 +105,8 @@ impl Loaded {
 
 fn load(runtime: Runtime, config: &Config, context: &Context) -> Result<Loaded> {
     let path = context.base_dir.join(&config.model);
-    let network = PersonNetwork::load_with(runtime, &path, &config.choices(), &config.limits());
+    let limits = config.limits.limits();
+    let network = PersonNetwork::load_with(runtime, &path, &config.choices(), &limits);
     let network = network.map_err(|why| Error::Model { path: config.model.clone(), why })?;
     let preparation = config.preparation(network.family())?;
     Ok(Loaded { network, preparation })

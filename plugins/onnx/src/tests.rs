@@ -8,7 +8,7 @@ use tagalong_core::{
     Images, Person, Query, RgbImage, Stamp, Track, TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect};
-use tagalong_network::{Colours, Family, Fit};
+use tagalong_network::{Colours, Family, Fit, LimitSettings};
 use tagalong_vision::{BoxSettings, BoxedBody};
 
 use super::*;
@@ -208,19 +208,21 @@ fn bad_files_are_named_with_the_reason() {
     assert!(why.contains("`yolox.json`: it is truncated or no ONNX file"), "{why}");
     let wrong = Config { family: OrAuto::Chosen(Family::RfDetr), ..config(Family::Yolox) };
     assert!(message(wrong).contains("is not of the family rf-detr"));
-    let small = Config { max_operators: 2, ..config(Family::Yolox) };
+    let limits = LimitSettings { max_operators: 2, ..LimitSettings::default() };
+    let small = Config { limits, ..config(Family::Yolox) };
     assert!(message(small).contains("raise `max_operators`"));
 }
 
 #[test]
 fn each_setting_that_cannot_work_is_named() {
+    let late = LimitSettings { deadline_s: 0.0, ..LimitSettings::default() };
     for (key, config) in [
         ("size", Config { size: vec![640], ..Config::default() }),
         ("size", Config { size: vec![640, 0], ..Config::default() }),
         ("mean", Config { mean: vec![1.0], ..Config::default() }),
         ("deviation", Config { deviation: vec![0.0; 3], ..Config::default() }),
         ("discover_score", Config { discover_score: 1.5, ..Config::default() }),
-        ("deadline_s", Config { deadline_s: 0.0, ..Config::default() }),
+        ("deadline_s", Config { limits: late, ..Config::default() }),
     ] {
         let why = message(config);
         assert!(why.starts_with(&format!("`{key}`")), "{why}");
@@ -229,7 +231,8 @@ fn each_setting_that_cannot_work_is_named() {
 
 #[test]
 fn a_late_call_is_counted_and_is_no_error() {
-    let hurried = Config { deadline_s: 1e-3, ..config(Family::Yolox) };
+    let limits = LimitSettings { deadline_s: 1e-3, ..LimitSettings::default() };
+    let hurried = Config { limits, ..config(Family::Yolox) };
     let mut detector = detector(hurried);
     // Whether a call is late depends on the machine; a frame has people or is counted.
     for index in 1..20 {

@@ -1,9 +1,16 @@
 //! Sensors whose messages enter a frame beside its images.
 //!
-//! A new message type with its sensor is one module here, and one entry in [`SENSORS`]. The module
-//! has the message, a reader that makes a [`tagalong_core::Sensor`] of it, and the entry. Its
-//! topic is found by type, or named as `topics.NAME` under `[input]`, where `NAME` is the name of
-//! the input. Images are no entries: they make the frames, and their calibrations the cameras.
+//! A new message type with its sensor takes two new files, each with a line or two in the `lib.rs`
+//! or `mod.rs` beside it:
+//!
+//! 1. `crates/core/src/NAME.rs`: the data as plugins receive them, with
+//!    [`tagalong_core::Sensor::INPUT`] set to `Input::Named("NAME")`.
+//! 2. `crates/log/src/sensors/NAME.rs`: the message (a struct with the fields of the ROS message in
+//!    their order), a [`SensorReader`] that makes the data of it, and the entry for [`SENSORS`].
+//!
+//! `laser.rs` keeps the message nearest in time, `detections.rs` pairs one message with each frame.
+//! A topic is found by type, or named as `topics.NAME` under `[input]`. Images are no entries: they
+//! make the frames, and their calibrations the cameras.
 
 mod detections;
 pub(crate) mod laser;

@@ -121,8 +121,15 @@ fn a_network_that_cannot_be_used_is_an_error_with_its_line() {
         why.contains("[appearance] model file") && why.contains("raise `max_operators`"),
         "{why}"
     );
-    let why = refusal(&config("deadline_s = 0.0", ""));
-    assert!(why.contains("deadline_s"), "{why}");
+    for (line, message) in [
+        ("deadline_s = 0.0", "`appearance.deadline_s` must lie between"),
+        ("deadline_s = 'long'", "invalid type: string \"long\""),
+        ("deadlin_s = 1.0", "did you mean `deadline_s`?"),
+        ("convention = 'osnett'", "did you mean `osnet`?"),
+    ] {
+        let why = refusal(&config(line, ""));
+        assert!(why.contains(message) && why.contains(&format!("| {line}\n")), "{why}");
+    }
     let blind = config("", "[reidentification]\nremember_s = 1.0");
     let why = refusal(&format!("without = ['colour']\n{blind}"));
     assert!(why.contains("`[appearance]` requires colour"), "{why}");
