@@ -4,7 +4,7 @@
 use nalgebra::Point3;
 use tagalong_core::{Command, EgoMotion, Frame, Images, Reason, Stamp, WheelSpeeds};
 
-use super::doubles::{PLAIN, World, camera, frame, person, scored};
+use super::doubles::{PLAIN, World, camera, frame, person, scored, with_eyes};
 use crate::{LockState, Pipeline};
 
 /// A pipeline that has followed a person for two seconds.
@@ -25,7 +25,7 @@ fn is_moving(command: &Command) -> bool {
 
 fn after(index: u64, t_s: f64, motion: EgoMotion) -> Frame {
     let stamp = frame(index, t_s).stamp;
-    Frame::new(index, stamp, std::sync::Arc::new(camera()), motion, Images::default())
+    with_eyes(Frame::new(index, stamp, std::sync::Arc::new(camera()), motion, Images::default()))
 }
 
 /// The command for a frame that comes that much later.
