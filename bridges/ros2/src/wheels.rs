@@ -207,7 +207,7 @@ mod tests {
 
     fn enable(wheels: &Wheels) {
         let switch = wheels.switch();
-        [Enable::Reset, Enable::On].map(|event| switch.take(event, switch.now()));
+        [Enable::Reset, Enable::On].into_iter().for_each(|event| switch.take(event, switch.now()));
         thread::sleep(Duration::from_millis(20));
     }
 

@@ -63,13 +63,13 @@ fn alone() -> Option<MutexGuard<'static, ()>> {
 }
 
 /// `std_msgs/Bool`.
-#[derive(Clone, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Bool {
     data: bool,
 }
 
 /// `std_msgs/Empty`, with its one byte on the wire.
-#[derive(Clone, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Empty {
     byte: u8,
 }
@@ -621,7 +621,8 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
     let array = "diagnostic_msgs/msg/DiagnosticArray";
     let told = robot.peer.collect_of::<DiagnosticArray>("/diagnostics", array, &heard_all);
-    let beats = robot.peer.collect_of::<Header>("/people/heartbeat", "std_msgs/msg/Header", &heard_all);
+    let beats =
+        robot.peer.collect_of::<Header>("/people/heartbeat", "std_msgs/msg/Header", &heard_all);
     let is_stuck = Arc::new(AtomicBool::new(false));
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
@@ -648,7 +649,9 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     let expired = Instant::now();
     sleep(Duration::from_millis(1900));
     assert!(!commands.moves_since(expired), "stuck");
-    let stuck = |message: &DiagnosticStatus| message.level == 2 && message.message.contains("one frame takes");
+    let stuck = |message: &DiagnosticStatus| {
+        message.level == 2 && message.message.contains("one frame takes")
+    };
     let statuses = |told: &Collected<DiagnosticArray>| -> Vec<DiagnosticStatus> {
         told.so_far().into_iter().flat_map(|(_, array)| array.status).collect()
     };
@@ -662,7 +665,8 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     sleep(Duration::from_millis(1500));
     let last = statuses(&told).pop().unwrap();
     assert_eq!((last.level, last.name.as_str()), (1, "tagalong: follow"));
-    let value = |key: &str| last.values.iter().find(|(name, _)| name == key).map(|(_, v)| v.clone());
+    let value =
+        |key: &str| last.values.iter().find(|(name, _)| name == key).map(|(_, v)| v.clone());
     assert_eq!(value("other publishers of commands").as_deref(), Some("1"), "{last:?}");
     assert_eq!(value("malformed messages").as_deref(), Some("1"), "{last:?}");
     assert!(beats.so_far().len() > 20);

@@ -94,7 +94,7 @@ impl Job {
 }
 
 /// Returns the data of a log that a controller may need.
-fn sources(source: &FrameSource) -> Sources {
+pub(crate) fn sources(source: &FrameSource) -> Sources {
     let facts = source.facts();
     Sources {
         depth: facts.depth_topic.is_some(),
