@@ -70,6 +70,7 @@ struct Job {
 impl Job {
     fn prepare(args: &RunArgs, registry: &Registry) -> Result<Self, Failure> {
         let named = args.config().map(ConfigFile::read).transpose()?;
+        let is_named = named.is_some();
         check_log_path(args.log())?;
         let config = match named {
             Some(config) => config,
@@ -85,7 +86,10 @@ impl Job {
         let inputs = if args.overlay { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)?;
         let missing = |why| Failure::failed(format!("`{}`: {why}", args.log().display()));
-        pipeline.check_sources(sources(&source)).map_err(missing)?;
+        // A config that the program chose is for the tracks alone; no robot follows its commands.
+        if is_named {
+            pipeline.check_sources(sources(&source)).map_err(missing)?;
+        }
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let report = blank_report(&config, settings.seed, log);

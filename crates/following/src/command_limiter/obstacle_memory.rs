@@ -756,10 +756,16 @@ mod tests {
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Blind));
     }
 
+    /// A camera as [`camera`] with as many columns as are sampled of an image.
+    fn fine_camera() -> Camera {
+        let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        Camera::mounted(lens, 160, 120, 1.0, 0.0, 0.0)
+    }
+
     /// A floor that lies `drop_m` lower from `edge_m` on, and a wall at 6 m.
     fn with_edge(edge_m: f64, drop_m: f64) -> DepthImage {
-        let camera = camera();
-        DepthImage::from_fn(80, 60, |u, v| {
+        let camera = fine_camera();
+        DepthImage::from_fn(160, 120, |u, v| {
             // The camera is level and 1 m high: a ray falls by this much for each metre of depth.
             let falls = 1.0 - camera.back_project(Point2::new(u as f64, v as f64), 1.0).z;
             let hits = |height_m: f64| if falls > 0.0 { height_m / falls } else { f64::INFINITY };
@@ -772,7 +778,7 @@ mod tests {
         let settings = CollisionMonitorSettings::default();
         let mut surroundings = ObstacleMemory::default();
         let (depth, still) = (with_edge(edge_m, drop_m), EgoMotion::at_rest(0.1));
-        surroundings.update(&settings, &camera(), Some(&depth), &still, None);
+        surroundings.update(&settings, &fine_camera(), Some(&depth), &still, None);
         surroundings.ahead(&settings, 0.0, target)
     }
 
@@ -802,7 +808,7 @@ mod tests {
             let forward = if step > 20 { 0.05 } else { 0.0 };
             let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
             let depth = with_edge(1.8 - driven_m, 0.17);
-            surroundings.update(&settings, &camera(), Some(&depth), &motion, None);
+            surroundings.update(&settings, &fine_camera(), Some(&depth), &motion, None);
         }
         let found = surroundings.ahead(&settings, 0.0, None);
         assert!(is_at(found, 1.8 - 0.95 - 0.2), "{found:?}");
@@ -817,7 +823,7 @@ mod tests {
         let mut sees = |has_depth: bool, has_laser: bool, frames: u32| {
             for _ in 0..frames {
                 let depth = has_depth.then_some(&depth);
-                surroundings.update(&settings, &camera(), depth, &still, None);
+                surroundings.update(&settings, &fine_camera(), depth, &still, None);
                 surroundings.add_scan(&settings, has_laser.then_some(&[]), &still);
             }
             surroundings.is_sighted(&settings, 0.45)
@@ -842,7 +848,13 @@ mod tests {
         surroundings.add_scan(&settings, Some(&[]), &still);
         surroundings.clear();
         for _ in 0..2 {
-            surroundings.update(&settings, &camera(), Some(&with_edge(9.0, 0.0)), &still, None);
+            surroundings.update(
+                &settings,
+                &fine_camera(),
+                Some(&with_edge(9.0, 0.0)),
+                &still,
+                None,
+            );
             surroundings.add_scan(&settings, None, &still);
         }
         assert!(!surroundings.is_sighted(&settings, 0.5));

@@ -42,7 +42,8 @@ pub fn frame(index: u64, t_s: f64) -> Frame {
 
 /// Adds the scan of a laser that meets nothing: without a sensor of obstacles no robot moves.
 pub fn with_eyes(frame: Frame) -> Frame {
-    frame.with_laser(Some(LaserScan::of_points(&[])))
+    let none: [Point3<f64>; 0] = [];
+    frame.with_laser(Some(LaserScan::of_points(none)))
 }
 
 /// A person 1.6 m tall (to the head's centre) at a place on the floor.
