@@ -231,9 +231,7 @@ impl CommandLimiter {
         let next = self.ramped(before, wanted, dt);
         let reason = match () {
             () if wish.aim == Aim::Nobody && next != Twist::STOP => Reason::Stopping,
-            () if next == wanted => why,
-            // Still above a limit that has just been lowered.
-            () if is_capped && next.linear_mps.abs() > wanted.linear_mps.abs() => why,
+            () if next == wanted || is_capped => why,
             () => Reason::Limited,
         };
         // A turn in place stays in place, and the corridor shows nothing behind the robot.

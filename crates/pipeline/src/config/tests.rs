@@ -295,8 +295,8 @@ fn settings_may_be_at_their_bounds_and_not_beyond() {
 fn a_limit_beyond_its_ceiling_is_shown_with_its_line_and_the_remedy() {
     let refused = |line: &str| build(&format!("seed = 1\n{line}\n{PLAIN}")).map(drop).unwrap_err();
     for (line, words) in [
-        ("robot.max_speed_mps = 50.0", "`max_speed_mps` must lie between 0.05 and 0.9, not 50"),
-        ("command_limiter.valid_s = 3600.0", "`valid_s` must lie between 0.05 and 0.5, not 3600"),
+        ("robot.max_speed_mps = 50.0", "max_speed_mps` must lie between 0.05 and 0.9, not 50"),
+        ("command_limiter.valid_s = 3600.0", "valid_s` must lie between 0.05 and 0.5, not 3600"),
         ("command_limiter.reaction_s = 0.2", "must be at least 0.25, as `valid_s`, not 0.2"),
         ("collision_monitor.range_m = 1.2", "raise it or lower `max_speed_mps` in [robot]"),
     ] {
@@ -332,7 +332,8 @@ fn a_source_without_the_data_of_a_controller_is_refused_unless_the_config_says_s
         pipeline.check_sources(sources)
     };
     let all = Sources { depth: true, right: false, laser: true, odometry: true };
-    let (eyes, odometry) = (Sources { depth: false, laser: false, ..all }, Sources { odometry: false, ..all });
+    let (eyes, odometry) =
+        (Sources { depth: false, laser: false, ..all }, Sources { odometry: false, ..all });
     let drive = "[controller]\nplugin = 'drive'\n";
     assert_eq!(check("", drive, all), Ok(()));
     assert_eq!(check("", drive, Sources { depth: false, ..all }), Ok(()));

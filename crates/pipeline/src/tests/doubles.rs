@@ -35,9 +35,14 @@ pub fn camera() -> Camera {
 }
 
 pub fn frame(index: u64, t_s: f64) -> Frame {
+    with_eyes(bare_frame(index, t_s))
+}
+
+/// Returns a frame without any sensor.
+pub fn bare_frame(index: u64, t_s: f64) -> Frame {
     let stamp = Stamp::from_nanos(1_000_000_000_000).plus_seconds(t_s);
     let motion = EgoMotion::at_rest(0.1);
-    with_eyes(Frame::new(index, stamp, Arc::new(camera()), motion, Images::default()))
+    Frame::new(index, stamp, Arc::new(camera()), motion, Images::default())
 }
 
 /// Adds the scan of a laser that meets nothing: without a sensor of obstacles no robot moves.
