@@ -5,14 +5,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use ros2_client::Publisher;
+use tagalong_config::Registry;
 use tagalong_core::{Stamp, WheelSpeeds};
-use tagalong_log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg, TwistStamped, decode};
+use tagalong_log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg, TwistStamped};
 use tagalong_log::write::{self, FrameRecord};
 use tagalong_log::{Listening, LiveSource, LogFrame};
-use tagalong_pipeline::{FrameReport, Pipeline};
+use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, Sources};
 
+use crate::diagnostics::{Diagnostics, Status};
 use crate::inbox::{Inbox, Traffic};
-use crate::messages::Bool;
 use crate::network::{Ear, Network};
 use crate::options::Setup;
 use crate::stamps::StampClock;
@@ -28,6 +29,10 @@ const ATTEMPT: Duration = Duration::from_millis(500);
 const GATHER: Duration = Duration::from_secs(2);
 /// Time without a frame after which a message is logged.
 const SILENCE: Duration = Duration::from_secs(2);
+/// Least time between two heartbeats.
+const BEAT: Duration = Duration::from_millis(100);
+/// Time between two looks for other publishers of commands.
+const RIVALS_EACH: Duration = Duration::from_secs(1);
 /// Age on arrival above which a frame indicates clocks that disagree, s.
 const OLD_S: f64 = 0.5;
 
@@ -52,14 +57,19 @@ impl fmt::Display for Summary {
         {
             writeln!(f, "{commands} commands, {zeros} of them zero")?;
         }
-        for (topic, Traffic { received, dropped }) in &self.traffic {
-            writeln!(f, "  {topic}: {received} received, {dropped} dropped unread")?;
+        for (topic, Traffic { received, dropped, malformed }) in &self.traffic {
+            write!(f, "  {topic}: {received} received, {dropped} dropped unread")?;
+            match malformed {
+                0 => writeln!(f)?,
+                _ => writeln!(f, ", {malformed} malformed")?,
+            }
         }
         self.counters.iter().try_for_each(|(name, count)| writeln!(f, "  {name}: {count}"))
     }
 }
 
-/// Runs the bridge until `stop` is set. `tell` receives log messages.
+/// Runs the bridge until `stop` is set, with the plugins of the catalog. `tell` receives log
+/// messages.
 ///
 /// # Errors
 /// [`BridgeError`]. The robot is told to stop in any case.
@@ -68,20 +78,36 @@ pub fn run(
     stop: &AtomicBool,
     tell: &dyn Fn(&str),
 ) -> Result<Summary, BridgeError> {
-    let setup = options.setup()?;
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    run_with(options, &registry, stop, tell)
+}
+
+/// Runs the bridge as [`run`], with these plugins.
+///
+/// # Errors
+/// [`BridgeError`]. The robot is told to stop in any case.
+pub fn run_with(
+    options: &Options,
+    registry: &Registry,
+    stop: &AtomicBool,
+    tell: &dyn Fn(&str),
+) -> Result<Summary, BridgeError> {
+    let setup = options.setup(registry)?;
     let mut network = Network::join(options.domain, &options.namespace)?;
     let inbox = Arc::new(Inbox::default());
     let clock = Arc::new(StampClock::new(options.clock));
     let started = start(options, &setup, &mut network, &inbox, &clock, stop, tell)?;
     let Some((source, ears)) = started else { return Ok(Summary::default()) };
     source.notes().iter().for_each(|note| tell(note));
-    let switch = network.listen_to_switch(&options.enable, &inbox)?;
-    let mut bridge = Bridge::new(options, setup, source, &mut network, inbox, clock)?;
+    let mut bridge = Bridge::new(options, setup, source, network, inbox, clock)?;
+    let switch = bridge.listen_to_switch()?;
     bridge.tell_topics(tell);
     let ended = bridge.work(stop, tell);
     // The robot is stopped before the node leaves the network.
-    let summary = bridge.finish();
+    let (summary, network) = bridge.finish();
     drop((ears, switch));
+    drop(network);
     ended.map(|()| summary)
 }
 
@@ -120,28 +146,52 @@ fn start(
         attempt = Instant::now() + ATTEMPT;
         let is_late = Instant::now() > deadline;
         let gathered = first.is_some_and(|first| first.elapsed() > GATHER);
-        match listening.start() {
+        let started = listening.start().map_err(BridgeError::from).and_then(|source| {
+            // Odometry and a laser may come later than the images.
+            setup.pipeline.check_sources(sources(&source))?;
+            Ok(source)
+        });
+        match started {
             Ok(source) if gathered || is_late => {
                 // Topics that the pipeline does not use are no longer received.
                 ears.retain(|ear| source.topics().any(|topic| topic == ear.topic()));
                 return Ok(Some((source, ears)));
             }
-            Err(missing) if is_late => return Err(missing.into()),
+            Err(missing) if is_late => return Err(missing),
             _ => {}
         }
     }
     Ok(None)
 }
 
+/// Returns the data that a controller may need and that has arrived.
+fn sources(source: &LiveSource) -> Sources {
+    let facts = source.facts();
+    Sources {
+        depth: facts.depth_topic.is_some(),
+        right: facts.right_topic.is_some(),
+        laser: facts.laser_topic.is_some(),
+        odometry: source.has_odometry(),
+    }
+}
+
 /// A pipeline between input and output topics.
 struct Bridge {
+    network: Network,
+    options: Options,
+    diagnostics: Diagnostics,
     pipeline: Pipeline,
     source: LiveSource,
     inbox: Arc<Inbox>,
     clock: Arc<StampClock>,
     wheels: Option<Wheels>,
     out: Out,
-    switch: String,
+    /// Last permission that was told.
+    told: Option<Permission>,
+    /// Number of other publishers of commands that was told.
+    rivals: usize,
+    looked: Instant,
+    beat: Option<Instant>,
     base_frame: String,
     odom_frame: String,
     frames: u64,
@@ -154,6 +204,7 @@ struct Out {
     tracks: Publisher<Detection3DArray>,
     target: Publisher<PoseStamped>,
     state: Publisher<StringMsg>,
+    heartbeat: Publisher<Header>,
 }
 
 impl Bridge {
@@ -161,7 +212,7 @@ impl Bridge {
         options: &Options,
         setup: Setup,
         source: LiveSource,
-        network: &mut Network,
+        mut network: Network,
         inbox: Arc<Inbox>,
         clock: Arc<StampClock>,
     ) -> Result<Self, BridgeError> {
@@ -170,19 +221,31 @@ impl Bridge {
             tracks: network.publisher(&options.tracks)?,
             target: network.publisher(&options.target)?,
             state: network.publisher(&options.state)?,
+            heartbeat: network.publisher_of(&options.heartbeat, "std_msgs/msg/Header")?,
         };
-        let wheels = match setup.pipeline.has_controller() {
-            true => Some(drive(options, &setup, &base_frame, network, &clock)?),
-            false => None,
+        let wheels = match setup.pipeline.enable_switch() {
+            Some(switch) => {
+                Some(drive(options, &setup, switch, &base_frame, &mut network, &clock)?)
+            }
+            None => None,
         };
+        let publisher =
+            network.publisher_of(&options.diagnostics, "diagnostic_msgs/msg/DiagnosticArray")?;
+        let diagnostics = Diagnostics::start(publisher, Arc::clone(&clock));
         Ok(Self {
+            network,
+            options: options.clone(),
+            diagnostics,
             pipeline: setup.pipeline,
             source,
             inbox,
             clock,
             wheels,
             out,
-            switch: options.enable.clone(),
+            told: None,
+            rivals: 0,
+            looked: Instant::now(),
+            beat: None,
             base_frame,
             odom_frame: setup.input.odom_frame,
             frames: 0,
@@ -199,21 +262,110 @@ impl Bridge {
         }
     }
 
+    /// Listens to the topics that let the robot move, stop it, and reset it; not without a
+    /// controller.
+    fn listen_to_switch(&mut self) -> Result<Vec<Ear>, BridgeError> {
+        let Some(wheels) = &self.wheels else { return Ok(Vec::new()) };
+        let (Options { enable, reset, .. }, inbox) = (&self.options, &self.inbox);
+        let switch = wheels.switch();
+        let on = move |enabled| {
+            let event = if enabled { Enable::On } else { Enable::Off };
+            switch.take(event, switch.now());
+        };
+        let enable = self.network.listen_to_enable(enable, inbox, on)?;
+        let (switch, topic, theirs) = (wheels.switch(), reset.clone(), Arc::clone(inbox));
+        // The thread that owns the pipeline clears its fault as well. The time is that of arrival,
+        // so that a stop that comes in between is not cleared.
+        let on = move || {
+            let nanos = u64::try_from(switch.now().as_nanos()).unwrap_or(u64::MAX);
+            theirs.push(&topic, nanos.to_le_bytes().to_vec(), 1);
+        };
+        let reset = self.network.listen_to_reset(reset, inbox, on)?;
+        Ok(vec![enable, reset])
+    }
+
     fn work(&mut self, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         while !stop.load(Ordering::Relaxed) {
             for (topic, data) in self.inbox.take(TURN) {
-                match topic == self.switch {
-                    true => self.switch(&data, tell),
+                match topic == self.options.reset {
+                    true => self.reset(&data, tell),
                     false => self.source.take(&topic, &data),
                 }
             }
+            self.check_calibration()?;
             // Only the newest frame: a slow pipeline must not fall behind the robot.
             match self.source.newest_frame() {
                 Some(found) => self.step(&found, tell)?,
                 None => self.look_for_silence(tell)?,
             }
+            self.report_state(tell);
         }
         Ok(())
+    }
+
+    /// Ends a drive by a calibration that is no longer that of the camera: the places of people and
+    /// obstacles would be wrong.
+    fn check_calibration(&self) -> Result<(), BridgeError> {
+        let changes = self.source.counters().get("camera_info_changes").copied().unwrap_or(0);
+        if changes == 0 || self.wheels.is_none() {
+            return Ok(());
+        }
+        let topic = self.source.facts().calibration_topic.unwrap_or_default();
+        Err(BridgeError::Calibration(topic))
+    }
+
+    /// Tells changes of the permission to move and other publishers of commands, and publishes the
+    /// heartbeat.
+    fn report_state(&mut self, tell: &dyn Fn(&str)) {
+        if self.beat.is_some_and(|beat| beat.elapsed() < BEAT) {
+            return;
+        }
+        self.beat = Some(Instant::now());
+        let permission = self.wheels.as_ref().map(|wheels| wheels.switch().permission());
+        if let Some(permission) = permission.filter(|now| Some(*now) != self.told) {
+            tell(&format!("{}{}", permission.cause(), self.remedy(permission)));
+            self.told = Some(permission);
+        }
+        if self.wheels.is_some() && self.looked.elapsed() > RIVALS_EACH {
+            self.looked = Instant::now();
+            self.look_for_rivals(tell);
+        }
+        let header = Header::new(self.clock.now(), "tagalong");
+        let _lost = self.out.heartbeat.publish(header);
+        self.diagnostics.update(Status {
+            frames: self.frames,
+            frame_since: None,
+            heard: self.heard,
+            permission,
+            fault: self.pipeline.fault(),
+            rivals: self.rivals,
+            malformed: self.inbox.traffic().values().map(|topic| topic.malformed).sum(),
+        });
+    }
+
+    fn remedy(&self, permission: Permission) -> String {
+        let Options { enable, reset, .. } = &self.options;
+        match permission {
+            Permission::Granted => String::new(),
+            Permission::NotEnabled | Permission::Expired => {
+                format!(": the robot stands until `true` comes on {enable}")
+            }
+            Permission::Latched(_) => {
+                format!(": the robot stands until a message on {reset}, and `true` on {enable}")
+            }
+        }
+    }
+
+    fn look_for_rivals(&mut self, tell: &dyn Fn(&str)) {
+        let rivals = self.network.others_on(&self.options.command);
+        if rivals > self.rivals {
+            tell(&format!(
+                "{rivals} other publishers of commands on {}: two drivers at one wheel; let one of \
+                 them publish elsewhere (`--command`) and a multiplexer choose",
+                self.options.command
+            ));
+        }
+        self.rivals = rivals;
     }
 
     /// Takes a frame through the pipeline and publishes the results.
@@ -226,7 +378,12 @@ impl Bridge {
         if found.odom_jumped {
             self.disarm("odometry jumped", tell);
         }
+        self.diagnostics.begin_frame();
+        let known = self.pipeline.fault();
         let report = self.pipeline.step(&found.frame);
+        if let Some(cause) = self.pipeline.fault().filter(|cause| Some(*cause) != known) {
+            self.latch(cause, tell);
+        }
         // A robot with stale odometry must not move, but may again afterwards.
         self.obey(!found.odom_stale);
         // Returned only now, so that the wheels hear of a failed step.
@@ -265,21 +422,28 @@ impl Bridge {
         }
     }
 
-    fn switch(&mut self, data: &[u8], tell: &dyn Fn(&str)) {
-        match decode::<Bool>(data) {
-            Ok(Bool { data: true }) => {
-                self.pipeline.arm();
-                self.obey(true);
-                tell("armed");
-            }
-            _ => self.disarm("somebody said stop", tell),
+    /// Clears stops and faults that are not newer than the message.
+    fn reset(&mut self, data: &[u8], tell: &dyn Fn(&str)) {
+        let nanos = <[u8; 8]>::try_from(data).map_or(0, u64::from_le_bytes);
+        self.pipeline.arm();
+        if let Some(wheels) = &self.wheels {
+            wheels.switch().take(Enable::Reset, Duration::from_nanos(nanos));
+            tell("reset");
         }
     }
 
     fn disarm(&mut self, why: &'static str, tell: &dyn Fn(&str)) {
         self.pipeline.disarm(why);
         self.obey(false);
-        tell(&format!("{why}: the robot stands until `true` comes on {}", self.switch));
+        self.latch(why, tell);
+    }
+
+    /// Latches the switch, so that only a reset clears the fault.
+    fn latch(&self, why: &'static str, tell: &dyn Fn(&str)) {
+        if let Some(switch) = self.wheels.as_ref().map(Wheels::switch) {
+            switch.take(Enable::Fault(why), switch.now());
+            tell(&format!("fault: {why}"));
+        }
     }
 
     fn compare_clocks(&self, stamp: Stamp, tell: &dyn Fn(&str)) {
@@ -316,9 +480,11 @@ impl Bridge {
         }
     }
 
-    fn finish(self) -> Summary {
+    /// Stops the robot; returns the counts and the network, which must outlast the last command.
+    fn finish(self) -> (Summary, Network) {
         let summary = self.summary();
-        Summary { told: self.wheels.map(Wheels::finish).unwrap_or_default(), ..summary }
+        let told = self.wheels.map(Wheels::finish).unwrap_or_default();
+        (Summary { told, ..summary }, self.network)
     }
 }
 
@@ -326,6 +492,7 @@ impl Bridge {
 fn drive(
     options: &Options,
     setup: &Setup,
+    switch: EnableSwitch,
     base_frame: &str,
     network: &mut Network,
     clock: &Arc<StampClock>,
@@ -342,7 +509,7 @@ fn drive(
         // A full queue means that the previous command has not been read.
         let _lost = publisher.publish(twist(header, wheels, half_m));
     };
-    Ok(Wheels::start(Duration::from_secs_f64(1.0 / options.rate), now, tell))
+    Ok(Wheels::start(Duration::from_secs_f64(1.0 / options.rate), switch, now, tell))
 }
 
 /// Converts wheel speeds to the velocity of the robot's centre.

@@ -24,24 +24,36 @@ pub struct Traffic {
     pub received: u64,
     /// Messages that were dropped because newer ones arrived before they were read.
     pub dropped: u64,
+    /// Messages whose bytes are not of the type that their topic states.
+    pub malformed: u64,
 }
 
 impl Inbox {
     /// Adds a message; of the same topic, `room` are kept and the oldest dropped.
     pub fn push(&self, topic: &str, message: Vec<u8>, room: usize) {
+        self.with_topic(topic, |Topic { waiting, traffic }| {
+            waiting.push_back(message);
+            traffic.received += 1;
+            while waiting.len() > room {
+                waiting.pop_front();
+                traffic.dropped += 1;
+            }
+        });
+        self.arrived.notify_all();
+    }
+
+    /// Counts a message that cannot be decoded.
+    pub fn count_malformed(&self, topic: &str) {
+        self.with_topic(topic, |topic| topic.traffic.malformed += 1);
+    }
+
+    fn with_topic(&self, name: &str, change: impl FnOnce(&mut Topic)) {
         let mut topics = self.lock();
         // `entry` would allocate the name for each message.
-        if !topics.contains_key(topic) {
-            topics.insert(topic.to_owned(), Topic::default());
+        if !topics.contains_key(name) {
+            topics.insert(name.to_owned(), Topic::default());
         }
-        let Some(Topic { waiting, traffic }) = topics.get_mut(topic) else { return };
-        waiting.push_back(message);
-        traffic.received += 1;
-        while waiting.len() > room {
-            waiting.pop_front();
-            traffic.dropped += 1;
-        }
-        self.arrived.notify_all();
+        topics.get_mut(name).map(change);
     }
 
     /// Returns all waiting messages by topic, in the order of arrival within a topic; empty if none
@@ -81,8 +93,16 @@ mod tests {
         let images: Vec<_> = taken.iter().filter(|(topic, _)| topic == "images").collect();
         assert_eq!(images, [&("images".into(), vec![3]), &("images".into(), vec![4])]);
         assert_eq!(taken.len(), 7);
-        assert_eq!(inbox.traffic()["images"], Traffic { received: 5, dropped: 3 });
+        assert_eq!(inbox.traffic()["images"], Traffic { received: 5, dropped: 3, malformed: 0 });
         assert!(inbox.take(Duration::from_millis(1)).is_empty());
+    }
+
+    #[test]
+    fn malformed_messages_are_counted_and_wake_no_reader() {
+        let inbox = Inbox::default();
+        (0..2).for_each(|_| inbox.count_malformed("odometry"));
+        assert!(inbox.take(Duration::ZERO).is_empty());
+        assert_eq!(inbox.traffic()["odometry"].malformed, 2);
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! the same code that reads logs: images are paired by the stamps in their headers, topics are
 //! found by type, and a config that ran on a recorded log runs live.
 //!
-//! # Three kinds of threads that must not wait for each other
+//! # Threads that must not wait for each other
 //!
 //! * One per topic takes messages from DDS into the [`inbox`], which drops the oldest and counts
 //!   them.
@@ -14,7 +14,10 @@
 //!   newest.
 //! * One drives the [`wheels`]: it sends a command at least twenty times a second, from a copy of
 //!   the last orders of the pipeline, and zero once those have expired. A pipeline that is stuck in
-//!   a frame therefore stops the robot too.
+//!   a frame therefore stops the robot too. The topics that enable and stop reach this thread
+//!   directly.
+//!
+//! * One publishes diagnostics every second, also while a frame takes long.
 //!
 //! If [`run`] ends by an error, a signal or a panic, the owner of the last thread is dropped, and
 //! with it the last command on the wire is zero.
@@ -22,6 +25,7 @@
 //! This is no safety function. See the README.
 
 mod bridge;
+mod diagnostics;
 pub mod inbox;
 mod messages;
 mod network;
@@ -29,7 +33,7 @@ mod options;
 mod stamps;
 pub mod wheels;
 
-pub use bridge::{Summary, run};
+pub use bridge::{Summary, run, run_with};
 pub use options::Options;
 pub use stamps::ClockSource;
 
@@ -46,6 +50,15 @@ pub enum BridgeError {
     /// An input of the pipeline did not arrive, or cannot be used.
     #[error(transparent)]
     Input(#[from] tagalong_log::LogError),
+    /// The controller lacks a source that its config demands.
+    #[error(transparent)]
+    Sources(#[from] tagalong_pipeline::MissingSource),
+    /// The camera's calibration changed while the robot was driven by the former one.
+    #[error(
+        "the calibration of the camera changed (topic {0}): the robot was told to stop; restart the \
+         bridge to take the new one"
+    )]
+    Calibration(String),
     /// A plugin failed; the robot was told to stop.
     #[error(transparent)]
     Pipeline(#[from] tagalong_pipeline::StepError),

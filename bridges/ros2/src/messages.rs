@@ -34,6 +34,37 @@ pub(crate) struct Bool {
     pub(crate) data: bool,
 }
 
+/// `std_msgs/Empty`, which has one byte on the wire.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Empty {
+    structure_needs_at_least_one_member: u8,
+}
+
+/// `diagnostic_msgs/DiagnosticArray`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct DiagnosticArray {
+    pub(crate) header: Header,
+    pub(crate) status: Vec<DiagnosticStatus>,
+}
+
+/// `diagnostic_msgs/DiagnosticStatus`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct DiagnosticStatus {
+    /// 0 ok, 1 warning, 2 error, 3 stale.
+    pub(crate) level: u8,
+    pub(crate) name: String,
+    pub(crate) message: String,
+    pub(crate) hardware_id: String,
+    pub(crate) values: Vec<KeyValue>,
+}
+
+/// `diagnostic_msgs/KeyValue`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct KeyValue {
+    pub(crate) key: String,
+    pub(crate) value: String,
+}
+
 impl OwnedImage {
     pub(crate) fn encode(&self) -> Vec<u8> {
         encode(&Image {

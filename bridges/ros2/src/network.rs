@@ -20,7 +20,7 @@ use tagalong_log::msgs::{
 
 use crate::BridgeError;
 use crate::inbox::Inbox;
-use crate::messages::{Bool, OwnedCompressedImage, OwnedImage, ros_topic, ros_type};
+use crate::messages::{Bool, Empty, OwnedCompressedImage, OwnedImage, ros_topic, ros_type};
 use crate::stamps::StampClock;
 
 /// Number of images that wait for the thread that makes frames.
@@ -72,6 +72,12 @@ fn latched() -> QosProfile {
     sensor(OTHERS)
         .reliability_reliable(WhenFull::DEFAULT)
         .durability(ros2_client::qos::Durability::TransientLocal)
+}
+
+/// Returns the profile of the topics that let the robot move and stop it: all messages arrive, and
+/// none that was sent before the subscription.
+fn commands() -> QosProfile {
+    sensor(OTHERS).reliability_reliable(WhenFull::DEFAULT)
 }
 
 /// Returns a profile in which all messages arrive, and publishing does not wait.
@@ -144,14 +150,42 @@ impl Network {
         ear.map(Some)
     }
 
-    /// Puts the messages of the topic that stops and arms into the inbox.
-    pub(crate) fn listen_to_switch(
+    /// Calls `on` for each message of the enable topic, in a thread of its own that waits for no
+    /// frame. A message that cannot be read counts as false.
+    pub(crate) fn listen_to_enable(
         &mut self,
         topic: &str,
         inbox: &Arc<Inbox>,
+        on: impl Fn(bool) + Send + 'static,
     ) -> Result<Ear, BridgeError> {
-        let encode = |switch: Bool| encode(&switch);
-        self.ear(topic, "std_msgs/msg/Bool", sensor(OTHERS), OTHERS, inbox, encode)
+        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        let take = move |message: Option<Bool>| {
+            if message.is_none() {
+                inbox.count_malformed(&name);
+            }
+            on(message.is_some_and(|message| message.data));
+        };
+        self.hear(topic, "std_msgs/msg/Bool", commands(), take)
+    }
+
+    /// Calls `on` for each message of the topic that resets.
+    pub(crate) fn listen_to_reset(
+        &mut self,
+        topic: &str,
+        inbox: &Arc<Inbox>,
+        on: impl Fn() + Send + 'static,
+    ) -> Result<Ear, BridgeError> {
+        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        let take = move |message: Option<Empty>| match message {
+            Some(_) => on(),
+            None => inbox.count_malformed(&name),
+        };
+        self.hear(topic, "std_msgs/msg/Empty", commands(), take)
+    }
+
+    /// Returns the number of other participants' publishers on a topic.
+    pub(crate) fn others_on(&self, topic: &str) -> usize {
+        self.node.publisher_count(&full_name(self.node.namespace(), topic))
     }
 
     fn plain<M: Message + Serialize + DeserializeOwned + Send + 'static>(
@@ -172,18 +206,33 @@ impl Network {
         inbox: &Arc<Inbox>,
         encode: impl Fn(M) -> Vec<u8> + Send + 'static,
     ) -> Result<Ear, BridgeError> {
+        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        let put = move |message: Option<M>| match message {
+            Some(message) => inbox.push(&name, encode(message), room),
+            None => inbox.count_malformed(&name),
+        };
+        self.hear(topic, message_type, qos, put)
+    }
+
+    /// Calls `take` for each message of a topic in a thread of its own, with `None` for one that does
+    /// not decode.
+    fn hear<M: DeserializeOwned + Send + 'static>(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+        qos: QosProfile,
+        take: impl Fn(Option<M>) + Send + 'static,
+    ) -> Result<Ear, BridgeError> {
         let node = &mut self.node;
         let full = name(node.namespace(), topic)?;
         let handle = node.create_topic(&full, kind(message_type), &qos).map_err(failed)?;
         let subscription: Subscription<M> =
             node.create_subscription(&handle, Some(qos)).map_err(failed)?;
-        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
         let (abort, registration) = AbortHandle::new_pair();
         let thread = thread::spawn(move || {
             // A message that does not decode is of another type than its topic states.
-            let whole = subscription.async_stream().filter_map(|message| ready(message.ok()));
-            let put = whole.for_each(|(message, _)| {
-                inbox.push(&name, encode(message), room);
+            let put = subscription.async_stream().for_each(|message| {
+                take(message.ok().map(|(message, _)| message));
                 ready(())
             });
             // The stream ends by being aborted.
@@ -197,9 +246,18 @@ impl Network {
         &mut self,
         topic: &str,
     ) -> Result<Publisher<M>, BridgeError> {
+        self.publisher_of(topic, M::TYPE)
+    }
+
+    /// Creates a publisher of a type that logs do not have.
+    pub(crate) fn publisher_of<M: Serialize>(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+    ) -> Result<Publisher<M>, BridgeError> {
         let (node, qos) = (&mut self.node, reliable());
         let name = name(node.namespace(), topic)?;
-        let handle = node.create_topic(&name, kind(M::TYPE), &qos).map_err(failed)?;
+        let handle = node.create_topic(&name, kind(message_type), &qos).map_err(failed)?;
         node.create_publisher(&handle, Some(qos)).map_err(failed)
     }
 }
@@ -207,11 +265,15 @@ impl Network {
 /// Returns the name of a topic, which lies in the namespace unless it begins with a slash.
 /// (ros2-client by itself doubles the slash in the namespace `/`.)
 fn name(namespace: &str, topic: &str) -> Result<Name, BridgeError> {
-    let full = match topic.starts_with('/') {
+    let full = full_name(namespace, topic);
+    Name::parse(&full).map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))
+}
+
+fn full_name(namespace: &str, topic: &str) -> String {
+    match topic.starts_with('/') {
         true => topic.to_owned(),
         false => format!("{}/{topic}", namespace.trim_end_matches('/')),
-    };
-    Name::parse(&full).map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))
+    }
 }
 
 fn kind(message_type: &str) -> MessageTypeName {

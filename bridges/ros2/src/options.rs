@@ -54,10 +54,19 @@ pub struct Options {
     /// Topic of states and reasons, as text (std_msgs/String).
     #[arg(long, value_name = "TOPIC", default_value = "people/state")]
     pub state: String,
-    /// Topic that stops the robot (false) and lets it move again after a fault (true)
-    /// (std_msgs/Bool).
+    /// Topic of the deadman's switch (std_msgs/Bool): true lets the robot move for a moment and must
+    /// be repeated, false stops it until a reset.
     #[arg(long, value_name = "TOPIC", default_value = "people/enable")]
     pub enable: String,
+    /// Topic that clears a stop and a fault (std_msgs/Empty); needed after each start.
+    #[arg(long, value_name = "TOPIC", default_value = "people/reset")]
+    pub reset: String,
+    /// Topic of a header for each turn of the bridge's loop (std_msgs/Header).
+    #[arg(long, value_name = "TOPIC", default_value = "people/heartbeat")]
+    pub heartbeat: String,
+    /// Topic of the bridge's state (diagnostic_msgs/DiagnosticArray).
+    #[arg(long, value_name = "TOPIC", default_value = "/diagnostics")]
+    pub diagnostics: String,
     /// Topic of commands (geometry_msgs/TwistStamped).
     #[arg(long, value_name = "TOPIC", default_value = "cmd_vel")]
     pub command: String,
@@ -102,19 +111,17 @@ impl Options {
     ///
     /// # Errors
     /// [`BridgeError::Config`], with file, line and remedy.
-    pub(crate) fn setup(&self) -> Result<Setup, BridgeError> {
+    pub(crate) fn setup(&self, registry: &Registry) -> Result<Setup, BridgeError> {
         let shown = self.config.display().to_string();
         let text = std::fs::read_to_string(&self.config)
             .map_err(|error| BridgeError::Config(format!("cannot read config {shown}: {error}")))?;
-        let mut registry = Registry::default();
-        tagalong_catalog::register(&mut registry);
         let folder = self.config.parent().unwrap_or("".as_ref());
         let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();
         let pipelines = tagalong_pipeline::Options { foreign, seed: None };
         let mistake =
             |error: tagalong_config::ConfigError| BridgeError::Config(error.render(&shown, &text));
         let (pipeline, run) =
-            Pipeline::from_toml_with(&text, folder, &registry, &pipelines).map_err(mistake)?;
+            Pipeline::from_toml_with(&text, folder, registry, &pipelines).map_err(mistake)?;
         let input = run.table("input").map_err(mistake)?;
         let limits = run.table("limits").map_err(mistake)?;
         Ok(Setup { pipeline, robot: run.robot, input: self.named(input), limits })

@@ -5,17 +5,17 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use tagalong_core::{Stamp, WheelSpeeds};
-use tagalong_pipeline::Orders;
+use tagalong_pipeline::{Enable, EnableSwitch, Orders, Permission};
 
-/// Duration of zero commands after the last frame, s; then none are sent, so that other nodes may
-/// drive (the `stop_pub_timeout` of Nav2).
+/// Duration of zero commands after the last frame, or the last time with permission to move, s; then
+/// none are sent, so that other nodes may drive (the `stop_pub_timeout` of Nav2).
 const ZEROS_S: f64 = 2.0;
 /// Number of zero commands at the end, and time between them.
 const FAREWELLS: u32 = 5;
 const BETWEEN_FAREWELLS: Duration = Duration::from_millis(10);
 
 /// Sends commands to the wheels at a steady rate, from the last orders; zero when these have
-/// expired, and zero at the end, also after an error.
+/// expired or the switch gives no permission, and zero at the end, also after an error.
 pub struct Wheels {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<CommandCounts>>,
@@ -30,15 +30,46 @@ pub struct CommandCounts {
     pub zeros: u64,
 }
 
-#[derive(Default)]
+/// Access to the switch of the wheels for the threads that hear its topics. It waits for no frame.
+#[derive(Clone)]
+pub struct SwitchHandle {
+    shared: Arc<Shared>,
+}
+
+impl SwitchHandle {
+    /// Returns the time by the clock of the switch.
+    pub fn now(&self) -> Duration {
+        self.shared.started.elapsed()
+    }
+
+    /// Takes in an event of the switch that happened at a time, and tells the wheels at once.
+    pub fn take(&self, event: Enable, at: Duration) {
+        let mut state = self.shared.lock();
+        state.switch.take(event, at);
+        // An enable is no reason for another command.
+        state.is_new = event != Enable::On;
+        self.shared.changed.notify_all();
+    }
+
+    /// Returns the permission to move.
+    pub fn permission(&self) -> Permission {
+        self.shared.lock().switch.permission(self.now())
+    }
+}
+
 struct Shared {
     state: Mutex<State>,
     changed: Condvar,
+    /// Start of the clock of the switch.
+    started: Instant,
 }
 
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct State {
     orders: Option<Orders>,
+    switch: EnableSwitch,
+    /// Last time at which the switch gave permission.
+    permitted: Option<Duration>,
     /// Time at which the last frame was processed.
     frame: Option<Instant>,
     /// True if the orders have not been sent yet.
@@ -47,26 +78,46 @@ struct State {
 }
 
 impl State {
-    /// Returns the command for this time, if any.
-    fn command(&self, now: Stamp) -> Option<WheelSpeeds> {
-        let wheels = self.orders.map_or(WheelSpeeds::STOP, |orders| orders.at(now).wheels);
-        let recent = self.frame.is_some_and(|at| at.elapsed().as_secs_f64() <= ZEROS_S);
-        (recent || wheels != WheelSpeeds::STOP).then_some(wheels)
+    /// Returns the command for this time, if any; `since` is the time by the clock of the switch.
+    fn command(&self, now: Stamp, since: Duration) -> Option<WheelSpeeds> {
+        let granted = self.switch.permission(since).is_granted();
+        let orders = self.orders.filter(|_| granted);
+        let wheels = orders.map_or(WheelSpeeds::STOP, |orders| orders.at(now).wheels);
+        let is_recent = self.frame.is_some_and(|at| at.elapsed().as_secs_f64() <= ZEROS_S);
+        let drives = self.permitted.is_some_and(|then| {
+            since.checked_sub(then).is_none_or(|ago| ago.as_secs_f64() <= ZEROS_S)
+        });
+        (is_recent && drives || wheels != WheelSpeeds::STOP).then_some(wheels)
     }
 }
 
 impl Wheels {
-    /// Starts the thread. `now` returns the time by the clock of the frames' stamps, `tell` sends
+    /// Starts the thread, with a switch that it obeys. `now` returns the time by the clock of the frames' stamps, `tell` sends
     /// wheel speeds and must not wait.
     pub fn start(
         period: Duration,
+        switch: EnableSwitch,
         now: impl Fn() -> Stamp + Send + 'static,
         tell: impl FnMut(WheelSpeeds) + Send + 'static,
     ) -> Self {
-        let shared = Arc::new(Shared::default());
+        let state = State {
+            orders: None,
+            switch,
+            permitted: None,
+            frame: None,
+            is_new: false,
+            quits: false,
+        };
+        let (state, changed) = (Mutex::new(state), Condvar::new());
+        let shared = Arc::new(Shared { state, changed, started: Instant::now() });
         let theirs = Arc::clone(&shared);
         let thread = thread::spawn(move || theirs.drive(period, now, tell));
         Self { shared, thread: Some(thread) }
+    }
+
+    /// Returns access to the switch.
+    pub fn switch(&self) -> SwitchHandle {
+        SwitchHandle { shared: Arc::clone(&self.shared) }
     }
 
     /// Sets the orders that hold until the next frame; `None` is a stop.
@@ -114,7 +165,8 @@ impl Shared {
             tell(wheels);
         };
         while let Some(state) = self.wait(period) {
-            state.command(now()).into_iter().for_each(&mut count_and_tell);
+            let since = self.started.elapsed();
+            state.command(now(), since).into_iter().for_each(&mut count_and_tell);
         }
         for _ in 0..FAREWELLS {
             count_and_tell(WheelSpeeds::STOP);
@@ -129,6 +181,10 @@ impl Shared {
         let waited = self.changed.wait_timeout_while(self.lock(), period, idle);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         state.is_new = false;
+        let since = self.started.elapsed();
+        if state.switch.permission(since).is_granted() {
+            state.permitted = Some(since);
+        }
         (!state.quits).then_some(*state)
     }
 }
@@ -145,7 +201,32 @@ mod tests {
     fn start(tape: &Tape) -> Wheels {
         let tape = Arc::clone(tape);
         let tell = move |wheels| tape.lock().unwrap().push((Instant::now(), wheels));
-        Wheels::start(Duration::from_millis(5), Stamp::default, tell)
+        let switch = EnableSwitch::new(Duration::from_millis(100));
+        Wheels::start(Duration::from_millis(5), switch, Stamp::default, tell)
+    }
+
+    fn enable(wheels: &Wheels) {
+        let switch = wheels.switch();
+        [Enable::Reset, Enable::On].into_iter().for_each(|event| switch.take(event, switch.now()));
+        thread::sleep(Duration::from_millis(20));
+    }
+
+    #[test]
+    fn nothing_is_told_without_an_enable_and_zero_once_it_is_gone() {
+        let tape = Tape::default();
+        let wheels = start(&tape);
+        wheels.obey(None);
+        thread::sleep(Duration::from_millis(50));
+        assert!(tape.lock().unwrap().is_empty(), "another node may drive");
+        enable(&wheels);
+        wheels.obey(None);
+        assert!(wheels.switch().permission().is_granted());
+        thread::sleep(Duration::from_millis(250));
+        assert_eq!(wheels.switch().permission(), Permission::Expired);
+        tape.lock().unwrap().clear();
+        thread::sleep(Duration::from_millis(100));
+        assert!(!tape.lock().unwrap().is_empty(), "zeros go on");
+        drop(wheels);
     }
 
     #[test]
@@ -163,6 +244,7 @@ mod tests {
     fn a_stop_is_repeated_and_then_left_to_others() {
         let tape = Tape::default();
         let wheels = start(&tape);
+        enable(&wheels);
         let from = Instant::now();
         wheels.obey(None);
         thread::sleep(Duration::from_secs_f64(ZEROS_S + 0.5));

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle, sleep};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -16,23 +16,26 @@ use ros2_client::{
     Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
     QosProfile,
 };
-use serde::Serialize;
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
-use tagalong_core::Stamp;
-use tagalong_geometry::{Camera, Lens};
+use serde::{Deserialize, Serialize};
+use tagalong_config::Registry;
+use tagalong_core::{Controller, Stamp, Twist};
+use tagalong_geometry::{Camera, Lens, Pinhole};
 use tagalong_log::msgs::{
     CameraInfo, Detection3DArray, Header, Image, Message, Odometry, Pose, PoseStamped, StringMsg,
     TFMessage, TransformStamped, TwistStamped,
 };
-use tagalong_ros2::{BridgeError, Options, Summary, run};
+use tagalong_ros2::{BridgeError, Options, Summary, run, run_with};
 use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Variant};
 
-/// Returns a scene of a person that stands before the robot and then walks away slowly.
-fn scene() -> Scene {
+/// Returns a scene of so many seconds, of a person that stands before the robot and then walks away
+/// slowly.
+fn scene(seconds: f64) -> Scene {
     let walk = Variant::default()
-        .with("duration_s", 10.0)
+        .with("duration_s", seconds)
         .with("people.0.path", "[[3.0, 2.0], [7.0, 2.0]]")
-        .with("people.0.speed_mps", 0.4)
+        .with("people.0.speed_mps", 0.3)
         .with("people.0.start_s", 3.0);
     Scene::parse_with(include_str!("../../../tests/scenes/small-room.toml"), &walk).unwrap()
 }
@@ -43,8 +46,50 @@ const LAST_MOVE_S: f64 = 0.5 + 0.04 + 0.2;
 
 /// Returns a domain that no other run of this test is likely to use.
 fn domain(offset: u32) -> u16 {
-    // Three domains per process, below the limit of 232.
-    (100 + 3 * (std::process::id() % 40) + offset) as u16
+    // Eight domains per process, below the limit of 232.
+    (100 + 8 * (std::process::id() % 15) + offset) as u16
+}
+
+/// Returns a guard for a test that runs alone, or `None` where participants do not hear each other.
+fn alone() -> Option<MutexGuard<'static, ()>> {
+    static ONE: Mutex<()> = Mutex::new(());
+    static TALK: OnceLock<bool> = OnceLock::new();
+    let guard = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    if *TALK.get_or_init(can_talk) {
+        return Some(guard);
+    }
+    eprintln!("skipped: two participants do not hear each other here (no multicast?)");
+    None
+}
+
+/// `std_msgs/Bool`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Bool {
+    data: bool,
+}
+
+/// `std_msgs/Empty`, with its one byte on the wire.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Empty {
+    byte: u8,
+}
+
+/// `diagnostic_msgs/DiagnosticArray`.
+#[derive(Clone, Debug, Deserialize)]
+struct DiagnosticArray {
+    #[expect(dead_code, reason = "it is on the wire")]
+    header: Header,
+    status: Vec<DiagnosticStatus>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct DiagnosticStatus {
+    level: u8,
+    name: String,
+    message: String,
+    #[expect(dead_code, reason = "it is on the wire")]
+    hardware_id: String,
+    values: Vec<(String, String)>,
 }
 
 fn name(topic: &str) -> Name {
@@ -80,7 +125,16 @@ impl Peer {
     }
 
     fn publisher<M: Message + Serialize>(&mut self, topic: &str, qos: QosProfile) -> Publisher<M> {
-        let topic = self.node.create_topic(&name(topic), kind(M::TYPE), &qos).unwrap();
+        self.publisher_of(topic, M::TYPE, qos)
+    }
+
+    fn publisher_of<M: Serialize>(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+        qos: QosProfile,
+    ) -> Publisher<M> {
+        let topic = self.node.create_topic(&name(topic), kind(message_type), &qos).unwrap();
         self.node.create_publisher(&topic, Some(qos)).unwrap()
     }
 
@@ -89,7 +143,19 @@ impl Peer {
     where
         M: Message + DeserializeOwned + Send + 'static,
     {
-        let topic = self.node.create_topic(&name(topic), kind(M::TYPE), &reliable()).unwrap();
+        self.collect_of(topic, M::TYPE, stop)
+    }
+
+    fn collect_of<M>(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+        stop: &Arc<AtomicBool>,
+    ) -> Collected<M>
+    where
+        M: DeserializeOwned + Send + 'static,
+    {
+        let topic = self.node.create_topic(&name(topic), kind(message_type), &reliable()).unwrap();
         let subscription = self.node.create_subscription::<M>(&topic, Some(reliable())).unwrap();
         let (stop, heard) = (Arc::clone(stop), Arc::new(Mutex::new(Vec::new())));
         let theirs = Arc::clone(&heard);
@@ -109,6 +175,79 @@ impl Peer {
 struct Collected<M> {
     heard: Arc<Mutex<Vec<(Instant, M)>>>,
     thread: JoinHandle<()>,
+}
+
+/// A hand at the switch, which enables ten times a second while it holds it.
+struct Hand {
+    holds: Arc<AtomicBool>,
+    enable: Arc<Publisher<Bool>>,
+    reset: Publisher<Empty>,
+}
+
+impl Hand {
+    fn new(domain: u16, stop: &Arc<AtomicBool>) -> Self {
+        let mut peer = Peer::join(domain, "hand");
+        let enable = peer.publisher_of::<Bool>("/people/enable", "std_msgs/msg/Bool", reliable());
+        let reset = peer.publisher_of("/people/reset", "std_msgs/msg/Empty", reliable());
+        let (enable, holds) = (Arc::new(enable), Arc::new(AtomicBool::new(false)));
+        let (theirs, held, stop) = (Arc::clone(&enable), Arc::clone(&holds), Arc::clone(stop));
+        thread::spawn(move || {
+            let _node = peer;
+            while !stop.load(Ordering::Relaxed) {
+                if held.load(Ordering::Relaxed) {
+                    theirs.publish(Bool { data: true }).unwrap();
+                }
+                sleep(Duration::from_millis(100));
+            }
+        });
+        Self { holds, enable, reset }
+    }
+
+    fn hold(&self, holds: bool) {
+        self.holds.store(holds, Ordering::Relaxed);
+    }
+
+    fn reset(&self) {
+        self.reset.publish(Empty { byte: 0 }).unwrap();
+    }
+
+    fn switch_off(&self) {
+        self.enable.publish(Bool { data: false }).unwrap();
+    }
+}
+
+/// Log messages of a bridge.
+type Said = Arc<Mutex<Vec<String>>>;
+
+/// Waits until the bridge has said these words.
+fn wait_for(said: &Said, words: &str) {
+    let deadline = Instant::now() + Duration::from_secs(30);
+    while !said.lock().unwrap().iter().any(|line| line.contains(words)) {
+        assert!(Instant::now() < deadline, "no `{words}` in {:?}", said.lock().unwrap());
+        sleep(Duration::from_millis(10));
+    }
+}
+
+impl<M: Clone> Collected<M> {
+    fn so_far(&self) -> Vec<(Instant, M)> {
+        self.heard.lock().unwrap().clone()
+    }
+}
+
+impl Collected<TwistStamped> {
+    /// Returns true if a command since then moves the robot.
+    fn moves_since(&self, then: Instant) -> bool {
+        self.so_far().iter().any(|(at, command)| *at > then && speeds(command) != [0.0, 0.0])
+    }
+
+    /// Waits until a command moves the robot.
+    fn wait_for_move(&self, why: &str) {
+        let from = Instant::now();
+        while !self.moves_since(from) {
+            assert!(from.elapsed() < Duration::from_secs(5), "nothing moves: {why}");
+            sleep(Duration::from_millis(10));
+        }
+    }
 }
 
 impl<M> Collected<M> {
@@ -144,6 +283,8 @@ struct Robot {
     camera: Camera,
     /// Time of the clock at the start of the scene.
     epoch: Stamp,
+    /// True once the calibration is another one.
+    zoomed: Arc<AtomicBool>,
 }
 
 impl Robot {
@@ -160,16 +301,26 @@ impl Robot {
             peer,
             camera: camera.clone(),
             epoch: Stamp::from_nanos(since.as_nanos() as u64),
+            zoomed: Arc::default(),
         }
     }
 
     /// Publishes a scene in real time; returns the time of the last image.
-    fn play(&self, mut simulation: Simulation) -> Instant {
+    fn play(&self, simulation: Simulation) -> Instant {
+        self.play_while(simulation, &|_| true)
+    }
+
+    /// Publishes the events of a scene for which `is_sent` is true in real time; returns the time of
+    /// the last image.
+    fn play_while(&self, mut simulation: Simulation, is_sent: &dyn Fn(&Event) -> bool) -> Instant {
         self.fixed.publish(self.mount()).unwrap();
         let start = Instant::now();
         let at = |ns| sleep((start + Duration::from_nanos(ns)) - Instant::now());
         let mut last = start;
         while let Some(event) = simulation.next_event() {
+            if !is_sent(&event) {
+                continue;
+            }
             match event {
                 Event::Odometry(reading) => {
                     at(reading.at_ns);
@@ -233,6 +384,8 @@ impl Robot {
 
     fn calibration(&self, header: &Header) -> CameraInfo {
         let Lens::Pinhole(lens) = self.camera.lens else { panic!("a pinhole camera") };
+        let zoom = if self.zoomed.load(Ordering::Relaxed) { 1.2 } else { 1.0 };
+        let lens = Pinhole { fx: zoom * lens.fx, fy: zoom * lens.fy, ..lens };
         let size = (self.camera.width, self.camera.height);
         CameraInfo::of_lens(header, &lens, size, 0.0)
     }
@@ -245,9 +398,24 @@ fn options(domain: u16, wait_s: &str) -> Options {
     Options::parse_from(["tagalong-ros2", config, "--domain", &domain, "--wait", wait_s])
 }
 
-fn bridge(domain: u16, stop: &Arc<AtomicBool>) -> JoinHandle<Result<Summary, BridgeError>> {
-    let (options, stop) = (options(domain, "20"), Arc::clone(stop));
-    thread::spawn(move || run(&options, &stop, &|sentence| eprintln!("bridge: {sentence}")))
+type Ended = JoinHandle<Result<Summary, BridgeError>>;
+
+fn bridge(domain: u16, stop: &Arc<AtomicBool>) -> (Ended, Said) {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    bridge_with(options(domain, "20"), registry, stop)
+}
+
+fn bridge_with(options: Options, registry: Registry, stop: &Arc<AtomicBool>) -> (Ended, Said) {
+    let (stop, said) = (Arc::clone(stop), Said::default());
+    let theirs = Arc::clone(&said);
+    let ended = thread::spawn(move || {
+        run_with(&options, &registry, &stop, &|sentence| {
+            eprintln!("bridge: {sentence}");
+            theirs.lock().unwrap().push(sentence.to_owned());
+        })
+    });
+    (ended, said)
 }
 
 /// Returns metres per second and radians per second.
@@ -257,19 +425,23 @@ fn speeds(command: &TwistStamped) -> [f64; 2] {
 
 #[test]
 fn images_become_tracks_and_commands_and_silence_becomes_zero() {
-    if !can_talk() {
-        eprintln!("skipped: two participants do not hear each other here (no multicast?)");
-        return;
-    }
+    let Some(_alone) = alone() else { return };
     let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
-    let simulation = Simulation::new(&scene(), 1);
+    let simulation = Simulation::new(&scene(12.0), 1);
     let mut robot = Robot::new(domain(0), simulation.camera());
     let tracks = robot.peer.collect::<Detection3DArray>("/people/tracks", &heard_all);
     let poses = robot.peer.collect::<PoseStamped>("/people/target_pose", &heard_all);
     let states = robot.peer.collect::<StringMsg>("/people/state", &heard_all);
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
-    let bridge = bridge(domain(0), &stop);
+    let (bridge, said) = bridge(domain(0), &stop);
+    let hand = Hand::new(domain(0), &stop);
+    let hands = thread::spawn(move || {
+        wait_for(&said, "needs a reset");
+        hand.reset();
+        hand.hold(true);
+    });
     let last_image = robot.play(simulation);
+    hands.join().unwrap();
     sleep(Duration::from_secs(3));
     let stopped = Instant::now();
     stop.store(true, Ordering::Relaxed);
@@ -308,6 +480,7 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
 #[test]
 fn what_is_missing_is_named_and_the_wait_has_an_end() {
     let stop = AtomicBool::new(false);
+    let _alone = alone();
     let from = Instant::now();
     let error = run(&options(domain(2), "1"), &stop, &|_| ()).unwrap_err();
     assert!(from.elapsed() < Duration::from_secs(10));
@@ -315,4 +488,213 @@ fn what_is_missing_is_named_and_the_wait_has_an_end() {
     let text = error.to_string();
     assert!(text.starts_with(&format!("`ROS domain {}` has no ", domain(2))), "{text}");
     assert!(text.contains("present:"), "{text}");
+}
+
+/// The deadman's switch on the network: before an enable, while it is repeated, after it ceases,
+/// after `false`, and after a reset.
+#[test]
+fn the_robot_moves_while_the_switch_is_held_and_after_a_stop_only_after_a_reset() {
+    let Some(_alone) = alone() else { return };
+    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let simulation = Simulation::new(&scene(25.0), 1);
+    let mut robot = Robot::new(domain(3), simulation.camera());
+    let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
+    let (bridge, said) = bridge(domain(3), &stop);
+    let hand = Hand::new(domain(3), &stop);
+    let playing = thread::spawn(move || robot.play(simulation));
+
+    wait_for(&said, "needs a reset");
+    hand.hold(true);
+    sleep(Duration::from_millis(1500));
+    assert!(commands.so_far().is_empty(), "a restart is no reset, and says nothing to the wheels");
+    hand.hold(false);
+    sleep(Duration::from_millis(700));
+    hand.reset();
+    wait_for(&said, "not enabled");
+    sleep(Duration::from_millis(1000));
+    assert!(commands.so_far().is_empty(), "a reset is no enable");
+    hand.hold(true);
+    commands.wait_for_move("enabled");
+    sleep(Duration::from_millis(500));
+
+    hand.hold(false);
+    // The last enable may be as old as a period of the hand; it holds half a second.
+    sleep(Duration::from_millis(100 + 500 + 200));
+    let expired = Instant::now();
+    sleep(Duration::from_millis(500));
+    assert!(!commands.moves_since(expired), "the enable was not repeated");
+    let zeros = commands.so_far().iter().filter(|(at, _)| *at > expired).count();
+    assert!(zeros > 5, "zeros are told: {zeros}");
+    hand.hold(true);
+    commands.wait_for_move("held again");
+
+    hand.switch_off();
+    sleep(Duration::from_millis(200));
+    let off = Instant::now();
+    sleep(Duration::from_millis(1500));
+    assert!(!commands.moves_since(off), "a false latches, though true is repeated");
+    wait_for(&said, "switched off");
+    hand.reset();
+    commands.wait_for_move("reset, and the switch is held");
+
+    stop.store(true, Ordering::Relaxed);
+    bridge.join().unwrap().unwrap();
+    playing.join().unwrap();
+    sleep(Duration::from_millis(300));
+    heard_all.store(true, Ordering::Relaxed);
+    assert_eq!(commands.finish().last().map(|(_, command)| speeds(command)), Some([0.0, 0.0]));
+}
+
+/// Odometry pauses for two seconds while frames go on; later the calibration changes.
+#[test]
+fn odometry_that_stops_while_frames_go_on_stops_the_robot_and_another_calibration_ends_the_ride() {
+    let Some(_alone) = alone() else { return };
+    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let simulation = Simulation::new(&scene(25.0), 1);
+    let mut robot = Robot::new(domain(4), simulation.camera());
+    let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
+    let (bridge, said) = bridge(domain(4), &stop);
+    let hand = Hand::new(domain(4), &stop);
+    let (silent, zoomed) = (Arc::new(AtomicBool::new(false)), Arc::clone(&robot.zoomed));
+    let is_silent = Arc::clone(&silent);
+    let playing = thread::spawn(move || {
+        robot.play_while(simulation, &|event| {
+            !(matches!(event, Event::Odometry(_)) && is_silent.load(Ordering::Relaxed))
+        })
+    });
+    wait_for(&said, "needs a reset");
+    hand.reset();
+    hand.hold(true);
+    commands.wait_for_move("enabled");
+    sleep(Duration::from_millis(500));
+
+    silent.store(true, Ordering::Relaxed);
+    // Odometry is stale after half a second, which the next frame tells.
+    sleep(Duration::from_millis(500 + 100 + 300));
+    let stale = Instant::now();
+    sleep(Duration::from_millis(700));
+    assert!(!commands.moves_since(stale), "no odometry: frames alone move nothing");
+    let zeros = commands.so_far().iter().filter(|(at, _)| *at > stale).count();
+    assert!(zeros > 10, "{zeros}");
+    silent.store(false, Ordering::Relaxed);
+    commands.wait_for_move("odometry is back");
+
+    zoomed.store(true, Ordering::Relaxed);
+    let error = bridge.join().unwrap().unwrap_err();
+    let text = error.to_string();
+    assert!(text.contains("calibration of the camera changed (topic /camera/color"), "{text}");
+    assert_eq!(error.exit_code(), 1);
+    sleep(Duration::from_millis(300));
+    assert_eq!(commands.so_far().last().map(|(_, command)| speeds(command)), Some([0.0, 0.0]));
+    stop.store(true, Ordering::Relaxed);
+    heard_all.store(true, Ordering::Relaxed);
+    playing.join().unwrap();
+}
+
+/// Controller that drives ahead, and is stuck for a while once the flag is set.
+struct Stuck(Arc<AtomicBool>);
+
+/// Time for which it is stuck.
+const STUCK: Duration = Duration::from_millis(3000);
+
+#[derive(Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+struct NoSettings {}
+
+impl Controller for Stuck {
+    fn command(&mut self, _: &tagalong_core::Scene<'_>) -> Twist {
+        if self.0.swap(false, Ordering::Relaxed) {
+            sleep(STUCK);
+        }
+        Twist::new(0.2, 0.0)
+    }
+}
+
+/// A pipeline that is stuck in one frame, another publisher of commands, and bytes that are no
+/// message of their type: the robot stands, and the diagnostics tell.
+#[test]
+fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
+    let Some(_alone) = alone() else { return };
+    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let simulation = Simulation::new(&scene(20.0), 1);
+    let mut robot = Robot::new(domain(5), simulation.camera());
+    let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
+    let array = "diagnostic_msgs/msg/DiagnosticArray";
+    let told = robot.peer.collect_of::<DiagnosticArray>("/diagnostics", array, &heard_all);
+    let beats =
+        robot.peer.collect_of::<Header>("/people/heartbeat", "std_msgs/msg/Header", &heard_all);
+    let is_stuck = Arc::new(AtomicBool::new(false));
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let flag = Arc::clone(&is_stuck);
+    registry.controller("stuck", "is stuck", move |_: NoSettings, _| Ok(Stuck(Arc::clone(&flag))));
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+    let config = std::env::temp_dir().join(format!("tagalong-stuck-{}.toml", std::process::id()));
+    let base = folder.join("depth-ekf.toml").canonicalize().unwrap();
+    let text = format!("extends = '{}'\n[controller]\nplugin = 'stuck'\n", base.display());
+    std::fs::write(&config, text).unwrap();
+    let options = Options { config: config.clone(), ..options(domain(5), "20") };
+    let (bridge, said) = bridge_with(options, registry, &stop);
+    let hand = Hand::new(domain(5), &stop);
+    let junk = robot.peer.publisher_of::<u8>("/odom", Odometry::TYPE, reliable());
+    let playing = thread::spawn(move || (robot.play(simulation), robot).1);
+    wait_for(&said, "needs a reset");
+    hand.reset();
+    hand.hold(true);
+    commands.wait_for_move("enabled");
+
+    is_stuck.store(true, Ordering::Relaxed);
+    // The command of the last frame expires a quarter of a second after its stamp.
+    sleep(Duration::from_millis(250 + 100 + 300));
+    let expired = Instant::now();
+    sleep(Duration::from_millis(1900));
+    assert!(!commands.moves_since(expired), "stuck");
+    let stuck = |message: &DiagnosticStatus| {
+        message.level == 2 && message.message.contains("one frame takes")
+    };
+    let statuses = |told: &Collected<DiagnosticArray>| -> Vec<DiagnosticStatus> {
+        told.so_far().into_iter().flat_map(|(_, array)| array.status).collect()
+    };
+    assert!(statuses(&told).iter().any(stuck), "{:?}", statuses(&told));
+    commands.wait_for_move("no longer stuck");
+
+    junk.publish(7).unwrap();
+    let mut rival = Peer::join(domain(5), "rival");
+    let _rival = rival.publisher::<TwistStamped>("/cmd_vel", reliable());
+    wait_for(&said, "1 other publishers of commands on cmd_vel");
+    sleep(Duration::from_millis(1500));
+    let last = statuses(&told).pop().unwrap();
+    assert_eq!((last.level, last.name.as_str()), (1, "tagalong: follow"));
+    let value =
+        |key: &str| last.values.iter().find(|(name, _)| name == key).map(|(_, v)| v.clone());
+    assert_eq!(value("other publishers of commands").as_deref(), Some("1"), "{last:?}");
+    assert_eq!(value("malformed messages").as_deref(), Some("1"), "{last:?}");
+    assert!(beats.so_far().len() > 20);
+
+    stop.store(true, Ordering::Relaxed);
+    let summary = bridge.join().unwrap().unwrap();
+    assert_eq!(summary.traffic["/odom"].malformed, 1, "{summary}");
+    assert!(summary.to_string().contains("1 malformed"), "{summary}");
+    heard_all.store(true, Ordering::Relaxed);
+    drop(playing.join().unwrap());
+    std::fs::remove_file(config).unwrap();
+}
+
+#[test]
+fn a_controller_without_odometry_is_refused_and_tells_the_wheels_nothing() {
+    let Some(_alone) = alone() else { return };
+    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let simulation = Simulation::new(&scene(9.0), 1);
+    let mut robot = Robot::new(domain(6), simulation.camera());
+    let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let (bridge, _) = bridge_with(options(domain(6), "6"), registry, &stop);
+    robot.play_while(simulation, &|event| !matches!(event, Event::Odometry(_)));
+    let error = bridge.join().unwrap().unwrap_err();
+    assert_eq!(error.exit_code(), 1);
+    let text = error.to_string();
+    assert!(text.contains("no odometry") && text.contains("odometry = \"none\""), "{text}");
+    heard_all.store(true, Ordering::Relaxed);
+    assert!(commands.finish().is_empty());
 }

@@ -78,9 +78,11 @@ pub enum Reason {
     Obstacle,
     /// Slower because frames arrive late.
     Slow,
+    /// Slower and slower until the robot stands, because there is no target.
+    Stopping,
     /// Stop: an obstacle ahead is too near.
     Blocked,
-    /// Stop: the depth image has no readings at all.
+    /// Stop: the depth image has no readings at all, or a sensor of obstacles is missing.
     Blind,
     /// Stop: there is no target.
     NoTarget,
@@ -106,6 +108,7 @@ impl Reason {
             Self::Search => "search",
             Self::Obstacle => "obstacle",
             Self::Slow => "slow",
+            Self::Stopping => "stopping",
             Self::Blocked => "blocked",
             Self::Blind => "blind",
             Self::NoTarget => "no-target",
@@ -127,6 +130,7 @@ impl Reason {
                 | Self::Search
                 | Self::Obstacle
                 | Self::Slow
+                | Self::Stopping
         )
     }
 }
@@ -206,13 +210,14 @@ pub trait Controller: Send {
 mod tests {
     use super::*;
 
-    const ALL: [Reason; 14] = [
+    const ALL: [Reason; 15] = [
         Reason::Follow,
         Reason::Limited,
         Reason::Unsure,
         Reason::Search,
         Reason::Obstacle,
         Reason::Slow,
+        Reason::Stopping,
         Reason::Blocked,
         Reason::Blind,
         Reason::NoTarget,
@@ -224,8 +229,8 @@ mod tests {
     ];
 
     #[test]
-    fn the_robot_moves_for_six_reasons_and_stands_for_the_others() {
-        let (moves, stands) = ALL.split_at(6);
+    fn the_robot_moves_for_seven_reasons_and_stands_for_the_others() {
+        let (moves, stands) = ALL.split_at(7);
         assert!(moves.iter().all(|reason| reason.moves()));
         assert!(stands.iter().all(|reason| !reason.moves()));
     }

@@ -13,15 +13,22 @@
 //!
 //! * A fault, a pause of the frames and a number that is not finite end in a stop.
 //! * A command is valid for a limited time; [`Orders`] answers with zero after that.
+//! * Without sensors of obstacles nothing moves, unless the settings say so in words.
+//! * [`EnableSwitch`] decides whether a robot may move at all; a bridge to a robot asks it for each
+//!   command.
 //! * This is no safety function in the sense of the standards.
 
 mod command_limiter;
+mod enable;
 mod settings;
 mod steering;
 mod target_lock;
 
-pub use command_limiter::{CollisionMonitorSettings, CommandLimiterSettings, Orders};
-pub use settings::{FollowSettings, RobotSettings};
+pub use command_limiter::{
+    CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource, Orders,
+};
+pub use enable::{Enable, EnableSwitch, Permission};
+pub use settings::{FollowSettings, OdometrySource, RobotSettings};
 pub use steering::{Steered, Steering};
 pub use target_lock::{
     Differences, Likeness, LockReport, LockState, LooksSettings, SearchSettings, TargetSettings,

@@ -22,19 +22,38 @@ pub struct FollowSettings {
 #[serde(default, deny_unknown_fields)]
 pub struct RobotSettings {
     /// Half the distance between the driven wheels, m.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(min = 0.05, max = 1.0))]
     pub wheel_half_separation_m: f64,
     /// Standard deviation of a wheel's travel, as a fraction of it.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub wheel_slip: f64,
     /// Speed limit of a wheel, m/s.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(min = 0.05, max = 0.9))]
     pub max_speed_mps: f64,
+    /// Source of the robot's motion: "required", or "none" for a controller that is to drive without
+    /// odometry, as if the robot were always at rest.
+    pub odometry: OdometrySource,
+}
+
+/// Source of the robot's motion that a controller has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum OdometrySource {
+    /// Without odometry nothing moves.
+    #[default]
+    Required,
+    /// The robot moves without odometry.
+    None,
 }
 
 impl Default for RobotSettings {
     fn default() -> Self {
-        Self { wheel_half_separation_m: 0.167, wheel_slip: 0.02, max_speed_mps: 0.9 }
+        Self {
+            wheel_half_separation_m: 0.167,
+            wheel_slip: 0.02,
+            max_speed_mps: 0.9,
+            odometry: OdometrySource::Required,
+        }
     }
 }
 

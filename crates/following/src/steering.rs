@@ -125,22 +125,24 @@ impl Steering {
         let followed = self.lock.followed();
         let target = tracks.iter().find(|track| Some(track.id) == followed);
         let twist = self.ask(frame, tracks, target)?;
-        let (wheels, aim) = self.aim(twist, tracks);
-        let wish = Wish {
-            wheels,
-            stamp: frame.stamp,
-            aim,
-            settled,
-            pause_s: self.last.map_or(0.0, |last| frame.stamp.seconds_since(last)),
-        };
-        self.last = Some(frame.stamp);
         let place = |track: &Track| track.estimate.person.position.xy();
         let person = target.map(|track| &track.estimate.person);
         let (monitor, camera) = (self.limiter.monitor(), &frame.camera);
         // Obstacles are updated after the lock, because points of the target are no obstacles.
         self.obstacles.update(monitor, camera, frame.depth().ok(), motion, person);
-        self.obstacles.add_scan(monitor, frame.laser().map(|scan| &scan.points[..]));
+        self.obstacles.add_scan(monitor, frame.laser().map(|scan| &scan.points[..]), motion);
         self.obstacles.add_tracks(tracks, followed);
+        let sighted = self.obstacles.is_sighted(monitor, self.limiter.patience_s());
+        let (wheels, aim) = self.aim(twist, tracks);
+        let wish = Wish {
+            wheels,
+            stamp: frame.stamp,
+            aim,
+            sighted,
+            settled,
+            pause_s: self.last.map_or(0.0, |last| frame.stamp.seconds_since(last)),
+        };
+        self.last = Some(frame.stamp);
         let look =
             |monitor: &_, curvature| self.obstacles.ahead(monitor, curvature, target.map(place));
         let command = self.limiter.limit(&wish, look);

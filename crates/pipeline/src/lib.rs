@@ -39,6 +39,7 @@ mod pipeline;
 mod preprocessors;
 mod report;
 mod settings;
+mod sources;
 #[cfg(test)]
 mod tests;
 
@@ -50,9 +51,11 @@ pub use config::{
 pub use pipeline::Pipeline;
 pub use report::FrameReport;
 pub use settings::{PipelineSettings, PluginSettings};
+pub use sources::{MissingSource, Sources};
 pub use tagalong_following::{
-    CollisionMonitorSettings, CommandLimiterSettings, Differences, Likeness, LockReport, LockState,
-    LooksSettings, Orders, RobotSettings, SearchSettings, TargetSettings,
+    CollisionMonitorSettings, CommandLimiterSettings, Differences, Enable, EnableSwitch, Likeness,
+    LockReport, LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission,
+    RobotSettings, SearchSettings, TargetSettings,
 };
 pub use tagalong_odometry::OdometrySettings;
 pub use tagalong_stereo::StereoSettings;

@@ -1,12 +1,12 @@
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use tagalong_core::{Command, Frame, Inputs, Reason, Stamp, TrackId};
 use tagalong_tracking::StepError;
 use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 
 use crate::{FrameReport, Orders, PipelineSettings};
-use tagalong_following::{Steered, Steering};
+use tagalong_following::{EnableSwitch, Steered, Steering};
 use tagalong_vision::Describer;
 
 /// Tracker, with the controller that drives the robot after one of its tracks.
@@ -67,6 +67,13 @@ impl Pipeline {
     /// Returns a copy of the state behind [`Pipeline::command_at`], for use in another thread.
     pub fn orders(&self) -> Option<Orders> {
         Some(self.steering.as_ref()?.orders())
+    }
+
+    /// Returns a latched switch, whose enable holds for the time of the config, for a program that
+    /// drives a robot; `None` without a controller.
+    pub fn enable_switch(&self) -> Option<EnableSwitch> {
+        let timeout = Duration::from_secs_f64(self.settings.command_limiter.enable_s);
+        self.has_controller().then(|| EnableSwitch::new(timeout))
     }
 
     /// Follows the person of this track from the next frame on, and forgets the previous target.

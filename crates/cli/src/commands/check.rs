@@ -9,6 +9,8 @@ use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Inputs, Usage};
 use tagalong_pipeline::Pipeline;
 
+use crate::run::sources;
+
 /// Frames of the log that are tried.
 const FRAMES: u64 = 3;
 
@@ -49,6 +51,8 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
 fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Vec<String>, Failure> {
     check_log_path(log)?;
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
+    let missing = |why| Failure::failed(format!("`{}`: {why}", log.display()));
+    pipeline.check_sources(sources(&source)).map_err(missing)?;
     let mut tried = 0;
     while tried < FRAMES
         && let Some(item) = source.next_frame()

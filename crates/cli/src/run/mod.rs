@@ -27,7 +27,7 @@ use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError};
 use tagalong_log::{FrameSource, Input};
-use tagalong_pipeline::{FrameReport, Pipeline, StepError};
+use tagalong_pipeline::{FrameReport, Pipeline, Sources, StepError};
 use tagalong_render::{Overlay, OverlayData};
 use tagalong_simulate::sample;
 
@@ -70,6 +70,7 @@ struct Job {
 impl Job {
     fn prepare(args: &RunArgs, registry: &Registry) -> Result<Self, Failure> {
         let named = args.config().map(ConfigFile::read).transpose()?;
+        let is_named = named.is_some();
         check_log_path(args.log())?;
         let config = match named {
             Some(config) => config,
@@ -84,10 +85,26 @@ impl Job {
         // A picture shows colour, whether or not the pipeline uses it.
         let inputs = if args.overlay { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)?;
+        let missing = |why| Failure::failed(format!("`{}`: {why}", args.log().display()));
+        // A config that the program chose is for the tracks alone; no robot follows its commands.
+        if is_named {
+            pipeline.check_sources(sources(&source)).map_err(missing)?;
+        }
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let report = blank_report(&config, settings.seed, log);
         Ok(Self { pipeline, outer, source, resolved, folder, report })
+    }
+}
+
+/// Returns the data of a log that a controller may need.
+pub(crate) fn sources(source: &FrameSource) -> Sources {
+    let facts = source.facts();
+    Sources {
+        depth: facts.depth_topic.is_some(),
+        right: facts.right_topic.is_some(),
+        laser: facts.laser_topic.is_some(),
+        odometry: source.has_odometry(),
     }
 }
 

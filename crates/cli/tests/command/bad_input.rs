@@ -45,7 +45,7 @@ const FINE: [&str; 6] = [
 ];
 
 /// Other mistakes: description, command, exit code, and part of the message.
-const OTHERS: [(&str, &str, i32, &str); 23] = [
+const OTHERS: [(&str, &str, i32, &str); 26] = [
     ("no depth", "run nearest.toml no-depth.mcap -o out", 1, "depth"),
     ("no depth", "check nearest.toml no-depth.mcap", 1, "depth"),
     ("an unknown key", "run typo.toml good.mcap -o out", 2, "typo.toml:4"),
@@ -79,6 +79,14 @@ const OTHERS: [(&str, &str, i32, &str); 23] = [
     ("an unknown plugin", "train svm-pitch", 2, "svm-patch"),
     ("an unknown system", "reproduce stereo-smv-ekf", 2, "stereo-svm-ekf"),
     ("an unknown layout", "import tmu folder.csv", 2, "tum"),
+    (
+        "no odometry for a controller",
+        "run steered.toml good.mcap",
+        1,
+        "odometry = \"none\"` in [robot]",
+    ),
+    ("the same in a check", "check steered.toml good.mcap", 1, "odometry = \"none\"` in [robot]"),
+    ("a limit beyond its ceiling", "check fast.toml", 2, "must lie between 0.05 and 0.9, not 50"),
 ];
 
 fn lay_out(home: &Path) {
@@ -94,7 +102,9 @@ fn lay_out(home: &Path) {
         fs::create_dir_all(home.join(format!("folder.{extension}"))).unwrap();
     }
     let fine = fs::read_to_string(home.join("nearest.toml")).unwrap();
-    write("steered.toml", &format!("{fine}\n[controller]\nplugin = \"arc-follow\"\n"));
+    let steered = format!("{fine}\n[controller]\nplugin = \"arc-follow\"\n");
+    write("steered.toml", &steered);
+    write("fast.toml", &format!("robot.max_speed_mps = 50.0\n{steered}"));
     write("typo.toml", &fine.replace("roles = ", "rolls = "));
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
     write("hat.toml", &fs::read_to_string(scenes.join("omni-hat.toml")).unwrap());

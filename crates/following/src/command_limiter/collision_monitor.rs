@@ -30,6 +30,8 @@ pub(super) struct Sign {
     /// Distance by which it may come nearer to the middle of the corridor before the robot is
     /// there, m.
     pub(super) steps_in_m: f64,
+    /// True for a fall, which never belongs to the target.
+    pub(super) is_drop: bool,
 }
 
 /// Returns the nearest obstacle in the corridor that the robot sweeps on an arc of this curvature,
@@ -57,6 +59,26 @@ pub(super) fn is_thing(settings: &CollisionMonitorSettings, point: &Point3<f64>)
     floor < point.z && point.z < settings.top_m
 }
 
+/// Returns the place in which the floor is missing, on the ray from the camera to a point below the
+/// floor; `None` for a point above it or one that the roughness of the floor explains.
+///
+/// The edge of a stair hides the step below it, so that the point itself may be far behind the edge;
+/// the ray crosses the floor right behind it.
+pub(super) fn fall(
+    settings: &CollisionMonitorSettings,
+    eye: &Point3<f64>,
+    point: &Point3<f64>,
+) -> Option<Point3<f64>> {
+    let depth = settings.drop_m + FLOOR_SLOPE * point.xy().coords.norm();
+    // A camera below the floor has a wrong mount; it sees no falls.
+    if !(point.z < -depth && eye.z > 0.0) {
+        return None;
+    }
+    let part = eye.z / (eye.z - point.z);
+    let at = eye + part * (point - eye);
+    Some(Point3::new(at.x, at.y, 0.0))
+}
+
 /// Returns the first bin up to which enough points lie.
 fn nearest(settings: &CollisionMonitorSettings, bins: &[u32]) -> Ahead {
     let mut points = 0_u32;
@@ -77,7 +99,7 @@ fn in_the_way(
 ) -> Option<f64> {
     let flat = sign.at;
     let of_target = |t| nalgebra::distance(&flat, &t) < settings.target_radius_m;
-    if target.is_some_and(of_target) {
+    if !sign.is_drop && target.is_some_and(of_target) {
         return None;
     }
     let (along, aside) = on_arc(flat, curvature);
@@ -128,7 +150,7 @@ mod tests {
         let settings = CollisionMonitorSettings::default();
         let way = |x: f64, y: f64, z: f64, target: Option<Point2<f64>>| {
             let (point, at) = (Point3::new(x, y, z), Point2::new(x, y));
-            let sign = Sign { at, points: 1, steps_in_m: 0.0 };
+            let sign = Sign { at, points: 1, steps_in_m: 0.0, is_drop: false };
             is_thing(&settings, &point).then(|| in_the_way(&settings, &sign, 0.0, target))?
         };
         assert_eq!(way(1.2, 0.0, 0.5, None), Some(1.0));
@@ -161,7 +183,7 @@ mod tests {
     fn what_is_beside_the_front_is_reached_at_once_and_what_is_behind_never() {
         let settings = CollisionMonitorSettings::default();
         let at = |x: f64, y: f64, steps_in_m: f64| {
-            let sign = Sign { at: Point2::new(x, y), points: 1, steps_in_m };
+            let sign = Sign { at: Point2::new(x, y), points: 1, steps_in_m, is_drop: false };
             in_the_way(&settings, &sign, 0.0, None)
         };
         assert_eq!((at(0.1, 0.0, 0.0), at(0.0, 0.0, 0.0)), (Some(0.0), None));
@@ -174,7 +196,7 @@ mod tests {
     fn what_is_near_the_person_is_the_person() {
         let settings = CollisionMonitorSettings::default();
         let at = |x: f64| {
-            let sign = Sign { at: Point2::new(x, 0.0), points: 1, steps_in_m: 0.0 };
+            let sign = Sign { at: Point2::new(x, 0.0), points: 1, steps_in_m: 0.0, is_drop: false };
             in_the_way(&settings, &sign, 0.0, Some(Point2::new(2.0, 0.0))).is_some()
         };
         assert_eq!([1.54, 1.56, 2.44, 2.46].map(at), [true, false, false, true]);
@@ -188,6 +210,7 @@ mod tests {
                 at: Point2::new(*x, 0.0),
                 points: *points,
                 steps_in_m: 0.0,
+                is_drop: false,
             };
             ahead(&settings, signs.iter().map(at), 0.0, None)
         };

@@ -1,9 +1,13 @@
 //! Governor of the commands: every command of the controller passes it on the way to the wheels.
 //!
 //! It does not depend on the source of the wish. It lets the robot move only while frames arrive, a
-//! target is followed or searched for and the path is free; it limits speed, acceleration and turn
-//! rate and keeps the curvature; each command carries its reason and the time until which it is
-//! valid.
+//! target is followed or searched for and the path is free; it limits the speed, the turn rate and the
+//! acceleration of both, and keeps the curvature; each command carries its reason and the time until
+//! which it is valid.
+//!
+//! Without a target the robot slows down within the limits. Emergencies stop the wheels at once: a
+//! fault, a missing sensor, a pause of the frames, a jump of the clock, an expired command, an
+//! obstacle nearer than the robot can stop.
 
 mod collision_monitor;
 mod obstacle_memory;
@@ -11,7 +15,7 @@ mod settings;
 
 pub(crate) use collision_monitor::Ahead;
 pub(crate) use obstacle_memory::ObstacleMemory;
-pub use settings::{CollisionMonitorSettings, CommandLimiterSettings};
+pub use settings::{CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource};
 
 use tagalong_core::{Command, DiffDrive, EgoMotion, Reason, Stamp, Twist, WheelSpeeds};
 
@@ -30,6 +34,8 @@ pub(crate) struct Wish {
     pub(crate) stamp: Stamp,
     /// Purpose of the motion.
     pub(crate) aim: Aim,
+    /// True if the sensors of obstacles are there, or the config does without them.
+    pub(crate) sighted: bool,
     /// True if enough frames came since the start or a jump.
     pub(crate) settled: bool,
     /// Time since the previous frame, s.
@@ -162,6 +168,11 @@ impl CommandLimiter {
         &self.monitor
     }
 
+    /// Returns the time for which a sensor may be silent, s.
+    pub(crate) fn patience_s(&self) -> f64 {
+        self.settings.stop_after_s
+    }
+
     /// Stops the robot until it is armed again.
     pub(crate) fn latch(&mut self, why: &'static str) {
         // The first cause is kept: later faults usually follow from it.
@@ -179,8 +190,9 @@ impl CommandLimiter {
         self.last = None;
     }
 
+    /// Returns the reason for an emergency stop, if there is one: the wheels stop at once.
     fn must_stop(&self, wish: &Wish) -> Option<Reason> {
-        let Wish { wheels, aim, settled, pause_s, .. } = wish;
+        let Wish { wheels, sighted, settled, pause_s, .. } = wish;
         let in_time = *pause_s <= self.settings.stop_after_s;
         // The order is that of severity: a fault outranks every passing state.
         if self.fault.is_some() {
@@ -189,8 +201,8 @@ impl CommandLimiter {
             Some(Reason::Settling)
         } else if !in_time {
             Some(Reason::Stalled)
-        } else if *aim == Aim::Nobody {
-            Some(Reason::NoTarget)
+        } else if !sighted {
+            Some(Reason::Blind)
         } else if !(wheels.left.is_finite() && wheels.right.is_finite()) {
             Some(Reason::NotFinite)
         } else {
@@ -198,43 +210,75 @@ impl CommandLimiter {
         }
     }
 
+    /// Returns the motion after which the command of this frame comes, and the time that it has to
+    /// change it, s.
+    fn before(&self, now: Stamp) -> (Twist, f64) {
+        let Some(last) = self.last else { return (Twist::STOP, LONGEST_STEP_S) };
+        // Stamps may stand still or step back; both allow no change of speed.
+        let dt = now.seconds_since(last.stamp).clamp(0.0, LONGEST_STEP_S);
+        // An expired command was followed by a stop.
+        let holds = now <= last.valid_until;
+        (if holds { last.twist } else { Twist::STOP }, dt)
+    }
+
     fn limited(
         &self,
         wish: &Wish,
         look: impl FnOnce(&CollisionMonitorSettings, f64) -> Option<Ahead>,
     ) -> (WheelSpeeds, Reason) {
-        let (wanted, as_wished) = self.within_drive(wish.wheels);
-        let (mut cap, mut why) = (self.max_speed_mps, Reason::Limited);
-        if wish.aim != Aim::Person {
-            (cap, why) = (0.5 * cap, wish.aim.reason());
-        }
-        if wish.pause_s > self.settings.slow_after_s {
-            (cap, why) = (0.5 * self.max_speed_mps, Reason::Slow);
-        }
+        let (before, dt) = self.before(wish.stamp);
+        let (wanted, why, is_capped) = self.wanted(wish);
+        let next = self.ramped(before, wanted, dt);
+        let reason = match () {
+            () if wish.aim == Aim::Nobody && next != Twist::STOP => Reason::Stopping,
+            () if next == wanted || is_capped => why,
+            () => Reason::Limited,
+        };
         // A turn in place stays in place, and the corridor shows nothing behind the robot.
-        if wanted.linear_mps > STILL_MPS {
-            match look(&self.monitor, curvature(wanted)) {
-                Some(Ahead::Blind) => return (WheelSpeeds::STOP, Reason::Blind),
-                Some(Ahead::Something(at_m)) if self.speed_before(at_m) < cap => {
-                    (cap, why) = (self.speed_before(at_m), Reason::Obstacle);
-                }
-                _ => {}
-            }
+        if next.linear_mps <= STILL_MPS {
+            return (self.in_reach(self.wheels.wheels(next)), reason);
         }
-        // Turning stays allowed: it may free the path.
+        let cap = match look(&self.monitor, curvature(next)) {
+            Some(Ahead::Blind) => return (WheelSpeeds::STOP, Reason::Blind),
+            Some(Ahead::Something(at_m)) => self.speed_before(at_m),
+            Some(Ahead::Free) | None => f64::INFINITY,
+        };
         if cap <= STILL_MPS {
-            let turn = Twist { linear_mps: 0.0, ..wanted };
-            return (self.wheels.wheels(turn), Reason::Blocked);
+            // Turning stays allowed: it may free the path.
+            let turn = self.turn_towards(before, wanted.angular_rps, dt);
+            return (self.in_reach(self.wheels.wheels(Twist::new(0.0, turn))), Reason::Blocked);
         }
-        let ramped = self.ramped(wanted, wish.stamp);
-        let as_wished = as_wished && ramped == wanted;
+        if next.linear_mps <= cap {
+            return (self.in_reach(self.wheels.wheels(next)), reason);
+        }
+        let slower = next.scaled(cap / next.linear_mps);
+        let is_emergency = cap < before.linear_mps - self.settings.max_decel_mps2 * dt;
+        // An emergency brakes harder than `max_decel_mps2`, and stays on the arc that was looked
+        // along.
+        let turn = match is_emergency {
+            true => slower.angular_rps,
+            false => self.turn_towards(before, slower.angular_rps, dt),
+        };
+        let slower = Twist::new(slower.linear_mps, turn);
+        (self.in_reach(self.wheels.wheels(slower)), Reason::Obstacle)
+    }
+
+    /// Returns the motion that is aimed at, within the limits of the drive and those of a doubt or of
+    /// late frames, its reason, and true if a doubt or late frames limit it.
+    fn wanted(&self, wish: &Wish) -> (Twist, Reason, bool) {
+        if wish.aim == Aim::Nobody {
+            return (Twist::STOP, Reason::NoTarget, false);
+        }
+        let (wanted, as_wished) = self.within_drive(wish.wheels);
         let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
-        // The cap comes after the ramp, so it may brake harder than `max_decel_mps2`.
-        if ramped.linear_mps.abs() > cap {
-            let slower = ramped.scaled(cap / ramped.linear_mps.abs());
-            return (self.in_reach(self.wheels.wheels(slower)), why);
+        let is_late = wish.pause_s > self.settings.slow_after_s;
+        let cap = if is_late || wish.aim != Aim::Person { 0.5 } else { 1.0 } * self.max_speed_mps;
+        let speed = wanted.linear_mps.abs();
+        if speed <= cap {
+            return (wanted, reason, false);
         }
-        (self.in_reach(self.wheels.wheels(ramped)), reason)
+        let why = if is_late { Reason::Slow } else { wish.aim.reason() };
+        (wanted.scaled(cap / speed), why, true)
     }
 
     /// Limits the wheel speeds to the drive and the turn rate, on the same arc, and returns whether
@@ -253,33 +297,49 @@ impl CommandLimiter {
         (slower, as_wished)
     }
 
-    /// Returns the speed from which the robot still stops in time, m/s.
+    /// Returns the speed from which the robot still stops in time, m/s, with its reaction.
     fn speed_before(&self, at_m: f64) -> f64 {
-        let left = at_m - self.monitor.stop_m;
-        // From v² = 2 a s, with the distance that is left before `stop_m`.
-        (2.0 * self.settings.max_decel_mps2 * left.max(0.0)).sqrt()
+        self.settings.speed_within(at_m - self.monitor.stop_m)
     }
 
-    /// Moves the speed towards the wish as far as the acceleration allows, on the wished arc.
-    fn ramped(&self, wanted: Twist, now: Stamp) -> Twist {
-        let before = self.last.map_or(Twist::STOP, |c| c.twist);
-        let dt = self.last.map_or(LONGEST_STEP_S, |c| now.seconds_since(c.stamp));
-        // Stamps may stand still or step back; both allow no change of speed.
-        let dt = dt.clamp(0.0, LONGEST_STEP_S);
+    /// Moves the speed towards the wish as far as the accelerations allow, on the wished arc as far
+    /// as that of the turn allows.
+    fn ramped(&self, before: Twist, wanted: Twist, dt: f64) -> Twist {
         let CommandLimiterSettings { max_accel_mps2, max_decel_mps2, .. } = self.settings;
         // Away from standstill is acceleration, towards it is deceleration.
         let up = if before.linear_mps < 0.0 { max_decel_mps2 } else { max_accel_mps2 };
         let down = if before.linear_mps > 0.0 { max_decel_mps2 } else { max_accel_mps2 };
         let (least, most) = (before.linear_mps - down * dt, before.linear_mps + up * dt);
         let forward = wanted.linear_mps.clamp(least, most);
-        if forward == wanted.linear_mps {
-            return wanted;
-        }
-        let turn = match wanted.linear_mps.abs() > STILL_MPS {
-            true => wanted.angular_rps * (forward / wanted.linear_mps).clamp(0.0, 1.0),
+        // A robot that stops stays on the arc that it drives.
+        let arc = if wanted == Twist::STOP { before } else { wanted };
+        let turn = match arc.linear_mps.abs() > STILL_MPS {
+            true => arc.angular_rps * (forward / arc.linear_mps).clamp(0.0, 1.0),
             false => wanted.angular_rps,
         };
-        Twist::new(forward, turn)
+        let turn = self.turn_towards(before, turn, dt);
+        self.within_wheels(Twist::new(forward, turn), least, most)
+    }
+
+    /// Moves the turn rate towards `turn` as far as its acceleration allows.
+    fn turn_towards(&self, before: Twist, turn: f64, dt: f64) -> f64 {
+        let step = self.settings.max_turn_accel_radps2 * dt;
+        turn.clamp(before.angular_rps - step, before.angular_rps + step)
+    }
+
+    /// Slows down a motion that is too fast for the outer wheel: first the forward speed as far as it
+    /// may lie between `least` and `most`, then the turn rate.
+    fn within_wheels(&self, twist: Twist, least: f64, most: f64) -> Twist {
+        let half_m = self.wheels.half_separation_m;
+        let Twist { linear_mps: forward, angular_rps: turn, .. } = twist;
+        let over = forward.abs() + half_m * turn.abs() - self.max_speed_mps;
+        if over <= 0.0 {
+            return twist;
+        }
+        let slower = forward - over.min(forward.abs()).copysign(forward);
+        let slower = slower.clamp(least, most);
+        let rim = ((self.max_speed_mps - slower.abs()) / half_m).max(0.0);
+        Twist::new(slower, turn.clamp(-rim, rim))
     }
 
     /// Scales the wheel speeds to the limit of the faster wheel, on the same arc.

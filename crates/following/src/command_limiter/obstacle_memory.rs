@@ -2,8 +2,8 @@ use nalgebra::{Point2, Point3, Vector3};
 use tagalong_core::{DepthImage, EgoMotion, Person, Track, TrackId};
 use tagalong_geometry::Camera;
 
-use super::CollisionMonitorSettings;
-use super::collision_monitor::{Ahead, Sign, ahead, is_thing};
+use super::collision_monitor::{Ahead, Sign, ahead, fall, is_thing};
+use super::{CollisionMonitorSettings, ObstacleSource};
 
 /// Sampled columns of the image.
 const COLUMNS: usize = 160;
@@ -46,6 +46,25 @@ pub(crate) struct ObstacleMemory {
     columns: Vec<Column>,
     things: Vec<Obstacle>,
     grid: Grid,
+    depth: Source,
+    laser: Source,
+}
+
+/// Sensor of obstacles, and how long it has been silent.
+#[derive(Clone, Copy, Default)]
+struct Source {
+    /// Time since its last reading, s; `None` before the first one.
+    silent_s: Option<f64>,
+}
+
+impl Source {
+    /// Takes in that the sensor delivered or did not, `dt_s` after the frame before.
+    fn update(&mut self, delivers: bool, dt_s: f64) {
+        self.silent_s = match delivers {
+            true => Some(0.0),
+            false => self.silent_s.map(|silent_s| silent_s + dt_s.max(0.0)),
+        };
+    }
 }
 
 /// Set of heights above the floor, one bit per decimetre.
@@ -77,6 +96,8 @@ struct Obstacle {
     unseen_s: f64,
     /// Track of the person that it was, if it is one.
     who: Option<TrackId>,
+    /// True for a place without a floor.
+    is_drop: bool,
 }
 
 impl ObstacleMemory {
@@ -90,6 +111,7 @@ impl ObstacleMemory {
         motion: &EgoMotion,
         target: Option<&Person>,
     ) {
+        self.depth.update(depth.is_some(), motion.dt);
         self.add_depth(settings, camera, depth, motion.dt);
         // The order matters: old obstacles are matched with the new points before the rest of these
         // become new obstacles.
@@ -98,18 +120,34 @@ impl ObstacleMemory {
         self.remember(settings, target);
     }
 
-    /// Takes in a laser scan. It needs no memory: a scanner also sees to the sides and close to the
-    /// robot.
+    /// Takes in a laser scan. It needs no memory, because a scanner also sees to the sides and close
+    /// to the robot: between two scans the last one holds.
     pub(crate) fn add_scan(
         &mut self,
         settings: &CollisionMonitorSettings,
         laser: Option<&[Point3<f64>]>,
+        motion: &EgoMotion,
     ) {
+        self.laser.update(laser.is_some(), motion.dt);
+        let Some(points) = laser else {
+            let felt = self.felt.iter_mut().flatten();
+            return felt.for_each(|at| *at = motion.apply_to_point(*at));
+        };
         let heights = settings.floor_m..settings.top_m;
-        self.felt = laser.map(|points| {
-            let met = points.iter().filter(|point| heights.contains(&point.z)).map(Point3::xy);
-            met.filter(|at| is_near(settings, at)).collect()
-        });
+        let met = points.iter().filter(|point| heights.contains(&point.z)).map(Point3::xy);
+        self.felt = Some(met.filter(|at| is_near(settings, at)).collect());
+    }
+
+    /// Returns true if the robot may move by its sensors of obstacles: one of them delivered with
+    /// this frame, and none that ever did has been silent for longer than `patience_s`. Always true
+    /// where the settings do without them.
+    pub(crate) fn is_sighted(&self, settings: &CollisionMonitorSettings, patience_s: f64) -> bool {
+        if settings.obstacles == ObstacleSource::None {
+            return true;
+        }
+        let silences = [self.depth, self.laser].map(|source| source.silent_s);
+        let delivers = silences.contains(&Some(0.0));
+        delivers && silences.iter().flatten().all(|silent_s| *silent_s <= patience_s)
     }
 
     /// Remembers other people where they were seen last, until the camera sees past that place or
@@ -124,14 +162,22 @@ impl ObstacleMemory {
                 let who = Some(track.id);
                 // `STANDS_S` at once: the tracker vouches for a person, so no second of standing is
                 // needed.
-                self.things.push(Obstacle { at, heights, seen_s: STANDS_S, unseen_s: 0.0, who });
+                self.things.push(Obstacle {
+                    at,
+                    heights,
+                    seen_s: STANDS_S,
+                    unseen_s: 0.0,
+                    who,
+                    is_drop: false,
+                });
             }
         }
     }
 
-    /// Forgets everything, after a jump of the clock.
+    /// Forgets all places, after a jump of the clock, but not which sensors there are.
     pub(crate) fn clear(&mut self) {
-        *self = Self::default();
+        let (depth, laser) = (self.depth, self.laser);
+        *self = Self { depth, laser, ..Self::default() };
     }
 
     /// Returns the nearest obstacle on an arc, as [`ahead`]; `None` with neither depth nor laser.
@@ -147,15 +193,18 @@ impl ObstacleMemory {
         if self.with_depth.is_some_and(|part| part < settings.min_seen) {
             return Some(Ahead::Blind);
         }
-        let stays = |at: Point2<f64>, points| Sign { at, points, steps_in_m: 0.0 };
-        // Points that may move get a wider corridor.
+        let stays = |at: Point2<f64>, points| Sign { at, points, steps_in_m: 0.0, is_drop: false };
+        // Points that may move get a wider corridor; the floor stays where it is, and where it is
+        // not.
         let seen = self.seen.iter().map(|point| match self.grid.stands(&point.xy()) {
+            _ if point.z <= 0.0 => Sign { is_drop: true, ..stays(point.xy(), 1) },
             true => stays(point.xy(), 1),
             false => Sign { steps_in_m: settings.steps_in_m, ..stays(point.xy(), 1) },
         });
         let unseen = self.things.iter().filter(|thing| thing.unseen_s > 0.0);
         // A remembered obstacle was confirmed by many points, so alone it is enough to stop.
-        let unseen = unseen.map(|thing| stays(thing.at, settings.min_points));
+        let unseen = unseen
+            .map(|thing| Sign { is_drop: thing.is_drop, ..stays(thing.at, settings.min_points) });
         let hidden = self.columns.iter().filter(|column| column.is_hidden(settings));
         let hidden = hidden.map(|column| stays(column.at, 1));
         let felt = self.felt.iter().flatten().map(|at| stays(*at, settings.ray_points()));
@@ -173,7 +222,7 @@ impl ObstacleMemory {
         target: Option<&Person>,
     ) {
         let grid = &self.grid;
-        self.things.retain_mut(|Obstacle { at, heights, seen_s, unseen_s, .. }| {
+        self.things.retain_mut(|Obstacle { at, heights, seen_s, unseen_s, is_drop, .. }| {
             *at = motion.apply_to_point(*at);
             if !is_near(settings, at) {
                 return false;
@@ -186,7 +235,10 @@ impl ObstacleMemory {
                 return true;
             }
             *unseen_s += motion.dt;
-            let is_gone = depth.is_some_and(|depth| shows_past(camera, depth, at, *heights));
+            let is_gone = depth.is_some_and(|depth| match is_drop {
+                true => shows_floor(settings, camera, depth, at),
+                false => shows_past(camera, depth, at, *heights),
+            });
             // An obstacle that stood for a second is kept for `memory_s`, a brief one only if it
             // was close.
             let kept_s = match () {
@@ -206,6 +258,7 @@ impl ObstacleMemory {
         dt_s: f64,
     ) {
         self.seen.clear();
+        let eye = camera.robot_from_camera.translation.vector.into();
         self.with_depth = depth.map(|depth| {
             // Large images are sampled, so that `min_points` does not depend on their resolution.
             let step = depth.width().div_ceil(COLUMNS).max(1);
@@ -221,9 +274,11 @@ impl ObstacleMemory {
                     column.read += 1;
                     let pixel = Point2::new((at * step) as f64, y as f64);
                     let point = camera.back_project(pixel, z);
-                    if is_near(settings, &point.xy()) && is_thing(settings, &point) {
-                        self.seen.push(point);
-                    }
+                    let place = match is_thing(settings, &point) {
+                        true => Some(point),
+                        false => fall(settings, &eye, &point),
+                    };
+                    self.seen.extend(place.filter(|place| is_near(settings, &place.xy())));
                 }
             }
             let read: u32 = self.columns.iter().map(|column| column.read).sum();
@@ -251,7 +306,17 @@ impl ObstacleMemory {
             if self.grid.is_full(&at) && !target.is_some_and(is_of) {
                 self.grid.clear_around(&at);
                 let heights = self.grid.heights_around(&at);
-                self.things.push(Obstacle { at, heights, seen_s: 0.0, unseen_s: 0.0, who: None });
+                let is_drop = point.z <= 0.0;
+                // A floor does not walk away, so no second of standing is needed.
+                let seen_s = if is_drop { STANDS_S } else { 0.0 };
+                self.things.push(Obstacle {
+                    at,
+                    heights,
+                    seen_s,
+                    unseen_s: 0.0,
+                    who: None,
+                    is_drop,
+                });
             }
         }
     }
@@ -367,6 +432,23 @@ fn shows_past(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, heights: He
             depth.get(x as i64, y as i64).map(f64::from)
         });
         seen_m.is_some_and(|z| z > 0.0 && z.is_finite() && z > camera.depth_of(&place) - BEFORE_M)
+    })
+}
+
+/// Returns true if the image shows a surface at a place of the floor that is no fall.
+fn shows_floor(
+    settings: &CollisionMonitorSettings,
+    camera: &Camera,
+    depth: &DepthImage,
+    at: &Point2<f64>,
+) -> bool {
+    let eye = camera.robot_from_camera.translation.vector.into();
+    let Some(pixel) = camera.project(&Point3::new(at.x, at.y, 0.0)) else { return false };
+    let pixel = Point2::new(pixel.x.round(), pixel.y.round());
+    let seen_m = depth.get(pixel.x as i64, pixel.y as i64).map(f64::from);
+    seen_m.is_some_and(|z| {
+        let is_valid = z > 0.0 && z.is_finite();
+        is_valid && fall(settings, &eye, &camera.back_project(pixel, z)).is_none()
     })
 }
 
@@ -571,12 +653,12 @@ mod tests {
     fn who_stood_and_left_is_gone_down_to_the_feet() {
         let settings = CollisionMonitorSettings::default();
         for (top_m, is_gone) in [(1.4, true), (0.5, false)] {
-            let camera = camera();
+            let (camera, empty) = (camera(), with_box(9.0, 0.0));
             let seen = |x: f64, stands: bool| {
                 DepthImage::from_fn(80, 60, |u, v| {
                     let at = camera.back_project(Point2::new(u as f64, v as f64), x);
                     let hit = stands && at.y.abs() < 0.2 && 0.1 < at.z && at.z < top_m;
-                    if hit { x as f32 } else { 6.0 }
+                    if hit { x as f32 } else { empty.row(v)[u] }
                 })
             };
             let mut surroundings = ObstacleMemory::default();
@@ -650,7 +732,7 @@ mod tests {
             let mut surroundings = ObstacleMemory::default();
             let mut feel = |laser: &[Point3<f64>], curvature, target| {
                 surroundings.update(&settings, &camera(), depth.as_ref(), &still, None);
-                surroundings.add_scan(&settings, Some(laser));
+                surroundings.add_scan(&settings, Some(laser), &still);
                 surroundings.ahead(&settings, curvature, target)
             };
             assert_eq!(feel(&leg, 0.0, None), Some(Ahead::Free), "beside the way");
@@ -672,5 +754,121 @@ mod tests {
         let empty = DepthImage::from_fn(80, 60, |_, _| f32::NAN);
         surroundings.update(&settings, &camera(), Some(&empty), &still, None);
         assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Blind));
+    }
+
+    /// A camera as [`camera`] with as many columns as are sampled of an image.
+    fn fine_camera() -> Camera {
+        let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        Camera::mounted(lens, 160, 120, 1.0, 0.0, 0.0)
+    }
+
+    /// A floor that lies `drop_m` lower from `edge_m` on, and a wall at 6 m.
+    fn with_edge(edge_m: f64, drop_m: f64) -> DepthImage {
+        let camera = fine_camera();
+        DepthImage::from_fn(160, 120, |u, v| {
+            // The camera is level and 1 m high: a ray falls by this much for each metre of depth.
+            let falls = 1.0 - camera.back_project(Point2::new(u as f64, v as f64), 1.0).z;
+            let hits = |height_m: f64| if falls > 0.0 { height_m / falls } else { f64::INFINITY };
+            let floor_m = if hits(1.0) < edge_m { hits(1.0) } else { hits(1.0 + drop_m) };
+            floor_m.min(6.0) as f32
+        })
+    }
+
+    fn before_edge(edge_m: f64, drop_m: f64, target: Option<Point2<f64>>) -> Option<Ahead> {
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
+        let (depth, still) = (with_edge(edge_m, drop_m), EgoMotion::at_rest(0.1));
+        surroundings.update(&settings, &fine_camera(), Some(&depth), &still, None);
+        surroundings.ahead(&settings, 0.0, target)
+    }
+
+    #[test]
+    fn a_stair_and_a_kerb_that_go_down_are_obstacles_where_the_floor_ends() {
+        for (edge_m, drop_m) in [(1.6, 0.17), (2.2, 0.17), (1.6, 0.14), (1.8, 2.5)] {
+            let found = before_edge(edge_m, drop_m, None);
+            assert!(is_at(found, edge_m - 0.2), "{edge_m} {drop_m}: {found:?}");
+        }
+        assert_eq!(before_edge(9.0, 0.17, None), Some(Ahead::Free), "a floor without an edge");
+        assert_eq!(before_edge(1.6, 0.05, None), Some(Ahead::Free), "a rough floor");
+    }
+
+    #[test]
+    fn a_fall_beside_the_target_is_none_of_the_target() {
+        let target = Some(Point2::new(1.7, 0.0));
+        assert!(is_at(before_edge(1.6, 0.17, target), 1.4));
+    }
+
+    /// The camera sees no floor nearer than 1.4 m.
+    #[test]
+    fn a_fall_below_the_image_is_remembered() {
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
+        for step in 0..40 {
+            let driven_m = 0.05 * f64::from((step - 20).max(0));
+            let forward = if step > 20 { 0.05 } else { 0.0 };
+            let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
+            let depth = with_edge(1.8 - driven_m, 0.17);
+            surroundings.update(&settings, &fine_camera(), Some(&depth), &motion, None);
+        }
+        let found = surroundings.ahead(&settings, 0.0, None);
+        assert!(is_at(found, 1.8 - 0.95 - 0.2), "{found:?}");
+    }
+
+    #[test]
+    fn a_sensor_that_falls_silent_and_the_lack_of_all_sensors_are_no_eyes() {
+        let settings = CollisionMonitorSettings::default();
+        let still = EgoMotion::at_rest(0.1);
+        let depth = with_edge(9.0, 0.0);
+        let mut surroundings = ObstacleMemory::default();
+        let mut sees = |has_depth: bool, has_laser: bool, frames: u32| {
+            for _ in 0..frames {
+                let depth = has_depth.then_some(&depth);
+                surroundings.update(&settings, &fine_camera(), depth, &still, None);
+                surroundings.add_scan(&settings, has_laser.then_some(&[]), &still);
+            }
+            surroundings.is_sighted(&settings, 0.45)
+        };
+        assert!(!sees(false, false, 1), "no sensor at all");
+        assert!(sees(true, false, 20), "there never was a laser");
+        assert!(!sees(false, false, 1), "not even a frame without depth");
+        assert!(sees(true, true, 1));
+        assert!(sees(true, false, 4), "a scan is late");
+        assert!(!sees(true, false, 1), "the laser is silent");
+        assert!(sees(true, true, 1) && sees(false, true, 4));
+        assert!(!sees(false, true, 1), "the camera is silent");
+        let without = CollisionMonitorSettings { obstacles: ObstacleSource::None, ..settings };
+        assert!(ObstacleMemory::default().is_sighted(&without, 0.5), "in those words");
+    }
+
+    #[test]
+    fn a_jump_of_the_clock_does_not_forget_which_sensors_there_were() {
+        let settings = CollisionMonitorSettings::default();
+        let still = EgoMotion::at_rest(0.3);
+        let mut surroundings = ObstacleMemory::default();
+        surroundings.add_scan(&settings, Some(&[]), &still);
+        surroundings.clear();
+        for _ in 0..2 {
+            surroundings.update(
+                &settings,
+                &fine_camera(),
+                Some(&with_edge(9.0, 0.0)),
+                &still,
+                None,
+            );
+            surroundings.add_scan(&settings, None, &still);
+        }
+        assert!(!surroundings.is_sighted(&settings, 0.5));
+    }
+
+    /// Between two scans the robot moves towards what the last one met.
+    #[test]
+    fn the_last_scan_holds_until_the_next_one() {
+        let settings = CollisionMonitorSettings::default();
+        let mut surroundings = ObstacleMemory::default();
+        let leg = [Point3::new(1.2, 0.0, 0.2); 2];
+        surroundings.add_scan(&settings, Some(&leg), &EgoMotion::at_rest(0.1));
+        let motion = EgoMotion { forward: 0.5, ..EgoMotion::at_rest(0.1) };
+        surroundings.add_scan(&settings, None, &motion);
+        assert!(is_at(surroundings.ahead(&settings, 0.0, None), 0.5));
     }
 }

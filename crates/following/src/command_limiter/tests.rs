@@ -20,6 +20,7 @@ fn wish(frame: u64, left: f64, right: f64) -> Wish {
         wheels: WheelSpeeds { left, right },
         stamp: Stamp::from_nanos(frame * 100_000_000),
         aim: Aim::Person,
+        sighted: true,
         settled: true,
         pause_s: PERIOD_S,
     }
@@ -64,10 +65,10 @@ fn speed_grows_no_faster_than_it_may() {
 }
 
 #[test]
-fn each_reason_to_stop_stops_at_once() {
+fn each_emergency_stops_at_once() {
     type Change = fn(Wish) -> Wish;
     let stops: [(Reason, Change); 4] = [
-        (Reason::NoTarget, |wish| Wish { aim: Aim::Nobody, ..wish }),
+        (Reason::Blind, |wish| Wish { sighted: false, ..wish }),
         (Reason::Settling, |wish| Wish { settled: false, ..wish }),
         (Reason::Stalled, |wish| Wish { pause_s: 0.6, ..wish }),
         (Reason::NotFinite, |wish| Wish {
@@ -82,28 +83,72 @@ fn each_reason_to_stop_stops_at_once() {
     }
 }
 
+/// Returns the commands of so many further frames, each with this wish but for the stamp.
+fn go_on(limiter: &mut CommandLimiter, wished: &Wish, frames: u64) -> Vec<Command> {
+    let next = |frame| Wish { stamp: wish(40 + frame, 0.0, 0.0).stamp, ..wished.clone() };
+    (0..frames).map(|frame| limiter.limit(&next(frame), free)).collect()
+}
+
 #[test]
-fn late_frames_halve_the_speed_and_later_ones_stop() {
+fn without_a_target_the_robot_slows_down_within_its_limits() {
     let (mut limiter, _) = at_speed(0.8, 0.8);
-    let late = Wish { pause_s: 0.3, ..wish(42, 0.8, 0.8) };
-    let command = limiter.limit(&late, free);
-    assert_eq!(command.reason, Reason::Slow);
-    assert!((command.wheels.left - 0.45).abs() < 1e-9, "{command:?}");
+    let commands = go_on(&mut limiter, &Wish { aim: Aim::Nobody, ..wish(0, 0.8, 0.8) }, 9);
+    for (command, speed) in commands.iter().zip([0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1]) {
+        assert_eq!(command.reason, Reason::Stopping);
+        assert!((command.wheels.left - speed).abs() < 1e-9, "{command:?}");
+    }
+    assert_eq!((commands[8].wheels, commands[8].reason), (WheelSpeeds::STOP, Reason::NoTarget));
+}
+
+#[test]
+fn a_robot_that_stops_stays_on_its_arc() {
+    let (mut limiter, before) = at_speed(0.4, 0.8);
+    let curve = curvature(before.twist);
+    let commands = go_on(&mut limiter, &Wish { aim: Aim::Nobody, ..wish(0, 0.0, 0.0) }, 5);
+    for command in commands {
+        assert!((curvature(command.twist) - curve).abs() < 1e-9, "{command:?}");
+    }
+}
+
+#[test]
+fn late_frames_halve_the_speed_within_the_limits() {
+    let (mut limiter, _) = at_speed(0.8, 0.8);
+    let late = Wish { pause_s: 0.3, ..wish(40, 0.8, 0.8) };
+    let commands = go_on(&mut limiter, &late, 5);
+    assert!(commands.iter().all(|command| command.reason == Reason::Slow), "{commands:?}");
+    assert!((commands[0].wheels.left - 0.7).abs() < 1e-9, "{commands:?}");
+    assert!((commands[4].wheels.left - 0.45).abs() < 1e-9, "{commands:?}");
 }
 
 #[test]
 fn whoever_may_be_the_wrong_one_is_followed_at_half_speed() {
     for (aim, reason) in [(Aim::Perhaps, Reason::Unsure), (Aim::Search, Reason::Search)] {
         let (mut limiter, _) = at_speed(0.8, 0.8);
-        let unsure = |frame| Wish { aim, ..wish(frame, 0.8, 0.8) };
-        let command = limiter.limit(&unsure(40), free);
-        assert_eq!(command.reason, reason);
-        assert!((command.wheels.left - 0.45).abs() < 1e-9, "{command:?}");
-        let slow = Wish { wheels: WheelSpeeds { left: 0.3, right: 0.3 }, ..unsure(41) };
-        assert_eq!(limiter.limit(&slow, free).reason, Reason::Limited);
-        let slow = Wish { stamp: Stamp::from_nanos(4_300_000_000), ..slow };
-        assert_eq!(limiter.limit(&slow, free).reason, reason);
+        let commands = go_on(&mut limiter, &Wish { aim, ..wish(0, 0.8, 0.8) }, 5);
+        assert!(commands.iter().all(|command| command.reason == reason), "{commands:?}");
+        assert!((commands[4].wheels.left - 0.45).abs() < 1e-9, "{commands:?}");
+        let slow = |frame| Wish { aim, ..wish(frame, 0.3, 0.3) };
+        assert_eq!(limiter.limit(&slow(45), free).reason, Reason::Limited);
+        assert_eq!(limiter.limit(&slow(46), free).reason, reason);
     }
+}
+
+#[test]
+fn an_expired_command_was_a_stop_from_which_the_robot_starts_anew() {
+    let (mut limiter, command) = at_speed(0.8, 0.8);
+    let late = Wish { stamp: command.stamp.plus_seconds(0.3), ..wish(0, 0.8, 0.8) };
+    assert!((limiter.limit(&late, free).wheels.left - 0.1).abs() < 1e-9);
+}
+
+#[test]
+fn the_turn_rate_changes_no_faster_than_it_may() {
+    let (mut limiter, _) = at_speed(0.0, 0.0);
+    let wishes = go_on(&mut limiter, &wish(0, -0.2, 0.2), 5);
+    for (command, turn) in wishes.iter().zip([0.4, 0.8, 0.2 / 0.167, 0.2 / 0.167]) {
+        assert!((command.twist.angular_rps - turn).abs() < 1e-9, "{command:?}");
+    }
+    let back = limiter.limit(&wish(45, 0.2, -0.2), free);
+    assert!((back.twist.angular_rps - (0.2 / 0.167 - 0.4)).abs() < 1e-9, "{back:?}");
 }
 
 #[test]
@@ -115,7 +160,7 @@ fn an_obstacle_slows_and_then_stops() {
     assert_eq!(speed(2.5).reason, Reason::Follow);
     let near = speed(0.6);
     assert_eq!(near.reason, Reason::Obstacle);
-    assert!((near.wheels.left - (2.0 * 0.2_f64).sqrt()).abs() < 1e-9, "{near:?}");
+    assert!((near.wheels.left - (0.65_f64.sqrt() - 0.5)).abs() < 1e-9, "{near:?}");
     assert_eq!((speed(0.39).wheels, speed(0.39).reason), (WheelSpeeds::STOP, Reason::Blocked));
 }
 
@@ -225,12 +270,12 @@ fn of_several_limits_the_lowest_holds_and_is_named() {
         let command = limiter.limit(&wish, |_, _| Some(Ahead::Something(at_m)));
         (command.reason, (command.wheels.left * 100.0).round())
     };
-    assert_eq!(command(Aim::Perhaps, 0.1, 2.0), (Reason::Unsure, 45.0));
-    assert_eq!(command(Aim::Perhaps, 0.3, 2.0), (Reason::Slow, 45.0), "and not a quarter");
-    assert_eq!(command(Aim::Perhaps, 0.1, 0.45), (Reason::Obstacle, 32.0));
-    assert_eq!(command(Aim::Person, 0.1, 0.7), (Reason::Obstacle, 77.0));
+    assert_eq!(command(Aim::Perhaps, 0.1, 2.0), (Reason::Unsure, 70.0));
+    assert_eq!(command(Aim::Perhaps, 0.3, 2.0), (Reason::Slow, 70.0), "and not a quarter");
+    assert_eq!(command(Aim::Perhaps, 0.1, 0.45), (Reason::Obstacle, 9.0));
+    assert_eq!(command(Aim::Person, 0.1, 0.7), (Reason::Obstacle, 42.0));
     assert_eq!(command(Aim::Person, 0.25, 2.0), (Reason::Follow, 80.0), "just in time");
-    assert_eq!(command(Aim::Person, 0.5, 2.0), (Reason::Slow, 45.0), "just not stopped");
+    assert_eq!(command(Aim::Person, 0.5, 2.0), (Reason::Slow, 70.0), "just not stopped");
 }
 
 #[test]
@@ -238,7 +283,7 @@ fn a_pause_gives_no_licence_for_a_leap() {
     let (mut limiter, _) = at_speed(0.1, 0.1);
     let late = Wish { stamp: Stamp::from_nanos(4_900_000_000), ..wish(0, 0.9, 0.9) };
     let command = limiter.limit(&late, free);
-    assert!((command.wheels.left - (0.1 + 0.5 * LONGEST_STEP_S)).abs() < 1e-9, "{command:?}");
+    assert!((command.wheels.left - (0.5 * LONGEST_STEP_S)).abs() < 1e-9, "{command:?}");
 }
 
 #[test]
@@ -321,6 +366,46 @@ fn any_number() -> impl Strategy<Value = f64> {
     ]
 }
 
+/// Returns true if the motion changes no faster than it may, or if it is an emergency: then it may
+/// only end sooner.
+fn is_gentle(before: Twist, command: &Command, ahead: Option<Ahead>, dt: f64) -> bool {
+    let settings = CommandLimiterSettings::default();
+    let Twist { linear_mps, angular_rps, .. } = command.twist;
+    let braked = before.linear_mps - linear_mps;
+    let is_stop = command.wheels == WheelSpeeds::STOP;
+    let emergencies =
+        [Reason::Settling, Reason::Stalled, Reason::Blind, Reason::NotFinite, Reason::Fault];
+    if emergencies.contains(&command.reason) {
+        return is_stop;
+    }
+    let gentle_turn =
+        (angular_rps - before.angular_rps).abs() <= settings.max_turn_accel_radps2 * dt + 1e-9;
+    let faster = -braked <= settings.max_accel_mps2 * dt + 1e-9;
+    let brakes_hard = braked > settings.max_decel_mps2 * dt + 1e-9;
+    match (command.reason, ahead) {
+        (Reason::Blocked, Some(Ahead::Something(_))) => linear_mps.abs() < 1e-9 && gentle_turn,
+        // No slower than the obstacle demands.
+        (Reason::Obstacle, Some(Ahead::Something(at_m))) if brakes_hard => {
+            let stop_m = CollisionMonitorSettings::default().stop_m;
+            (linear_mps - settings.speed_within(at_m - stop_m)).abs() < 1e-9
+        }
+        _ => faster && !brakes_hard && gentle_turn,
+    }
+}
+
+/// Returns true if the robot comes to rest before an obstacle ahead, with its reaction.
+fn stops_before(command: &Command, ahead: Option<Ahead>) -> bool {
+    let speed = command.twist.linear_mps;
+    match ahead {
+        Some(Ahead::Something(at_m)) if speed > STILL_MPS => {
+            let limits = CommandLimiterSettings { margin_m: 0.0, ..Default::default() };
+            limits.stopping_m(speed) + CollisionMonitorSettings::default().stop_m <= at_m + 1e-9
+        }
+        Some(Ahead::Blind) => speed <= STILL_MPS,
+        _ => true,
+    }
+}
+
 fn any_ahead() -> impl Strategy<Value = Option<Ahead>> {
     prop_oneof![
         Just(None),
@@ -332,12 +417,17 @@ fn any_ahead() -> impl Strategy<Value = Option<Ahead>> {
 
 fn any_wish() -> impl Strategy<Value = (Wish, Option<Ahead>)> {
     let aims = vec![Aim::Person, Aim::Perhaps, Aim::Search, Aim::Nobody];
-    let flags = (any::<bool>(), prop::sample::select(aims), prop::bool::weighted(0.9));
+    let flags = (
+        any::<bool>(),
+        prop::sample::select(aims),
+        prop::bool::weighted(0.9),
+        prop::bool::weighted(0.9),
+    );
     (any_number(), any_number(), flags, any_number(), any_ahead()).prop_map(
         |(left, right, flags, pause, ahead)| {
-            let (short, aim, settled) = flags;
+            let (short, aim, settled, sighted) = flags;
             let pause_s = if short { PERIOD_S } else { pause };
-            (Wish { aim, settled, pause_s, ..wish(0, left, right) }, ahead)
+            (Wish { aim, settled, sighted, pause_s, ..wish(0, left, right) }, ahead)
         },
     )
 }
@@ -347,11 +437,11 @@ proptest! {
 
     /// With fifty wishes per case this is a million states.
     #[test]
-    fn commands_are_finite_limited_and_gentle(
+    fn commands_are_finite_limited_and_gentle_but_for_emergencies(
         wishes in prop::collection::vec(any_wish(), 50)
     ) {
         let mut limiter = limiter();
-        let mut before = 0.0_f64;
+        let mut before = Twist::STOP;
         for (frame, (wish, ahead)) in wishes.into_iter().enumerate() {
             let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
             let wish = Wish { stamp, ..wish };
@@ -362,11 +452,13 @@ proptest! {
                 prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
             }
             if wish.aim == Aim::Nobody {
-                prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
+                let slower = command.twist.linear_mps.abs() <= before.linear_mps.abs() + 1e-9;
+                prop_assert!(slower, "{before:?} {command:?}");
             }
-            let forward = 0.5 * (left + right);
-            prop_assert!(forward - before <= 0.5 * LONGEST_STEP_S + 1e-9, "{before} {command:?}");
-            before = forward;
+            let dt = if frame == 0 { LONGEST_STEP_S } else { PERIOD_S };
+            prop_assert!(is_gentle(before, &command, ahead, dt), "{before:?} {command:?}");
+            prop_assert!(stops_before(&command, ahead), "{command:?} {ahead:?}");
+            before = command.twist;
         }
     }
 
@@ -379,5 +471,37 @@ proptest! {
             prop_assert_eq!(a.left, b.right);
             prop_assert_eq!(a.right, b.left);
         }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2_000, ..ProptestConfig::default() })]
+
+    /// From every state the robot is at rest within the stated distance, by the time that it takes
+    /// to answer and the deceleration that it may have.
+    #[test]
+    fn rest_is_reached_within_the_stated_distance(
+        wishes in prop::collection::vec(any_wish(), 20)
+    ) {
+        let mut limiter = limiter();
+        let mut frame = 0;
+        let mut last = None;
+        for (wish, ahead) in wishes {
+            frame += 1;
+            let stamp = Stamp::from_nanos(frame * 100_000_000);
+            last = Some(limiter.limit(&Wish { stamp, ..wish }, |_, _| ahead));
+        }
+        let mut speed = last.map_or(0.0, |command| command.twist.linear_mps.abs());
+        let stated_m = limiter.settings.stopping_m(speed) - limiter.settings.margin_m;
+        let mut driven_m = 0.0;
+        for _ in 0..20 {
+            // The speed of a frame lasts until the next one.
+            driven_m += speed * PERIOD_S;
+            frame += 1;
+            let nobody = Wish { aim: Aim::Nobody, ..wish(frame, 0.0, 0.0) };
+            speed = limiter.limit(&nobody, free).twist.linear_mps.abs();
+        }
+        prop_assert_eq!(speed, 0.0);
+        prop_assert!(driven_m <= stated_m + 1e-9, "{driven_m} {stated_m}");
     }
 }

@@ -172,6 +172,11 @@ impl LiveSource {
         &self.assembly.tally.notes
     }
 
+    /// Returns true if there is odometry: a topic, or transforms.
+    pub fn has_odometry(&self) -> bool {
+        self.assembly.plan.odom_frames.is_some()
+    }
+
     /// Returns the facts about the source; about the camera only after a frame.
     pub fn facts(&self) -> LogFacts {
         self.assembly.facts()

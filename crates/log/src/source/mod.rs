@@ -182,6 +182,11 @@ impl FrameSource {
         self.assembly.tally.lost
     }
 
+    /// Returns true if there is odometry: a topic, or transforms.
+    pub fn has_odometry(&self) -> bool {
+        self.assembly.plan.odom_frames.is_some()
+    }
+
     /// Returns the facts about the log.
     pub fn facts(&self) -> &LogFacts {
         &self.facts

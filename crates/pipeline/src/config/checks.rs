@@ -2,6 +2,7 @@ use std::ops::Range;
 
 use tagalong_config::ConfigError;
 use tagalong_core::{Error, Result};
+use toml::Spanned;
 use toml::de::DeTable;
 
 use crate::PipelineSettings;
@@ -12,17 +13,22 @@ pub(super) fn check(
     settings: &PipelineSettings,
     root: &DeTable<'_>,
 ) -> std::result::Result<(), ConfigError> {
-    let PipelineSettings { stereo, odometry, .. } = settings;
+    let PipelineSettings { stereo, odometry, robot, command_limiter, collision_monitor, .. } =
+        settings;
     let found = [
         ("clock", check_clock(settings)),
         ("target", check_target(settings)),
+        ("command_limiter", command_limiter.check(robot)),
+        ("collision_monitor", collision_monitor.check(robot, command_limiter)),
         ("stereo", stereo.as_ref().map_or(Ok(()), |stereo| stereo.check())),
         ("odometry", odometry.as_ref().map_or(Ok(()), |odometry| odometry.check())),
     ];
     for (section, result) in found {
         if let Err(Error::Settings { key, why }) = result {
             let message = format!("`{section}.{key}` {why}");
-            return Err(ConfigError { message, span: place(root, section, &key) });
+            // A default may contradict a setting of the robot.
+            let span = place(root, section, &key).or_else(|| root.get("robot").map(Spanned::span));
+            return Err(ConfigError { message, span });
         }
     }
     // TOML knows no larger numbers, and the seed is written into the reports.

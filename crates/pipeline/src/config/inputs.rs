@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use tagalong_config::ConfigError;
 use tagalong_core::{Input, Inputs};
+use tagalong_following::ObstacleSource;
 
 use super::PipelineSettings;
 
@@ -59,6 +60,22 @@ pub(super) fn declared_inputs(
             return Err(ConfigError { message, span: without_span });
         }
     }
+    if has_controller && lacks_eyes(settings) {
+        let message = "the controller has no sensor of obstacles, for `without` leaves out depth and \
+                       laser: remove one of them from `without`, or, for a robot that is to drive \
+                       without eyes, set `obstacles = \"none\"` in [collision_monitor]";
+        return Err(ConfigError { message: message.into(), span: without_span });
+    }
     let sum = all.into_iter().fold(Inputs::NONE, |sum, (_, inputs)| sum.union(inputs));
     Ok(settings.without.iter().fold(sum, |sum, input| sum.without(*input)))
+}
+
+/// Returns true if the settings leave out every sensor of obstacles, and do not say that the robot
+/// drives without.
+fn lacks_eyes(settings: &PipelineSettings) -> bool {
+    let leaves_out = |input| settings.without.contains(&input);
+    let has_depth = settings.stereo.is_some() || !leaves_out(Input::Depth);
+    settings.collision_monitor.obstacles == ObstacleSource::Sensed
+        && !has_depth
+        && leaves_out(Input::Laser)
 }

@@ -7,7 +7,7 @@ use tagalong_config::commented_defaults;
 
 use super::{Options, RunSettings};
 use crate::tests::doubles::{PLAIN, World, frame, person};
-use crate::{Pipeline, PipelineSettings};
+use crate::{MissingSource, Pipeline, PipelineSettings, Sources};
 
 fn build(text: &str) -> Result<(Pipeline, RunSettings), String> {
     Pipeline::from_toml(text, Path::new("."), &World::default().registry())
@@ -54,7 +54,10 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
             own("associator.plugin = 'manage-m-of-n'"),
             &["not an associator; available", "hungarian"],
         ),
-        (own("robot.max_speed_mps = inf"), &["a.toml:1:23", "must be positive, not inf"]),
+        (
+            own("robot.max_speed_mps = inf"),
+            &["a.toml:1:23", "must lie between 0.05 and 0.9, not inf"],
+        ),
         (own("stereo.window = 4"), &["a.toml:1:17", "`stereo.window` must be 3, 5, 7 or 9"]),
         (
             own("odometry.cell_px = 4"),
@@ -250,10 +253,99 @@ fn settings_may_be_at_their_bounds_and_not_beyond() {
         ("merge.max_tracks = 0", false),
         ("clock = { max_gap_s = 2.0, reset_gap_s = 2.0 }", true),
         ("clock = { max_gap_s = 2.0, reset_gap_s = 1.9 }", false),
-        ("collision_monitor.range_m = 100.0", true),
-        ("collision_monitor.range_m = 100.1", false),
+        ("collision_monitor.range_m = 10.0", true),
+        ("collision_monitor.range_m = 10.1", false),
+        // The ceilings of the governor, and the limits that contradict each other.
+        ("robot.max_speed_mps = 0.91", false),
+        ("robot.max_speed_mps = 50.0", false),
+        ("robot.wheel_half_separation_m = 0.0", false),
+        ("command_limiter.valid_s = 0.5", true),
+        ("command_limiter.valid_s = 0.51", false),
+        ("command_limiter.valid_s = 3600.0", false),
+        ("command_limiter.stop_after_s = 1e9", false),
+        ("command_limiter.margin_m = 0.0", false),
+        ("command_limiter.reaction_s = 0.0", false),
+        ("command_limiter.enable_s = 1.0", true),
+        ("command_limiter.enable_s = 1.1", false),
+        ("command_limiter.enable_s = 0.0", false),
+        ("command_limiter.max_accel_mps2 = 1.1", false),
+        ("command_limiter.max_decel_mps2 = 100.0", false),
+        ("command_limiter.max_turn_accel_radps2 = 100.0", false),
+        ("command_limiter = { reaction_s = 0.25, valid_s = 0.25 }", true),
+        ("command_limiter = { reaction_s = 0.24, valid_s = 0.25 }", false),
+        ("command_limiter = { slow_after_s = 0.5, stop_after_s = 0.4 }", false),
+        ("command_limiter = { max_accel_mps2 = 0.8, max_decel_mps2 = 0.7 }", false),
+        ("command_limiter.max_odometry_mps = 0.8", false),
+        ("collision_monitor.min_seen = 0.0", false),
+        ("collision_monitor.stop_m = 0.0", false),
+        ("collision_monitor.memory_s = 0.0", false),
+        ("collision_monitor.half_width_m = 0.16", false),
+        ("collision_monitor.range_m = 1.2", false),
+        ("collision_monitor.range_m = 1.3", true),
+        ("collision_monitor.obstacles = 'none'", true),
+        ("collision_monitor.obstacles = 'off'", false),
+        ("robot.odometry = 'none'", true),
+        ("robot.odometry = false", false),
     ] {
         assert_eq!(build(&format!("{line}\n{PLAIN}")).is_ok(), fits, "{line}");
+    }
+}
+
+#[test]
+fn a_limit_beyond_its_ceiling_is_shown_with_its_line_and_the_remedy() {
+    let refused = |line: &str| build(&format!("seed = 1\n{line}\n{PLAIN}")).map(drop).unwrap_err();
+    for (line, words) in [
+        ("robot.max_speed_mps = 50.0", "max_speed_mps` must lie between 0.05 and 0.9, not 50"),
+        ("command_limiter.valid_s = 3600.0", "valid_s` must lie between 0.05 and 0.5, not 3600"),
+        ("command_limiter.reaction_s = 0.2", "must be at least 0.25, as `valid_s`, not 0.2"),
+        ("collision_monitor.range_m = 1.2", "raise it or lower `max_speed_mps` in [robot]"),
+    ] {
+        let shown = refused(line);
+        assert!(shown.contains("a.toml:2:"), "{shown}");
+        assert!(shown.contains(words), "{shown}");
+    }
+}
+
+#[test]
+fn a_controller_without_sensors_of_obstacles_is_refused_unless_the_config_says_so() {
+    let with = |head: &str| {
+        let text = format!("{head}\n{PLAIN}[controller]\nplugin = 'drive'\n");
+        build(&text).map(drop)
+    };
+    let blind = "without = ['depth', 'laser']";
+    let refused = with(blind).unwrap_err();
+    for words in ["a.toml:1:", "no sensor of obstacles", "obstacles = \"none\"", "without = "] {
+        assert!(refused.contains(words), "{refused}");
+    }
+    assert_eq!(with("without = ['depth']"), Ok(()), "a laser may be there");
+    assert_eq!(with("without = ['laser']"), Ok(()), "depth may be there");
+    assert_eq!(with(&format!("{blind}\ncollision_monitor.obstacles = 'none'")), Ok(()));
+    assert_eq!(build(&format!("{blind}\n{PLAIN}")).map(drop), Ok(()), "no controller");
+}
+
+#[test]
+fn a_source_without_the_data_of_a_controller_is_refused_unless_the_config_says_so() {
+    let check = |head: &str, tail: &str, sources: Sources| {
+        let text = format!("{head}\n{PLAIN}{tail}");
+        let (pipeline, _) =
+            Pipeline::from_toml(&text, Path::new("."), &World::default().registry()).unwrap();
+        pipeline.check_sources(sources)
+    };
+    let all = Sources { depth: true, right: false, laser: true, odometry: true };
+    let (eyes, odometry) =
+        (Sources { depth: false, laser: false, ..all }, Sources { odometry: false, ..all });
+    let drive = "[controller]\nplugin = 'drive'\n";
+    assert_eq!(check("", drive, all), Ok(()));
+    assert_eq!(check("", drive, Sources { depth: false, ..all }), Ok(()));
+    assert_eq!(check("", drive, Sources { laser: false, ..all }), Ok(()));
+    assert_eq!(check("", drive, eyes), Err(MissingSource::Obstacles));
+    assert_eq!(check("", drive, Sources { right: true, ..eyes }), Err(MissingSource::Obstacles));
+    assert_eq!(check("collision_monitor.obstacles = 'none'", drive, eyes), Ok(()));
+    assert_eq!(check("", drive, odometry), Err(MissingSource::Odometry));
+    assert_eq!(check("robot.odometry = 'none'", drive, odometry), Ok(()));
+    assert_eq!(check("", "", Sources::default()), Ok(()), "without a controller");
+    for missing in [MissingSource::Obstacles, MissingSource::Odometry] {
+        assert!(missing.to_string().contains("= \"none\"` in ["), "{missing}");
     }
 }
 

@@ -4,7 +4,7 @@
 use nalgebra::Point3;
 use tagalong_core::{Command, EgoMotion, Frame, Images, Reason, Stamp, WheelSpeeds};
 
-use super::doubles::{PLAIN, World, camera, frame, person, scored};
+use super::doubles::{PLAIN, World, camera, frame, person, scored, with_eyes};
 use crate::{LockState, Pipeline};
 
 /// A pipeline that has followed a person for two seconds.
@@ -25,7 +25,7 @@ fn is_moving(command: &Command) -> bool {
 
 fn after(index: u64, t_s: f64, motion: EgoMotion) -> Frame {
     let stamp = frame(index, t_s).stamp;
-    Frame::new(index, stamp, std::sync::Arc::new(camera()), motion, Images::default())
+    with_eyes(Frame::new(index, stamp, std::sync::Arc::new(camera()), motion, Images::default()))
 }
 
 /// The command for a frame that comes that much later.
@@ -160,5 +160,36 @@ fn p1_a_plugin_that_panics_stops_the_robot_in_the_same_tick() {
         assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
         pipeline.arm();
         assert!(!is_moving(&pipeline.command_at(now).unwrap()), "no restart of a broken pipeline");
+    }
+}
+
+/// Ten minutes at fifteen frames a second.
+#[test]
+fn s3_without_people_there_is_no_track_and_every_command_is_zero() {
+    let world = World::of([]);
+    let config = format!("{PLAIN}\n[controller]\nplugin = 'drive'\n");
+    let mut pipeline = world.pipeline(&config);
+    for index in 1..=9000 {
+        let report = pipeline.step(&frame(index, index as f64 / 15.0)).unwrap();
+        assert!(report.tracks.is_empty(), "{index}");
+        assert_eq!(report.command.unwrap().wheels, WheelSpeeds::STOP, "{index}");
+    }
+}
+
+#[test]
+fn s4_of_a_crowd_so_many_are_tracked_as_the_limit_says_and_the_target_stays_or_is_lost() {
+    let (world, mut pipeline) = driving("");
+    let target = pipeline.step(&frame(21, 2.1)).unwrap().target.unwrap();
+    let place = |i: u32| person(1.5 + 0.8 * f64::from(i / 20), -8.0 + 0.8 * f64::from(i % 20));
+    let crowd = (0..300).map(|i| scored(4.0, place(i)));
+    let all: Vec<_> = std::iter::once(scored(5.0, person(3.0, 0.0))).chain(crowd).collect();
+    for index in 22..=40 {
+        world.show(0, index, all.clone());
+        let report = pipeline.step(&frame(index, index as f64 * 0.1)).unwrap();
+        assert!(report.tracks.len() <= 256, "{}", report.tracks.len());
+        let is_lost = report.lock.unwrap().state == LockState::Lost;
+        assert!(report.target == Some(target) || is_lost, "{index}: {:?}", report.target);
+        let WheelSpeeds { left, right } = report.command.unwrap().wheels;
+        assert!(left.abs() <= 0.9 && right.abs() <= 0.9, "{left} {right}");
     }
 }

@@ -11,8 +11,8 @@ use tagalong_config::Registry;
 use tagalong_core::{
     Association, Associations, Associator, Capabilities, Controller, Detection, Detector,
     EgoMotion, Error, Estimate, Evidence, Filter, FilterRequirements, Frame, Funnel, Gate, Images,
-    Input, Inputs, Likelihood, Person, Query, Result, Scene, Stamp, Track, TrackId, Twist, Update,
-    Verifier, WheelSpeeds,
+    Input, Inputs, LaserScan, Likelihood, Person, Query, Result, Scene, Stamp, Track, TrackId,
+    Twist, Update, Verifier, WheelSpeeds,
 };
 use tagalong_filtering::{PerPerson, PersonFilter};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
@@ -35,9 +35,20 @@ pub fn camera() -> Camera {
 }
 
 pub fn frame(index: u64, t_s: f64) -> Frame {
+    with_eyes(bare_frame(index, t_s))
+}
+
+/// Returns a frame without any sensor.
+pub fn bare_frame(index: u64, t_s: f64) -> Frame {
     let stamp = Stamp::from_nanos(1_000_000_000_000).plus_seconds(t_s);
     let motion = EgoMotion::at_rest(0.1);
     Frame::new(index, stamp, Arc::new(camera()), motion, Images::default())
+}
+
+/// Adds the scan of a laser that meets nothing: without a sensor of obstacles no robot moves.
+pub fn with_eyes(frame: Frame) -> Frame {
+    let none: [Point3<f64>; 0] = [];
+    frame.with_laser(Some(LaserScan::of_points(none)))
 }
 
 /// A person 1.6 m tall (to the head's centre) at a place on the floor.

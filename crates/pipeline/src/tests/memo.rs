@@ -2,7 +2,7 @@
 
 use tagalong_core::Frame;
 
-use super::doubles::{World, frame, person};
+use super::doubles::{World, bare_frame, person};
 use crate::{FrameReport, Pipeline};
 
 /// Of two scripts the first has no memory; verifiers and thresholds differ.
@@ -36,7 +36,7 @@ fn untimed(report: FrameReport) -> String {
 
 /// Reports of several pipelines for the same frames, step by step side by side.
 fn together(pipelines: &mut [Pipeline]) -> Vec<Vec<String>> {
-    let frames: Vec<Frame> = (1..=20).map(|i| frame(i, i as f64 * 0.1)).collect();
+    let frames: Vec<Frame> = (1..=20).map(|i| bare_frame(i, i as f64 * 0.1)).collect();
     let of = |frame| -> Vec<String> {
         pipelines.iter_mut().map(|p| untimed(p.step(frame).unwrap())).collect()
     };
@@ -86,7 +86,7 @@ fn another_frame_is_looked_at_anew() {
     let mut pair = [world.pipeline(&texts()[0]), world.pipeline(&texts()[0])];
     pair.iter_mut().for_each(Pipeline::share_findings);
     for pipeline in &mut pair {
-        pipeline.step(&frame(1, 0.1)).unwrap();
+        pipeline.step(&bare_frame(1, 0.1)).unwrap();
     }
     assert_eq!(world.asked.lock().unwrap().len(), 2);
 }

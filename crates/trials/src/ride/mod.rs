@@ -6,8 +6,8 @@ use std::time::Instant;
 
 pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_config::Registry;
-use tagalong_core::{Stamp, WheelSpeeds};
-use tagalong_pipeline::{FrameReport, Pipeline};
+use tagalong_core::{Frame, Stamp, WheelSpeeds};
+use tagalong_pipeline::{FrameReport, Pipeline, Sources};
 use tagalong_sim::{Clearance, Event, Scene, Simulation};
 
 use crate::{Contender, Draw, Drawn, Moment, TrialError};
@@ -66,7 +66,9 @@ impl Ride {
     /// late are late for it, too; between them the wheels get the command of
     /// [`Pipeline::command_at`] at each message of the odometry.
     ///
-    /// # Errors A config that is wrong or has no controller, or a plugin that fails.
+    /// # Errors
+    /// A config that is wrong, has no controller or one without sensors of obstacles, or a plugin
+    /// that fails.
     pub fn new(
         scene: &Scene,
         contender: &Contender,
@@ -90,6 +92,10 @@ impl Ride {
         let failed =
             |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
         while let Some(drawn) = ride.next_frame(&mut draw, &pipeline, witness) {
+            if ride.reports.is_empty() {
+                let missing = pipeline.check_sources(sources(&drawn.frame));
+                missing.map_err(|why| TrialError::Config(format!("{}: {why}", contender.name)))?;
+            }
             let start = Instant::now();
             let report = pipeline.step(&drawn.frame).map_err(failed)?;
             ride.took_ms.push(start.elapsed().as_secs_f64() * 1e3);
@@ -121,6 +127,12 @@ impl Ride {
             command(pipeline, Stamp::from_nanos(reading.at_ns))
         })
     }
+}
+
+/// Returns the data of a simulated frame; its robot always has odometry.
+fn sources(frame: &Frame) -> Sources {
+    let (right, laser) = (frame.right().is_ok(), frame.laser().is_some());
+    Sources { depth: frame.depth().is_ok(), right, laser, odometry: true }
 }
 
 fn tick(simulation: &Simulation, at_ns: u64) -> Tick {

@@ -1,0 +1,161 @@
+//! Thread that publishes the state of the bridge, also while a frame takes long.
+
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use ros2_client::Publisher;
+use tagalong_log::msgs::Header;
+use tagalong_pipeline::Permission;
+
+use crate::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::stamps::StampClock;
+
+/// Time between two messages.
+const EACH: Duration = Duration::from_secs(1);
+/// Time in one frame, or without one, from which on it is an error.
+const STUCK: Duration = Duration::from_secs(1);
+
+const OK: u8 = 0;
+const WARN: u8 = 1;
+const ERROR: u8 = 2;
+const STALE: u8 = 3;
+
+/// State of the bridge.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Status {
+    /// Frames that the pipeline processed.
+    pub(crate) frames: u64,
+    /// Time since which a frame is in the pipeline.
+    pub(crate) frame_since: Option<Instant>,
+    /// Time of the last frame.
+    pub(crate) heard: Instant,
+    /// Permission to move; `None` without a controller.
+    pub(crate) permission: Option<Permission>,
+    /// Fault of the pipeline.
+    pub(crate) fault: Option<&'static str>,
+    /// Other publishers of commands.
+    pub(crate) rivals: usize,
+    /// Messages that could not be decoded.
+    pub(crate) malformed: u64,
+}
+
+/// Publisher of the diagnostics; it ends when it is dropped.
+pub(crate) struct Diagnostics {
+    status: Arc<Mutex<Option<Status>>>,
+    end: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Diagnostics {
+    pub(crate) fn start(publisher: Publisher<DiagnosticArray>, clock: Arc<StampClock>) -> Self {
+        let status: Arc<Mutex<Option<Status>>> = Arc::default();
+        let theirs = Arc::clone(&status);
+        let (end, ended) = channel();
+        let thread = thread::spawn(move || {
+            while ended.recv_timeout(EACH) == Err(RecvTimeoutError::Timeout) {
+                let status = *theirs.lock().unwrap_or_else(PoisonError::into_inner);
+                let header = Header::new(clock.now(), "");
+                let status = status.map(|status| status.message(Instant::now()));
+                let status = status.into_iter().collect();
+                // Subscribers are not waited for.
+                let _lost = publisher.publish(DiagnosticArray { header, status });
+            }
+        });
+        Self { status, end: Some(end), thread: Some(thread) }
+    }
+
+    /// Sets the state after a turn of the loop.
+    pub(crate) fn update(&self, status: Status) {
+        *self.status.lock().unwrap_or_else(PoisonError::into_inner) = Some(status);
+    }
+
+    /// Notes that a frame goes into the pipeline.
+    pub(crate) fn begin_frame(&self) {
+        if let Some(status) = &mut *self.status.lock().unwrap_or_else(PoisonError::into_inner) {
+            status.frame_since = Some(Instant::now());
+        }
+    }
+}
+
+impl Drop for Diagnostics {
+    fn drop(&mut self) {
+        self.end.take();
+        self.thread.take().map(JoinHandle::join);
+    }
+}
+
+impl Status {
+    /// Returns the message for a time: its level is that of the worst of its causes.
+    fn message(&self, now: Instant) -> DiagnosticStatus {
+        let (level, message) = self.worst(now);
+        let value = |key: &str, value: String| KeyValue { key: key.into(), value };
+        DiagnosticStatus {
+            level,
+            name: "tagalong: follow".into(),
+            message,
+            hardware_id: "tagalong".into(),
+            values: vec![
+                value("frames", self.frames.to_string()),
+                value("enable", self.permission.map_or("no controller", Permission::cause).into()),
+                value("other publishers of commands", self.rivals.to_string()),
+                value("malformed messages", self.malformed.to_string()),
+            ],
+        }
+    }
+
+    fn worst(&self, now: Instant) -> (u8, String) {
+        let stuck_s = self.frame_since.map_or(Duration::ZERO, |since| now - since);
+        if stuck_s > STUCK {
+            return (ERROR, format!("one frame takes {:.1} s", stuck_s.as_secs_f64()));
+        }
+        if let Some(fault) = self.fault {
+            return (ERROR, format!("fault: {fault}"));
+        }
+        if now.saturating_duration_since(self.heard) > STUCK {
+            return (STALE, "no frames".into());
+        }
+        match self.permission {
+            _ if self.rivals > 0 => (WARN, "other nodes publish commands".into()),
+            Some(Permission::Latched(cause)) => (WARN, cause.into()),
+            _ if self.malformed > 0 => (WARN, "messages that do not decode".into()),
+            Some(permission) => (OK, permission.cause().into()),
+            None => (OK, "tracks people".into()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_cause_is_told() {
+        let now = Instant::now();
+        let well = Status {
+            frames: 9,
+            frame_since: None,
+            heard: now,
+            permission: Some(Permission::Granted),
+            fault: None,
+            rivals: 0,
+            malformed: 0,
+        };
+        let worst = |status: Status| status.worst(now + Duration::from_secs(1));
+        assert_eq!(worst(well), (OK, "enabled".into()));
+        assert_eq!(worst(Status { malformed: 1, ..well }).0, WARN);
+        assert_eq!(worst(Status { rivals: 1, ..well }).0, WARN);
+        let latched = Some(Permission::Latched("switched off"));
+        assert_eq!(worst(Status { permission: latched, ..well }), (WARN, "switched off".into()));
+        let late = well.worst(now + Duration::from_millis(1001));
+        assert_eq!(late.0, STALE);
+        let fault = Status { fault: Some("odometry jumped"), permission: latched, ..well };
+        assert_eq!(worst(fault), (ERROR, "fault: odometry jumped".into()));
+        let stuck = Status { frame_since: Some(now), ..well };
+        assert_eq!(
+            stuck.worst(now + Duration::from_secs(3)),
+            (ERROR, "one frame takes 3.0 s".into())
+        );
+    }
+}
