@@ -41,7 +41,7 @@ mod walker;
 pub mod write;
 
 pub use error::LogError;
-pub use input::{InputSettings, MountSettings};
+pub use input::{DisparitySettings, InputSettings, MountSettings};
 pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};
 pub use leg_scans::{LegScan, read_leg_scans};
 pub use limits::Limits;

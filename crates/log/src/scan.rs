@@ -8,9 +8,11 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
-use crate::images::{Content, content_of_encoding, content_of_format};
+use crate::images::{Content, content_of_encoding, content_of_format, may_be_disparity};
 use crate::log_files::{LogFiles, open_file};
-use crate::msgs::{CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, decode};
+use crate::msgs::{
+    CameraInfo, CompressedImage, DisparityImage, Header, Image, Odometry, TFMessage, decode,
+};
 use crate::sensors::SensorType;
 use crate::tf::TfBuffer;
 use crate::walk::{Channel, Counters, Message};
@@ -25,6 +27,7 @@ const MAX_STAMPS: usize = 20_000;
 pub(crate) enum Type {
     Image,
     CompressedImage,
+    DisparityImage,
     CameraInfo,
     Tf,
     Odometry,
@@ -40,6 +43,7 @@ impl Type {
         match (package, name.rsplit('/').next().unwrap_or(name)) {
             ("sensor_msgs", "Image") => Self::Image,
             ("sensor_msgs", "CompressedImage") => Self::CompressedImage,
+            ("stereo_msgs", "DisparityImage") => Self::DisparityImage,
             ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
             ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Self::Tf,
             ("nav_msgs", "Odometry") => Self::Odometry,
@@ -283,6 +287,7 @@ impl Gathering {
         let done = match topic.kind {
             Type::Image => topic.take_image(message.data, unit),
             Type::CompressedImage => topic.take_compressed(message.data),
+            Type::DisparityImage => topic.take_disparity(message.data),
             Type::Odometry => topic.take_odometry(message.data),
             Type::Sensor => topic.take_sensor(message.data),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
@@ -343,6 +348,21 @@ impl Topic {
             self.pixels = Some(image.format);
         }
         self.take_header(image.header);
+        Some(())
+    }
+
+    fn take_disparity(&mut self, data: &[u8]) -> Option<()> {
+        let message: DisparityImage<'_> = decode(data).ok()?;
+        if self.pixels.is_none() {
+            let image = &message.image;
+            self.content = match may_be_disparity(&image.encoding) {
+                true => Content::Depth,
+                false => Content::Unknown,
+            };
+            self.size = Some((image.width, image.height));
+            self.pixels = Some(format!("{} disparity", image.encoding));
+        }
+        self.take_header(message.header);
         Some(())
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
 
-use crate::images::Content;
+use crate::images::{Content, may_be_disparity};
 use crate::scan::{Scan, Topic, Type};
 use crate::sensors::{SENSORS, SensorType};
 use crate::{InputSettings, LogError};
@@ -64,17 +64,24 @@ pub(crate) fn choose(
     let named = |key, topic: &Option<String>, fits: fn(&Topic) -> bool| {
         named(scan, key, topic.as_deref(), fits)
     };
-    let colour = named("colour_topic", &input.colour_topic, is_image)?
-        .or_else(|| best(scan, |name, topic| colour_rank(name, topic, false)));
+    let is_disparity = input.disparity.is_some();
+    // Chosen first, because such images look like those of a grey camera.
+    let disparity = match is_disparity && input.depth_topic.is_none() {
+        true => best(scan, None, disparity_rank),
+        false => input.depth_topic.clone().filter(|_| is_disparity),
+    };
+    let colour = named("colour_topic", &input.colour_topic, is_picture)?.or_else(|| {
+        best(scan, disparity.as_deref(), |name, topic| colour_rank(name, topic, false))
+    });
     let depth = match inputs.uses(Input::Depth) || colour.is_none() {
-        true => {
-            named("depth_topic", &input.depth_topic, is_image)?.or_else(|| best(scan, depth_rank))
-        }
+        true => named("depth_topic", &input.depth_topic, is_image)?
+            .or(disparity)
+            .or_else(|| best(scan, None, depth_rank)),
         false => None,
     };
     let right = match inputs.uses(Input::Right) {
-        true => named("right_topic", &input.right_topic, is_image)?
-            .or_else(|| best(scan, |name, topic| colour_rank(name, topic, true))),
+        true => named("right_topic", &input.right_topic, is_picture)?
+            .or_else(|| best(scan, None, |name, topic| colour_rank(name, topic, true))),
         false => None,
     };
     // The settings may name the right images as the colour topic.
@@ -85,7 +92,7 @@ pub(crate) fn choose(
         sensors.extend(topic.map(|topic| (sensor.input, topic)));
     }
     let odometry = named("odometry_topic", &input.odometry_topic, is_odometry)?
-        .or_else(|| best(scan, odometry_rank));
+        .or_else(|| best(scan, None, odometry_rank));
     let info = |key, wanted: &Option<String>, image: &Option<String>| {
         Ok::<_, LogError>(named(key, wanted, is_info)?.or_else(|| info_of(scan, image.as_deref()?)))
     };
@@ -114,7 +121,7 @@ fn choose_sensor(
     let rank = |name: &str, topic: &Topic| {
         sensor.rank.filter(|_| is_of(sensor, topic)).map(|rank| rank(name))
     };
-    Ok(named.or_else(|| best(scan, rank)))
+    Ok(named.or_else(|| best(scan, None, rank)))
 }
 
 /// Returns the topic that the settings name for a sensor.
@@ -196,15 +203,20 @@ const UNREADABLE: &str = ", because no topic is read for it: a program that adds
                           otherwise leave out the plugin that requires it";
 const COLOUR: &str = "sensor_msgs/Image with colour, mono, bayer or yuv pixels of 8 bits, or \
                       sensor_msgs/CompressedImage with jpeg or png";
-const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, or sensor_msgs/CompressedImage \
-                     with compressedDepth";
+const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, sensor_msgs/CompressedImage with \
+                     compressedDepth, or stereo_msgs/DisparityImage";
 
 pub(crate) fn missing(scan: &Scan, wanted: String, hint: String) -> LogError {
     LogError::Missing { path: scan.path.clone(), wanted, hint, present: scan.listing() }
 }
 
-fn is_image(topic: &Topic) -> bool {
+fn is_picture(topic: &Topic) -> bool {
     matches!(topic.kind, Type::Image | Type::CompressedImage)
+}
+
+/// Returns true for images, of disparity included.
+fn is_image(topic: &Topic) -> bool {
+    is_picture(topic) || topic.kind == Type::DisparityImage
 }
 
 fn is_info(topic: &Topic) -> bool {
@@ -237,11 +249,16 @@ fn named(
     Err(missing(scan, format!("topic `{name}` fit for `{key}` of [input]"), hint))
 }
 
-/// Returns the topic with the highest rank; of equal ones that with the most messages, then the
-/// first by name.
-fn best(scan: &Scan, rank: impl Fn(&str, &Topic) -> Option<i32>) -> Option<String> {
+/// Returns the topic with the highest rank but one that is taken; of equal ones that with the most
+/// messages, then the first by name.
+fn best(
+    scan: &Scan,
+    taken: Option<&str>,
+    rank: impl Fn(&str, &Topic) -> Option<i32>,
+) -> Option<String> {
+    let free = |(name, topic): &(&String, &Topic)| topic.count > 0 && taken != Some(name.as_str());
     let ranked =
-        scan.topics.iter().filter(|(_, topic)| topic.count > 0).filter_map(|(name, topic)| {
+        scan.topics.iter().filter(free).filter_map(|(name, topic)| {
             Some((rank(&name.to_lowercase(), topic)?, topic.count, name))
         });
     // Reversed, because the last of equal maxima is returned.
@@ -254,14 +271,17 @@ fn has(name: &str, words: &[&str]) -> bool {
 
 fn colour_rank(name: &str, topic: &Topic, right: bool) -> Option<i32> {
     let is_right = has(name, &["right", "infra2"]);
-    if !is_image(topic) || topic.content != Content::Picture || is_right != right {
+    if !is_picture(topic) || topic.content != Content::Picture || is_right != right {
         return None;
     }
     // A name for colour decides before one for a side, and before an uncompressed image.
     let mut rank = 0;
     rank += 8 * i32::from(has(name, &["color", "colour", "rgb"]));
     rank += 4 * i32::from(has(name, &["left", "front", "rect"]));
-    rank -= 6 * i32::from(has(name, &["infra", "/ir", "depth", "fisheye", "mono", "debug"]));
+    rank -= 6 * i32::from(has(
+        name,
+        &["infra", "/ir", "depth", "disparity", "fisheye", "mono", "debug"],
+    ));
     rank += i32::from(topic.kind == Type::Image);
     Some(rank)
 }
@@ -278,6 +298,17 @@ fn depth_rank(name: &str, topic: &Topic) -> Option<i32> {
     Some(rank)
 }
 
+/// Returns the rank of images that the settings declare to be disparities, by their name.
+fn disparity_rank(name: &str, topic: &Topic) -> Option<i32> {
+    let pixels = topic.pixels.as_deref().unwrap_or_default();
+    let may_be = match topic.kind {
+        Type::Image => may_be_disparity(pixels),
+        Type::CompressedImage => pixels.contains("png"),
+        _ => false,
+    };
+    (may_be && name.contains("disp")).then(|| i32::from(topic.kind == Type::Image))
+}
+
 fn odometry_rank(name: &str, topic: &Topic) -> Option<i32> {
     let filtered = has(name, &["filtered", "fused"]);
     (topic.kind == Type::Odometry).then(|| i32::from(!has(name, &["visual"])) + i32::from(filtered))
@@ -291,6 +322,11 @@ fn info_of(scan: &Scan, image: &str) -> Option<String> {
     let sibling = format!("{folder}/camera_info");
     if scan.infos.contains_key(&sibling) {
         return Some(sibling);
+    }
+    let left = format!("{folder}/left/camera_info");
+    // Disparities are those of the left camera, and its calibration stands beside its images.
+    if scan.topics.get(image)?.kind == Type::DisparityImage && scan.infos.contains_key(&left) {
+        return Some(left);
     }
     let frame = scan.frame_of(image)?;
     let mut same = scan.infos.iter().filter(|(_, info)| info.header.frame_id == frame);

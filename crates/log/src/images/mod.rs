@@ -6,11 +6,17 @@
 
 mod bayer;
 mod compressed;
+mod disparity;
 mod raw;
 mod rvl;
 mod yuv;
 
 pub use compressed::{decode_compressed, encode_rvl, size_of_compressed};
+pub(crate) use disparity::may_be_disparity;
+pub use disparity::{
+    DepthFromDisparity, StereoGeometry, decode_compressed_disparity, decode_disparity,
+    decode_plain_disparity,
+};
 pub use raw::{decode_raw, size_of_raw};
 use tagalong_core::{DepthImage, GreyImage, RgbImage};
 
@@ -39,7 +45,7 @@ impl Pixels {
 }
 
 /// Reason for which an image message was not decoded.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
     /// The encoding is unknown, or unknown for depth.
@@ -55,6 +61,29 @@ pub enum ImageError {
          bits (rgb8 or bayer_rggb8, say)"
     )]
     Deep(String),
+    /// An encoding that holds no disparities.
+    #[error(
+        "disparities as `{0}`; known: 32FC1, 8UC1, mono8, 16SC1, and 16UC1, mono16 where \
+         `disparity.unit_px` is set under [input]"
+    )]
+    NoDisparity(String),
+    /// Disparities in a unit for which there is no convention.
+    #[error(
+        "disparities as `{0}`, for which there is no one unit: set `disparity.unit_px` under \
+         [input] (0.0625 for 16 parts of a pixel, 0.00390625 for 256)"
+    )]
+    Unit(String),
+    /// Disparities without a geometry that makes depth of them.
+    #[error(
+        "disparities with f = {focal_px} px and T = {baseline_m} m, which have to be positive: \
+         publish them with the calibration of the stereo camera"
+    )]
+    Geometry {
+        /// Focal length, pixels.
+        focal_px: f64,
+        /// Baseline, m.
+        baseline_m: f64,
+    },
     /// The image is larger than the limits allow.
     #[error("{width}x{height} pixels exceed the limit")]
     TooLarge {
@@ -75,7 +104,10 @@ impl ImageError {
     /// Returns the name under which such messages are counted.
     pub fn counter(&self) -> &'static str {
         match self {
-            Self::Encoding(_) | Self::Deep(_) => "images_of_unknown_encoding",
+            Self::Encoding(_) | Self::Deep(_) | Self::NoDisparity(_) | Self::Unit(_) => {
+                "images_of_unknown_encoding"
+            }
+            Self::Geometry { .. } => "disparity_without_geometry",
             Self::TooLarge { .. } => "images_too_large",
             Self::Layout(_) => "images_of_wrong_layout",
             Self::Codec(_) => "images_undecodable",

@@ -140,7 +140,7 @@ impl<'a> Rows<'a> {
         &self.data[at * self.step..][..self.row_bytes]
     }
 
-    fn plane<const N: usize, P: Copy>(&self, pixel: impl Fn([u8; N]) -> P) -> Plane<P> {
+    pub(super) fn plane<const N: usize, P: Copy>(&self, pixel: impl Fn([u8; N]) -> P) -> Plane<P> {
         let mut out = Vec::with_capacity(self.width * self.height);
         for row in self.data.chunks_exact(self.step) {
             let (pixels, _) = row[..self.row_bytes].as_chunks::<N>();

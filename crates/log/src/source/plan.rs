@@ -9,7 +9,8 @@ use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use super::assembly::{Assembly, Messages};
 use super::mount::{Mount, robot_frame};
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
-use crate::scan::Scan;
+use crate::images::StereoGeometry;
+use crate::scan::{Scan, Type};
 use crate::tally::Tally;
 use crate::topics::{Chosen, choose, missing};
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
@@ -28,6 +29,8 @@ pub(super) struct Plan {
     pub(super) lens: Option<Intrinsics>,
     depth_lens: Option<Intrinsics>,
     pub(super) baseline_m: Option<f64>,
+    /// Geometry of depth images that are disparities without one of their own.
+    pub(super) disparity: Option<StereoGeometry>,
     /// Source of the odometry. `None`: no odometry. `Some(None)`: its topic. Else the two frames of
     /// tf.
     pub(super) odom_frames: Option<Option<(String, String)>>,
@@ -146,17 +149,18 @@ pub(super) fn plan(
     reread: Reread<'_>,
 ) -> Result<Plan, LogError> {
     let chosen = choose(&scan, input, inputs)?;
-    let depth_lens = lens_of(&scan, chosen.depth.as_deref(), chosen.depth_info.as_deref())?;
+    let depth_lens = lens_of(&scan, chosen.depth.as_deref(), chosen.depth_info.as_deref(), input)?;
     let lens = match chosen.colour {
-        Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref())?,
+        Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref(), input)?,
         None => depth_lens,
     };
-    let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref())?;
+    let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref(), input)?;
     let mut plan = Plan {
         mount: Mount::assumed(),
         lens: lens.or_else(|| depth_lens.filter(|_| same_frame(&scan, &chosen))),
         depth_lens,
         baseline_m: right.and_then(|right| right.baseline_m),
+        disparity: None,
         odom_frames: odom_frames(&scan, &chosen, input),
         scan,
         chosen,
@@ -165,6 +169,7 @@ pub(super) fn plan(
         inputs,
     };
     check_calibration(&plan, tally)?;
+    plan.disparity = stereo_geometry(&plan)?;
     plan.mount = find_mount(&plan, reread)?;
     tally.note(format!("the pose of the camera comes from {}", plan.mount.source()));
     if plan.odom_frames.is_none() {
@@ -183,15 +188,58 @@ fn lens_of(
     scan: &Scan,
     image: Option<&str>,
     info: Option<&str>,
+    input: &InputSettings,
 ) -> Result<Option<Intrinsics>, LogError> {
     let (Some(image), Some(topic)) = (image, info) else { return Ok(None) };
     let Some(info) = scan.infos.get(topic) else { return Ok(None) };
-    // The name of the topic is the only sign that images are rectified.
-    intrinsics(info, image.contains("rect")).map(Some).map_err(|source| LogError::Calibration {
+    // Of other images, the name of the topic is the only sign that they are rectified.
+    let is_rectified = image.contains("rect") || is_disparity(scan, image, input);
+    intrinsics(info, is_rectified).map(Some).map_err(|source| LogError::Calibration {
         path: scan.path.clone(),
         topic: topic.to_owned(),
         source,
     })
+}
+
+/// Returns true for images of disparities, which are those of the rectified left camera.
+fn is_disparity(scan: &Scan, image: &str, input: &InputSettings) -> bool {
+    let named = input.disparity.is_some() && input.depth_topic.as_deref() == Some(image);
+    let kind = scan.topics.get(image).map(|topic| topic.kind);
+    named || kind == Some(Type::DisparityImage)
+}
+
+/// Returns the geometry of disparities that come without one; `None` for all other depth.
+///
+/// # Errors
+/// A log that has no calibration for it.
+fn stereo_geometry(plan: &Plan) -> Result<Option<StereoGeometry>, LogError> {
+    let (Some(settings), Some(depth)) = (plan.input.disparity, &plan.chosen.depth) else {
+        return Ok(None);
+    };
+    if plan.scan.topics.get(depth).is_some_and(|topic| topic.kind == Type::DisparityImage) {
+        return Ok(None);
+    }
+    let Some(lens) = plan.depth_lens.or(plan.lens) else {
+        let hint = "; name it as `depth_info_topic` under [input]".to_owned();
+        return Err(missing(&plan.scan, format!("calibration of the disparities {depth}"), hint));
+    };
+    let Some(baseline_m) = settings.baseline_m.or_else(|| right_baseline_m(plan)) else {
+        let hint = "; set `disparity.baseline_m` under [input], or name the right camera's \
+                    camera_info as `right_info_topic`";
+        let wanted = format!("baseline of the disparities {depth}");
+        return Err(missing(&plan.scan, wanted, hint.to_owned()));
+    };
+    Ok(Some(StereoGeometry { focal_px: lens.lens.fx, baseline_m }))
+}
+
+/// Returns the baseline of the right camera that the settings name, else of the only one.
+fn right_baseline_m(plan: &Plan) -> Option<f64> {
+    let of = |info| intrinsics(info, true).ok()?.baseline_m.filter(|baseline| *baseline > 0.0);
+    if let Some(named) = &plan.chosen.right_info {
+        return of(plan.scan.infos.get(named)?);
+    }
+    let mut all = plan.scan.infos.values().filter_map(of);
+    all.next().filter(|_| all.next().is_none())
 }
 
 /// Checks that there is a calibration if positions in metres need it; a monocular pipeline works
