@@ -26,6 +26,14 @@ pub enum LogError {
         /// Advice for the user.
         remedy: &'static str,
     },
+    /// The file is compressed and cannot be unpacked.
+    #[error("`{}` is compressed: {why}", path.display())]
+    Packed {
+        /// Path of the file.
+        path: PathBuf,
+        /// Reason, with the remedy.
+        why: String,
+    },
     /// The file is not MCAP.
     #[error("`{}`: {source}", path.display())]
     NotMcap {

@@ -26,6 +26,7 @@ mod log_files;
 mod mcap;
 pub mod msgs;
 pub mod odometry;
+mod packed;
 mod pairing;
 pub mod register;
 mod scan;

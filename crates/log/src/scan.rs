@@ -9,10 +9,11 @@ use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
 use crate::images::{Content, content_of_encoding, content_of_format, may_be_disparity};
-use crate::log_files::{LogFiles, open_file};
+use crate::log_files::LogFiles;
 use crate::msgs::{
     CameraInfo, CompressedImage, DisparityImage, Header, Image, Odometry, TFMessage, decode,
 };
+use crate::packed::LogFile;
 use crate::sensors::SensorType;
 use crate::tf::TfBuffer;
 use crate::walk::{Channel, Counters, Message};
@@ -155,8 +156,10 @@ impl Scan {
         let mut scan = Self { parts: Vec::new(), ..gathering.scan("") };
         let mut hash = Sha256::new();
         for part in parts {
-            let file = Hashing { reader: open_file(&part.path)?, hash, bytes: 0 };
-            let mut walker = LogWalker::at(&part.path, file, limits)
+            let file = LogFile::open(&part.path, limits)?;
+            let (contents, fault) = (file.path().to_owned(), file.fault().map(str::to_owned));
+            let file = Hashing { reader: file, hash, bytes: 0 };
+            let mut walker = LogWalker::at(&contents, file, limits)
                 .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?
                 .knowing(part.channels.iter().cloned());
             while let Some(message) = walker.next() {
@@ -167,6 +170,7 @@ impl Scan {
                 gathering.topic(&channel.topic, &channel.schema_name, &channel.encoding);
             }
             scan.add_part(part, &walker, parts.len() > 1);
+            scan.add_fault(part, fault);
             let (bytes, so_far) = walker.into_reader().finish();
             (scan.bytes, hash) = (scan.bytes + bytes, so_far);
         }
@@ -187,6 +191,15 @@ impl Scan {
         let said = |note: &String| if is_split { format!("{file}: {note}") } else { note.clone() };
         self.notes.extend(walker.notes().iter().map(said));
         self.data_lost |= walker.data_lost();
+    }
+
+    /// Counts a file that does not unpack to its end.
+    fn add_fault(&mut self, part: &LogPart, fault: Option<String>) {
+        let Some(fault) = fault else { return };
+        self.data_lost = true;
+        *self.counters.entry("damaged_compression").or_default() += 1;
+        let file = part.path.file_name().unwrap_or_default().display();
+        self.notes.push(format!("{file}: {fault}; what came before is used"));
     }
 
     /// Counts files that are not there as lost.
