@@ -54,6 +54,20 @@ pub enum LogError {
         /// Topics of the log, one per line.
         present: String,
     },
+    /// A topic that the settings name is of another kind.
+    #[error("`{}`: `{key}` under [input] names {topic}, which is {kind}; {remedy}", path.display())]
+    WrongTopic {
+        /// Path of the file.
+        path: PathBuf,
+        /// Key under `[input]`.
+        key: String,
+        /// Topic of that name.
+        topic: String,
+        /// Type and encoding of its messages.
+        kind: String,
+        /// Advice for the user.
+        remedy: String,
+    },
     /// A calibration cannot be used.
     #[error("`{}`, topic {topic}: {source}", path.display())]
     Calibration {

@@ -8,7 +8,9 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
-use crate::images::{Content, content_of_encoding, content_of_format, may_be_disparity};
+use crate::images::{
+    Content, content_of_encoding, content_of_format, is_coded_picture, may_be_disparity,
+};
 use crate::log_files::LogFiles;
 use crate::msgs::{
     CameraInfo, CompressedImage, DisparityImage, Header, Image, Odometry, TFMessage, decode,
@@ -357,7 +359,11 @@ impl Topic {
     fn take_compressed(&mut self, data: &[u8]) -> Option<()> {
         let image: CompressedImage<'_> = decode(data).ok()?;
         if self.pixels.is_none() {
-            self.content = content_of_format(&image.format);
+            self.content = match content_of_format(&image.format) {
+                // The format is any text, and the codec is told by the first bytes.
+                Content::Unknown if is_coded_picture(image.data) => Content::Picture,
+                content => content,
+            };
             self.pixels = Some(image.format);
         }
         self.take_header(image.header);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
 
-use crate::images::{Content, may_be_disparity};
+use crate::images::{Content, VIDEO_REMEDY, may_be_disparity, refusal_of};
 use crate::scan::{Scan, Topic, Type};
 use crate::sensors::{SENSORS, SensorType};
 use crate::{InputSettings, LogError};
@@ -64,23 +64,24 @@ pub(crate) fn choose(
     let named = |key, topic: &Option<String>, fits: fn(&Topic) -> bool| {
         named(scan, key, topic.as_deref(), fits)
     };
+    let is_depth = |topic: &Topic| is_usable_depth(topic, input);
     let is_disparity = input.disparity.is_some();
     // Chosen first, because such images look like those of a grey camera.
     let disparity = match is_disparity && input.depth_topic.is_none() {
         true => best(scan, None, disparity_rank),
         false => input.depth_topic.clone().filter(|_| is_disparity),
     };
-    let colour = named("colour_topic", &input.colour_topic, is_picture)?.or_else(|| {
+    let colour = named("colour_topic", &input.colour_topic, is_usable_picture)?.or_else(|| {
         best(scan, disparity.as_deref(), |name, topic| colour_rank(name, topic, false))
     });
     let depth = match inputs.uses(Input::Depth) || colour.is_none() {
-        true => named("depth_topic", &input.depth_topic, is_image)?
+        true => self::named(scan, "depth_topic", input.depth_topic.as_deref(), is_depth)?
             .or(disparity)
             .or_else(|| best(scan, None, depth_rank)),
         false => None,
     };
     let right = match inputs.uses(Input::Right) {
-        true => named("right_topic", &input.right_topic, is_picture)?
+        true => named("right_topic", &input.right_topic, is_usable_picture)?
             .or_else(|| best(scan, None, |name, topic| colour_rank(name, topic, true))),
         false => None,
     };
@@ -94,7 +95,9 @@ pub(crate) fn choose(
     let odometry = named("odometry_topic", &input.odometry_topic, is_odometry)?
         .or_else(|| best(scan, None, odometry_rank));
     let info = |key, wanted: &Option<String>, image: &Option<String>| {
-        Ok::<_, LogError>(named(key, wanted, is_info)?.or_else(|| info_of(scan, image.as_deref()?)))
+        let of_left = key == "depth_info_topic" && is_disparity;
+        let found = || info_of(scan, image.as_deref()?, of_left);
+        Ok::<_, LogError>(named(key, wanted, is_info)?.or_else(found))
     };
     let chosen = Chosen {
         colour_info: info("colour_info_topic", &input.colour_info_topic, &colour)?,
@@ -158,7 +161,7 @@ fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
         wanted,
         key: key.to_owned(),
         types: types.to_owned(),
-        fits: Box::new(is_image),
+        fits: Box::new(if key == "depth_topic" { is_image } else { is_usable_picture }),
     };
     let lacks_right = lacks(Input::Right, &chosen.right);
     let images = [
@@ -182,14 +185,23 @@ fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
 }
 
 impl Requirement<'_> {
-    /// Returns the error of a log that lacks the topic, with the first topic that could be meant.
+    /// Returns the error of a log that lacks the topic, with the first topic that could be meant, or
+    /// the first one that cannot be read.
     fn error(&self, scan: &Scan) -> LogError {
         let Self { wanted, key, types, fits, .. } = self;
-        let hint = scan.topics.iter().find(|(_, topic)| fits(topic)).map(|(name, topic)| {
-            let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
-            format!("; if {name} ({kind}) is meant, name it as `{key}` under [input]")
+        let is_image = key.ends_with("_topic") && types.contains("Image");
+        let unreadable = scan.topics.iter().find_map(|(name, topic)| {
+            let why = unreadable(topic).filter(|_| is_image)?;
+            Some(format!("; {name} ({}) cannot be read: {why}", kind_of(topic)))
         });
-        missing(scan, format!("{wanted} ({types})"), hint.unwrap_or_default())
+        let meant = scan.topics.iter().find(|(_, topic)| fits(topic)).map(|(name, topic)| {
+            let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
+            match remedy_as_depth(topic).filter(|_| key == "depth_topic") {
+                Some(remedy) => format!("; if {name} ({kind}) is meant, {remedy}"),
+                None => format!("; if {name} ({kind}) is meant, name it as `{key}` under [input]"),
+            }
+        });
+        missing(scan, format!("{wanted} ({types})"), unreadable.or(meant).unwrap_or_default())
     }
 }
 
@@ -219,6 +231,62 @@ fn is_image(topic: &Topic) -> bool {
     is_picture(topic) || topic.kind == Type::DisparityImage
 }
 
+/// Returns true for pictures that can be read, as far as that is known before the first one.
+fn is_usable_picture(topic: &Topic) -> bool {
+    is_picture(topic) && (topic.content == Content::Picture || topic.pixels.is_none())
+}
+
+/// Returns true for depth that can be read.
+fn is_usable_depth(topic: &Topic, input: &InputSettings) -> bool {
+    let is_disparity = input.disparity.is_some() && disparity_rank("disparity", topic).is_some();
+    let is_depth = topic.content == Content::Depth || topic.pixels.is_none();
+    is_image(topic) && (is_depth || is_disparity)
+}
+
+/// Returns the setting that makes depth of images that look like others.
+fn remedy_as_depth(topic: &Topic) -> Option<&'static str> {
+    match topic.pixels.as_deref()? {
+        "mono16" => Some("set `depth_unit_m` under [input] (0.001 for millimetres)"),
+        "mono8" | "8UC1" | "16SC1" => Some("and its pixels are disparities, add [input.disparity]"),
+        _ => None,
+    }
+}
+
+/// Returns type and encoding of the messages of a topic.
+fn kind_of(topic: &Topic) -> String {
+    match (&topic.pixels, topic.encoding.as_str()) {
+        (Some(pixels), _) => format!("{}, {pixels}", topic.schema),
+        (None, "cdr" | "ros1" | "") => topic.schema.clone(),
+        (None, encoding) => format!("{}, {encoding}", topic.schema),
+    }
+}
+
+/// Names of messages with images or scans, whatever their package and encoding.
+const SENSOR_MESSAGES: [&str; 5] =
+    ["Image", "RawImage", "CompressedImage", "DisparityImage", "LaserScan"];
+/// Names of messages with video.
+const VIDEO_MESSAGES: [&str; 3] = ["CompressedVideo", "FFMPEGPacket", "H264Packet"];
+
+/// Returns the reason for which images or scans of a topic cannot be read, with the remedy; `None`
+/// for those that can, and for all other topics.
+pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
+    let name = topic.schema.rsplit(['/', '.']).next().unwrap_or_default();
+    if VIDEO_MESSAGES.contains(&name) {
+        return Some(VIDEO_REMEDY.to_owned());
+    }
+    match (&topic.pixels, topic.kind) {
+        (Some(pixels), _) if topic.content == Content::Unknown => Some(refusal_of(pixels)),
+        (None, Type::Other) if SENSOR_MESSAGES.contains(&name) => Some(match &*topic.encoding {
+            "cdr" | "ros1" => format!("its type is not read; {name} of sensor_msgs is"),
+            other => format!(
+                "its messages are in `{other}`, and those of ROS 2 (`cdr`) and ROS 1 (`ros1`) are \
+                 read: record with `ros2 bag record`, or convert the log"
+            ),
+        }),
+        _ => None,
+    }
+}
+
 fn is_info(topic: &Topic) -> bool {
     topic.kind == Type::CameraInfo
 }
@@ -243,7 +311,18 @@ fn named(
     if scan.topics.get(name).is_some_and(&fits) {
         return Ok(Some(name.to_owned()));
     }
-    let fitting = scan.topics.iter().filter(|(_, topic)| fits(topic));
+    let mut fitting = scan.topics.iter().filter(|(_, topic)| fits(topic));
+    if let Some(topic) = scan.topics.get(name) {
+        let other = fitting.next().map(|(name, topic)| format!("{name} ({})", kind_of(topic)));
+        let as_depth = remedy_as_depth(topic).filter(|_| key == "depth_topic");
+        let remedy = unreadable(topic)
+            .or_else(|| as_depth.map(|remedy| format!("if it is meant, {remedy}")))
+            .or_else(|| other.map(|other| format!("{other} would fit")))
+            .unwrap_or_else(|| "no topic of the log would fit: leave the key out".to_owned());
+        let (path, kind) = (scan.path.clone(), kind_of(topic));
+        let (key, topic) = (key.to_owned(), name.to_owned());
+        return Err(LogError::WrongTopic { path, key, topic, kind, remedy });
+    }
     let near = nearest(name, fitting.map(|(name, _)| name.as_str()));
     let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
     Err(missing(scan, format!("topic `{name}` fit for `{key}` of [input]"), hint))
@@ -316,7 +395,7 @@ fn odometry_rank(name: &str, topic: &Topic) -> Option<i32> {
 
 /// Returns the calibration of an image topic: its `camera_info` sibling, else the only one with the
 /// same frame.
-fn info_of(scan: &Scan, image: &str) -> Option<String> {
+fn info_of(scan: &Scan, image: &str, is_disparity: bool) -> Option<String> {
     let base = image.trim_end_matches("/compressedDepth").trim_end_matches("/compressed");
     let folder = base.rsplit_once('/').map_or("", |(folder, _)| folder);
     let sibling = format!("{folder}/camera_info");
@@ -325,7 +404,8 @@ fn info_of(scan: &Scan, image: &str) -> Option<String> {
     }
     let left = format!("{folder}/left/camera_info");
     // Disparities are those of the left camera, and its calibration stands beside its images.
-    if scan.topics.get(image)?.kind == Type::DisparityImage && scan.infos.contains_key(&left) {
+    let is_disparity = is_disparity || scan.topics.get(image)?.kind == Type::DisparityImage;
+    if is_disparity && scan.infos.contains_key(&left) {
         return Some(left);
     }
     let frame = scan.frame_of(image)?;

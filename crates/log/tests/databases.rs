@@ -169,7 +169,7 @@ fn frames_of(path: &Path) -> (Vec<(Stamp, RgbImage)>, Vec<String>, bool) {
     let mut source = source(path, &Limits::default()).unwrap();
     let mut frames = Vec::new();
     while let Some(found) = source.next_frame() {
-        frames.push((found.frame.stamp, found.frame.colour().unwrap().as_ref().clone()));
+        frames.push((found.frame.stamp, found.frame.colour().unwrap().clone()));
     }
     let counted = source.counters().iter().map(|(name, count)| format!("{name} {count}"));
     (frames, counted.collect(), source.data_lost())

@@ -438,7 +438,7 @@ fn depths_with(log: LogWriter, input: &InputSettings) -> Result<(FrameSource, Lo
 }
 
 /// Returns an image of 16 columns and 12 rows whose first pixel has no disparity.
-fn disparities(encoding: &'static str, data: &[u8]) -> Image<'_> {
+fn disparities<'a>(encoding: &str, data: &'a [u8]) -> Image<'a> {
     Image {
         header: Header::new(at(0.1), "colour"),
         height: 12,
@@ -498,6 +498,103 @@ fn plain_disparities_take_their_geometry_from_the_calibrations_or_the_settings()
     alone.message("/stereo/disparity", at(0.1), &disparities("mono8", &data));
     let error = depths_with(alone, &input).err().unwrap();
     assert!(error.contains("disparity.baseline_m"), "{error}");
+}
+
+/// Writes a log with depth, and with an image in `encoding`.
+fn log_with(topic: &str, encoding: &str) -> LogWriter {
+    let mut log = started();
+    log.depth(at(0.1), "colour", 2.0);
+    let data = [0; 16 * 12 * 6];
+    let image = Image { encoding: encoding.into(), step: 96, ..disparities("", &data) };
+    log.message(topic, at(0.1), &image);
+    log
+}
+
+fn refusal(log: LogWriter, input: &InputSettings, inputs: Inputs) -> LogError {
+    let saved = log.save();
+    FrameSource::open(&saved.path, input, &Limits::default(), inputs).err().unwrap()
+}
+
+#[test]
+fn images_in_an_encoding_that_is_not_read_are_named_with_the_remedy() {
+    let input = InputSettings::default();
+    let colour = Inputs::ANY.require(Input::Colour);
+    for (encoding, remedy) in [
+        ("rgb16", "let the driver publish 8 bits"),
+        ("bayer_rggb12", "encoding `bayer_rggb12`; known: rgb8"),
+        ("h264", "image_transport republish"),
+    ] {
+        let error = refusal(log_with("/cam/image_raw", encoding), &input, colour).to_string();
+        let named = format!("/cam/image_raw (sensor_msgs/msg/Image, {encoding}) cannot be read: ");
+        assert!(error.contains(&named) && error.contains(remedy), "{error}");
+        // A pipeline that can do without makes its frames of depth, and hears of the images.
+        let (source, _saved) = open(log_with("/cam/image_raw", encoding), Inputs::ANY);
+        assert_eq!(count(&source, "messages_not_read"), 1);
+        let told = source.notes().iter().find(|note| note.contains("/cam/image_raw")).unwrap();
+        assert!(told.contains(remedy), "{told}");
+    }
+    let mut log = started();
+    log.foreign("/video", "foxglove_msgs/msg/CompressedVideo", "cdr", at(0.1), &[0, 1, 0, 0]);
+    assert!(refusal(log, &input, colour).to_string().contains("image_transport republish"));
+    let mut log = started();
+    log.foreign("/image", "foxglove.CompressedImage", "protobuf", at(0.1), &[8, 1]);
+    let error = refusal(log, &input, colour).to_string();
+    assert!(error.contains("/image (foxglove.CompressedImage, protobuf)"), "{error}");
+    assert!(error.contains("its messages are in `protobuf`"), "{error}");
+}
+
+#[test]
+fn a_named_topic_of_a_wrong_kind_is_an_error_of_the_settings() {
+    let named = |depth: &str| InputSettings {
+        depth_topic: Some(depth.to_owned()),
+        ..InputSettings::default()
+    };
+    for (encoding, remedy) in [
+        ("rgb8", "/camera/depth/image_raw (sensor_msgs/msg/Image, 32FC1) would fit"),
+        ("mono16", "set `depth_unit_m` under [input]"),
+        ("mono8", "add [input.disparity]"),
+        ("rgb16", "let the driver publish 8 bits"),
+    ] {
+        let error = refusal(log_with("/cam", encoding), &named("/cam"), DEPTH);
+        assert!(matches!(&error, LogError::WrongTopic { key, .. } if key == "depth_topic"));
+        let told = error.to_string();
+        let kind = format!("names /cam, which is sensor_msgs/msg/Image, {encoding}; ");
+        assert!(told.contains(&kind) && told.contains(remedy), "{told}");
+    }
+    let input = InputSettings {
+        laser_topic: Some("/cam".into()),
+        colour_topic: Some("/tf_static".into()),
+        ..InputSettings::default()
+    };
+    let laser = Inputs::NONE.require(Input::Laser);
+    let told = refusal(log_with("/cam", "rgb8"), &input, laser).to_string();
+    assert!(told.contains("`colour_topic` under [input] names /tf_static"), "{told}");
+    let input = InputSettings { colour_topic: None, ..input };
+    let told = refusal(log_with("/cam", "rgb8"), &input, laser).to_string();
+    assert!(told.contains("`laser_topic`") && told.contains("leave the key out"), "{told}");
+}
+
+#[test]
+fn messages_of_ros_1_in_an_mcap_file_are_read() {
+    let text = |text: &str| [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
+    let words = |words: &[u32]| words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>();
+    let image = [
+        words(&[7, 1_700_000_000, 100_000_000]),
+        text("colour"),
+        words(&[2, 3]),
+        text("mono8"),
+        vec![0],
+        words(&[3, 6]),
+        vec![1, 2, 3, 4, 5, 6],
+    ]
+    .concat();
+    let mut log = LogWriter::plain();
+    log.foreign("/camera/image_raw", "sensor_msgs/Image", "ros1", at(0.1), &image);
+    let (mut source, _saved) = open(log, Inputs::ANY.require(Input::Colour));
+    let found = frames(&mut source);
+    assert_eq!(stamps(&found), [0.1]);
+    assert_eq!(found[0].frame.grey().unwrap().pixels(), [1, 2, 3, 4, 5, 6]);
+    assert!(!source.data_lost(), "{:?}", source.notes());
 }
 
 /// Renders a floor 1.2 m below and a wall 4 m ahead of the colour camera, from a camera with the

@@ -11,6 +11,7 @@ mod raw;
 mod rvl;
 mod yuv;
 
+pub(crate) use compressed::is_coded_picture;
 pub use compressed::{decode_compressed, encode_rvl, size_of_compressed};
 pub(crate) use disparity::may_be_disparity;
 pub use disparity::{
@@ -50,8 +51,8 @@ impl Pixels {
 pub enum ImageError {
     /// The encoding is unknown, or unknown for depth.
     #[error(
-        "encoding `{0}`; known: rgb8, bgr8, rgba8, bgra8, mono8, mono16, 8UC1, 8UC3, bayer_*8, \
-         yuv422 (uyvy), yuv422_yuy2 (yuyv), nv12, nv21, and for depth 16UC1, 32FC1 (mono16 where \
+        "encoding `{0}`; known: rgb8, bgr8, rgba8, bgra8, mono8, mono16, 8UC1, 8UC3, 8UC4, bayer_*8, \
+         yuv422 (uyvy), yuv422_yuy2 (yuyv), nv12, nv21, nv24, and for depth 16UC1, 32FC1 (mono16 where \
          `depth_unit_m` is set); jpeg, png, compressedDepth"
     )]
     Encoding(String),
@@ -130,16 +131,34 @@ pub enum Content {
 /// that makes `mono16` depth.
 pub fn content_of_encoding(encoding: &str, depth_unit_m: Option<f64>) -> Content {
     match encoding {
-        "rgb8" | "bgr8" | "rgba8" | "bgra8" | "mono8" | "8UC1" | "8UC3" => Content::Picture,
+        "rgb8" | "bgr8" | "rgba8" | "bgra8" | "mono8" | "8UC1" | "8UC3" | "8UC4" => {
+            Content::Picture
+        }
         "16UC1" | "32FC1" => Content::Depth,
         "mono16" if depth_unit_m.is_some() => Content::Depth,
         "mono16" => Content::Picture,
-        // Also those that are refused: the error then names the encoding.
-        _ if is_deep(encoding) || bayer::Pattern::of(encoding).is_some() => Content::Picture,
+        _ if bayer::Pattern::of(encoding).is_some() => Content::Picture,
         _ if yuv::Order::of(encoding).is_some() => Content::Picture,
         _ => Content::Unknown,
     }
 }
+
+/// Returns the reason for which images of an encoding or format cannot be read, with the remedy.
+pub(crate) fn refusal_of(pixels: &str) -> String {
+    let lower = pixels.to_ascii_lowercase();
+    let video = ["h264", "h265", "hevc", "avc", "ffmpeg", "theora", "av1"];
+    if video.iter().any(|name| lower.contains(name)) {
+        return VIDEO_REMEDY.to_owned();
+    }
+    match is_deep(pixels) {
+        true => ImageError::Deep(pixels.to_owned()).to_string(),
+        false => ImageError::Encoding(pixels.to_owned()).to_string(),
+    }
+}
+
+/// Remedy for video in a log.
+pub(crate) const VIDEO_REMEDY: &str = "video is not decoded: republish it as jpeg (`ros2 run \
+                                       image_transport republish`) and record that";
 
 /// Returns true for colour with 16 bits a channel.
 fn is_deep(encoding: &str) -> bool {

@@ -54,11 +54,12 @@ fn same_depth(a: &[f32], b: &[f32]) -> bool {
 #[test]
 fn every_colour_encoding_gives_red_green_blue() {
     let expected = Pixels::Colour(RgbImage::from_pixels(2, 1, vec![[1, 2, 3], [4, 5, 6]]).unwrap());
-    let cases: [(&str, &[u8]); 4] = [
+    let cases: [(&str, &[u8]); 5] = [
         ("rgb8", &[1, 2, 3, 4, 5, 6]),
         ("bgr8", &[3, 2, 1, 6, 5, 4]),
         ("rgba8", &[1, 2, 3, 9, 4, 5, 6, 9]),
         ("bgra8", &[3, 2, 1, 9, 6, 5, 4, 9]),
+        ("8UC4", &[3, 2, 1, 9, 6, 5, 4, 9]),
     ];
     for (encoding, data) in cases {
         assert_eq!(decoded(&raw(encoding, 2, 1, data.len() as u32, data)).unwrap(), expected);
@@ -111,12 +112,15 @@ fn deep_colour_says_so() {
     for encoding in ["rgb16", "bgra16", "bayer_rggb16", "16UC3"] {
         let error = decoded(&raw(encoding, 1, 1, 6, &[0; 6])).unwrap_err();
         assert!(error.to_string().contains("16 bits a channel"), "{error}");
-        assert_eq!(content_of_encoding(encoding, None), Content::Picture);
+        assert_eq!(content_of_encoding(encoding, None), Content::Unknown);
+        assert!(refusal_of(encoding).contains("16 bits a channel"));
     }
+    assert!(refusal_of("h264").contains("image_transport republish"));
+    assert!(refusal_of("yuv999").contains("`yuv999`; known: rgb8"));
 }
 
 /// Pixels as OpenCV 4.10 decodes them: `tests/clients/encodings_opencv.py` prints this table.
-const OPENCV: [(&str, usize, usize, &[u8]); 8] = [
+const OPENCV: [(&str, usize, usize, &[u8]); 9] = [
     (
         "bayer_rggb8",
         6,
@@ -203,6 +207,15 @@ const OPENCV: [(&str, usize, usize, &[u8]); 8] = [
             25, 0, 76, 0, 0, 115, 0,
         ],
     ),
+    (
+        "nv24",
+        4,
+        2,
+        &[
+            0, 67, 0, 80, 11, 18, 242, 0, 211, 0, 227, 0, 155, 181, 79, 255, 135, 255, 69, 255,
+            255, 0, 60, 0,
+        ],
+    ),
 ];
 
 /// The bytes of that script.
@@ -214,6 +227,7 @@ fn noise(count: usize) -> Vec<u8> {
 fn layout(encoding: &str, width: usize, height: usize) -> (usize, usize) {
     match encoding {
         _ if encoding.starts_with("bayer") => (width, height),
+        "nv24" => (width, height * 3),
         _ if encoding.starts_with("nv") => (width, height * 3 / 2),
         _ => (2 * width, height),
     }
@@ -229,8 +243,13 @@ fn mosaics_and_apart_colours_are_decoded_as_opencv_does() {
         let expected = Pixels::Colour(RgbImage::from_pixels(width, height, expected).unwrap());
         assert_eq!(decoded(&image).unwrap(), expected, "{encoding}");
         assert_eq!(content_of_encoding(encoding, None), Content::Picture);
-        let padded: Vec<u8> =
-            bytes.chunks(step).flat_map(|row| [row, &[9, 9][..]].concat()).collect();
+        // A line of colour pairs of `nv24` takes two rows, with the padding behind both.
+        let (bright, pairs) = bytes.split_at(if encoding == "nv24" { step * height } else { 0 });
+        let length = if encoding == "nv24" { 2 * step } else { step };
+        let mut padded: Vec<u8> =
+            bright.chunks(step).flat_map(|row| [row, &[9, 9][..]].concat()).collect();
+        let padding = vec![9; 2 * length / step];
+        padded.extend(pairs.chunks(length).flat_map(|row| [row, &padding].concat()));
         let image = raw(encoding, width as u32, height as u32, step as u32 + 2, &padded);
         assert_eq!(decoded(&image).unwrap(), expected, "{encoding}, padded");
     }
@@ -243,6 +262,19 @@ fn other_names_of_the_same_order_give_the_same_image() {
         let [a, b] = [name, other].map(|encoding| decoded(&raw(encoding, 4, 2, 8, &bytes)));
         assert_eq!(a.unwrap(), b.unwrap());
     }
+}
+
+#[test]
+fn the_step_of_planes_of_one_resolution_may_be_that_of_any_plane() {
+    let bytes = noise(24);
+    let image = |step| decoded(&raw("nv24", 4, 2, step, &bytes)).unwrap();
+    assert!(image(4) == image(8) && image(4) == image(12));
+    let odd = noise(27);
+    assert!(decoded(&raw("nv24", 3, 3, 3, &odd)).is_ok());
+    assert_eq!(
+        decoded(&raw("nv24", 4, 2, 8, &bytes[1..])).unwrap_err().counter(),
+        "images_of_wrong_layout"
+    );
 }
 
 #[test]

@@ -10,9 +10,9 @@ use super::assembly::{Assembly, Messages};
 use super::mount::{Mount, robot_frame};
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::images::StereoGeometry;
-use crate::scan::{Scan, Type};
+use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
-use crate::topics::{Chosen, choose, missing};
+use crate::topics::{Chosen, choose, missing, unreadable};
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
 /// Function that starts another pass over the same messages.
@@ -149,12 +149,17 @@ pub(super) fn plan(
     reread: Reread<'_>,
 ) -> Result<Plan, LogError> {
     let chosen = choose(&scan, input, inputs)?;
-    let depth_lens = lens_of(&scan, chosen.depth.as_deref(), chosen.depth_info.as_deref(), input)?;
+    let depth_lens = lens_of(
+        &scan,
+        chosen.depth.as_deref(),
+        chosen.depth_info.as_deref(),
+        input.disparity.is_some(),
+    )?;
     let lens = match chosen.colour {
-        Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref(), input)?,
+        Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref(), false)?,
         None => depth_lens,
     };
-    let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref(), input)?;
+    let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref(), false)?;
     let mut plan = Plan {
         mount: Mount::assumed(),
         lens: lens.or_else(|| depth_lens.filter(|_| same_frame(&scan, &chosen))),
@@ -172,10 +177,24 @@ pub(super) fn plan(
     plan.disparity = stereo_geometry(&plan)?;
     plan.mount = find_mount(&plan, reread)?;
     tally.note(format!("the pose of the camera comes from {}", plan.mount.source()));
+    note_unread_images(&plan, tally);
     if plan.odom_frames.is_none() {
         tally.note("no odometry: the robot is taken to be at rest");
     }
     Ok(plan)
+}
+
+/// Counts the images that cannot be read, if the log has no others of their kind.
+fn note_unread_images(plan: &Plan, tally: &mut Tally) {
+    if plan.chosen.colour.is_some() || !plan.inputs.uses(Input::Colour) {
+        return;
+    }
+    for (name, topic) in &plan.scan.topics {
+        if let Some(why) = unreadable(topic) {
+            tally.add("messages_not_read", topic.count);
+            tally.note(format!("{name} is not read: {why}"));
+        }
+    }
 }
 
 fn same_frame(scan: &Scan, chosen: &Chosen) -> bool {
@@ -188,12 +207,13 @@ fn lens_of(
     scan: &Scan,
     image: Option<&str>,
     info: Option<&str>,
-    input: &InputSettings,
+    is_disparity: bool,
 ) -> Result<Option<Intrinsics>, LogError> {
     let (Some(image), Some(topic)) = (image, info) else { return Ok(None) };
     let Some(info) = scan.infos.get(topic) else { return Ok(None) };
     // Of other images, the name of the topic is the only sign that they are rectified.
-    let is_rectified = image.contains("rect") || is_disparity(scan, image, input);
+    let is_disparity = is_disparity || scan.topics.get(image).is_some_and(is_disparity_image);
+    let is_rectified = image.contains("rect") || is_disparity;
     intrinsics(info, is_rectified).map(Some).map_err(|source| LogError::Calibration {
         path: scan.path.clone(),
         topic: topic.to_owned(),
@@ -202,10 +222,8 @@ fn lens_of(
 }
 
 /// Returns true for images of disparities, which are those of the rectified left camera.
-fn is_disparity(scan: &Scan, image: &str, input: &InputSettings) -> bool {
-    let named = input.disparity.is_some() && input.depth_topic.as_deref() == Some(image);
-    let kind = scan.topics.get(image).map(|topic| topic.kind);
-    named || kind == Some(Type::DisparityImage)
+fn is_disparity_image(topic: &Topic) -> bool {
+    topic.kind == Type::DisparityImage
 }
 
 /// Returns the geometry of disparities that come without one; `None` for all other depth.
@@ -216,7 +234,7 @@ fn stereo_geometry(plan: &Plan) -> Result<Option<StereoGeometry>, LogError> {
     let (Some(settings), Some(depth)) = (plan.input.disparity, &plan.chosen.depth) else {
         return Ok(None);
     };
-    if plan.scan.topics.get(depth).is_some_and(|topic| topic.kind == Type::DisparityImage) {
+    if plan.scan.topics.get(depth).is_some_and(is_disparity_image) {
         return Ok(None);
     }
     let Some(lens) = plan.depth_lens.or(plan.lens) else {
