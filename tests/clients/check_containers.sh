@@ -1,6 +1,6 @@
 #!/bin/sh
-# Converts an MCAP log with `rosbags` to a rosbag2 database and to a ROS 1 bag, tracks all
-# three, and compares the tracks byte by byte.
+# Converts an MCAP log with `rosbags` to a rosbag2 database, plain, compressed as a file and message by
+# message, and to a ROS 1 bag, tracks all of them, and compares the tracks byte by byte.
 #
 #   tests/clients/check_containers.sh ../shared/data/logs/lab2-camera2.mcap [CONFIG] [TAGALONG]
 #
@@ -28,8 +28,12 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "$venv/bin/rosbags-convert" --src "$log" --dst "$work/walk" --dst-storage sqlite3
 "$venv/bin/rosbags-convert" --src "$work/walk" --dst "$work/walk.bag" --dst-typestore ros1_noetic
+for mode in file message; do
+    "$venv/bin/rosbags-convert" --src "$work/walk" --dst "$work/walk-$mode" --dst-storage sqlite3 \
+        --compress zstd --compress-mode $mode
+done
 
-for container in "$log" "$work/walk" "$work/walk.bag"; do
+for container in "$log" "$work/walk" "$work/walk.bag" "$work/walk-file" "$work/walk-message"; do
     "$tagalong" run "$config" "$container" -o "$work/run" --overwrite 2> /dev/null > /dev/null
     cat "$work/run/tracks.csv" "$work/run/tracks-metres.csv" > "$work/now"
     [ -s "$work/now" ]

@@ -27,5 +27,9 @@ tables += [
     (name, cv2.cvtColor(noise(2, 8).reshape(2, 4, 2), code)) for name, code in PACKED.items()
 ]
 tables += [(name, cv2.cvtColor(noise(6, 4), code)) for name, code in PLANES.items()]
+# OpenCV has no NV24. A pixel of it is one of YUY2 that stands twice in its pair.
+y, uv = noise(6, 4)[:2], noise(6, 4)[2:].reshape(2, 4, 2)
+pairs = np.stack([y, uv[..., 0], y, uv[..., 1]], axis=-1).reshape(2, 8, 2)
+tables.append(("nv24", cv2.cvtColor(pairs, cv2.COLOR_YUV2RGB_YUY2)[:, ::2]))
 for name, image in tables:
     print(f'("{name}", {image.shape[1]}, {image.shape[0]}, &{image.reshape(-1).tolist()}),')

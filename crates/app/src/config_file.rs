@@ -1,6 +1,7 @@
 //! Config files, with the tables that are not the pipeline's.
 
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -8,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tagalong_config::{ConfigError, Registry, Settings, parse_settings};
 use tagalong_log::write::OutputSettings;
-use tagalong_log::{InputSettings, Limits};
+use tagalong_log::{InputSettings, Limits, LogError};
 use tagalong_pipeline::{Document, Options, Pipeline, RunSettings, check_tuning, flattened};
 
 use crate::outcome::Failure;
@@ -206,8 +207,44 @@ impl ConfigFile {
         Document::read(&self.text, self.folder())
     }
 
+    /// Returns the failure of a log that does not fit the config: a topic of a wrong kind is shown
+    /// with the line that names it.
+    pub fn refusal(&self, error: LogError) -> Failure {
+        let LogError::WrongTopic { key, .. } = &error else { return error.into() };
+        match self.place_of_input(key) {
+            Some(place) => self.mistake(&place.into_error(error.to_string())),
+            None => error.into(),
+        }
+    }
+
+    /// Returns the place of a key under `[input]`.
+    fn place_of_input(&self, key: &str) -> Option<Place> {
+        let document = self.document().ok()?;
+        let span = {
+            let root = document.root().ok()?;
+            let input = root.get("input")?;
+            let keys = || key.split('.');
+            let found = keys().try_fold(input, |at, part| at.get_ref().as_table()?.get(part));
+            found?.span()
+        };
+        Some(Place { document, span })
+    }
+
     fn mistake(&self, error: &ConfigError) -> Failure {
         Failure::usage(error.render(&self.path.display().to_string(), &self.text))
+    }
+}
+
+/// Place in a config or in one that it extends.
+struct Place {
+    document: Document,
+    span: Range<usize>,
+}
+
+impl Place {
+    /// Returns the error at this place.
+    fn into_error(self, message: String) -> ConfigError {
+        self.document.locate(ConfigError { message, span: Some(self.span) })
     }
 }
 

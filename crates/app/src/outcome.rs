@@ -62,7 +62,7 @@ impl From<LogError> for Failure {
     /// are 2.
     fn from(error: LogError) -> Self {
         match error {
-            LogError::Settings(_) => Self::usage(error),
+            LogError::Settings(_) | LogError::WrongTopic { .. } => Self::usage(error),
             _ => Self::failed(error),
         }
     }

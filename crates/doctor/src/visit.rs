@@ -7,7 +7,7 @@ use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::outcome::Failure;
 use tagalong_app::progress::Progress;
 use tagalong_config::Registry;
-use tagalong_log::{FrameSource, Input, Inspection, examine};
+use tagalong_log::{FrameSource, Input, Inspection, LogError, examine};
 use tagalong_pipeline::{Pipeline, Tunable};
 
 use super::coverage::Coverage;
@@ -55,7 +55,12 @@ impl Visit {
         // Light and coverage are judged, and pictures are rendered, also where the pipeline does
         // not use colour or depth.
         let read = inputs.accept(Input::Colour).accept(Input::Depth);
-        let found = examine(scope.log, &outer.input, &outer.limits, read)?;
+        let mut found = examine(scope.log, &outer.input, &outer.limits, read)?;
+        // A topic of a wrong kind is a mistake of the config, and shown as such.
+        let is_mistake = matches!(found.refusal, Some(LogError::WrongTopic { .. }));
+        if let Some(error) = found.refusal.take_if(|_| is_mistake) {
+            return Err(config.refusal(error));
+        }
         let expected = expected_frames(&found.inspection).min(scope.frames);
         let mut evidence = Evidence {
             config: config.stem(),

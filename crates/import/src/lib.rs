@@ -22,7 +22,8 @@ use self::sequence::Sequence;
 /// Layout of the imported data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
-    /// A folder of the TUM RGB-D benchmark: rgb.txt, depth.txt, groundtruth.txt.
+    /// A folder of the TUM RGB-D benchmark or of the Bonn RGB-D dynamic dataset: rgb.txt, depth.txt,
+    /// groundtruth.txt.
     Tum,
     /// The `training` or `testing` folder of KITTI tracking; one --sequence.
     Kitti,

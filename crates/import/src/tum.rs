@@ -1,6 +1,10 @@
 //! Folders of the TUM RGB-D benchmark (Sturm et al., IROS 2012): `rgb.txt` and `depth.txt` list
 //! images with their times, `groundtruth.txt` the poses of the camera in a room with the floor at z
 //! = 0; depth has 5000 units per metre.
+//!
+//! The Bonn RGB-D dynamic dataset (Palazzolo et al., IROS 2019) has the same layout and unit, and folders
+//! named `rgbd_bonn_*`. Its poses are left out: they are those of markers on the camera, in a frame
+//! whose floor is not told.
 
 use std::path::Path;
 
@@ -21,12 +25,22 @@ const DEPTH_UNIT_M: f64 = 1.0 / 5000.0;
 /// Files that are missing or wrong.
 pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     let folder = &args.path;
-    let mut moments = images(folder, "rgb.txt", Eye::Left)?;
-    moments.extend(images(folder, "depth.txt", Eye::Depth)?);
+    let mut notes = Vec::new();
+    let mut moments = images(folder, "rgb.txt", Eye::Left, &mut notes)?;
+    moments.extend(images(folder, "depth.txt", Eye::Depth, &mut notes)?);
     moments.sort_by_key(|moment| (moment.stamp, moment.eye));
     let truth = folder.join("groundtruth.txt");
-    let placed = if truth.exists() { poses(&truth)? } else { Vec::new() };
-    let mut notes = Vec::new();
+    let placed = match is_bonn(folder) {
+        true => Vec::new(),
+        false if truth.exists() => poses(&truth)?,
+        false => Vec::new(),
+    };
+    if placed.is_empty() && args.height.is_none() {
+        notes.push(
+            "no poses of the camera: it is taken to stand still; --height and --tilt tell where"
+                .into(),
+        );
+    }
     let columns = 640;
     let calibration = args.calibration(columns).unwrap_or_else(|| calibration(folder, &mut notes));
     // True poses of the camera take precedence over a constant mount.
@@ -43,6 +57,11 @@ pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     })
 }
 
+/// Returns true for the Bonn dataset, by the name of the folder.
+fn is_bonn(folder: &Path) -> bool {
+    folder.to_string_lossy().contains("rgbd_bonn")
+}
+
 /// Returns the colour camera as the benchmark publishes it, by the name of the folder.
 fn calibration(folder: &Path, notes: &mut Vec<String>) -> Calibration {
     let name = folder.to_string_lossy();
@@ -55,11 +74,15 @@ fn calibration(folder: &Path, notes: &mut Vec<String>) -> Calibration {
         let distortion = [0.2312, -0.7849, -0.0033, -0.0001, 0.9172];
         return of([520.9, 521.0], [325.1, 249.7], distortion);
     }
+    if is_bonn(folder) {
+        let distortion = [0.039903, -0.099343, -0.000730, -0.000144, 0.0];
+        return of([542.822841, 542.576870], [315.593520, 237.756098], distortion);
+    }
     if name.contains("freiburg3") {
         return of([535.4, 539.2], [320.1, 247.6], [0.0; 5]);
     }
     notes.push(
-        "not freiburg1 to 3 by its name: the usual 525 pixels of focal length are taken".into(),
+        "not freiburg1 to 3 nor rgbd_bonn by its name: the usual 525 pixels of focal length are taken".into(),
     );
     of([525.0, 525.0], [319.5, 239.5], [0.0; 5])
 }
@@ -70,10 +93,16 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
-fn images(folder: &Path, list: &str, eye: Eye) -> Result<Vec<Moment>, Failure> {
+/// Reads a list of images. Images that are not there, as in parts of a sequence, are left out.
+fn images(
+    folder: &Path,
+    list: &str,
+    eye: Eye,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Moment>, Failure> {
     let path = folder.join(list);
     let text = text(&path, LAYOUT)?;
-    lines(&text)
+    let listed: Result<Vec<Moment>, Failure> = lines(&text)
         .map(|(number, line)| {
             let mut words = line.split_whitespace();
             let stamp = stamp(words.next().unwrap_or_default(), &path, number)?;
@@ -83,7 +112,15 @@ fn images(folder: &Path, list: &str, eye: Eye) -> Result<Vec<Moment>, Failure> {
             };
             Ok(Moment { stamp, eye, file: folder.join(file) })
         })
-        .collect()
+        .collect();
+    let listed = listed?;
+    let count = listed.len();
+    let present: Vec<Moment> = listed.into_iter().filter(|moment| moment.file.is_file()).collect();
+    if present.len() < count {
+        let absent = count - present.len();
+        notes.push(format!("{absent} of {count} images of {list} are not there and left out"));
+    }
+    Ok(present)
 }
 
 /// Parses seconds with a fraction, without rounding them.

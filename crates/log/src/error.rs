@@ -26,6 +26,14 @@ pub enum LogError {
         /// Advice for the user.
         remedy: &'static str,
     },
+    /// The file is compressed and cannot be unpacked.
+    #[error("`{}` is compressed: {why}", path.display())]
+    Packed {
+        /// Path of the file.
+        path: PathBuf,
+        /// Reason, with the remedy.
+        why: String,
+    },
     /// The file is not MCAP.
     #[error("`{}`: {source}", path.display())]
     NotMcap {
@@ -45,6 +53,20 @@ pub enum LogError {
         hint: String,
         /// Topics of the log, one per line.
         present: String,
+    },
+    /// A topic that the settings name is of another kind.
+    #[error("`{}`: `{key}` under [input] names {topic}, which is {kind}; {remedy}", path.display())]
+    WrongTopic {
+        /// Path of the file.
+        path: PathBuf,
+        /// Key under `[input]`.
+        key: String,
+        /// Topic of that name.
+        topic: String,
+        /// Type and encoding of its messages.
+        kind: String,
+        /// Advice for the user.
+        remedy: String,
     },
     /// A calibration cannot be used.
     #[error("`{}`, topic {topic}: {source}", path.display())]

@@ -47,6 +47,9 @@ pub struct InputSettings {
     /// metres for 32FC1); makes mono16 images depth.
     #[schemars(range(min = 1e-6, max = 1e3))]
     pub depth_unit_m: Option<f64>,
+    /// Makes the depth topic one of disparities: images without the geometry that
+    /// `stereo_msgs/DisparityImage` has, which needs no setting.
+    pub disparity: Option<DisparitySettings>,
     /// Columns and rows by which depth images are shifted to lie on colour, if those of the log are
     /// not registered well (`tagalong doctor` measures it).
     #[schemars(inner(range(min = -1000, max = 1000)))]
@@ -81,6 +84,7 @@ impl Default for InputSettings {
             base_frame: "base_link".into(),
             odom_frame: "odom".into(),
             depth_unit_m: None,
+            disparity: None,
             depth_offset_px: [0, 0],
             camera: None,
             panorama: [480, 120],
@@ -110,6 +114,20 @@ fn check_sensor(name: &str) -> Result<(), LogError> {
     }
     let hint = keys.join(", ");
     Err(LogError::Settings(format!("`{wanted}`: no sensor of that name is read; sensors: {hint}")))
+}
+
+/// Images of disparity: depth is focal length times baseline, divided by disparity.
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DisparitySettings {
+    /// Pixels per unit of disparity. By default 1, and 1/16 for 16SC1; 16UC1 and mono16 have no
+    /// default.
+    #[schemars(range(min = 1e-6, max = 1e3))]
+    pub unit_px: Option<f64>,
+    /// Distance of the right camera from the left one, m; by default that of the right camera's
+    /// calibration.
+    #[schemars(range(min = 1e-4, max = 100.0))]
+    pub baseline_m: Option<f64>,
 }
 
 /// Pose of the camera: above the robot's origin, looking forward.

@@ -5,8 +5,8 @@ use std::path::Path;
 use nalgebra::{Isometry2, Isometry3, Point2};
 use tagalong_core::LaserScan as CoreScan;
 
-use crate::log_files::open_file;
 use crate::msgs::{LaserScan, PoseArray, decode};
+use crate::packed::LogFile;
 use crate::sensors::laser::{is_sane, seen_from};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
@@ -32,7 +32,9 @@ pub struct LegScan {
 /// # Errors
 /// A log that cannot be opened, that is damaged, or that has not as many annotations as scans.
 pub fn read_leg_scans(path: &Path, limits: &Limits) -> Result<Vec<LegScan>, LogError> {
-    let mut walker = LogWalker::at(path, open_file(path)?, limits)
+    let file = LogFile::open(path, limits)?;
+    let (contents, is_unpacked) = (file.path().to_owned(), file.fault().is_none());
+    let mut walker = LogWalker::at(&contents, file, limits)
         .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
     let (mut scans, mut legs, mut unreadable) = (Vec::new(), Vec::new(), 0);
     while let Some(message) = walker.next() {
@@ -51,7 +53,7 @@ pub fn read_leg_scans(path: &Path, limits: &Limits) -> Result<Vec<LegScan>, LogE
         }
     }
     let annotated = walker.channels().any(|channel| channel.topic.ends_with(LEGS));
-    let is_whole = !walker.data_lost() && unreadable == 0;
+    let is_whole = is_unpacked && !walker.data_lost() && unreadable == 0;
     if !is_whole || (annotated && legs.len() != scans.len()) {
         let why = format!(
             "{} scans, {} annotations, {unreadable} unreadable messages{}; without all of them \

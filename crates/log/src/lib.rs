@@ -26,6 +26,7 @@ mod log_files;
 mod mcap;
 pub mod msgs;
 pub mod odometry;
+mod packed;
 mod pairing;
 pub mod register;
 mod scan;
@@ -41,7 +42,7 @@ mod walker;
 pub mod write;
 
 pub use error::LogError;
-pub use input::{InputSettings, MountSettings};
+pub use input::{DisparitySettings, InputSettings, MountSettings};
 pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};
 pub use leg_scans::{LegScan, read_leg_scans};
 pub use limits::Limits;

@@ -11,6 +11,8 @@ pub struct Limits {
     pub record_bytes: u64,
     /// Maximum length of a chunk after decompression, bytes.
     pub chunk_bytes: u64,
+    /// Maximum length of a compressed file after decompression, bytes.
+    pub file_bytes: u64,
     /// Maximum length of a message definition, bytes.
     pub schema_bytes: u64,
     /// Maximum width or height of an image, pixels.
@@ -24,6 +26,7 @@ impl Default for Limits {
         Self {
             record_bytes: 64 << 20,
             chunk_bytes: 256 << 20,
+            file_bytes: 8 << 30,
             schema_bytes: 1 << 20,
             image_side_px: 16_384,
             image_bytes: 64 << 20,

@@ -11,6 +11,8 @@ use crate::LogError;
 const METADATA: &str = "metadata.yaml";
 /// Endings of the files of a rosbag2 folder.
 const KINDS: [&str; 2] = ["mcap", "db3"];
+/// Endings that rosbag2 adds to compressed files, the second one of the command `zstd`.
+const PACKED: [&str; 2] = [".zstd", ".zst"];
 /// Largest part of the metadata that is read, bytes. A list of 10,000 parts fits.
 const MAX_METADATA: u64 = 1 << 20;
 
@@ -53,7 +55,8 @@ impl LogFiles {
             });
         }
         // Only names count: metadata may come from another machine.
-        let present = |name: &String| parts.iter().any(|part| part.ends_with(name));
+        let present =
+            |name: &String| parts.iter().any(|part| unpacked_name(part) == stripped(name));
         let missing = listed.unwrap_or_default().into_iter().filter(|name| !present(name));
         Ok(Self { missing: missing.collect(), parts })
     }
@@ -86,20 +89,37 @@ pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
     File::open(path).map_err(failed)
 }
 
-/// Returns the files of the first kind of [`KINDS`] of which there are any.
+/// Returns the name of a file without the ending of a compressed one.
+fn unpacked_name(path: &Path) -> &str {
+    stripped(path.file_name().and_then(|name| name.to_str()).unwrap_or_default())
+}
+
+fn stripped(name: &str) -> &str {
+    PACKED.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(name)
+}
+
+/// Returns the files of the first kind of [`KINDS`] of which there are any. Of a file that is there
+/// compressed and unpacked, as players leave it, the unpacked one is read.
 fn parts_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let files = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path());
     let files: Vec<PathBuf> = files.collect();
     let of = |kind: &&str| -> Vec<PathBuf> {
-        let has_kind = |path: &&PathBuf| path.extension().is_some_and(|it| it == *kind);
-        files.iter().filter(has_kind).cloned().collect()
+        let has_kind = |path: &&PathBuf| {
+            Path::new(unpacked_name(path)).extension().is_some_and(|it| it == *kind)
+        };
+        let is_plain = |path: &Path| path.extension().is_some_and(|it| it == *kind);
+        let is_twice = |path: &PathBuf| {
+            !is_plain(path) && files.contains(&path.with_file_name(unpacked_name(path)))
+        };
+        files.iter().filter(has_kind).filter(|path| !is_twice(path)).cloned().collect()
     };
     Ok(KINDS.iter().map(of).find(|parts| !parts.is_empty()).unwrap_or_default())
 }
 
 /// Splits `NAME_12.mcap` into its name and its number; a name without a number is number 0.
 fn name_and_number(part: &Path) -> (&str, u64) {
-    let stem = part.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    let name = unpacked_name(part);
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let split = stem.rsplit_once('_').and_then(|(name, n)| Some((name, n.parse().ok()?)));
     split.unwrap_or((stem, 0))
 }
@@ -124,7 +144,7 @@ fn listed_parts(metadata: &Path) -> Option<Vec<String>> {
     let names = items.filter_map(|item| item.trim_matches(['"', '\'']).rsplit('/').next());
     Some(
         names
-            .filter(|name| KINDS.iter().any(|kind| name.ends_with(kind)))
+            .filter(|name| KINDS.iter().any(|kind| stripped(name).ends_with(kind)))
             .map(str::to_owned)
             .collect(),
     )
@@ -163,6 +183,17 @@ mod tests {
         assert_eq!(LogFiles::of(bag.path()).unwrap().missing(), ["walk_2.db3"]);
         let both = folder(&["walk_0.db3", "walk_0.mcap"]);
         assert_eq!(names(&LogFiles::of(both.path()).unwrap()), ["walk_0.mcap"]);
+    }
+
+    #[test]
+    fn compressed_parts_are_parts_and_the_unpacked_one_of_two_is_read() {
+        let bag = folder(&["walk_1.db3.zstd", "walk_0.db3.zstd", "walk_0.db3", "walk_2.db3.zst"]);
+        let text = "  relative_file_paths:\n    - walk_0.db3.zstd\n    - walk_1.db3\n    - \
+                    walk_3.db3.zstd\n";
+        fs::write(bag.path().join(METADATA), text).unwrap();
+        let files = LogFiles::of(bag.path()).unwrap();
+        assert_eq!(names(&files), ["walk_0.db3", "walk_1.db3.zstd", "walk_2.db3.zst"]);
+        assert_eq!(files.missing(), ["walk_3.db3.zstd"]);
     }
 
     #[test]

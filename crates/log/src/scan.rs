@@ -8,9 +8,14 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
-use crate::images::{Content, content_of_encoding, content_of_format};
-use crate::log_files::{LogFiles, open_file};
-use crate::msgs::{CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, decode};
+use crate::images::{
+    Content, content_of_encoding, content_of_format, is_coded_picture, may_be_disparity,
+};
+use crate::log_files::LogFiles;
+use crate::msgs::{
+    CameraInfo, CompressedImage, DisparityImage, Header, Image, Odometry, TFMessage, decode,
+};
+use crate::packed::LogFile;
 use crate::sensors::SensorType;
 use crate::tf::TfBuffer;
 use crate::walk::{Channel, Counters, Message};
@@ -25,6 +30,7 @@ const MAX_STAMPS: usize = 20_000;
 pub(crate) enum Type {
     Image,
     CompressedImage,
+    DisparityImage,
     CameraInfo,
     Tf,
     Odometry,
@@ -40,6 +46,7 @@ impl Type {
         match (package, name.rsplit('/').next().unwrap_or(name)) {
             ("sensor_msgs", "Image") => Self::Image,
             ("sensor_msgs", "CompressedImage") => Self::CompressedImage,
+            ("stereo_msgs", "DisparityImage") => Self::DisparityImage,
             ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
             ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Self::Tf,
             ("nav_msgs", "Odometry") => Self::Odometry,
@@ -151,8 +158,10 @@ impl Scan {
         let mut scan = Self { parts: Vec::new(), ..gathering.scan("") };
         let mut hash = Sha256::new();
         for part in parts {
-            let file = Hashing { reader: open_file(&part.path)?, hash, bytes: 0 };
-            let mut walker = LogWalker::at(&part.path, file, limits)
+            let file = LogFile::open(&part.path, limits)?;
+            let (contents, fault) = (file.path().to_owned(), file.fault().map(str::to_owned));
+            let file = Hashing { reader: file, hash, bytes: 0 };
+            let mut walker = LogWalker::at(&contents, file, limits)
                 .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?
                 .knowing(part.channels.iter().cloned());
             while let Some(message) = walker.next() {
@@ -163,6 +172,7 @@ impl Scan {
                 gathering.topic(&channel.topic, &channel.schema_name, &channel.encoding);
             }
             scan.add_part(part, &walker, parts.len() > 1);
+            scan.add_fault(part, fault);
             let (bytes, so_far) = walker.into_reader().finish();
             (scan.bytes, hash) = (scan.bytes + bytes, so_far);
         }
@@ -183,6 +193,15 @@ impl Scan {
         let said = |note: &String| if is_split { format!("{file}: {note}") } else { note.clone() };
         self.notes.extend(walker.notes().iter().map(said));
         self.data_lost |= walker.data_lost();
+    }
+
+    /// Counts a file that does not unpack to its end.
+    fn add_fault(&mut self, part: &LogPart, fault: Option<String>) {
+        let Some(fault) = fault else { return };
+        self.data_lost = true;
+        *self.counters.entry("damaged_compression").or_default() += 1;
+        let file = part.path.file_name().unwrap_or_default().display();
+        self.notes.push(format!("{file}: {fault}; what came before is used"));
     }
 
     /// Counts files that are not there as lost.
@@ -283,6 +302,7 @@ impl Gathering {
         let done = match topic.kind {
             Type::Image => topic.take_image(message.data, unit),
             Type::CompressedImage => topic.take_compressed(message.data),
+            Type::DisparityImage => topic.take_disparity(message.data),
             Type::Odometry => topic.take_odometry(message.data),
             Type::Sensor => topic.take_sensor(message.data),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
@@ -339,10 +359,29 @@ impl Topic {
     fn take_compressed(&mut self, data: &[u8]) -> Option<()> {
         let image: CompressedImage<'_> = decode(data).ok()?;
         if self.pixels.is_none() {
-            self.content = content_of_format(&image.format);
+            self.content = match content_of_format(&image.format) {
+                // The format is any text, and the codec is told by the first bytes.
+                Content::Unknown if is_coded_picture(image.data) => Content::Picture,
+                content => content,
+            };
             self.pixels = Some(image.format);
         }
         self.take_header(image.header);
+        Some(())
+    }
+
+    fn take_disparity(&mut self, data: &[u8]) -> Option<()> {
+        let message: DisparityImage<'_> = decode(data).ok()?;
+        if self.pixels.is_none() {
+            let image = &message.image;
+            self.content = match may_be_disparity(&image.encoding) {
+                true => Content::Depth,
+                false => Content::Unknown,
+            };
+            self.size = Some((image.width, image.height));
+            self.pixels = Some(format!("{} disparity", image.encoding));
+        }
+        self.take_header(message.header);
         Some(())
     }
 

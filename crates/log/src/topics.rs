@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
 
-use crate::images::Content;
+use crate::images::{Content, VIDEO_REMEDY, may_be_disparity, refusal_of};
 use crate::scan::{Scan, Topic, Type};
 use crate::sensors::{SENSORS, SensorType};
 use crate::{InputSettings, LogError};
@@ -64,17 +64,25 @@ pub(crate) fn choose(
     let named = |key, topic: &Option<String>, fits: fn(&Topic) -> bool| {
         named(scan, key, topic.as_deref(), fits)
     };
-    let colour = named("colour_topic", &input.colour_topic, is_image)?
-        .or_else(|| best(scan, |name, topic| colour_rank(name, topic, false)));
+    let is_depth = |topic: &Topic| is_usable_depth(topic, input);
+    let is_disparity = input.disparity.is_some();
+    // Chosen first, because such images look like those of a grey camera.
+    let disparity = match is_disparity && input.depth_topic.is_none() {
+        true => best(scan, None, disparity_rank),
+        false => input.depth_topic.clone().filter(|_| is_disparity),
+    };
+    let colour = named("colour_topic", &input.colour_topic, is_usable_picture)?.or_else(|| {
+        best(scan, disparity.as_deref(), |name, topic| colour_rank(name, topic, false))
+    });
     let depth = match inputs.uses(Input::Depth) || colour.is_none() {
-        true => {
-            named("depth_topic", &input.depth_topic, is_image)?.or_else(|| best(scan, depth_rank))
-        }
+        true => self::named(scan, "depth_topic", input.depth_topic.as_deref(), is_depth)?
+            .or(disparity)
+            .or_else(|| best(scan, None, depth_rank)),
         false => None,
     };
     let right = match inputs.uses(Input::Right) {
-        true => named("right_topic", &input.right_topic, is_image)?
-            .or_else(|| best(scan, |name, topic| colour_rank(name, topic, true))),
+        true => named("right_topic", &input.right_topic, is_usable_picture)?
+            .or_else(|| best(scan, None, |name, topic| colour_rank(name, topic, true))),
         false => None,
     };
     // The settings may name the right images as the colour topic.
@@ -85,9 +93,11 @@ pub(crate) fn choose(
         sensors.extend(topic.map(|topic| (sensor.input, topic)));
     }
     let odometry = named("odometry_topic", &input.odometry_topic, is_odometry)?
-        .or_else(|| best(scan, odometry_rank));
+        .or_else(|| best(scan, None, odometry_rank));
     let info = |key, wanted: &Option<String>, image: &Option<String>| {
-        Ok::<_, LogError>(named(key, wanted, is_info)?.or_else(|| info_of(scan, image.as_deref()?)))
+        let of_left = key == "depth_info_topic" && is_disparity;
+        let found = || info_of(scan, image.as_deref()?, of_left);
+        Ok::<_, LogError>(named(key, wanted, is_info)?.or_else(found))
     };
     let chosen = Chosen {
         colour_info: info("colour_info_topic", &input.colour_info_topic, &colour)?,
@@ -114,7 +124,7 @@ fn choose_sensor(
     let rank = |name: &str, topic: &Topic| {
         sensor.rank.filter(|_| is_of(sensor, topic)).map(|rank| rank(name))
     };
-    Ok(named.or_else(|| best(scan, rank)))
+    Ok(named.or_else(|| best(scan, None, rank)))
 }
 
 /// Returns the topic that the settings name for a sensor.
@@ -151,7 +161,7 @@ fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
         wanted,
         key: key.to_owned(),
         types: types.to_owned(),
-        fits: Box::new(is_image),
+        fits: Box::new(if key == "depth_topic" { is_image } else { is_usable_picture }),
     };
     let lacks_right = lacks(Input::Right, &chosen.right);
     let images = [
@@ -175,14 +185,23 @@ fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
 }
 
 impl Requirement<'_> {
-    /// Returns the error of a log that lacks the topic, with the first topic that could be meant.
+    /// Returns the error of a log that lacks the topic, with the first topic that could be meant, or
+    /// the first one that cannot be read.
     fn error(&self, scan: &Scan) -> LogError {
         let Self { wanted, key, types, fits, .. } = self;
-        let hint = scan.topics.iter().find(|(_, topic)| fits(topic)).map(|(name, topic)| {
-            let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
-            format!("; if {name} ({kind}) is meant, name it as `{key}` under [input]")
+        let is_image = key.ends_with("_topic") && types.contains("Image");
+        let unreadable = scan.topics.iter().find_map(|(name, topic)| {
+            let why = unreadable(topic).filter(|_| is_image)?;
+            Some(format!("; {name} ({}) cannot be read: {why}", kind_of(topic)))
         });
-        missing(scan, format!("{wanted} ({types})"), hint.unwrap_or_default())
+        let meant = scan.topics.iter().find(|(_, topic)| fits(topic)).map(|(name, topic)| {
+            let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
+            match remedy_as_depth(topic).filter(|_| key == "depth_topic") {
+                Some(remedy) => format!("; if {name} ({kind}) is meant, {remedy}"),
+                None => format!("; if {name} ({kind}) is meant, name it as `{key}` under [input]"),
+            }
+        });
+        missing(scan, format!("{wanted} ({types})"), unreadable.or(meant).unwrap_or_default())
     }
 }
 
@@ -196,15 +215,76 @@ const UNREADABLE: &str = ", because no topic is read for it: a program that adds
                           otherwise leave out the plugin that requires it";
 const COLOUR: &str = "sensor_msgs/Image with colour, mono, bayer or yuv pixels of 8 bits, or \
                       sensor_msgs/CompressedImage with jpeg or png";
-const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, or sensor_msgs/CompressedImage \
-                     with compressedDepth";
+const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, sensor_msgs/CompressedImage with \
+                     compressedDepth, or stereo_msgs/DisparityImage";
 
 pub(crate) fn missing(scan: &Scan, wanted: String, hint: String) -> LogError {
     LogError::Missing { path: scan.path.clone(), wanted, hint, present: scan.listing() }
 }
 
-fn is_image(topic: &Topic) -> bool {
+fn is_picture(topic: &Topic) -> bool {
     matches!(topic.kind, Type::Image | Type::CompressedImage)
+}
+
+/// Returns true for images, of disparity included.
+fn is_image(topic: &Topic) -> bool {
+    is_picture(topic) || topic.kind == Type::DisparityImage
+}
+
+/// Returns true for pictures that can be read, as far as that is known before the first one.
+fn is_usable_picture(topic: &Topic) -> bool {
+    is_picture(topic) && (topic.content == Content::Picture || topic.pixels.is_none())
+}
+
+/// Returns true for depth that can be read.
+fn is_usable_depth(topic: &Topic, input: &InputSettings) -> bool {
+    let is_disparity = input.disparity.is_some() && disparity_rank("disparity", topic).is_some();
+    let is_depth = topic.content == Content::Depth || topic.pixels.is_none();
+    is_image(topic) && (is_depth || is_disparity)
+}
+
+/// Returns the setting that makes depth of images that look like others.
+fn remedy_as_depth(topic: &Topic) -> Option<&'static str> {
+    match topic.pixels.as_deref()? {
+        "mono16" => Some("set `depth_unit_m` under [input] (0.001 for millimetres)"),
+        "mono8" | "8UC1" | "16SC1" => Some("and its pixels are disparities, add [input.disparity]"),
+        _ => None,
+    }
+}
+
+/// Returns type and encoding of the messages of a topic.
+fn kind_of(topic: &Topic) -> String {
+    match (&topic.pixels, topic.encoding.as_str()) {
+        (Some(pixels), _) => format!("{}, {pixels}", topic.schema),
+        (None, "cdr" | "ros1" | "") => topic.schema.clone(),
+        (None, encoding) => format!("{}, {encoding}", topic.schema),
+    }
+}
+
+/// Names of messages with images or scans, whatever their package and encoding.
+const SENSOR_MESSAGES: [&str; 5] =
+    ["Image", "RawImage", "CompressedImage", "DisparityImage", "LaserScan"];
+/// Names of messages with video.
+const VIDEO_MESSAGES: [&str; 3] = ["CompressedVideo", "FFMPEGPacket", "H264Packet"];
+
+/// Returns the reason for which images or scans of a topic cannot be read, with the remedy; `None`
+/// for those that can, and for all other topics.
+pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
+    let name = topic.schema.rsplit(['/', '.']).next().unwrap_or_default();
+    if VIDEO_MESSAGES.contains(&name) {
+        return Some(VIDEO_REMEDY.to_owned());
+    }
+    match (&topic.pixels, topic.kind) {
+        (Some(pixels), _) if topic.content == Content::Unknown => Some(refusal_of(pixels)),
+        (None, Type::Other) if SENSOR_MESSAGES.contains(&name) => Some(match &*topic.encoding {
+            "cdr" | "ros1" => format!("its type is not read; {name} of sensor_msgs is"),
+            other => format!(
+                "its messages are in `{other}`, and those of ROS 2 (`cdr`) and ROS 1 (`ros1`) are \
+                 read: record with `ros2 bag record`, or convert the log"
+            ),
+        }),
+        _ => None,
+    }
 }
 
 fn is_info(topic: &Topic) -> bool {
@@ -231,17 +311,33 @@ fn named(
     if scan.topics.get(name).is_some_and(&fits) {
         return Ok(Some(name.to_owned()));
     }
-    let fitting = scan.topics.iter().filter(|(_, topic)| fits(topic));
+    let mut fitting = scan.topics.iter().filter(|(_, topic)| fits(topic));
+    if let Some(topic) = scan.topics.get(name) {
+        let other = fitting.next().map(|(name, topic)| format!("{name} ({})", kind_of(topic)));
+        let as_depth = remedy_as_depth(topic).filter(|_| key == "depth_topic");
+        let remedy = unreadable(topic)
+            .or_else(|| as_depth.map(|remedy| format!("if it is meant, {remedy}")))
+            .or_else(|| other.map(|other| format!("{other} would fit")))
+            .unwrap_or_else(|| "no topic of the log would fit: leave the key out".to_owned());
+        let (path, kind) = (scan.path.clone(), kind_of(topic));
+        let (key, topic) = (key.to_owned(), name.to_owned());
+        return Err(LogError::WrongTopic { path, key, topic, kind, remedy });
+    }
     let near = nearest(name, fitting.map(|(name, _)| name.as_str()));
     let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
     Err(missing(scan, format!("topic `{name}` fit for `{key}` of [input]"), hint))
 }
 
-/// Returns the topic with the highest rank; of equal ones that with the most messages, then the
-/// first by name.
-fn best(scan: &Scan, rank: impl Fn(&str, &Topic) -> Option<i32>) -> Option<String> {
+/// Returns the topic with the highest rank but one that is taken; of equal ones that with the most
+/// messages, then the first by name.
+fn best(
+    scan: &Scan,
+    taken: Option<&str>,
+    rank: impl Fn(&str, &Topic) -> Option<i32>,
+) -> Option<String> {
+    let free = |(name, topic): &(&String, &Topic)| topic.count > 0 && taken != Some(name.as_str());
     let ranked =
-        scan.topics.iter().filter(|(_, topic)| topic.count > 0).filter_map(|(name, topic)| {
+        scan.topics.iter().filter(free).filter_map(|(name, topic)| {
             Some((rank(&name.to_lowercase(), topic)?, topic.count, name))
         });
     // Reversed, because the last of equal maxima is returned.
@@ -254,14 +350,17 @@ fn has(name: &str, words: &[&str]) -> bool {
 
 fn colour_rank(name: &str, topic: &Topic, right: bool) -> Option<i32> {
     let is_right = has(name, &["right", "infra2"]);
-    if !is_image(topic) || topic.content != Content::Picture || is_right != right {
+    if !is_picture(topic) || topic.content != Content::Picture || is_right != right {
         return None;
     }
     // A name for colour decides before one for a side, and before an uncompressed image.
     let mut rank = 0;
     rank += 8 * i32::from(has(name, &["color", "colour", "rgb"]));
     rank += 4 * i32::from(has(name, &["left", "front", "rect"]));
-    rank -= 6 * i32::from(has(name, &["infra", "/ir", "depth", "fisheye", "mono", "debug"]));
+    rank -= 6 * i32::from(has(
+        name,
+        &["infra", "/ir", "depth", "disparity", "fisheye", "mono", "debug"],
+    ));
     rank += i32::from(topic.kind == Type::Image);
     Some(rank)
 }
@@ -278,6 +377,17 @@ fn depth_rank(name: &str, topic: &Topic) -> Option<i32> {
     Some(rank)
 }
 
+/// Returns the rank of images that the settings declare to be disparities, by their name.
+fn disparity_rank(name: &str, topic: &Topic) -> Option<i32> {
+    let pixels = topic.pixels.as_deref().unwrap_or_default();
+    let may_be = match topic.kind {
+        Type::Image => may_be_disparity(pixels),
+        Type::CompressedImage => pixels.contains("png"),
+        _ => false,
+    };
+    (may_be && name.contains("disp")).then(|| i32::from(topic.kind == Type::Image))
+}
+
 fn odometry_rank(name: &str, topic: &Topic) -> Option<i32> {
     let filtered = has(name, &["filtered", "fused"]);
     (topic.kind == Type::Odometry).then(|| i32::from(!has(name, &["visual"])) + i32::from(filtered))
@@ -285,12 +395,18 @@ fn odometry_rank(name: &str, topic: &Topic) -> Option<i32> {
 
 /// Returns the calibration of an image topic: its `camera_info` sibling, else the only one with the
 /// same frame.
-fn info_of(scan: &Scan, image: &str) -> Option<String> {
+fn info_of(scan: &Scan, image: &str, is_disparity: bool) -> Option<String> {
     let base = image.trim_end_matches("/compressedDepth").trim_end_matches("/compressed");
     let folder = base.rsplit_once('/').map_or("", |(folder, _)| folder);
     let sibling = format!("{folder}/camera_info");
     if scan.infos.contains_key(&sibling) {
         return Some(sibling);
+    }
+    let left = format!("{folder}/left/camera_info");
+    // Disparities are those of the left camera, and its calibration stands beside its images.
+    let is_disparity = is_disparity || scan.topics.get(image)?.kind == Type::DisparityImage;
+    if is_disparity && scan.infos.contains_key(&left) {
+        return Some(left);
     }
     let frame = scan.frame_of(image)?;
     let mut same = scan.infos.iter().filter(|(_, info)| info.header.frame_id == frame);

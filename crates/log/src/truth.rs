@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::log_files::{LogFiles, open_file};
 use crate::msgs::{StringMsg, decode};
+use crate::packed::LogFile;
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
@@ -82,7 +83,9 @@ impl TruthFrame {
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
     let (mut frames, mut present) = (Vec::new(), false);
     for part in LogFiles::of(path)?.parts() {
-        let mut walker = LogWalker::at(part, open_file(part)?, limits)
+        let file = LogFile::open(part, limits)?;
+        let contents = file.path().to_owned();
+        let mut walker = LogWalker::at(&contents, file, limits)
             .map_err(|source| LogError::NotMcap { path: part.clone(), source })?;
         while let Some(message) = walker.next() {
             if message.channel.topic == TRUTH_TOPIC {

@@ -4,11 +4,13 @@
 mod common;
 
 use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use common::LogWriter;
 use proptest::prelude::*;
 use rusqlite::Connection;
+use tagalong_core::{RgbImage, Stamp};
 use tagalong_log::msgs::{CameraInfo, Header};
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogWalker};
 
@@ -59,6 +61,11 @@ fn in_mcap(bytes: &[u8]) -> Vec<Told> {
 fn store(messages: &[Told], path: &Path) -> Connection {
     let database = Connection::open(path).unwrap();
     database.execute_batch(TABLES).unwrap();
+    store_into(&database, messages);
+    database
+}
+
+fn store_into(database: &Connection, messages: &[Told]) {
     let mut topics: Vec<&str> = Vec::new();
     for (topic, kind, time, data) in messages {
         let known = topics.iter().position(|name| name == topic);
@@ -71,7 +78,6 @@ fn store(messages: &[Told], path: &Path) -> Connection {
         let sql = "INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)";
         database.execute(sql, (id as i64, *time as i64, data)).unwrap();
     }
-    database
 }
 
 /// A database in a folder of its own.
@@ -146,6 +152,128 @@ fn a_real_database_tells_what_its_mcap_file_tells() {
         assert!(*data == expected.3, "{topic}: {} and {} bytes", data.len(), expected.3.len());
     }
     assert_eq!(found.len(), expected.len());
+}
+
+fn packed(bytes: &[u8]) -> Vec<u8> {
+    zstd::bulk::compress(bytes, 3).unwrap()
+}
+
+fn source(path: &Path, limits: &Limits) -> Result<FrameSource, String> {
+    let input = InputSettings { base_frame: "colour".into(), ..InputSettings::default() };
+    let inputs = Inputs::NONE.require(Input::Colour);
+    FrameSource::open(path, &input, limits, inputs).map_err(|error| error.to_string())
+}
+
+/// Returns stamps and images of all frames, and what was counted.
+fn frames_of(path: &Path) -> (Vec<(Stamp, RgbImage)>, Vec<String>, bool) {
+    let mut source = source(path, &Limits::default()).unwrap();
+    let mut frames = Vec::new();
+    while let Some(found) = source.next_frame() {
+        frames.push((found.frame.stamp, found.frame.colour().unwrap().clone()));
+    }
+    let counted = source.counters().iter().map(|(name, count)| format!("{name} {count}"));
+    (frames, counted.collect(), source.data_lost())
+}
+
+/// Compresses each message, as `compression_mode: MESSAGE` does.
+fn packed_messages(messages: &[Told]) -> Vec<Told> {
+    let pack =
+        |(topic, kind, time, data): &Told| (topic.clone(), kind.clone(), *time, packed(data));
+    messages.iter().map(pack).collect()
+}
+
+#[test]
+fn compressed_messages_are_those_that_were_compressed() {
+    let stored = Stored::new("DELETE FROM messages; DELETE FROM topics");
+    store_into(&Connection::open(&stored.path).unwrap(), &packed_messages(&stored.messages));
+    let (messages, counters, lost) = stored.walk().unwrap();
+    assert_eq!((messages, lost), (stored.messages.clone(), false), "{counters:?}");
+    assert!(counters.contains(&"messages_unpacked"));
+}
+
+#[test]
+fn a_compressed_file_makes_the_frames_of_the_plain_one() {
+    let stored = Stored::new("");
+    let plain = frames_of(&stored.path);
+    assert_eq!(plain.0.len(), 9);
+    // Also under a name that says nothing.
+    for name in ["walk_0.db3.zstd", "walk"] {
+        let path = stored.path.with_file_name(name);
+        std::fs::write(&path, packed(&std::fs::read(&stored.path).unwrap())).unwrap();
+        assert_eq!(frames_of(&path), plain);
+        std::fs::remove_file(&path).unwrap();
+    }
+    let mcap = stored.path.with_file_name("walk_0.mcap.zstd");
+    std::fs::write(&mcap, packed(&log())).unwrap();
+    assert_eq!(frames_of(&mcap).0, plain.0);
+}
+
+#[test]
+fn a_split_bag_of_compressed_files_and_messages_is_one_log() {
+    let stored = Stored::new("");
+    let whole = frames_of(&stored.path);
+    let bag = tempfile::tempdir().unwrap();
+    let (first, second) = stored.messages.split_at(5);
+    for (number, part) in [first, second].iter().enumerate() {
+        let part_file = stored.path.with_file_name(format!("part_{number}.db3"));
+        store(&packed_messages(part), &part_file).close().unwrap();
+        let bytes = packed(&std::fs::read(&part_file).unwrap());
+        std::fs::write(bag.path().join(format!("walk_{number}.db3.zstd")), bytes).unwrap();
+    }
+    let text = "  relative_file_paths:\n    - walk_0.db3.zstd\n    - walk_1.db3.zstd\n";
+    std::fs::write(bag.path().join("metadata.yaml"), text).unwrap();
+    let (frames, counted, lost) = frames_of(bag.path());
+    assert_eq!((frames, lost), (whole.0, false), "{counted:?}");
+}
+
+#[test]
+fn messages_that_do_not_unpack_are_counted_and_passed_over() {
+    let huge = packed(&vec![0; 65 << 20]);
+    let unstated = {
+        // A stream does not state its size in advance.
+        let mut encoder = zstd::Encoder::new(Vec::new(), 3).unwrap();
+        std::io::copy(&mut std::io::repeat(0).take(65 << 20), &mut encoder).unwrap();
+        encoder.finish().unwrap()
+    };
+    let cut = packed(&[7; 300])[..12].to_vec();
+    let cases = [
+        (huge, "oversized_records"),
+        (unstated, "oversized_records"),
+        (cut, "damaged_records"),
+        (b"\x28\xb5\x2f\xfdnoise".to_vec(), "damaged_records"),
+    ];
+    for (data, counter) in cases {
+        let stored = Stored::new("");
+        let sql = "UPDATE messages SET data = ? WHERE id = 3";
+        Connection::open(&stored.path).unwrap().execute(sql, [data]).unwrap();
+        let (messages, counters, lost) = stored.walk().unwrap();
+        let mut expected = stored.messages.clone();
+        expected.remove(2);
+        assert!(lost && counters.contains(&counter), "{counter}: {counters:?}");
+        assert_eq!(messages, expected, "{counter}");
+    }
+}
+
+#[test]
+fn a_compressed_file_beyond_the_limit_is_refused_and_a_cut_one_is_used_up_to_the_cut() {
+    let stored = Stored::new("");
+    let bytes = std::fs::read(&stored.path).unwrap();
+    let path = stored.path.with_file_name("walk_0.db3.zstd");
+    let limits = Limits { file_bytes: bytes.len() as u64 - 1, ..Limits::default() };
+    let unstated = zstd::encode_all(&bytes[..], 3).unwrap();
+    for packed in [packed(&bytes), unstated] {
+        std::fs::write(&path, packed).unwrap();
+        let error = source(&path, &limits).err().unwrap();
+        assert!(error.contains("walk_0.db3.zstd") && error.contains("`file_bytes`"), "{error}");
+        assert!(error.contains("zstd -d"), "{error}");
+    }
+    // An MCAP file in several frames of zstd, of which the last is cut.
+    let mcap = log();
+    let frames: Vec<u8> = mcap.chunks(1000).flat_map(|part| packed(part)).collect();
+    std::fs::write(&path, &frames[..frames.len() - 5]).unwrap();
+    let (found, counted, lost) = frames_of(&path);
+    assert!(lost && !found.is_empty(), "{counted:?}");
+    assert!(counted.contains(&"damaged_compression 1".to_owned()), "{counted:?}");
 }
 
 #[test]

@@ -84,7 +84,8 @@ impl Job {
         let inputs = pipeline.inputs();
         // A picture shows colour, whether or not the pipeline uses it.
         let inputs = if args.overlay { inputs.accept(Input::Colour) } else { inputs };
-        let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)?;
+        let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
+            .map_err(|error| config.refusal(error))?;
         let missing = |why| Failure::failed(format!("`{}`: {why}", args.log().display()));
         // A config that the program chose is for the tracks alone; no robot follows its commands.
         if is_named {
@@ -242,7 +243,8 @@ impl Desk {
         describe_end(&mut report, stopped.as_ref(), signals);
         // Without a single processed frame the output would be an empty directory that looks like a
         // result.
-        if report.frames.processed == 0 && stopped.is_some() {
+        let is_empty = report.frames.read == 0 && signals.received().is_none();
+        if report.frames.processed == 0 && (stopped.is_some() || is_empty) {
             self.log.discard().map_err(Failure::failed)?;
             return verdict(args, &report, stopped, signals);
         }
@@ -288,6 +290,29 @@ fn about(report: &RunReport) -> BTreeMap<String, String> {
     ])
 }
 
+/// Counters of the reader that are no reason for a missing frame.
+const NO_REASON: [&str; 6] = [
+    "chunks_verified",
+    "chunks_without_crc",
+    "messages",
+    "messages_unpacked",
+    "disparity_pixels",
+    "disparity_pixels_invalid",
+];
+
+/// Returns the message about a log of which no frame could be made.
+fn no_frame(report: &RunReport) -> String {
+    let telling = report.counters.iter().filter(|(name, _)| !NO_REASON.contains(&name.as_str()));
+    let reasons: Vec<String> =
+        telling.map(|(name, count)| format!("{} {count}", name.replace('_', " "))).collect();
+    let why = match reasons.is_empty() {
+        true => "it has no image (or scan) that could make one".to_owned(),
+        false => reasons.join(", "),
+    };
+    let name = &report.log.name;
+    format!("not one frame could be made of {name}: {why}; `tagalong doctor` tells more")
+}
+
 /// Returns the exit code, and the reason for a failure.
 fn verdict(
     args: &RunArgs,
@@ -308,6 +333,9 @@ fn verdict(
     }
     if let Some(signal) = signals.received() {
         return Ok(Ended::BySignal(signal));
+    }
+    if report.frames.read == 0 {
+        return Err(Failure::failed(no_frame(report)));
     }
     match (report.data_lost, args.strict) {
         (false, _) => Ok(Ended::Well),

@@ -69,6 +69,50 @@ fn a_tum_folder_has_depth_and_a_camera_that_moves() {
 }
 
 #[test]
+fn a_part_of_a_tum_folder_is_what_is_there_of_it() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("part");
+    for i in [0u8, 2] {
+        colour(&folder.join(format!("rgb/{i}.png")), (640, 480), 10 * i);
+        depth(&folder.join(format!("depth/{i}.png")), (640, 480), 10_000);
+    }
+    let list = |name: &str| (0..3).map(|i| format!("100.{i} {name}/{i}.png\n")).collect::<String>();
+    fs::write(folder.join("rgb.txt"), list("rgb")).unwrap();
+    fs::write(folder.join("depth.txt"), list("depth")).unwrap();
+    let (code, said) = import(home.path(), &["tum", "part", "--height", "1.2"]);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("1 of 3 images of rgb.txt are not there"), "{said}");
+    let found = frames(&home.path().join("runs/part.mcap"), DEPTH);
+    assert_eq!(found.len(), 2);
+    assert!((found[1].frame.camera.height_m() - 1.2).abs() < 1e-6);
+    assert_eq!(found[1].frame.colour().unwrap().get(5, 5), Some([20, 90, 20]));
+    fs::remove_dir_all(folder.join("rgb")).unwrap();
+    fs::remove_dir_all(folder.join("depth")).unwrap();
+    let (code, said) = import(home.path(), &["tum", "part", "--overwrite"]);
+    assert_eq!(code, 1, "{said}");
+    assert!(said.contains("has no images"), "{said}");
+}
+
+#[test]
+fn a_bonn_folder_has_its_own_camera_and_no_poses_of_markers() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("rgbd_bonn_tiny");
+    colour(&folder.join("rgb/1548266469.88.png"), (640, 480), 30);
+    depth(&folder.join("depth/1548266469.89.png"), (640, 480), 5000);
+    fs::write(folder.join("rgb.txt"), "# color images\n1548266469.88 rgb/1548266469.88.png\n")
+        .unwrap();
+    fs::write(folder.join("depth.txt"), "1548266469.89 depth/1548266469.89.png\n").unwrap();
+    fs::write(folder.join("groundtruth.txt"), "1548266469.88 1 2 3 0 0 0 1\n").unwrap();
+    let (code, said) = import(home.path(), &["tum", "rgbd_bonn_tiny", "--height", "1.5"]);
+    assert_eq!(code, 0, "{said}");
+    let found = frames(&home.path().join("runs/rgbd_bonn_tiny.mcap"), DEPTH);
+    let frame = &found[0].frame;
+    assert!((frame.camera.focal_px() - 542.822_841).abs() < 1e-6);
+    assert!((frame.camera.height_m() - 1.5).abs() < 1e-6, "not that of the poses");
+    assert_eq!(frame.depth().unwrap().get(5, 5), Some(1.0));
+}
+
+#[test]
 fn a_kitti_sequence_is_a_pair_with_boxes_and_a_drive() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("training");

@@ -35,6 +35,25 @@ fn t6_a_topic_that_is_not_there_is_told_with_those_that_are() {
 }
 
 #[test]
+fn a_topic_of_a_wrong_kind_is_told_with_its_line_its_kind_and_the_remedy() {
+    let home = tempfile::tempdir().unwrap();
+    Drawn::of(3).write(&home.path().join("good.mcap"));
+    let (colour, depth) = ("/camera/color/image_raw", "/camera/depth/image_raw");
+    for (key, wrong, kind, remedy) in [
+        ("depth_topic", colour, "sensor_msgs/msg/Image, rgb8", depth),
+        ("colour_topic", depth, "sensor_msgs/msg/Image, ", colour),
+        ("colour_topic", "/tf_static", "tf2_msgs/msg/TFMessage", colour),
+    ] {
+        let input = format!("{key} = \"{wrong}\"");
+        let (code, told) = run(home.path(), "good.mcap", &input);
+        assert_eq!(code, 2, "{key}: {told}");
+        assert!(told.contains("nearest.toml:") && told.contains(&format!("| {input}")), "{told}");
+        assert!(told.contains(kind) && told.contains(remedy), "{key}: {told}");
+        assert!(!home.path().join("runs").exists(), "a refused run leaves nothing behind");
+    }
+}
+
+#[test]
 fn t6_images_that_are_needed_and_found_nowhere_are_told() {
     let home = tempfile::tempdir().unwrap();
     Drawn { depth: false, ..Drawn::of(3) }.write(&home.path().join("no-depth.mcap"));
@@ -42,4 +61,18 @@ fn t6_images_that_are_needed_and_found_nowhere_are_told() {
     assert_eq!(code, 1, "{told}");
     assert!(told.contains("has no depth images (sensor_msgs/Image with 16UC1 or 32FC1"), "{told}");
     assert!(told.contains("present:") && told.contains("/camera/color/image_raw"), "{told}");
+}
+
+#[test]
+fn a_log_of_which_no_frame_can_be_made_is_no_success() {
+    let home = tempfile::tempdir().unwrap();
+    Drawn::of(3).write(&home.path().join("good.mcap"));
+    config(home.path(), "[limits]\nimage_side_px = 8");
+    let args = ["run", "nearest.toml", "good.mcap"];
+    let output = own_plugin().args(args).current_dir(home.path()).output().unwrap();
+    let told = text(&output.stderr);
+    assert_eq!(code(&output), 1, "{told}");
+    assert!(told.contains("not one frame could be made of good.mcap: "), "{told}");
+    assert!(told.contains("images too large 3") && told.contains("tagalong doctor"), "{told}");
+    assert!(!home.path().join("runs/good-nearest").exists(), "an empty result looks like one");
 }

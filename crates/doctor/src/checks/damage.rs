@@ -2,7 +2,14 @@ use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
 /// Counters of read items, as opposed to lost ones.
-const NO_LOSS: [&str; 3] = ["chunks_verified", "frames", "messages"];
+const NO_LOSS: [&str; 6] = [
+    "chunks_verified",
+    "chunks_without_crc",
+    "disparity_pixels",
+    "frames",
+    "messages",
+    "messages_unpacked",
+];
 
 /// Checks that no part of the file was damaged or unusable.
 pub fn damage(evidence: &Evidence) -> Option<Finding> {

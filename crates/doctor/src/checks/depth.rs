@@ -20,6 +20,7 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
             "is the depth camera switched on? which topic is it? [input] depth_topic = \"...\"",
         ));
     };
+    let is_disparity = is_disparity(evidence);
     let far = !PLAUSIBLE_M.contains(&quality.median_m);
     let step = quality.step_m.unwrap_or(0.0);
     // The steps of stereo depth grow with the square of the distance.
@@ -40,12 +41,31 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
     Some(if far {
         finding
             .why("people are looked for between half a metre and some metres: the unit is wrong")
-            .remedy(format!("[input] depth_unit_m = {}", better_unit(evidence, quality.median_m)))
+            .remedy(if is_disparity {
+                better_geometry(quality.median_m)
+            } else {
+                format!("[input] depth_unit_m = {}", better_unit(evidence, quality.median_m))
+            })
     } else {
         finding
             .why("people in holes, or between coarse steps, have no shape")
             .remedy("dark or shiny surfaces, sunlight, the camera's own range: look at the pictures; a stereo config may do better")
     })
+}
+
+/// Returns true if depth comes from disparities.
+fn is_disparity(evidence: &Evidence) -> bool {
+    evidence.inspection.counters.contains_key("disparity_pixels")
+}
+
+/// Returns the remedy for disparities in a wrong unit, or with a wrong baseline.
+fn better_geometry(median_m: f64) -> String {
+    let factor = median_m / 3.0;
+    format!(
+        "the unit of the disparities or the baseline is off by a factor of about {factor:.2}: \
+         [input.disparity] unit_px (0.0625 for sixteenths), baseline_m; or correct f and T of the \
+         messages"
+    )
 }
 
 /// Returns the unit by which the median would be some metres: a power of ten times the present one.

@@ -20,6 +20,7 @@ mod rate;
 mod reading;
 mod registration;
 mod skew;
+mod skipped;
 mod stamps;
 mod still;
 mod suits;
@@ -37,6 +38,7 @@ pub const ALL: &[Check] = &[
     needs::needs,
     damage::damage,
     reading::reading,
+    skipped::skipped,
     intrinsics::intrinsics,
     frames::frames,
     rate::rate,

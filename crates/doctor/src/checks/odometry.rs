@@ -35,7 +35,11 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
         (None, _) => match evidence.changed {
             Some(_) => (Severity::Ok, "none, and the camera stands still".to_owned()),
             // A scanner alone cannot tell, so nothing is said about how right that is.
-            None => (Severity::Unknown, "none: the robot is taken to stand still".to_owned()),
+            None => (
+                Severity::Unknown,
+                "none: the robot is taken to stand still; if it drives, record its odometry"
+                    .to_owned(),
+            ),
         },
     };
     let finding = Finding::new("odometry", severity, measured)

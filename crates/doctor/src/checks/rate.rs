@@ -10,16 +10,16 @@ impl Evidence {
     /// Returns the topic that makes the frames.
     fn primary(&self) -> Option<&TopicFacts> {
         let facts = &self.inspection.facts;
-        let topic = facts.colour_topic.as_ref().or(facts.depth_topic.as_ref())?;
-        self.inspection.topic(topic)
+        let images = facts.colour_topic.as_ref().or(facts.depth_topic.as_ref());
+        self.inspection.topic(images.or(facts.laser_topic.as_ref())?)
     }
 }
 
-/// Checks the rate of the images.
+/// Checks the rate of the images, or of the scans where they make the frames.
 pub fn rate(evidence: &Evidence) -> Option<Finding> {
     let topic = evidence.primary()?;
     let Some(timing) = topic.timing else {
-        let measured = format!("{} has {} image", topic.topic, topic.count);
+        let measured = format!("{} has {} message", topic.topic, topic.count);
         return Some(Finding::new("rate", Severity::Unknown, measured));
     };
     let hz = 1.0 / timing.median_period_s;
@@ -27,14 +27,19 @@ pub fn rate(evidence: &Evidence) -> Option<Finding> {
     let finding = Finding::new(
         "rate",
         Severity::beyond(walked, 0.6, f64::INFINITY),
-        format!("{hz:.1} images a second: somebody walks {walked:.2} m between two"),
+        format!("{hz:.1} {} a second: a person walks {walked:.2} m between two", kind_of(topic)),
     );
     let finding = finding.figure("rate_hz", hz).why(
-        "a person who goes far between two images fits no track, and tracks are confirmed late",
+        "a person who goes far between two of them fits no track, and tracks are confirmed late",
     );
     Some(finding.remedy(format!(
-        "record 5 images a second or more; else\n[associator.config] gate_m = {:.1}\n[manager.config] \
+        "record 5 a second or more; else\n[associator.config] gate_m = {:.1}\n[manager.config] \
          confirm_hits = 2",
         (1.0 + walked).min(3.0)
     )))
+}
+
+/// Returns the noun for the messages of a topic.
+fn kind_of(topic: &TopicFacts) -> &'static str {
+    if topic.image.is_some() { "images" } else { "scans" }
 }

@@ -2,8 +2,12 @@ use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
 /// Counters of the reader that are no reason for a missing frame.
-const NO_REASON: [&str; 6] = [
+const NO_REASON: [&str; 10] = [
     "chunks_verified",
+    "chunks_without_crc",
+    "messages_unpacked",
+    "disparity_pixels",
+    "disparity_pixels_invalid",
     "frames",
     "messages",
     "depth_registered",

@@ -4,10 +4,11 @@ use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
 impl Evidence {
-    /// Returns the topics of the images, with their stamps.
+    /// Returns the topics of the images and of the laser scans, with their stamps.
     fn timings(&self) -> impl Iterator<Item = (&str, Timing)> {
         let facts = &self.inspection.facts;
-        let topics = [&facts.colour_topic, &facts.depth_topic, &facts.right_topic];
+        let topics =
+            [&facts.colour_topic, &facts.depth_topic, &facts.right_topic, &facts.laser_topic];
         let known = topics.into_iter().flatten().filter_map(|name| self.inspection.topic(name));
         known.filter_map(|topic| Some((topic.topic.as_str(), topic.timing?)))
     }
@@ -46,11 +47,11 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
     }
     if timing.steps_back + timing.repeated > 0 {
         let measured = format!(
-            "{topic}: {} images out of order, {} with the stamp of another",
+            "{topic}: {} messages out of order, {} with the stamp of another",
             timing.steps_back, timing.repeated
         );
         return finding(Severity::Warn, measured)
-            .why("images that come later than a few others are dropped")
+            .why("messages that come later than a few others are dropped")
             .remedy("[input] reorder_frames = 8");
     }
     finding(Severity::Ok, format!("in order, the longest pause is {:.2} s", timing.longest_gap_s))

@@ -40,6 +40,11 @@ pub fn decode_compressed(
     }
 }
 
+/// Returns true for the first bytes of a JPEG or a PNG.
+pub(crate) fn is_coded_picture(data: &[u8]) -> bool {
+    matches!(data, [0xff, 0xd8, ..] | [0x89, b'P', b'N', b'G', ..])
+}
+
 /// Returns the columns and rows of a compressed image, from its header.
 ///
 /// # Errors

@@ -6,11 +6,18 @@
 
 mod bayer;
 mod compressed;
+mod disparity;
 mod raw;
 mod rvl;
 mod yuv;
 
+pub(crate) use compressed::is_coded_picture;
 pub use compressed::{decode_compressed, encode_rvl, size_of_compressed};
+pub(crate) use disparity::may_be_disparity;
+pub use disparity::{
+    DepthFromDisparity, StereoGeometry, decode_compressed_disparity, decode_disparity,
+    decode_plain_disparity,
+};
 pub use raw::{decode_raw, size_of_raw};
 use tagalong_core::{DepthImage, GreyImage, RgbImage};
 
@@ -39,13 +46,13 @@ impl Pixels {
 }
 
 /// Reason for which an image message was not decoded.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
     /// The encoding is unknown, or unknown for depth.
     #[error(
-        "encoding `{0}`; known: rgb8, bgr8, rgba8, bgra8, mono8, mono16, 8UC1, 8UC3, bayer_*8, \
-         yuv422 (uyvy), yuv422_yuy2 (yuyv), nv12, nv21, and for depth 16UC1, 32FC1 (mono16 where \
+        "encoding `{0}`; known: rgb8, bgr8, rgba8, bgra8, mono8, mono16, 8UC1, 8UC3, 8UC4, bayer_*8, \
+         yuv422 (uyvy), yuv422_yuy2 (yuyv), nv12, nv21, nv24, and for depth 16UC1, 32FC1 (mono16 where \
          `depth_unit_m` is set); jpeg, png, compressedDepth"
     )]
     Encoding(String),
@@ -55,6 +62,29 @@ pub enum ImageError {
          bits (rgb8 or bayer_rggb8, say)"
     )]
     Deep(String),
+    /// An encoding that holds no disparities.
+    #[error(
+        "disparities as `{0}`; known: 32FC1, 8UC1, mono8, 16SC1, and 16UC1, mono16 where \
+         `disparity.unit_px` is set under [input]"
+    )]
+    NoDisparity(String),
+    /// Disparities in a unit for which there is no convention.
+    #[error(
+        "disparities as `{0}`, for which there is no one unit: set `disparity.unit_px` under \
+         [input] (0.0625 for 16 parts of a pixel, 0.00390625 for 256)"
+    )]
+    Unit(String),
+    /// Disparities without a geometry that makes depth of them.
+    #[error(
+        "disparities with f = {focal_px} px and T = {baseline_m} m, which have to be positive: \
+         publish them with the calibration of the stereo camera"
+    )]
+    Geometry {
+        /// Focal length, pixels.
+        focal_px: f64,
+        /// Baseline, m.
+        baseline_m: f64,
+    },
     /// The image is larger than the limits allow.
     #[error("{width}x{height} pixels exceed the limit")]
     TooLarge {
@@ -75,7 +105,10 @@ impl ImageError {
     /// Returns the name under which such messages are counted.
     pub fn counter(&self) -> &'static str {
         match self {
-            Self::Encoding(_) | Self::Deep(_) => "images_of_unknown_encoding",
+            Self::Encoding(_) | Self::Deep(_) | Self::NoDisparity(_) | Self::Unit(_) => {
+                "images_of_unknown_encoding"
+            }
+            Self::Geometry { .. } => "disparity_without_geometry",
             Self::TooLarge { .. } => "images_too_large",
             Self::Layout(_) => "images_of_wrong_layout",
             Self::Codec(_) => "images_undecodable",
@@ -98,16 +131,34 @@ pub enum Content {
 /// that makes `mono16` depth.
 pub fn content_of_encoding(encoding: &str, depth_unit_m: Option<f64>) -> Content {
     match encoding {
-        "rgb8" | "bgr8" | "rgba8" | "bgra8" | "mono8" | "8UC1" | "8UC3" => Content::Picture,
+        "rgb8" | "bgr8" | "rgba8" | "bgra8" | "mono8" | "8UC1" | "8UC3" | "8UC4" => {
+            Content::Picture
+        }
         "16UC1" | "32FC1" => Content::Depth,
         "mono16" if depth_unit_m.is_some() => Content::Depth,
         "mono16" => Content::Picture,
-        // Also those that are refused: the error then names the encoding.
-        _ if is_deep(encoding) || bayer::Pattern::of(encoding).is_some() => Content::Picture,
+        _ if bayer::Pattern::of(encoding).is_some() => Content::Picture,
         _ if yuv::Order::of(encoding).is_some() => Content::Picture,
         _ => Content::Unknown,
     }
 }
+
+/// Returns the reason for which images of an encoding or format cannot be read, with the remedy.
+pub(crate) fn refusal_of(pixels: &str) -> String {
+    let lower = pixels.to_ascii_lowercase();
+    let video = ["h264", "h265", "hevc", "avc", "ffmpeg", "theora", "av1"];
+    if video.iter().any(|name| lower.contains(name)) {
+        return VIDEO_REMEDY.to_owned();
+    }
+    match is_deep(pixels) {
+        true => ImageError::Deep(pixels.to_owned()).to_string(),
+        false => ImageError::Encoding(pixels.to_owned()).to_string(),
+    }
+}
+
+/// Remedy for video in a log.
+pub(crate) const VIDEO_REMEDY: &str = "video is not decoded: republish it as jpeg (`ros2 run \
+                                       image_transport republish`) and record that";
 
 /// Returns true for colour with 16 bits a channel.
 fn is_deep(encoding: &str) -> bool {

@@ -45,7 +45,7 @@ pub fn decode_raw(
         "rgb8" => Pixels::Colour(rows.plane(|p: [u8; 3]| p)),
         "bgr8" | "8UC3" => Pixels::Colour(rows.plane(|[b, g, r]: [u8; 3]| [r, g, b])),
         "rgba8" => Pixels::Colour(rows.plane(|[r, g, b, _]: [u8; 4]| [r, g, b])),
-        "bgra8" => Pixels::Colour(rows.plane(|[b, g, r, _]: [u8; 4]| [r, g, b])),
+        "bgra8" | "8UC4" => Pixels::Colour(rows.plane(|[b, g, r, _]: [u8; 4]| [r, g, b])),
         "mono8" | "8UC1" => Pixels::Grey(rows.plane(|[v]: [u8; 1]| v)),
         "32FC1" => {
             let unit = depth_unit_m.unwrap_or(1.0) as f32;
@@ -86,7 +86,7 @@ impl Layout {
             "mono8" | "8UC1" => 1,
             "16UC1" | "mono16" => 2,
             "rgb8" | "bgr8" | "8UC3" => 3,
-            "rgba8" | "bgra8" | "32FC1" => 4,
+            "rgba8" | "bgra8" | "8UC4" | "32FC1" => 4,
             deep if is_deep(deep) => return Err(ImageError::Deep(deep.to_owned())),
             other => return Err(ImageError::Encoding(other.to_owned())),
         }))
@@ -140,7 +140,12 @@ impl<'a> Rows<'a> {
         &self.data[at * self.step..][..self.row_bytes]
     }
 
-    fn plane<const N: usize, P: Copy>(&self, pixel: impl Fn([u8; N]) -> P) -> Plane<P> {
+    /// Returns `count` rows with their padding.
+    pub(super) fn rows_from(&self, at: usize, count: usize) -> &'a [u8] {
+        &self.data[at * self.step..][..count * self.step]
+    }
+
+    pub(super) fn plane<const N: usize, P: Copy>(&self, pixel: impl Fn([u8; N]) -> P) -> Plane<P> {
         let mut out = Vec::with_capacity(self.width * self.height);
         for row in self.data.chunks_exact(self.step) {
             let (pixels, _) = row[..self.row_bytes].as_chunks::<N>();

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::msgs::{CompressedImage, Header, Image};
+use crate::msgs::{CompressedImage, DisparityImage, Header, Image, RegionOfInterest};
 
 const JPEG: &[u8] = include_bytes!("../../tests/data/gradient.jpg");
 const GREY_JPEG: &[u8] = include_bytes!("../../tests/data/gradient-grey.jpg");
@@ -54,11 +54,12 @@ fn same_depth(a: &[f32], b: &[f32]) -> bool {
 #[test]
 fn every_colour_encoding_gives_red_green_blue() {
     let expected = Pixels::Colour(RgbImage::from_pixels(2, 1, vec![[1, 2, 3], [4, 5, 6]]).unwrap());
-    let cases: [(&str, &[u8]); 4] = [
+    let cases: [(&str, &[u8]); 5] = [
         ("rgb8", &[1, 2, 3, 4, 5, 6]),
         ("bgr8", &[3, 2, 1, 6, 5, 4]),
         ("rgba8", &[1, 2, 3, 9, 4, 5, 6, 9]),
         ("bgra8", &[3, 2, 1, 9, 6, 5, 4, 9]),
+        ("8UC4", &[3, 2, 1, 9, 6, 5, 4, 9]),
     ];
     for (encoding, data) in cases {
         assert_eq!(decoded(&raw(encoding, 2, 1, data.len() as u32, data)).unwrap(), expected);
@@ -111,12 +112,15 @@ fn deep_colour_says_so() {
     for encoding in ["rgb16", "bgra16", "bayer_rggb16", "16UC3"] {
         let error = decoded(&raw(encoding, 1, 1, 6, &[0; 6])).unwrap_err();
         assert!(error.to_string().contains("16 bits a channel"), "{error}");
-        assert_eq!(content_of_encoding(encoding, None), Content::Picture);
+        assert_eq!(content_of_encoding(encoding, None), Content::Unknown);
+        assert!(refusal_of(encoding).contains("16 bits a channel"));
     }
+    assert!(refusal_of("h264").contains("image_transport republish"));
+    assert!(refusal_of("yuv999").contains("`yuv999`; known: rgb8"));
 }
 
 /// Pixels as OpenCV 4.10 decodes them: `tests/clients/encodings_opencv.py` prints this table.
-const OPENCV: [(&str, usize, usize, &[u8]); 8] = [
+const OPENCV: [(&str, usize, usize, &[u8]); 9] = [
     (
         "bayer_rggb8",
         6,
@@ -203,6 +207,15 @@ const OPENCV: [(&str, usize, usize, &[u8]); 8] = [
             25, 0, 76, 0, 0, 115, 0,
         ],
     ),
+    (
+        "nv24",
+        4,
+        2,
+        &[
+            0, 67, 0, 80, 11, 18, 242, 0, 211, 0, 227, 0, 155, 181, 79, 255, 135, 255, 69, 255,
+            255, 0, 60, 0,
+        ],
+    ),
 ];
 
 /// The bytes of that script.
@@ -214,6 +227,7 @@ fn noise(count: usize) -> Vec<u8> {
 fn layout(encoding: &str, width: usize, height: usize) -> (usize, usize) {
     match encoding {
         _ if encoding.starts_with("bayer") => (width, height),
+        "nv24" => (width, height * 3),
         _ if encoding.starts_with("nv") => (width, height * 3 / 2),
         _ => (2 * width, height),
     }
@@ -229,8 +243,13 @@ fn mosaics_and_apart_colours_are_decoded_as_opencv_does() {
         let expected = Pixels::Colour(RgbImage::from_pixels(width, height, expected).unwrap());
         assert_eq!(decoded(&image).unwrap(), expected, "{encoding}");
         assert_eq!(content_of_encoding(encoding, None), Content::Picture);
-        let padded: Vec<u8> =
-            bytes.chunks(step).flat_map(|row| [row, &[9, 9][..]].concat()).collect();
+        // A line of colour pairs of `nv24` takes two rows, with the padding behind both.
+        let (bright, pairs) = bytes.split_at(if encoding == "nv24" { step * height } else { 0 });
+        let length = if encoding == "nv24" { 2 * step } else { step };
+        let mut padded: Vec<u8> =
+            bright.chunks(step).flat_map(|row| [row, &[9, 9][..]].concat()).collect();
+        let padding = vec![9; 2 * length / step];
+        padded.extend(pairs.chunks(length).flat_map(|row| [row, &padding].concat()));
         let image = raw(encoding, width as u32, height as u32, step as u32 + 2, &padded);
         assert_eq!(decoded(&image).unwrap(), expected, "{encoding}, padded");
     }
@@ -243,6 +262,19 @@ fn other_names_of_the_same_order_give_the_same_image() {
         let [a, b] = [name, other].map(|encoding| decoded(&raw(encoding, 4, 2, 8, &bytes)));
         assert_eq!(a.unwrap(), b.unwrap());
     }
+}
+
+#[test]
+fn the_step_of_planes_of_one_resolution_may_be_that_of_any_plane() {
+    let bytes = noise(24);
+    let image = |step| decoded(&raw("nv24", 4, 2, step, &bytes)).unwrap();
+    assert!(image(4) == image(8) && image(4) == image(12));
+    let odd = noise(27);
+    assert!(decoded(&raw("nv24", 3, 3, 3, &odd)).is_ok());
+    assert_eq!(
+        decoded(&raw("nv24", 4, 2, 8, &bytes[1..])).unwrap_err().counter(),
+        "images_of_wrong_layout"
+    );
 }
 
 #[test]
@@ -391,6 +423,109 @@ fn what_is_in_an_image_shows_in_its_name() {
     assert_eq!(content_of_format("h264"), Content::Unknown);
     assert_eq!(content_of_encoding("mono16", None), Content::Picture);
     assert_eq!(content_of_encoding("mono16", Some(0.001)), Content::Depth);
+}
+
+const STEREO: StereoGeometry = StereoGeometry { focal_px: 420.0, baseline_m: 0.12 };
+
+fn plain_disparity(
+    encoding: &str,
+    unit_px: Option<f64>,
+    data: &[u8],
+) -> Result<Vec<f32>, ImageError> {
+    let image = raw(encoding, 6, 1, data.len() as u32, data);
+    let read = decode_plain_disparity(&image, STEREO, unit_px, &Limits::default())?;
+    assert_eq!(read.invalid, read.depth.pixels().iter().filter(|z| z.is_nan()).count());
+    Ok(read.depth.pixels().to_vec())
+}
+
+/// The values are those of `tests/clients/disparity_opencv.py`.
+#[test]
+fn disparities_are_the_depth_that_opencv_computes() {
+    let tables: [(&str, &[u8], [f32; 6]); 3] = [
+        ("8UC1", &[0, 1, 7, 42, 200, 255], [f32::NAN, 50.4, 7.2, 1.2, 0.252, 0.197_647_07]),
+        (
+            "16SC1",
+            &[240, 255, 1, 0, 113, 0, 160, 2, 128, 12, 255, 127],
+            [f32::NAN, 806.4, 7.136_283_4, 1.2, 0.252, 0.024_610_126],
+        ),
+        (
+            "32FC1",
+            &[0, 0, 0, 0, 0, 0, 0, 63, 0, 0, 232, 64, 0, 0, 40, 66, 0, 0, 126, 66, 0, 0, 250, 67],
+            [f32::NAN, 100.8, 6.951_724, 1.2, 0.793_700_8, 0.1008],
+        ),
+    ];
+    let is_same = |read: &[f32], expected: &[f32; 6]| {
+        let mut pairs = read.iter().zip(expected);
+        pairs.all(|(a, b)| a.is_nan() && b.is_nan() || (a - b).abs() <= 1e-6 * b.abs())
+    };
+    for (encoding, data, expected) in &tables {
+        let read = plain_disparity(encoding, None, data).unwrap();
+        assert!(is_same(&read, expected), "{encoding}: {read:?}");
+    }
+    // The same numbers without a sign, in the unit that the settings state.
+    let (_, mut data, expected) = tables[1];
+    let unsigned = [&[0, 0][..], &data[2..]].concat();
+    data = &unsigned;
+    for encoding in ["16UC1", "mono16"] {
+        assert!(is_same(&plain_disparity(encoding, Some(0.0625), data).unwrap(), &expected));
+        let error = plain_disparity(encoding, None, data).unwrap_err().to_string();
+        assert!(error.contains(encoding) && error.contains("disparity.unit_px"), "{error}");
+    }
+    let bytes: Vec<u16> =
+        unsigned.as_chunks::<2>().0.iter().map(|b| u16::from_le_bytes(*b)).collect();
+    let png = png_16(6, 1, &bytes);
+    let header = Header::default();
+    let image = CompressedImage { header, format: "png".into(), data: &png };
+    let read = decode_compressed_disparity(&image, STEREO, Some(0.0625), &Limits::default());
+    assert!(is_same(read.unwrap().depth.pixels(), &expected));
+    let jpeg = CompressedImage { data: GREY_JPEG, ..image };
+    assert!(decode_compressed_disparity(&jpeg, STEREO, None, &Limits::default()).is_err());
+    let error = plain_disparity("rgb8", None, &[0; 18]).unwrap_err().to_string();
+    assert!(error.contains("disparities as `rgb8`"), "{error}");
+}
+
+fn disparity_message(data: &[u8]) -> DisparityImage<'_> {
+    DisparityImage {
+        image: raw("32FC1", 4, 1, 16, data),
+        f: 420.0,
+        t: 0.12,
+        ..DisparityImage::default()
+    }
+}
+
+fn depth_of_message(message: &DisparityImage<'_>) -> (Vec<f32>, usize) {
+    let read = decode_disparity(message, None, None, &Limits::default()).unwrap();
+    (read.depth.pixels().to_vec(), read.invalid)
+}
+
+#[test]
+fn disparities_outside_of_the_range_or_the_window_are_invalid() {
+    let data: Vec<u8> = [2.0_f32, 10.0, 60.0, 64.5].iter().flat_map(|d| d.to_le_bytes()).collect();
+    let message = disparity_message(&data);
+    let all = [25.2, 5.04, 0.84, 50.4 / 64.5];
+    let (read, invalid) = depth_of_message(&message);
+    assert!(same_depth(&read, &all) && invalid == 0, "{read:?}");
+    let of_range = DisparityImage { min_disparity: 10.0, max_disparity: 64.0, ..message.clone() };
+    let (read, invalid) = depth_of_message(&of_range);
+    assert!(same_depth(&read, &[f32::NAN, all[1], all[2], f32::NAN]), "{read:?}");
+    assert_eq!(invalid, 2);
+    // A range whose end is not set has a start all the same, and one of no numbers has none.
+    let no_end = DisparityImage { min_disparity: 10.0, ..message.clone() };
+    assert_eq!(depth_of_message(&no_end).1, 1);
+    let none = DisparityImage { min_disparity: f32::NAN, ..message.clone() };
+    assert_eq!(depth_of_message(&none).1, 0);
+    let window = RegionOfInterest { x_offset: 1, width: u32::MAX, height: 1, ..Default::default() };
+    let windowed = DisparityImage { valid_window: window, ..message.clone() };
+    let (read, _) = depth_of_message(&windowed);
+    assert!(same_depth(&read, &[f32::NAN, all[1], all[2], all[3]]), "{read:?}");
+    for (f, t) in [(0.0, 0.12), (420.0, -0.12), (f32::NAN, 1.0), (420.0, f32::INFINITY)] {
+        let wrong = DisparityImage { f, t, ..message.clone() };
+        let error = decode_disparity(&wrong, None, None, &Limits::default()).unwrap_err();
+        assert!(error.to_string().contains("have to be positive"), "{error}");
+    }
+    let in_millimetres = DisparityImage { t: 120.0, ..message };
+    let read = decode_disparity(&in_millimetres, None, Some(1e-3), &Limits::default()).unwrap();
+    assert!(same_depth(read.depth.pixels(), &all));
 }
 
 proptest! {

@@ -22,6 +22,8 @@ pub(super) enum Order {
     Packed([usize; 4]),
     /// All of Y, then a row of colour pairs for each two rows; the place of U in a pair.
     TwoPlanes(usize),
+    /// All of Y, then a colour pair for each pixel; the place of U in a pair.
+    FullPlanes(usize),
 }
 
 impl Order {
@@ -33,6 +35,7 @@ impl Order {
             "yuv422_yuy2" | "yuyv" => Self::Packed([0, 2, 1, 3]),
             "nv12" => Self::TwoPlanes(0),
             "nv21" => Self::TwoPlanes(1),
+            "nv24" => Self::FullPlanes(0),
             _ => return None,
         })
     }
@@ -41,19 +44,30 @@ impl Order {
 /// Decodes an image.
 ///
 /// # Errors
-/// An odd size, for which there are no pairs, and a length of the data that contradicts the size.
+/// An odd size where pixels share their colour, and a length of the data that contradicts the size.
 pub(super) fn decode(image: &Image<'_>, order: Order) -> Result<RgbImage, ImageError> {
     let (width, height) = (image.width as usize, image.height as usize);
-    let halves_rows = matches!(order, Order::TwoPlanes(_));
-    if !width.is_multiple_of(2) || (halves_rows && !height.is_multiple_of(2)) {
-        let encoding = &image.encoding;
-        return Err(ImageError::Layout(format!("{width}x{height} pixels of {encoding} are odd")));
-    }
     let pixels = match order {
-        Order::Packed(places) => packed(&Rows::new(image, height, 2 * width)?, places),
-        Order::TwoPlanes(u) => two_planes(&Rows::new(image, height + height / 2, width)?, u),
+        Order::Packed(places) => {
+            check_even(image, false)?;
+            packed(&Rows::new(image, height, 2 * width)?, places)
+        }
+        Order::TwoPlanes(u) => {
+            check_even(image, true)?;
+            two_planes(&Rows::new(image, height + height / 2, width)?, u)
+        }
+        Order::FullPlanes(u) => full_planes(image, u)?,
     };
     Ok(exact(width, height, pixels))
+}
+
+/// Checks that the pixels make pairs, in both directions if rows share their colour, too.
+fn check_even(image: &Image<'_>, halves_rows: bool) -> Result<(), ImageError> {
+    let Image { width, height, encoding, .. } = image;
+    if !width.is_multiple_of(2) || (halves_rows && !height.is_multiple_of(2)) {
+        return Err(ImageError::Layout(format!("{width}x{height} pixels of {encoding} are odd")));
+    }
+    Ok(())
 }
 
 fn packed(rows: &Rows<'_>, [first, second, u, v]: [usize; 4]) -> Vec<[u8; 3]> {
@@ -80,6 +94,23 @@ fn two_planes(rows: &Rows<'_>, u: usize) -> Vec<[u8; 3]> {
         }));
     }
     out
+}
+
+/// Decodes planes of one resolution. A line of colour pairs takes two lines of brightness.
+fn full_planes(image: &Image<'_>, u: usize) -> Result<Vec<[u8; 3]>, ImageError> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    // Drivers disagree on `step`, of which the common definition has one for all planes: if the
+    // lines have no padding, the length of the data tells.
+    let is_dense = image.data.len() == 3 * width * height;
+    let step = if is_dense { image.width } else { image.step };
+    let rows = Rows::new(&Image { step, ..image.clone() }, 3 * height, width)?;
+    let mut out = Vec::with_capacity(width * height);
+    for y in 0..height {
+        let pairs = rows.rows_from(height + 2 * y, 2);
+        let bright = rows.row(y).iter().enumerate();
+        out.extend(bright.map(|(x, y)| colour(*y, pairs[2 * x + u], pairs[2 * x + 1 - u])));
+    }
+    Ok(out)
 }
 
 fn colour(y: u8, u: u8, v: u8) -> [u8; 3] {

@@ -15,6 +15,8 @@ use std::ops::Range;
 use chunk::ChunkFault;
 use record::Opcode;
 
+use crate::bag;
+use crate::msgs::ROS1_MARK;
 use crate::walk::{Channel, Located, Walk};
 
 /// Error for a file that is not MCAP at all.
@@ -226,7 +228,12 @@ fn locate_message<R: Read>(walk: &mut Walk<R>, body: Range<usize>) -> Option<()>
     let (sequence, log_time) = (record::u32_at(head, 2), record::u64_at(head, 6));
     let publish_time = record::u64_at(head, 14);
     if let Some(channel) = walk.channel_of(id) {
-        let data = body.start + record::MESSAGE_HEAD..body.end;
+        let mut data = body.start + record::MESSAGE_HEAD..body.end;
+        if channel.encoding == bag::ENCODING {
+            // The mark takes the place of the last bytes of the head, which was read.
+            data.start -= ROS1_MARK.len();
+            walk.buffer[data.start..][..ROS1_MARK.len()].copy_from_slice(&ROS1_MARK);
+        }
         walk.deliver(Located { channel, log_time, publish_time, sequence, data });
     }
     Some(())
@@ -238,6 +245,7 @@ fn describe_start(start: &[u8]) -> String {
         [b'#', b'R', b'O', b'S', ..] => {
             "it is a ROS 1 bag of another version than 2.0; convert it with `rosbag fix`".into()
         }
+        [0x28, 0xb5, 0x2f, 0xfd, ..] => "it is compressed by zstd, twice or as a stream".into(),
         _ => format!("it starts with {start:02x?}"),
     }
 }

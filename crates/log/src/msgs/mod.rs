@@ -19,7 +19,9 @@ pub use geometry::{
     Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
 };
 use re_cdr::{BigEndian, LittleEndian};
-pub use sensor::{CameraInfo, CompressedImage, Image, JointState, LaserScan, RegionOfInterest};
+pub use sensor::{
+    CameraInfo, CompressedImage, DisparityImage, Image, JointState, LaserScan, RegionOfInterest,
+};
 use serde::{Deserialize, Serialize};
 pub use vision::{
     BoundingBox2D, BoundingBox3D, Detection2D, Detection2DArray, Detection3D, Detection3DArray,

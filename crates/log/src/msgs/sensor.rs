@@ -38,6 +38,30 @@ pub struct CompressedImage<'a> {
 
 message!(CompressedImage<'_>, "sensor_msgs/msg/CompressedImage", "CompressedImage.msg");
 
+/// `stereo_msgs/DisparityImage`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DisparityImage<'a> {
+    /// Time and camera, as in the image.
+    pub header: Header,
+    /// Disparities of the rectified left image, pixels.
+    #[serde(borrow)]
+    pub image: Image<'a>,
+    /// Focal length, pixels.
+    pub f: f32,
+    /// Baseline, m.
+    pub t: f32,
+    /// Part of the image that may have disparities; 0 by 0 is all of it.
+    pub valid_window: RegionOfInterest,
+    /// Minimum of the range that was searched, pixels; less is invalid.
+    pub min_disparity: f32,
+    /// Maximum of the range that was searched, pixels.
+    pub max_disparity: f32,
+    /// Resolution, pixels.
+    pub delta_d: f32,
+}
+
+message!(DisparityImage<'_>, "stereo_msgs/msg/DisparityImage", "DisparityImage.msg");
+
 /// `sensor_msgs/RegionOfInterest`, in unbinned pixels of the full image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RegionOfInterest {

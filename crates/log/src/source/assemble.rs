@@ -15,9 +15,10 @@ use super::mount::robot_frame;
 use super::plan::Plan;
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size};
 use crate::images::{
-    ImageError, Pixels, decode_compressed, decode_raw, size_of_compressed, size_of_raw,
+    DepthFromDisparity, ImageError, Pixels, decode_compressed, decode_compressed_disparity,
+    decode_disparity, decode_plain_disparity, decode_raw, size_of_compressed, size_of_raw,
 };
-use crate::msgs::{CompressedImage, Image, LaserScan, decode};
+use crate::msgs::{CompressedImage, DisparityImage, Image, LaserScan, decode};
 use crate::odometry::{PoseAt, unknown_motion};
 use crate::pairing::Payload;
 use crate::register::Registration;
@@ -433,12 +434,46 @@ fn lens_of(known: &Intrinsics, width: usize, height: usize) -> Lens {
 
 /// Decodes an image message; a failure is counted as lost.
 fn pixels(plan: &Plan, topic: &str, image: &Payload, tally: &mut Tally) -> Option<Pixels> {
+    if is_disparity(plan, topic) {
+        return depth_of_disparity(plan, topic, image, tally).map(Pixels::Depth);
+    }
     let (unit, limits) = (plan.input.depth_unit_m, &plan.limits);
     let of = |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => decode_raw(&image, unit, limits),
         AnyImage::Compressed(image) => decode_compressed(&image, unit, limits),
+        AnyImage::Disparity(image) => Err(ImageError::Encoding(image.image.encoding)),
     };
     read(plan, topic, image, tally, of)
+}
+
+/// Returns true for the depth topic if its images are disparities.
+fn is_disparity(plan: &Plan, topic: &str) -> bool {
+    let kind = plan.scan.topics.get(topic).map(|topic| topic.kind);
+    let is_depth = plan.chosen.depth.as_deref() == Some(topic);
+    is_depth && (plan.disparity.is_some() || kind == Some(Type::DisparityImage))
+}
+
+/// Decodes disparities to depth; invalid ones are counted.
+fn depth_of_disparity(
+    plan: &Plan,
+    topic: &str,
+    image: &Payload,
+    tally: &mut Tally,
+) -> Option<DepthImage> {
+    let unit_px = plan.input.disparity.and_then(|settings| settings.unit_px);
+    let (unit_m, limits) = (plan.input.depth_unit_m, &plan.limits);
+    let stereo = plan.disparity.ok_or_else(|| ImageError::NoDisparity("an image".into()));
+    let of = |image: AnyImage<'_>| match image {
+        AnyImage::Disparity(image) => decode_disparity(&image, unit_px, unit_m, limits),
+        AnyImage::Raw(image) => decode_plain_disparity(&image, stereo.clone()?, unit_px, limits),
+        AnyImage::Compressed(image) => {
+            decode_compressed_disparity(&image, stereo.clone()?, unit_px, limits)
+        }
+    };
+    let DepthFromDisparity { depth, invalid } = read(plan, topic, image, tally, of)?;
+    tally.add("disparity_pixels", depth.pixels().len() as u64);
+    tally.add("disparity_pixels_invalid", invalid as u64);
+    Some(depth)
 }
 
 /// Returns the size of an image that makes a frame, from its header; a failure is counted as lost.
@@ -446,14 +481,16 @@ fn size_without_pixels(plan: &Plan, image: &Payload, tally: &mut Tally) -> Optio
     let of = |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => size_of_raw(&image, &plan.limits),
         AnyImage::Compressed(image) => size_of_compressed(&image, &plan.limits),
+        AnyImage::Disparity(image) => size_of_raw(&image.image, &plan.limits),
     };
     read(plan, plan.primary(), image, tally, of)
 }
 
-/// Image message of one of the two types.
+/// Image message of one of the types.
 enum AnyImage<'a> {
     Raw(Image<'a>),
     Compressed(CompressedImage<'a>),
+    Disparity(DisparityImage<'a>),
 }
 
 /// Reads an image message with `of`; a failure is counted as lost.
@@ -467,6 +504,7 @@ fn read<T>(
     let kind = plan.scan.topics.get(topic).map(|topic| topic.kind);
     let message = match kind {
         Some(Type::Image) => decode(&image.data).map(AnyImage::Raw),
+        Some(Type::DisparityImage) => decode(&image.data).map(AnyImage::Disparity),
         _ => decode(&image.data).map(AnyImage::Compressed),
     };
     message

@@ -4,7 +4,9 @@ use tagalong_core::{Stamp, planar_pose};
 
 use super::plan::Plan;
 use crate::InputSettings;
-use crate::msgs::{CameraInfo, CdrError, CompressedImage, Image, Odometry, TFMessage, decode};
+use crate::msgs::{
+    CameraInfo, CdrError, CompressedImage, DisparityImage, Image, Odometry, TFMessage, decode,
+};
 use crate::odometry::PoseBuffer;
 use crate::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
 use crate::scan::{Scan, Type, is_static};
@@ -171,6 +173,7 @@ fn payload(message: &Message<'_>) -> Result<Payload, CdrError> {
     let header = match Type::of(&message.channel.schema_name) {
         Type::Image => decode::<Image<'_>>(message.data)?.header,
         Type::CompressedImage => decode::<CompressedImage<'_>>(message.data)?.header,
+        Type::DisparityImage => decode::<DisparityImage<'_>>(message.data)?.header,
         _ => decode(message.data)?,
     };
     Ok(Payload::new(header, message.data))

@@ -41,7 +41,7 @@ pub struct LogFrame {
 pub struct LogFacts {
     /// Path of the file.
     pub path: PathBuf,
-    /// Size of the file, bytes.
+    /// Size of the file, bytes; of a compressed one unpacked, as the hash.
     pub bytes: u64,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,

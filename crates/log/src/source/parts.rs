@@ -1,10 +1,9 @@
 //! Second pass over the files of a log, one after the other.
 
-use std::fs::File;
 use std::sync::Arc;
 
 use super::assembly::Messages;
-use crate::log_files::open_file;
+use crate::packed::LogFile;
 use crate::scan::{LogPart, Scan};
 use crate::walk::Message;
 use crate::walker::LogWalker;
@@ -14,7 +13,7 @@ use crate::{Limits, LogError};
 pub(super) struct PartsWalker {
     scan: Arc<Scan>,
     limits: Limits,
-    walker: LogWalker<File>,
+    walker: LogWalker<LogFile>,
     /// Number of files that have been opened.
     opened: usize,
     /// Bytes of the files that are finished.
@@ -87,8 +86,10 @@ impl Messages for PartsWalker {
     }
 }
 
-fn open_part(part: &LogPart, limits: &Limits) -> Result<LogWalker<File>, LogError> {
-    let walker = LogWalker::at(&part.path, open_file(&part.path)?, limits)
+fn open_part(part: &LogPart, limits: &Limits) -> Result<LogWalker<LogFile>, LogError> {
+    let file = LogFile::open(&part.path, limits)?;
+    let contents = file.path().to_owned();
+    let walker = LogWalker::at(&contents, file, limits)
         .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?;
     Ok(walker.knowing(part.channels.iter().cloned()))
 }

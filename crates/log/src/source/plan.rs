@@ -9,9 +9,10 @@ use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use super::assembly::{Assembly, Messages};
 use super::mount::{Mount, robot_frame};
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
-use crate::scan::Scan;
+use crate::images::StereoGeometry;
+use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
-use crate::topics::{Chosen, choose, missing};
+use crate::topics::{Chosen, choose, missing, unreadable};
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
 /// Function that starts another pass over the same messages.
@@ -28,6 +29,8 @@ pub(super) struct Plan {
     pub(super) lens: Option<Intrinsics>,
     depth_lens: Option<Intrinsics>,
     pub(super) baseline_m: Option<f64>,
+    /// Geometry of depth images that are disparities without one of their own.
+    pub(super) disparity: Option<StereoGeometry>,
     /// Source of the odometry. `None`: no odometry. `Some(None)`: its topic. Else the two frames of
     /// tf.
     pub(super) odom_frames: Option<Option<(String, String)>>,
@@ -146,17 +149,23 @@ pub(super) fn plan(
     reread: Reread<'_>,
 ) -> Result<Plan, LogError> {
     let chosen = choose(&scan, input, inputs)?;
-    let depth_lens = lens_of(&scan, chosen.depth.as_deref(), chosen.depth_info.as_deref())?;
+    let depth_lens = lens_of(
+        &scan,
+        chosen.depth.as_deref(),
+        chosen.depth_info.as_deref(),
+        input.disparity.is_some(),
+    )?;
     let lens = match chosen.colour {
-        Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref())?,
+        Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref(), false)?,
         None => depth_lens,
     };
-    let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref())?;
+    let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref(), false)?;
     let mut plan = Plan {
         mount: Mount::assumed(),
         lens: lens.or_else(|| depth_lens.filter(|_| same_frame(&scan, &chosen))),
         depth_lens,
         baseline_m: right.and_then(|right| right.baseline_m),
+        disparity: None,
         odom_frames: odom_frames(&scan, &chosen, input),
         scan,
         chosen,
@@ -165,12 +174,27 @@ pub(super) fn plan(
         inputs,
     };
     check_calibration(&plan, tally)?;
+    plan.disparity = stereo_geometry(&plan)?;
     plan.mount = find_mount(&plan, reread)?;
     tally.note(format!("the pose of the camera comes from {}", plan.mount.source()));
+    note_unread_images(&plan, tally);
     if plan.odom_frames.is_none() {
         tally.note("no odometry: the robot is taken to be at rest");
     }
     Ok(plan)
+}
+
+/// Counts the images that cannot be read, if the log has no others of their kind.
+fn note_unread_images(plan: &Plan, tally: &mut Tally) {
+    if plan.chosen.colour.is_some() || !plan.inputs.uses(Input::Colour) {
+        return;
+    }
+    for (name, topic) in &plan.scan.topics {
+        if let Some(why) = unreadable(topic) {
+            tally.add("messages_not_read", topic.count);
+            tally.note(format!("{name} is not read: {why}"));
+        }
+    }
 }
 
 fn same_frame(scan: &Scan, chosen: &Chosen) -> bool {
@@ -183,15 +207,57 @@ fn lens_of(
     scan: &Scan,
     image: Option<&str>,
     info: Option<&str>,
+    is_disparity: bool,
 ) -> Result<Option<Intrinsics>, LogError> {
     let (Some(image), Some(topic)) = (image, info) else { return Ok(None) };
     let Some(info) = scan.infos.get(topic) else { return Ok(None) };
-    // The name of the topic is the only sign that images are rectified.
-    intrinsics(info, image.contains("rect")).map(Some).map_err(|source| LogError::Calibration {
+    // Of other images, the name of the topic is the only sign that they are rectified.
+    let is_disparity = is_disparity || scan.topics.get(image).is_some_and(is_disparity_image);
+    let is_rectified = image.contains("rect") || is_disparity;
+    intrinsics(info, is_rectified).map(Some).map_err(|source| LogError::Calibration {
         path: scan.path.clone(),
         topic: topic.to_owned(),
         source,
     })
+}
+
+/// Returns true for images of disparities, which are those of the rectified left camera.
+fn is_disparity_image(topic: &Topic) -> bool {
+    topic.kind == Type::DisparityImage
+}
+
+/// Returns the geometry of disparities that come without one; `None` for all other depth.
+///
+/// # Errors
+/// A log that has no calibration for it.
+fn stereo_geometry(plan: &Plan) -> Result<Option<StereoGeometry>, LogError> {
+    let (Some(settings), Some(depth)) = (plan.input.disparity, &plan.chosen.depth) else {
+        return Ok(None);
+    };
+    if plan.scan.topics.get(depth).is_some_and(is_disparity_image) {
+        return Ok(None);
+    }
+    let Some(lens) = plan.depth_lens.or(plan.lens) else {
+        let hint = "; name it as `depth_info_topic` under [input]".to_owned();
+        return Err(missing(&plan.scan, format!("calibration of the disparities {depth}"), hint));
+    };
+    let Some(baseline_m) = settings.baseline_m.or_else(|| right_baseline_m(plan)) else {
+        let hint = "; set `disparity.baseline_m` under [input], or name the right camera's \
+                    camera_info as `right_info_topic`";
+        let wanted = format!("baseline of the disparities {depth}");
+        return Err(missing(&plan.scan, wanted, hint.to_owned()));
+    };
+    Ok(Some(StereoGeometry { focal_px: lens.lens.fx, baseline_m }))
+}
+
+/// Returns the baseline of the right camera that the settings name, else of the only one.
+fn right_baseline_m(plan: &Plan) -> Option<f64> {
+    let of = |info| intrinsics(info, true).ok()?.baseline_m.filter(|baseline| *baseline > 0.0);
+    if let Some(named) = &plan.chosen.right_info {
+        return of(plan.scan.infos.get(named)?);
+    }
+    let mut all = plan.scan.infos.values().filter_map(of);
+    all.next().filter(|_| all.next().is_none())
 }
 
 /// Checks that there is a calibration if positions in metres need it; a monocular pipeline works

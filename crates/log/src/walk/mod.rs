@@ -10,6 +10,7 @@ use std::sync::Arc;
 pub(crate) use source::Source;
 
 use crate::Limits;
+use crate::packed::{is_packed, unpack_message};
 
 /// Stream of messages of one type.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,6 +52,7 @@ pub const LOSSES: &[&str] = &[
     "conflicting_channels",
     "crc_failed_chunks",
     "damaged_chunks",
+    "damaged_compression",
     "damaged_records",
     "data_section_crc_failed",
     "nested_chunks",
@@ -86,6 +88,9 @@ pub(crate) struct Walk<R> {
     /// Offset of the current top-level record in the file.
     pub(crate) offset: u64,
     pub(crate) located: Option<Located>,
+    /// The message itself, if it is compressed in the buffer.
+    unpacked: Vec<u8>,
+    is_unpacked: bool,
     pub(crate) counters: Counters,
     pub(crate) notes: Vec<String>,
     pub(crate) ended: bool,
@@ -102,6 +107,8 @@ impl<R: Read> Walk<R> {
             buffer: Vec::new(),
             rest: 0..0,
             located: None,
+            unpacked: Vec::new(),
+            is_unpacked: false,
             counters: BTreeMap::new(),
             notes: Vec::new(),
             ended: false,
@@ -116,7 +123,7 @@ impl<R: Read> Walk<R> {
             log_time: found.log_time,
             publish_time: found.publish_time,
             sequence: found.sequence,
-            data: &self.buffer[found.data.clone()],
+            data: if self.is_unpacked { &self.unpacked } else { &self.buffer[found.data.clone()] },
         })
     }
 
@@ -166,8 +173,17 @@ impl<R: Read> Walk<R> {
         known
     }
 
-    /// Delivers a message.
+    /// Delivers a message, unpacked if it is compressed.
     pub(crate) fn deliver(&mut self, located: Located) {
+        let data = &self.buffer[located.data.clone()];
+        // Messages in other encodings than CDR may start with any bytes.
+        self.is_unpacked = located.channel.encoding == "cdr" && is_packed(data);
+        if self.is_unpacked {
+            if let Err((counter, why)) = unpack_message(data, &self.limits, &mut self.unpacked) {
+                return self.fault(counter, || why);
+            }
+            self.count("messages_unpacked");
+        }
         self.located = Some(located);
         self.count("messages");
     }

@@ -56,6 +56,16 @@ impl LogWriter {
         self.writer.write_to_known_channel(&header, data).unwrap();
     }
 
+    /// Writes a message of a type and in an encoding of any name.
+    pub fn foreign(&mut self, topic: &str, name: &str, encoding: &str, stamp: Stamp, data: &[u8]) {
+        let schema = self.writer.add_schema(name, "", b"").unwrap();
+        let channel_id =
+            self.writer.add_channel(schema, topic, encoding, &BTreeMap::new()).unwrap();
+        let time = stamp.nanos();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        self.writer.write_to_known_channel(&header, data).unwrap();
+    }
+
     pub fn message<T: Message + Serialize>(&mut self, topic: &str, stamp: Stamp, message: &T) {
         self.bytes::<T>(topic, stamp, &encode(message));
     }

@@ -1,0 +1,85 @@
+use super::super::evidence::Evidence;
+use super::super::finding::{Finding, Severity};
+
+/// Counters of messages that are skipped without being damaged: the name, the words, the remedy.
+const SKIPPED: [(&str, &str, &str); 8] = [
+    (
+        "messages_not_read",
+        "images in an encoding that is not read",
+        "record jpeg, rgb8 or bayer_*8 in place of it",
+    ),
+    (
+        "laser_scans_without_pose",
+        "scans without a pose of the scanner",
+        "publish tf from the robot to the scanner, throughout",
+    ),
+    (
+        "detections_without_transform",
+        "recorded detections without a transform",
+        "publish tf from the robot to their frame, throughout",
+    ),
+    (
+        "frames_without_camera_pose",
+        "images at times without a pose of the camera",
+        "publish tf to the camera throughout, or give [input.camera]",
+    ),
+    ("late_frames", "images too late to be put in order", "[input] reorder_frames = 8"),
+    (
+        "duplicate_frames",
+        "images with the stamp of another",
+        "is the same image published twice, or a bag played in a loop?",
+    ),
+    (
+        "camera_info_changes",
+        "changes of the calibration",
+        "record with one calibration: the first one is used throughout",
+    ),
+    (
+        "disparity_pixels_invalid",
+        "pixels without a valid disparity",
+        "texture, light and the range of disparities decide how many there are: look at the \
+         matcher's settings",
+    ),
+];
+
+/// Share of the messages beyond which skipped ones are a serious problem.
+const MOST: f64 = 0.5;
+
+/// Share of pixels without disparity that is usual: half of them.
+const USUAL_INVALID: f64 = 0.5;
+
+/// Checks that messages were used, as far as the reader counts those that were not.
+pub fn skipped(evidence: &Evidence) -> Option<Finding> {
+    let found: Vec<_> = SKIPPED
+        .iter()
+        .filter_map(|(name, words, remedy)| Some((share(evidence, name)?, *words, *remedy)))
+        .filter(|((severity, _), ..)| *severity > Severity::Ok)
+        .collect();
+    if found.is_empty() {
+        return Some(Finding::new("skipped", Severity::Ok, "no message was left out"));
+    }
+    let severity = found.iter().map(|((severity, _), ..)| *severity).max()?;
+    let measured: Vec<String> =
+        found.iter().map(|((_, count), words, _)| format!("{count} {words}")).collect();
+    let remedies: Vec<&str> = found.iter().map(|(.., remedy)| *remedy).collect();
+    let notes = evidence.inspection.notes.iter().filter(|note| note.contains("is not read"));
+    let remedies: Vec<&str> = remedies.into_iter().chain(notes.map(String::as_str)).collect();
+    let finding = Finding::new("skipped", severity, measured.join(", "))
+        .why("people in messages that are left out are missed, and nothing else says so");
+    Some(finding.remedy(remedies.join("\n")))
+}
+
+/// Returns the severity of a counter, and its count; `None` if nothing was counted.
+fn share(evidence: &Evidence, name: &str) -> Option<(Severity, u64)> {
+    let counters = &evidence.inspection.counters;
+    let count = *counters.get(name).filter(|count| **count > 0)?;
+    let (of, usual) = match name {
+        "disparity_pixels_invalid" => {
+            (counters.get("disparity_pixels").copied().unwrap_or(0), USUAL_INVALID)
+        }
+        _ => (evidence.reading.wanted.max(evidence.reading.made), 0.0),
+    };
+    let share = count as f64 / of.max(1) as f64;
+    let serious = usual + MOST * (1.0 - usual);
+    Some((Severity::beyond(share, usual, serious), count))
+}
