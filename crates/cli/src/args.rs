@@ -12,6 +12,7 @@ use tagalong_experiments::trials::TrialsArgs;
 use tagalong_import::ImportArgs;
 use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
+use tagalong_view::{HELP as VIEW_HELP, ViewArgs};
 use tagalong_webcams::TriangulateArgs;
 
 use crate::commands::{EvalArgs, ModelArgs};
@@ -45,6 +46,9 @@ pub enum Command {
     /// Tracks the people of a log
     #[command(after_help = RUN_HELP)]
     Run(RunArgs),
+    /// Makes a page of a run to look at: images, plan, events, and why a person was missed
+    #[command(after_help = VIEW_HELP)]
+    View(ViewArgs),
     /// Lists the plugins
     #[command(after_help = "Example:\n  tagalong list --format json")]
     List {

@@ -17,6 +17,8 @@ use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
+use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
+use tagalong_app::origin::Origin;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::progress::Progress;
 use tagalong_app::serialize::to_json;
@@ -25,7 +27,7 @@ use tagalong_app::suggest::check_log_path;
 use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
-use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError};
+use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog, WriteError};
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 use tagalong_render::{Overlay, OverlayData};
@@ -207,6 +209,8 @@ impl Desk {
             command: report.command.map(|command| command.wheels),
         };
         self.log.write(&record).map_err(Failure::failed)?;
+        let notes = FrameNotes::of(report, &item.frame.frame.camera, &item.frame.odom_from_robot);
+        self.log.write_json(FRAME_NOTES_TOPIC, report.stamp, &notes).map_err(Failure::failed)?;
         self.timings.add("write", ms_since(writing));
         Ok(())
     }
@@ -231,7 +235,9 @@ impl Desk {
         }
         let times = to_json("timings.json", &self.timings.summary())?;
         let json = to_json("report.json", &report)?;
-        let folder = self.log.finish(about(&report), &json, &times).map_err(Failure::failed)?;
+        let origin = to_json("origin.json", &Origin::of(args.log(), args.config()))?;
+        let texts = RunTexts { report: &json, timings: &times, origin: &origin };
+        let folder = self.log.finish(about(&report), &texts).map_err(Failure::failed)?;
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,

@@ -32,6 +32,7 @@ pub(super) struct McapTracks<W: Write + Seek> {
     tf: Channel,
     target: Option<Channel>,
     people: BTreeMap<TrackId, Channel>,
+    texts: BTreeMap<String, Channel>,
 }
 
 /// Topic with its number of messages.
@@ -62,7 +63,16 @@ impl<W: Write + Seek> McapTracks<W> {
         let tracks = open::<Detection3DArray, W>(&mut writer, "/people/tracks")?;
         let json = open::<StringMsg, W>(&mut writer, "/people/tracks_json")?;
         let tf = open::<TFMessage, W>(&mut writer, "/tf")?;
-        Ok(Self { writer, frames, tracks, json, tf, target: None, people: BTreeMap::new() })
+        Ok(Self {
+            writer,
+            frames,
+            tracks,
+            json,
+            tf,
+            target: None,
+            people: BTreeMap::new(),
+            texts: BTreeMap::new(),
+        })
     }
 
     /// Writes one frame.
@@ -75,6 +85,18 @@ impl<W: Write + Seek> McapTracks<W> {
         let tf = encode(&messages::transforms(record, &self.frames));
         self.tf.send(&mut self.writer, at, &tf)?;
         self.write_poses(record)
+    }
+
+    /// Writes a text to a topic of its own, opened on first use.
+    pub fn write_text(&mut self, topic: &str, at: Stamp, data: String) -> McapResult<()> {
+        if !self.texts.contains_key(topic) {
+            let channel = open::<StringMsg, W>(&mut self.writer, topic)?;
+            self.texts.insert(topic.to_owned(), channel);
+        }
+        match self.texts.get_mut(topic) {
+            Some(channel) => channel.send(&mut self.writer, at, &encode(&StringMsg { data })),
+            None => Ok(()),
+        }
     }
 
     fn write_poses(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {

@@ -35,7 +35,8 @@ fn log(dir: &Path, frames: u64, finish: bool) {
         with_record(index, &[track(12), tentative.clone()], |r| log.write(r)).unwrap();
     }
     if finish {
-        log.finish(BTreeMap::from([("seed".into(), "1".into())]), "{}\n", "{}\n").unwrap();
+        let texts = RunTexts { report: "{}\n", timings: "{}\n", origin: "{}\n" };
+        log.finish(BTreeMap::from([("seed".into(), "1".into())]), &texts).unwrap();
     } else {
         std::mem::forget(log);
     }
