@@ -232,13 +232,18 @@ fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<PlannedConfig>, F
     shipped(registry)
 }
 
-/// Reads every config in configs.
+/// Reads every config in configs, or every built-in one outside of a clone.
 ///
 /// # Errors
 /// If there is none.
 pub fn shipped(registry: &Registry) -> Result<Vec<PlannedConfig>, Failure> {
     let mut found = Vec::new();
-    for path in toml_files(Path::new("configs")) {
+    let mut paths = toml_files(Path::new("configs"));
+    if paths.is_empty() {
+        // Outside of a clone those that need no file are compared.
+        paths = ConfigFile::built_in_names().map(Path::new).map(Path::to_owned).collect();
+    }
+    for path in paths {
         match candidate(&path, registry) {
             Ok(candidate) => found.push(candidate),
             // A broken config of the folder should not keep the others from running.

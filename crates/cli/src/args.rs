@@ -232,9 +232,9 @@ Examples:
   tagalong triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml --format json | jq .held_out";
 
 const RUN_HELP: &str = "\
-Files: tracks.mcap (open it in Rerun or Foxglove), tracks.csv (MOTChallenge columns, pixels),
-tracks-metres.csv, report.json (what was dropped and why), timings.json, and with --overlay
-overlay/000001.png and so on.
+Files: tracks.mcap (for `tagalong view`, Foxglove and Rerun), tracks.csv (MOTChallenge columns,
+pixels), tracks-metres.csv, report.json (what was dropped and why), timings.json, origin.json, and
+with --overlay overlay/000001.png and so on.
 
 Examples:
   tagalong run --overlay --overwrite       (built-in config, drawn log)
@@ -242,6 +242,7 @@ Examples:
   tagalong run depth-verified robot.mcap   (a built-in pipeline, from any folder)
   tagalong run configs/depth-ekf.toml robot.mcap
   tagalong run configs/depth-ekf.toml robot.mcap -o out --overlay --overwrite
+  tagalong run robot.mcap --with-images    (tracks.mcap with the images, for Foxglove)
   tagalong run configs/depth-ekf.toml robot.mcap --format json | jq .funnel";
 
 const CONFIG_HELP: &str = "\

@@ -88,6 +88,7 @@ fn run_args(folder: &Path, name: &str, config: PathBuf, log: &Path) -> RunArgs {
         config: Some(config),
         log: Some(log.to_owned()),
         output: Some(folder.join(name)),
+        with_images: false,
         overlay: true,
         overwrite: true,
         strict: false,

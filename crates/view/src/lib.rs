@@ -233,6 +233,7 @@ fn read_truth(
         notes.push(format!("{} has nobody in the frames shown", path.display()));
         return Ok(None);
     }
-    notes.push(format!("truth: {}", path.display()));
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    notes.push(format!("truth: {name}"));
     Ok(Some(truth))
 }

@@ -125,7 +125,7 @@
       const taken = [];
       for (const track of frame.tracks) {
         const sign = frame.target === track.id ? "◎" : "";
-        parts.push(label(taken, track.box, `${sign}${track.id}${STATES[track.state]} ${fixed(track.d, 1)} m`, k));
+        parts.push(label(taken, track.box, `${sign}${track.id}${STATES[track.state]} · ${fixed(track.d, 1)} m`, k));
       }
     }
     if (state.question) parts.push(outline(state.question.box, "asked", k, 2, "the place in question"));
@@ -214,6 +214,7 @@
 
   const personMark = (run, track, k) => {
     const [x, y] = [track.at[0], -track.at[1]];
+    const r = Math.min(Math.max(0.2, 5 * k), 9 * k);
     const kind = track.state === "tentative" ? "tentative"
       : `${colour(track.id)}${track.state === "seen" ? "" : " guess"}`;
     const ahead = { x1: x, y1: y, x2: x + track.v[0], y2: y - track.v[1] };
@@ -221,8 +222,8 @@
       svg("title", {}, describe(track)),
       id("show-trails").checked && track.state !== "tentative" ? planTrail(run, track, k) : null,
       track.state === "tentative" ? null : svg("line", { class: `speed ${colour(track.id)}`, ...ahead, "stroke-width": 2.5 * k }),
-      svg("circle", { class: `person ${kind}`, cx: x, cy: y, r: Math.max(0.2, 6 * k), "stroke-width": 2 * k }),
-      svg("text", { class: "plan-text", x: x + 11 * k, y: y - 6 * k, "font-size": 13 * k, "stroke-width": 3 * k }, String(track.id)));
+      svg("circle", { class: `person ${kind}`, cx: x, cy: y, r, "stroke-width": 2 * k }),
+      svg("text", { class: "plan-text", x: x + 0.8 * r + 3 * k, y: y - 0.8 * r, "font-size": 13 * k, "stroke-width": 3 * k }, String(track.id)));
   };
 
   const truthSpots = (run, k) => truthAt(state.at).filter((person) => person.at).map((person) => {
@@ -315,10 +316,10 @@
 
   // ---- tables ----------------------------------------------------------------------------------
 
+  const NUMBERS = ["Distance", "Speed", "Probability", "Number"];
   const table = (caption, heads, rows) =>
-    el("div", { class: "scroll" }, el("table", {},
-      el("caption", { class: "unseen" }, caption),
-      el("thead", {}, el("tr", {}, ...heads.map((head) => el("th", { scope: "col" }, head)))),
+    el("div", { class: "scroll", role: "region", "aria-label": caption, tabindex: "0" }, el("table", {},
+      el("thead", {}, el("tr", {}, ...heads.map((head) => el("th", { scope: "col", class: NUMBERS.includes(head) ? "number" : "" }, head)))),
       el("tbody", {}, ...rows)));
 
   const number = (text) => el("td", { class: "number" }, text);
@@ -330,7 +331,7 @@
     const row = (track) => el("tr", {},
       el("th", { scope: "row" }, el("span", { class: `swatch ${colour(track.id)}` }), String(track.id)),
       el("td", {}, track.state), number(`${fixed(track.d, 2)} m`), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
-    return place.replaceChildren(table("People in this frame", ["Person", "State", "Distance", "Speed", "Probability"], tracks.map(row)));
+    return place.replaceChildren(table(`People of ${run.name}`, ["Person", "State", "Distance", "Speed", "Probability"], tracks.map(row)));
   };
 
   const settings = (run, test) => {
@@ -348,7 +349,7 @@
       el("th", { scope: "row" }, test.test), number(String(test.n)), el("td", {}, bar(test.n / most)));
     return place.replaceChildren(
       el("p", {}, `${frame.found.length} candidates: ${used.length - started} given to tracks, ${started} started one, ${frame.found.length - used.length} dropped.`),
-      frame.dropped.length ? table("Funnel of this frame", ["Dropped by", "Number", ""], frame.dropped.map(row)) : el("p", { class: "soft" }, "No test dropped anything."));
+      frame.dropped.length ? table(`Funnel of ${run.name}`, ["Dropped by", "Number", "Share"], frame.dropped.map(row)) : el("p", { class: "soft" }, "No test dropped anything."));
   };
 
   const bar = (part) => {
@@ -407,7 +408,7 @@
       el("th", { scope: "row" }, test), el("td", {}, texts.length > 1 ? `${texts.length}: ${texts[0]}` : texts[0]), settings(run, test));
     const parts = tracksNear(frame, state.question).map((text) => el("p", {}, text));
     parts.push(groups.length
-      ? table("Tests that dropped candidates here", ["Dropped by", "What", "Decided by"], groups.map(row))
+      ? table(`Tests of ${run.name} that dropped candidates here`, ["Dropped by", "What", "Decided by"], groups.map(row))
       : el("p", {}, silent(frame)));
     const around = aroundCounts(run, state.question);
     if (around.length) parts.push(el("p", { class: "soft" }, `In the ${2 * AROUND + 1} frames around: ${around.map(([test, n]) => `${test} in ${n}`).join(", ")}.`));

@@ -137,11 +137,11 @@ fn time_line(runs: usize) -> Markup {
             }
             input type="range" id="frame" min="0" max="0" value="0" step="1" aria-label="Frame";
             div class="controls" {
-                (button("before", "⏮", "Previous event"))
+                (button("before", "|◂", "Previous event"))
                 (button("back", "◂", "One frame back"))
                 (button("play", "▶", "Play"))
                 (button("ahead", "▸", "One frame ahead"))
-                (button("next", "⏭", "Next event"))
+                (button("next", "▸|", "Next event"))
                 output id="clock" for="frame" {}
                 label { "Speed " select id="speed" {
                     option value="0.25" { "¼" } option value="0.5" { "½" }

@@ -3,6 +3,7 @@
 mod args;
 mod choice;
 mod frames;
+mod images;
 mod pictures;
 mod report;
 mod summary;
@@ -30,7 +31,7 @@ use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog, WriteError};
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
-use tagalong_render::{Overlay, OverlayData};
+use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
 
 /// Runs a pipeline over a log.
@@ -84,7 +85,8 @@ impl Job {
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();
         // A picture shows colour, whether or not the pipeline uses it.
-        let inputs = if args.overlay { inputs.accept(Input::Colour) } else { inputs };
+        let wants_pictures = args.overlay || args.with_images;
+        let inputs = if wants_pictures { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)?;
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
@@ -151,6 +153,7 @@ fn work(
         let people = report.tracks.iter().filter(|track| track.confirmed && track.seen).count();
         progress.show(item.progress, report.index, people);
         desk.take(&item, &report)?;
+        desk.pass_image(&item, &report)?;
         pictures.draw(|| scene(&item, report))?;
     }
 }
@@ -175,6 +178,7 @@ struct Desk {
     overlay: Option<Overlay>,
     tally: Tally,
     timings: Timings,
+    with_images: bool,
 }
 
 impl Desk {
@@ -183,10 +187,16 @@ impl Desk {
         let overlay =
             if args.overlay { Some(Overlay::new(dir.overlay().map_err(refused)?)) } else { None };
         let input = &job.outer.input;
-        let names = FrameNames { base: input.base_frame.clone(), odom: input.odom_frame.clone() };
+        let camera = job.source.facts().camera_frame.clone();
+        let names = FrameNames {
+            base: input.base_frame.clone(),
+            odom: input.odom_frame.clone(),
+            camera: camera.unwrap_or_else(|| "camera".into()),
+        };
         let log = TrackLog::create(dir, names, job.outer.output.clone(), &job.resolved)
             .map_err(refused)?;
-        Ok(Self { log, overlay, tally: Tally::default(), timings: Timings::default() })
+        let (tally, timings) = (Tally::default(), Timings::default());
+        Ok(Self { log, overlay, tally, timings, with_images: args.with_images })
     }
 
     /// Adds the report of a frame.
@@ -213,6 +223,16 @@ impl Desk {
         self.log.write_json(FRAME_NOTES_TOPIC, report.stamp, &notes).map_err(Failure::failed)?;
         self.timings.add("write", ms_since(writing));
         Ok(())
+    }
+
+    /// Adds the image of a frame, where that is wanted.
+    fn pass_image(&mut self, item: &Item, report: &FrameReport) -> Result<(), Failure> {
+        if !self.with_images || !report.outcome.is_processed() {
+            return Ok(());
+        }
+        let Some(image) = background(&item.frame.frame.images()) else { return Ok(()) };
+        let jpeg = images::jpeg(&image)?;
+        self.log.write_image(report.stamp, &jpeg).map_err(Failure::failed)
     }
 
     /// Finishes the files and prints a summary.

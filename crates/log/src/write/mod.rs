@@ -13,6 +13,7 @@ mod message_log;
 mod messages;
 mod record;
 mod run_dir;
+mod scene;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -112,6 +113,15 @@ impl TrackLog {
         let in_words = |why| io::Error::other(format!("a message of {topic} as JSON: {why}"));
         let text = serde_json::to_string(value).map_err(in_words).map_err(WriteError::io(&path))?;
         self.mcap.write_text(topic, at, text).map_err(WriteError::mcap(&path))
+    }
+
+    /// Writes a JPEG as the image of a frame to `tracks.mcap`; `at` is the stamp of the frame.
+    ///
+    /// # Errors
+    /// [`WriteError::Mcap`].
+    pub fn write_image(&mut self, at: Stamp, jpeg: &[u8]) -> Result<(), WriteError> {
+        let path = self.file("tracks.mcap");
+        self.mcap.write_image(at, jpeg).map_err(WriteError::mcap(&path))
     }
 
     fn flush(&mut self, now: Stamp) -> Result<(), WriteError> {
