@@ -229,21 +229,22 @@ fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<PlannedConfig>, F
     if !args.configs.is_empty() {
         return args.configs.iter().map(|path| candidate(path, registry)).collect();
     }
+    // Outside of a clone those that need no file are compared.
+    if toml_files(Path::new("configs")).is_empty() {
+        return ConfigFile::built_in_names()
+            .map(|name| candidate(Path::new(name), registry))
+            .collect();
+    }
     shipped(registry)
 }
 
-/// Reads every config in configs, or every built-in one outside of a clone.
+/// Reads every config in configs.
 ///
 /// # Errors
 /// If there is none.
 pub fn shipped(registry: &Registry) -> Result<Vec<PlannedConfig>, Failure> {
     let mut found = Vec::new();
-    let mut paths = toml_files(Path::new("configs"));
-    if paths.is_empty() {
-        // Outside of a clone those that need no file are compared.
-        paths = ConfigFile::built_in_names().map(Path::new).map(Path::to_owned).collect();
-    }
-    for path in paths {
+    for path in toml_files(Path::new("configs")) {
         match candidate(&path, registry) {
             Ok(candidate) => found.push(candidate),
             // A broken config of the folder should not keep the others from running.

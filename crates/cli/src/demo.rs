@@ -114,14 +114,14 @@ Look at:
   {shown}/naive/overlay/: the same, with ids that change whenever somebody is hidden
 
 Try next:
+  tagalong view {shown}/depth-ekf {shown}/naive
+      both runs side by side in the browser, frame by frame
   tagalong trials --seeds 10
       are the differences luck? Ten draws of each hard scene
   tagalong run {shown}/depth-ekf.toml YOUR.mcap --overlay
       the log of your own robot
   tagalong simulate {shown}/demo-scene.toml --gallery pictures
       change the scene, and look at it
-  rerun {shown}/depth-ekf/tracks.mcap
-      the tracks in space, if you have Rerun
 "
     )
 }

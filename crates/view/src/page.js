@@ -129,7 +129,8 @@
       }
     }
     if (state.question) parts.push(outline(state.question.box, "asked", k, 2, "the place in question"));
-    target.replaceChildren(...parts.filter(Boolean));
+    // A picture of its own cuts off what lies outside of the image.
+    target.replaceChildren(svg("svg", { x: 0, y: 0, width: WIDTH, height: HEIGHT }, ...parts.filter(Boolean)));
   };
 
   const describe = (track) =>
@@ -151,6 +152,10 @@
         xs.push(track.at[0]);
         ys.push(track.at[1]);
       }
+    }
+    for (const people of data.truth || []) for (const person of people) if (person.at) {
+      xs.push(person.at[0]);
+      ys.push(person.at[1]);
     }
     const ends = (values) => {
       values.sort((a, b) => a - b);
@@ -183,7 +188,7 @@
     const [x, y, heading] = frame.robot;
     const parts = [];
     if (data.view_rad) {
-      const reach = 9;
+      const reach = 40;
       const end = (angle) => `${x + reach * Math.cos(heading + angle)},${-y - reach * Math.sin(heading + angle)}`;
       parts.push(svg("polygon", { class: "view", points: `${x},${-y} ${data.view_rad.map(end).join(" ")}` }));
     }
@@ -348,7 +353,7 @@
     const row = (test) => el("tr", {},
       el("th", { scope: "row" }, test.test), number(String(test.n)), el("td", {}, bar(test.n / most)));
     return place.replaceChildren(
-      el("p", {}, `${frame.found.length} candidates: ${used.length - started} given to tracks, ${started} started one, ${frame.found.length - used.length} dropped.`),
+      el("p", {}, `${frame.found.length} ${frame.found.length === 1 ? "candidate" : "candidates"}: ${used.length - started} given to tracks, ${started} started one, ${frame.found.length - used.length} dropped.`),
       frame.dropped.length ? table(`Funnel of ${run.name}`, ["Dropped by", "Number", "Share"], frame.dropped.map(row)) : el("p", { class: "soft" }, "No test dropped anything."));
   };
 
