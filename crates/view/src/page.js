@@ -399,10 +399,11 @@
       ? `A tentative track (${track.id}, probability ${fixed(track.p, 2)}) is here: the track manager has not confirmed it yet.`
       : `Person ${track.id} is tracked here, ${track.state}.`);
 
-  const silent = (frame) => {
-    const without = frame.dropped.filter((test) => !(test.boxes || []).length && !frame.found.some((c) => c.test === test.test));
-    const list = without.map((test) => `${test.test} ${test.n}`).join(", ");
-    return `No candidate was dropped near this place in this frame: no detector proposed one.${list ? ` Tests that keep no places: ${list}.` : ""}`;
+  // Many tests drop thousands of places and record some of them.
+  const unplaced = (frame) => {
+    const count = (test) => test.n - (test.boxes || []).length - frame.found.filter((c) => c.test === test.test).length;
+    const list = frame.dropped.filter((test) => count(test) > 0).map((test) => `${test.test} ${count(test)}`).join(", ");
+    return list ? `Anywhere in this frame, at places that were not recorded: ${list}.` : "";
   };
 
   const explain = (run, place) => {
@@ -414,7 +415,8 @@
     const parts = tracksNear(frame, state.question).map((text) => el("p", {}, text));
     parts.push(groups.length
       ? table(`Tests of ${run.name} that dropped candidates here`, ["Dropped by", "What", "Decided by"], groups.map(row))
-      : el("p", {}, silent(frame)));
+      : el("p", {}, "No recorded candidate was dropped near this place in this frame."));
+    parts.push(el("p", { class: "soft" }, unplaced(frame)));
     const around = aroundCounts(run, state.question);
     if (around.length) parts.push(el("p", { class: "soft" }, `In the ${2 * AROUND + 1} frames around: ${around.map(([test, n]) => `${test} in ${n}`).join(", ")}.`));
     return place.replaceChildren(...parts);

@@ -86,7 +86,8 @@ fn only_runs_of_one_log_are_compared() {
 #[test]
 fn what_is_no_run_is_answered_with_the_command_that_makes_one() {
     let home = home();
-    for (argument, said) in [("walk.mcap", "is a file"), (".", "no tracks.mcap"), ("x", "no such")] {
+    for (argument, said) in [("walk.mcap", "is a file"), (".", "no tracks.mcap"), ("x", "no such")]
+    {
         let output = view(home.path(), &[argument]);
         assert_eq!(code(&output), 2, "{argument}");
         let message = text(&output.stderr);
