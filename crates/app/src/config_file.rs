@@ -20,9 +20,10 @@ use crate::suggest::config_hint;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Configs that need no file. None of them extends another one, which would be a file.
-const BUILT_IN: [(&str, &str); 10] = [
+const BUILT_IN: [(&str, &str); 14] = [
     ("depth-alone", include_str!("../../../configs/depth-alone.toml")),
     ("depth-verified", include_str!("../../../configs/depth-verified.toml")),
+    ("depth-ekf-as-printed", include_str!("../../../configs/depth-ekf-as-printed.toml")),
     ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
     ("depth-net-ekf", include_str!("../../../configs/depth-net-ekf.toml")),
     ("stereo-verified", include_str!("../../../configs/stereo-verified.toml")),
@@ -31,6 +32,9 @@ const BUILT_IN: [(&str, &str); 10] = [
     ("mono", include_str!("../../../configs/mono.toml")),
     ("laser-legs", include_str!("../../../configs/laser-legs.toml")),
     ("laser-follow", include_str!("../../../configs/laser-follow.toml")),
+    ("follow-depth", include_str!("../../../configs/follow-depth.toml")),
+    ("naive", include_str!("../../../configs/naive.toml")),
+    ("recorded", include_str!("../../../configs/recorded.toml")),
 ];
 
 /// Text of a config file, with its path.
@@ -90,8 +94,16 @@ impl ConfigFile {
         Self::new("depth-ekf", include_str!("../../../configs/depth-ekf.toml"))
     }
 
-    /// Returns the built-in config of a name; `None` if there is none.
+    /// Returns the names of the built-in configs.
+    pub fn built_in_names() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name)
+    }
+
+    /// Returns the built-in config of a name, or of the file that it is in a clone; `None` if there
+    /// is none.
     pub fn named(name: &str) -> Option<Self> {
+        let file = name.strip_prefix("configs/");
+        let name = file.map_or(Some(name), |file| file.strip_suffix(".toml"))?;
         let (name, text) = BUILT_IN.iter().find(|(built_in, _)| *built_in == name)?;
         Some(Self::new(name, text))
     }

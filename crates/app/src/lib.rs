@@ -7,8 +7,11 @@
 pub mod choice;
 pub mod config_file;
 pub mod format;
+pub mod frame_notes;
+pub mod origin;
 pub mod outcome;
 pub mod progress;
+pub mod remedies;
 pub mod serialize;
 pub mod signals;
 pub mod suggest;

@@ -69,7 +69,7 @@ pub enum Step {
 /// Compared pipelines and logs.
 #[derive(Args, Clone, Debug)]
 pub struct PlanArgs {
-    /// The pipelines [default: every config in configs that suits a log].
+    /// The pipelines [default: every config in configs that suits a log, or every built-in one].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
     /// The logs; the truth of NAME.mcap is NAME.people.csv, NAME.truth.jsonl, NAME.boxes.csv, or in

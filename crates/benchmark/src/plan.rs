@@ -231,6 +231,12 @@ fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<PlannedConfig>, F
     if !args.configs.is_empty() {
         return args.configs.iter().map(|path| candidate(path, registry)).collect();
     }
+    // Outside of a clone those that need no file are compared.
+    if toml_files(Path::new("configs")).is_empty() {
+        return ConfigFile::built_in_names()
+            .map(|name| candidate(Path::new(name), registry))
+            .collect();
+    }
     shipped(registry)
 }
 

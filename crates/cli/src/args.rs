@@ -12,6 +12,7 @@ use tagalong_experiments::trials::TrialsArgs;
 use tagalong_import::ImportArgs;
 use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
+use tagalong_view::{HELP as VIEW_HELP, ViewArgs};
 use tagalong_webcams::TriangulateArgs;
 
 use crate::commands::{EvalArgs, ModelArgs};
@@ -45,6 +46,9 @@ pub enum Command {
     /// Tracks the people of a log
     #[command(after_help = RUN_HELP)]
     Run(RunArgs),
+    /// Makes a page of a run to look at: images, plan, events, and why a person was missed
+    #[command(after_help = VIEW_HELP)]
+    View(ViewArgs),
     /// Lists the plugins
     #[command(after_help = "Example:\n  tagalong list --format json")]
     List {
@@ -228,9 +232,9 @@ Examples:
   tagalong triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml --format json | jq .held_out";
 
 const RUN_HELP: &str = "\
-Files: tracks.mcap (open it in Rerun or Foxglove), tracks.csv (MOTChallenge columns, pixels),
-tracks-metres.csv, report.json (what was dropped and why), timings.json, and with --overlay
-overlay/000001.png and so on.
+Files: tracks.mcap (for `tagalong view`, Foxglove and Rerun), tracks.csv (MOTChallenge columns,
+pixels), tracks-metres.csv, report.json (what was dropped and why), timings.json, origin.json, and
+with --overlay overlay/000001.png and so on.
 
 Examples:
   tagalong run --overlay --overwrite       (built-in config, drawn log)
@@ -238,6 +242,7 @@ Examples:
   tagalong run depth-verified robot.mcap   (a built-in pipeline, from any folder)
   tagalong run configs/depth-ekf.toml robot.mcap
   tagalong run configs/depth-ekf.toml robot.mcap -o out --overlay --overwrite
+  tagalong run robot.mcap --with-images    (tracks.mcap with the images, for Foxglove)
   tagalong run configs/depth-ekf.toml robot.mcap --format json | jq .funnel";
 
 const CONFIG_HELP: &str = "\

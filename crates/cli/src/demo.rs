@@ -88,6 +88,7 @@ fn run_args(folder: &Path, name: &str, config: PathBuf, log: &Path) -> RunArgs {
         config: Some(config),
         log: Some(log.to_owned()),
         output: Some(folder.join(name)),
+        with_images: false,
         overlay: true,
         overwrite: true,
         strict: false,
@@ -113,14 +114,14 @@ Look at:
   {shown}/naive/overlay/: the same, with ids that change whenever somebody is hidden
 
 Try next:
+  tagalong view {shown}/depth-ekf {shown}/naive
+      both runs side by side in the browser, frame by frame
   tagalong trials --seeds 10
       are the differences luck? Ten draws of each hard scene
   tagalong run {shown}/depth-ekf.toml YOUR.mcap --overlay
       the log of your own robot
   tagalong simulate {shown}/demo-scene.toml --gallery pictures
       change the scene, and look at it
-  rerun {shown}/depth-ekf/tracks.mcap
-      the tracks in space, if you have Rerun
 "
     )
 }

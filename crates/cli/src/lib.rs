@@ -55,6 +55,7 @@ fn tell_panics_briefly() {
 fn dispatch(command: &Command, registry: &Registry) -> Outcome {
     match command {
         Command::Run(args) => run::run(args, registry),
+        Command::View(args) => tagalong_view::view(args),
         Command::List { format } => commands::list(registry, *format),
         Command::Config { plugin, format } => commands::config(registry, plugin, *format),
         Command::Schema => commands::schema(registry),

@@ -11,7 +11,13 @@ pub struct Dropped {
     pub count: u64,
     /// Region of the last one, if known.
     pub example: Option<Rect>,
+    /// Regions of the first ones that have one, at most [`MAX_PLACES`].
+    pub places: Vec<Rect>,
 }
+
+/// Largest number of regions that are kept of one test: enough for what is dropped near a person,
+/// and a bound for tests that look at every pixel.
+pub const MAX_PLACES: usize = 48;
 
 /// Rejection funnel: the number of candidates that each test dropped.
 ///
@@ -43,7 +49,11 @@ impl Funnel {
     /// Adds the entries of `other`.
     pub fn merge(&mut self, other: &Self) {
         for entry in &other.entries {
-            self.add(entry.test, entry.count, entry.example);
+            let own = self.entry(entry.test);
+            own.count += entry.count;
+            own.example = entry.example.or(own.example);
+            let room = MAX_PLACES - own.places.len();
+            own.places.extend(entry.places.iter().take(room));
         }
     }
 
@@ -57,14 +67,22 @@ impl Funnel {
         self.entries.iter().find(|e| e.test == test).map_or(0, |e| e.count)
     }
 
-    fn add(&mut self, test: &'static str, count: u64, example: Option<Rect>) {
-        match self.entries.iter_mut().find(|e| e.test == test) {
-            Some(entry) => {
-                entry.count += count;
-                entry.example = example.or(entry.example);
-            }
-            None => self.entries.push(Dropped { test, count, example }),
+    fn add(&mut self, test: &'static str, count: u64, region: Option<Rect>) {
+        let entry = self.entry(test);
+        entry.count += count;
+        entry.example = region.or(entry.example);
+        if entry.places.len() < MAX_PLACES {
+            entry.places.extend(region);
         }
+    }
+
+    /// Returns the entry of a test, a new one if it has none.
+    fn entry(&mut self, test: &'static str) -> &mut Dropped {
+        let index = self.entries.iter().position(|e| e.test == test).unwrap_or_else(|| {
+            self.entries.push(Dropped { test, count: 0, example: None, places: Vec::new() });
+            self.entries.len() - 1
+        });
+        &mut self.entries[index]
     }
 }
 
@@ -87,6 +105,19 @@ mod tests {
         assert_eq!(tests, [("small", 2), ("dark", 3)]);
         assert_eq!((funnel.count("small"), funnel.count("never")), (2, 0));
         assert_eq!(funnel.entries()[0].example, Some(at(2.0)), "the last one that was dropped");
+        assert_eq!(funnel.entries()[0].places, [at(1.0), at(2.0)]);
+    }
+
+    #[test]
+    fn the_first_places_are_kept_up_to_a_bound() {
+        let (mut sum, mut frame) = (Funnel::default(), Funnel::default());
+        (0..MAX_PLACES + 5).for_each(|x| frame.drop_at("small", at(x as f64)));
+        sum.drop_at("small", at(-1.0));
+        sum.merge(&frame);
+        let places = &sum.entries()[0].places;
+        assert_eq!((places.len(), places[0], places[1]), (MAX_PLACES, at(-1.0), at(0.0)));
+        assert_eq!(sum.count("small"), MAX_PLACES as u64 + 6);
+        assert_eq!(sum.entries()[0].example, Some(at(MAX_PLACES as f64 + 4.0)));
     }
 
     #[test]

@@ -51,7 +51,7 @@ pub use error::{Error, Result};
 pub use external::ExternalDetection;
 pub use filter::{Estimate, Evidence, Filter, FilterRequirements, Matched, Person, Update};
 pub use frame::{Derived, Frame, Images};
-pub use funnel::{Dropped, Funnel};
+pub use funnel::{Dropped, Funnel, MAX_PLACES};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
 pub use inputs::{Capabilities, Input, Inputs, Usage};
 pub use manager::{

@@ -4,6 +4,7 @@ use serde::Serialize;
 use tagalong_app::choice::fitting;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::progress::Progress;
+use tagalong_app::remedies::{self, Change, is_present};
 use tagalong_config::Registry;
 use tagalong_core::Inputs;
 use tagalong_log::{FrameSource, LogFrame};
@@ -11,7 +12,6 @@ use tagalong_pipeline::{Pipeline, with_values};
 use toml::Table;
 
 use super::coverage::{Course, Coverage};
-use super::remedies::{self, Change, is_present};
 use super::visit::{Scope, Visit};
 
 /// Most built-in configs that are tried beside the one of the user.

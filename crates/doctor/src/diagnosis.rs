@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use tagalong_app::outcome::{Failure, make_folder};
+use tagalong_app::remedies;
 
 use super::alternatives::Alternative;
 use super::comparison::Row;
 use super::coverage::Coverage;
 use super::finding::Finding;
 use super::visit::Visit;
-use super::{DoctorArgs, checks, present, remedies, sheets};
+use super::{DoctorArgs, checks, present, sheets};
 
 /// Complete result of the doctor.
 #[derive(Debug, Serialize)]

@@ -17,7 +17,6 @@ mod finding;
 mod preparations;
 mod present;
 mod print;
-pub mod remedies;
 mod scenery;
 mod sheets;
 mod snapshots;

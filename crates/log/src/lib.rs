@@ -13,6 +13,7 @@
 //! messages, [`images`] for pictures and [`Limits`] for sizes. Intact data is used; lost data is
 //! counted under a name.
 
+mod attachment;
 mod bag;
 pub mod camera_info;
 mod database;
@@ -41,6 +42,7 @@ mod walk;
 mod walker;
 pub mod write;
 
+pub use attachment::read_attachment;
 pub use error::LogError;
 pub use input::{DisparitySettings, InputSettings, MountSettings};
 pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};

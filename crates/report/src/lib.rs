@@ -34,5 +34,5 @@ pub use files::{csv, json};
 pub use model::{
     Benchmark, Dropped, EventRow, Outcome, StageTiming, TaskResult, TaskTiming, Timings, Trajectory,
 };
-pub use page::html;
+pub use page::{COLOURS, html};
 pub use summary::{Estimate, PairSummary, PipelineSummary, Summary};

@@ -4,6 +4,7 @@ mod gallery;
 mod realism;
 mod record;
 pub mod sample;
+pub mod scenes;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +16,7 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
-use tagalong_config::Registry;
+use tagalong_config::{Registry, nearest};
 use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
@@ -109,14 +110,21 @@ pub fn key_and_value(argument: &str) -> Result<(String, String), String> {
     Ok((key.trim().to_owned(), value.trim().to_owned()))
 }
 
-/// Reads a scene.
+/// Reads a scene: a file, or the name of a built-in one.
 ///
 /// # Errors
 /// A file that cannot be read, or a mistake in it with its place: exit code 2.
 pub fn read(path: &Path, variant: &Variant) -> Result<Scene, Failure> {
     let shown = path.display();
-    let text = fs::read_to_string(path)
-        .map_err(|error| Failure::usage(format!("cannot read scene {shown}: {error}")))?;
+    let text = match (fs::read_to_string(path), scenes::built_in(path)) {
+        (Ok(text), _) => text,
+        (Err(_), Some(text)) => text.to_owned(),
+        (Err(error), None) => {
+            let named = nearest(&path.to_string_lossy(), scenes::names());
+            let hint = named.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
+            return Err(Failure::usage(format!("cannot read scene {shown}: {error}{hint}")));
+        }
+    };
     Scene::parse_with(&text, variant)
         .map_err(|error| Failure::usage(error.render(&shown.to_string(), &text)))
 }

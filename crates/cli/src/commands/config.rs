@@ -1,9 +1,9 @@
 use tagalong_app::config_file::OuterSettings;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::remedies;
 use tagalong_app::serialize::to_json;
 use tagalong_config::{PluginInfo, Registry, commented_defaults};
-use tagalong_doctor::remedies;
 use tagalong_pipeline::PipelineSettings;
 
 use crate::keys;

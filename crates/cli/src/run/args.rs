@@ -10,7 +10,7 @@ pub struct RunArgs {
     /// depth-net-ekf, stereo-verified, stereo-street, omni-rich, mono, laser-legs,
     /// laser-follow [default: the one for what the log has].
     pub config: Option<PathBuf>,
-    /// The log, an MCAP file with ROS 2 messages [default: a short simulated one, written to
+    /// The log: .mcap, .db3, .bag, or the folder of a recording [default: a short simulated one, written to
     /// runs/sample.mcap].
     pub log: Option<PathBuf>,
     /// Output folder [default: runs/<log>-<config>].
@@ -19,6 +19,9 @@ pub struct RunArgs {
     /// Render a picture of every frame: boxes, ids, trails, and a view from above.
     #[arg(long)]
     pub overlay: bool,
+    /// Put the images into tracks.mcap, too, as JPEG, so that one file opens to a whole scene.
+    #[arg(long)]
+    pub with_images: bool,
     /// Replace the files of an earlier run in the same directory.
     #[arg(long)]
     pub overwrite: bool,
@@ -44,7 +47,11 @@ impl RunArgs {
     /// Returns the path of the log: a single path is that of the log if it looks like one.
     pub fn log(&self) -> &Path {
         let single = self.config.as_deref().filter(|path| is_log(path));
-        self.log.as_deref().or(single).unwrap_or(Path::new(SAMPLE))
+        match &self.log {
+            // Config and log in the other order mean the same.
+            Some(log) if !is_log(log) => single.unwrap_or(log),
+            log => log.as_deref().or(single).unwrap_or(Path::new(SAMPLE)),
+        }
     }
 
     /// Returns true if a log is given.
@@ -54,15 +61,53 @@ impl RunArgs {
 
     /// Returns the config, if one is given.
     pub fn config(&self) -> Option<&Path> {
-        self.config.as_deref().filter(|path| self.log.is_some() || !is_log(path))
+        let swapped = self.log.as_deref().filter(|path| !is_log(path));
+        match &self.config {
+            Some(config) if is_log(config) => swapped,
+            config => config.as_deref(),
+        }
     }
 }
 
-/// Returns true for the path of a log, as opposed to that of a config: an MCAP file, or a folder
-/// with one.
+/// Endings of logs.
+const LOG_ENDINGS: [&str; 3] = ["mcap", "db3", "bag"];
+
+/// Returns true for the path of a log, as opposed to that of a config: a file of a recorder, or a
+/// folder with its files.
 fn is_log(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "mcap") || path.is_dir()
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    ending.is_some_and(|ending| LOG_ENDINGS.contains(&ending.as_str())) || path.is_dir()
 }
 
 /// Path of the simulated log that stands in for a real one.
 const SAMPLE: &str = "runs/sample.mcap";
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        run: RunArgs,
+    }
+
+    fn split(arguments: &[&str]) -> (Option<String>, String) {
+        let line = Line::parse_from([&["run"], arguments].concat());
+        let config = line.run.config().map(|path| path.display().to_string());
+        (config, line.run.log().display().to_string())
+    }
+
+    #[test]
+    fn a_log_is_known_by_its_ending_wherever_it_stands() {
+        for log in ["robot.mcap", "robot.MCAP", "robot.db3", "robot.bag"] {
+            assert_eq!(split(&[log]), (None, log.into()));
+            assert_eq!(split(&["depth-ekf", log]), (Some("depth-ekf".into()), log.into()));
+            assert_eq!(split(&[log, "depth-ekf"]), (Some("depth-ekf".into()), log.into()));
+        }
+        assert_eq!(split(&["depth-ekf"]), (Some("depth-ekf".into()), SAMPLE.into()));
+        assert_eq!(split(&[]), (None, SAMPLE.into()));
+    }
+}

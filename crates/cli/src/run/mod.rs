@@ -3,6 +3,7 @@
 mod args;
 mod choice;
 mod frames;
+mod images;
 mod pictures;
 mod report;
 mod summary;
@@ -17,6 +18,8 @@ use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
+use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
+use tagalong_app::origin::Origin;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::progress::Progress;
 use tagalong_app::serialize::to_json;
@@ -25,10 +28,10 @@ use tagalong_app::suggest::check_log_path;
 use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
-use tagalong_log::write::{FrameNames, FrameRecord, RunDir, TrackLog, WriteError};
+use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog, WriteError};
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources, StepError};
-use tagalong_render::{Overlay, OverlayData};
+use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
 
 /// Runs a pipeline over a log.
@@ -83,7 +86,8 @@ impl Job {
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();
         // A picture shows colour, whether or not the pipeline uses it.
-        let inputs = if args.overlay { inputs.accept(Input::Colour) } else { inputs };
+        let wants_pictures = args.overlay || args.with_images;
+        let inputs = if wants_pictures { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
             .map_err(|error| config.refusal(error))?;
         let missing = |why| Failure::failed(format!("`{}`: {why}", args.log().display()));
@@ -167,6 +171,7 @@ fn work(
         let people = report.tracks.iter().filter(|track| track.confirmed && track.seen).count();
         progress.show(item.progress, report.index, people);
         desk.take(&item, &report)?;
+        desk.pass_image(&item, &report)?;
         pictures.draw(|| scene(&item, report))?;
     }
 }
@@ -191,6 +196,7 @@ struct Desk {
     overlay: Option<Overlay>,
     tally: Tally,
     timings: Timings,
+    with_images: bool,
 }
 
 impl Desk {
@@ -199,10 +205,16 @@ impl Desk {
         let overlay =
             if args.overlay { Some(Overlay::new(dir.overlay().map_err(refused)?)) } else { None };
         let input = &job.outer.input;
-        let names = FrameNames { base: input.base_frame.clone(), odom: input.odom_frame.clone() };
+        let camera = job.source.facts().camera_frame.clone();
+        let names = FrameNames {
+            base: input.base_frame.clone(),
+            odom: input.odom_frame.clone(),
+            camera: camera.unwrap_or_else(|| "camera".into()),
+        };
         let log = TrackLog::create(dir, names, job.outer.output.clone(), &job.resolved)
             .map_err(refused)?;
-        Ok(Self { log, overlay, tally: Tally::default(), timings: Timings::default() })
+        let (tally, timings) = (Tally::default(), Timings::default());
+        Ok(Self { log, overlay, tally, timings, with_images: args.with_images })
     }
 
     /// Adds the report of a frame.
@@ -225,8 +237,20 @@ impl Desk {
             command: report.command.map(|command| command.wheels),
         };
         self.log.write(&record).map_err(Failure::failed)?;
+        let notes = FrameNotes::of(report, &item.frame.frame.camera, &item.frame.odom_from_robot);
+        self.log.write_json(FRAME_NOTES_TOPIC, report.stamp, &notes).map_err(Failure::failed)?;
         self.timings.add("write", ms_since(writing));
         Ok(())
+    }
+
+    /// Adds the image of a frame, where that is wanted.
+    fn pass_image(&mut self, item: &Item, report: &FrameReport) -> Result<(), Failure> {
+        if !self.with_images || !report.outcome.is_processed() {
+            return Ok(());
+        }
+        let Some(image) = background(&item.frame.frame.images()) else { return Ok(()) };
+        let jpeg = images::jpeg(&image)?;
+        self.log.write_image(report.stamp, &jpeg).map_err(Failure::failed)
     }
 
     /// Finishes the files and prints a summary.
@@ -250,7 +274,9 @@ impl Desk {
         }
         let times = to_json("timings.json", &self.timings.summary())?;
         let json = to_json("report.json", &report)?;
-        let folder = self.log.finish(about(&report), &json, &times).map_err(Failure::failed)?;
+        let origin = to_json("origin.json", &Origin::of(args.log(), args.config()))?;
+        let texts = RunTexts { report: &json, timings: &times, origin: &origin };
+        let folder = self.log.finish(about(&report), &texts).map_err(Failure::failed)?;
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,

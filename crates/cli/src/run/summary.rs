@@ -46,6 +46,16 @@ fn persons(out: &mut String, report: &RunReport) {
     }
 }
 
+/// Returns a path as one word of a POSIX shell.
+fn quoted(path: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:@%,".contains(c);
+    match !path.is_empty() && path.chars().all(is_plain) {
+        true => path.to_owned(),
+        // A quote ends the quoted word, stands escaped, and begins the next.
+        false => format!("'{}'", path.replace('\'', "'\\''")),
+    }
+}
+
 /// Writes the tests that dropped most.
 fn funnel(out: &mut String, report: &RunReport) {
     let mut lines: Vec<_> = report.funnel.iter().collect();
@@ -71,8 +81,24 @@ fn losses(out: &mut String, report: &RunReport) {
 fn files(out: &mut String, folder: &Path, overlay: bool) {
     let shown = folder.display();
     let _ = writeln!(out, "files in {shown}; to look at them:");
-    let _ = writeln!(out, "  rerun {shown}/tracks.mcap");
+    let _ = writeln!(out, "  tagalong view {}", quoted(&shown.to_string()));
+    let _ = writeln!(
+        out,
+        "  {shown}/tracks.mcap opens in Foxglove (people in 3D, boxes) and Rerun (poses)"
+    );
     if overlay {
         let _ = writeln!(out, "  {shown}/overlay/ has a picture of every frame");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn a_printed_path_is_one_word_of_a_shell() {
+        assert_eq!(quoted("runs/a-b.c"), "runs/a-b.c");
+        assert_eq!(quoted("my runs/a"), "'my runs/a'");
+        assert_eq!(quoted("it's; rm"), "'it'\\''s; rm'");
     }
 }

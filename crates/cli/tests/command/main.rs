@@ -26,3 +26,4 @@ mod signals;
 mod simulate;
 mod train;
 mod triangulate;
+mod view;

@@ -59,7 +59,14 @@ fn a_run_writes_whole_files_and_says_what_it_found() {
     names.sort();
     assert_eq!(
         names,
-        ["report.json", "timings.json", "tracks-metres.csv", "tracks.csv", "tracks.mcap"]
+        [
+            "origin.json",
+            "report.json",
+            "timings.json",
+            "tracks-metres.csv",
+            "tracks.csv",
+            "tracks.mcap"
+        ]
     );
 }
 

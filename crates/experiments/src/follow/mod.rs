@@ -22,6 +22,7 @@ use tagalong_config::Registry;
 use tagalong_pipeline::LooksSettings;
 use tagalong_reproduce::Table;
 use tagalong_sim::{Scene, Seeds, Split, Variant};
+use tagalong_simulate::scenes;
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
 use crate::contender::contender;
@@ -199,8 +200,8 @@ fn scenes(args: &FollowArgs) -> Result<Vec<PathBuf>, Failure> {
         return Ok(args.scenes.clone());
     }
     let (folder, prefix) = SCENES;
-    let found = fs::read_dir(folder)
-        .map_err(|error| Failure::usage(format!("cannot read {folder}: {error}; name a scene")))?;
+    // Outside of a clone the same scenes are built in.
+    let Ok(found) = fs::read_dir(folder) else { return Ok(scenes::beginning_with(prefix)) };
     let mut paths: Vec<PathBuf> = found
         .flatten()
         .filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix))

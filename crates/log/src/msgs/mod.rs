@@ -10,6 +10,7 @@
 mod common;
 mod geometry;
 mod ros1;
+mod scene;
 mod sensor;
 mod vision;
 
@@ -19,6 +20,11 @@ pub use geometry::{
     Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
 };
 use re_cdr::{BigEndian, LittleEndian};
+pub use scene::{
+    ArrowPrimitive, Color, ColorRgba, CylinderPrimitive, ImageAnnotations, Marker, MarkerArray,
+    Pixel, PointsAnnotation, SceneEntity, SceneEntityDeletion, SceneUpdate, TextAnnotation,
+    TextPrimitive,
+};
 pub use sensor::{
     CameraInfo, CompressedImage, DisparityImage, Image, JointState, LaserScan, RegionOfInterest,
 };

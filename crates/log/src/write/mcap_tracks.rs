@@ -8,7 +8,11 @@ use tagalong_core::{Stamp, TrackId};
 
 use super::messages;
 use super::record::FrameRecord;
-use crate::msgs::{Detection3DArray, Message, PoseStamped, StringMsg, TFMessage, encode};
+use super::scene;
+use crate::msgs::{
+    CameraInfo, CompressedImage, Detection3DArray, Header, ImageAnnotations, MarkerArray, Message,
+    PoseStamped, SceneUpdate, StringMsg, TFMessage, encode,
+};
 
 /// Maximum number of pose topics: a file has 65,535 channels, and more would not be viewed. Further
 /// people are still in the other topics.
@@ -21,6 +25,8 @@ pub struct FrameNames {
     pub base: String,
     /// Odometry frame, for example `odom`.
     pub odom: String,
+    /// Frame of the camera, for example `camera_color_optical_frame`.
+    pub camera: String,
 }
 
 /// Writer of `tracks.mcap`.
@@ -30,8 +36,14 @@ pub(super) struct McapTracks<W: Write + Seek> {
     tracks: Channel,
     json: Channel,
     tf: Channel,
+    markers: Channel,
+    scene: Channel,
+    annotations: Channel,
+    camera_info: Option<Channel>,
+    images: Option<Channel>,
     target: Option<Channel>,
     people: BTreeMap<TrackId, Channel>,
+    texts: BTreeMap<String, Channel>,
 }
 
 /// Topic with its number of messages.
@@ -62,7 +74,24 @@ impl<W: Write + Seek> McapTracks<W> {
         let tracks = open::<Detection3DArray, W>(&mut writer, "/people/tracks")?;
         let json = open::<StringMsg, W>(&mut writer, "/people/tracks_json")?;
         let tf = open::<TFMessage, W>(&mut writer, "/tf")?;
-        Ok(Self { writer, frames, tracks, json, tf, target: None, people: BTreeMap::new() })
+        let markers = open::<MarkerArray, W>(&mut writer, "/people/markers")?;
+        let scene = open::<SceneUpdate, W>(&mut writer, "/people/scene")?;
+        let annotations = open::<ImageAnnotations, W>(&mut writer, "/people/annotations")?;
+        Ok(Self {
+            writer,
+            frames,
+            tracks,
+            json,
+            tf,
+            markers,
+            scene,
+            annotations,
+            camera_info: None,
+            images: None,
+            target: None,
+            people: BTreeMap::new(),
+            texts: BTreeMap::new(),
+        })
     }
 
     /// Writes one frame.
@@ -74,7 +103,51 @@ impl<W: Write + Seek> McapTracks<W> {
         self.json.send(&mut self.writer, at, &json)?;
         let tf = encode(&messages::transforms(record, &self.frames));
         self.tf.send(&mut self.writer, at, &tf)?;
+        self.write_scene(record)?;
         self.write_poses(record)
+    }
+
+    /// Writes what viewers draw by themselves.
+    fn write_scene(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {
+        let at = record.stamp;
+        let markers = encode(&scene::markers(record, &self.frames.odom));
+        self.markers.send(&mut self.writer, at, &markers)?;
+        let update = encode(&scene::scene(record, &self.frames.odom));
+        self.scene.send(&mut self.writer, at, &update)?;
+        let annotations = encode(&scene::annotations(record));
+        self.annotations.send(&mut self.writer, at, &annotations)?;
+        let Some(info) = scene::camera_info(record, &self.frames.camera) else { return Ok(()) };
+        let channel = match &mut self.camera_info {
+            Some(channel) => channel,
+            none => none.insert(open::<CameraInfo, W>(&mut self.writer, "/camera/camera_info")?),
+        };
+        channel.send(&mut self.writer, at, &encode(&info))
+    }
+
+    /// Writes a JPEG as the image of a frame.
+    pub fn write_image(&mut self, at: Stamp, jpeg: &[u8]) -> McapResult<()> {
+        let header = Header::new(at, self.frames.camera.as_str());
+        let image = CompressedImage { header, format: "jpeg".into(), data: jpeg };
+        let channel = match &mut self.images {
+            Some(channel) => channel,
+            none => none.insert(open::<CompressedImage<'_>, W>(
+                &mut self.writer,
+                "/camera/image/compressed",
+            )?),
+        };
+        channel.send(&mut self.writer, at, &encode(&image))
+    }
+
+    /// Writes a text to a topic of its own, opened on first use.
+    pub fn write_text(&mut self, topic: &str, at: Stamp, data: String) -> McapResult<()> {
+        if !self.texts.contains_key(topic) {
+            let channel = open::<StringMsg, W>(&mut self.writer, topic)?;
+            self.texts.insert(topic.to_owned(), channel);
+        }
+        match self.texts.get_mut(topic) {
+            Some(channel) => channel.send(&mut self.writer, at, &encode(&StringMsg { data })),
+            None => Ok(()),
+        }
     }
 
     fn write_poses(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {
@@ -105,6 +178,11 @@ impl<W: Write + Seek> McapTracks<W> {
             self.people.insert(id, channel);
         }
         Ok(self.people.get_mut(&id))
+    }
+
+    #[cfg(test)]
+    pub fn images(&self) -> u32 {
+        self.images.as_ref().map_or(0, |channel| channel.sequence)
     }
 
     #[cfg(test)]

@@ -16,13 +16,13 @@ use crate::msgs::{
 const UNKNOWN_VARIANCE: f64 = 1e6;
 
 /// Speed over ground below which a person has no heading, m/s.
-const MIN_HEADING_SPEED_MPS: f64 = 0.2;
+pub(super) const MIN_HEADING_SPEED_MPS: f64 = 0.2;
 
 /// Width and depth of the box around a person, m.
 const PERSON_WIDTH_M: f64 = 0.6;
 
 /// Height of the crown above the centre of the head, m.
-const CROWN_ABOVE_HEAD_M: f64 = 0.115;
+pub(super) const CROWN_ABOVE_HEAD_M: f64 = 0.115;
 
 /// Returns the confirmed tracks in the robot frame, most certain first, as
 /// `vision_msgs/Detection3DArray` asks.
@@ -85,7 +85,7 @@ pub fn pose(record: &FrameRecord<'_>, track: &Track, odom_frame: &str) -> PoseSt
     }
 }
 
-fn odom_from_person(record: &FrameRecord<'_>, track: &Track) -> Isometry3<f64> {
+pub(super) fn odom_from_person(record: &FrameRecord<'_>, track: &Track) -> Isometry3<f64> {
     let velocity = track.estimate.person.velocity;
     let walks = velocity.norm() >= MIN_HEADING_SPEED_MPS;
     // A person at rest is given the heading of the robot.
@@ -95,7 +95,8 @@ fn odom_from_person(record: &FrameRecord<'_>, track: &Track) -> Isometry3<f64> {
     record.odom_from_robot() * Isometry3::from_parts(head.into(), turn)
 }
 
-/// Returns the transforms of the robot and all confirmed people in the odometry frame.
+/// Returns the transforms of the robot and all confirmed people in the odometry frame, and of the
+/// camera in that of the robot.
 pub(super) fn transforms(record: &FrameRecord<'_>, frames: &FrameNames) -> TFMessage {
     let stamped = |child: String, pose: &Isometry3<f64>| TransformStamped {
         header: Header::new(record.stamp, frames.odom.as_str()),
@@ -103,6 +104,13 @@ pub(super) fn transforms(record: &FrameRecord<'_>, frames: &FrameNames) -> TFMes
         transform: pose.into(),
     };
     let mut transforms = vec![stamped(frames.base.clone(), &record.odom_from_robot())];
+    if !record.camera.is_blind() {
+        transforms.push(TransformStamped {
+            header: Header::new(record.stamp, frames.base.as_str()),
+            child_frame_id: frames.camera.clone(),
+            transform: (&record.camera.robot_from_camera).into(),
+        });
+    }
     transforms.extend(
         record
             .confirmed()

@@ -1,5 +1,5 @@
-//! Files of a run: `tracks.mcap`, `tracks.csv`, `tracks-metres.csv`, `report.json` and
-//! `timings.json`.
+//! Files of a run: `tracks.mcap`, `tracks.csv`, `tracks-metres.csv`, `report.json`,
+//! `timings.json` and `origin.json`.
 //!
 //! All are written under partial names and get their final names together at the end of the run, so
 //! that the files of a crash are never mistaken for a result. At least once per second of log time
@@ -13,6 +13,7 @@ mod message_log;
 mod messages;
 mod record;
 mod run_dir;
+mod scene;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -20,7 +21,7 @@ mod tests;
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 pub use csv::METRES_HEADER;
@@ -31,10 +32,22 @@ pub use message_log::MessageLog;
 pub use messages::{detections, pose};
 pub use record::{FrameRecord, OutputSettings};
 pub use run_dir::RunDir;
+use serde::Serialize;
 use tagalong_core::Stamp;
 
 /// Log time after which everything written is flushed, s.
 const FLUSH_EVERY_S: f64 = 1.0;
+
+/// Small files of a run, written at its end.
+#[derive(Clone, Copy, Debug)]
+pub struct RunTexts<'a> {
+    /// `report.json`: results, the same for the same log, config and seed.
+    pub report: &'a str,
+    /// `timings.json`: times, different each time.
+    pub timings: &'a str,
+    /// `origin.json`: paths of the log and the config, different in each place.
+    pub origin: &'a str,
+}
 
 /// Writer of the tracks of a run, frame by frame.
 pub struct TrackLog {
@@ -86,6 +99,31 @@ impl TrackLog {
         if due { self.flush(record.stamp) } else { Ok(()) }
     }
 
+    /// Writes a value as a JSON text to a topic of `tracks.mcap`; `at` is the stamp of its frame.
+    ///
+    /// # Errors
+    /// [`WriteError`], also for a value that JSON cannot express.
+    pub fn write_json<T: Serialize>(
+        &mut self,
+        topic: &str,
+        at: Stamp,
+        value: &T,
+    ) -> Result<(), WriteError> {
+        let path = self.file("tracks.mcap");
+        let in_words = |why| io::Error::other(format!("a message of {topic} as JSON: {why}"));
+        let text = serde_json::to_string(value).map_err(in_words).map_err(WriteError::io(&path))?;
+        self.mcap.write_text(topic, at, text).map_err(WriteError::mcap(&path))
+    }
+
+    /// Writes a JPEG as the image of a frame to `tracks.mcap`; `at` is the stamp of the frame.
+    ///
+    /// # Errors
+    /// [`WriteError::Mcap`].
+    pub fn write_image(&mut self, at: Stamp, jpeg: &[u8]) -> Result<(), WriteError> {
+        let path = self.file("tracks.mcap");
+        self.mcap.write_image(at, jpeg).map_err(WriteError::mcap(&path))
+    }
+
     fn flush(&mut self, now: Stamp) -> Result<(), WriteError> {
         self.flushed = Some(now);
         self.mcap.flush().map_err(WriteError::mcap(&self.file("tracks.mcap")))?;
@@ -97,7 +135,7 @@ impl TrackLog {
         self.metres.flush().map_err(WriteError::io(&self.file("tracks-metres.csv")))
     }
 
-    /// Ends the files, adds the report, the timings and `about` (as metadata of the log), and gives
+    /// Ends the files, adds the report, the timings, the origin and `about` (as metadata of the log), and gives
     /// all files their final names. Returns the directory.
     ///
     /// # Errors
@@ -105,14 +143,14 @@ impl TrackLog {
     pub fn finish(
         mut self,
         about: BTreeMap<String, String>,
-        report: &str,
-        timings: &str,
+        texts: &RunTexts<'_>,
     ) -> Result<PathBuf, WriteError> {
         self.flush_text()?;
         let mcap = self.file("tracks.mcap");
         self.mcap.finish(about).map_err(WriteError::mcap(&mcap))?;
-        self.dir.put("report.json", report.as_bytes())?;
-        self.dir.put("timings.json", timings.as_bytes())?;
+        self.dir.put("report.json", texts.report.as_bytes())?;
+        self.dir.put("timings.json", texts.timings.as_bytes())?;
+        self.dir.put("origin.json", texts.origin.as_bytes())?;
         let path = self.dir.path().to_owned();
         self.dir.publish()?;
         Ok(path)

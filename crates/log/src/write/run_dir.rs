@@ -15,8 +15,14 @@ pub struct RunDir {
 }
 
 /// Names of the files of a run; only these are ever removed.
-const OWN_FILES: [&str; 5] =
-    ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json", "timings.json"];
+const OWN_FILES: [&str; 6] = [
+    "tracks.mcap",
+    "tracks.csv",
+    "tracks-metres.csv",
+    "report.json",
+    "timings.json",
+    "origin.json",
+];
 
 /// Folder of overlay pictures.
 const OVERLAY: &str = "overlay";

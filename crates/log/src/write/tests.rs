@@ -7,10 +7,13 @@ use tagalong_core::{Stamp, Track, WheelSpeeds};
 use super::mcap_tracks::McapTracks;
 use super::testing::{camera, track};
 use super::*;
-use crate::msgs::{Detection3DArray, PoseStamped, StringMsg, TFMessage, decode};
+use crate::msgs::{
+    CameraInfo, Detection3DArray, ImageAnnotations, Marker, MarkerArray, PoseStamped,
+    SceneEntityDeletion, SceneUpdate, StringMsg, TFMessage, decode,
+};
 
 fn names() -> FrameNames {
-    FrameNames { base: "base_link".into(), odom: "odom".into() }
+    FrameNames { base: "base_link".into(), odom: "odom".into(), camera: "eye".into() }
 }
 
 /// Passes a record of frame `index` (ten a second) to `use_it`.
@@ -35,7 +38,8 @@ fn log(dir: &Path, frames: u64, finish: bool) {
         with_record(index, &[track(12), tentative.clone()], |r| log.write(r)).unwrap();
     }
     if finish {
-        log.finish(BTreeMap::from([("seed".into(), "1".into())]), "{}\n", "{}\n").unwrap();
+        let texts = RunTexts { report: "{}\n", timings: "{}\n", origin: "{}\n" };
+        log.finish(BTreeMap::from([("seed".into(), "1".into())]), &texts).unwrap();
     } else {
         std::mem::forget(log);
     }
@@ -72,7 +76,7 @@ fn the_log_carries_tracks_poses_transforms_and_the_config() {
     assert_eq!(read(&bytes, "/people/target_pose").len(), 3);
     let tf: TFMessage = decode(&read(&bytes, "/tf")[0]).unwrap();
     let children: Vec<_> = tf.transforms.iter().map(|t| t.child_frame_id.as_str()).collect();
-    assert_eq!(children, ["base_link", "person_12"]);
+    assert_eq!(children, ["base_link", "eye", "person_12"]);
     let text: StringMsg = decode(&read(&bytes, "/people/tracks_json")[0]).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text.data).unwrap();
     assert_eq!(json["tracks"][1]["confirmed"], false);
@@ -80,6 +84,41 @@ fn the_log_carries_tracks_poses_transforms_and_the_config() {
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     assert_eq!(summary.attachment_indexes[0].name, "config.toml");
     assert_eq!(summary.metadata_indexes[0].name, "tagalong");
+}
+
+#[test]
+fn the_log_carries_what_viewers_draw() {
+    let home = tempfile::tempdir().unwrap();
+    log(home.path(), 2, true);
+    let bytes = std::fs::read(home.path().join("tracks.mcap")).unwrap();
+    let markers: MarkerArray = decode(&read(&bytes, "/people/markers")[1]).unwrap();
+    let shapes: Vec<i32> = markers.markers.iter().map(|marker| marker.shape).collect();
+    assert_eq!(markers.markers[0].action, Marker::DELETE_ALL);
+    assert_eq!(shapes[1..], [Marker::CYLINDER, Marker::TEXT, Marker::ARROW]);
+    let body = &markers.markers[1];
+    assert_eq!((body.header.frame_id.as_str(), body.id), ("odom", 12));
+    // The robot is at 0.2 m, the head 3 m ahead of it and 1.6 m high.
+    assert_eq!((body.pose.position.x, body.scale.z), (3.2, 1.715));
+    assert_eq!(markers.markers[2].text, "12");
+    let tip = markers.markers[3].points[1];
+    assert_eq!((tip.x, tip.y), (3.7, 0.25), "where the person is in a second");
+    let scene: SceneUpdate = decode(&read(&bytes, "/people/scene")[1]).unwrap();
+    assert_eq!(scene.deletions[0].extent, SceneEntityDeletion::ALL);
+    let [person] = &scene.entities[..] else { panic!("tentative tracks are not drawn") };
+    assert_eq!((person.id.as_str(), person.texts[0].text.as_str()), ("person_12", "12"));
+    assert_eq!((person.cylinders.len(), person.arrows.len()), (1, 1));
+    let drawn: ImageAnnotations = decode(&read(&bytes, "/people/annotations")[1]).unwrap();
+    assert_eq!((drawn.points[0].points.len(), drawn.texts[0].text.as_str()), (4, "12 3.0 m"));
+    let info: CameraInfo = decode(&read(&bytes, "/camera/camera_info")[1]).unwrap();
+    assert_eq!((info.header.frame_id.as_str(), info.width, info.k[0]), ("eye", 640, 525.0));
+}
+
+#[test]
+fn images_are_passed_through_as_they_are() {
+    let mut log = McapTracks::new(Cursor::new(Vec::new()), names(), "").unwrap();
+    log.write_image(Stamp::from_nanos(5), b"jpeg of a frame").unwrap();
+    assert_eq!(log.images(), 1);
+    log.finish(BTreeMap::new()).unwrap();
 }
 
 #[test]

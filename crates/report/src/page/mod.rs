@@ -15,8 +15,11 @@ use crate::model::{Benchmark, Outcome, Timings};
 use crate::summary::Summary;
 use crate::view::OrderedBenchmark;
 
+/// Colours of the pages as CSS variables, for light and dark.
+pub const COLOURS: &str = include_str!("colours.css");
+
 // Inlined, so that the page is one file.
-const STYLE: &str = include_str!("page.css");
+const STYLE: &str = concat!(include_str!("colours.css"), include_str!("page.css"));
 const SCRIPT: &str = include_str!("page.js");
 
 /// Data that the sections are made from.

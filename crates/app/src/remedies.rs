@@ -213,11 +213,11 @@ impl Remedy {
 mod tests {
     use std::collections::BTreeSet;
 
-    use tagalong_app::config_file::OuterSettings;
     use tagalong_config::commented_defaults;
     use tagalong_pipeline::PipelineSettings;
 
     use super::*;
+    use crate::config_file::OuterSettings;
 
     #[test]
     fn every_setting_of_the_table_exists() {

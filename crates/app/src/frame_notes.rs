@@ -1,0 +1,186 @@
+//! Notes of a run on one frame: every candidate with its place and its fate, and the tests that
+//! dropped others. They are what a page needs to say why a person was missed.
+
+use nalgebra::{Isometry2, Point3};
+use serde::{Deserialize, Serialize};
+use tagalong_core::Funnel;
+use tagalong_geometry::{Camera, Rect};
+use tagalong_pipeline::{Candidate, Fate, FrameReport};
+
+/// Topic of the notes in `tracks.mcap`, one JSON text per frame.
+pub const FRAME_NOTES_TOPIC: &str = "/people/frames_json";
+
+/// Notes on one frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FrameNotes {
+    /// Index of the frame in the log, from 1.
+    pub frame: u64,
+    /// Stamp of its image, ns.
+    pub stamp_ns: u64,
+    /// Columns and rows of the image.
+    pub image_px: [usize; 2],
+    /// Pose of the robot in the odometry frame: x, y in metres and heading in radians.
+    pub robot_odom: [f64; 3],
+    /// All detections, each with its fate.
+    pub candidates: Vec<CandidateNote>,
+    /// Tests that dropped anything, in the order of the stages.
+    pub dropped: Vec<DroppedNote>,
+    /// Numbers of the tracks that ended in this frame.
+    pub ended: Vec<u32>,
+}
+
+/// Detection with its fate.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CandidateNote {
+    /// Upper-body square: x, y, width, height, pixels.
+    pub box_px: [f64; 4],
+    /// Centre of the head in the odometry frame, m.
+    pub head_odom_m: [f64; 3],
+    /// Log-odds that it is a person, with those of the verifiers.
+    pub score: f64,
+    /// Plugin that detected it.
+    pub source: String,
+    /// Its fate.
+    pub fate: FateNote,
+}
+
+/// Fate of a detection.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FateNote {
+    /// It was associated with this track.
+    Matched(u32),
+    /// It started this track.
+    Started(u32),
+    /// This test dropped it.
+    Dropped(String),
+}
+
+impl Default for FateNote {
+    fn default() -> Self {
+        Self::Dropped(String::new())
+    }
+}
+
+/// Test of the funnel in one frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DroppedNote {
+    /// Name of the test.
+    pub test: String,
+    /// Number of candidates, windows or pixels that it dropped.
+    pub count: u64,
+    /// Regions of the first of them, as far as they have one, pixels.
+    pub boxes_px: Vec<[f64; 4]>,
+}
+
+impl FrameNotes {
+    /// Extracts the notes from the report of a frame.
+    pub fn of(report: &FrameReport, camera: &Camera, odom_from_robot: &Isometry2<f64>) -> Self {
+        let at = odom_from_robot.translation;
+        let note = |candidate: &Candidate| CandidateNote::of(candidate, camera, odom_from_robot);
+        Self {
+            frame: report.index,
+            stamp_ns: report.stamp.nanos(),
+            image_px: [camera.width, camera.height],
+            robot_odom: [at.x, at.y, odom_from_robot.rotation.angle()].map(|v| rounded(v, 1e4)),
+            candidates: report.candidates.iter().map(note).collect(),
+            dropped: dropped(&report.funnel),
+            ended: report.ended.iter().map(|id| id.0).collect(),
+        }
+    }
+}
+
+impl CandidateNote {
+    fn of(candidate: &Candidate, camera: &Camera, odom_from_robot: &Isometry2<f64>) -> Self {
+        let detection = &candidate.detection;
+        let head: Point3<f64> = detection.position;
+        let floor = odom_from_robot * head.xy();
+        Self {
+            box_px: corners(&detection.rect_in(camera)),
+            head_odom_m: [floor.x, floor.y, head.z].map(|v| rounded(v, 1e3)),
+            score: rounded(detection.score, 1e3),
+            source: detection.source.to_owned(),
+            fate: match candidate.fate {
+                Fate::Matched(id) => FateNote::Matched(id.0),
+                Fate::Started(id) => FateNote::Started(id.0),
+                Fate::Dropped(test) => FateNote::Dropped(test.to_owned()),
+            },
+        }
+    }
+}
+
+fn dropped(funnel: &Funnel) -> Vec<DroppedNote> {
+    let note = |entry: &tagalong_core::Dropped| DroppedNote {
+        test: entry.test.to_owned(),
+        count: entry.count,
+        // A region without an area says nothing about the place.
+        boxes_px: entry.places.iter().filter(|rect| rect.area() > 0.0).map(corners).collect(),
+    };
+    funnel.entries().iter().map(note).collect()
+}
+
+fn corners(rect: &Rect) -> [f64; 4] {
+    [rect.x, rect.y, rect.width, rect.height].map(|v| rounded(v, 10.0))
+}
+
+/// Rounds to a fraction of one; the result has no negative zero.
+fn rounded(value: f64, parts: f64) -> f64 {
+    (value * parts).round() / parts + 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Vector2};
+    use tagalong_core::{Detection, Stamp, TrackId};
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+    }
+
+    fn candidate(fate: Fate) -> Candidate {
+        let position = Point3::new(2.0, 0.0, 1.6);
+        let (covariance, source) = (Matrix3::identity(), "eyes");
+        Candidate {
+            detection: Detection { image: None, position, covariance, score: 1.23456, source },
+            fate,
+        }
+    }
+
+    #[test]
+    fn notes_name_each_fate_and_the_places_of_the_tests() {
+        let mut report = FrameReport::new(7, Stamp::from_nanos(9));
+        report.candidates =
+            vec![candidate(Fate::Matched(TrackId(3))), candidate(Fate::Dropped("verifier"))];
+        report.funnel.drop_at("head width", Rect::new(1.04, 2.0, 3.0, 4.0));
+        report.funnel.drop_at("head width", Rect::default());
+        report.funnel.drop_many("score", 5);
+        report.ended = vec![TrackId(2)];
+        let turned = Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2);
+        let notes = FrameNotes::of(&report, &camera(), &turned);
+        assert_eq!((notes.frame, notes.stamp_ns, notes.image_px), (7, 9, [640, 480]));
+        assert_eq!(notes.candidates[0].fate, FateNote::Matched(3));
+        assert_eq!(notes.candidates[1].fate, FateNote::Dropped("verifier".into()));
+        assert_eq!(notes.candidates[0].head_odom_m, [1.0, 2.0, 1.6], "turned left, then moved");
+        assert_eq!(notes.candidates[0].score, 1.235);
+        assert!(notes.candidates[0].box_px[2] > 10.0, "without a box the place is projected");
+        assert_eq!(notes.dropped[0].count, 2);
+        assert_eq!(notes.dropped[0].boxes_px, [[1.0, 2.0, 3.0, 4.0]]);
+        assert_eq!((notes.dropped[1].count, notes.dropped[1].boxes_px.len()), (5, 0));
+        assert_eq!(notes.ended, [2]);
+    }
+
+    #[test]
+    fn notes_survive_their_text() {
+        let mut report = FrameReport::new(1, Stamp::from_nanos(1));
+        report.candidates = vec![candidate(Fate::Started(TrackId(1)))];
+        let notes = FrameNotes::of(&report, &camera(), &Isometry2::identity());
+        let text = serde_json::to_string(&notes).unwrap();
+        assert!(text.contains(r#""fate":{"started":1}"#), "{text}");
+        assert_eq!(serde_json::from_str::<FrameNotes>(&text).unwrap(), notes);
+    }
+}

@@ -1,0 +1,41 @@
+//! Origin of a run: the paths of its log and its config.
+
+use std::path::{Path, PathBuf, absolute};
+
+use serde::{Deserialize, Serialize};
+
+/// Contents of `origin.json`: the only file of a run that depends on the place of its log.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Origin {
+    /// Path of the log.
+    pub log: PathBuf,
+    /// Path of the config, or the name of a built-in one; none if the program chose it.
+    pub config: Option<PathBuf>,
+}
+
+impl Origin {
+    /// Records the paths, independently of the current folder.
+    pub fn of(log: &Path, config: Option<&Path>) -> Self {
+        let config =
+            config.map(|config| if config.exists() { whole(config) } else { config.into() });
+        Self { log: whole(log), config }
+    }
+}
+
+/// Returns the absolute path, or the path as it is where the current folder is unknown.
+fn whole(path: &Path) -> PathBuf {
+    absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_do_not_depend_on_the_current_folder() {
+        let origin = Origin::of(Path::new("a/b.mcap"), Some(Path::new("depth-ekf")));
+        assert!(origin.log.is_absolute() && origin.log.ends_with("a/b.mcap"), "{origin:?}");
+        assert_eq!(origin.config, Some("depth-ekf".into()), "a built-in config has no path");
+    }
+}

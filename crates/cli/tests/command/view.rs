@@ -1,0 +1,96 @@
+//! `tagalong view`: the page of a run, and the runs that it refuses.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use crate::common::{Drawn, code, config, own_plugin, text};
+
+fn run(home: &Path, log: &str, out: &str) {
+    let mut command = own_plugin();
+    command.current_dir(home).args(["run", "nearest.toml", log, "-o", out]);
+    let output = command.output().unwrap();
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+}
+
+fn view(home: &Path, arguments: &[&str]) -> Output {
+    own_plugin().current_dir(home).arg("view").args(arguments).output().unwrap()
+}
+
+fn home() -> tempfile::TempDir {
+    let home = tempfile::tempdir().unwrap();
+    Drawn::of(20).write(&home.path().join("walk.mcap"));
+    config(home.path(), "");
+    run(home.path(), "walk.mcap", "one");
+    home
+}
+
+fn data(page: &str) -> serde_json::Value {
+    let start = page.find("id=\"data\">").unwrap() + "id=\"data\">".len();
+    let end = start + page[start..].find("</script>").unwrap();
+    serde_json::from_str(&page[start..end]).unwrap()
+}
+
+#[test]
+fn a_page_has_the_frames_the_images_and_the_candidates() {
+    let home = home();
+    let output = view(home.path(), &["one"]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("one/view.html: 20 frames"), "{}", text(&output.stdout));
+    let page = data(&fs::read_to_string(home.path().join("one/view.html")).unwrap());
+    let frames = page["runs"][0]["frames"].as_array().unwrap();
+    assert_eq!((frames.len(), page["t"].as_array().unwrap().len()), (20, 20));
+    assert!(page["images"].as_array().unwrap().iter().all(|image| image != ""));
+    let last = &frames[19];
+    assert_eq!(last["tracks"][0]["state"], "seen");
+    assert!(last["found"][0]["track"].is_u64(), "{last}");
+    assert_eq!(page["runs"][0]["events"][0]["kind"], "started");
+    // The page is not replaced unasked, and shows a part where that is asked.
+    assert_eq!(code(&view(home.path(), &["one"])), 2);
+    let part = view(home.path(), &["one", "--overwrite", "--from", "0.5", "--to", "1.0"]);
+    assert_eq!(code(&part), 0, "{}", text(&part.stderr));
+    assert!(!text(&part.stdout).contains("20 frames"), "{}", text(&part.stdout));
+}
+
+#[test]
+fn a_log_that_is_gone_or_another_one_is_said() {
+    let home = home();
+    Drawn::of(12).write(&home.path().join("other.mcap"));
+    let wrong = view(home.path(), &["one", "--log", "other.mcap"]);
+    assert_eq!(code(&wrong), 2, "{}", text(&wrong.stderr));
+    assert!(text(&wrong.stderr).contains("is not the log of one"), "{}", text(&wrong.stderr));
+    fs::rename(home.path().join("walk.mcap"), home.path().join("moved.mcap")).unwrap();
+    let gone = view(home.path(), &["one"]);
+    assert_eq!(code(&gone), 0, "{}", text(&gone.stderr));
+    assert!(text(&gone.stdout).contains("name it with --log"), "{}", text(&gone.stdout));
+    let named = view(home.path(), &["one", "--overwrite", "--log", "moved.mcap"]);
+    assert!(text(&named.stdout).contains("20 images"), "{}", text(&named.stdout));
+}
+
+#[test]
+fn only_runs_of_one_log_are_compared() {
+    let home = home();
+    Drawn::of(12).write(&home.path().join("other.mcap"));
+    run(home.path(), "other.mcap", "two");
+    run(home.path(), "walk.mcap", "three");
+    let refused = view(home.path(), &["one", "two"]);
+    assert_eq!(code(&refused), 2);
+    assert!(text(&refused.stderr).contains("different logs"), "{}", text(&refused.stderr));
+    let both = view(home.path(), &["one", "three", "-o", "both.html"]);
+    assert_eq!(code(&both), 0, "{}", text(&both.stderr));
+    let page = data(&fs::read_to_string(home.path().join("both.html")).unwrap());
+    assert_eq!(page["runs"][0]["name"], "one", "runs of one config are told apart by folder");
+    assert_eq!(page["runs"][1]["name"], "three");
+}
+
+#[test]
+fn what_is_no_run_is_answered_with_the_command_that_makes_one() {
+    let home = home();
+    for (argument, said) in [("walk.mcap", "is a file"), (".", "no tracks.mcap"), ("x", "no such")]
+    {
+        let output = view(home.path(), &[argument]);
+        assert_eq!(code(&output), 2, "{argument}");
+        let message = text(&output.stderr);
+        assert!(message.contains(said) && message.contains("tagalong run"), "{message}");
+    }
+}

@@ -1,0 +1,223 @@
+//! People of one frame as shapes that viewers draw by themselves: an upright cylinder with the
+//! number above it and an arrow to the place in one second, and boxes in the image.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use tagalong_core::Track;
+use tagalong_geometry::Lens;
+
+use super::messages::{CROWN_ABOVE_HEAD_M, MIN_HEADING_SPEED_MPS, odom_from_person};
+use super::record::FrameRecord;
+use crate::msgs::{
+    ArrowPrimitive, CameraInfo, Color, ColorRgba, CylinderPrimitive, Header, ImageAnnotations,
+    Marker, MarkerArray, Pixel, Point, PointsAnnotation, Pose, SceneEntity, SceneEntityDeletion,
+    SceneUpdate, TextAnnotation, TextPrimitive,
+};
+
+/// Diameter of a person, m.
+const PERSON_WIDTH_M: f64 = 0.5;
+
+/// Height of the number, and of its centre above the crown, m.
+const TEXT_M: f64 = 0.25;
+
+/// Width of the arrow, m.
+const ARROW_WIDTH_M: f64 = 0.06;
+
+/// Colours of tracks: neighbours in number are far apart in hue.
+const COLOURS: [[u8; 3]; 8] = [
+    [98, 176, 255],
+    [255, 156, 87],
+    [67, 207, 155],
+    [213, 152, 240],
+    [255, 143, 163],
+    [195, 212, 82],
+    [79, 207, 224],
+    [189, 182, 196],
+];
+
+/// Opacity of a person that is seen, and of one that is predicted only.
+const OPACITY: (f64, f64) = (0.8, 0.3);
+
+/// Shape of one person, in the odometry frame.
+struct Figure {
+    id: u32,
+    /// Centre of the upright cylinder.
+    middle: Isometry3<f64>,
+    height_m: f64,
+    /// Place of the number.
+    top: Isometry3<f64>,
+    /// Pose of the arrow's tail along the direction of walking, and its length; none at rest.
+    arrow: Option<(Isometry3<f64>, f64)>,
+    colour: Color,
+}
+
+impl Figure {
+    fn of(record: &FrameRecord<'_>, track: &Track) -> Self {
+        let head = odom_from_person(record, track);
+        let at = head.translation.vector;
+        // A head far too low must not give a cylinder of negative height.
+        let height_m = (at.z + CROWN_ABOVE_HEAD_M).max(0.1);
+        let upright = |z: f64| {
+            Isometry3::from_parts(Vector3::new(at.x, at.y, z).into(), UnitQuaternion::identity())
+        };
+        let speed = track.estimate.person.velocity.norm();
+        let walks = speed >= MIN_HEADING_SPEED_MPS;
+        let tail = Isometry3::from_parts(upright(0.5 * height_m).translation, head.rotation);
+        Self {
+            id: track.id.0,
+            middle: upright(0.5 * height_m),
+            height_m,
+            top: upright(height_m + TEXT_M),
+            arrow: walks.then_some((tail, speed)),
+            colour: colour_of(track),
+        }
+    }
+
+    fn size(&self) -> Point {
+        Point { x: PERSON_WIDTH_M, y: PERSON_WIDTH_M, z: self.height_m }
+    }
+}
+
+fn colour_of(track: &Track) -> Color {
+    let [r, g, b] = COLOURS[track.id.0 as usize % COLOURS.len()].map(|v| f64::from(v) / 255.0);
+    Color { r, g, b, a: if track.seen { OPACITY.0 } else { OPACITY.1 } }
+}
+
+fn figures(record: &FrameRecord<'_>) -> Vec<Figure> {
+    record.confirmed().map(|track| Figure::of(record, track)).collect()
+}
+
+/// Returns the confirmed people as markers; those of the frame before are removed first.
+pub(super) fn markers(record: &FrameRecord<'_>, odom_frame: &str) -> MarkerArray {
+    let header = Header::new(record.stamp, odom_frame);
+    let clear = Marker { header: header.clone(), action: Marker::DELETE_ALL, ..Marker::default() };
+    let people = figures(record).into_iter().flat_map(|figure| figure_markers(&figure, &header));
+    MarkerArray { markers: std::iter::once(clear).chain(people).collect() }
+}
+
+fn figure_markers(figure: &Figure, header: &Header) -> Vec<Marker> {
+    let Color { r, g, b, a } = figure.colour;
+    let opaque = ColorRgba { r: r as f32, g: g as f32, b: b as f32, a: 1.0 };
+    let marker = |ns: &str, shape, pose: &Isometry3<f64>| Marker {
+        header: header.clone(),
+        ns: ns.to_owned(),
+        // Beyond 2^31 numbers repeat, which no run reaches.
+        id: figure.id as i32,
+        shape,
+        action: Marker::ADD,
+        pose: pose.into(),
+        color: opaque,
+        ..Marker::default()
+    };
+    let color = ColorRgba { a: a as f32, ..opaque };
+    let body = Marker {
+        scale: figure.size(),
+        color,
+        ..marker("people", Marker::CYLINDER, &figure.middle)
+    };
+    let text = Marker {
+        scale: Point { z: TEXT_M, ..Point::default() },
+        text: figure.id.to_string(),
+        ..marker("numbers", Marker::TEXT, &figure.top)
+    };
+    let arrow = figure.arrow.map(|(tail, length)| Marker {
+        points: vec![point(&tail.translation.vector.into()), tip(&tail, length)],
+        // The widths of shaft and tip; the length follows from the points.
+        scale: Point { x: ARROW_WIDTH_M, y: 2.0 * ARROW_WIDTH_M, z: 0.0 },
+        ..marker("velocities", Marker::ARROW, &Isometry3::identity())
+    });
+    [Some(body), Some(text), arrow].into_iter().flatten().collect()
+}
+
+fn tip(tail: &Isometry3<f64>, length: f64) -> Point {
+    point(&(tail * Point3::new(length, 0.0, 0.0)))
+}
+
+/// Returns a point, rounded to a micrometre as the turn by a heading is not exact.
+fn point(at: &Point3<f64>) -> Point {
+    let [x, y, z] = [at.x, at.y, at.z].map(|v| (v * 1e6).round() / 1e6);
+    Point { x, y, z }
+}
+
+/// Returns the confirmed people as a scene; those of the frame before are removed first.
+pub(super) fn scene(record: &FrameRecord<'_>, odom_frame: &str) -> SceneUpdate {
+    let timestamp = record.stamp.into();
+    let clear =
+        SceneEntityDeletion { timestamp, extent: SceneEntityDeletion::ALL, id: String::new() };
+    let entity = |figure: Figure| SceneEntity {
+        timestamp,
+        frame_id: odom_frame.to_owned(),
+        id: format!("person_{}", figure.id),
+        arrows: figure.arrow.iter().map(|(tail, length)| arrow(tail, *length, &figure)).collect(),
+        cylinders: vec![CylinderPrimitive {
+            pose: (&figure.middle).into(),
+            size: figure.size(),
+            bottom_scale: 1.0,
+            top_scale: 1.0,
+            color: figure.colour,
+        }],
+        texts: vec![TextPrimitive {
+            pose: Pose::from(&figure.top),
+            billboard: true,
+            font_size: TEXT_M,
+            scale_invariant: false,
+            color: Color { a: 1.0, ..figure.colour },
+            text: figure.id.to_string(),
+        }],
+        ..SceneEntity::default()
+    };
+    SceneUpdate {
+        deletions: vec![clear],
+        entities: figures(record).into_iter().map(entity).collect(),
+    }
+}
+
+fn arrow(tail: &Isometry3<f64>, length: f64, figure: &Figure) -> ArrowPrimitive {
+    // The tip is a part of the whole length, which is the way of one second.
+    let head_length = (0.3 * length).min(0.2);
+    ArrowPrimitive {
+        pose: tail.into(),
+        shaft_length: length - head_length,
+        shaft_diameter: ARROW_WIDTH_M,
+        head_length,
+        head_diameter: 2.0 * ARROW_WIDTH_M,
+        color: Color { a: 1.0, ..figure.colour },
+    }
+}
+
+/// Returns the boxes of the confirmed people as annotations of the image.
+pub(super) fn annotations(record: &FrameRecord<'_>) -> ImageAnnotations {
+    let timestamp = record.stamp.into();
+    let mut out = ImageAnnotations::default();
+    for track in record.confirmed() {
+        let Some(region) = record.visible_region(track) else { continue };
+        let colour = Color { a: 1.0, ..colour_of(track) };
+        let (left, top) = (region.x, region.y);
+        let (right, bottom) = (region.right(), region.bottom());
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
+        out.points.push(PointsAnnotation {
+            timestamp,
+            shape: PointsAnnotation::LINE_LOOP,
+            points: corners.map(|(x, y)| Pixel { x, y }).to_vec(),
+            outline_color: colour,
+            thickness: if track.seen { 3.0 } else { 1.0 },
+            ..PointsAnnotation::default()
+        });
+        let distance = track.estimate.person.position.xy().coords.norm();
+        out.texts.push(TextAnnotation {
+            timestamp,
+            position: Pixel { x: left, y: top },
+            text: format!("{} {distance:.1} m", track.id),
+            font_size: 16.0,
+            text_color: colour,
+            background_color: Color { r: 0.0, g: 0.0, b: 0.0, a: 0.7 },
+        });
+    }
+    out
+}
+
+/// Returns the calibration of the camera; none without a lens that the message can describe.
+pub(super) fn camera_info(record: &FrameRecord<'_>, frame: &str) -> Option<CameraInfo> {
+    let Lens::Pinhole(lens) = &record.camera.lens else { return None };
+    let header = Header::new(record.stamp, frame);
+    Some(CameraInfo::of_lens(&header, lens, (record.camera.width, record.camera.height), 0.0))
+}

@@ -1,0 +1,177 @@
+//! Events of a run: people that appear, are lost, and come back.
+
+use std::collections::BTreeMap;
+
+use crate::page_data::EventData;
+use crate::recording::Moment;
+
+/// Time without evidence from which on a person counts as lost, s.
+const LOST_AFTER_S: f64 = 0.5;
+
+/// Course of one person so far.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    /// Position and time of the last frame with evidence.
+    seen: (usize, f64),
+    /// Position of the first frame without evidence since then.
+    unseen_since: Option<usize>,
+    /// Position of the last frame with the track.
+    present: usize,
+    is_lost: bool,
+    has_ended: bool,
+}
+
+/// Lists the events of a run. `times` are those of all frames of the page, and `moments` their
+/// frames in the run.
+pub fn of_run(times: &[f64], moments: &[Option<&Moment>]) -> Vec<EventData> {
+    let mut watch = Watch::default();
+    for (at, moment) in moments.iter().enumerate() {
+        if let Some(moment) = moment {
+            watch.take(at, times[at], moment);
+        }
+    }
+    watch.events.sort_by_key(|event| event.i);
+    watch.events
+}
+
+#[derive(Default)]
+struct Watch {
+    events: Vec<EventData>,
+    courses: BTreeMap<u32, Course>,
+    target: Option<u32>,
+}
+
+impl Watch {
+    fn take(&mut self, at: usize, t_s: f64, moment: &Moment) {
+        for track in moment.tracks.iter().filter(|track| track.confirmed) {
+            match track.seen {
+                true => self.see(at, t_s, track.id),
+                false => self.miss(at, t_s, track.id),
+            }
+        }
+        self.end_absent(at, moment);
+        if moment.target != self.target {
+            self.target = moment.target;
+            let text = match moment.target {
+                Some(id) => format!("person {id} is followed from now on"),
+                None => "the target is lost".to_owned(),
+            };
+            self.tell(at, "target", moment.target, text);
+        }
+    }
+
+    fn see(&mut self, at: usize, t_s: f64, id: u32) {
+        let fresh = Course {
+            seen: (at, t_s),
+            unseen_since: None,
+            present: at,
+            is_lost: false,
+            has_ended: false,
+        };
+        match self.courses.insert(id, fresh) {
+            None => self.tell(at, "started", Some(id), format!("person {id} is tracked")),
+            Some(before) if before.has_ended => {
+                let text = format!("person {id} is recognised after {:.1} s", t_s - before.seen.1);
+                self.tell(at, "recognised", Some(id), text);
+            }
+            Some(before) if before.is_lost => {
+                let text = format!("person {id} is seen again after {:.1} s", t_s - before.seen.1);
+                self.tell(at, "found", Some(id), text);
+            }
+            Some(_) => {}
+        }
+    }
+
+    fn miss(&mut self, at: usize, t_s: f64, id: u32) {
+        let fresh = Course {
+            seen: (at, t_s),
+            unseen_since: None,
+            present: at,
+            is_lost: false,
+            has_ended: false,
+        };
+        let is_new = !self.courses.contains_key(&id);
+        let course = self.courses.entry(id).or_insert(fresh);
+        course.present = at;
+        let since = *course.unseen_since.get_or_insert(at);
+        // A single frame without evidence is no event.
+        let is_lost = t_s - course.seen.1 >= LOST_AFTER_S;
+        let newly_lost = is_lost && !std::mem::replace(&mut course.is_lost, is_lost);
+        if is_new {
+            self.tell(at, "started", Some(id), format!("person {id} is tracked"));
+        }
+        if newly_lost {
+            self.tell(since, "lost", Some(id), format!("person {id} is not seen any more"));
+        }
+    }
+
+    /// Ends the courses of tracks that are gone.
+    fn end_absent(&mut self, at: usize, moment: &Moment) {
+        let mut gone = Vec::new();
+        for (id, course) in &mut self.courses {
+            let is_there = moment.tracks.iter().any(|track| track.id == *id && track.confirmed);
+            if !is_there && !course.has_ended {
+                course.has_ended = true;
+                gone.push(*id);
+            }
+        }
+        for id in gone {
+            self.tell(at, "ended", Some(id), format!("the track of person {id} ends"));
+        }
+    }
+
+    fn tell(&mut self, i: usize, kind: &'static str, track: Option<u32>, text: String) {
+        self.events.push(EventData { i, kind, track, person: None, text });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::TrackState;
+
+    fn moment(tracks: &[(u32, bool)]) -> Moment {
+        let state = |&(id, seen): &(u32, bool)| TrackState {
+            id,
+            seen,
+            confirmed: true,
+            ..TrackState::default()
+        };
+        Moment { tracks: tracks.iter().map(state).collect(), ..Moment::default() }
+    }
+
+    fn kinds(frames: &[&[(u32, bool)]]) -> Vec<(usize, &'static str)> {
+        let moments: Vec<Moment> = frames.iter().map(|tracks| moment(tracks)).collect();
+        let times: Vec<f64> = (0..frames.len()).map(|i| 0.3 * i as f64).collect();
+        let all: Vec<Option<&Moment>> = moments.iter().map(Some).collect();
+        of_run(&times, &all).into_iter().map(|event| (event.i, event.kind)).collect()
+    }
+
+    #[test]
+    fn a_person_who_stays_unseen_is_lost_where_that_began() {
+        let events = kinds(&[&[(1, true)], &[(1, false)], &[(1, false)], &[(1, true)]]);
+        assert_eq!(events, [(0, "started"), (1, "lost"), (3, "found")]);
+    }
+
+    #[test]
+    fn a_single_frame_without_evidence_is_no_event() {
+        assert_eq!(kinds(&[&[(1, true)], &[(1, false)], &[(1, true)]]), [(0, "started")]);
+    }
+
+    #[test]
+    fn a_number_that_comes_back_was_recognised() {
+        let events = kinds(&[&[(4, true)], &[], &[(4, true)], &[(4, true)]]);
+        assert_eq!(events, [(0, "started"), (1, "ended"), (2, "recognised")]);
+    }
+
+    #[test]
+    fn a_new_target_is_an_event() {
+        let (mut a, b) = (moment(&[(1, true)]), moment(&[(1, true)]));
+        a.target = Some(1);
+        let events = of_run(&[0.0, 0.1], &[Some(&a), Some(&b)]);
+        let texts: Vec<&str> = events.iter().map(|event| event.text.as_str()).collect();
+        let expected =
+            ["person 1 is tracked", "person 1 is followed from now on", "the target is lost"];
+        assert_eq!(texts, expected);
+    }
+}

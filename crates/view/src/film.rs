@@ -1,0 +1,219 @@
+//! The log of the runs, passed once: images, laser scans, trails and the times of all frames.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry2, Point2, Point3};
+use tagalong_app::config_file::OuterSettings;
+use tagalong_app::outcome::Failure;
+use tagalong_app::progress::Progress;
+use tagalong_geometry::Camera;
+use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
+use tagalong_render::background;
+use tagalong_scoring::{Shot, Shots};
+
+use crate::page_data::{FrameData, RunData};
+use crate::pictures::Pictures;
+use crate::recording::Recording;
+
+/// Frames of a trail.
+const TRAIL_FRAMES: usize = 40;
+
+/// Points kept of a laser scan.
+const SCAN_POINTS: usize = 240;
+
+/// Parts of the page that come from the log.
+pub struct Film {
+    /// Images of the frames.
+    pub pictures: Pictures,
+    /// Points of laser scans in the odometry frame, cm.
+    pub scans: Vec<Vec<i32>>,
+    /// Directions of the edges of the view, rad.
+    pub view_rad: Option<[f64; 2]>,
+    /// Times and poses of the frames.
+    pub shots: Shots,
+}
+
+/// Opens the log of a run if it is the same file that the run read.
+///
+/// # Errors
+/// A log that was asked for and cannot be read or is another one. A log that was only looked for
+/// is a sentence for the page instead.
+pub fn open(run: &Recording, asked: Option<&Path>) -> Result<Result<FrameSource, String>, Failure> {
+    let Some(path) = asked.map(Path::to_owned).or_else(|| find(run)) else {
+        let name = &run.report.log.name;
+        return Ok(Err(format!(
+            "{name} was not found, so there are no images; name it with --log"
+        )));
+    };
+    let outer = outer_settings(run);
+    // The right image adds nothing but the time to decode it.
+    let inputs = Inputs::ANY.without(Input::Right);
+    let source = FrameSource::open(&path, &outer.input, &outer.limits, inputs);
+    let shown = path.display();
+    match (source, asked.is_some()) {
+        (Ok(source), _) if source.facts().sha256 == run.report.log.sha256 => Ok(Ok(source)),
+        (Ok(_), true) => Err(Failure::usage(format!(
+            "{shown} is not the log of {}: its contents differ from those of {}",
+            run.folder.display(),
+            run.report.log.name
+        ))),
+        (Ok(_), false) => {
+            Ok(Err(format!("{shown} has changed since the run, so there are no images")))
+        }
+        (Err(error), true) => Err(error.into()),
+        (Err(error), false) => Ok(Err(format!("there are no images: {error}"))),
+    }
+}
+
+/// Returns the path of the log: where it was, beside the run, or in the current folder.
+fn find(run: &Recording) -> Option<PathBuf> {
+    let name = &run.report.log.name;
+    let beside = run.folder.parent().map(|folder| folder.join(name));
+    let places = [Some(run.origin.log.clone()), beside, Some(PathBuf::from(name))];
+    places.into_iter().flatten().find(|path| path.exists() && !path.as_os_str().is_empty())
+}
+
+/// Returns the settings by which the run read its log.
+fn outer_settings(run: &Recording) -> OuterSettings {
+    let own = ["input", "limits", "output"];
+    let tables = run.config.iter().filter(|(key, _)| own.contains(&key.as_str()));
+    let tables = tables.map(|(key, value)| (key.clone(), value.clone())).collect();
+    toml::Value::Table(tables).try_into().unwrap_or_default()
+}
+
+impl Film {
+    /// Passes the log once; fills the trails of the runs on the way.
+    pub fn of(
+        mut source: FrameSource,
+        stamps: &[u64],
+        runs: &mut [RunData],
+        image_bytes: usize,
+    ) -> Self {
+        let positions: BTreeMap<u64, usize> =
+            stamps.iter().enumerate().map(|(at, stamp)| (*stamp, at)).collect();
+        let mut film = Self {
+            pictures: Pictures::within(image_bytes, stamps.len()),
+            scans: vec![Vec::new(); stamps.len()],
+            view_rad: None,
+            shots: Shots::default(),
+        };
+        let progress = Progress::titled("images");
+        while let Some(item) = source.next_frame() {
+            film.shots.push(Shot::of(&item));
+            progress.advance(source.progress(), item.frame.index);
+            if let Some(at) = positions.get(&item.frame.stamp.nanos()) {
+                film.take(*at, &item, runs);
+            }
+        }
+        film
+    }
+
+    fn take(&mut self, at: usize, item: &LogFrame, runs: &mut [RunData]) {
+        let frame = &item.frame;
+        if let Some(image) = background(&frame.images()) {
+            self.pictures.add(at, &image);
+        }
+        if let Some(laser) = frame.laser() {
+            self.scans[at] = scan_points(&laser.points, &item.odom_from_robot);
+        }
+        if frame.camera.is_blind() {
+            return;
+        }
+        if self.view_rad.is_none() && frame.camera.panorama().is_none() {
+            self.view_rad = Some(view_edges(&frame.camera));
+        }
+        for run in runs {
+            add_trails(&mut run.frames, at, &frame.camera, &item.odom_from_robot);
+        }
+    }
+
+    /// Returns the scans; none if the log has none.
+    pub fn scans(&self) -> Option<Vec<Vec<i32>>> {
+        self.scans.iter().any(|scan| !scan.is_empty()).then(|| self.scans.clone())
+    }
+}
+
+/// Returns evenly chosen points of a scan in the odometry frame, cm.
+fn scan_points(points: &[Point3<f64>], odom_from_robot: &Isometry2<f64>) -> Vec<i32> {
+    let every = points.len().div_ceil(SCAN_POINTS).max(1);
+    let chosen = points.iter().step_by(every).map(|point| odom_from_robot * point.xy());
+    chosen.flat_map(|point| [point.x, point.y].map(|v| (100.0 * v).round() as i32)).collect()
+}
+
+/// Returns the directions of the left and right edge of the image, from the robot's heading.
+fn view_edges(camera: &Camera) -> [f64; 2] {
+    let middle = 0.5 * camera.height as f64;
+    [0.0, camera.width as f64 - 1.0].map(|column| {
+        let ray = camera.robot_from_camera.rotation * camera.ray(Point2::new(column, middle));
+        let angle = ray.y.atan2(ray.x);
+        (angle * 1e4).round() / 1e4
+    })
+}
+
+/// Projects the past heads of the tracks of a frame into its image.
+fn add_trails(
+    frames: &mut [Option<FrameData>],
+    at: usize,
+    camera: &Camera,
+    odom_from_robot: &Isometry2<f64>,
+) {
+    let (past, rest) = frames.split_at_mut(at);
+    let Some(Some(frame)) = rest.first_mut() else { return };
+    let from = past.len().saturating_sub(TRAIL_FRAMES);
+    let before: Vec<&FrameData> = past[from..].iter().flatten().collect();
+    for track in frame.tracks.iter_mut().filter(|track| track.state != "tentative") {
+        let heads =
+            before.iter().filter_map(|frame| frame.tracks.iter().find(|t| t.id == track.id));
+        let heads = heads.map(|t| {
+            let floor = odom_from_robot.inverse_transform_point(&Point2::from(t.at));
+            Point3::new(floor.x, floor.y, t.z)
+        });
+        let pixels = heads.filter_map(|head| camera.project(&head));
+        track.trail = pixels.flat_map(|p| [p.x, p.y].map(|v| v.round() as i32)).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector2;
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+    use crate::page_data::TrackData;
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.6, 0.0, 0.0)
+    }
+
+    #[test]
+    fn a_trail_stays_on_the_floor_while_the_robot_turns() {
+        let person = |at| TrackData { id: 1, state: "seen", at, z: 1.6, ..TrackData::default() };
+        let frame = |at| Some(FrameData { tracks: vec![person(at)], ..FrameData::default() });
+        let mut frames = vec![frame([4.0, 0.0]), None, frame([4.0, 0.5])];
+        add_trails(&mut frames, 2, &camera(), &Isometry2::identity());
+        assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [320, 240], "straight ahead");
+        // Turned to the left, the place is to the right in the image.
+        let turned = Isometry2::new(Vector2::zeros(), 0.1);
+        add_trails(&mut frames, 2, &camera(), &turned);
+        assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [370, 240]);
+    }
+
+    #[test]
+    fn the_edges_of_the_view_are_left_and_right() {
+        let [left, right] = view_edges(&camera());
+        assert!((left - 0.5686).abs() < 0.01 && (right + 0.5686).abs() < 0.01, "{left} {right}");
+    }
+
+    #[test]
+    fn scans_are_thinned_and_moved_into_the_odometry_frame() {
+        let points: Vec<Point3<f64>> =
+            (0..1000).map(|i| Point3::new(f64::from(i), 0.0, 0.2)).collect();
+        let turned = Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2);
+        let shown = scan_points(&points, &turned);
+        assert!(shown.len() <= 2 * SCAN_POINTS, "{}", shown.len());
+        assert_eq!(shown[..4], [100, 0, 100, 500]);
+    }
+}

@@ -1,0 +1,239 @@
+//! `tagalong view`: one run, or two side by side, as one page that needs no network and no server.
+//!
+//! A [`recording`] is read from the folder of a run; `assemble` puts runs on one list of times;
+//! `film` passes the log once for images, laser scans and trails; `truth` says which annotated
+//! people a run has missed. The page's script shows the data as it is: nothing is computed a second
+//! time in the browser but the answer to a click.
+
+mod assemble;
+mod events;
+mod film;
+mod page;
+mod page_data;
+mod pictures;
+mod recording;
+mod truth;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
+
+use crate::assemble::{Span, run_data, stamps, times};
+use crate::film::Film;
+use crate::page::{Heading, html};
+use crate::page_data::{PageData, RunData};
+use crate::recording::Recording;
+use crate::truth::PageTruth;
+
+/// Arguments of `tagalong view`.
+#[derive(Args, Debug)]
+pub struct ViewArgs {
+    /// Folder of the run.
+    pub run: PathBuf,
+    /// Folder of another run over the same log, shown beside the first.
+    pub other: Option<PathBuf>,
+    /// The page [default: view.html in the folder of the run].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing page.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// The log of the run, for its images [default: where it was when the run was made].
+    #[arg(long, value_name = "LOG")]
+    pub log: Option<PathBuf>,
+    /// The truth [default: beside the log, as for `bench`, or in it].
+    #[arg(long, value_name = "FILE")]
+    pub truth: Option<PathBuf>,
+    /// Show frames from this time on, in seconds since the first.
+    #[arg(long, value_name = "S")]
+    pub from: Option<f64>,
+    /// Show frames up to this time, in seconds since the first.
+    #[arg(long, value_name = "S")]
+    pub to: Option<f64>,
+    /// Size of the page, in megabytes: images become smaller, and frames are left out evenly where
+    /// that does not suffice.
+    #[arg(long, value_name = "MB", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub max_mb: u32,
+}
+
+/// Examples for `tagalong view --help`.
+pub const HELP: &str = "\
+The page has a time line, the images with boxes, numbers and trails, a plan from above, the funnel of
+each frame and a list of events. A click on an image says which tests dropped candidates there, and
+which settings decide them. It is one file, and works without a network.
+
+Examples:
+  tagalong run robot.mcap && tagalong view runs/robot-depth-verified
+  tagalong view runs/robot-depth-verified runs/robot-depth-ekf -o compare.html
+  tagalong view runs/robot-depth-verified --from 30 --to 60 --max-mb 50
+  tagalong view runs/robot-depth-verified --log /data/robot.mcap --truth robot.people.csv";
+
+/// Writes the page of one run or two.
+///
+/// # Errors
+/// A folder that is no run, two runs of different logs, a log or a truth that was named and cannot
+/// be used, a page that exists.
+pub fn view(args: &ViewArgs) -> Outcome {
+    let output = args.output.clone().unwrap_or_else(|| args.run.join("view.html"));
+    let folders = [Some(&args.run), args.other.as_ref()];
+    let runs: Vec<Recording> = folders
+        .into_iter()
+        .flatten()
+        .map(|folder| Recording::read(folder))
+        .collect::<Result<_, _>>()?;
+    check_same_log(&runs)?;
+    spare(&output, args.overwrite)?;
+    let page = Page::of(&runs, args)?;
+    make_room_for(&output)?;
+    let shown = output.display();
+    fs::write(&output, &page.text)
+        .map_err(|error| Failure::failed(format!("cannot write {shown}: {error}")))?;
+    let megabytes = page.text.len() as f64 / 1e6;
+    let mut said = format!("{shown}: {} frames, {megabytes:.1} MB\n", page.frames);
+    page.notes.iter().for_each(|note| said += &format!("  {note}\n"));
+    print(&(said + "open it in a browser; it needs no network\n"))?;
+    Ok(Ended::Well)
+}
+
+fn check_same_log(runs: &[Recording]) -> Result<(), Failure> {
+    let [one, other] = runs else { return Ok(()) };
+    if one.report.log.sha256 == other.report.log.sha256 {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "the runs are of different logs, {} and {}; two runs are compared frame by frame, so run \
+         both pipelines on one log",
+        one.report.log.name, other.report.log.name
+    )))
+}
+
+/// Finished page.
+struct Page {
+    text: String,
+    frames: usize,
+    notes: Vec<String>,
+}
+
+impl Page {
+    fn of(runs: &[Recording], args: &ViewArgs) -> Result<Self, Failure> {
+        let mut notes = Vec::new();
+        let span = Span { from_s: args.from, to_s: args.to };
+        let all = stamps(runs, span);
+        if all.is_empty() {
+            return Err(Failure::usage("no frame lies between --from and --to"));
+        }
+        let budget = args.max_mb as usize * 1_000_000;
+        let (stamps, run_data) = thinned(runs, all, budget / 2, &mut notes);
+        let mut data = PageData {
+            t: times(&stamps),
+            image_px: image_size(runs),
+            runs: run_data,
+            ..PageData::default()
+        };
+        name_apart(&mut data.runs, runs);
+        let left = budget.saturating_sub(length_of(&data));
+        add_log(&mut data, runs, &stamps, args, left, &mut notes)?;
+        let heading = Heading::of(runs, &data, &notes);
+        let text = html(&heading, &data).map_err(Failure::failed)?;
+        Ok(Self { text, frames: data.t.len(), notes })
+    }
+}
+
+/// Returns the frames of the runs, every second or third where all would be too long.
+fn thinned(
+    runs: &[Recording],
+    all: Vec<u64>,
+    bytes: usize,
+    notes: &mut Vec<String>,
+) -> (Vec<u64>, Vec<RunData>) {
+    let whole: Vec<RunData> = runs.iter().map(|run| run_data(run, &all)).collect();
+    let length: usize = whole.iter().map(length_of).sum();
+    let every = length.div_ceil(bytes.max(1)).max(1);
+    if every == 1 {
+        return (all, whole);
+    }
+    let kept: Vec<u64> = all.iter().copied().step_by(every).collect();
+    notes.push(format!(
+        "one frame in {every} is shown, so that the page stays small; --from and --to show all of \
+         a part"
+    ));
+    let data = runs.iter().map(|run| run_data(run, &kept)).collect();
+    (kept, data)
+}
+
+fn length_of<T: serde::Serialize>(data: &T) -> usize {
+    serde_json::to_string(data).map_or(0, |text| text.len())
+}
+
+/// Returns the size of the image in which boxes are given.
+fn image_size(runs: &[Recording]) -> [usize; 2] {
+    let mut moments = runs.iter().flat_map(|run| &run.moments);
+    moments.find(|m| m.notes.image_px[0] > 0).map_or([0, 0], |m| m.notes.image_px)
+}
+
+/// Gives runs of one config the names of their folders.
+fn name_apart(data: &mut [RunData], runs: &[Recording]) {
+    let are_alike = data.len() == 2 && data[0].name == data[1].name;
+    for (run, recording) in data.iter_mut().zip(runs).filter(|_| are_alike) {
+        run.name = recording.folder.display().to_string();
+    }
+}
+
+/// Adds what the log has: images, scans, trails, and the truth with it.
+fn add_log(
+    data: &mut PageData,
+    runs: &[Recording],
+    stamps: &[u64],
+    args: &ViewArgs,
+    image_bytes: usize,
+    notes: &mut Vec<String>,
+) -> Result<(), Failure> {
+    let Some(first) = runs.first() else { return Ok(()) };
+    let source = match film::open(first, args.log.as_deref())? {
+        Ok(source) => source,
+        Err(why) => {
+            notes.push(why);
+            return Ok(());
+        }
+    };
+    let log = source.facts().path.clone();
+    let film = Film::of(source, stamps, &mut data.runs, image_bytes);
+    notes.extend(film.pictures.summary());
+    data.scans = film.scans();
+    data.view_rad = film.view_rad;
+    if let Some(truth) = read_truth(args, &log, &film, stamps, notes)? {
+        for run in &mut data.runs {
+            // Contradictions are those of the truth: the page is of use without it.
+            if let Err(why) = truth.judge(&data.t, data.image_px, run) {
+                notes.push(format!("{} is not compared with the truth: {why}", run.name));
+            }
+        }
+        data.truth = Some(truth.frames);
+    }
+    data.images = film.pictures.into_images();
+    Ok(())
+}
+
+fn read_truth(
+    args: &ViewArgs,
+    log: &Path,
+    film: &Film,
+    stamps: &[u64],
+    notes: &mut Vec<String>,
+) -> Result<Option<PageTruth>, Failure> {
+    let named = args.truth.clone().map(|path| {
+        let is_whole = path.to_string_lossy().ends_with(".boxes.csv");
+        (path, is_whole)
+    });
+    let Some((path, is_whole)) = named.or_else(|| truth::beside(log)) else { return Ok(None) };
+    let truth = PageTruth::read(&path, is_whole, &film.shots, stamps)?;
+    if !truth.has_people() {
+        notes.push(format!("{} has nobody in the frames shown", path.display()));
+        return Ok(None);
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    notes.push(format!("truth: {name}"));
+    Ok(Some(truth))
+}

@@ -1,0 +1,645 @@
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const SVG = "http://www.w3.org/2000/svg";
+  const COLOURS = 8;
+  const [WIDTH, HEIGHT] = data.image_px;
+  const last = data.t.length - 1;
+  const id = (name) => document.getElementById(name);
+
+  // Elements are made from names and texts alone, so that no text is read as markup.
+  const fill = (element, attributes, children) => {
+    for (const [key, value] of Object.entries(attributes || {})) element.setAttribute(key, value);
+    element.append(...children.filter((child) => child !== null));
+    return element;
+  };
+  const el = (tag, attributes, ...children) =>
+    fill(document.createElement(tag), attributes, children);
+  const svg = (tag, attributes, ...children) =>
+    fill(document.createElementNS(SVG, tag), attributes, children);
+  const colour = (track) => `c${track % COLOURS}`;
+  const fixed = (value, digits) => value.toFixed(digits).replace("-", "−");
+
+  const state = { at: 0, playing: false, question: null, from: 0, since: 0 };
+
+  // A run that has no frame at a time shows the one before, if that is not long ago.
+  const STALE_S = 0.25;
+  const frameOf = (run, at) => {
+    for (let i = at; i >= 0 && data.t[at] - data.t[i] <= STALE_S; i -= 1) {
+      if (run.frames[i]) return run.frames[i];
+    }
+    return null;
+  };
+  const imageAt = (at) => {
+    for (let i = at; data.images && i >= 0; i -= 1) if (data.images[i]) return data.images[i];
+    return null;
+  };
+  const truthAt = (at) => (data.truth && data.truth[at]) || [];
+  const isMissed = (run, at, person) =>
+    Boolean(run.hits && run.hits[at] && run.hits[at][person] === null);
+
+  // ---- image -----------------------------------------------------------------------------------
+
+  // Units of a picture for one pixel of the screen: lines and letters keep their size.
+  const unitsPerPixel = (element, width, height) => {
+    const area = element.getBoundingClientRect();
+    return area.width > 0 ? Math.max(width / area.width, height / area.height) : 1;
+  };
+
+  const overlaps = (a, b) =>
+    a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
+
+  // Labels take the first free place above, below or inside their box.
+  const placeLabel = (taken, [x, y, w, h], width, height) => {
+    const inside = (v, room) => Math.max(0, Math.min(v, room));
+    const rows = [y - height, y + h, y, y - 2 * height, y + h + height, y + height];
+    const places = rows.map((row) => ({
+      x: inside(x, WIDTH - width), y: inside(row, HEIGHT - height), w: width, h: height,
+    }));
+    const free = places.find((place) => !taken.some((other) => overlaps(place, other)));
+    const place = free || places[0];
+    taken.push(place);
+    return place;
+  };
+
+  const rect = ([x, y, w, h], attributes) => svg("rect", { x, y, width: w, height: h, ...attributes });
+
+  const outline = (box, kind, k, width, hint) =>
+    svg("g", {},
+      svg("title", {}, hint),
+      rect(box, { class: "halo", "stroke-width": (width + 2) * k }),
+      rect(box, { class: `box ${kind}`, "stroke-width": width * k,
+        "stroke-dasharray": kind.includes("guess") ? `${6 * k} ${4 * k}`
+          : kind.includes("truth") ? `${8 * k} ${3 * k}` : kind.includes("tentative") ? `${2 * k} ${3 * k}` : "none" }));
+
+  const label = (taken, box, text, k) => {
+    const size = 13 * k;
+    const place = placeLabel(taken, box, (text.length * 0.62 + 0.7) * size, 1.35 * size);
+    return svg("g", { class: "label" },
+      rect([place.x, place.y, place.w, place.h], { class: "tag", rx: 3 * k }),
+      svg("text", { class: "tag-text", x: place.x + 0.35 * size, y: place.y + size, "font-size": size }, text));
+  };
+
+  const STATES = { seen: "", hidden: " hidden", unseen: " unseen", tentative: " ?" };
+  const trackKind = (track) =>
+    track.state === "seen" ? colour(track.id)
+      : track.state === "tentative" ? "tentative" : `${colour(track.id)} guess`;
+
+  const trailLine = (track, k) => {
+    if (!track.trail || track.trail.length < 4) return null;
+    const points = [];
+    for (let i = 0; i < track.trail.length; i += 2) points.push(`${track.trail[i]},${track.trail[i + 1]}`);
+    return svg("polyline", { class: `trail ${colour(track.id)}`, points: points.join(" "), "stroke-width": 2 * k });
+  };
+
+  const droppedMarks = (frame, k) => [
+    ...frame.dropped.flatMap((test) => (test.boxes || []).map((box) => outline(box, "dropped", k, 1, test.test))),
+    ...frame.found.filter((c) => c.test).map((c) => outline(c.box, "dropped", k, 1.5, `${c.test} (${c.by})`)),
+  ];
+
+  const truthMarks = (run, k) => truthAt(state.at).filter((person) => person.box).map((person) => {
+    const missed = isMissed(run, state.at, person.id);
+    const kind = missed ? "truth miss" : "truth";
+    return outline(person.box, kind, k, missed ? 2.5 : 1, `annotated person ${person.id}${missed ? ", missed" : ""}`);
+  });
+
+  const drawImage = (run, number) => {
+    const target = id(`image-${number}`);
+    if (!WIDTH) return;
+    const k = unitsPerPixel(target, WIDTH, HEIGHT);
+    const frame = frameOf(run, state.at);
+    const picture = imageAt(state.at);
+    const parts = [picture
+      ? svg("image", { href: `data:image/jpeg;base64,${picture}`, width: WIDTH, height: HEIGHT, preserveAspectRatio: "none" })
+      : rect([0, 0, WIDTH, HEIGHT], { class: "blank" })];
+    if (id("show-truth").checked) parts.push(...truthMarks(run, k));
+    if (frame) {
+      if (id("show-dropped").checked) parts.push(...droppedMarks(frame, k));
+      const far = [...frame.tracks].reverse();
+      if (id("show-trails").checked) parts.push(...far.map((track) => trailLine(track, k)));
+      for (const track of far) {
+        const node = outline(track.box, trackKind(track), k, track.state === "seen" ? 2.5 : 1.5, describe(track));
+        node.dataset.track = track.id;
+        parts.push(node);
+      }
+      const taken = [];
+      for (const track of frame.tracks) {
+        const sign = frame.target === track.id ? "◎" : "";
+        parts.push(label(taken, track.box, `${sign}${track.id}${STATES[track.state]} · ${fixed(track.d, 1)} m`, k));
+      }
+    }
+    if (state.question) parts.push(outline(state.question.box, "asked", k, 2, "the place in question"));
+    // A picture of its own cuts off what lies outside of the image.
+    target.replaceChildren(svg("svg", { x: 0, y: 0, width: WIDTH, height: HEIGHT }, ...parts.filter(Boolean)));
+  };
+
+  const describe = (track) =>
+    `person ${track.id}, ${track.state}, ${fixed(track.d, 1)} m away, ${fixed(Math.hypot(...track.v), 1)} m/s`;
+
+  // ---- plan ------------------------------------------------------------------------------------
+
+  // Follows the robot where the whole way would be too small to see.
+  const WHOLE_M = 24;
+  const ASPECT = 4 / 3;
+
+  const extent = () => {
+    const xs = [];
+    const ys = [];
+    for (const run of data.runs) for (const frame of run.frames) if (frame) {
+      xs.push(frame.robot[0]);
+      ys.push(frame.robot[1]);
+      for (const track of frame.tracks) if (track.state === "seen" && track.d < 15) {
+        xs.push(track.at[0]);
+        ys.push(track.at[1]);
+      }
+    }
+    for (const people of data.truth || []) for (const person of people) if (person.at) {
+      xs.push(person.at[0]);
+      ys.push(person.at[1]);
+    }
+    const ends = (values) => {
+      values.sort((a, b) => a - b);
+      return [values[0] ?? 0, values[values.length - 1] ?? 0];
+    };
+    const [[left, right], [low, high]] = [ends(xs), ends(ys)];
+    return { x: (left + right) / 2, y: (low + high) / 2, w: right - left + 2, h: high - low + 2 };
+  };
+  const whole = extent();
+  const windowAt = (frame) => {
+    const fits = Math.max(whole.w, whole.h) <= WHOLE_M;
+    const centre = fits || !frame ? [whole.x, whole.y] : frame.robot;
+    const height = fits ? Math.max(whole.h, whole.w / ASPECT, 5) : 14;
+    return { x: centre[0], y: centre[1], w: height * ASPECT, h: height };
+  };
+
+  const gridLines = (area, k) => {
+    const step = area.h > 16 ? 2 : 1;
+    const parts = [];
+    const line = (x1, y1, x2, y2) => parts.push(svg("line", { class: "grid", x1, y1, x2, y2, "stroke-width": k }));
+    const from = (v) => Math.ceil(v / step) * step;
+    for (let x = from(area.x - area.w / 2); x < area.x + area.w / 2; x += step) line(x, -area.y - area.h / 2, x, -area.y + area.h / 2);
+    for (let y = from(area.y - area.h / 2); y < area.y + area.h / 2; y += step) line(area.x - area.w / 2, -y, area.x + area.w / 2, -y);
+    const corner = { x: area.x - area.w / 2 + 8 * k, y: -area.y + area.h / 2 - 8 * k };
+    parts.push(svg("text", { class: "axis-text", ...corner, "font-size": 12 * k }, `grid ${step} m`));
+    return parts;
+  };
+
+  const robotMark = (frame, k) => {
+    const [x, y, heading] = frame.robot;
+    const parts = [];
+    if (data.view_rad) {
+      const reach = 40;
+      const end = (angle) => `${x + reach * Math.cos(heading + angle)},${-y - reach * Math.sin(heading + angle)}`;
+      parts.push(svg("polygon", { class: "view", points: `${x},${-y} ${data.view_rad.map(end).join(" ")}` }));
+    }
+    const tip = (angle, far) => `${x + far * Math.cos(heading + angle)},${-y - far * Math.sin(heading + angle)}`;
+    const r = 11 * k;
+    parts.push(svg("polygon", { class: "robot", points: `${tip(0, r)} ${tip(2.5, r)} ${tip(-2.5, r)}` }, svg("title", {}, "robot")));
+    return parts;
+  };
+
+  const wayOf = (run, k) => {
+    const points = [];
+    for (let i = 0; i <= state.at; i += 1) {
+      const frame = run.frames[i];
+      if (frame) points.push(`${frame.robot[0]},${-frame.robot[1]}`);
+    }
+    return svg("polyline", { class: "path", points: points.join(" "), "stroke-width": 1.5 * k });
+  };
+
+  const TRAIL_FRAMES = 60;
+  const planTrail = (run, track, k) => {
+    const points = [];
+    for (let i = Math.max(0, state.at - TRAIL_FRAMES); i <= state.at; i += 1) {
+      const past = run.frames[i] && run.frames[i].tracks.find((other) => other.id === track.id);
+      if (past) points.push(`${past.at[0]},${-past.at[1]}`);
+    }
+    return svg("polyline", { class: `trail ${colour(track.id)}`, points: points.join(" "), "stroke-width": 2 * k });
+  };
+
+  const personMark = (run, track, k) => {
+    const [x, y] = [track.at[0], -track.at[1]];
+    const r = Math.min(Math.max(0.2, 5 * k), 9 * k);
+    const kind = track.state === "tentative" ? "tentative"
+      : `${colour(track.id)}${track.state === "seen" ? "" : " guess"}`;
+    const ahead = { x1: x, y1: y, x2: x + track.v[0], y2: y - track.v[1] };
+    return svg("g", { "data-track": track.id },
+      svg("title", {}, describe(track)),
+      id("show-trails").checked && track.state !== "tentative" ? planTrail(run, track, k) : null,
+      track.state === "tentative" ? null : svg("line", { class: `speed ${colour(track.id)}`, ...ahead, "stroke-width": 2.5 * k }),
+      svg("circle", { class: `person ${kind}`, cx: x, cy: y, r, "stroke-width": 2 * k }),
+      svg("text", { class: "plan-text", x: x + 0.8 * r + 3 * k, y: y - 0.8 * r, "font-size": 13 * k, "stroke-width": 3 * k }, String(track.id)));
+  };
+
+  const truthSpots = (run, k) => truthAt(state.at).filter((person) => person.at).map((person) => {
+    const r = 9 * k;
+    const missed = isMissed(run, state.at, person.id);
+    return rect([person.at[0] - r, -person.at[1] - r, 2 * r, 2 * r],
+      { class: `truth-spot${missed ? " miss" : ""}`, "stroke-width": (missed ? 2.5 : 1.5) * k });
+  });
+
+  const drawPlan = (run, number) => {
+    const target = id(`plan-${number}`);
+    const frame = frameOf(run, state.at);
+    const area = windowAt(frame);
+    target.setAttribute("viewBox", `${area.x - area.w / 2} ${-area.y - area.h / 2} ${area.w} ${area.h}`);
+    const k = unitsPerPixel(target, area.w, area.h);
+    const parts = gridLines(area, k);
+    const scan = data.scans && data.scans[state.at];
+    for (let i = 0; scan && i < scan.length; i += 2) {
+      parts.push(svg("circle", { class: "scan", cx: scan[i] / 100, cy: -scan[i + 1] / 100, r: 1.6 * k }));
+    }
+    parts.push(wayOf(run, k));
+    if (frame) {
+      parts.push(...robotMark(frame, k));
+      if (id("show-truth").checked) parts.push(...truthSpots(run, k));
+      if (id("show-dropped").checked) {
+        for (const c of frame.found.filter((candidate) => candidate.test)) {
+          const [x, y, r] = [c.at[0], -c.at[1], 4 * k];
+          parts.push(svg("path", { class: "cross", d: `M${x - r} ${y - r}L${x + r} ${y + r}M${x - r} ${y + r}L${x + r} ${y - r}`, "stroke-width": 1.5 * k }, svg("title", {}, c.test)));
+        }
+      }
+      parts.push(...[...frame.tracks].reverse().map((track) => personMark(run, track, k)));
+    }
+    target.replaceChildren(...parts);
+  };
+
+  // ---- time line -------------------------------------------------------------------------------
+
+  // Lanes: each track in the first one that is free again.
+  const lanesOf = (run) => {
+    const lives = new Map();
+    run.frames.forEach((frame, at) => frame && frame.tracks.forEach((track) => {
+      if (track.state === "tentative") return;
+      if (!lives.has(track.id)) lives.set(track.id, []);
+      lives.get(track.id).push([at, track.state === "seen"]);
+    }));
+    const ends = [];
+    return [...lives].map(([track, points]) => {
+      const start = points[0][0];
+      let lane = ends.findIndex((end) => end < start);
+      if (lane < 0) lane = ends.length;
+      ends[lane] = points[points.length - 1][0];
+      return { track, points, lane };
+    });
+  };
+
+  const STRIP_WIDTH = 1000;
+  const column = (at) => (last > 0 ? (at / last) * STRIP_WIDTH : 0);
+
+  const stretches = (points) => {
+    const out = [];
+    for (const [at, seen] of points) {
+      const open = out[out.length - 1];
+      if (open && open.to >= at - 2 && open.seen === seen) open.to = at;
+      else out.push({ from: at, to: at, seen });
+    }
+    return out;
+  };
+
+  const drawStrip = (run, number) => {
+    const lives = lanesOf(run);
+    const rows = Math.max(1, ...lives.map((life) => life.lane + 1));
+    const height = 10 * rows + 6;
+    const target = id(`strip-${number}`);
+    target.setAttribute("viewBox", `0 0 ${STRIP_WIDTH} ${height}`);
+    target.setAttribute("preserveAspectRatio", "none");
+    const parts = lives.flatMap((life) => stretches(life.points).map((part) =>
+      svg("line", { class: `life ${colour(life.track)}${part.seen ? "" : " weak"}`, x1: column(part.from), x2: Math.max(column(part.to), column(part.from) + 1.5), y1: 10 * life.lane + 5, y2: 10 * life.lane + 5, "stroke-width": 6 })));
+    for (const event of run.events) if (event.kind === "missed") {
+      parts.push(svg("line", { class: "gap", x1: column(event.i), x2: column(event.i), y1: height - 6, y2: height, "stroke-width": 2 }));
+    }
+    parts.push(svg("line", { class: "head", "stroke-width": 1.5, "vector-effect": "non-scaling-stroke", y1: 0, y2: height }));
+    target.replaceChildren(...parts);
+  };
+
+  const moveHeads = () => data.runs.forEach((run, number) => {
+    const head = id(`strip-${number}`).querySelector(".head");
+    head.setAttribute("x1", column(state.at));
+    head.setAttribute("x2", column(state.at));
+  });
+
+  // ---- tables ----------------------------------------------------------------------------------
+
+  const NUMBERS = ["Distance", "Speed", "Probability", "Number"];
+  const table = (caption, heads, rows) =>
+    el("div", { class: "scroll", role: "region", "aria-label": caption, tabindex: "0" }, el("table", {},
+      el("thead", {}, el("tr", {}, ...heads.map((head) => el("th", { scope: "col", class: NUMBERS.includes(head) ? "number" : "" }, head)))),
+      el("tbody", {}, ...rows)));
+
+  const number = (text) => el("td", { class: "number" }, text);
+
+  const people = (run, place) => {
+    const frame = frameOf(run, state.at);
+    const tracks = frame ? frame.tracks : [];
+    if (!tracks.length) return place.replaceChildren(el("p", { class: "soft" }, "Nobody is tracked."));
+    const row = (track) => el("tr", {},
+      el("th", { scope: "row" }, el("span", { class: `swatch ${colour(track.id)}` }), String(track.id)),
+      el("td", {}, track.state), number(`${fixed(track.d, 2)} m`), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
+    return place.replaceChildren(table(`People of ${run.name}`, ["Person", "State", "Distance", "Speed", "Probability"], tracks.map(row)));
+  };
+
+  const settings = (run, test) => {
+    const of = run.tests[test];
+    return el("td", {}, ...(of ? of.settings : []).map((line) => el("code", {}, line)), of && of.look ? el("span", { class: "soft" }, of.look) : null);
+  };
+
+  const funnel = (run, place) => {
+    const frame = frameOf(run, state.at);
+    if (!frame) return place.replaceChildren(el("p", { class: "soft" }, "The run has no frame here."));
+    const used = frame.found.filter((candidate) => !candidate.test);
+    const started = used.filter((candidate) => candidate.starts).length;
+    const most = Math.max(1, ...frame.dropped.map((test) => test.n));
+    const row = (test) => el("tr", {},
+      el("th", { scope: "row" }, test.test), number(String(test.n)), el("td", {}, bar(test.n / most)));
+    return place.replaceChildren(
+      el("p", {}, `${frame.found.length} ${frame.found.length === 1 ? "candidate" : "candidates"}: ${used.length - started} given to tracks, ${started} started one, ${frame.found.length - used.length} dropped.`),
+      frame.dropped.length ? table(`Funnel of ${run.name}`, ["Dropped by", "Number", "Share"], frame.dropped.map(row)) : el("p", { class: "soft" }, "No test dropped anything."));
+  };
+
+  const bar = (part) => {
+    const node = el("span", { class: "bar" });
+    node.style.width = `${(8 * Math.sqrt(part)).toFixed(2)}rem`;
+    return node;
+  };
+
+  // ---- why was a person missed? ------------------------------------------------------------------
+
+  const AROUND = 7;
+  const isNear = (box, question) => {
+    const [x, y, w, h] = box;
+    const [qx, qy, qw, qh] = question.box;
+    const [dx, dy] = [x + w / 2 - qx - qw / 2, y + h / 2 - qy - qh / 2];
+    const reach = 0.5 * Math.max(w, h) + 0.5 * Math.max(qw, qh);
+    return Math.hypot(dx, dy) <= Math.max(reach * 0.75, 0.03 * WIDTH);
+  };
+
+  const droppedNear = (frame, question) => [
+    ...frame.found.filter((c) => c.test && isNear(c.box, question)).map((c) => ({ test: c.test, text: `${c.by}, log-odds ${fixed(c.score, 1)}` })),
+    ...frame.dropped.flatMap((test) => (test.boxes || []).filter((box) => isNear(box, question)).map(() => ({ test: test.test, text: "a place that did not become a candidate" }))),
+  ];
+
+  const grouped = (items) => {
+    const groups = new Map();
+    for (const item of items) groups.set(item.test, [...(groups.get(item.test) || []), item.text]);
+    return [...groups];
+  };
+
+  const aroundCounts = (run, question) => {
+    const counts = new Map();
+    for (let i = Math.max(0, state.at - AROUND); i <= Math.min(last, state.at + AROUND); i += 1) {
+      if (!run.frames[i]) continue;
+      for (const test of new Set(droppedNear(run.frames[i], question).map((item) => item.test))) counts.set(test, (counts.get(test) || 0) + 1);
+    }
+    return [...counts].sort((a, b) => b[1] - a[1]);
+  };
+
+  const tracksNear = (frame, question) => frame.tracks.filter((track) => isNear(track.box, question)).map((track) =>
+    track.state === "tentative"
+      ? `A tentative track (${track.id}, probability ${fixed(track.p, 2)}) is here: the track manager has not confirmed it yet.`
+      : `Person ${track.id} is tracked here, ${track.state}.`);
+
+  // Many tests drop thousands of places and record some of them.
+  const unplaced = (frame) => {
+    const count = (test) => test.n - (test.boxes || []).length - frame.found.filter((c) => c.test === test.test).length;
+    const list = frame.dropped.filter((test) => count(test) > 0).map((test) => `${test.test} ${count(test)}`).join(", ");
+    return list ? `Anywhere in this frame, at places that were not recorded: ${list}.` : "";
+  };
+
+  const explain = (run, place) => {
+    const frame = frameOf(run, state.at);
+    if (!state.question || !frame) return place.replaceChildren();
+    const groups = grouped(droppedNear(frame, state.question));
+    const row = ([test, texts]) => el("tr", {},
+      el("th", { scope: "row" }, test), el("td", {}, texts.length > 1 ? `${texts.length}: ${texts[0]}` : texts[0]), settings(run, test));
+    const parts = tracksNear(frame, state.question).map((text) => el("p", {}, text));
+    parts.push(groups.length
+      ? table(`Tests of ${run.name} that dropped candidates here`, ["Dropped by", "What", "Decided by"], groups.map(row))
+      : el("p", {}, "No recorded candidate was dropped near this place in this frame."));
+    parts.push(el("p", { class: "soft" }, unplaced(frame)));
+    const around = aroundCounts(run, state.question);
+    if (around.length) parts.push(el("p", { class: "soft" }, `In the ${2 * AROUND + 1} frames around: ${around.map(([test, n]) => `${test} in ${n}`).join(", ")}.`));
+    return place.replaceChildren(...parts);
+  };
+
+  const ask = (question) => {
+    state.question = question;
+    id("question").textContent = question ? question.text : INVITATION;
+    draw();
+  };
+  const INVITATION = id("question").textContent;
+  const HALF_PX = 0.04;
+
+  const askAt = (event) => {
+    const target = event.currentTarget;
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(target.getScreenCTM().inverse());
+    const half = HALF_PX * WIDTH;
+    pause();
+    ask({ box: [point.x - half, point.y - half, 2 * half, 2 * half], text: `At column ${Math.round(point.x)}, row ${Math.round(point.y)}:` });
+  };
+
+  const askPerson = (person) => {
+    pause();
+    ask({ box: person.box, text: `At annotated person ${person.id}:`, person: person.id });
+  };
+
+  // Keeps the question on the annotated person while time goes on.
+  const followQuestion = () => {
+    if (!state.question || state.question.person === undefined) return;
+    const person = truthAt(state.at).find((other) => other.id === state.question.person && other.box);
+    if (person) state.question.box = person.box;
+  };
+
+  const missedButtons = () => {
+    const place = id("missed");
+    const missed = truthAt(state.at).filter((person) => person.box && data.runs.some((run) => isMissed(run, state.at, person.id)));
+    place.hidden = !missed.length;
+    const button = (person) => {
+      const by = data.runs.length > 1 ? ` by ${data.runs.filter((run) => isMissed(run, state.at, person.id)).map((run) => run.name).join(" and ")}` : "";
+      const node = el("button", { type: "button" }, `annotated person ${person.id}, missed${by}`);
+      node.addEventListener("click", () => askPerson(person));
+      return node;
+    };
+    place.replaceChildren(...missed.map(button));
+  };
+
+  // ---- events ----------------------------------------------------------------------------------
+
+  const events = data.runs.flatMap((run, number) => run.events.map((event) => ({ ...event, run: number })))
+    .sort((a, b) => a.i - b.i || a.run - b.run);
+  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", target: "◎", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
+  const BAD = ["missed", "switched", "wrong person", "false track"];
+  const hiddenKinds = new Set();
+
+  const goToEvent = (event) => {
+    pause();
+    show(event.i);
+    const person = truthAt(event.i).find((other) => other.id === event.person && other.box);
+    if (event.kind === "missed" && person) askPerson(person);
+  };
+
+  const fillEvents = () => {
+    const rows = events.filter((event) => !hiddenKinds.has(event.kind)).map((event) => {
+      const text = data.runs.length > 1 ? `${data.runs[event.run].name}: ${event.text}` : event.text;
+      const node = el("button", { type: "button", "data-i": event.i },
+        el("span", { class: "when" }, `${fixed(data.t[event.i], 2)} s`),
+        el("span", { class: BAD.includes(event.kind) ? "kind bad" : "kind" }, `${SIGNS[event.kind] || "·"} ${event.kind}`), el("span", {}, text));
+      node.addEventListener("click", () => goToEvent(event));
+      return el("li", {}, node);
+    });
+    id("event-list").replaceChildren(...rows);
+  };
+
+  const fillKinds = () => {
+    for (const kind of [...new Set(events.map((event) => event.kind))].sort()) {
+      const box = el("input", { type: "checkbox" });
+      box.checked = true;
+      box.addEventListener("change", () => {
+        if (box.checked) hiddenKinds.delete(kind);
+        else hiddenKinds.add(kind);
+        fillEvents();
+      });
+      id("kinds").append(el("label", {}, box, ` ${kind}`));
+    }
+  };
+
+  const markEvents = () => {
+    for (const node of id("event-list").querySelectorAll("button")) {
+      if (Number(node.dataset.i) === state.at) node.setAttribute("aria-current", "true");
+      else node.removeAttribute("aria-current");
+    }
+  };
+
+  const step = (direction, wanted) => {
+    const kinds = events.filter((event) => (wanted ? event.kind === wanted : !hiddenKinds.has(event.kind)));
+    const ahead = direction > 0 ? kinds.find((event) => event.i > state.at) : kinds.filter((event) => event.i < state.at).pop();
+    if (ahead) goToEvent(ahead);
+  };
+
+  // ---- time ------------------------------------------------------------------------------------
+
+  const draw = () => {
+    followQuestion();
+    data.runs.forEach((run, number) => {
+      drawImage(run, number);
+      drawPlan(run, number);
+      const frame = frameOf(run, state.at);
+      const seen = frame ? frame.tracks.filter((track) => track.state === "seen").length : 0;
+      id(`now-${number}`).textContent = frame ? `${seen} seen` : "no frame";
+      people(run, id(`people-${number}`));
+      funnel(run, id(`funnel-${number}`));
+      explain(run, id(`why-${number}`));
+    });
+    missedButtons();
+    moveHeads();
+    markEvents();
+  };
+
+  const show = (at) => {
+    state.at = Math.max(0, Math.min(last, at));
+    id("frame").value = state.at;
+    const frame = frameOf(data.runs[0], state.at);
+    const clock = `${fixed(data.t[state.at], 2)} of ${fixed(data.t[last], 2)} s`;
+    id("clock").textContent = frame ? `${clock}, frame ${frame.n}` : clock;
+    id("frame").setAttribute("aria-valuetext", clock);
+    draw();
+  };
+
+  const setPlaying = (playing) => {
+    state.playing = playing;
+    id("play").textContent = playing ? "❚❚" : "▶";
+    id("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+    id("play").title = playing ? "Pause" : "Play";
+  };
+  const pause = () => setPlaying(false);
+
+  const play = () => {
+    if (state.at >= last) show(0);
+    setPlaying(true);
+    [state.from, state.since] = [data.t[state.at], performance.now()];
+    requestAnimationFrame(tick);
+  };
+
+  const tick = (now) => {
+    if (!state.playing) return;
+    const time = state.from + ((now - state.since) / 1000) * Number(id("speed").value);
+    let at = state.at;
+    while (at < last && data.t[at + 1] <= time) at += 1;
+    if (at !== state.at) show(at);
+    if (at >= last) pause();
+    else requestAnimationFrame(tick);
+  };
+
+  const toggle = (name) => {
+    id(name).checked = !id(name).checked;
+    draw();
+  };
+
+  const KEYS = {
+    " ": () => (state.playing ? pause() : play()),
+    ArrowLeft: (event) => move(event.shiftKey ? -10 : -1),
+    ArrowRight: (event) => move(event.shiftKey ? 10 : 1),
+    Home: () => move(-Infinity),
+    End: () => move(Infinity),
+    p: () => step(-1),
+    n: () => step(1),
+    m: () => step(1, "missed"),
+    d: () => toggle("show-dropped"),
+    t: () => toggle("show-trails"),
+    Escape: () => ask(null),
+  };
+  const move = (by) => {
+    pause();
+    show(state.at + by);
+  };
+
+  const onKey = (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const on = event.target.closest("button, select, input, a, summary");
+    // A focused control keeps the keys that it has a use for.
+    if (on && event.key === " ") return;
+    if (on && (on.tagName === "SELECT" || (on.id === "frame" && !event.shiftKey)) && /^(Arrow|Home|End)/.test(event.key)) return;
+    const act = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!act) return;
+    event.preventDefault();
+    act(event);
+  };
+
+  const jump = (event) => {
+    const area = event.currentTarget.getBoundingClientRect();
+    pause();
+    show(Math.round(((event.clientX - area.left) / area.width) * last));
+  };
+
+  const prepare = () => {
+    id("frame").max = last;
+    id("frame").addEventListener("input", (event) => {
+      pause();
+      show(Number(event.target.value));
+    });
+    id("speed").addEventListener("change", () => state.playing && play());
+    id("play").addEventListener("click", () => (state.playing ? pause() : play()));
+    for (const [name, act] of [["back", () => move(-1)], ["ahead", () => move(1)], ["before", () => step(-1)], ["next", () => step(1)]]) id(name).addEventListener("click", act);
+    for (const name of ["show-dropped", "show-trails", "show-truth"]) id(name).addEventListener("change", draw);
+    id("truth-label").hidden = !data.truth;
+    data.runs.forEach((run, number) => {
+      const image = id(`image-${number}`);
+      image.setAttribute("viewBox", `0 0 ${WIDTH || 4} ${HEIGHT || 3}`);
+      image.addEventListener("click", askAt);
+      id(`picture-${number}`).hidden = !WIDTH;
+      if (!WIDTH) {
+        image.closest(".views").classList.add("alone");
+        id("why").hidden = true;
+      }
+      drawStrip(run, number);
+      id(`strip-${number}`).addEventListener("click", jump);
+    });
+    fillKinds();
+    fillEvents();
+    addEventListener("keydown", onKey);
+    addEventListener("resize", draw);
+  };
+
+  prepare();
+  show(0);
+})();

@@ -1,0 +1,264 @@
+//! HTML of the page: its frame, with style, script and data inlined.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use tagalong_report::COLOURS;
+
+use crate::page_data::PageData;
+use crate::recording::Recording;
+
+// Inlined, so that the page is one file.
+const STYLE: &str = concat!(include_str!("page.css"), "\n");
+const SCRIPT: &str = include_str!("page.js");
+
+/// Keys of the page, and what they do.
+const KEYS: [(&str, &str); 8] = [
+    ("Space", "play, pause"),
+    ("← →", "one frame back, ahead; with Shift ten"),
+    ("Home End", "first frame, last frame"),
+    ("P N", "previous event, next event"),
+    ("M", "next missed person, where there is truth"),
+    ("D", "dropped candidates, on and off"),
+    ("T", "trails, on and off"),
+    ("Esc", "forget the place that was clicked"),
+];
+
+/// Texts above the page.
+pub struct Heading {
+    log: String,
+    runs: Vec<String>,
+    notes: Vec<String>,
+}
+
+impl Heading {
+    /// Describes the runs of a page.
+    pub fn of(runs: &[Recording], data: &PageData, notes: &[String]) -> Self {
+        let log = runs.first().map(|run| run.report.log.name.clone()).unwrap_or_default();
+        let described = runs.iter().zip(&data.runs).map(|(run, shown)| {
+            let frames = shown.frames.iter().flatten().count();
+            let (name, folder) = (&shown.name, run.folder.display());
+            format!("{name}: {frames} frames, {}, from {folder}", run.report.ended)
+        });
+        Self { log, runs: described.collect(), notes: notes.to_vec() }
+    }
+}
+
+/// Returns the page as one text without any reference to another file.
+///
+/// # Errors
+/// Data that JSON cannot express.
+pub fn html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
+    let json = script_safe(&serde_json::to_string(data)?);
+    let names: Vec<&str> = data.runs.iter().map(|run| run.name.as_str()).collect();
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (format!("{} - Tagalong", heading.log)) }
+                style { (PreEscaped(COLOURS)) (PreEscaped(STYLE)) }
+            }
+            body {
+                a class="skip" href="#main" { "Skip to the images" }
+                (top(heading))
+                main id="main" tabindex="-1" {
+                    noscript { p { "This page needs JavaScript, which is inside it." } }
+                    (stage(&names))
+                    (time_line(names.len()))
+                    (answers(&names))
+                }
+                footer { p { "Made by Tagalong " (env!("CARGO_PKG_VERSION")) "." } }
+                script type="application/json" id="data" { (PreEscaped(json)) }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+/// Escapes JSON so that no text in it can end the script that holds it.
+fn script_safe(json: &str) -> String {
+    let mut out = String::with_capacity(json.len());
+    for letter in json.chars() {
+        match letter {
+            // The two separators are line ends in older scripts.
+            '<' | '>' | '&' | '\u{2028}' | '\u{2029}' => {
+                out += &format!("\\u{:04x}", u32::from(letter));
+            }
+            _ => out.push(letter),
+        }
+    }
+    out
+}
+
+fn top(heading: &Heading) -> Markup {
+    html! {
+        header class="top" {
+            h1 { (heading.log) }
+            ul class="facts" {
+                @for line in heading.runs.iter().chain(&heading.notes) { li { (line) } }
+            }
+        }
+    }
+}
+
+/// Renders a place for the image and the plan of each run.
+fn stage(names: &[&str]) -> Markup {
+    let class = if names.len() > 1 { "runs two" } else { "runs" };
+    html! {
+        div class=(class) {
+            @for (number, name) in names.iter().enumerate() {
+                section class="run" aria-labelledby=(format!("name-{number}")) {
+                    h2 id=(format!("name-{number}")) { (name) span class="now" id=(format!("now-{number}")) {} }
+                    div class="views" {
+                        figure class="picture" id=(format!("picture-{number}")) {
+                            svg class="image" id=(format!("image-{number}")) role="img" aria-label=(format!("Image with the tracks of {name}")) {}
+                        }
+                        figure class="above" {
+                            svg class="plan" id=(format!("plan-{number}")) role="img" aria-label=(format!("Plan from above of {name}")) {}
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Renders the controls, which stay in view.
+fn time_line(runs: usize) -> Markup {
+    let button = |id: &str, sign: &str, name: &str| {
+        html! { button type="button" id=(id) aria-label=(name) title=(name) { (sign) } }
+    };
+    html! {
+        section class="time" aria-label="Time line" {
+            div class="strips" aria-hidden="true" {
+                @for number in 0..runs { svg class="strip" id=(format!("strip-{number}")) {} }
+            }
+            input type="range" id="frame" min="0" max="0" value="0" step="1" aria-label="Frame";
+            div class="controls" {
+                (button("before", "|◂", "Previous event"))
+                (button("back", "◂", "One frame back"))
+                (button("play", "▶", "Play"))
+                (button("ahead", "▸", "One frame ahead"))
+                (button("next", "▸|", "Next event"))
+                output id="clock" for="frame" {}
+                label { "Speed " select id="speed" {
+                    option value="0.25" { "¼" } option value="0.5" { "½" }
+                    option value="1" selected { "1" } option value="2" { "2" } option value="4" { "4" }
+                } }
+                fieldset class="layers" {
+                    legend class="unseen" { "Show" }
+                    label { input type="checkbox" id="show-dropped"; " dropped" }
+                    label { input type="checkbox" id="show-trails" checked; " trails" }
+                    label id="truth-label" { input type="checkbox" id="show-truth" checked; " truth" }
+                }
+            }
+        }
+    }
+}
+
+/// Renders the sections below the time line.
+fn answers(names: &[&str]) -> Markup {
+    html! {
+        div class="answers" {
+            section id="why" aria-labelledby="h-why" {
+                h2 id="h-why" { "Why was a person missed?" }
+                p id="question" aria-live="polite" { "Click on the image where a person was missed." }
+                p class="missed" id="missed" hidden { }
+                (columns("why", names))
+            }
+            section id="people" aria-labelledby="h-people" {
+                h2 id="h-people" { "People in this frame" }
+                (columns("people", names))
+            }
+            section id="funnel" aria-labelledby="h-funnel" {
+                h2 id="h-funnel" { "Funnel of this frame" }
+                (columns("funnel", names))
+            }
+            section id="events" aria-labelledby="h-events" {
+                h2 id="h-events" { "Events" }
+                fieldset class="filters" id="kinds" { legend class="unseen" { "Kinds of events" } }
+                ol class="events" id="event-list" tabindex="0" aria-label="Events" {}
+            }
+            section id="keys" aria-labelledby="h-keys" {
+                h2 id="h-keys" { "Keys" }
+                dl { @for (key, does) in KEYS { dt { kbd { (key) } } dd { (does) } } }
+            }
+        }
+    }
+}
+
+/// Renders a place for each run, with its name where there are two.
+fn columns(id: &str, names: &[&str]) -> Markup {
+    html! {
+        div class=(if names.len() > 1 { "columns two" } else { "columns" }) {
+            @for (number, name) in names.iter().enumerate() {
+                div {
+                    @if names.len() > 1 { h3 { (name) } }
+                    div id=(format!("{id}-{number}")) {}
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::page_data::{CandidateData, FrameData, RunData, TestData};
+
+    const HOSTILE: &str = "</script><img src=x onerror=alert(1)>&\u{2028}\"'";
+
+    fn hostile_page() -> String {
+        let found = vec![CandidateData {
+            by: HOSTILE.into(),
+            test: Some(HOSTILE.into()),
+            ..CandidateData::default()
+        }];
+        let frame = FrameData { found, ..FrameData::default() };
+        let test = TestData { settings: vec![HOSTILE.into()], look: HOSTILE.into() };
+        let run = RunData {
+            name: HOSTILE.into(),
+            frames: vec![Some(frame)],
+            tests: [(HOSTILE.to_owned(), test)].into(),
+            ..RunData::default()
+        };
+        let data = PageData { t: vec![0.0], runs: vec![run], ..PageData::default() };
+        let heading = Heading {
+            log: HOSTILE.into(),
+            runs: vec![HOSTILE.into()],
+            notes: vec![HOSTILE.into()],
+        };
+        html(&heading, &data).unwrap()
+    }
+
+    #[test]
+    fn hostile_names_stay_text() {
+        let page = hostile_page();
+        assert!(!page.contains("<img"), "a name became an element");
+        assert_eq!(page.matches("</script>").count(), 2, "a name ended a script");
+        assert!(!page.contains('\u{2028}') || page.contains("&lt;/script&gt;"));
+    }
+
+    #[test]
+    fn the_data_survives_its_escapes() {
+        let page = hostile_page();
+        let start = page.find("id=\"data\">").unwrap() + "id=\"data\">".len();
+        let end = start + page[start..].find("</script>").unwrap();
+        let data: serde_json::Value = serde_json::from_str(&page[start..end]).unwrap();
+        assert_eq!(data["runs"][0]["name"], HOSTILE);
+        assert_eq!(data["runs"][0]["frames"][0]["found"][0]["test"], HOSTILE);
+        assert_eq!(data["runs"][0]["tests"][HOSTILE]["look"], HOSTILE);
+    }
+
+    #[test]
+    fn the_page_refers_to_no_other_file() {
+        let page = hostile_page();
+        for address in ["http:", "https:", "src=\"", "@import", "url("] {
+            let text = page.replace("http://www.w3.org/2000/svg", "");
+            assert!(!text.contains(address), "{address}");
+        }
+        assert!(!SCRIPT.contains("innerHTML"), "names must not be read as markup");
+    }
+}

@@ -1,0 +1,214 @@
+//! Annotated people beside the runs, and which of them each run has missed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry2, Point2};
+use tagalong_app::outcome::Failure;
+use tagalong_eval::{
+    Clear, Event, EventKind, Frame, Prepared, Region, Report, Role, Sequence, Similarity, Truth,
+    events,
+};
+use tagalong_geometry::Rect;
+use tagalong_log::{Limits, read_truth};
+use tagalong_scoring::{Shots, TruthFile, TruthOptions, comparable, comparison};
+
+use crate::page_data::{EventData, FrameData, RunData, TruthBox};
+
+/// Truth by frame of the page.
+pub struct PageTruth {
+    file: TruthFile,
+    /// People that are annotated in each frame.
+    pub frames: Vec<Vec<TruthBox>>,
+    /// As they are scored.
+    people: Vec<(Vec<Truth>, Vec<Region>)>,
+}
+
+/// Returns the file with the truth of a log, as `bench` looks for it; the flag is true if its boxes
+/// are of whole people.
+pub fn beside(log: &Path) -> Option<(PathBuf, bool)> {
+    let file = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
+    let upper = file("people.csv").or_else(|| file("truth.jsonl"));
+    let whole = || file("boxes.csv").map(|path| (path, true));
+    let inside = || {
+        let has_truth = read_truth(log, &Limits::default()).is_ok_and(|truth| truth.is_some());
+        has_truth.then(|| (log.to_owned(), false))
+    };
+    upper.map(|path| (path, false)).or_else(whole).or_else(inside)
+}
+
+impl PageTruth {
+    /// Reads truth for the frames of a log.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read(
+        path: &Path,
+        upper_body: bool,
+        shots: &Shots,
+        stamps: &[u64],
+    ) -> Result<Self, Failure> {
+        let file = TruthFile::read(path, TruthOptions { upper_body, ..TruthOptions::default() })?;
+        let mut by_number = file.frames(shots);
+        let by_stamp: BTreeMap<u64, (u32, Isometry2<f64>)> =
+            shots.iter().map(|shot| (shot.stamp_ns, (shot.number, shot.odom_from_robot))).collect();
+        let (mut frames, mut people) = (Vec::new(), Vec::new());
+        for stamp in stamps {
+            let shot = by_stamp.get(stamp);
+            let there = shot.and_then(|(number, _)| by_number.remove(number)).unwrap_or_default();
+            let pose = shot.map_or_else(Isometry2::identity, |(_, pose)| *pose);
+            frames.push(there.0.iter().map(|truth| shown(truth, &pose)).collect());
+            people.push(there);
+        }
+        Ok(Self { file, frames, people })
+    }
+
+    /// Returns true if any frame has anyone.
+    pub fn has_people(&self) -> bool {
+        self.frames.iter().any(|frame| !frame.is_empty())
+    }
+
+    /// Matches a run with the truth; adds its hits and misses.
+    ///
+    /// # Errors
+    /// Truth that contradicts itself, in a sentence.
+    pub fn judge(&self, times: &[f64], size: [usize; 2], run: &mut RunData) -> Result<(), String> {
+        let sequence = self.sequence(times, size, &run.frames);
+        let similarity = [Similarity::Iou, Similarity::Metres];
+        let found = similarity.into_iter().find_map(|s| Some((s, comparable(&sequence, s)?)));
+        let Some((similarity, sequence)) = found else { return Ok(()) };
+        let prepared = Prepared::new(&sequence, &comparison(&self.file, similarity))
+            .map_err(|error| error.to_string())?;
+        let (_, matches) = Clear::measure(&prepared);
+        let mut hits = Vec::new();
+        for (frame, matches) in prepared.frames.iter().zip(&matches) {
+            let mut on: BTreeMap<i64, Option<i64>> = frame
+                .truths
+                .iter()
+                .map(|truth| (prepared.truth_ids[*truth as usize], None))
+                .collect();
+            for m in matches {
+                let person = prepared.truth_ids[frame.truths[m.row as usize] as usize];
+                on.insert(person, Some(prepared.track_ids[frame.tracks[m.col as usize] as usize]));
+            }
+            hits.push(on);
+        }
+        run.hits = Some(hits);
+        let happened = events(&prepared, &matches);
+        run.events.extend(happened.iter().filter_map(described));
+        run.events.sort_by_key(|event| event.i);
+        Ok(())
+    }
+
+    fn sequence(&self, times: &[f64], size: [usize; 2], run: &[Option<FrameData>]) -> Sequence {
+        let frame = |(at, (truths, regions)): (usize, &(Vec<Truth>, Vec<Region>))| Frame {
+            stamp_ns: (times[at] * 1e9).round() as i64,
+            truths: truths.clone(),
+            reports: run[at].as_ref().map(|frame| reports(frame, size)).unwrap_or_default(),
+            ignore_regions: regions.clone(),
+        };
+        let frames = self.people.iter().enumerate().map(frame).collect();
+        Sequence { name: "page".into(), frames }
+    }
+}
+
+fn shown(truth: &Truth, odom_from_robot: &Isometry2<f64>) -> TruthBox {
+    let tenth = |v: f64| (v * 10.0).round() / 10.0;
+    TruthBox {
+        id: truth.id,
+        box_px: truth.region.map(|r| [r.x, r.y, r.width, r.height].map(tenth)),
+        at: truth.floor_m.map(|floor| {
+            let place = odom_from_robot * Point2::from(floor);
+            [place.x, place.y].map(|v| (v * 1e3).round() / 1e3)
+        }),
+        counts: truth.role == Role::Counts,
+    }
+}
+
+/// Returns the tracks of a frame as `tracks.csv` has them: confirmed, seen and inside the image.
+fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
+    let (sin, cos) = frame.robot[2].sin_cos();
+    let seen = frame.tracks.iter().filter(|track| track.state == "seen");
+    let report = |track: &crate::page_data::TrackData| {
+        let [x, y, width, height] = track.box_px;
+        let inside = Rect::new(x, y, width, height).clipped(size[0], size[1]);
+        let (dx, dy) = (track.at[0] - frame.robot[0], track.at[1] - frame.robot[1]);
+        Report {
+            id: i64::from(track.id),
+            region: (inside.area() > 0.0).then(|| tagalong_scoring::region(&inside)),
+            floor_m: Some([cos * dx + sin * dy, cos * dy - sin * dx]),
+            score: track.p,
+        }
+    };
+    seen.map(report).collect()
+}
+
+/// Describes an event of the comparison; people found again are told by the run itself.
+fn described(event: &Event) -> Option<EventData> {
+    let number = |id: i64| u32::try_from(id).ok();
+    let (kind, person, track, text) = match event.kind {
+        EventKind::Miss { person, track } => {
+            let had = track.map(|id| format!(", who was track {id}")).unwrap_or_default();
+            ("missed", Some(person), track, format!("annotated person {person}{had}, is missed"))
+        }
+        EventKind::Switch { person, from, to } => {
+            let text = format!("annotated person {person} changes from track {from} to {to}");
+            ("switched", Some(person), Some(to), text)
+        }
+        EventKind::WrongPerson { track, began_with, person } => {
+            let text =
+                format!("track {track} began on annotated person {began_with}, is on {person}");
+            ("wrong person", Some(person), Some(track), text)
+        }
+        EventKind::FalseTrack { track } => {
+            ("false track", None, Some(track), format!("track {track} begins where no person is"))
+        }
+        EventKind::Found { .. } => return None,
+    };
+    let i = event.frame.saturating_sub(1);
+    Some(EventData { i, kind, track: track.and_then(number), person, text })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::page_data::TrackData;
+
+    fn run(boxes: &[Option<[f64; 4]>]) -> RunData {
+        let frame = |box_px: &Option<[f64; 4]>| {
+            let track = |box_px| TrackData { id: 7, state: "seen", box_px, ..TrackData::default() };
+            let tracks = box_px.iter().map(|b| track(*b)).collect();
+            Some(FrameData { tracks, ..FrameData::default() })
+        };
+        RunData { frames: boxes.iter().map(frame).collect(), ..RunData::default() }
+    }
+
+    #[test]
+    fn a_person_without_a_track_is_a_miss_that_can_be_jumped_to() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("gt.csv");
+        std::fs::write(&path, "1,1,10,10,40,40,1\n2,1,10,10,40,40,1\n3,1,10,10,40,40,1\n").unwrap();
+        let mut shots = Shots::default();
+        for number in 1..4 {
+            shots.push(tagalong_scoring::Shot {
+                number,
+                stamp_ns: u64::from(number) * 100_000_000,
+                robot_from_camera: nalgebra::Isometry3::identity(),
+                odom_from_robot: Isometry2::identity(),
+                size: (640, 480),
+            });
+        }
+        let stamps = [100_000_000, 200_000_000, 300_000_000];
+        let truth = PageTruth::read(&path, false, &shots, &stamps).unwrap();
+        assert!(truth.has_people());
+        assert_eq!(truth.frames[0][0].box_px, Some([10.0, 10.0, 40.0, 40.0]));
+        let on = Some([10.0, 10.0, 40.0, 40.0]);
+        let mut run = run(&[on, Some([300.0, 9.0, 40.0, 40.0]), on]);
+        truth.judge(&[0.0, 0.1, 0.2], [640, 480], &mut run).unwrap();
+        let hits = run.hits.unwrap();
+        assert_eq!((hits[0][&1], hits[1][&1], hits[2][&1]), (Some(7), None, Some(7)));
+        let missed: Vec<usize> =
+            run.events.iter().filter(|e| e.kind == "missed").map(|e| e.i).collect();
+        assert_eq!(missed, [1]);
+    }
+}
