@@ -171,6 +171,8 @@ fn described(event: &Event) -> Option<EventData> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::page_data::TrackData;
 
@@ -193,9 +195,13 @@ mod tests {
             shots.push(tagalong_scoring::Shot {
                 number,
                 stamp_ns: u64::from(number) * 100_000_000,
-                robot_from_camera: nalgebra::Isometry3::identity(),
+                camera: Arc::new(tagalong_geometry::Camera {
+                    lens: tagalong_geometry::Lens::Blind,
+                    width: 640,
+                    height: 480,
+                    robot_from_camera: nalgebra::Isometry3::identity(),
+                }),
                 odom_from_robot: Isometry2::identity(),
-                size: (640, 480),
             });
         }
         let stamps = [100_000_000, 200_000_000, 300_000_000];
