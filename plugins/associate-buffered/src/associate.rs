@@ -160,6 +160,26 @@ mod tests {
         assert_eq!(pairs(&answer(&one, &tracks, &found)), [(0, 0)]);
     }
 
+    #[test]
+    fn a_detection_within_the_wider_reach_fits() {
+        let config = Config { buffer: 0.0, second_buffer: 0.8, ..Config::default() };
+        let associator = Buffered::new(config).unwrap();
+        assert!(associator.fits(&track(1, 0.0), &detection(22.0, 3.0), &GATE));
+        assert!(!associator.fits(&track(1, 0.0), &detection(90.0, 3.0), &GATE));
+    }
+
+    /// The farther detection looks like the track.
+    #[test]
+    fn the_better_of_overlap_and_appearance_counts() {
+        let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
+        let with = |appearance: &[Vec<f64>]| {
+            let gate = Gate { appearance, ..GATE };
+            let mut associator = Buffered::new(Config::default()).unwrap();
+            pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
+        };
+        assert_eq!((with(&[]), with(&[vec![0.0, 6.0]])), (vec![(0, 0)], vec![(0, 1)]));
+    }
+
     /// The track goes 8 pixels a frame; the filter has not noticed.
     #[test]
     fn a_track_is_expected_by_the_mean_velocity_of_its_observations() {

@@ -161,6 +161,37 @@ mod tests {
         assert_eq!(with(0.2), [(0, 1)]);
     }
 
+    /// The direction speaks for the left one of equal overlap only as far as the detection is sure.
+    #[test]
+    fn the_direction_counts_by_the_certainty_of_the_detection() {
+        let ahead = |score: f64| [detection(at(14.0, 6.0), 3.0), detection(at(21.0, 0.0), score)];
+        let with = |score: f64| {
+            let priority = PrioritySettings { strong_log_odds: -9.0, ..PrioritySettings::default() };
+            let config = Config { priority, direction_weight: 0.35, ..Config::default() };
+            let track = [track_in(1, at(16.0, 0.0))];
+            pairs(&walking(config).associate(&track, &ahead(score), &GATE))
+        };
+        assert_eq!((with(3.0), with(-2.0)), (vec![(0, 1)], vec![(0, 0)]));
+    }
+
+    #[test]
+    fn a_tentative_track_gets_what_the_confirmed_ones_leave() {
+        let priority = PrioritySettings { confirmed_first: true, ..PrioritySettings::default() };
+        let config = Config { priority, ..Config::default() };
+        let tentative = Track { confirmed: false, ..track_in(1, at(0.0, 0.0)) };
+        let mut associator = associator(config);
+        let found = [detection(at(1.0, 0.0), 3.0)];
+        assert_eq!(pairs(&associator.associate(&[tentative], &found, &GATE)), [(0, 0)]);
+    }
+
+    #[test]
+    fn a_weak_detection_does_not_recover_a_track() {
+        let associator = walking(Config::default());
+        let (lost, there) = (track_in(1, at(60.0, 0.0)), at(12.0, 0.0));
+        assert!(associator.fits(&lost, &detection(there, 3.0), &GATE));
+        assert!(!associator.fits(&lost, &detection(there, -3.0), &GATE));
+    }
+
     #[test]
     fn directions_are_compared_as_the_paper_has_them() {
         let associator = walking(Config::default());
