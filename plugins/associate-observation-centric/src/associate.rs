@@ -166,7 +166,8 @@ mod tests {
     fn the_direction_counts_by_the_certainty_of_the_detection() {
         let ahead = |score: f64| [detection(at(14.0, 6.0), 3.0), detection(at(21.0, 0.0), score)];
         let with = |score: f64| {
-            let priority = PrioritySettings { strong_log_odds: -9.0, ..PrioritySettings::default() };
+            let priority =
+                PrioritySettings { strong_log_odds: -9.0, ..PrioritySettings::default() };
             let config = Config { priority, direction_weight: 0.35, ..Config::default() };
             let track = [track_in(1, at(16.0, 0.0))];
             pairs(&walking(config).associate(&track, &ahead(score), &GATE))

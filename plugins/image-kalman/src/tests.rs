@@ -538,8 +538,8 @@ proptest! {
 }
 
 /// Returns the velocity after a gap, pixels a frame: a box moves by 4 pixels a frame to frame 10, is
-/// missed, and is seen in frame 20 where it was in frame 10.
-fn after_a_gap(reupdate: bool) -> f64 {
+/// missed, and is seen in frame 20 where it would have been in the frame of number `reached`.
+fn after_a_gap(reupdate: bool, reached: u32) -> f64 {
     let (camera, seen) = ahead(4.0);
     let config = Config { reupdate, ..Config::default() };
     let mut filter = ImageKalman::new(config).unwrap();
@@ -558,7 +558,7 @@ fn after_a_gap(reupdate: bool) -> f64 {
         if (11..20).contains(&index) {
             continue;
         }
-        let found = at(4.0 * f64::from(index.min(10)));
+        let found = at(4.0 * f64::from(if index == 20 { reached } else { index }));
         let stamp = Stamp::default();
         let frame = Frame::new(index.into(), stamp, Arc::clone(&camera), motion, Images::default());
         let matched = [Matched::certain(TrackId(1), &found)];
@@ -573,9 +573,11 @@ fn after_a_gap(reupdate: bool) -> f64 {
 
 #[test]
 fn a_gap_that_is_filtered_anew_leaves_no_wrong_velocity() {
-    let (with, without) = (after_a_gap(true), after_a_gap(false));
+    let (with, without) = (after_a_gap(true, 10), after_a_gap(false, 10));
     assert!(with.abs() < 0.5, "pixels a frame: {with}");
     assert!(without.abs() > 2.0 * with.abs().max(0.1), "{without} {with}");
+    let went_on = after_a_gap(true, 20);
+    assert!((went_on - 4.0).abs() < 0.2, "pixels a frame: {went_on}");
 }
 
 #[test]

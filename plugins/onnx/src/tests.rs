@@ -4,8 +4,8 @@ use std::sync::Arc;
 use nalgebra::{Matrix5, Vector2, Vector3};
 use tagalong_config::{Context, OrAuto, Registry, parse_settings};
 use tagalong_core::{
-    DepthImage, Detection, Detector, DiffDrive, EgoMotion, Estimate, Frame, Funnel, GreyImage,
-    Images, Person, Query, RgbImage, Stamp, Track, TrackId,
+    Capabilities, DepthImage, Detection, Detector, DiffDrive, EgoMotion, Estimate, Frame, Funnel,
+    GreyImage, Images, Person, Query, RgbImage, Stamp, Track, TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect};
 use tagalong_network::{Colours, Family, Fit, LimitSettings};
@@ -32,6 +32,24 @@ fn context() -> Context {
 
 fn config(family: Family) -> Config {
     Config { model: format!("{family}.onnx"), ..Config::default() }
+}
+
+#[test]
+fn it_discovers_and_tracks_by_each_frame_alone() {
+    let detector = detector(config(Family::Yolox));
+    let Capabilities { discovers, tracks, weighs, .. } = detector.capabilities();
+    assert_eq!((discovers, tracks, weighs, detector.remembers()), (true, true, false, false));
+}
+
+/// They share what a network found in a frame by their settings.
+#[test]
+fn detectors_with_other_settings_have_answers_of_their_own() {
+    let frame = frame(1, 240);
+    let mut first = detector(config(Family::Yolox));
+    let found = detect(&mut first, &frame);
+    let mut blind = detector(Config { classes: vec![1], ..config(Family::Yolox) });
+    assert_eq!((found.len(), detect(&mut blind, &frame).len()), (1, 0));
+    assert_eq!(detect(&mut first, &frame).len(), 1);
 }
 
 /// Returns the settings for boxes that enclose this.
