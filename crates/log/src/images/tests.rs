@@ -487,8 +487,8 @@ fn disparities_are_the_depth_that_opencv_computes() {
 fn disparity_message(data: &[u8]) -> DisparityImage<'_> {
     DisparityImage {
         image: raw("32FC1", 4, 1, 16, data),
-        f: 420.0,
-        t: 0.12,
+        f: 400.0,
+        t: 0.125,
         ..DisparityImage::default()
     }
 }
@@ -502,7 +502,7 @@ fn depth_of_message(message: &DisparityImage<'_>) -> (Vec<f32>, usize) {
 fn disparities_outside_of_the_range_or_the_window_are_invalid() {
     let data: Vec<u8> = [2.0_f32, 10.0, 60.0, 64.5].iter().flat_map(|d| d.to_le_bytes()).collect();
     let message = disparity_message(&data);
-    let all = [25.2, 5.04, 0.84, 50.4 / 64.5];
+    let all = [25.0, 5.0, 50.0 / 60.0, 50.0 / 64.5];
     let (read, invalid) = depth_of_message(&message);
     assert!(same_depth(&read, &all) && invalid == 0, "{read:?}");
     let of_range = DisparityImage { min_disparity: 10.0, max_disparity: 64.0, ..message.clone() };
@@ -523,7 +523,7 @@ fn disparities_outside_of_the_range_or_the_window_are_invalid() {
         let error = decode_disparity(&wrong, None, None, &Limits::default()).unwrap_err();
         assert!(error.to_string().contains("have to be positive"), "{error}");
     }
-    let in_millimetres = DisparityImage { t: 120.0, ..message };
+    let in_millimetres = DisparityImage { t: 125.0, ..message };
     let read = decode_disparity(&in_millimetres, None, Some(1e-3), &Limits::default()).unwrap();
     assert!(same_depth(read.depth.pixels(), &all));
 }
