@@ -84,7 +84,7 @@ fn files(out: &mut String, folder: &Path, overlay: bool) {
     let _ = writeln!(out, "  tagalong view {}", quoted(&shown.to_string()));
     let _ = writeln!(
         out,
-        "  {shown}/tracks.mcap opens in Foxglove (people in 3D, boxes) and Rerun (poses)"
+        "  {shown}/tracks.mcap opens in Foxglove (people in 3D, boxes) and Rerun (camera, images)"
     );
     if overlay {
         let _ = writeln!(out, "  {shown}/overlay/ has a picture of every frame");
