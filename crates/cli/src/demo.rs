@@ -61,6 +61,9 @@ pub fn demo(args: &DemoArgs, registry: &Registry) -> Outcome {
     }
     say("4/4 comparing both with the truth");
     let ended = bench(&bench_args(folder, &log), registry)?;
+    if let Some(signal) = signals.received() {
+        return Ok(Ended::BySignal(signal));
+    }
     print(&what_now(folder))?;
     Ok(ended)
 }

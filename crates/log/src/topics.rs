@@ -161,7 +161,7 @@ fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
         wanted,
         key: key.to_owned(),
         types: types.to_owned(),
-        fits: Box::new(if key == "depth_topic" { is_image } else { is_usable_picture }),
+        fits: Box::new(if key == "depth_topic" { could_be_depth } else { is_usable_picture }),
     };
     let lacks_right = lacks(Input::Right, &chosen.right);
     let images = [
@@ -201,7 +201,9 @@ impl Requirement<'_> {
                 None => format!("; if {name} ({kind}) is meant, name it as `{key}` under [input]"),
             }
         });
-        missing(scan, format!("{wanted} ({types})"), unreadable.or(meant).unwrap_or_default())
+        let depth = (key == "depth_topic").then(|| DEPTH_REMEDY.to_owned());
+        let hint = unreadable.or(meant).or(depth).unwrap_or_default();
+        missing(scan, format!("{wanted} ({types})"), hint)
     }
 }
 
@@ -217,6 +219,9 @@ const COLOUR: &str = "sensor_msgs/Image with colour, mono, bayer or yuv pixels o
                       sensor_msgs/CompressedImage with jpeg or png";
 const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, sensor_msgs/CompressedImage with \
                      compressedDepth, or stereo_msgs/DisparityImage";
+
+const DEPTH_REMEDY: &str = "; name a topic that has them as `depth_topic` under [input], or take \
+                            a config without depth";
 
 pub(crate) fn missing(scan: &Scan, wanted: String, hint: String) -> LogError {
     LogError::Missing { path: scan.path.clone(), wanted, hint, present: scan.listing() }
@@ -241,6 +246,11 @@ fn is_usable_depth(topic: &Topic, input: &InputSettings) -> bool {
     let is_disparity = input.disparity.is_some() && disparity_rank("disparity", topic).is_some();
     let is_depth = topic.content == Content::Depth || topic.pixels.is_none();
     is_image(topic) && (is_depth || is_disparity)
+}
+
+/// Returns true for images whose pixels may be depth or disparities, by a setting at most.
+fn could_be_depth(topic: &Topic) -> bool {
+    is_image(topic) && (topic.content != Content::Picture || remedy_as_depth(topic).is_some())
 }
 
 /// Returns the setting that makes depth of images that look like others.

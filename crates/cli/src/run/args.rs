@@ -44,27 +44,30 @@ pub struct RunArgs {
 }
 
 impl RunArgs {
-    /// Returns the path of the log: a single path is that of the log if it looks like one.
+    /// Returns the path of the log.
     pub fn log(&self) -> &Path {
-        let single = self.config.as_deref().filter(|path| is_log(path));
-        match &self.log {
-            // Config and log in the other order mean the same.
-            Some(log) if !is_log(log) => single.unwrap_or(log),
-            log => log.as_deref().or(single).unwrap_or(Path::new(SAMPLE)),
-        }
+        self.in_order().1.unwrap_or(Path::new(SAMPLE))
     }
 
     /// Returns true if a log is given.
     pub fn has_log(&self) -> bool {
-        self.log.is_some() || self.config.as_deref().is_some_and(is_log)
+        self.in_order().1.is_some()
     }
 
     /// Returns the config, if one is given.
     pub fn config(&self) -> Option<&Path> {
-        let swapped = self.log.as_deref().filter(|path| !is_log(path));
-        match &self.config {
-            Some(config) if is_log(config) => swapped,
-            config => config.as_deref(),
+        self.in_order().0
+    }
+
+    /// Returns config and log, given in either order; a single path is that of a log if it looks
+    /// like one.
+    fn in_order(&self) -> (Option<&Path>, Option<&Path>) {
+        match (self.config.as_deref(), self.log.as_deref()) {
+            (Some(single), None) if is_log(single) => (None, Some(single)),
+            (Some(first), Some(second)) if is_log(first) && !is_log(second) => {
+                (Some(second), Some(first))
+            }
+            given => given,
         }
     }
 }
@@ -108,6 +111,8 @@ mod tests {
             assert_eq!(split(&[log, "depth-ekf"]), (Some("depth-ekf".into()), log.into()));
         }
         assert_eq!(split(&["depth-ekf"]), (Some("depth-ekf".into()), SAMPLE.into()));
+        // The first of two logs is an error, not left out.
+        assert_eq!(split(&["a.mcap", "b.mcap"]), (Some("a.mcap".into()), "b.mcap".into()));
         assert_eq!(split(&[]), (None, SAMPLE.into()));
     }
 }

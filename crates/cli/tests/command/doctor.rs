@@ -210,7 +210,7 @@ fn cases() -> Vec<Case> {
             Changes { thinned: Some(("/camera/", 10)), ..Changes::default() },
             "rate",
             "warn",
-            "record 5 images",
+            "record 5 a second",
         ),
         case(
             "no depth",

@@ -11,6 +11,9 @@ const COLUMNS: usize = 160;
 const CELL_M: f64 = 0.05;
 /// Points in a cell that are no noise.
 const ENOUGH: u16 = 3;
+/// Depth beyond which a pixel has none, m: some cameras say so by the largest value of 16 bits,
+/// 65.535 m, which is no fall in the floor.
+const FARTHEST_M: f64 = 50.0;
 /// Time after which a static point is an obstacle to remember, s; a person walking by is not.
 const STANDS_S: f64 = 1.0;
 /// Distance ahead of the robot, m, within which an obstacle that left the image at its edge or
@@ -268,7 +271,7 @@ impl ObstacleMemory {
                 let row = depth.row(y).iter().step_by(step);
                 for (at, (z, column)) in row.zip(&mut self.columns).enumerate() {
                     let z = f64::from(*z);
-                    if !(z > 0.0 && z.is_finite()) {
+                    if !is_reading(z) {
                         continue;
                     }
                     column.read += 1;
@@ -422,6 +425,11 @@ impl Grid {
     }
 }
 
+/// Returns true for a depth that was measured, m.
+fn is_reading(depth_m: f64) -> bool {
+    0.0 < depth_m && depth_m < FARTHEST_M
+}
+
 /// Returns true if the image shows a surface behind a place at one of the heights. Out of the image
 /// and at pixels without depth it shows nothing.
 fn shows_past(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, heights: Heights) -> bool {
@@ -431,7 +439,7 @@ fn shows_past(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, heights: He
             let (x, y) = (pixel.x.round(), pixel.y.round());
             depth.get(x as i64, y as i64).map(f64::from)
         });
-        seen_m.is_some_and(|z| z > 0.0 && z.is_finite() && z > camera.depth_of(&place) - BEFORE_M)
+        seen_m.is_some_and(|z| is_reading(z) && z > camera.depth_of(&place) - BEFORE_M)
     })
 }
 
@@ -447,8 +455,7 @@ fn shows_floor(
     let pixel = Point2::new(pixel.x.round(), pixel.y.round());
     let seen_m = depth.get(pixel.x as i64, pixel.y as i64).map(f64::from);
     seen_m.is_some_and(|z| {
-        let is_valid = z > 0.0 && z.is_finite();
-        is_valid && fall(settings, &eye, &camera.back_project(pixel, z)).is_none()
+        is_reading(z) && fall(settings, &eye, &camera.back_project(pixel, z)).is_none()
     })
 }
 
