@@ -6,6 +6,7 @@ use std::thread::{self, JoinHandle};
 use futures::StreamExt;
 use futures::executor::block_on;
 use futures::future::{AbortHandle, Abortable, ready};
+use ros2_client::dds::rustdds::RTPSEntity;
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
     Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
@@ -185,7 +186,13 @@ impl Network {
 
     /// Returns the number of other participants' publishers on a topic.
     pub(crate) fn others_on(&self, topic: &str) -> usize {
-        self.node.publisher_count(&full_name(self.node.namespace(), topic))
+        let participant = self.context.domain_participant();
+        let dds_name = format!("rt{}", full_name(self.node.namespace(), topic));
+        // Our own publishers may be among those that are discovered.
+        let ours = participant.guid().prefix;
+        let writers = participant.discovered_writers();
+        let topic = writers.iter().filter(|w| w.publication_topic_data.topic_name == dds_name);
+        topic.filter(|writer| writer.writer_proxy.remote_writer_guid.prefix != ours).count()
     }
 
     fn plain<M: Message + Serialize + DeserializeOwned + Send + 'static>(
