@@ -269,7 +269,7 @@ fn a_compressed_file_beyond_the_limit_is_refused_and_a_cut_one_is_used_up_to_the
     }
     // An MCAP file in several frames of zstd, of which the last is cut.
     let mcap = log();
-    let frames: Vec<u8> = mcap.chunks(1000).flat_map(|part| packed(part)).collect();
+    let frames: Vec<u8> = mcap.chunks(1000).flat_map(packed).collect();
     std::fs::write(&path, &frames[..frames.len() - 5]).unwrap();
     let (found, counted, lost) = frames_of(&path);
     assert!(lost && !found.is_empty(), "{counted:?}");
