@@ -180,7 +180,7 @@ fn a_repeated_look_renews_the_faded_one() {
     assert_near(bench.look(0.0, 3.0, 2.0), 5.0);
 }
 
-/// What faded during a pause does not come back with a look at another place.
+/// The part that faded during a pause does not come back with a look at another place.
 #[test]
 fn a_look_from_before_a_pause_stays_faded_beside_the_next_one_elsewhere() {
     let mut bench = Bench::new(Config { look_s: 2.0, repeated: 1.0, ..looks_only() }, 3.0, 2.0);

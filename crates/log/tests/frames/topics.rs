@@ -1,0 +1,186 @@
+//! Topics of a wrong kind or in other encodings, and disparities in place of depth.
+
+use super::*;
+
+/// Writes a log of a stereo camera, with `depth` on its topic of disparities, and without
+/// transforms between its frames.
+fn stereo_log<T: Message + serde::Serialize>(topic: &str, disparities: &T) -> LogWriter {
+    let mut log = LogWriter::plain();
+    let left = camera(16, 12, 14.0);
+    log.info("/stereo/left/camera_info", "colour", &left);
+    let mut right = info_of("colour", &left);
+    right.p[3] = -14.0 * 0.1;
+    log.message("/stereo/right/camera_info", at(0.0), &right);
+    log.fixed("base_link", "colour", &level_pose());
+    log.message(topic, at(0.1), disparities);
+    log
+}
+
+fn depths_with(log: LogWriter, input: &InputSettings) -> Result<(FrameSource, LogFrame), String> {
+    let saved = log.save();
+    let inputs = Inputs::ANY.require(Input::Depth);
+    let source = FrameSource::open(&saved.path, input, &Limits::default(), inputs);
+    let mut source = source.map_err(|error| error.to_string())?;
+    let frame = source.next_frame().ok_or_else(|| format!("{:?}", source.notes()))?;
+    Ok((source, frame))
+}
+
+/// Returns an image of 16 columns and 12 rows whose first pixel has no disparity.
+fn disparities<'a>(encoding: &str, data: &'a [u8]) -> Image<'a> {
+    Image {
+        header: Header::new(at(0.1), "colour"),
+        height: 12,
+        width: 16,
+        encoding: encoding.into(),
+        is_bigendian: 0,
+        step: data.len() as u32 / 12,
+        data,
+    }
+}
+
+#[test]
+fn a_disparity_image_is_depth_with_its_own_geometry() {
+    let data: Vec<u8> = (0..192_u16).flat_map(|i| f32::from(i.min(4)).to_le_bytes()).collect();
+    let message = DisparityImage {
+        header: Header::new(at(0.1), "colour"),
+        image: disparities("32FC1", &data),
+        f: 14.0,
+        t: 0.1,
+        min_disparity: 1.5,
+        max_disparity: 15.0,
+        ..DisparityImage::default()
+    };
+    let log = stereo_log("/stereo/disparity", &message);
+    let (source, found) = depths_with(log, &InputSettings::default()).unwrap();
+    let depth = found.frame.depth().unwrap();
+    let [first, second, third] = [0, 1, 4].map(|x| depth.get(x, 0).unwrap());
+    assert!(first.is_nan() && second.is_nan() && (third - 1.4 / 4.0).abs() < 1e-6, "{third}");
+    assert_eq!(
+        (count(&source, "disparity_pixels"), count(&source, "disparity_pixels_invalid")),
+        (192, 2)
+    );
+    // Its calibration is that of the left camera.
+    assert_eq!(source.facts().calibration_topic.as_deref(), Some("/stereo/left/camera_info"));
+}
+
+#[test]
+fn plain_disparities_take_their_geometry_from_the_calibrations_or_the_settings() {
+    let data: Vec<u8> = (0..192).collect();
+    let log = || stereo_log("/stereo/disparity", &disparities("mono8", &data));
+    let disparity = Some(DisparitySettings::default());
+    let input = InputSettings { disparity, ..InputSettings::default() };
+    let read = |input: &InputSettings| {
+        let found = depths_with(log(), input)?.1;
+        Ok::<_, String>(found.frame.depth().unwrap().get(7, 0).unwrap())
+    };
+    // The settings find the topic by its name, which is otherwise one of grey images.
+    assert!((read(&input).unwrap() - 1.4 / 7.0).abs() < 1e-6);
+    let halves = DisparitySettings { unit_px: Some(0.5), baseline_m: Some(0.2) };
+    let told = InputSettings { disparity: Some(halves), ..input.clone() };
+    assert!((read(&told).unwrap() - 2.8 / 3.5).abs() < 1e-6);
+    let named = InputSettings { depth_topic: Some("/stereo/disparity".into()), ..input.clone() };
+    assert!((read(&named).unwrap() - 1.4 / 7.0).abs() < 1e-6);
+    // Without a right camera nothing tells the baseline.
+    let mut alone = LogWriter::plain();
+    alone.info("/stereo/camera_info", "colour", &camera(16, 12, 14.0));
+    alone.message("/stereo/disparity", at(0.1), &disparities("mono8", &data));
+    let error = depths_with(alone, &input).err().unwrap();
+    assert!(error.contains("disparity.baseline_m"), "{error}");
+}
+
+/// Writes a log with depth, and with an image in `encoding`.
+fn log_with(topic: &str, encoding: &str) -> LogWriter {
+    let mut log = started();
+    log.depth(at(0.1), "colour", 2.0);
+    let data = [0; 16 * 12 * 6];
+    let image = Image { encoding: encoding.into(), step: 96, ..disparities("", &data) };
+    log.message(topic, at(0.1), &image);
+    log
+}
+
+fn refusal(log: LogWriter, input: &InputSettings, inputs: Inputs) -> LogError {
+    let saved = log.save();
+    FrameSource::open(&saved.path, input, &Limits::default(), inputs).err().unwrap()
+}
+
+#[test]
+fn images_in_an_encoding_that_is_not_read_are_named_with_the_remedy() {
+    let input = InputSettings::default();
+    let colour = Inputs::ANY.require(Input::Colour);
+    for (encoding, remedy) in [
+        ("rgb16", "let the driver publish 8 bits"),
+        ("bayer_rggb12", "encoding `bayer_rggb12`; known: rgb8"),
+        ("h264", "image_transport republish"),
+    ] {
+        let error = refusal(log_with("/cam/image_raw", encoding), &input, colour).to_string();
+        let named = format!("/cam/image_raw (sensor_msgs/msg/Image, {encoding}) cannot be read: ");
+        assert!(error.contains(&named) && error.contains(remedy), "{error}");
+        // A pipeline that can do without makes its frames of depth, and hears of the images.
+        let (source, _saved) = open(log_with("/cam/image_raw", encoding), Inputs::ANY);
+        assert_eq!(count(&source, "messages_not_read"), 1);
+        let told = source.notes().iter().find(|note| note.contains("/cam/image_raw")).unwrap();
+        assert!(told.contains(remedy), "{told}");
+    }
+    let mut log = started();
+    log.foreign("/video", "foxglove_msgs/msg/CompressedVideo", "cdr", at(0.1), &[0, 1, 0, 0]);
+    assert!(refusal(log, &input, colour).to_string().contains("image_transport republish"));
+    let mut log = started();
+    log.foreign("/image", "foxglove.CompressedImage", "protobuf", at(0.1), &[8, 1]);
+    let error = refusal(log, &input, colour).to_string();
+    assert!(error.contains("/image (foxglove.CompressedImage, protobuf)"), "{error}");
+    assert!(error.contains("its messages are in `protobuf`"), "{error}");
+}
+
+#[test]
+fn a_named_topic_of_a_wrong_kind_is_an_error_of_the_settings() {
+    let named = |depth: &str| InputSettings {
+        depth_topic: Some(depth.to_owned()),
+        ..InputSettings::default()
+    };
+    for (encoding, remedy) in [
+        ("rgb8", "/camera/depth/image_raw (sensor_msgs/msg/Image, 32FC1) would fit"),
+        ("mono16", "set `depth_unit_m` under [input]"),
+        ("mono8", "add [input.disparity]"),
+        ("rgb16", "let the driver publish 8 bits"),
+    ] {
+        let error = refusal(log_with("/cam", encoding), &named("/cam"), DEPTH);
+        assert!(matches!(&error, LogError::WrongTopic { key, .. } if key == "depth_topic"));
+        let told = error.to_string();
+        let kind = format!("names /cam, which is sensor_msgs/msg/Image, {encoding}; ");
+        assert!(told.contains(&kind) && told.contains(remedy), "{told}");
+    }
+    let input = InputSettings {
+        laser_topic: Some("/cam".into()),
+        colour_topic: Some("/tf_static".into()),
+        ..InputSettings::default()
+    };
+    let laser = Inputs::NONE.require(Input::Laser);
+    let told = refusal(log_with("/cam", "rgb8"), &input, laser).to_string();
+    assert!(told.contains("`colour_topic` under [input] names /tf_static"), "{told}");
+    let input = InputSettings { colour_topic: None, ..input };
+    let told = refusal(log_with("/cam", "rgb8"), &input, laser).to_string();
+    assert!(told.contains("`laser_topic`") && told.contains("leave the key out"), "{told}");
+}
+
+#[test]
+fn messages_of_ros_1_in_an_mcap_file_are_read() {
+    let text = |text: &str| [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
+    let words = |words: &[u32]| words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>();
+    let image = [
+        words(&[7, 1_700_000_000, 100_000_000]),
+        text("colour"),
+        words(&[2, 3]),
+        text("mono8"),
+        vec![0],
+        words(&[3, 6]),
+        vec![1, 2, 3, 4, 5, 6],
+    ]
+    .concat();
+    let mut log = LogWriter::plain();
+    log.foreign("/camera/image_raw", "sensor_msgs/Image", "ros1", at(0.1), &image);
+    let (mut source, _saved) = open(log, Inputs::ANY.require(Input::Colour));
+    let found = frames(&mut source);
+    assert_eq!(stamps(&found), [0.1]);
+    assert_eq!(found[0].frame.grey().unwrap().pixels(), [1, 2, 3, 4, 5, 6]);
+    assert!(!source.data_lost(), "{:?}", source.notes());
+}
