@@ -1,6 +1,6 @@
 //! `tagalong view`: one run, or two side by side, as one page that needs no network and no server.
 //!
-//! A [`recording`] is read from the folder of a run; `assemble` puts runs on one list of times;
+//! A `recording` is read from the folder of a run; `assemble` puts runs on one list of times;
 //! `film` passes the log once for images, laser scans and trails; `truth` says which annotated
 //! people a run has missed. The page's script shows the data as it is: nothing is computed a second
 //! time in the browser but the answer to a click.
