@@ -58,7 +58,8 @@ impl Permission {
     }
 }
 
-/// Deadman's switch; see the [module](self).
+/// Deadman's switch with a latch: it starts latched, moves only while an `On` is repeated, and stays
+/// stopped after an `Off` or a fault until a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EnableSwitch {
     timeout: Duration,
