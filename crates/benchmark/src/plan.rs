@@ -11,8 +11,9 @@ use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::suggest::{self, check_log_path, toml_files};
 use tagalong_config::Registry;
-use tagalong_log::{FrameSource, Inputs, Limits, LogError, read_truth};
+use tagalong_log::{FrameSource, Inputs, LogError};
 use tagalong_pipeline::Tunable;
+use tagalong_scoring::TruthFile;
 
 use super::args::PlanArgs;
 
@@ -313,15 +314,7 @@ pub fn with_truth(log: &Path) -> Result<Annotated, Failure> {
 
 /// Returns the log with its truth, if it has any.
 fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
-    let beside = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
-    // Files beside the log take precedence, so that they can replace the log's own truth.
-    let people = beside("people.csv").or_else(|| beside("truth.jsonl"));
-    let (truth, whole_bodies) = match (people, beside("boxes.csv")) {
-        (Some(people), _) => (people, false),
-        (None, Some(boxes)) => (boxes, true),
-        (None, None) if read_truth(log, &Limits::default())?.is_some() => (log.to_owned(), false),
-        (None, None) => return Ok(None),
-    };
+    let Some((truth, whole_bodies)) = TruthFile::beside(log)? else { return Ok(None) };
     Ok(Some(Annotated {
         log: log.to_owned(),
         name: log.file_stem().unwrap_or_default().to_string_lossy().into_owned(),

@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3};
@@ -87,6 +87,22 @@ pub struct TruthFile {
 }
 
 impl TruthFile {
+    /// Finds the file with the truth of a log, beside it or the log itself; the flag is true if its
+    /// boxes are of whole people.
+    ///
+    /// # Errors
+    /// A log without a file beside it that cannot be read.
+    pub fn beside(log: &Path) -> Result<Option<(PathBuf, bool)>, Failure> {
+        let file = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
+        // Files beside the log take precedence, so that they can replace the log's own truth.
+        let people = file("people.csv").or_else(|| file("truth.jsonl"));
+        Ok(match (people, file("boxes.csv")) {
+            (Some(people), _) => Some((people, false)),
+            (None, Some(boxes)) => Some((boxes, true)),
+            (None, None) => read_truth(log, &Limits::default())?.map(|_| (log.to_owned(), false)),
+        })
+    }
+
     /// Reads truth of any format.
     ///
     /// # Errors

@@ -21,6 +21,13 @@ struct Course {
     has_ended: bool,
 }
 
+impl Course {
+    /// Begins the course of a track at a position and time of the page.
+    fn begun(at: usize, t_s: f64) -> Self {
+        Self { seen: (at, t_s), unseen_since: None, present: at, is_lost: false, has_ended: false }
+    }
+}
+
 /// Lists the events of a run. `times` are those of all frames of the page, and `moments` their
 /// frames in the run.
 pub fn of_run(times: &[f64], moments: &[Option<&Moment>]) -> Vec<EventData> {
@@ -61,14 +68,7 @@ impl Watch {
     }
 
     fn see(&mut self, at: usize, t_s: f64, id: u32) {
-        let fresh = Course {
-            seen: (at, t_s),
-            unseen_since: None,
-            present: at,
-            is_lost: false,
-            has_ended: false,
-        };
-        match self.courses.insert(id, fresh) {
+        match self.courses.insert(id, Course::begun(at, t_s)) {
             None => self.tell(at, "started", Some(id), format!("person {id} is tracked")),
             Some(before) if before.has_ended => {
                 let text = format!("person {id} is recognised after {:.1} s", t_s - before.seen.1);
@@ -83,15 +83,8 @@ impl Watch {
     }
 
     fn miss(&mut self, at: usize, t_s: f64, id: u32) {
-        let fresh = Course {
-            seen: (at, t_s),
-            unseen_since: None,
-            present: at,
-            is_lost: false,
-            has_ended: false,
-        };
         let is_new = !self.courses.contains_key(&id);
-        let course = self.courses.entry(id).or_insert(fresh);
+        let course = self.courses.entry(id).or_insert_with(|| Course::begun(at, t_s));
         course.present = at;
         let since = *course.unseen_since.get_or_insert(at);
         // A single frame without evidence is no event.

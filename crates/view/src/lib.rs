@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
+use tagalong_scoring::TruthFile;
 
 use crate::assemble::{Span, run_data, stamps, times};
 use crate::film::Film;
@@ -227,7 +228,9 @@ fn read_truth(
         let is_whole = path.to_string_lossy().ends_with(".boxes.csv");
         (path, is_whole)
     });
-    let Some((path, is_whole)) = named.or_else(|| truth::beside(log)) else { return Ok(None) };
+    let Some((path, is_whole)) = named.or_else(|| TruthFile::beside(log).ok().flatten()) else {
+        return Ok(None);
+    };
     let truth = PageTruth::read(&path, is_whole, &film.shots, stamps)?;
     if !truth.has_people() {
         notes.push(format!("{} has nobody in the frames shown", path.display()));

@@ -1,7 +1,7 @@
 //! Annotated people beside the runs, and which of them each run has missed.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Isometry2, Point2};
 use tagalong_app::outcome::Failure;
@@ -10,7 +10,6 @@ use tagalong_eval::{
     events,
 };
 use tagalong_geometry::Rect;
-use tagalong_log::{Limits, read_truth};
 use tagalong_scoring::{Shots, TruthFile, TruthOptions, comparable, comparison};
 
 use crate::page_data::{EventData, FrameData, RunData, TruthBox};
@@ -22,19 +21,6 @@ pub struct PageTruth {
     pub frames: Vec<Vec<TruthBox>>,
     /// As they are scored.
     people: Vec<(Vec<Truth>, Vec<Region>)>,
-}
-
-/// Returns the file with the truth of a log, as `bench` looks for it; the flag is true if its boxes
-/// are of whole people.
-pub fn beside(log: &Path) -> Option<(PathBuf, bool)> {
-    let file = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
-    let upper = file("people.csv").or_else(|| file("truth.jsonl"));
-    let whole = || file("boxes.csv").map(|path| (path, true));
-    let inside = || {
-        let has_truth = read_truth(log, &Limits::default()).is_ok_and(|truth| truth.is_some());
-        has_truth.then(|| (log.to_owned(), false))
-    };
-    upper.map(|path| (path, false)).or_else(whole).or_else(inside)
 }
 
 impl PageTruth {
