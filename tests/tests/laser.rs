@@ -7,7 +7,7 @@ mod legs;
 
 use std::path::Path;
 
-use legs::{Config, Legs};
+use legs::Legs;
 use nalgebra::Point2;
 use tagalong_config::Registry;
 use tagalong_eval::formats::floor;
@@ -26,7 +26,7 @@ fn source(name: &str, pipeline: &Pipeline) -> Option<FrameSource> {
 fn pipeline() -> Pipeline {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    registry.detector("legs", "pairs of legs", |config: Config, _| Ok(Legs(config)));
+    registry.detector("legs", "pairs of legs", |legs: Legs, _| Ok(legs));
     Pipeline::from_toml(CONFIG, Path::new("."), &registry).unwrap().0
 }
 

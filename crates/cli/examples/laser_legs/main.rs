@@ -15,6 +15,6 @@ fn main() -> ExitCode {
     tagalong_cli::main_with(|registry| {
         tagalong_catalog::register(registry);
         let summary = "two segments of a scan that are as wide as legs";
-        registry.detector("legs", summary, |config: legs::Config, _| Ok(legs::Legs(config)));
+        registry.detector("legs", summary, |legs: legs::Legs, _| Ok(legs));
     })
 }

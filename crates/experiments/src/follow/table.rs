@@ -78,7 +78,7 @@ fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
         ),
         "contacts: rides in which the robot touched somebody or something; beside it the least room"
             .into(),
-        "ms/frame: 95th percentile of the pipeline's time".into(),
+        "ms/frame: 95th percentile of the processor time of the pipeline's thread".into(),
     ]
 }
 
