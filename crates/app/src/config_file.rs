@@ -1,13 +1,13 @@
 //! Config files, with the tables that are not the pipeline's.
 
-use std::fs;
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use tagalong_config::{ConfigError, Registry, Settings, parse_settings};
+use tagalong_config::{ConfigError, FileLimit, Registry, Settings, parse_settings, read_text};
 use tagalong_log::write::OutputSettings;
 use tagalong_log::{InputSettings, Limits, LogError};
 use tagalong_pipeline::{Document, Options, Pipeline, RunSettings, check_tuning, flattened};
@@ -15,9 +15,6 @@ use tagalong_pipeline::{Document, Options, Pipeline, RunSettings, check_tuning, 
 use crate::outcome::Failure;
 use crate::serialize::to_toml;
 use crate::suggest::config_hint;
-
-/// Longest config that is read, bytes.
-const MAX_BYTES: u64 = 1 << 20;
 
 /// Configs that need no file. None of them extends another one, which would be a file.
 const BUILT_IN: [(&str, &str); 14] = [
@@ -62,31 +59,25 @@ impl ConfigFile {
     /// A file that is missing, unreadable, too long or no text: exit code 2.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let shown = path.display();
-        let size = match fs::metadata(path) {
-            Ok(about) if about.is_dir() => {
-                let message = format!("{shown} is a directory, not a config");
-                // A config in the directory is suggested: `x` stands for any name in it.
-                return Err(Failure::usage(message + &config_hint(&path.join("x"))));
+        let error = match read_text(path, FileLimit::Config) {
+            Ok(text) => return Ok(Self { path: path.to_owned(), text }),
+            Err(error) => error,
+        };
+        Err(Failure::usage(match error.kind() {
+            // A config in the directory is suggested: `x` stands for any name in it.
+            ErrorKind::IsADirectory => {
+                format!("{shown} is a directory, not a config") + &config_hint(&path.join("x"))
             }
-            Ok(about) => about.len(),
-            Err(error) => {
+            ErrorKind::InvalidData => format!("{shown} is not UTF-8 text, so no config"),
+            ErrorKind::FileTooLarge => format!("{shown}: a config {error}"),
+            ErrorKind::NotFound => {
                 if let Some(built_in) = path.to_str().and_then(Self::named) {
                     return Ok(built_in);
                 }
-                let message = format!("cannot read config {shown}: {error}");
-                return Err(Failure::usage(message + &config_hint(path)));
+                format!("cannot read config {shown}: {error}") + &config_hint(path)
             }
-        };
-        if size > MAX_BYTES {
-            let message = format!("{shown} has {size} bytes; a config has at most {MAX_BYTES}");
-            return Err(Failure::usage(message));
-        }
-        // Read as bytes: a file that is no text gets a message of its own.
-        let bytes = fs::read(path)
-            .map_err(|error| Failure::usage(format!("cannot read config {shown}: {error}")))?;
-        let text = String::from_utf8(bytes)
-            .map_err(|_| Failure::usage(format!("{shown} is not UTF-8 text, so no config")))?;
-        Ok(Self { path: path.to_owned(), text })
+            _ => format!("cannot read config {shown}: {error}"),
+        }))
     }
 
     /// Returns the config that is used where neither a config nor a log is given.

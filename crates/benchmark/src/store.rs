@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use tagalong_app::outcome::{Failure, make_room_for};
+use tagalong_config::{FileLimit, read_bytes, read_text};
 use tagalong_eval::Sequence;
 use tagalong_report::{TaskResult, TaskTiming};
 
@@ -74,7 +75,7 @@ impl Store {
     pub fn plan(&self) -> Result<Vec<Task>, Failure> {
         let path = self.path("plan.jsonl");
         let shown = path.display();
-        let text = fs::read_to_string(&path).map_err(|error| {
+        let text = read_text(&path, FileLimit::Table).map_err(|error| {
             Failure::usage(format!("cannot read {shown}: {error}; `tagalong bench plan` writes it"))
         })?;
         let line = |(index, line): (usize, &str)| {
@@ -121,7 +122,7 @@ impl Store {
     /// Returns a file of the benchmark as JSON, if it exists and is whole.
     pub fn get<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
         // A damaged file counts as missing.
-        serde_json::from_slice(&fs::read(self.path(name)).ok()?).ok()
+        serde_json::from_slice(&read_bytes(&self.path(name), FileLimit::Table).ok()?).ok()
     }
 }
 

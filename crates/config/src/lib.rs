@@ -4,9 +4,11 @@
 //!   reads it from TOML and refuses unknown keys and numbers out of range, with their place.
 //! * [`Registry`]: the plugins of a program. A plugin crate has a `register` function that the
 //!   program calls.
+//! * [`read_text`], [`read_bytes`]: files that a user names, within a limit.
 //! * [`OrAuto`]: a setting that is one of several words, or `auto`.
 //! * [`ConfigError`]: a mistake with its place in the text.
 
+mod bounded;
 mod exported;
 mod names;
 mod or_auto;
@@ -14,6 +16,7 @@ mod registry;
 mod settings;
 mod trainer;
 
+pub use bounded::{FileLimit, read_bytes, read_text};
 pub use exported::{ExportedNetwork, NamedTensor};
 pub use names::nearest;
 pub use or_auto::OrAuto;

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::bounded::{FileLimit, read_text};
 use crate::{
     ConfigError, ExportedNetwork, Settings, Trainer, Value, commented_defaults, nearest,
     parse_settings,
@@ -75,7 +76,7 @@ impl Context {
         if file.is_empty() {
             return parse(built_in).map_err(broken);
         }
-        let text = std::fs::read_to_string(self.base_dir.join(file))
+        let text = read_text(&self.base_dir.join(file), FileLimit::Model)
             .map_err(|error| broken(error.to_string()))?;
         parse(&text).map_err(broken)
     }

@@ -1,14 +1,14 @@
 //! Folders of images, plain or in the layout of the MOTChallenge.
 
-use std::fs;
 use std::path::PathBuf;
 
 use tagalong_app::outcome::Failure;
+use tagalong_config::{FileLimit, read_text};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
-use super::ImportArgs;
 use super::recorded;
 use super::sequence::{Eye, Sequence, pictures, size, steady, text};
+use super::{ImportArgs, MAX_HZ};
 
 /// Reads a folder of images, with one of depth if the options say so.
 ///
@@ -46,14 +46,17 @@ pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
         let lines = about.lines().filter_map(|line| line.split_once('='));
         lines.map(|(name, value)| (name.trim(), value.trim())).find(|(name, _)| *name == key)
     };
-    let fps = value("frameRate").and_then(|(_, hz)| hz.parse::<f64>().ok()).filter(|hz| *hz > 0.0);
+    let fps = value("frameRate")
+        .and_then(|(_, hz)| hz.parse::<f64>().ok())
+        .filter(|hz| *hz > 0.0 && *hz <= MAX_HZ);
     let Some(fps) = fps else {
-        let message = format!("{}: there is no `frameRate` above 0", ini.display());
+        let message =
+            format!("{}: there is no `frameRate` above 0 and up to {MAX_HZ}", ini.display());
         return Err(Failure::failed(message));
     };
     let folder = args.path.join(value("imDir").map_or("img1", |(_, name)| name));
     let mut sequence = of_files(args, pictures(&folder)?, fps)?;
-    if let Ok(truth) = fs::read_to_string(args.path.join("gt/gt.txt")) {
+    if let Ok(truth) = read_text(&args.path.join("gt/gt.txt"), FileLimit::Table) {
         sequence.beside.push(("boxes.csv", truth));
     }
     let detections = args.path.join("det/det.txt");

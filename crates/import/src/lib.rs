@@ -51,16 +51,16 @@ pub struct ImportArgs {
     #[arg(long, value_name = "NUMBER", default_value = "0000")]
     pub sequence: String,
     /// images: images per second.
-    #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = positive)]
+    #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = rate)]
     pub fps: f64,
     /// Focal length, pixels; positions in metres need it, or --view.
-    #[arg(long, value_name = "PX", value_parser = positive)]
+    #[arg(long, value_name = "PX", value_parser = focal_length)]
     pub focal: Option<f64>,
     /// Horizontal field of view, degrees; an alternative to --focal.
     #[arg(long, value_name = "DEG", conflicts_with = "focal", value_parser = angle)]
     pub view: Option<f64>,
     /// Height of the camera above the floor, m.
-    #[arg(long, value_name = "M", value_parser = positive)]
+    #[arg(long, value_name = "M", value_parser = height)]
     pub height: Option<f64>,
     /// Downward tilt of the camera, degrees.
     #[arg(
@@ -85,6 +85,26 @@ pub struct ImportArgs {
 fn positive(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if value > 0.0 && value.is_finite() { Ok(value) } else { Err("must be positive".into()) }
+}
+
+/// Highest rate of images, Hz.
+pub(crate) const MAX_HZ: f64 = 1e4;
+
+/// Parses a number up to a largest one that still makes sense.
+fn up_to(text: &str, most: f64) -> Result<f64, String> {
+    positive(text).and_then(|v| if v <= most { Ok(v) } else { Err(format!("at most {most}")) })
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    up_to(text, MAX_HZ)
+}
+
+fn focal_length(text: &str) -> Result<f64, String> {
+    up_to(text, 1e6)
+}
+
+fn height(text: &str) -> Result<f64, String> {
+    up_to(text, 100.0)
 }
 
 fn angle(text: &str) -> Result<f64, String> {
@@ -112,7 +132,10 @@ pub fn import(args: &ImportArgs) -> Outcome {
     }
     let sequence = read(args)?;
     make_room_for(&log)?;
-    writer::write(&sequence, &log, &signals)?;
+    writer::write(&sequence, &log, &signals).inspect_err(|_| {
+        // A log without its end would pass for the whole sequence.
+        let _ = std::fs::remove_file(&log);
+    })?;
     beside(&sequence, &log)?;
     if let Some(signal) = signals.received() {
         say(CUT_SHORT);

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
 use tagalong_app::outcome::Failure;
+use tagalong_config::{FileLimit, read_text};
 use tagalong_core::Stamp;
 
 use super::ImportArgs;
@@ -84,7 +85,7 @@ pub struct Sequence {
 /// # Errors
 /// A missing file: the folder is not of that layout.
 pub fn text(path: &Path, layout: &str) -> Result<String, Failure> {
-    fs::read_to_string(path).map_err(|error| {
+    read_text(path, FileLimit::Table).map_err(|error| {
         let shown = path.display();
         Failure::failed(format!("cannot read {shown}: {error}; is this {layout}?"))
     })

@@ -1,11 +1,11 @@
 //! Writes a sequence as a log with the topics that robots use.
 
-use std::fs;
 use std::path::Path;
 
 use nalgebra::Isometry3;
 use tagalong_app::outcome::Failure;
 use tagalong_app::signals::Signals;
+use tagalong_config::{FileLimit, read_bytes};
 use tagalong_core::Stamp;
 use tagalong_geometry::{Distortion, Pinhole};
 use tagalong_log::msgs::{
@@ -87,9 +87,7 @@ fn picture(log: &mut MessageLog, sequence: &Sequence, moment: &Moment) -> Result
     if moment.eye == Eye::Depth {
         return depth(log, sequence.depth_unit_m, moment, header);
     }
-    let data = fs::read(&moment.file).map_err(|error| {
-        Failure::failed(format!("cannot read {}: {error}", moment.file.display()))
-    })?;
+    let data = whole_image(&moment.file)?;
     // By content: file endings in data sets are not reliable.
     let format = if data.starts_with(b"\x89PNG") { "png" } else { "jpeg" }.to_owned();
     let image = if is_pair { "image_rect_color" } else { "image_raw" };
@@ -114,6 +112,16 @@ fn info(
     Some(CameraInfo::of_lens(header, &lens, (width as usize, height as usize), aside_m))
 }
 
+/// Reads the bytes of an image that can be decoded to its end.
+fn whole_image(file: &Path) -> Result<Vec<u8>, Failure> {
+    let unusable = |why: &dyn std::fmt::Display| {
+        Failure::failed(format!("cannot use {}: {why}", file.display()))
+    };
+    let data = read_bytes(file, FileLimit::Image).map_err(|error| unusable(&error))?;
+    image::load_from_memory(&data).map_err(|error| unusable(&error))?;
+    Ok(data)
+}
+
 /// Writes a 16-bit PNG as millimetres.
 fn depth(
     log: &mut MessageLog,
@@ -124,7 +132,8 @@ fn depth(
     let shown = moment.file.display();
     let unusable =
         |why: &dyn std::fmt::Display| Failure::failed(format!("cannot use {shown}: {why}"));
-    let image = match image::open(&moment.file).map_err(|error| unusable(&error))? {
+    let data = read_bytes(&moment.file, FileLimit::Image).map_err(|error| unusable(&error))?;
+    let image = match image::load_from_memory(&data).map_err(|error| unusable(&error))? {
         image::DynamicImage::ImageLuma16(image) => image,
         other => {
             return Err(unusable(&format!(

@@ -50,6 +50,7 @@ pub use leg_scans::{LegScan, read_leg_scans};
 pub use limits::Limits;
 pub use log_files::LogFiles;
 pub use mcap::NotMcap;
+pub use packed::LogFile;
 pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
 pub use tagalong_core::{Input, Inputs, Usage};
 pub use timing::{Skew, Timing};

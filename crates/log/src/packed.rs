@@ -64,7 +64,7 @@ pub(crate) fn unpack_message(
 }
 
 /// File of a log that is open for reading, unpacked if it is compressed.
-pub(crate) struct LogFile {
+pub struct LogFile {
     file: File,
     path: PathBuf,
     /// Deletes the temporary file in the end.

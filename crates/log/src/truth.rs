@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::log_files::{LogFiles, open_file};
 use crate::msgs::{StringMsg, decode};
-use crate::packed::LogFile;
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
@@ -83,10 +82,7 @@ impl TruthFrame {
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
     let (mut frames, mut present) = (Vec::new(), false);
     for part in LogFiles::of(path)?.parts() {
-        let file = LogFile::open(part, limits)?;
-        let contents = file.path().to_owned();
-        let mut walker = LogWalker::at(&contents, file, limits)
-            .map_err(|source| LogError::NotMcap { path: part.clone(), source })?;
+        let mut walker = LogWalker::open(part, limits)?;
         while let Some(message) = walker.next() {
             if message.channel.topic == TRUTH_TOPIC {
                 let plain = message.channel.encoding == "json";

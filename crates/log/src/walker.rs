@@ -2,11 +2,12 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::Limits;
 use crate::bag::{self, Bag};
 use crate::database::{self, Database};
 use crate::mcap::{Mcap, NotMcap};
+use crate::packed::LogFile;
 use crate::walk::{Channel, Counters, LOSSES, Message, Source, Walk};
+use crate::{Limits, LogError};
 
 /// Robust reader of an MCAP file, of a ROS 1 bag or of a rosbag2 database, which trusts nothing in
 /// it. The container is told apart by its first bytes.
@@ -27,6 +28,20 @@ enum Container {
     Mcap(Mcap),
     Bag(Bag),
     Database(Box<Database>),
+}
+
+impl LogWalker<LogFile> {
+    /// Opens a file of a log, compressed or not.
+    ///
+    /// # Errors
+    /// [`LogError`] for a file that cannot be opened, is no regular file or starts as no container
+    /// does.
+    pub fn open(path: &Path, limits: &Limits) -> Result<Self, LogError> {
+        let file = LogFile::open(path, limits)?;
+        let contents = file.path().to_owned();
+        Self::at(&contents, file, limits)
+            .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })
+    }
 }
 
 impl<R: Read> LogWalker<R> {

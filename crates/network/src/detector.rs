@@ -1,8 +1,9 @@
 //! Network of one of the families, from a file to boxes in an image.
 
-use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 
+use tagalong_config::{FileLimit, read_bytes};
 use tagalong_core::RgbImage;
 
 use crate::decode::{Wanted, decode, suppress};
@@ -80,15 +81,10 @@ impl About {
 
 /// Reads the bytes of a file within the limits.
 fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, String> {
-    let about = fs::metadata(path).map_err(|why| format!("cannot be read: {why}"))?;
-    if !about.is_file() {
-        return Err("is no file".into());
-    }
-    if about.len() > limits.file_bytes {
-        let (has, most) = (about.len(), limits.file_bytes);
-        return Err(format!("has {has} bytes; at most {most} are read: raise `max_file_mb`"));
-    }
-    fs::read(path).map_err(|why| format!("cannot be read: {why}"))
+    read_bytes(path, FileLimit::Bytes(limits.file_bytes)).map_err(|why| match why.kind() {
+        ErrorKind::FileTooLarge => format!("{why}: raise `max_file_mb`"),
+        _ => format!("cannot be read: {why}"),
+    })
 }
 
 /// Reads a network and runs it once, in a thread of its own.

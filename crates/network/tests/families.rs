@@ -167,7 +167,7 @@ fn choices_that_do_not_fit_are_refused() {
 fn paths_that_are_no_files_are_refused() {
     let why = |name: &str| inspect(&path(name), None, &Limits::default()).unwrap_err();
     assert!(why("none.onnx").contains("cannot be read"));
-    assert!(why("").contains("is no file"));
+    assert!(why("").contains("is a directory"));
     assert!(why("yolox.json").contains("no ONNX file"), "{}", why("yolox.json"));
 }
 

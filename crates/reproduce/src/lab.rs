@@ -1,9 +1,8 @@
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
-use tagalong_config::Registry;
+use tagalong_config::{FileLimit, Registry, read_text};
 use tagalong_pipeline::{StereoSettings, flattened};
 use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::{Contender, Trial, TrialError, each, in_order};
@@ -216,7 +215,7 @@ pub(crate) fn read(path: &Path) -> Result<String, ReproduceError> {
         path: path.display().to_string(),
         why: error.to_string(),
     };
-    fs::read_to_string(path).map_err(unreadable)
+    read_text(path, FileLimit::Table).map_err(unreadable)
 }
 
 #[cfg(test)]

@@ -5,11 +5,12 @@ mod tracks;
 mod truth;
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 
 pub use shots::{Shot, Shots};
 use tagalong_app::outcome::Failure;
+use tagalong_config::{FileLimit, read_text as read_bounded};
 use tagalong_eval::formats::{OddLines, kitti};
 use tagalong_eval::{Comparison, Frame, Region, Report, Sequence, Similarity, Truth};
 pub use tracks::Tracks;
@@ -116,13 +117,14 @@ fn odd_labels(name: &str, labels: &[kitti::Label]) -> Vec<String> {
 /// A file that cannot be read, by name.
 pub fn read_text(path: &Path) -> Result<String, Failure> {
     let shown = path.display();
-    let bytes =
-        fs::read(path).map_err(|error| Failure::failed(format!("cannot read {shown}: {error}")))?;
-    String::from_utf8(bytes).map_err(|_| {
-        Failure::failed(format!(
-            "{shown} is no text; truth and tracks are MOTChallenge, KITTI or CSV text, a log, or \
-             the folder of a run"
-        ))
+    read_bounded(path, FileLimit::Table).map_err(|error| {
+        Failure::failed(match error.kind() {
+            ErrorKind::InvalidData => format!(
+                "{shown} is no text; truth and tracks are MOTChallenge, KITTI or CSV text, a log, or \
+                 the folder of a run"
+            ),
+            _ => format!("cannot read {shown}: {error}"),
+        })
     })
 }
 

@@ -6,7 +6,7 @@ mod record;
 pub mod sample;
 pub mod scenes;
 
-use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -16,7 +16,7 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
-use tagalong_config::{Registry, nearest};
+use tagalong_config::{FileLimit, Registry, nearest, read_text};
 use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
@@ -116,10 +116,12 @@ pub fn key_and_value(argument: &str) -> Result<(String, String), String> {
 /// A file that cannot be read, or a mistake in it with its place: exit code 2.
 pub fn read(path: &Path, variant: &Variant) -> Result<Scene, Failure> {
     let shown = path.display();
-    let text = match (fs::read_to_string(path), scenes::built_in(path)) {
-        (Ok(text), _) => text,
-        (Err(_), Some(text)) => text.to_owned(),
-        (Err(error), None) => {
+    let text = match read_text(path, FileLimit::Config) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::NotFound && scenes::built_in(path).is_some() => {
+            scenes::built_in(path).unwrap_or_default().to_owned()
+        }
+        Err(error) => {
             let named = nearest(&path.to_string_lossy(), scenes::names());
             let hint = named.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
             return Err(Failure::usage(format!("cannot read scene {shown}: {error}{hint}")));

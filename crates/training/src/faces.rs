@@ -7,7 +7,7 @@ use std::path::Path;
 
 use flate2::read::GzDecoder;
 use tagalong_app::outcome::Failure;
-use tagalong_config::Example;
+use tagalong_config::{Example, FileLimit, read_text};
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
 
@@ -54,7 +54,7 @@ pub fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> 
 pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let (table, folder) = (data.join("faces/fddb.csv"), data.join("faces/fddb"));
     let wrong = |why: String| Failure::failed(format!("{}: {why}", table.display()));
-    let text = fs::read_to_string(&table).map_err(|error| wrong(error.to_string()))?;
+    let text = read_text(&table, FileLimit::Table).map_err(|error| wrong(error.to_string()))?;
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
     let column = |name: &str| names.iter().position(|n| *n == name);

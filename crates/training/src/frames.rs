@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point2, Point3};
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::serialize::to_toml;
 use tagalong_app::threads::threads;
-use tagalong_config::{AnnotatedPerson, Trainer};
+use tagalong_config::{AnnotatedPerson, FileLimit, Trainer, read_text};
 use tagalong_core::Frame;
 use tagalong_eval::Region;
 use tagalong_eval::formats::{mot, people};
@@ -163,7 +163,7 @@ impl RealTruth {
             ["people", "boxes"].map(|kind| folder.join(format!("{log}.{kind}.csv")));
         let path = if heads.is_file() { &heads } else { &boxes };
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path)
+        let text = read_text(path, FileLimit::Table)
             .map_err(|error| Failure::failed(format!("{name}: {error}")))?;
         if path == &heads {
             return people::parse(&text, &name).map(Self::People).map_err(Failure::failed);

@@ -1,10 +1,9 @@
 //! Pipelines that a verifier is trained for: one for colour and depth, one for stereo pairs.
 
-use std::fs;
 use std::path::Path;
 
 use tagalong_app::outcome::Failure;
-use tagalong_config::Registry;
+use tagalong_config::{FileLimit, Registry, read_text};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::CameraKind;
 use tagalong_stereo::StereoSettings;
@@ -39,7 +38,7 @@ impl InUse {
     /// A file that cannot be read or is no TOML.
     pub fn as_it_is(path: &Path) -> Result<Self, Failure> {
         let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
-        let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let text = read_text(path, FileLimit::Config).map_err(|error| wrong(error.to_string()))?;
         let config = text.parse().map_err(|error: toml::de::Error| wrong(error.to_string()))?;
         Ok(Self { config: without_verifiers(config), is_lowered: false })
     }
@@ -111,6 +110,8 @@ fn without_verifiers(mut config: Table) -> Table {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::outcome::Failure;
 use tagalong_app::threads::threads;
-use tagalong_config::{ConfigError, Context, Example, Registry, Trainer};
+use tagalong_config::{ConfigError, Context, Example, FileLimit, Registry, Trainer, read_text};
 use tagalong_core::{Detection, DiffDrive, Frame, Verifier};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{CameraKind, Split};
@@ -282,7 +282,7 @@ fn quick_settings(plugin: &str) -> toml::Table {
 fn settings(path: Option<&Path>) -> Result<toml::Table, Failure> {
     let Some(path) = path else { return Ok(toml::Table::new()) };
     let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
-    let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+    let text = read_text(path, FileLimit::Config).map_err(|error| wrong(error.to_string()))?;
     text.parse().map_err(|error: toml::de::Error| wrong(error.to_string()))
 }
 

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use cpu_time::ThreadTime;
-use tagalong_config::Registry;
+use tagalong_config::{FileLimit, Registry, read_text};
 use tagalong_core::{EgoMotion, ExternalDetection, Frame, Images, Stamp};
 use tagalong_eval::formats::mot::{
     self, Rules, SequenceInfo, parse_info, parse_truth, write_report,
@@ -205,7 +205,7 @@ fn boxes_of(folder: &Path, boxes: Option<&Path>) -> PathBuf {
 fn text(folder: &Path, name: &str) -> Result<(String, String), TrialError> {
     let path = if name.is_empty() { folder.to_owned() } else { folder.join(name) };
     let shown = path.display().to_string();
-    match fs::read_to_string(&path) {
+    match read_text(&path, FileLimit::Table) {
         Ok(text) => Ok((shown, text)),
         Err(error) => Err(given(format!("cannot read {shown}: {error}"))),
     }

@@ -1,13 +1,13 @@
 //! Run as it was recorded: frames with tracks, candidates and funnel, and its config.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::Failure;
+use tagalong_config::{FileLimit, read_text};
 use tagalong_log::msgs::{StringMsg, decode};
 use tagalong_log::{Limits, LogWalker, read_attachment};
 use toml::Table;
@@ -137,7 +137,7 @@ fn no_run(folder: &Path) -> Failure {
 
 fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, Failure> {
     let shown = path.display();
-    let text = fs::read_to_string(path)
+    let text = read_text(path, FileLimit::Table)
         .map_err(|error| Failure::failed(format!("cannot read {shown}: {error}")))?;
     serde_json::from_str(&text).map_err(|error| Failure::failed(format!("{shown}: {error}")))
 }
@@ -145,9 +145,8 @@ fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, Failure> {
 fn read_moments(path: &Path) -> Result<Vec<Moment>, Failure> {
     let shown = path.display();
     let broken = |why: &dyn std::fmt::Display| Failure::failed(format!("{shown}: {why}"));
-    let file = File::open(path).map_err(|error| broken(&error))?;
-    let mut walker =
-        LogWalker::at(path, file, &Limits::default()).map_err(|error| broken(&error))?;
+    // Its message names the file.
+    let mut walker = LogWalker::open(path, &Limits::default()).map_err(Failure::failed)?;
     let mut by_stamp: BTreeMap<u64, Moment> = BTreeMap::new();
     let mut has_notes = false;
     while let Some(message) = walker.next() {

@@ -13,6 +13,7 @@ use nalgebra::{Point2, Point3};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
+use tagalong_config::{FileLimit, read_text};
 use tagalong_core::Stamp;
 use tagalong_log::{Limits, read_truth};
 use tagalong_sim::WebcamSettings;
@@ -115,7 +116,7 @@ pub fn triangulate(args: &TriangulateArgs) -> Outcome {
 
 fn guess(path: &Path) -> Result<Vec<WebcamSettings>, Failure> {
     let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
-    let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+    let text = read_text(path, FileLimit::Config).map_err(|error| wrong(error.to_string()))?;
     let guess: Guess = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     Ok(guess.webcams)
 }
@@ -143,7 +144,7 @@ type Places = BTreeMap<u64, Point2<f64>>;
 /// Reads the places of a file, by stamp.
 fn known_places(path: &Path, seen: &CameraSightings) -> Result<Places, Failure> {
     let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
-    let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+    let text = read_text(path, FileLimit::Table).map_err(|error| wrong(error.to_string()))?;
     let first = seen.first.map_or(0, |stamp| stamp.nanos());
     let mut places = Places::new();
     for (number, line) in text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty()) {

@@ -1,7 +1,6 @@
 //! Sightings of the hat in the camera images of a log.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::Path;
 
 use nalgebra::{Isometry2, Point2};
@@ -10,7 +9,7 @@ use tagalong_core::{Stamp, planar_pose};
 use tagalong_log::Limits;
 use tagalong_log::images::{Pixels, decode_compressed, decode_raw};
 use tagalong_log::msgs::{CameraInfo, CompressedImage, Image, PoseStamped, decode};
-use tagalong_log::{LogWalker, Message};
+use tagalong_log::{LogFiles, LogWalker, Message};
 use tagalong_sim::WebcamSettings;
 use tagalong_triangulate::{HatColour, Sight, Station, find_hat};
 
@@ -34,14 +33,12 @@ pub(super) struct CameraSightings {
 impl CameraSightings {
     /// Searches for the hat in all images of so many cameras.
     pub(super) fn read(log: &Path, cameras: usize, colour: &HatColour) -> Result<Self, Failure> {
-        let failed = |why: String| Failure::failed(format!("{}: {why}", log.display()));
-        let file = File::open(log).map_err(|error| failed(error.to_string()))?;
-        let limits = Limits::default();
-        let mut walker =
-            LogWalker::new(file, &limits).map_err(|error| failed(error.to_string()))?;
-        let mut seen = Self::default();
-        while let Some(message) = walker.next() {
-            seen.take(&message, cameras, colour, &limits);
+        let (limits, mut seen) = (Limits::default(), Self::default());
+        for part in LogFiles::of(log).map_err(Failure::failed)?.parts() {
+            let mut walker = LogWalker::open(part, &limits).map_err(Failure::failed)?;
+            while let Some(message) = walker.next() {
+                seen.take(&message, cameras, colour, &limits);
+            }
         }
         // Messages of several cameras come in no fixed order.
         seen.hats.sort_by_key(|(stamp, sight)| (*stamp, sight.station));

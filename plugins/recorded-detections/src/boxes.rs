@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use tagalong_config::{FileLimit, read_text};
 use tagalong_core::{Error, ExternalDetection, Result};
 use tagalong_geometry::Rect;
 
@@ -15,7 +16,7 @@ pub(crate) type Boxes = BTreeMap<u64, Vec<ExternalDetection>>;
 /// A file that cannot be read, or a line that is not a detection: the message names both.
 pub(crate) fn read(path: &Path) -> Result<Boxes> {
     let shown = path.display();
-    let text = std::fs::read_to_string(path)
+    let text = read_text(path, FileLimit::Table)
         .map_err(|error| Error::Other(format!("cannot read boxes `{shown}`: {error}")))?;
     let mut boxes = Boxes::new();
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {

@@ -3,15 +3,19 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use crate::common::{Drawn, code, config, own_plugin, people, text, unread};
 
 /// Content in place of a valid file.
-const BAD_FILES: [(&str, &str); 4] = [
+const BAD_FILES: [(&str, &str); 6] = [
     ("a missing file", "missing.EXT"),
     ("a file of words", "words.EXT"),
     ("an empty file", "empty.EXT"),
     ("a folder", "folder.EXT"),
+    // Without a writer: opening it would wait for ever.
+    ("a pipe", "pipe.EXT"),
+    ("gigabytes of nothing", "sparse.EXT"),
 ];
 
 /// Commands with a place for a file, its extension, and the exit code where the file is bad.
@@ -45,7 +49,7 @@ const FINE: [&str; 6] = [
 ];
 
 /// Other mistakes: description, command, exit code, and part of the message.
-const OTHERS: [(&str, &str, i32, &str); 26] = [
+const OTHERS: [(&str, &str, i32, &str); 31] = [
     ("no depth", "run nearest.toml no-depth.mcap -o out", 1, "depth"),
     ("no depth", "check nearest.toml no-depth.mcap", 1, "depth"),
     ("an unknown key", "run typo.toml good.mcap -o out", 2, "typo.toml:4"),
@@ -86,6 +90,11 @@ const OTHERS: [(&str, &str, i32, &str); 26] = [
         "odometry = \"none\"` in [robot]",
     ),
     ("the same in a check", "check steered.toml good.mcap", 1, "odometry = \"none\"` in [robot]"),
+    ("a model of gigabytes", "check sparse-model.toml", 2, "at most 67108864 are read"),
+    ("a pipe as a model", "check pipe-model.toml", 2, "is a pipe or a device"),
+    ("a cut image", "import images cut -o out.mcap", 1, "cut/1.png"),
+    ("a rate beyond sense", "import images photos --fps 1e300", 2, "at most 10000"),
+    ("a lens beyond sense", "import images photos --focal 1e30", 2, "at most 1000000"),
     ("a limit beyond its ceiling", "check fast.toml", 2, "must lie between 0.05 and 0.9, not 50"),
 ];
 
@@ -100,8 +109,17 @@ fn lay_out(home: &Path) {
         write(&format!("words.{extension}"), "these are only words, and a good lot of them\n");
         write(&format!("empty.{extension}"), "");
         fs::create_dir_all(home.join(format!("folder.{extension}"))).unwrap();
+        let pipe = Command::new("mkfifo").arg(home.join(format!("pipe.{extension}"))).status();
+        assert!(pipe.unwrap().success());
+        let sparse = fs::File::create(home.join(format!("sparse.{extension}"))).unwrap();
+        sparse.set_len(3 << 30).unwrap();
     }
     let fine = fs::read_to_string(home.join("nearest.toml")).unwrap();
+    for kind in ["sparse", "pipe"] {
+        let verifier = "[[verifiers]]\nplugin = \"body-net\"\n";
+        let model = format!("{verifier}config = {{ model = \"{kind}.toml\" }}\n");
+        write(&format!("{kind}-model.toml"), &(fine.clone() + "\n" + &model));
+    }
     let steered = format!("{fine}\n[controller]\nplugin = \"arc-follow\"\n");
     write("steered.toml", &steered);
     write("fast.toml", &format!("robot.max_speed_mps = 50.0\n{steered}"));
@@ -116,6 +134,9 @@ fn lay_out(home: &Path) {
     write("full/precious.txt", "keep me");
     fs::create_dir_all(home.join("photos")).unwrap();
     image::RgbImage::new(8, 8).save(home.join("photos/1.png")).unwrap();
+    let whole = fs::read(home.join("photos/1.png")).unwrap();
+    fs::create_dir_all(home.join("cut")).unwrap();
+    fs::write(home.join("cut/1.png"), &whole[..whole.len() - 20]).unwrap();
 }
 
 /// Runs a command; returns a description of its wrong answer, if it is wrong.

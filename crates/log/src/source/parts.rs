@@ -87,9 +87,6 @@ impl Messages for PartsWalker {
 }
 
 fn open_part(part: &LogPart, limits: &Limits) -> Result<LogWalker<LogFile>, LogError> {
-    let file = LogFile::open(&part.path, limits)?;
-    let contents = file.path().to_owned();
-    let walker = LogWalker::at(&contents, file, limits)
-        .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?;
+    let walker = LogWalker::open(&part.path, limits)?;
     Ok(walker.knowing(part.channels.iter().cloned()))
 }

@@ -2,11 +2,10 @@
 //!
 //! The texts are read as one, end to end: a byte range says in which file it lies.
 
-use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use tagalong_config::ConfigError;
+use tagalong_config::{ConfigError, FileLimit, read_text};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -177,7 +176,7 @@ fn base_at(
             "`{EXTENDS}` goes on in a circle, or through more than {MAX_BASES} configs"
         ));
     }
-    let text = fs::read_to_string(&path)
+    let text = read_text(&path, FileLimit::Config)
         .map_err(|error| format!("cannot extend {}: {error}", path.display()))?;
     Ok(Base { path, padded: "\n".repeat(start) + &text, start })
 }
@@ -230,6 +229,8 @@ fn anchor_path<'a>(value: Spanned<DeValue<'a>>, folder: &Path) -> Spanned<DeValu
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {

@@ -9,6 +9,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
+use tagalong_config::{FileLimit, read_text};
 use tagalong_core::DepthImage;
 use tagalong_eval::formats::people;
 use tagalong_geometry::Rect;
@@ -61,7 +62,7 @@ fn log(name: &str) -> PathBuf {
 
 /// Returns the samples of the wholly visible people of a recording; `None` where it is absent.
 fn recording(log: &Path) -> Option<Vec<Sample>> {
-    let text = std::fs::read_to_string(log.with_extension("people.csv")).ok()?;
+    let text = read_text(&log.with_extension("people.csv"), FileLimit::Table).ok()?;
     let rows = people::parse(&text, "people.csv").ok()?;
     let mut source =
         FrameSource::open(log, &InputSettings::default(), &Limits::default(), DEPTH).ok()?;
