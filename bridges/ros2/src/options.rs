@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use tagalong_config::Registry;
+use tagalong_config::{FileLimit, Registry, read_text};
 use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{Pipeline, RobotSettings};
 
@@ -113,7 +113,7 @@ impl Options {
     /// [`BridgeError::Config`], with file, line and remedy.
     pub(crate) fn setup(&self, registry: &Registry) -> Result<Setup, BridgeError> {
         let shown = self.config.display().to_string();
-        let text = std::fs::read_to_string(&self.config)
+        let text = read_text(&self.config, FileLimit::Config)
             .map_err(|error| BridgeError::Config(format!("cannot read config {shown}: {error}")))?;
         let folder = self.config.parent().unwrap_or("".as_ref());
         let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();

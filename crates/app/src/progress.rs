@@ -1,7 +1,11 @@
 //! Progress of a pass over a log.
 
+use std::time::Duration;
+
 use indicatif::{ProgressBar, ProgressStyle};
 
+/// Time between two pictures of a spinner.
+const TICK: Duration = Duration::from_millis(100);
 /// Steps of the bar.
 const STEPS: u64 = 1000;
 
@@ -31,6 +35,15 @@ impl Progress {
         }
         let title = if title.is_empty() { String::new() } else { format!("{title}: ") };
         Self { bar, title }
+    }
+
+    /// Shows what is done, of unknown duration, while it is done.
+    pub fn waiting<T>(message: &str, work: impl FnOnce() -> T) -> T {
+        let spinner = ProgressBar::new_spinner().with_message(message.to_owned());
+        spinner.enable_steady_tick(TICK);
+        let done = work();
+        spinner.finish_and_clear();
+        done
     }
 
     /// Shows the progress of the run.

@@ -40,12 +40,15 @@ use tagalong_simulate::sample;
 /// A config, log or output directory that cannot be used; a plugin that fails on a frame; a disk
 /// that fails.
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
-    let signals = Signals::listen()?;
     if !args.has_log() {
         sample::write(args.log()).map_err(refused)?;
         say(&format!("no log given: two drawn people walk through {}", args.log().display()));
     }
-    let job = Job::prepare(args, registry)?;
+    let job = Progress::waiting(&format!("looking through {}", args.log().display()), || {
+        Job::prepare(args, registry)
+    })?;
+    // Until here nothing is written: a signal ends the program at once, however long the log is.
+    let signals = Signals::listen()?;
     let mut desk = Desk::open(args, &job)?;
     // Reading ahead pays from the second core on, rendering in parallel from the third.
     let threads = threads(args.threads);

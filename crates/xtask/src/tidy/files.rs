@@ -15,6 +15,9 @@ const MAX_RUST_LINES: usize = 700;
 const UNFINISHED: &[&str] =
     &[concat!("to", "do!"), concat!("unimpl", "emented!"), concat!("FIX", "ME")];
 
+/// Reads of a whole file, however long it is.
+const UNBOUNDED: &[&str] = &["fs::read_to_string(", "fs::read("];
+
 /// Beginnings of paths that exist on one machine only.
 const MACHINE: &[&str] =
     &[concat!("/", "work"), concat!("/", "tmp"), concat!("/", "root"), concat!("/", "home")];
@@ -37,10 +40,30 @@ pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
     Ok(complaints)
 }
 
+/// Complains about files that are read without a limit: a user may name a device or a pipe.
+fn unbounded<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = String> + 'a {
+    let is_program = file.components().any(|part| part.as_os_str() == "src")
+        && !file.starts_with("crates/xtask")
+        && !file.iter().any(|part| part == "tests" || part == "tests.rs");
+    let tests = text.find("#[cfg(test)]").unwrap_or(text.len());
+    let lines = (1..).zip(text[..tests].lines()).filter(move |_| is_program);
+    let reads = lines.filter(|(_, line)| UNBOUNDED.iter().any(|read| line.contains(read)));
+    // What the system itself writes is short.
+    reads.filter(|(_, line)| !line.contains("\"/proc/")).map(|(number, _)| {
+        format!(
+            "{}:{number}: read it with `tagalong_config::read_text`, which has a limit",
+            file.display()
+        )
+    })
+}
+
 fn in_text(file: &Path, text: &str) -> Vec<String> {
     let name = file.display();
     let is_rust = file.extension().is_some_and(|extension| extension == "rs");
     let mut complaints = Vec::new();
+    if is_rust {
+        complaints.extend(unbounded(file, text));
+    }
     let lines = text.lines().count();
     if is_rust && lines > MAX_RUST_LINES {
         complaints.push(format!("{name} has {lines} lines: split it"));
@@ -70,6 +93,17 @@ fn names_path(line: &str, path: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_read_without_a_limit_is_for_tests_alone() {
+        let read = "let text = std::fs::read_to_string(path)?;\n";
+        let complaints = |file: &str, text: &str| unbounded(Path::new(file), text).count();
+        assert_eq!(complaints("crates/a/src/b.rs", read), 1);
+        assert_eq!(complaints("crates/a/tests/b.rs", read), 0);
+        assert_eq!(complaints("crates/a/src/tests/b.rs", read), 0);
+        assert_eq!(complaints("crates/a/src/b.rs", &format!("#[cfg(test)]\n{read}")), 0);
+        assert_eq!(complaints("crates/a/src/b.rs", "fs::read_to_string(\"/proc/cpuinfo\")"), 0);
+    }
 
     #[test]
     fn paths_of_one_machine_are_found_and_others_are_not() {
