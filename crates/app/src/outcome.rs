@@ -20,6 +20,11 @@ pub enum Ended {
 }
 
 impl Ended {
+    /// Returns the end of a command that read a log, of which part may have been lost.
+    pub fn with_loss(data_lost: bool) -> Self {
+        if data_lost { Self::WithLoss } else { Self::Well }
+    }
+
     /// Returns the exit code.
     pub fn code(self) -> u8 {
         match self {

@@ -44,7 +44,7 @@ pub fn rooms(args: &RoomsArgs, registry: &Registry) -> Outcome {
         TableFormat::Markdown => report.markdown(),
         TableFormat::Json => json,
     })?;
-    Ok(if done.lost { Ended::WithLoss } else { Ended::Well })
+    Ok(Ended::with_loss(done.lost))
 }
 
 /// Returns the rooms and their logs, all of which have truth.

@@ -24,7 +24,9 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     file.check_tuning(registry)?;
     let outer = file.outer()?;
     let inputs = pipeline.inputs();
-    let notes = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
+    let fit = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
+    let data_lost = fit.as_ref().is_some_and(|fit| fit.data_lost);
+    let notes = fit.map(|fit| fit.notes);
     let config = config.display();
     print(&match format {
         Format::Text => {
@@ -44,11 +46,19 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
             format!("{answer:#}\n")
         }
     })?;
-    Ok(Ended::Well)
+    Ok(Ended::with_loss(data_lost))
 }
 
-/// Tries the first frames of the log; returns the reader's notes.
-fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Vec<String>, Failure> {
+/// Facts about a log that fits.
+struct Fit {
+    /// Notes of the reader.
+    notes: Vec<String>,
+    /// Part of the log was lost.
+    data_lost: bool,
+}
+
+/// Tries the first frames of the log.
+fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit, Failure> {
     check_log_path(log)?;
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
     let missing = |why| Failure::failed(format!("`{}`: {why}", log.display()));
@@ -64,7 +74,7 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Vec
     if tried == 0 {
         return Err(Failure::failed(format!("{}: no frame that can be used", log.display())));
     }
-    Ok(source.notes().to_vec())
+    Ok(Fit { notes: source.notes().to_vec(), data_lost: source.data_lost() })
 }
 
 fn names(inputs: Inputs, usage: Usage) -> Vec<&'static str> {

@@ -21,5 +21,5 @@ pub fn inspect(log: &Path, config: Option<&Path>, format: Format) -> Outcome {
         Format::Text => found.to_string(),
         Format::Json => to_json("the contents of the log", &found)?,
     })?;
-    Ok(Ended::Well)
+    Ok(Ended::with_loss(found.data_lost))
 }

@@ -230,3 +230,21 @@ fn json_is_printed_by_every_command_that_prints_data() {
         assert!(read.is_ok(), "{line}: {}{}", text(&output.stdout), text(&output.stderr));
     }
 }
+
+/// A log that ends too early is worked on, and the exit code tells.
+#[test]
+fn lost_data_is_an_exit_code_of_every_command_that_reads_a_log() {
+    let home = tempfile::tempdir().unwrap();
+    lay_out(home.path());
+    Drawn::of(40).write(&home.path().join("whole.mcap"));
+    let whole = fs::read(home.path().join("whole.mcap")).unwrap();
+    fs::write(home.path().join("short.mcap"), &whole[..whole.len() * 2 / 3]).unwrap();
+    for (log, expected) in [("whole.mcap", 0), ("short.mcap", 3)] {
+        let lines = ["inspect LOG", "check nearest.toml LOG", "run nearest.toml LOG --overwrite"];
+        for line in lines.map(|line| line.replace("LOG", log)) {
+            let output =
+                own_plugin().args(line.split(' ')).current_dir(home.path()).output().unwrap();
+            assert_eq!(code(&output), expected, "{line}: {}", text(&output.stderr));
+        }
+    }
+}
