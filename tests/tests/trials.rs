@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tagalong_config::Registry;
 use tagalong_eval::Tally;
-use tagalong_sim::Scene;
+use tagalong_sim::{Scene, Variant};
 use tagalong_trials::{Contender, Judge, each};
 
 /// Scene with two people that pass before a turning robot, one behind the other; small images,
@@ -39,12 +39,15 @@ fn scenes(seeds: u64, duration_s: f64) -> Vec<Scene> {
 
 /// Returns one tally per contender and scene.
 fn tallies(names: &[&str], seeds: u64, duration_s: f64, threads: usize) -> Vec<Vec<Tally>> {
+    judged(names, &scenes(seeds, duration_s), threads)
+}
+
+fn judged(names: &[&str], scenes: &[Scene], threads: usize) -> Vec<Vec<Tally>> {
     let keep = |trial: tagalong_trials::Trial| {
         let judge = Judge::default();
         trial.runs.iter().map(|run| Ok(judge.judge(&trial, run)?.tally)).collect()
     };
-    let (scenes, contenders) = (scenes(seeds, duration_s), contenders(names));
-    each(&scenes, &contenders, &registry(), threads, keep, |_| ()).unwrap()
+    each(scenes, &contenders(names), &registry(), threads, keep, |_| ()).unwrap()
 }
 
 #[test]
@@ -54,6 +57,22 @@ fn the_naive_baseline_is_clearly_worse() {
     let (naive, ekf) = (scores(0), scores(1));
     assert!(ekf.idf1 > naive.idf1.map(|f| f + 0.1), "{:?} {:?}", ekf.idf1, naive.idf1);
     assert!(ekf.mota > naive.mota, "{:?} {:?}", ekf.mota, naive.mota);
+}
+
+/// People in like clothes hide each other from the camera; the scanner sees the legs of both, and
+/// tells nobody from the next.
+#[test]
+fn camera_and_laser_together_lose_fewer_people_than_each_alone() {
+    let crossing = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/scenes/crossing.toml");
+    let text = std::fs::read_to_string(crossing).unwrap();
+    let laser = ("laser".to_owned(), "{}".to_owned());
+    let variant = |seed| Variant { seed: Some(seed), set: vec![laser.clone()], split: None };
+    let scenes: Vec<Scene> =
+        [1, 2].map(|seed| Scene::parse_with(&text, &variant(seed)).unwrap()).into();
+    let all = judged(&["depth-laser", "depth-ekf", "laser-follow"], &scenes, 2);
+    let idf1 = |at: usize| Tally::combine(all.iter().map(|t| &t[at])).scores().idf1.unwrap_or(0.0);
+    let [both, camera, laser] = [0, 1, 2].map(idf1);
+    assert!(both > camera.max(laser) + 0.05, "{both} {camera} {laser}");
 }
 
 #[test]

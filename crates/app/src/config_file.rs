@@ -17,11 +17,12 @@ use crate::serialize::to_toml;
 use crate::suggest::config_hint;
 
 /// Configs that need no file. None of them extends another one, which would be a file.
-const BUILT_IN: [(&str, &str); 14] = [
+const BUILT_IN: [(&str, &str); 15] = [
     ("depth-alone", include_str!("../../../configs/depth-alone.toml")),
     ("depth-verified", include_str!("../../../configs/depth-verified.toml")),
     ("depth-ekf-as-printed", include_str!("../../../configs/depth-ekf-as-printed.toml")),
     ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
+    ("depth-laser", include_str!("../../../configs/depth-laser.toml")),
     ("depth-net-ekf", include_str!("../../../configs/depth-net-ekf.toml")),
     ("stereo-verified", include_str!("../../../configs/stereo-verified.toml")),
     ("stereo-street", include_str!("../../../configs/stereo-street.toml")),

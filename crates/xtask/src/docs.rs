@@ -16,7 +16,8 @@ const BEGIN: &str = "<!-- begin: ";
 const END: &str = "<!-- end -->";
 
 /// Commands that take minutes to hours.
-const SLOW: &[&str] = &["tagalong reproduce", "tagalong follow", "tagalong bench"];
+const SLOW: &[&str] =
+    &["tagalong reproduce", "tagalong follow", "tagalong bench", "tagalong trials"];
 
 /// A document with parts to fill.
 struct Document {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::config_file::ConfigFile;
-use tagalong_app::format::Format;
+use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
@@ -59,7 +59,7 @@ pub struct TrialsArgs {
     pub jobs: Option<u8>,
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
-    pub format: Format,
+    pub format: TableFormat,
 }
 
 /// Runs the trials and prints the table.
@@ -76,8 +76,8 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let names = suites.iter().map(|(name, _)| name);
     let mut table = table::Table::new(seeds, names, contenders.iter().map(|c| &c.name));
     let tell = |text: String| match args.format {
-        Format::Text => bar.suspend(|| print(&text)),
-        Format::Json => Ok(()),
+        TableFormat::Text => bar.suspend(|| print(&text)),
+        TableFormat::Markdown | TableFormat::Json => Ok(()),
     };
     tell(table.header())?;
     for (name, scenes) in &suites {
@@ -90,8 +90,10 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     }
     bar.finish_and_clear();
     tell(table.summary())?;
-    if args.format == Format::Json {
-        print(&to_json("the table", &table)?)?;
+    match args.format {
+        TableFormat::Text => {}
+        TableFormat::Markdown => print(&format!("{}\n", table.page().markdown()))?,
+        TableFormat::Json => print(&to_json("the table", &table)?)?,
     }
     Ok(Ended::Well)
 }

@@ -5,6 +5,7 @@ use tagalong_eval::{
     CONFIDENCE, Clear, Gain, Identity, Interval, PositionError, draws_interval, holm,
     is_significant, paired_gain, wilson,
 };
+use tagalong_reproduce::{self as reproduce, Cell};
 use tagalong_sim::Seeds;
 use tagalong_trials::Contender;
 
@@ -157,6 +158,43 @@ impl Table {
             );
         }
         out
+    }
+
+    /// Returns the table for a page, with the gains as its last column.
+    pub fn page(&self) -> reproduce::Table {
+        let columns = ["MOTA", "IDF1", "error m", "all frames right", "IDSW", "IDF1 gained"]
+            .map(str::to_owned);
+        let seeds = format!("each scene with {}", self.seeds);
+        let intervals = "intervals: 95 %, over draws (Student; Wilson where all is right)";
+        let gains = self.gains.first().map(|gain| {
+            format!(
+                "gained: over {} on the same draws; sign-flip test over draws, with Holm's correction \
+                 for {}",
+                gain.baseline,
+                self.gains.len()
+            )
+        });
+        let notes = [seeds, intervals.into(), self.perfection()].into_iter().chain(gains);
+        reproduce::Table {
+            title: "Simulated scenes".into(),
+            columns: columns.to_vec(),
+            rows: self.rows.iter().map(|row| self.page_row(row)).collect(),
+            notes: notes.collect(),
+        }
+    }
+
+    fn page_row(&self, row: &Row) -> reproduce::Row {
+        let of_row = |gain: &&GainRow| gain.suite == row.suite && gain.pipeline == row.pipeline;
+        let gain = self.gains.iter().find(of_row).map(|gain| gain.idf1.difference);
+        let cells = vec![
+            Cell::estimate(row.mota, 3),
+            Cell::estimate(row.idf1, 3),
+            row.error.map_or_else(Cell::default, |error| Cell::number(error.mean_m, 3)),
+            Cell::estimate(row.success, 3),
+            Cell::number(row.switches as f64, 0),
+            Cell::estimate(gain, 3),
+        ];
+        reproduce::Row::ours(format!("{}: {}", row.suite, row.pipeline), cells)
     }
 
     /// Returns a note on suites that a pipeline solves, which are too easy.
