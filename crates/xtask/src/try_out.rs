@@ -1,7 +1,7 @@
 //! Generates one plugin of each kind in a copy of the workspace, and the one of the walk-through,
 //! and runs the checks of every plugin on them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{fs, io};
 
@@ -21,8 +21,8 @@ const COPY: &str = "target/try-new-plugin";
 /// for those of the other.
 const BUILD: &str = "target/try-new-plugin-build";
 
-/// The workspace's own build, whose outside crates are as good for the copy.
-const BUILT: &str = "target/debug";
+/// Folder of the workspace's own build, whose outside crates are as good for the copy.
+const BUILT: &str = "debug";
 
 /// Runs the whole trial.
 pub fn try_out(workspace: &Workspace) -> Result<()> {
@@ -37,7 +37,7 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
     walk_through::walk(&copy)?;
     format(&copy, walk_through::NAME)?;
     names.push(walk_through::NAME.to_owned());
-    lend(&workspace.root().join(BUILT), &workspace.root().join(BUILD).join("debug"))?;
+    lend(&target(workspace).join(BUILT), &workspace.root().join(BUILD).join("debug"))?;
     let packages: Vec<String> =
         names.iter().flat_map(|name| ["-p".to_owned(), format!("tagalong-{name}")]).collect();
     let cargo = |step: &str, args: &[&str], packages: &[String]| -> Result<()> {
@@ -65,6 +65,12 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
     }
     eprintln!("new-plugin --try: all six kinds work, and so does the walk-through");
     Ok(())
+}
+
+/// Returns the folder in which cargo builds the workspace.
+fn target(workspace: &Workspace) -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR")
+        .map_or_else(|| workspace.root().join("target"), PathBuf::from)
 }
 
 /// Copies the outside crates that cargo has built, so that they are not built a second time.
