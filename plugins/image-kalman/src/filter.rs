@@ -46,7 +46,7 @@ impl Filter for ImageKalman {
         for state in self.states.values_mut() {
             state.predict(&self.config, motion, camera);
         }
-        self.gaps.values_mut().for_each(|gap| gap.add(motion));
+        self.gaps.values_mut().for_each(|gap| gap.add(motion, camera));
     }
 
     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {

@@ -32,6 +32,8 @@ pub struct State {
     /// Position in space of a person behind the camera, after a motion of the robot: there is no
     /// pixel, so the person is kept here until in front again.
     behind: Option<RobotPoint>,
+    /// Camera of the frame in whose pixels the state is.
+    camera: Camera,
     /// Time since the previous frame, s.
     step_s: f64,
     /// Box of the detection in this frame, where that is to be reported.
@@ -86,6 +88,7 @@ impl State {
             )),
             shape: Shape::of(detection, camera).unwrap_or(upper_body),
             behind: None,
+            camera: camera.clone(),
             step_s: 0.0,
             observed: config.observed_boxes.then_some(rect),
         }
@@ -101,6 +104,7 @@ impl State {
         if !config.compat_printed_ego_motion {
             self.turn_with(motion, camera);
         }
+        self.camera.clone_from(camera);
         self.stay_in_range();
     }
 
@@ -119,13 +123,14 @@ impl State {
             + white_acceleration(config.range_noise, dt);
     }
 
-    /// Compensates the robot's own motion: the head is moved in space, and the box with it.
+    /// Compensates the robot's own motion, and that of the camera on the robot: the head is moved in
+    /// space, and the box with it.
     fn turn_with(&mut self, motion: &EgoMotion, camera: &Camera) {
         let before = self.seen();
-        let last = before.in_space(camera);
+        let last = before.in_space(&self.camera);
         let place = match self.behind.take() {
             Some(place) => place.walked(motion.dt),
-            None if is_still(motion) => return,
+            None if is_still(motion) && self.camera == *camera => return,
             None => last,
         };
         let place = place.after(motion);
@@ -135,8 +140,10 @@ impl State {
         };
         self.doubt_the_motion(&before, &after, motion, camera);
         // The floor keeps the ratio of the widths finite for a head beside the lens.
-        let depth = |place: &RobotPoint| camera.depth_of(&place.position).max(MIN_RANGE_M);
-        self.image[4] *= depth(&last) / depth(&place);
+        let depth =
+            |camera: &Camera, place: &RobotPoint| camera.depth_of(&place.position).max(MIN_RANGE_M);
+        self.image[4] *= depth(&self.camera, &last) / depth(camera, &place);
+        self.image[4] *= zoom(&self.camera, camera);
         self.image.fixed_rows_mut::<2>(2).copy_from(&after.velocity);
         let centre = after.pixel - self.shape.head * self.image[4];
         self.image.fixed_rows_mut::<2>(0).copy_from(&centre.coords);
@@ -154,7 +161,7 @@ impl State {
     ) {
         let mut by_motion = Matrix3::zeros();
         for (column, step) in steps(motion).into_iter().enumerate() {
-            let Some(moved) = before.after(&step, camera) else { return };
+            let Some(moved) = before.after(&step, [&self.camera, camera]) else { return };
             by_motion.set_column(column, &(difference(&moved, after) / MOTION_STEP));
         }
         let noise = by_motion * motion.covariance * by_motion.transpose();
@@ -164,7 +171,7 @@ impl State {
         // The shift at one standard deviation of the range gives that error to first order.
         let sigma = Vector2::new(self.range_covariance[(0, 0)].max(0.0).sqrt(), 0.0);
         let farther = ImagePoint { range: before.range + sigma, ..*before };
-        if let Some(moved) = farther.after(motion, camera) {
+        if let Some(moved) = farther.after(motion, [&self.camera, camera]) {
             let shift = moved.pixel - after.pixel;
             place = self.image_covariance.fixed_view_mut::<2, 2>(0, 0);
             place += shift * shift.transpose();
@@ -332,6 +339,11 @@ fn image_noise(
 fn measured_range(config: &Config, detection: &Detection, camera: &Camera) -> (f64, f64) {
     let (range, variance) = range(camera, &detection.position, &detection.covariance);
     (range, variance + config.sigma_range_m.powi(2))
+}
+
+/// Returns the factor by which things grow in the image where the focal length changes.
+fn zoom(from: &Camera, to: &Camera) -> f64 {
+    if from.lens == to.lens { 1.0 } else { to.focal_px() / from.focal_px() }
 }
 
 fn is_still(motion: &EgoMotion) -> bool {

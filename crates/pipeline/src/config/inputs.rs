@@ -5,14 +5,16 @@ use std::ops::Range;
 use tagalong_config::ConfigError;
 use tagalong_core::{Input, Inputs};
 use tagalong_following::ObstacleSource;
+use tagalong_odometry::OdometrySource;
 
 use super::PipelineSettings;
 
 /// Inputs of the target lock and the collision monitor, which every controller has.
 const STEERING: Inputs =
     Inputs::NONE.accept(Input::Colour).accept(Input::Depth).accept(Input::Laser);
-/// Inputs of `[odometry]`.
-const ODOMETRY: Inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
+/// Inputs of `[odometry]`, by depth and by the image alone.
+const ODOMETRY: Inputs = CAMERA_MOTION.require(Input::Depth);
+const CAMERA_MOTION: Inputs = Inputs::NONE.require(Input::Colour);
 /// Inputs of `[reidentification]`.
 const REIDENTIFICATION: Inputs = Inputs::NONE.accept(Input::Colour).accept(Input::Depth);
 /// Inputs of the network of `[appearance]`.
@@ -34,7 +36,10 @@ pub(super) fn declared_inputs(
     has_controller: bool,
     without_span: Option<Range<usize>>,
 ) -> Result<Inputs, ConfigError> {
-    let odometry = settings.odometry.is_some().then_some(("[odometry]", ODOMETRY));
+    let odometry = settings.odometry.as_ref().map(|odometry| match odometry.source {
+        OdometrySource::Depth => ("[odometry]", ODOMETRY),
+        OdometrySource::Image => ("[odometry]", CAMERA_MOTION),
+    });
     let steering = has_controller.then_some(("[collision_monitor]", STEERING));
     let remembers = settings.reidentification.remember_s > 0.0;
     let people = remembers.then_some(("[reidentification]", REIDENTIFICATION));

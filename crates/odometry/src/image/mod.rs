@@ -1,0 +1,212 @@
+//! Motion of the camera from its images alone, for logs without odometry and depth: corners are
+//! tracked from image to image, a similarity transform is fitted to those that agree, and what it
+//! says is told as a turn of the robot, a way ahead, and a nod and a roll of the camera.
+
+mod corners;
+mod flow;
+mod similarity;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, UnitQuaternion, Vector3};
+use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, GreyImage};
+use tagalong_geometry::{Camera, Lens, Rect};
+
+use crate::{OdometrySettings, halve};
+use corners::corners;
+use flow::track;
+pub use similarity::{Similarity, SimilarityFit};
+
+/// Most sizes of an image, each half of the one before.
+const LEVELS: usize = 4;
+/// Smallest side of an image that is worth halving, px.
+const LEAST_SIDE_PX: usize = 48;
+/// Height of a person of whom the upper body alone is known, m.
+const TALL_M: f64 = 1.8;
+/// Ratio of height and width from which on a region is that of a whole person.
+const WHOLE_FROM: f64 = 1.5;
+/// Part by which the box of a person is enlarged, for limbs that leave it.
+const LIMBS: f64 = 0.3;
+/// Error of a shift beside that of the corners, px: a scene in depth does not move by a similarity.
+const MODEL_PX: f64 = 0.3;
+/// Error of the way ahead, as a fraction of it: the depth of the scene is a guess.
+const GUESSED_DEPTH: f64 = 0.5;
+/// Smallest horizontal part of the optical axis for which the camera has a heading.
+const LEAST_LEVEL: f64 = 0.2;
+
+/// Motion of a camera from its images.
+pub struct CameraMotion {
+    settings: OdometrySettings,
+    last: Option<View>,
+}
+
+/// An image at several sizes, and how it was taken.
+struct View {
+    levels: Vec<GreyImage>,
+    /// The camera as the log describes it.
+    nominal: Camera,
+    /// Rotation of the camera in the robot frame, as the images show it.
+    mount: UnitQuaternion<f64>,
+}
+
+/// Motion of the camera from one frame to the next.
+#[derive(Clone, Debug)]
+pub struct CameraMoved {
+    /// Motion of the robot.
+    pub motion: Option<EgoMotion>,
+    /// Camera of the frame, if it differs from that of the log.
+    pub camera: Option<Camera>,
+}
+
+impl CameraMotion {
+    /// Creates the stage with these settings.
+    pub fn new(settings: OdometrySettings) -> Self {
+        Self { settings, last: None }
+    }
+
+    /// Returns the robot's motion since the previous frame, and the camera of this one. `motion` is
+    /// that of the log; one that is not rest stays as it is, and the images tell the nod and the roll
+    /// of the camera alone. `people` are those of the previous frame.
+    ///
+    /// A frame without an image or with a panorama leaves everything as it is, and so does one with
+    /// too few corners that agree, which is counted in the funnel.
+    pub fn see(
+        &mut self,
+        frame: &Frame,
+        motion: Option<EgoMotion>,
+        people: &[Estimate],
+        funnel: &mut Funnel,
+    ) -> CameraMoved {
+        let (Ok(grey), Lens::Pinhole(_)) = (frame.grey(), &frame.camera.lens) else {
+            self.last = None;
+            return CameraMoved { motion, camera: None };
+        };
+        let nominal = &*frame.camera;
+        let mut view = View {
+            levels: levels(grey),
+            nominal: nominal.clone(),
+            mount: nominal.robot_from_camera.rotation,
+        };
+        // A camera that the log moves is told by the log.
+        let last = self.last.take().filter(|last| last.nominal == *nominal).zip(motion);
+        let moved = last.and_then(|(last, motion)| {
+            let found = last.compared(&view, people, &self.settings);
+            funnel.drop_many("odometry: too few corners agree", u64::from(found.is_none()));
+            let (motion, mount) = last.explained(found.as_ref(), motion, &self.settings)?;
+            view.mount = mount;
+            Some(motion)
+        });
+        let camera = (view.mount != nominal.robot_from_camera.rotation).then(|| view.camera());
+        self.last = Some(view);
+        CameraMoved { motion: moved.or(motion), camera }
+    }
+}
+
+impl View {
+    /// Returns the transform from this image to the next one, fitted to static corners; `None` if
+    /// too few of them agree.
+    fn compared(
+        &self,
+        next: &Self,
+        people: &[Estimate],
+        settings: &OdometrySettings,
+    ) -> Option<SimilarityFit> {
+        let people: Vec<Rect> = people.iter().map(|person| outline(&person.region)).collect();
+        let is_free = |at: &Point2<f64>| people.iter().all(|person| !holds(person, at));
+        let from = corners(&self.levels, settings).into_iter().filter(is_free);
+        let pairs: Vec<[Point2<f64>; 2]> = from
+            .filter_map(|from| Some([from, track(&self.levels, &next.levels, from)?]))
+            .collect();
+        SimilarityFit::of_agreeing(&pairs, self.nominal.width as f64, settings.min_points)
+    }
+
+    /// Returns the motion of the robot and the new rotation of the camera that a transform of the
+    /// image stands for; without one the camera goes back to its mount. `None` if the camera has no
+    /// heading.
+    fn explained(
+        &self,
+        found: Option<&SimilarityFit>,
+        motion: EgoMotion,
+        settings: &OdometrySettings,
+    ) -> Option<(EgoMotion, UnitQuaternion<f64>)> {
+        let still = SimilarityFit::default();
+        let fit = found.unwrap_or(&still);
+        let Lens::Pinhole(lens) = &self.nominal.lens else { return None };
+        let centre = Point2::new(lens.cx, lens.cy);
+        // The old optical axis as the new camera sees it, and the image turned about it.
+        let axis = self.nominal.ray(fit.transform.apply(centre));
+        let swing = Rotation3::rotation_between(&Vector3::z(), &axis)?;
+        let roll = Rotation3::from_axis_angle(&Vector3::z_axis(), fit.transform.angle());
+        let old_from_new = UnitQuaternion::from_rotation_matrix(&(swing * roll).inverse());
+        let turned = self.mount * old_from_new;
+        let pan = heading(&turned)? - heading(&self.nominal.robot_from_camera.rotation)?;
+        let level = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -pan) * turned;
+        let mount = settled(&level, &self.nominal, motion.dt, settings.settle_s);
+        let is_at_rest = motion == EgoMotion::at_rest(motion.dt);
+        let moved = found.filter(|_| is_at_rest).map(|fit| {
+            let shift_px = fit.sigma_px.hypot(MODEL_PX);
+            let ahead_m = settings.scene_depth_m * (1.0 - 1.0 / fit.transform.scale());
+            let by_scale = settings.scene_depth_m * fit.sigma_scale;
+            let ahead_sigma = by_scale.hypot(GUESSED_DEPTH * ahead_m);
+            let turn_sigma = shift_px / lens.fx;
+            let sigma = Vector3::new(ahead_sigma, 0.0, turn_sigma);
+            let covariance = Matrix3::from_diagonal(&sigma.map(|sigma| sigma * sigma));
+            EgoMotion { forward: ahead_m, turn: pan, covariance, ..motion }
+        });
+        Some((moved.unwrap_or(motion), mount))
+    }
+
+    /// Returns the camera of the log with the rotation that the images show.
+    fn camera(&self) -> Camera {
+        let translation = self.nominal.robot_from_camera.translation;
+        let robot_from_camera = Isometry3::from_parts(translation, self.mount);
+        Camera { robot_from_camera, ..self.nominal.clone() }
+    }
+}
+
+/// Returns a rotation of the camera that has gone part of the way back to its mount: errors of many
+/// frames would add up to a camera that looks at the ceiling.
+fn settled(
+    mount: &UnitQuaternion<f64>,
+    nominal: &Camera,
+    dt_s: f64,
+    settle_s: f64,
+) -> UnitQuaternion<f64> {
+    let home = nominal.robot_from_camera.rotation;
+    let part = 1.0 - (-dt_s / settle_s).exp();
+    // Half a turn has no shortest way back, and is no nod either.
+    mount.try_slerp(&home, part, 1e-9).unwrap_or(home)
+}
+
+/// Returns the heading of the optical axis of a camera with this rotation, rad; `None` for a camera
+/// that looks up or down.
+fn heading(robot_from_camera: &UnitQuaternion<f64>) -> Option<f64> {
+    let axis = robot_from_camera * Vector3::z();
+    (axis.xy().norm() > LEAST_LEVEL).then(|| axis.y.atan2(axis.x))
+}
+
+/// Returns the box of a whole person, enlarged, around the region of a track.
+fn outline(region: &Rect) -> Rect {
+    let is_whole = region.height >= WHOLE_FROM * region.width;
+    let whole = if is_whole { *region } else { region.standing_of_upper_body(TALL_M) };
+    whole.inflated(LIMBS)
+}
+
+fn holds(area: &Rect, at: &Point2<f64>) -> bool {
+    (area.x..area.right()).contains(&at.x) && (area.y..area.bottom()).contains(&at.y)
+}
+
+/// Returns an image at full size, half of it, and so on.
+fn levels(grey: &GreyImage) -> Vec<GreyImage> {
+    let mut levels = vec![grey.clone()];
+    while levels.len() < LEVELS {
+        let last = &levels[levels.len() - 1];
+        if last.width().min(last.height()) < 2 * LEAST_SIDE_PX {
+            break;
+        }
+        let mut half = GreyImage::default();
+        halve(last, &mut half);
+        levels.push(half);
+    }
+    levels
+}
