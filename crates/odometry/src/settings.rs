@@ -6,7 +6,7 @@ use tagalong_core::{Error, Result};
 /// Data from which the motion is estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum OdometrySource {
+pub enum MotionSource {
     /// Images with depth correct the odometry of the log.
     #[default]
     Depth,
@@ -21,7 +21,7 @@ pub struct OdometrySettings {
     /// `depth`: static points of known depth correct the odometry of the log. `image`: corners of the
     /// images alone, for a log without odometry and depth; of the settings below, `cell_px`,
     /// `min_slope`, `min_points`, `scene_depth_m` and `settle_s` count then, and the others do not.
-    pub source: OdometrySource,
+    pub source: MotionSource,
     /// Side of the square cells that yield at most one point each, px.
     #[schemars(range(min = 8, max = 256))]
     pub cell_px: usize,
@@ -68,7 +68,7 @@ pub struct OdometrySettings {
 impl Default for OdometrySettings {
     fn default() -> Self {
         Self {
-            source: OdometrySource::Depth,
+            source: MotionSource::Depth,
             cell_px: 24,
             min_slope: 5.0,
             min_depth_m: 0.8,

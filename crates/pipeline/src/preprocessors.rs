@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, Result};
 use tagalong_geometry::Camera;
-use tagalong_odometry::{CameraMotion, OdometrySettings, OdometrySource, VisualOdometry};
+use tagalong_odometry::{CameraMotion, MotionSource, OdometrySettings, VisualOdometry};
 use tagalong_stereo::StereoDepth;
 use tagalong_tracking::Guarded;
 use tagalong_tracking::{Preprocessed, Preprocessor};
@@ -73,8 +73,8 @@ fn seen_by(frame: &Frame, camera: Camera) -> Frame {
 /// Returns the stage of `[odometry]`.
 fn odometry_stage(settings: OdometrySettings) -> Box<dyn Preprocessor> {
     match settings.source {
-        OdometrySource::Depth => Box::new(MotionOfImages(VisualOdometry::new(settings))),
-        OdometrySource::Image => Box::new(MotionOfCorners(CameraMotion::new(settings))),
+        MotionSource::Depth => Box::new(MotionOfImages(VisualOdometry::new(settings))),
+        MotionSource::Image => Box::new(MotionOfCorners(CameraMotion::new(settings))),
     }
 }
 

@@ -9,6 +9,9 @@ use crate::patch::{PIXELS, Patch};
 /// Distance between candidates, px of the half image: a patch is as wide as two of these.
 const STRIDE: usize = 4;
 
+/// Slope in a patch, as a fraction of that of an edge in it.
+const MEAN_SLOPE: f64 = 0.3;
+
 /// Returns the corners of an image, pixels of its full size: those patches whose brightness changes
 /// most in the direction in which it changes least (J. Shi and C. Tomasi, *Good features to track*,
 /// CVPR 1994).
@@ -35,8 +38,8 @@ fn corner_of_cell(
     cell: usize,
     min_slope: f64,
 ) -> Option<(usize, usize)> {
-    // Half the slope, because the mean over a patch is less than that of an edge in it.
-    let mut most = PIXELS as f64 * (0.5 * min_slope).powi(2);
+    // The mean over a patch is less than the slope of an edge in it.
+    let mut most = PIXELS as f64 * (MEAN_SLOPE * min_slope).powi(2);
     let mut best = None;
     let places = |from: usize, side: usize| (from..(from + cell).min(side)).step_by(STRIDE);
     for y in places(top, image.height()) {

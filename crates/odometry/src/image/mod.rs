@@ -1,33 +1,41 @@
 //! Motion of the camera from its images alone, for logs without odometry and depth: corners are
-//! tracked from image to image, a similarity transform is fitted to those that agree, and what it
-//! says is told as a turn of the robot, a way ahead, and a nod and a roll of the camera.
+//! tracked from image to image, a rotation and a zoom of the camera are fitted to those that agree,
+//! and told as a turn of the robot, a way ahead, and a nod and a roll of the camera.
 
 mod corners;
 mod flow;
-mod similarity;
+mod swing;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, UnitQuaternion, Vector3};
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, Matrix3, Point2, UnitQuaternion, Vector2, Vector3};
 use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, GreyImage};
 use tagalong_geometry::{Camera, Lens, Rect};
 
 use crate::{OdometrySettings, halve};
 use corners::corners;
-use flow::track;
-pub use similarity::{Similarity, SimilarityFit};
+use flow::{track, whole_shift};
+use swing::Pair;
+pub use swing::{Swing, SwingFit};
 
 /// Most sizes of an image, each half of the one before.
 const LEVELS: usize = 4;
 /// Smallest side of an image that is worth halving, px.
 const LEAST_SIDE_PX: usize = 48;
+/// Part of the corners that agree on a motion that needs no search for another one.
+const MOST: f64 = 0.6;
 /// Height of a person of whom the upper body alone is known, m.
 const TALL_M: f64 = 1.8;
 /// Ratio of height and width from which on a region is that of a whole person.
 const WHOLE_FROM: f64 = 1.5;
 /// Part by which the box of a person is enlarged, for limbs that leave it.
 const LIMBS: f64 = 0.3;
-/// Error of a shift beside that of the corners, px: a scene in depth does not move by a similarity.
+/// Distance from a fitted motion within which a corner agrees with it, as a fraction of the width of
+/// the image: 1.3 px of 640.
+const AGREES: f64 = 2e-3;
+/// Error of a pan beside that of the corners, px: a scene in depth does not move as if far away.
 const MODEL_PX: f64 = 0.3;
 /// Error of the way ahead, as a fraction of it: the depth of the scene is a guess.
 const GUESSED_DEPTH: f64 = 0.5;
@@ -103,57 +111,74 @@ impl CameraMotion {
 }
 
 impl View {
-    /// Returns the transform from this image to the next one, fitted to static corners; `None` if
-    /// too few of them agree.
+    /// Returns the motion from this image to the next one, fitted to static corners; `None` if too
+    /// few of them agree.
     fn compared(
         &self,
         next: &Self,
         people: &[Estimate],
         settings: &OdometrySettings,
-    ) -> Option<SimilarityFit> {
+    ) -> Option<SwingFit> {
+        let Lens::Pinhole(lens) = &self.nominal.lens else { return None };
+        let near = AGREES * self.nominal.width as f64 / lens.fx;
+        let ray = |at: Point2<f64>| self.nominal.ray(at).xy();
         let people: Vec<Rect> = people.iter().map(|person| outline(&person.region)).collect();
         let is_free = |at: &Point2<f64>| people.iter().all(|person| !holds(person, at));
-        let from = corners(&self.levels, settings).into_iter().filter(is_free);
-        let pairs: Vec<[Point2<f64>; 2]> = from
-            .filter_map(|from| Some([from, track(&self.levels, &next.levels, from)?]))
-            .collect();
-        SimilarityFit::of_agreeing(&pairs, self.nominal.width as f64, settings.min_points)
+        let from: Vec<Point2<f64>> =
+            corners(&self.levels, settings).into_iter().filter(is_free).collect();
+        let fit = |guess: Vector2<f64>| {
+            let found = |at: &Point2<f64>| track(&self.levels, &next.levels, *at, guess);
+            let pairs = from.iter().filter_map(|at| Some([ray(*at), ray(found(at)?)]));
+            let pairs: Vec<Pair> = pairs.collect();
+            SwingFit::of_agreeing(&pairs, near, settings.min_points)
+        };
+        let near = fit(Vector2::zeros());
+        if near.is_some_and(|fit| fit.points as f64 >= MOST * from.len() as f64) {
+            return near;
+        }
+        // A jerk moves corners farther than a patch shows; whole images are compared then.
+        let far = fit(whole_shift(&self.levels, &next.levels));
+        near.into_iter().chain(far).reduce(|a, b| if b.points > a.points { b } else { a })
     }
 
-    /// Returns the motion of the robot and the new rotation of the camera that a transform of the
-    /// image stands for; without one the camera goes back to its mount. `None` if the camera has no
+    /// Returns the motion of the robot and the new rotation of the camera that a motion of the image
+    /// stands for; without one the camera goes back to its mount. `None` if the camera has no
     /// heading.
     fn explained(
         &self,
-        found: Option<&SimilarityFit>,
+        found: Option<&SwingFit>,
         motion: EgoMotion,
         settings: &OdometrySettings,
     ) -> Option<(EgoMotion, UnitQuaternion<f64>)> {
-        let still = SimilarityFit::default();
+        let still = SwingFit::default();
         let fit = found.unwrap_or(&still);
-        let Lens::Pinhole(lens) = &self.nominal.lens else { return None };
-        let centre = Point2::new(lens.cx, lens.cy);
-        // The old optical axis as the new camera sees it, and the image turned about it.
-        let axis = self.nominal.ray(fit.transform.apply(centre));
-        let swing = Rotation3::rotation_between(&Vector3::z(), &axis)?;
-        let roll = Rotation3::from_axis_angle(&Vector3::z_axis(), fit.transform.angle());
-        let old_from_new = UnitQuaternion::from_rotation_matrix(&(swing * roll).inverse());
-        let turned = self.mount * old_from_new;
+        let new_from_old = UnitQuaternion::from_rotation_matrix(&fit.swing.new_from_old);
+        let turned = self.mount * new_from_old.inverse();
         let pan = heading(&turned)? - heading(&self.nominal.robot_from_camera.rotation)?;
+        let pan = pan - TAU * (pan / TAU).round();
         let level = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -pan) * turned;
         let mount = settled(&level, &self.nominal, motion.dt, settings.settle_s);
         let is_at_rest = motion == EgoMotion::at_rest(motion.dt);
-        let moved = found.filter(|_| is_at_rest).map(|fit| {
-            let shift_px = fit.sigma_px.hypot(MODEL_PX);
-            let ahead_m = settings.scene_depth_m * (1.0 - 1.0 / fit.transform.scale());
-            let by_scale = settings.scene_depth_m * fit.sigma_scale;
-            let ahead_sigma = by_scale.hypot(GUESSED_DEPTH * ahead_m);
-            let turn_sigma = shift_px / lens.fx;
-            let sigma = Vector3::new(ahead_sigma, 0.0, turn_sigma);
-            let covariance = Matrix3::from_diagonal(&sigma.map(|sigma| sigma * sigma));
-            EgoMotion { forward: ahead_m, turn: pan, covariance, ..motion }
-        });
-        Some((moved.unwrap_or(motion), mount))
+        let by_image =
+            found.filter(|_| is_at_rest).map(|fit| self.moved(fit, pan, motion, settings));
+        Some((by_image.unwrap_or(motion), mount))
+    }
+
+    /// Returns the motion of the robot with a turn, rad, and a way ahead by the zoom.
+    fn moved(
+        &self,
+        fit: &SwingFit,
+        turn: f64,
+        motion: EgoMotion,
+        settings: &OdometrySettings,
+    ) -> EgoMotion {
+        let depth_m = settings.scene_depth_m;
+        let forward = depth_m * (1.0 - 1.0 / fit.swing.zoom);
+        let ahead_sigma = (depth_m * fit.sigma_zoom).hypot(GUESSED_DEPTH * forward);
+        let turn_sigma = fit.sigma_pan.hypot(MODEL_PX / self.nominal.focal_px());
+        let sigma = Vector3::new(ahead_sigma, 0.0, turn_sigma);
+        let covariance = Matrix3::from_diagonal(&sigma.map(|sigma| sigma * sigma));
+        EgoMotion { forward, turn, covariance, ..motion }
     }
 
     /// Returns the camera of the log with the rotation that the images show.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use tagalong_config::ConfigError;
 use tagalong_core::{Input, Inputs};
 use tagalong_following::ObstacleSource;
-use tagalong_odometry::OdometrySource;
+use tagalong_odometry::MotionSource;
 
 use super::PipelineSettings;
 
@@ -37,8 +37,8 @@ pub(super) fn declared_inputs(
     without_span: Option<Range<usize>>,
 ) -> Result<Inputs, ConfigError> {
     let odometry = settings.odometry.as_ref().map(|odometry| match odometry.source {
-        OdometrySource::Depth => ("[odometry]", ODOMETRY),
-        OdometrySource::Image => ("[odometry]", CAMERA_MOTION),
+        MotionSource::Depth => ("[odometry]", ODOMETRY),
+        MotionSource::Image => ("[odometry]", CAMERA_MOTION),
     });
     let steering = has_controller.then_some(("[collision_monitor]", STEERING));
     let remembers = settings.reidentification.remember_s > 0.0;
