@@ -158,7 +158,8 @@ impl View {
         let pan = pan - TAU * (pan / TAU).round();
         let level = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -pan) * turned;
         let mount = settled(&level, &self.nominal, motion.dt, settings.settle_s);
-        let is_at_rest = motion == EgoMotion::at_rest(motion.dt);
+        // Without odometry a log says that the robot stands, surely or not.
+        let is_at_rest = [motion.forward, motion.left, motion.turn] == [0.0; 3];
         let by_image =
             found.filter(|_| is_at_rest).map(|fit| self.moved(fit, pan, motion, settings));
         Some((by_image.unwrap_or(motion), mount))
