@@ -35,7 +35,8 @@ const LIMBS: f64 = 0.3;
 /// Distance from a fitted motion within which a corner agrees with it, as a fraction of the width of
 /// the image: 1.3 px of 640.
 const AGREES: f64 = 2e-3;
-/// Error of a pan beside that of the corners, px: a scene in depth does not move as if far away.
+/// Error of a pan beside that of the corners, px: a scene in depth does not move as if far away, and
+/// people who are no tracks yet do. A camera whose image moves less than that stands still.
 const MODEL_PX: f64 = 0.3;
 /// Error of the way ahead, as a fraction of it: the depth of the scene is a guess.
 const GUESSED_DEPTH: f64 = 0.5;
@@ -134,11 +135,24 @@ impl View {
         };
         let near = fit(Vector2::zeros());
         if near.is_some_and(|fit| fit.points as f64 >= MOST * from.len() as f64) {
-            return near;
+            return near.map(|fit| self.without_noise(fit));
         }
         // A jerk moves corners farther than a patch shows; whole images are compared then.
         let far = fit(whole_shift(&self.levels, &next.levels));
         near.into_iter().chain(far).reduce(|a, b| if b.points > a.points { b } else { a })
+    }
+
+    /// Returns a fit without a motion that is less than its errors: they would shake the tracks of a
+    /// camera at rest.
+    fn without_noise(&self, fit: SwingFit) -> SwingFit {
+        let (right, bottom) = (self.nominal.width as f64, self.nominal.height as f64);
+        let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
+        let moves_px = corners.map(|(x, y)| {
+            let ray = self.nominal.ray(Point2::new(x, y)).xy();
+            (fit.swing.apply(ray) - ray).norm() * self.nominal.focal_px()
+        });
+        let is_at_rest = moves_px.iter().sum::<f64>() < 4.0 * MODEL_PX;
+        if is_at_rest { SwingFit { points: fit.points, ..SwingFit::default() } } else { fit }
     }
 
     /// Returns the motion of the robot and the new rotation of the camera that a motion of the image
@@ -160,8 +174,8 @@ impl View {
         let mount = settled(&level, &self.nominal, motion.dt, settings.settle_s);
         // Without odometry a log says that the robot stands, surely or not.
         let is_at_rest = [motion.forward, motion.left, motion.turn] == [0.0; 3];
-        let by_image =
-            found.filter(|_| is_at_rest).map(|fit| self.moved(fit, pan, motion, settings));
+        let moves = |fit: &&SwingFit| is_at_rest && fit.swing != Swing::default();
+        let by_image = found.filter(moves).map(|fit| self.moved(fit, pan, motion, settings));
         Some((by_image.unwrap_or(motion), mount))
     }
 

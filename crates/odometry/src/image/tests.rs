@@ -190,6 +190,17 @@ fn a_person_who_is_known_is_left_out() {
 }
 
 #[test]
+fn a_camera_at_rest_stays_at_rest() {
+    let images = [STRAIGHT, panned(0.0005)].map(|look| image(look, 1.0));
+    let moved = seen(settings(), &images).0;
+    assert_eq!(moved.motion, Some(EgoMotion::at_rest(DT_S)));
+    assert!(moved.camera.is_none());
+    let images = [STRAIGHT, panned(0.002)].map(|look| image(look, 1.0));
+    let turn = seen(settings(), &images).0.motion.unwrap().turn;
+    assert!((turn - 0.002).abs() < 2e-4, "{turn}");
+}
+
+#[test]
 fn a_bare_wall_tells_nothing() {
     let images = [STRAIGHT, panned(0.03)].map(|look| image(look, 0.0));
     let (moved, funnel) = seen(settings(), &images);
