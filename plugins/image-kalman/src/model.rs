@@ -1,6 +1,8 @@
 //! State of one track, its prediction over time and robot motion, and its update by a detection.
 
-use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, SMatrix, Vector2, Vector3, Vector5};
+use nalgebra::{
+    Cholesky, Const, Matrix2, Matrix3, Matrix5, Point2, SMatrix, Vector2, Vector3, Vector5,
+};
 use tagalong_core::{Detection, EgoMotion, Estimate, Person, Update};
 use tagalong_geometry::{Camera, Rect};
 
@@ -63,6 +65,16 @@ impl Shape {
         self.aspect += weight * (seen.aspect - self.aspect);
         self.head += weight * (seen.head - self.head);
     }
+}
+
+/// Difference between a box and its prediction.
+struct Innovation {
+    /// Measurement matrix and measurement noise.
+    look: Matrix3x5,
+    noise: Matrix3<f64>,
+    innovation: Vector3<f64>,
+    /// Its covariance, S = H P H^T + R.
+    spread: Cholesky<f64, Const<3>>,
 }
 
 impl State {
@@ -204,16 +216,58 @@ impl State {
         self.behind.is_some()
     }
 
-    /// Updates the box; returns the normalised innovation squared of centre and width.
-    fn correct_box(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Option<f64> {
+    /// Replaces the estimates by the moments of a mixture of states with these weights, which sum to
+    /// 1. What does not change as a box moves stays.
+    pub(crate) fn take_mixture<'s>(
+        &mut self,
+        parts: impl Iterator<Item = (f64, &'s Self)> + Clone,
+    ) {
+        let (mut image, mut range) = (Vector5::zeros(), Vector2::zeros());
+        for (weight, state) in parts.clone() {
+            image += state.image * weight;
+            range += state.range * weight;
+        }
+        let (mut image_covariance, mut range_covariance) = (Matrix5::zeros(), Matrix2::zeros());
+        for (weight, state) in parts {
+            let (apart, farther) = (state.image - image, state.range - range);
+            image_covariance += (state.image_covariance + apart * apart.transpose()) * weight;
+            range_covariance += (state.range_covariance + farther * farther.transpose()) * weight;
+        }
+        (self.image, self.image_covariance) = (image, symmetric(image_covariance));
+        (self.range, self.range_covariance) = (range, range_covariance);
+    }
+
+    /// Returns the log-likelihood of a detection's box, up to a constant; `None` for a covariance
+    /// that is singular.
+    pub(crate) fn log_likelihood(
+        &self,
+        config: &Config,
+        seen: &Detection,
+        camera: &Camera,
+    ) -> Option<f64> {
+        let Innovation { innovation, spread, .. } = self.innovation(config, seen, camera)?;
+        let log_volume = 2.0 * spread.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>();
+        Some(-0.5 * (innovation.dot(&spread.solve(&innovation)) + log_volume))
+    }
+
+    /// Returns the innovation of centre and width of a box; `None` for a covariance that is
+    /// singular.
+    fn innovation(&self, config: &Config, seen: &Detection, camera: &Camera) -> Option<Innovation> {
         let dt = if config.compat_printed_measurement { self.step_s } else { 0.0 };
         let look = measurement(dt);
         let noise = image_noise(config, seen, self.image[4], camera);
         let rect = seen.rect_in(camera);
         let measured = Vector3::new(rect.centre().x, rect.centre().y, rect.width);
         let innovation = measured - look * self.image;
+        let spread = (look * self.image_covariance * look.transpose() + noise).cholesky()?;
+        Some(Innovation { look, noise, innovation, spread })
+    }
+
+    /// Updates the box; returns the normalised innovation squared of centre and width.
+    fn correct_box(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Option<f64> {
+        let Innovation { look, noise, innovation, spread } =
+            self.innovation(config, seen, camera)?;
         let p = self.image_covariance;
-        let spread = (look * p * look.transpose() + noise).cholesky()?;
         let gain = spread.solve(&(look * p)).transpose();
         self.image += gain * innovation;
         let kept = Matrix5::identity() - gain * look;
