@@ -71,8 +71,19 @@ pub(super) fn declared_inputs(
                        without eyes, set `obstacles = \"none\"` in [collision_monitor]";
         return Err(ConfigError { message: message.into(), span: without_span });
     }
+    if has_controller && guesses_motion(settings) {
+        let message = "`[odometry] source = \"image\"` is a guess by which no robot may drive: \
+                       remove it, or the controller";
+        return Err(ConfigError::new(message));
+    }
     let sum = all.into_iter().fold(Inputs::NONE, |sum, (_, inputs)| sum.union(inputs));
     Ok(settings.without.iter().fold(sum, |sum, input| sum.without(*input)))
+}
+
+/// Returns true if the motion of the robot comes from images alone, without a scale. The collision
+/// monitor moves the obstacles that it remembers by that motion.
+fn guesses_motion(settings: &PipelineSettings) -> bool {
+    settings.odometry.as_ref().is_some_and(|odometry| odometry.source == MotionSource::Image)
 }
 
 /// Returns true if the settings leave out every sensor of obstacles, and do not say that the robot

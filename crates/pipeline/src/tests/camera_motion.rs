@@ -1,13 +1,14 @@
 //! `[odometry] source = "image"`: people before a camera that jerks, in a log without odometry and
 //! depth.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point2, Point3, Rotation2, Vector2};
 use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images};
 
 use super::doubles::{World, camera, frame, person};
-use crate::FrameReport;
+use crate::{FrameReport, Pipeline};
 
 const FRAMES: u64 = 24;
 /// Image shift of a jerk, px: more than half of the way from one person to the next.
@@ -112,6 +113,14 @@ fn the_turn_is_reported_as_the_motion_of_the_robot() {
     }
     assert!(worst < 1e-3, "{worst} rad");
     assert!(reports.iter().all(|report| report.funnel.entries().is_empty()));
+}
+
+#[test]
+fn no_robot_drives_by_it() {
+    let config = format!("{}\n[controller]\nplugin = 'drive'\n", by_image());
+    let built = Pipeline::from_toml(&config, Path::new("."), &World::default().registry());
+    let message = built.err().unwrap().render("test.toml", &config);
+    assert!(message.contains("by which no robot may drive"), "{message}");
 }
 
 /// The odometry of a log is better than any image; what it says stays.
