@@ -5,11 +5,13 @@
 //! here.
 
 mod assign;
+mod fusion;
 mod observations;
 mod pair;
 mod similarity;
 
 pub use assign::assign;
+pub use fusion::{AppearanceFusion, Fusion};
 pub use observations::{ObservationMemory, Observed};
 pub use pair::{Cost, Fit, Overlap, PairCost, Pairs, assign_fits};
-pub use similarity::{PrioritySettings, Stage, Staged, best_of, buffered_iou, probability};
+pub use similarity::{PrioritySettings, Stage, Staged, buffered_iou, probability};

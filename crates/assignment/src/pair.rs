@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::{Detection, Gate, Track};
 use tagalong_geometry::Rect;
 
-use crate::assign;
+use crate::{AppearanceFusion, assign};
 
 /// Measure of the fit of a detection and a track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -44,6 +44,8 @@ pub struct PairCost {
     pub min_overlap: f64,
     /// Overlap: measure of the overlap.
     pub overlap: Overlap,
+    /// Part of the appearance.
+    pub fusion: AppearanceFusion,
 }
 
 /// Fit of a pair: the cost, and the logarithm of the volume of the innovation covariance.
@@ -70,12 +72,12 @@ impl PairCost {
         }
     }
 
-    /// Adds the log-likelihood ratio of the appearances to the cost of a pair, in the unit of the
-    /// cost. Positions alone decide about the gate.
+    /// Takes the log-likelihood ratio of the appearances into the cost of a pair, in the unit of
+    /// the cost. Positions alone decide about the gate.
     pub fn with_appearance(&self, fit: Fit, log_ratio: f64) -> Fit {
         // d² + ln |S| is twice a negative log-likelihood.
         let unit = if self.cost == Cost::Mahalanobis { 2.0 } else { 1.0 };
-        Fit { cost: fit.cost - unit * log_ratio, ..fit }
+        Fit { cost: self.fusion.cost(fit.cost, unit, log_ratio), ..fit }
     }
 
     /// Returns the largest cost within the gate.
@@ -184,6 +186,7 @@ mod tests {
     use tagalong_geometry::ImageBox;
 
     use super::*;
+    use crate::Fusion;
 
     const DEFAULT: PairCost = PairCost {
         cost: Cost::Mahalanobis,
@@ -192,6 +195,7 @@ mod tests {
         gate_speed_mps: 1.5,
         min_overlap: 0.3,
         overlap: Overlap::Iou,
+        fusion: AppearanceFusion { fusion: Fusion::Sum, gate: 0.0 },
     };
 
     #[test]
@@ -200,6 +204,22 @@ mod tests {
         let overlap = PairCost { cost: Cost::Overlap, ..DEFAULT };
         assert_eq!(DEFAULT.with_appearance(fit, 0.5), Fit { cost: 2.0, ..fit });
         assert_eq!(overlap.with_appearance(fit, 0.5), Fit { cost: 2.5, ..fit });
+    }
+
+    /// exp(-3/2) is 0.22 as a similarity, and exp(-3) 0.05.
+    #[test]
+    fn the_smaller_cost_counts_in_the_unit_of_the_cost() {
+        let fit = Fit { cost: 3.0, log_volume: -1.0 };
+        let with = |cost: Cost, gate: f64, log_ratio: f64| {
+            let fusion = AppearanceFusion { fusion: Fusion::Minimum, gate };
+            PairCost { cost, fusion, ..DEFAULT }.with_appearance(fit, log_ratio).cost
+        };
+        let even = 0.5_f64.ln();
+        assert!((with(Cost::Mahalanobis, 0.2, 1e-9) + 2.0 * even).abs() < 1e-6);
+        assert!((with(Cost::Overlap, 0.04, 1e-9) + even).abs() < 1e-6);
+        assert_eq!(with(Cost::Mahalanobis, 0.3, 4.0), 3.0, "too far away");
+        assert_eq!(with(Cost::Overlap, 0.06, 4.0), 3.0, "too far away");
+        assert_eq!(with(Cost::Mahalanobis, 0.0, -4.0), 3.0, "it never speaks against a pair");
     }
 
     fn fit(track: &Track, detection: &Detection, dt_s: f64, settings: &PairCost) -> Option<Fit> {

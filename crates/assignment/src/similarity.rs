@@ -86,21 +86,6 @@ pub fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
-/// Returns the similarity of a pair that its appearance may raise: the better of the overlap and of
-/// the probability that both look like one person (BoT-SORT: Aharon et al., 2022, which takes the
-/// smaller distance). An appearance that speaks against the pair changes nothing,
-/// and one that is unknown neither.
-///
-/// ```
-/// use tagalong_assignment::best_of;
-/// assert_eq!(best_of(0.6, 0.0), 0.6);
-/// assert_eq!(best_of(0.6, -3.0), 0.6);
-/// assert!(best_of(0.6, 3.0) > 0.95);
-/// ```
-pub fn best_of(overlap: f64, log_ratio: f64) -> f64 {
-    if log_ratio > 0.0 { overlap.max(probability(log_ratio)) } else { overlap }
-}
-
 /// Order of detections and tracks in associators of boxes, by score and confirmation; flattened into
 /// their settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

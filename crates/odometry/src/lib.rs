@@ -6,10 +6,14 @@
 //! corrects the wheel odometry. Points at people, and behind them, are left out because their
 //! outlines move.
 //!
+//! [`CameraMotion`] needs neither wheels nor depth: it fits a rotation and a zoom to corners that
+//! are tracked from image to image, for a camera that turns and shakes.
+//!
 //! An image of a bare wall carries no information and leaves the wheel odometry as it is; otherwise
 //! the weight of the image grows with the texture that it shows.
 
 mod align;
+mod image;
 mod keyframe;
 mod patch;
 mod settings;
@@ -21,8 +25,9 @@ use tagalong_core::{DepthImage, EgoMotion, Frame, Funnel, GreyImage};
 use tagalong_geometry::{Lens, Pinhole};
 
 use align::{AlignmentInput, Fit, Prior};
+pub use image::{CameraMotion, CameraMoved, Swing, SwingFit};
 use keyframe::{Keyframe, Pyramid};
-pub use settings::OdometrySettings;
+pub use settings::{MotionSource, OdometrySettings};
 
 /// Minimum standard deviations of the wheel odometry, m and rad.
 const LEAST_M: f64 = 1e-3;

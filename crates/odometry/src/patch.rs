@@ -5,7 +5,8 @@ use tagalong_core::GreyImage;
 
 /// Side of a patch, px.
 const SIDE: usize = 7;
-const PIXELS: usize = SIDE * SIDE;
+/// Pixels of a patch.
+pub const PIXELS: usize = SIDE * SIDE;
 /// Distance from the centre to the border of a patch, px.
 const HALF: usize = SIDE / 2;
 
@@ -47,6 +48,11 @@ impl Patch {
         ];
         let products = [(0, 0), (0, 1), (1, 1)].map(|(a, b)| dot(&slopes[a], &slopes[b]));
         Some(Self { grey: each(&at), slopes, products })
+    }
+
+    /// Returns the variance of the brightness, grey levels squared.
+    pub fn variance(&self) -> f64 {
+        dot(&self.grey, &self.grey) / PIXELS as f64
     }
 
     /// Compares the patch with an image around a position that may lie between pixels; `None` where

@@ -3,10 +3,25 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::{Error, Result};
 
+/// Data from which the motion is estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MotionSource {
+    /// Images with depth correct the odometry of the log.
+    #[default]
+    Depth,
+    /// Images alone, for a log without odometry and depth.
+    Image,
+}
+
 /// Settings of the odometry that is corrected by images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OdometrySettings {
+    /// `depth`: static points of known depth correct the odometry of the log. `image`: corners of the
+    /// images alone, for a log without odometry and depth; of the settings below, `cell_px`,
+    /// `min_slope`, `min_points`, `scene_depth_m` and `settle_s` count then, and the others do not.
+    pub source: MotionSource,
     /// Side of the square cells that yield at most one point each, px.
     #[schemars(range(min = 8, max = 256))]
     pub cell_px: usize,
@@ -40,11 +55,20 @@ pub struct OdometrySettings {
     /// Standard deviation of the heading by wheel odometry, rad per metre of the path.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub heading_error_per_m: f64,
+    /// `image`: assumed depth of the scene behind the people, m. Images that grow tell how far the
+    /// robot went ahead as a fraction of it.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub scene_depth_m: f64,
+    /// `image`: time constant with which a camera that nods or rolls is believed to return to its
+    /// mount, s, because small errors add up.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub settle_s: f64,
 }
 
 impl Default for OdometrySettings {
     fn default() -> Self {
         Self {
+            source: MotionSource::Depth,
             cell_px: 24,
             min_slope: 5.0,
             min_depth_m: 0.8,
@@ -56,6 +80,8 @@ impl Default for OdometrySettings {
             max_turn_deg: 10.0,
             wheel_error: 0.01,
             heading_error_per_m: 0.05,
+            scene_depth_m: 8.0,
+            settle_s: 5.0,
         }
     }
 }

@@ -6,7 +6,6 @@ use std::path::Path;
 
 use tagalong_config::{ConfigError, Context, Registry, Settings, Value, nearest, parse_settings};
 use tagalong_core::{Associator, Filter, TrackManager, Verifier};
-use tagalong_odometry::VisualOdometry;
 use tagalong_stereo::StereoDepth;
 use tagalong_tracking::Guarded;
 use toml::Spanned;
@@ -179,8 +178,7 @@ impl Pipeline {
         let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
         let (seed, robot) = (settings.seed, settings.robot.clone());
         let run = RunSettings { seed, robot, tune, suits, document: document.clone() };
-        let odometry = settings.odometry.clone().map(VisualOdometry::new);
-        let preprocessors = preprocessors(stereo, odometry);
+        let preprocessors = preprocessors(stereo, settings.odometry.clone());
         let parts = Parts {
             preprocessors,
             detectors,

@@ -57,7 +57,7 @@ pub use tagalong_following::{
     LockReport, LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission,
     RobotSettings, SearchSettings, TargetSettings,
 };
-pub use tagalong_odometry::OdometrySettings;
+pub use tagalong_odometry::{MotionSource, OdometrySettings};
 pub use tagalong_stereo::StereoSettings;
 pub use tagalong_tracking::StepError;
 pub use tagalong_tracking::{

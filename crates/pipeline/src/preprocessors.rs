@@ -1,8 +1,11 @@
 //! Stages that complete a frame: `[stereo]` and `[odometry]`.
 
 use nalgebra::Point2;
-use tagalong_core::{EgoMotion, Frame, Funnel, Result};
-use tagalong_odometry::VisualOdometry;
+use std::sync::Arc;
+
+use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, Result};
+use tagalong_geometry::Camera;
+use tagalong_odometry::{CameraMotion, MotionSource, OdometrySettings, VisualOdometry};
 use tagalong_stereo::StereoDepth;
 use tagalong_tracking::Guarded;
 use tagalong_tracking::{Preprocessed, Preprocessor};
@@ -15,7 +18,7 @@ impl Preprocessor for DepthOfPair {
         &mut self,
         frame: &Frame,
         motion: Option<EgoMotion>,
-        _: &[Point2<f64>],
+        _: &[Estimate],
         funnel: &mut Funnel,
     ) -> Result<Preprocessed> {
         if frame.depth().is_ok() {
@@ -34,26 +37,58 @@ impl Preprocessor for MotionOfImages {
         &mut self,
         frame: &Frame,
         motion: Option<EgoMotion>,
-        people: &[Point2<f64>],
+        people: &[Estimate],
         funnel: &mut Funnel,
     ) -> Result<Preprocessed> {
-        let motion = self.0.see(frame, motion, people, funnel);
+        let people: Vec<Point2<f64>> =
+            people.iter().map(|person| person.person.position.xy()).collect();
+        let motion = self.0.see(frame, motion, &people, funnel);
         Ok(Preprocessed { frame: None, motion })
+    }
+}
+
+/// Motion of the camera by the images alone.
+struct MotionOfCorners(CameraMotion);
+
+impl Preprocessor for MotionOfCorners {
+    fn process(
+        &mut self,
+        frame: &Frame,
+        motion: Option<EgoMotion>,
+        people: &[Estimate],
+        funnel: &mut Funnel,
+    ) -> Result<Preprocessed> {
+        let moved = self.0.see(frame, motion, people, funnel);
+        let frame = moved.camera.map(|camera| seen_by(frame, camera));
+        Ok(Preprocessed { frame, motion: moved.motion })
+    }
+}
+
+/// Returns the frame as another camera took it; the data of the sensors are shared.
+fn seen_by(frame: &Frame, camera: Camera) -> Frame {
+    let sensors = frame.sensors().clone();
+    Frame::of_sensors(frame.index, frame.stamp, Arc::new(camera), frame.motion, sensors)
+}
+
+/// Returns the stage of `[odometry]`.
+fn odometry_stage(settings: OdometrySettings) -> Box<dyn Preprocessor> {
+    match settings.source {
+        MotionSource::Depth => Box::new(MotionOfImages(VisualOdometry::new(settings))),
+        MotionSource::Image => Box::new(MotionOfCorners(CameraMotion::new(settings))),
     }
 }
 
 /// Returns the stages that a config asks for, in the order in which they work.
 pub(crate) fn preprocessors(
     stereo: Option<StereoDepth>,
-    odometry: Option<VisualOdometry>,
+    odometry: Option<OdometrySettings>,
 ) -> Vec<Guarded<dyn Preprocessor>> {
     // Stereo goes first, because odometry needs depth.
     let mut stages: Vec<Guarded<dyn Preprocessor>> = Vec::new();
     stages.extend(
         stereo.map(|s| Guarded::<dyn Preprocessor>::new("stereo", Box::new(DepthOfPair(s)))),
     );
-    stages.extend(
-        odometry.map(|o| Guarded::<dyn Preprocessor>::new("odometry", Box::new(MotionOfImages(o)))),
-    );
+    stages
+        .extend(odometry.map(|o| Guarded::<dyn Preprocessor>::new("odometry", odometry_stage(o))));
     stages
 }

@@ -30,8 +30,8 @@ pub struct PipelineSettings {
     /// plugin needs it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stereo: Option<StereoSettings>,
-    /// Odometry that is corrected by static structure in the images. Left out: the odometry of the
-    /// log is used as it is.
+    /// Odometry that is corrected by static structure in the images, or comes from them alone. Left
+    /// out: the odometry of the log is used as it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometry: Option<OdometrySettings>,
     /// Treatment of stamps that jump.

@@ -1,4 +1,5 @@
 mod appearance;
+mod camera_motion;
 mod clock;
 mod commands;
 pub(crate) mod doubles;

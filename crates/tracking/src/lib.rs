@@ -50,7 +50,7 @@ mod weighing;
 pub use guarded::{Guarded, StepError};
 pub use memo::Identities;
 pub use preprocess::{Preprocessed, Preprocessor};
-pub use reidentification::ReidentificationSettings;
+pub use reidentification::{AppearanceEvidence, ReidentificationSettings};
 pub use report::{Candidate, Fate, Outcome, TrackingReport};
 pub use search::DetectorSlot;
 pub use settings::{

@@ -1,6 +1,5 @@
 use crate::{Guarded, StepError};
-use nalgebra::Point2;
-use tagalong_core::{EgoMotion, Frame, Funnel};
+use tagalong_core::{EgoMotion, Estimate, Frame, Funnel};
 
 use crate::stage::StageLog;
 
@@ -17,8 +16,8 @@ pub struct Preprocessed {
 /// Completes frames before detection: depth from a stereo pair, or egomotion from the images.
 pub trait Preprocessor: Send {
     /// Completes a frame. `motion` is the robot's motion since the last processed frame, `None`
-    /// after a jump of the clock; `people` are the positions of all tracks before that motion,
-    /// m on the floor, sorted by track number.
+    /// after a jump of the clock; `people` are the estimates of all tracks before that motion,
+    /// sorted by track number.
     ///
     /// # Errors
     /// [`tagalong_core::Error::MissingImage`] if the frame lacks a required input.
@@ -26,7 +25,7 @@ pub trait Preprocessor: Send {
         &mut self,
         frame: &Frame,
         motion: Option<EgoMotion>,
-        people: &[Point2<f64>],
+        people: &[Estimate],
         funnel: &mut Funnel,
     ) -> tagalong_core::Result<Preprocessed>;
 }
@@ -36,7 +35,7 @@ pub(crate) fn preprocess(
     preprocessors: &mut [Guarded<dyn Preprocessor>],
     frame: &Frame,
     mut motion: Option<EgoMotion>,
-    people: &[Point2<f64>],
+    people: &[Estimate],
     log: &mut StageLog,
 ) -> Result<(Option<Frame>, Option<EgoMotion>), StepError> {
     let mut completed: Option<Frame> = None;

@@ -178,11 +178,11 @@ impl Tracker {
         motion: Option<EgoMotion>,
         log: &mut StageLog,
     ) -> Result<(Option<Frame>, Option<EgoMotion>), StepError> {
-        let mut people: Vec<(TrackId, Point2<f64>)> =
-            self.last.iter().map(|t| (t.id, t.estimate.person.position.xy())).collect();
+        let mut people: Vec<&Track> = self.last.iter().collect();
         // The tracks are sorted by range, but preprocessors receive them by number.
-        people.sort_by_key(|(id, _)| *id);
-        let people: Vec<Point2<f64>> = people.into_iter().map(|(_, place)| place).collect();
+        people.sort_by_key(|track| track.id);
+        let people: Vec<Estimate> =
+            people.into_iter().map(|track| track.estimate.clone()).collect();
         preprocess(&mut self.preprocessors, frame, motion, &people, log)
     }
 

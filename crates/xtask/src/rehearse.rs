@@ -24,6 +24,8 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("yolox_s.onnx", "needs a network of the user"),
     ("people.toml", "needs a network of the user"),
     ("every-third", "needs a network that a script of Python makes"),
+    ("upper-bodies", "needs a network that a script of Python makes"),
+    ("turning", "needs a log that a script of Python makes"),
     ("../shared", "needs the annotated logs"),
     ("benches/rooms.toml", "needs the annotated logs"),
     ("LOG.people.csv", "needs an annotated log"),

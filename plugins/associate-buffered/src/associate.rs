@@ -1,4 +1,4 @@
-use tagalong_assignment::{ObservationMemory, Staged, best_of, buffered_iou};
+use tagalong_assignment::{ObservationMemory, Staged, buffered_iou};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 use tagalong_geometry::Rect;
 
@@ -83,7 +83,8 @@ impl Associator for Buffered {
             move |row: usize, column: usize| {
                 let (track, detection) = (&tracks[row], &detections[column]);
                 let overlap = this.overlap(track, detection, reach)?;
-                let overlap = best_of(overlap, gate.appearance_of(row, column));
+                let log_ratio = gate.appearance_of(row, column);
+                let overlap = this.config.appearance().similarity(overlap, log_ratio);
                 let counted = this.config.priority.weighed(overlap, detection);
                 gate.admits(track, detection).then_some(counted)
             }
@@ -108,7 +109,7 @@ impl Associator for Buffered {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_assignment::PrioritySettings;
+    use tagalong_assignment::{Fusion, PrioritySettings};
     use tagalong_config::Registry;
     use tagalong_conformance::samples::{GATE, detection_in, pairs, track_in};
 
@@ -180,6 +181,33 @@ mod tests {
         assert_eq!((with(&[]), with(&[vec![0.0, 6.0]])), (vec![(0, 0)], vec![(0, 1)]));
     }
 
+    /// The nearer detection looks like another person.
+    #[test]
+    fn a_sum_lets_the_appearance_speak_against_a_pair() {
+        let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
+        let with = |fusion: Fusion| {
+            let appearance = [vec![-6.0, 0.0]];
+            let gate = Gate { appearance: &appearance, ..GATE };
+            let config = Config { fusion, ..Config::default() };
+            let mut associator = Buffered::new(config).unwrap();
+            pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
+        };
+        assert_eq!((with(Fusion::Minimum), with(Fusion::Sum)), (vec![(0, 0)], vec![(0, 1)]));
+    }
+
+    #[test]
+    fn the_appearance_counts_for_boxes_that_overlap_enough() {
+        let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
+        let with = |fusion_gate: f64| {
+            let appearance = [vec![0.0, 6.0]];
+            let gate = Gate { appearance: &appearance, ..GATE };
+            let config = Config { fusion_gate, ..Config::default() };
+            let mut associator = Buffered::new(config).unwrap();
+            pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
+        };
+        assert_eq!((with(0.5), with(0.9)), (vec![(0, 1)], vec![(0, 0)]));
+    }
+
     /// The track goes 8 pixels a frame; the filter has not noticed.
     #[test]
     fn a_track_is_expected_by_the_mean_velocity_of_its_observations() {
@@ -243,6 +271,7 @@ mod tests {
             Config { motion_frames: 0, ..Config::default() },
             Config { priority: undefined, ..Config::default() },
             Config { weak_overlap: 0.0, ..Config::default() },
+            Config { fusion_gate: -0.1, ..Config::default() },
         ] {
             assert!(Buffered::new(config.clone()).is_err(), "{config:?}");
         }

@@ -10,6 +10,7 @@ mod config;
 
 pub use associate::Buffered;
 pub use config::{Config, Motion};
+pub use tagalong_assignment::Fusion;
 use tagalong_config::Registry;
 
 /// Registers the associator `associate-buffered`.

@@ -51,6 +51,7 @@ impl Associator for Hungarian {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_assignment::Fusion;
     use tagalong_config::Registry;
     use tagalong_conformance::samples::{
         GATE, detection_at, detection_in, pairs, track_at, track_in, with_variance,
@@ -97,6 +98,24 @@ mod tests {
         assert_eq!(given(&[vec![-0.1, 0.1], vec![0.1, -0.1]]), [0, 1], "places still count");
     }
 
+    /// Both detections are near the first track, and the farther one looks like it. The second track
+    /// looks like nothing that is seen.
+    #[test]
+    fn the_better_of_place_and_appearance_counts_where_the_settings_say_so() {
+        let boxed = |x: f64| Rect::new(x, 0.0, 20.0, 40.0);
+        let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(2.0))];
+        let seen = [1.0, 4.0].map(|x| detection_in(boxed(x)));
+        let looks = [vec![-3.0, 6.0], vec![-3.0, -3.0]];
+        let given = |fusion: Fusion, fusion_gate: f64| {
+            let config = Config { cost: Cost::Overlap, fusion, fusion_gate, ..Config::default() };
+            let gate = Gate { appearance: &looks, ..GATE };
+            pairs(&Hungarian::new(config).unwrap().associate(&tracks, &seen, &gate))
+        };
+        assert_eq!(given(Fusion::Minimum, 0.5), [(0, 1), (1, 0)]);
+        assert_eq!(given(Fusion::Minimum, 0.9), [(0, 0), (1, 1)], "too little overlap");
+        assert_eq!(given(Fusion::Sum, 0.5), [(0, 1)], "other looks speak against the second pair");
+    }
+
     #[test]
     fn settings_that_cannot_work_are_refused() {
         for config in [
@@ -105,6 +124,7 @@ mod tests {
             Config { gate_speed_mps: -1.0, ..Config::default() },
             Config { min_overlap: 1.1, ..Config::default() },
             Config { miss_factor: f64::INFINITY, ..Config::default() },
+            Config { fusion_gate: 1.1, ..Config::default() },
         ] {
             assert!(Hungarian::new(config.clone()).is_err(), "{config:?}");
         }

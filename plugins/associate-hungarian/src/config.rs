@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_assignment::{Cost, Overlap, PairCost};
+use tagalong_assignment::{AppearanceFusion, Cost, Fusion, Overlap, PairCost};
 use tagalong_config::check_settings;
 use tagalong_core::Result;
 
@@ -29,6 +29,14 @@ pub struct Config {
     /// Overlap, as P2 prints it (eq. 10): a pair that overlaps less costs nothing, and
     /// so comes first.
     pub compat_printed_cost: bool,
+    /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
+    /// place (`sum`), or the better of both counts (`minimum`).
+    pub fusion: Fusion,
+    /// `minimum`: the appearance counts for pairs whose places are at least so similar: the
+    /// overlap, or exp(-d²/2) with the Mahalanobis distance d.
+    /// BoT-SORT has 0.5.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub fusion_gate: f64,
     /// Cost of leaving a track without a detection, as a multiple of the cost at the gate.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub miss_factor: f64,
@@ -43,6 +51,8 @@ impl Default for Config {
             gate_speed_mps: 1.5,
             min_overlap: 0.3,
             overlap: Overlap::Iou,
+            fusion: Fusion::Sum,
+            fusion_gate: 0.0,
             compat_printed_cost: false,
             miss_factor: 1.0,
         }
@@ -53,7 +63,8 @@ impl Config {
     /// Returns the part that says how well a pair fits.
     pub(crate) fn pair_cost(&self) -> PairCost {
         let Self { cost, gate, gate_m, gate_speed_mps, min_overlap, overlap, .. } = *self;
-        PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap, overlap }
+        let fusion = AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate };
+        PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap, overlap, fusion }
     }
 
     /// Refuses numbers that cannot work.

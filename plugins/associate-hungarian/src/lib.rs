@@ -10,7 +10,7 @@ mod config;
 
 pub use associate::Hungarian;
 pub use config::Config;
-pub use tagalong_assignment::{Cost, Overlap};
+pub use tagalong_assignment::{Cost, Fusion, Overlap};
 use tagalong_config::Registry;
 
 /// Registers the associator `associate-hungarian`.

@@ -91,6 +91,7 @@ impl Associator for Jpda {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_assignment::Fusion;
     use tagalong_config::Registry;
     use tagalong_conformance::samples::{GATE, detection_at, track_at};
 
@@ -141,6 +142,23 @@ mod tests {
         assert!((answer.pairs[0].weight - 0.5).abs() < 1e-9, "{answer:?}");
     }
 
+    /// Without appearances the detection between two tracks is of both by half.
+    #[test]
+    fn an_appearance_may_help_a_pair_and_not_harm_the_other() {
+        let tracks = [track(1, -0.2), track(2, 0.2)];
+        let weights = |looks: [f64; 2]| {
+            let config = Config { fusion: Fusion::Minimum, ..Config::default() };
+            let looks = looks.map(|look| vec![look]);
+            let gate = Gate { appearance: &looks, ..GATE };
+            let answer = Jpda::new(config).unwrap().associate(&tracks, &[detection(0.0)], &gate);
+            [0, 1].map(|at| answer.pairs[at].weight)
+        };
+        let [helped, other] = weights([5.0, 0.0]);
+        assert!(helped > other + 0.1, "{helped} {other}");
+        let [a, b] = weights([-5.0, 0.0]);
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+
     #[test]
     fn the_least_likely_detections_of_a_large_cluster_are_left_out() {
         let config = Config { max_detections: 2, ..Config::default() };
@@ -163,6 +181,7 @@ mod tests {
         for config in [
             Config { detection_probability: 1.0, ..Config::default() },
             Config { clutter_per_m3: 0.0, ..Config::default() },
+            Config { fusion_gate: 1.5, ..Config::default() },
             Config { max_detections: 17, ..Config::default() },
         ] {
             assert!(Jpda::new(config.clone()).is_err(), "{config:?}");

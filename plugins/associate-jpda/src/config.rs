@@ -1,6 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_assignment::{Cost, Overlap, PairCost};
+use tagalong_assignment::{AppearanceFusion, Cost, Fusion, Overlap, PairCost};
 use tagalong_config::check_settings;
 use tagalong_core::Result;
 
@@ -18,6 +18,14 @@ pub struct Config {
     /// ... and by how much it grows with the time between them, m/s.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub gate_speed_mps: f64,
+    /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
+    /// place (`sum`), or the better of both counts (`minimum`).
+    pub fusion: Fusion,
+    /// `minimum`: the appearance counts for pairs whose places are at least so similar: exp(-d²/2)
+    /// with the Mahalanobis distance d.
+    /// BoT-SORT has 0.5.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub fusion_gate: f64,
     /// Probability that a visible person is detected in a frame.
     #[schemars(range(min = 0.01, max = 0.999))]
     pub detection_probability: f64,
@@ -38,6 +46,8 @@ impl Default for Config {
             gate: 11.34,
             gate_m: 1.0,
             gate_speed_mps: 1.5,
+            fusion: Fusion::Sum,
+            fusion_gate: 0.0,
             detection_probability: 0.9,
             clutter_per_m3: 0.05,
             min_weight: 0.05,
@@ -50,8 +60,9 @@ impl Config {
     /// Returns the part that says how well a pair fits.
     pub(crate) fn pair_cost(&self) -> PairCost {
         let Self { gate, gate_m, gate_speed_mps, .. } = *self;
+        let fusion = AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate };
         let (cost, overlap) = (Cost::Mahalanobis, Overlap::Iou);
-        PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap: 1.0, overlap }
+        PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap: 1.0, overlap, fusion }
     }
 
     /// Refuses numbers that cannot work.

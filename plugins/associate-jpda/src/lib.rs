@@ -19,6 +19,7 @@ mod marginals;
 
 pub use associate::Jpda;
 pub use config::Config;
+pub use tagalong_assignment::Fusion;
 use tagalong_config::Registry;
 
 /// Registers the associator `associate-jpda`.

@@ -1,6 +1,6 @@
 use std::f64::consts::PI;
 
-use tagalong_assignment::{ObservationMemory, Staged, best_of, buffered_iou, probability};
+use tagalong_assignment::{ObservationMemory, Staged, buffered_iou, probability};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 use tagalong_geometry::Rect;
 
@@ -61,7 +61,8 @@ impl ObservationCentric {
     fn similarity(&self, scene: &Scene<'_>, row: usize, column: usize) -> Option<f64> {
         let (track, detection) = scene.pair(row, column)?;
         let overlap = self.overlap(track, detection)?;
-        let overlap = best_of(overlap, scene.gate.appearance_of(row, column));
+        let log_ratio = scene.gate.appearance_of(row, column);
+        let overlap = self.config.appearance().similarity(overlap, log_ratio);
         let consistency = self.consistency(track, &detection.rect()?);
         let bonus = self.config.direction_weight * probability(detection.score) * consistency;
         Some(self.config.priority.weighed(overlap, detection) + bonus)
@@ -113,7 +114,7 @@ impl Associator for ObservationCentric {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_assignment::PrioritySettings;
+    use tagalong_assignment::{Fusion, PrioritySettings};
     use tagalong_config::Registry;
     use tagalong_conformance::samples::{GATE, detection_in, pairs, track_in};
 
@@ -271,6 +272,18 @@ mod tests {
     }
 
     #[test]
+    fn a_sum_lets_the_appearance_speak_against_a_pair() {
+        let found = [detection(at(0.0, 0.0), 3.0), detection(at(5.0, 0.0), 3.0)];
+        let appearance = [vec![-4.0, 0.0]];
+        let answer = |fusion: Fusion| {
+            let mut associator = associator(Config { fusion, ..Config::default() });
+            let gate = Gate { appearance: &appearance, ..GATE };
+            pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, &gate))
+        };
+        assert_eq!((answer(Fusion::Minimum), answer(Fusion::Sum)), (vec![(0, 0)], vec![(0, 1)]));
+    }
+
+    #[test]
     fn settings_that_cannot_work_are_refused() {
         let undefined =
             PrioritySettings { strong_log_odds: f64::NAN, ..PrioritySettings::default() };
@@ -282,6 +295,7 @@ mod tests {
             Config { recovery_buffer: -0.1, ..Config::default() },
             Config { priority: undefined, ..Config::default() },
             Config { weak_overlap: 3.0, ..Config::default() },
+            Config { fusion_gate: 2.0, ..Config::default() },
         ] {
             assert!(ObservationCentric::new(config.clone()).is_err(), "{config:?}");
         }

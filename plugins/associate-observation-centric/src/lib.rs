@@ -11,6 +11,7 @@ mod config;
 
 pub use associate::ObservationCentric;
 pub use config::Config;
+pub use tagalong_assignment::Fusion;
 use tagalong_config::Registry;
 
 /// Registers the associator `associate-observation-centric`.

@@ -77,6 +77,7 @@ impl Associator for TwoStage {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_assignment::Fusion;
     use tagalong_config::Registry;
     use tagalong_conformance::samples::{GATE, detection_at, pairs, track_at};
 
@@ -126,12 +127,29 @@ mod tests {
         assert!(fits(3.0) && !fits(0.2));
     }
 
+    /// The detections are in front of the wrong tracks by 6 cm, and look like the right ones.
+    #[test]
+    fn the_better_of_place_and_appearance_may_count_in_metres() {
+        let tracks = [track(1, 0.0), track(2, 0.2)];
+        let found = [detection(0.13, 3.0), detection(0.07, 3.0)];
+        let looks = [vec![4.0, -4.0], vec![-4.0, 4.0]];
+        let given = |appearance, fusion_gate: f64| {
+            let config = Config { fusion: Fusion::Minimum, fusion_gate, ..Config::default() };
+            let gate = Gate { appearance, ..GATE };
+            pairs(&TwoStage::new(config).unwrap().associate(&tracks, &found, &gate))
+        };
+        assert_eq!(given(&[], 0.0), [(0, 1), (1, 0)]);
+        assert_eq!(given(&looks, 0.0), [(0, 0), (1, 1)]);
+        assert_eq!(given(&looks, 0.95), [(0, 1), (1, 0)], "exp(-d²/2) is less than that");
+    }
+
     #[test]
     fn settings_that_cannot_work_are_refused() {
         for config in [
             Config { weak_gate: 1.5, ..Config::default() },
             Config { strong_log_odds: f64::NAN, ..Config::default() },
             Config { gate: 0.0, ..Config::default() },
+            Config { fusion_gate: 1.5, ..Config::default() },
         ] {
             assert!(TwoStage::new(config.clone()).is_err(), "{config:?}");
         }

@@ -11,6 +11,13 @@ pub struct Config {
     /// Spectral density of the white acceleration of the box, widths²/s³.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub acceleration_noise: f64,
+    /// Factor by which `acceleration_noise` is larger in a manoeuvre; 0: there are none. Two filters
+    /// then run for each person, and the likelihoods of the detections weigh them.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub manoeuvre_factor: f64,
+    /// Rate at which manoeuvres begin and end, 1/s.
+    #[schemars(range(min = 0.0, max = 1e3))]
+    pub manoeuvre_rate_hz: f64,
     /// Random walk of the box beside its velocity, widths per square root of a second: the shaking
     /// of a camera whose motion is not known.
     #[schemars(range(min = 0.0, max = 1e6))]
@@ -62,6 +69,8 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             acceleration_noise: 1.5,
+            manoeuvre_factor: 0.0,
+            manoeuvre_rate_hz: 0.5,
             position_noise: 0.0,
             scale_noise: 0.3,
             range_noise: 0.5,

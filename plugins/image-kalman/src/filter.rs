@@ -5,15 +5,14 @@ use tagalong_core::{
 };
 use tagalong_geometry::Camera;
 
-use crate::reupdate::Gap;
-use crate::{Config, State};
+use crate::Config;
+use crate::models::{Models, configs_of};
 
-/// Kalman filter of the box in the image, with one state for each track.
+/// Kalman filter of the box in the image, with one state for each track, or two that interact.
 pub struct ImageKalman {
-    config: Config,
-    states: BTreeMap<TrackId, State>,
-    /// State to filter anew from the last observation of each track on.
-    gaps: BTreeMap<TrackId, Gap>,
+    /// Settings of each model.
+    configs: Vec<Config>,
+    states: BTreeMap<TrackId, Models>,
 }
 
 impl ImageKalman {
@@ -23,7 +22,7 @@ impl ImageKalman {
     /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config) -> Result<Self> {
         config.check()?;
-        Ok(Self { config, states: BTreeMap::new(), gaps: BTreeMap::new() })
+        Ok(Self { configs: configs_of(&config), states: BTreeMap::new() })
     }
 }
 
@@ -35,46 +34,29 @@ impl Filter for ImageKalman {
     }
 
     fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera) {
-        let state = State::start(&self.config, detection, camera);
-        if self.config.reupdate {
-            self.gaps.insert(id, Gap::new(&state, detection));
-        }
-        self.states.insert(id, state);
+        self.states.insert(id, Models::start(&self.configs, detection, camera));
     }
 
     fn predict(&mut self, motion: &EgoMotion, camera: &Camera) {
-        for state in self.states.values_mut() {
-            state.predict(&self.config, motion, camera);
-        }
-        self.gaps.values_mut().for_each(|gap| gap.add(motion));
+        self.states.values_mut().for_each(|models| models.predict(&self.configs, motion, camera));
     }
 
     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         let camera = &evidence.frame.camera;
         let mut supported = BTreeMap::new();
         for (id, detection) in evidence.best_matches() {
-            let Some(state) = self.states.get_mut(&id) else { continue };
-            let gap = self.gaps.get(&id);
-            let bridged = gap.and_then(|gap| gap.bridged(&self.config, detection, camera));
-            // The consistency of a track is that of its prediction, so it is updated in any case.
-            let support = state.correct(&self.config, detection, camera);
-            if let Some(bridged) = bridged {
-                *state = bridged;
-            }
-            if self.config.reupdate {
-                self.gaps.insert(id, Gap::new(state, detection));
-            }
-            supported.insert(id, support);
+            let Some(models) = self.states.get_mut(&id) else { continue };
+            supported.insert(id, models.correct(&self.configs, detection, camera));
         }
         Ok(supported)
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
-        self.states.iter().map(|(id, state)| (*id, state.estimate(camera))).collect()
+        let estimate = |(id, models): (&TrackId, &Models)| Some((*id, models.estimate(camera)?));
+        self.states.iter().filter_map(estimate).collect()
     }
 
     fn stop(&mut self, id: TrackId) {
         self.states.remove(&id);
-        self.gaps.remove(&id);
     }
 }

@@ -13,6 +13,7 @@
 mod config;
 mod filter;
 mod model;
+mod models;
 mod reupdate;
 mod space;
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! State of one track, its prediction over time and robot motion, and its update by a detection.
 
-use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, SMatrix, Vector2, Vector3, Vector5};
+use nalgebra::{
+    Cholesky, Const, Matrix2, Matrix3, Matrix5, Point2, SMatrix, Vector2, Vector3, Vector5,
+};
 use tagalong_core::{Detection, EgoMotion, Estimate, Person, Update};
 use tagalong_geometry::{Camera, Rect};
 
@@ -32,6 +34,8 @@ pub struct State {
     /// Position in space of a person behind the camera, after a motion of the robot: there is no
     /// pixel, so the person is kept here until in front again.
     behind: Option<RobotPoint>,
+    /// Camera of the frame in whose pixels the state is.
+    camera: Camera,
     /// Time since the previous frame, s.
     step_s: f64,
     /// Box of the detection in this frame, where that is to be reported.
@@ -63,6 +67,16 @@ impl Shape {
     }
 }
 
+/// Difference between a box and its prediction.
+struct Innovation {
+    /// Measurement matrix and measurement noise.
+    look: Matrix3x5,
+    noise: Matrix3<f64>,
+    innovation: Vector3<f64>,
+    /// Its covariance, S = H P H^T + R.
+    spread: Cholesky<f64, Const<3>>,
+}
+
 impl State {
     /// Initialises the state from the first detection.
     pub fn start(config: &Config, detection: &Detection, camera: &Camera) -> Self {
@@ -86,6 +100,7 @@ impl State {
             )),
             shape: Shape::of(detection, camera).unwrap_or(upper_body),
             behind: None,
+            camera: camera.clone(),
             step_s: 0.0,
             observed: config.observed_boxes.then_some(rect),
         }
@@ -101,6 +116,7 @@ impl State {
         if !config.compat_printed_ego_motion {
             self.turn_with(motion, camera);
         }
+        self.camera.clone_from(camera);
         self.stay_in_range();
     }
 
@@ -119,13 +135,14 @@ impl State {
             + white_acceleration(config.range_noise, dt);
     }
 
-    /// Compensates the robot's own motion: the head is moved in space, and the box with it.
+    /// Compensates the robot's own motion, and that of the camera on the robot: the head is moved in
+    /// space, and the box with it.
     fn turn_with(&mut self, motion: &EgoMotion, camera: &Camera) {
         let before = self.seen();
-        let last = before.in_space(camera);
+        let last = before.in_space(&self.camera);
         let place = match self.behind.take() {
             Some(place) => place.walked(motion.dt),
-            None if is_still(motion) => return,
+            None if is_still(motion) && self.camera == *camera => return,
             None => last,
         };
         let place = place.after(motion);
@@ -135,8 +152,10 @@ impl State {
         };
         self.doubt_the_motion(&before, &after, motion, camera);
         // The floor keeps the ratio of the widths finite for a head beside the lens.
-        let depth = |place: &RobotPoint| camera.depth_of(&place.position).max(MIN_RANGE_M);
-        self.image[4] *= depth(&last) / depth(&place);
+        let depth =
+            |camera: &Camera, place: &RobotPoint| camera.depth_of(&place.position).max(MIN_RANGE_M);
+        self.image[4] *= depth(&self.camera, &last) / depth(camera, &place);
+        self.image[4] *= zoom(&self.camera, camera);
         self.image.fixed_rows_mut::<2>(2).copy_from(&after.velocity);
         let centre = after.pixel - self.shape.head * self.image[4];
         self.image.fixed_rows_mut::<2>(0).copy_from(&centre.coords);
@@ -154,7 +173,7 @@ impl State {
     ) {
         let mut by_motion = Matrix3::zeros();
         for (column, step) in steps(motion).into_iter().enumerate() {
-            let Some(moved) = before.after(&step, camera) else { return };
+            let Some(moved) = before.after(&step, [&self.camera, camera]) else { return };
             by_motion.set_column(column, &(difference(&moved, after) / MOTION_STEP));
         }
         let noise = by_motion * motion.covariance * by_motion.transpose();
@@ -164,7 +183,7 @@ impl State {
         // The shift at one standard deviation of the range gives that error to first order.
         let sigma = Vector2::new(self.range_covariance[(0, 0)].max(0.0).sqrt(), 0.0);
         let farther = ImagePoint { range: before.range + sigma, ..*before };
-        if let Some(moved) = farther.after(motion, camera) {
+        if let Some(moved) = farther.after(motion, [&self.camera, camera]) {
             let shift = moved.pixel - after.pixel;
             place = self.image_covariance.fixed_view_mut::<2, 2>(0, 0);
             place += shift * shift.transpose();
@@ -197,16 +216,58 @@ impl State {
         self.behind.is_some()
     }
 
-    /// Updates the box; returns the normalised innovation squared of centre and width.
-    fn correct_box(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Option<f64> {
+    /// Replaces the estimates by the moments of a mixture of states with these weights, which sum to
+    /// 1. What does not change as a box moves stays.
+    pub(crate) fn take_mixture<'s>(
+        &mut self,
+        parts: impl Iterator<Item = (f64, &'s Self)> + Clone,
+    ) {
+        let (mut image, mut range) = (Vector5::zeros(), Vector2::zeros());
+        for (weight, state) in parts.clone() {
+            image += state.image * weight;
+            range += state.range * weight;
+        }
+        let (mut image_covariance, mut range_covariance) = (Matrix5::zeros(), Matrix2::zeros());
+        for (weight, state) in parts {
+            let (apart, farther) = (state.image - image, state.range - range);
+            image_covariance += (state.image_covariance + apart * apart.transpose()) * weight;
+            range_covariance += (state.range_covariance + farther * farther.transpose()) * weight;
+        }
+        (self.image, self.image_covariance) = (image, symmetric(image_covariance));
+        (self.range, self.range_covariance) = (range, range_covariance);
+    }
+
+    /// Returns the log-likelihood of a detection's box, up to a constant; `None` for a covariance
+    /// that is singular.
+    pub(crate) fn log_likelihood(
+        &self,
+        config: &Config,
+        seen: &Detection,
+        camera: &Camera,
+    ) -> Option<f64> {
+        let Innovation { innovation, spread, .. } = self.innovation(config, seen, camera)?;
+        let log_volume = 2.0 * spread.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>();
+        Some(-0.5 * (innovation.dot(&spread.solve(&innovation)) + log_volume))
+    }
+
+    /// Returns the innovation of centre and width of a box; `None` for a covariance that is
+    /// singular.
+    fn innovation(&self, config: &Config, seen: &Detection, camera: &Camera) -> Option<Innovation> {
         let dt = if config.compat_printed_measurement { self.step_s } else { 0.0 };
         let look = measurement(dt);
         let noise = image_noise(config, seen, self.image[4], camera);
         let rect = seen.rect_in(camera);
         let measured = Vector3::new(rect.centre().x, rect.centre().y, rect.width);
         let innovation = measured - look * self.image;
+        let spread = (look * self.image_covariance * look.transpose() + noise).cholesky()?;
+        Some(Innovation { look, noise, innovation, spread })
+    }
+
+    /// Updates the box; returns the normalised innovation squared of centre and width.
+    fn correct_box(&mut self, config: &Config, seen: &Detection, camera: &Camera) -> Option<f64> {
+        let Innovation { look, noise, innovation, spread } =
+            self.innovation(config, seen, camera)?;
         let p = self.image_covariance;
-        let spread = (look * p * look.transpose() + noise).cholesky()?;
         let gain = spread.solve(&(look * p)).transpose();
         self.image += gain * innovation;
         let kept = Matrix5::identity() - gain * look;
@@ -332,6 +393,11 @@ fn image_noise(
 fn measured_range(config: &Config, detection: &Detection, camera: &Camera) -> (f64, f64) {
     let (range, variance) = range(camera, &detection.position, &detection.covariance);
     (range, variance + config.sigma_range_m.powi(2))
+}
+
+/// Returns the factor by which things grow in the image where the focal length changes.
+fn zoom(from: &Camera, to: &Camera) -> f64 {
+    if from.lens == to.lens { 1.0 } else { to.focal_px() / from.focal_px() }
 }
 
 fn is_still(motion: &EgoMotion) -> bool {

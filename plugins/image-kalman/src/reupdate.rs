@@ -17,19 +17,20 @@ const MAX_FRAMES: usize = 256;
 pub(crate) struct Gap {
     state: State,
     seen: Detection,
-    motions: Vec<EgoMotion>,
+    /// Motion from each frame to the next, and the camera of that.
+    steps: Vec<(EgoMotion, Camera)>,
 }
 
 impl Gap {
     /// Begins after an observation.
     pub(crate) fn new(state: &State, seen: &Detection) -> Self {
-        Self { state: state.clone(), seen: seen.clone(), motions: Vec::new() }
+        Self { state: state.clone(), seen: seen.clone(), steps: Vec::new() }
     }
 
-    /// Adds the motion of the robot from one frame to the next.
-    pub(crate) fn add(&mut self, motion: &EgoMotion) {
-        if self.motions.len() <= MAX_FRAMES {
-            self.motions.push(*motion);
+    /// Adds the motion of the robot from one frame to the next, with the camera of that.
+    pub(crate) fn add(&mut self, motion: &EgoMotion, camera: &Camera) {
+        if self.steps.len() <= MAX_FRAMES {
+            self.steps.push((*motion, camera.clone()));
         }
     }
 
@@ -41,18 +42,18 @@ impl Gap {
         seen: &Detection,
         camera: &Camera,
     ) -> Option<State> {
-        let frames = self.motions.len();
+        let frames = self.steps.len();
         if !(2..=MAX_FRAMES).contains(&frames) || self.state.is_behind() {
             return None;
         }
-        let whole_s: f64 = self.motions.iter().map(|motion| motion.dt).sum();
+        let whole_s: f64 = self.steps.iter().map(|(motion, _)| motion.dt).sum();
         let (mut state, mut passed_s) = (self.state.clone(), 0.0);
-        for (at, motion) in self.motions.iter().enumerate() {
+        for (at, (motion, then)) in self.steps.iter().enumerate() {
             passed_s += motion.dt;
-            state.predict(config, motion, camera);
+            state.predict(config, motion, then);
             if at + 1 < frames {
                 let part = if whole_s > 0.0 { passed_s / whole_s } else { 1.0 };
-                state.correct(config, &between(&self.seen, seen, part, camera), camera);
+                state.correct(config, &between(&self.seen, seen, part, camera), then);
             }
         }
         state.correct(config, seen, camera);

@@ -46,9 +46,10 @@ impl ImagePoint {
         }
     }
 
-    /// Returns the same point after the robot's motion; `None` if that takes it behind the camera.
-    pub(crate) fn after(&self, motion: &EgoMotion, camera: &Camera) -> Option<Self> {
-        self.in_space(camera).after(motion).seen(camera)
+    /// Returns the same point after the robot's motion, from one camera to the next; `None` if that
+    /// takes it behind the camera.
+    pub(crate) fn after(&self, motion: &EgoMotion, [from, to]: [&Camera; 2]) -> Option<Self> {
+        self.in_space(from).after(motion).seen(to)
     }
 
     /// Returns the derivative of (X, Y, Z, VX, VY) in the robot frame with respect to (x, y, vx,

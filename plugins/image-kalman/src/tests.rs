@@ -11,6 +11,8 @@ use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 use crate::space::{ImagePoint, RobotPoint, pixel_covariance};
 use crate::{Config, ImageKalman, State};
 
+mod camera_motion;
+
 const DT_S: f64 = 1.0 / 23.0;
 
 fn camera() -> Arc<Camera> {

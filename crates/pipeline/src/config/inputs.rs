@@ -5,14 +5,16 @@ use std::ops::Range;
 use tagalong_config::ConfigError;
 use tagalong_core::{Input, Inputs};
 use tagalong_following::ObstacleSource;
+use tagalong_odometry::MotionSource;
 
 use super::PipelineSettings;
 
 /// Inputs of the target lock and the collision monitor, which every controller has.
 const STEERING: Inputs =
     Inputs::NONE.accept(Input::Colour).accept(Input::Depth).accept(Input::Laser);
-/// Inputs of `[odometry]`.
-const ODOMETRY: Inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
+/// Inputs of `[odometry]`, by depth and by the image alone.
+const ODOMETRY: Inputs = CAMERA_MOTION.require(Input::Depth);
+const CAMERA_MOTION: Inputs = Inputs::NONE.require(Input::Colour);
 /// Inputs of `[reidentification]`.
 const REIDENTIFICATION: Inputs = Inputs::NONE.accept(Input::Colour).accept(Input::Depth);
 /// Inputs of the network of `[appearance]`.
@@ -34,7 +36,10 @@ pub(super) fn declared_inputs(
     has_controller: bool,
     without_span: Option<Range<usize>>,
 ) -> Result<Inputs, ConfigError> {
-    let odometry = settings.odometry.is_some().then_some(("[odometry]", ODOMETRY));
+    let odometry = settings.odometry.as_ref().map(|odometry| match odometry.source {
+        MotionSource::Depth => ("[odometry]", ODOMETRY),
+        MotionSource::Image => ("[odometry]", CAMERA_MOTION),
+    });
     let steering = has_controller.then_some(("[collision_monitor]", STEERING));
     let remembers = settings.reidentification.remember_s > 0.0;
     let people = remembers.then_some(("[reidentification]", REIDENTIFICATION));
@@ -66,8 +71,19 @@ pub(super) fn declared_inputs(
                        without eyes, set `obstacles = \"none\"` in [collision_monitor]";
         return Err(ConfigError { message: message.into(), span: without_span });
     }
+    if has_controller && guesses_motion(settings) {
+        let message = "`[odometry] source = \"image\"` is a guess by which no robot may drive: \
+                       remove it, or the controller";
+        return Err(ConfigError::new(message));
+    }
     let sum = all.into_iter().fold(Inputs::NONE, |sum, (_, inputs)| sum.union(inputs));
     Ok(settings.without.iter().fold(sum, |sum, input| sum.without(*input)))
+}
+
+/// Returns true if the motion of the robot comes from images alone, without a scale. The collision
+/// monitor moves the obstacles that it remembers by that motion.
+fn guesses_motion(settings: &PipelineSettings) -> bool {
+    settings.odometry.as_ref().is_some_and(|odometry| odometry.source == MotionSource::Image)
 }
 
 /// Returns true if the settings leave out every sensor of obstacles, and do not say that the robot

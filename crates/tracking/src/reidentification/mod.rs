@@ -21,7 +21,7 @@ use tagalong_geometry::Extent;
 use tagalong_vision::{Appearance, Describer};
 
 use person::{Identity, Person};
-pub use settings::ReidentificationSettings;
+pub use settings::{AppearanceEvidence, ReidentificationSettings};
 
 use crate::{Fate, TrackingReport};
 
@@ -103,7 +103,8 @@ impl Reidentifier {
         tracks: &[Track],
         detections: &[Detection],
     ) -> Result<Vec<Vec<f64>>> {
-        let weight = self.settings.association_weight;
+        let (weight, evidence) =
+            (self.settings.association_weight, self.settings.association_evidence);
         // Between one track and one detection there is nothing to choose.
         if weight == 0.0
             || self.settings.remember_s == 0.0
@@ -116,8 +117,8 @@ impl Reidentifier {
         let ratio = |known: Option<&Identity>, seen: &Option<Appearance>| {
             let difference =
                 known.zip(seen.as_ref()).and_then(|(known, seen)| known.difference(seen));
-            let fit = |difference: f64| 1.0 - difference / self.settings.max_difference.max(1e-3);
-            difference.map_or(0.0, |difference| weight * fit(difference).max(-1.0))
+            let most = self.settings.max_difference;
+            difference.map_or(0.0, |difference| weight * evidence.log_ratio(difference, most))
         };
         let row = |track: &Track| {
             let known = self.tracks.get(&track.id);

@@ -1,6 +1,19 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Log-likelihood ratio that a difference of two appearances amounts to, for the associator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum AppearanceEvidence {
+    /// 1 for equal appearances, falling with the difference to 0 at `max_difference`, and to no less
+    /// than -1.
+    #[default]
+    Linear,
+    /// The log-odds of 1 minus half the difference below `max_difference`, and 0 from there on: as
+    /// in BoT-SORT (N. Aharon et al., arXiv 2206.14651, section 3.3).
+    HalfDistance,
+}
+
 /// Recognition of people by their appearance: a person whose track ended keeps the number when
 /// another track starts, and two people who passed each other are told apart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -30,14 +43,35 @@ pub struct ReidentificationSettings {
     /// after they part.
     #[schemars(range(min = 0.0))]
     pub alone_m: f64,
-    /// Log-likelihood ratio of equal appearances, by which the associator prefers a detection that
-    /// looks like the person of a track: it falls with the difference, to 0 at `max_difference`, and
-    /// is bounded by minus the same. 0: positions alone decide.
+    /// Weight of the appearance, by which the associator prefers a detection that looks like the
+    /// person of a track: a factor of `association_evidence`. With `linear` it is the log-likelihood
+    /// ratio of equal appearances, with `half-distance` 1 is BoT-SORT. 0: positions alone decide.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub association_weight: f64,
+    /// Log-likelihood ratio that a difference of appearances amounts to: `linear` or
+    /// `half-distance`.
+    pub association_evidence: AppearanceEvidence,
     /// Number of appearances by which tracks that parted are compared.
     #[schemars(range(min = 1))]
     pub appearances: u32,
+}
+
+/// Least difference of two appearances in `half-distance`, so that equal ones are not certain beyond
+/// all places: odds of 2,000 to 1.
+const LEAST_DIFFERENCE: f64 = 1e-3;
+
+impl AppearanceEvidence {
+    /// Returns the log-likelihood ratio of two appearances with this difference between them.
+    pub(crate) fn log_ratio(self, difference: f64, max_difference: f64) -> f64 {
+        match self {
+            Self::Linear => (1.0 - difference / max_difference.max(1e-3)).max(-1.0),
+            Self::HalfDistance if difference < max_difference => {
+                let difference = difference.max(LEAST_DIFFERENCE);
+                ((2.0 - difference) / difference).ln()
+            }
+            Self::HalfDistance => 0.0,
+        }
+    }
 }
 
 impl Default for ReidentificationSettings {
@@ -51,6 +85,7 @@ impl Default for ReidentificationSettings {
             decide_s: 2.0,
             alone_m: 0.6,
             association_weight: 0.0,
+            association_evidence: AppearanceEvidence::Linear,
             appearances: 2,
         }
     }

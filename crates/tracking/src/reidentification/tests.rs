@@ -171,3 +171,30 @@ fn a_detection_that_looks_like_the_person_of_a_track_speaks_for_it() {
     let unseen = scene.stage.compare(&frame(RED, BLUE), &tracks, &[whole]).unwrap();
     assert_eq!(unseen, [[0.0], [0.0]], "without an image box there is no appearance");
 }
+
+/// The associator's `minimum` of this and the overlap is that of BoT-SORT, whose appearance has half
+/// the cosine distance.
+#[test]
+fn the_log_odds_of_half_the_distance_give_it_back() {
+    let half = AppearanceEvidence::HalfDistance;
+    let distance = |log_ratio: f64| 1.0 / (1.0 + log_ratio.exp());
+    for difference in [0.001, 0.1, 0.24] {
+        let log_ratio = half.log_ratio(difference, 0.25);
+        assert!((distance(log_ratio) - 0.5 * difference).abs() < 1e-12, "{difference}");
+    }
+    assert_eq!(half.log_ratio(0.25, 0.25), 0.0, "no more alike than two people");
+    assert!((distance(half.log_ratio(0.0, 0.25)) - 0.0005).abs() < 1e-12, "equal is not certain");
+}
+
+#[test]
+fn the_evidence_of_the_appearance_is_that_of_the_settings() {
+    let mut scene = Scene::new();
+    let tracks = [track(1, 0.8, 1.7), track(2, -0.8, 1.7)];
+    scene.show(3, &frame(RED, BLUE), &tracks);
+    let detections = [detection(0.8), detection(-0.8)];
+    scene.stage.settings.association_weight = 1.0;
+    scene.stage.settings.association_evidence = AppearanceEvidence::HalfDistance;
+    let same = scene.stage.compare(&frame(RED, BLUE), &tracks, &detections).unwrap();
+    assert!(same[0][0] > 4.0 && same[1][1] > 4.0, "{same:?}");
+    assert_eq!([same[0][1], same[1][0]], [0.0; 2], "other clothes say nothing");
+}
