@@ -193,11 +193,12 @@ Examples:
 const FOLLOW_HELP: &str = "\
 Prints how long the right person was followed, and the wrong one, how soon somebody who came back was
 found, the distance, the room to people and things, and how smooth the ride was. The log of a ride has
-its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames).
+its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames); --overlay puts a
+picture per frame beside it.
 
 Examples:
   tagalong follow
-  tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml -o rides
+  tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml -o rides --overlay
   tagalong follow configs/follow-depth.toml --seeds 50 --against configs/follow-as-printed.toml
   tagalong follow configs/follow-depth.toml --latency-ms 150 --drop 0.2 --format markdown";
 

@@ -69,6 +69,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "app",
             "simulate",
             "pipeline",
+            "render",
             "log",
             "sim",
             "eval",
