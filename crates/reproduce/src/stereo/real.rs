@@ -84,28 +84,28 @@ fn moment(frame: &Frame, known: &[Annotated]) -> Moment {
     let pose = &frame.camera.robot_from_camera;
     Moment {
         stamp: frame.stamp,
-        truth: known.iter().map(|row| somebody(row, pose)).collect(),
+        truth: known.iter().filter_map(|row| annotated(row, pose)).collect(),
         odom_from_robot: Isometry2::identity(),
         world_from_robot: Isometry2::identity(),
     }
 }
 
-/// Converts an annotation; heads are annotated at their surface.
-fn somebody(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Truth {
-    let surface = Point3::from(row.head_in_camera_m);
+/// Converts an annotation; heads are annotated at their surface. `None` without a place.
+fn annotated(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Option<Truth> {
+    let surface = Point3::from(row.head_in_camera_m?);
     let ray = surface.coords.try_normalize(1e-6).unwrap_or_default();
     let head = robot_from_camera * (surface + ray * HEAD_RADIUS_M);
     let rect = |r: &tagalong_eval::Region| Rect::new(r.x, r.y, r.width, r.height);
-    Truth {
+    Some(Truth {
         id: u16::try_from(row.id).unwrap_or(u16::MAX),
         head_in_robot: head,
         torso_in_robot: head,
-        upper_body: Some(rect(&row.upper_body)),
-        visible: Some(rect(&row.visible_body)),
+        upper_body: row.upper_body.as_ref().map(rect),
+        visible: row.visible_body.as_ref().map(rect),
         visible_fraction: row.visible,
         occluder: None,
         ignore: row.ignore,
-    }
+    })
 }
 
 #[cfg(test)]
