@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
+use tagalong_annotate::{AnnotateArgs, HELP as ANNOTATE_HELP};
 use tagalong_app::format::{Format, TableFormat};
 use tagalong_benchmark::BenchArgs;
 use tagalong_doctor::DoctorArgs;
@@ -49,6 +50,9 @@ pub enum Command {
     /// Makes a page of a run to look at: images, plan, events, and why a person was missed
     #[command(after_help = VIEW_HELP)]
     View(ViewArgs),
+    /// Opens a page to annotate the people of a log: truth for `eval`, `bench` and `view`
+    #[command(after_help = ANNOTATE_HELP)]
+    Annotate(AnnotateArgs),
     /// Lists the plugins
     #[command(after_help = "Example:\n  tagalong list --format json")]
     List {

@@ -58,6 +58,7 @@ const ARROWS: &[(&str, &[&str])] = &[
         &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
     ),
     ("doctor", &["app", "render", "vision", "pipeline", "log"]),
+    ("annotate", &["app", "render", "log", "eval", "pipeline"]),
     ("view", &["app", "scoring", "render", "report", "log", "eval", "pipeline"]),
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
     ("benchmark", &["app", "scoring", "pipeline", "log", "eval", "report", "reproduce", "tuning"]),
@@ -82,6 +83,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
+            "annotate",
             "app",
             "benchmark",
             "catalog",
