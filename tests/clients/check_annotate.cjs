@@ -200,7 +200,7 @@ const main = async () => {
   const index = await findBusyFrame(page);
   await checkMoving(page);
   await checkNewPerson(page, index);
-  assert.deepEqual(problems, [], "errors of the page");
+  assert.deepEqual(problems, [], `errors of the page: ${problems.join("; ")}`);
   await checkKill(page, first.child);
   problems.length = 0; // The connection that was refused is an error of the page.
   const before = readFileSync(file, "utf8");

@@ -29,7 +29,7 @@ impl Key {
     /// Returns a wholly visible person in a box.
     pub fn new(region: Region) -> Self {
         Self {
-            region,
+            region: tenths(region),
             visible: 1.0,
             ignore: false,
             occluder: "0".into(),
@@ -41,11 +41,20 @@ impl Key {
 
     /// Moves the box; what was measured in the old one goes.
     pub fn move_to(&mut self, region: Region) {
-        self.region = region;
+        self.region = tenths(region);
         self.visible_body = None;
         self.head_in_camera_m = None;
         self.interpolated = 0;
     }
+}
+
+/// Returns a box in tenths of a pixel, which are finer than a hand: so the file has the same keys as
+/// the page, and what lies between them comes back the same.
+pub fn tenths(region: Region) -> Region {
+    let [x, y, width, height] = [region.x, region.y, region.width, region.height]
+        // Adding 0 removes the sign of -0.
+        .map(|v| (v * 10.0).round() / 10.0 + 0.0);
+    Region { x, y, width, height }
 }
 
 /// Boxes of one person over time.

@@ -27,6 +27,7 @@ const SILENCE: Duration = Duration::from_secs(5);
 const PAGE: &str = include_str!("page/page.html");
 const SCRIPT: &str = include_str!("page/page.js");
 const STYLE: &str = include_str!("page/page.css");
+const ICON: &str = include_str!("page/icon.svg");
 
 /// Everything that answers need.
 pub struct App {
@@ -129,6 +130,7 @@ impl Guard {
             ("GET" | "HEAD", "") => Response::ok("text/html; charset=utf-8", PAGE),
             ("GET" | "HEAD", "page.js") => Response::ok("text/javascript; charset=utf-8", SCRIPT),
             ("GET" | "HEAD", "page.css") => Response::ok("text/css; charset=utf-8", STYLE),
+            ("GET" | "HEAD", "icon.svg") => Response::ok("image/svg+xml", ICON),
             ("GET" | "HEAD", "state") => app.state(),
             ("GET" | "HEAD", image) if image.starts_with("frame/") => app.image(image),
             ("POST", "change") => app.change(&request.body),
@@ -332,7 +334,7 @@ mod tests {
     fn the_page_its_parts_and_the_images_are_served() {
         let running = Running::new();
         for (path, part) in [
-            ("", "<!doctype html>"),
+            ("", "<!DOCTYPE html>"),
             ("page.js", "use strict"),
             ("page.css", "{"),
             ("state", "\"frames\":[1,2,3"),

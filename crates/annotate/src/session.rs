@@ -14,7 +14,7 @@ use tagalong_eval::formats::people::{self, Row};
 
 use crate::document::{Change, Document};
 use crate::film::{Film, Place};
-use crate::person::{Key, Person};
+use crate::person::{Key, Person, tenths};
 
 /// A person in a frame, as the page takes it: frame, box, then 1 for a key, 1 for ignored, the
 /// visible fraction, and the distance, m, or null.
@@ -161,9 +161,7 @@ impl Session {
         let like = id.and_then(|id| self.latest(id, frame));
         let region = self.film.upper_body(frame, Point2::new(*x, *y), like.as_ref());
         let region = region.ok_or_else(none)?;
-        // A tenth of a pixel is finer than a hand.
-        let px = |v: f64| (v * 10.0).round() / 10.0;
-        let region = [region.x, region.y, region.width, region.height].map(px);
+        let region = [region.x, region.y, region.width, region.height];
         Ok(Change::Box { frame, id: *id, region })
     }
 
@@ -187,8 +185,8 @@ impl Session {
         let numbers = person.frames().filter(|number| film.shot(*number).is_some());
         let rows = numbers.filter_map(|number| {
             let key = person.at(number)?;
-            let Region { x, y, width, height } = key.region;
-            let box_px = [x, y, width, height].map(|v| (v * 10.0).round() / 10.0);
+            let Region { x, y, width, height } = tenths(key.region);
+            let box_px = [x, y, width, height];
             let head = self.head(id, number, &key);
             let distance = head.map(|(head, _)| head.iter().map(|v| v * v).sum::<f64>().sqrt());
             let distance = distance.map(|m| (m * 100.0).round() / 100.0);
@@ -231,9 +229,10 @@ impl Session {
     fn row(&mut self, id: i64, person: &Person, number: u32) -> Option<Row> {
         let camera = Arc::clone(&self.film.shot(number)?.camera);
         let found = person.at(number)?;
-        let region = clipped(&found.region, camera.width, camera.height)?;
-        let head = self.head(id, number, &found);
         let is_key = person.key(number).is_some();
+        let region = if is_key { found.region } else { tenths(found.region) };
+        let region = clipped(region, camera.width, camera.height)?;
+        let head = self.head(id, number, &found);
         // 1 is the word for boxes and places that were not measured.
         let measured = head.map_or(1, |(_, origin)| origin);
         Some(Row {
@@ -277,14 +276,16 @@ impl Session {
     }
 }
 
-/// Returns the part of a box inside the image, in tenths of a pixel; none if there is none.
-fn clipped(region: &Region, width: usize, height: usize) -> Option<Region> {
-    let right = (region.x + region.width).min(width as f64);
-    let bottom = (region.y + region.height).min(height as f64);
+/// Returns the part of a box inside the image, in tenths of a pixel where it is cut; none if there is
+/// none.
+fn clipped(region: Region, columns: usize, rows: usize) -> Option<Region> {
+    let right = (region.x + region.width).min(columns as f64);
+    let bottom = (region.y + region.height).min(rows as f64);
     let (x, y) = (region.x.max(0.0), region.y.max(0.0));
-    let px = |v: f64| (v * 10.0).round() / 10.0;
-    let inside = Region { x: px(x), y: px(y), width: px(right - x), height: px(bottom - y) };
-    (inside.width >= 1.0 && inside.height >= 1.0).then_some(inside)
+    let inside = tenths(Region { x, y, width: right - x, height: bottom - y });
+    let is_whole = inside == tenths(region);
+    let is_seen = inside.width >= 1.0 && inside.height >= 1.0;
+    is_seen.then_some(if is_whole { region } else { inside })
 }
 
 fn stamp_of(path: &Path) -> Option<(u64, SystemTime)> {
@@ -336,7 +337,9 @@ pub fn read_people(path: &Path, film: &Film) -> Result<BTreeMap<i64, Person>, St
 /// Returns the key of a row; none for a place behind the camera.
 fn key_of(row: Row, film: &Film) -> Option<Key> {
     let of_place = || film.region_of(row.frame, row.head_in_camera_m?);
-    let region = row.upper_body.or_else(of_place)?;
+    let camera = &film.shot(row.frame)?.camera;
+    let whole = |region: &Region| squared(region, camera.width as f64, camera.height as f64);
+    let region = row.upper_body.as_ref().map(whole).or_else(of_place)?;
     Some(Key {
         region,
         visible: row.visible,
@@ -346,6 +349,24 @@ fn key_of(row: Row, film: &Film) -> Option<Key> {
         head_in_camera_m: row.head_in_camera_m,
         interpolated: row.interpolated,
     })
+}
+
+/// Returns the whole square of a box of which the file has the part inside the image.
+fn squared(region: &Region, columns: f64, rows: f64) -> Region {
+    let Region { mut x, mut y, mut width, mut height } = *region;
+    let side = width.max(height);
+    let is_left = x <= 0.0;
+    if width < side && (is_left || x + width >= columns) {
+        x -= if is_left { side - width } else { 0.0 };
+        width = side;
+    }
+    let is_top = y <= 0.0;
+    if height < side && (is_top || y + height >= rows) {
+        y -= if is_top { side - height } else { 0.0 };
+        height = side;
+    }
+    let whole = Region { x, y, width, height };
+    if whole == *region { whole } else { tenths(whole) }
 }
 
 #[cfg(test)]
@@ -416,6 +437,28 @@ mod tests {
         let new = fs::read_to_string(&path).unwrap();
         let wanted: Vec<String> = old.lines().skip(1).map(|line| format!("{line},1")).collect();
         assert_eq!(new.lines().skip(2).collect::<Vec<_>>(), wanted, "{new}");
+    }
+
+    #[test]
+    fn boxes_that_the_border_cuts_come_back_whole_and_are_written_cut() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("cut.people.csv");
+        let mut session = session(&path);
+        let whole = [[-20.3, 50.0], [290.0, 50.0], [100.0, -20.0], [100.0, 200.0], [100.0, 50.0]];
+        for (frame, [x, y]) in (1..).step_by(2).zip(whole) {
+            let region = [x, y, 60.0, 60.0];
+            session.apply(&Change::Box { frame, id: Some(1), region }).unwrap();
+        }
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.lines().any(|line| line.starts_with("1,1,0,50,39.7,60,")), "{text}");
+        let people = read_people(&path, &film(12)).unwrap();
+        for (frame, [x, y]) in (1..).step_by(2).zip(whole) {
+            let Region { x: left, y: top, width, height } = people[&1].at(frame).unwrap().region;
+            assert_eq!([left, top, width, height], [x, y, 60.0, 60.0]);
+        }
+        let mut again = Session::new(Arc::new(film(12)), people, path.clone());
+        again.save().unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), text);
     }
 
     #[test]
