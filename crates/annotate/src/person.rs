@@ -1,5 +1,6 @@
 //! One annotated person: boxes set by hand, and boxes between them.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 
@@ -135,9 +136,9 @@ impl Person {
     /// Makes a key of an interpolated box; false if the frame has no box.
     pub fn pin(&mut self, frame: u32) -> bool {
         let Some(mut key) = self.at(frame) else { return false };
-        if !self.keys.contains_key(&frame) {
+        if let Entry::Vacant(place) = self.keys.entry(frame) {
             key.interpolated = 0;
-            self.keys.insert(frame, key);
+            place.insert(key);
         }
         true
     }

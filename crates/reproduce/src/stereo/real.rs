@@ -119,9 +119,10 @@ mod tests {
         let row = Annotated {
             frame: 1,
             id: 3,
-            upper_body: tagalong_eval::Region::new(10.0, 20.0, 30.0, 40.0),
-            visible_body: tagalong_eval::Region::default(),
-            head_in_camera_m: [0.0, 0.0, 2.0],
+            upper_body: Some(tagalong_eval::Region::new(10.0, 20.0, 30.0, 40.0)),
+            visible_body: None,
+            head_in_camera_m: Some([0.0, 0.0, 2.0]),
+            key: true,
             visible: 0.5,
             occluder: "0".into(),
             ignore: true,
@@ -133,7 +134,7 @@ mod tests {
             nalgebra::Rotation3::from_basis_unchecked(&[forward, -Vector3::z(), Vector3::x()]);
         let turn = UnitQuaternion::from_rotation_matrix(&turn);
         let pose = Isometry3::from_parts(Translation3::new(0.1, 0.0, 1.0), turn);
-        let found = somebody(&row, &pose);
+        let found = annotated(&row, &pose).unwrap();
         let expected = Point3::new(2.1 + HEAD_RADIUS_M, 0.0, 1.0);
         assert!((found.head_in_robot - expected).norm() < 1e-9, "{}", found.head_in_robot);
         assert!(found.ignore && found.id == 3);
