@@ -5,12 +5,11 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use image::ExtendedColorType;
-use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Point2, Point3};
 use tagalong_core::{DepthImage, RgbImage};
 use tagalong_eval::Region;
 use tagalong_geometry::{Camera, HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
+use tagalong_render::jpeg;
 
 /// Quality of the images: people look at them, and no program measures in them.
 const QUALITY: u8 = 88;
@@ -83,7 +82,9 @@ impl Film {
         image: Option<&RgbImage>,
         depth: Option<&DepthImage>,
     ) -> io::Result<()> {
-        let image = image.and_then(jpeg).map(|bytes| self.write(&bytes)).transpose()?;
+        let image = image.map(|image| jpeg(image, image.width(), QUALITY));
+        let image = image.filter(|bytes| !bytes.is_empty());
+        let image = image.map(|bytes| self.write(&bytes)).transpose()?;
         let depth = match depth {
             Some(depth) => {
                 let piece = self.write(&packed(depth)?)?;
@@ -197,16 +198,6 @@ fn place(camera: &Camera, depth: &DepthImage, region: &Region) -> Option<Place> 
 fn rounded(point: &Point3<f64>) -> [f64; 3] {
     // Dividing gives the number nearest to three decimals, and adding 0 removes the sign of -0.
     [point.x, point.y, point.z].map(|v| (v * 1e3).round() / 1e3 + 0.0)
-}
-
-/// Encodes an image; none for one without pixels.
-fn jpeg(image: &RgbImage) -> Option<Vec<u8>> {
-    let mut out = Vec::new();
-    let (width, height) = (image.width() as u32, image.height() as u32);
-    JpegEncoder::new_with_quality(&mut out, QUALITY)
-        .encode(image.pixels().as_flattened(), width, height, ExtendedColorType::Rgb8)
-        .ok()?;
-    Some(out)
 }
 
 /// Compresses depth in whole millimetres; 0 is no reading.

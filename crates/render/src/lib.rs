@@ -8,6 +8,7 @@
 pub mod canvas;
 mod enlarge;
 mod image_view;
+mod jpeg;
 mod labels;
 mod legend;
 mod plan_view;
@@ -20,6 +21,7 @@ use std::sync::Arc;
 
 use self::canvas::{Canvas, Ink};
 pub use image_view::background;
+pub use jpeg::jpeg;
 use nalgebra::Isometry2;
 use tagalong_core::{Images, RgbImage};
 use tagalong_geometry::Camera;

@@ -61,7 +61,10 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("annotate", &["app", "render", "log", "eval", "pipeline"]),
     ("view", &["app", "scoring", "render", "report", "log", "eval", "pipeline"]),
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
-    ("benchmark", &["app", "scoring", "pipeline", "log", "eval", "report", "reproduce", "tuning"]),
+    (
+        "benchmark",
+        &["app", "scoring", "render", "pipeline", "log", "eval", "report", "reproduce", "tuning"],
+    ),
     ("import", &["app", "log"]),
     ("webcams", &["app", "scoring", "log", "sim", "triangulate"]),
     (
