@@ -23,6 +23,10 @@ const SIDE_WITHOUT_DEPTH: f64 = 0.15;
 /// Side of the square around a pixel in which depth is looked for, pixels.
 const PROBE_PX: f64 = 9.0;
 
+/// Factor between the depth in a box and the depth by the size of the box up to which both are of
+/// the same person: boxes are drawn by hand, and people differ in size.
+const SAME_DEPTH: f64 = 1.4;
+
 /// Part of the temporary file.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
@@ -153,6 +157,14 @@ impl Film {
         regions.iter().map(|region| place(&camera, &depth, region)).collect()
     }
 
+    /// Returns the place of the head of a person in a box whose depth is known otherwise.
+    pub fn head(&self, number: u32, region: &Region, depth_m: f64) -> Option<[f64; 3]> {
+        let square = Rect::new(region.x, region.y, region.width, region.height);
+        let camera = &self.shot(number)?.camera;
+        // The depth of a panorama is horizontal, and no coordinate of a place.
+        camera.panorama().is_none().then(|| head_at(camera, &square, depth_m))?
+    }
+
     /// Returns the upper body of a person whose head is at a pixel: as large as depth says, or as
     /// `like`, or as a share of the image.
     pub fn upper_body(
@@ -185,13 +197,24 @@ impl Film {
 /// torso.
 fn place(camera: &Camera, depth: &DepthImage, region: &Region) -> Option<Place> {
     let square = Rect::new(region.x, region.y, region.width, region.height);
-    let face = depth.face_m(&square);
-    let depth_m = face.or_else(|| depth.surface_m(&square))?;
-    let centre = camera.robot_from_camera.inverse() * camera.head_of(&square, depth_m);
+    // A box says how far away its person is: another depth is that of an occluder, or of the wall.
+    let fits = |depth_m: &f64| {
+        let by_size = camera.focal_px() * UPPER_BODY_SIDE_M / square.width.max(square.height);
+        let ratio = depth_m / by_size;
+        camera.panorama().is_some() || (1.0 / SAME_DEPTH..=SAME_DEPTH).contains(&ratio)
+    };
+    let face = depth.face_m(&square).filter(fits);
+    let depth_m = face.or_else(|| depth.surface_m(&square).filter(fits))?;
+    let head_in_camera_m = head_at(camera, &square, depth_m)?;
+    Some(Place { head_in_camera_m, by_torso: face.is_none() })
+}
+
+/// Returns the surface of the head of a person in a box at a depth, in the camera frame, m.
+fn head_at(camera: &Camera, square: &Rect, depth_m: f64) -> Option<[f64; 3]> {
+    let centre = camera.robot_from_camera.inverse() * camera.head_of(square, depth_m);
     // Annotations hold the surface; the centre lies behind it.
     let ray = centre.coords.try_normalize(1e-6)?;
-    let head = centre - ray * HEAD_RADIUS_M;
-    Some(Place { head_in_camera_m: rounded(&head), by_torso: face.is_none() })
+    Some(rounded(&(centre - ray * HEAD_RADIUS_M)))
 }
 
 /// Returns a place in whole millimetres.
@@ -270,6 +293,17 @@ pub mod tests {
         assert_eq!(film.places(7, &[like]), [None]);
         assert_eq!(film.image(7).unwrap(), None);
         assert!(!film.has_depth());
+    }
+
+    #[test]
+    fn the_depth_of_an_occluder_or_of_the_wall_is_no_place() {
+        let film = film(1);
+        let at = |x: f64, side: f64| Region { x, y: 75.0, width: side, height: side };
+        assert!(film.places(1, &[at(130.0, 59.0)])[0].is_some());
+        // The box of a person at 5 m, behind the one at 2.5 m, and one at 2.5 m before the wall.
+        assert_eq!(film.places(1, &[at(145.0, 29.0), at(20.0, 59.0)]), [None, None]);
+        let [x, _, z] = film.head(1, &at(145.0, 29.0), 5.0).unwrap();
+        assert!((z - 5.0).abs() < 0.02 && x.abs() < 0.05, "{x} {z}");
     }
 
     #[test]

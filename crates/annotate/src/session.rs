@@ -218,9 +218,10 @@ impl Session {
         let people = self.document.people().clone();
         let mut rows = Vec::new();
         for (id, person) in &people {
-            for number in person.frames() {
-                rows.extend(self.row(*id, person, number));
-            }
+            let mut own: Vec<Row> =
+                person.frames().filter_map(|number| self.row(*id, person, number)).collect();
+            self.fill_places(person, &mut own);
+            rows.extend(own);
         }
         rows.sort_by_key(|row| (row.frame, row.id));
         rows
@@ -249,6 +250,27 @@ impl Session {
         })
     }
 
+    /// Fills in the places of a person that depth does not show, hidden behind another one say: the
+    /// depth changes evenly between the places that were measured, and as the size of the box does.
+    fn fill_places(&self, person: &Person, rows: &mut [Row]) {
+        let size = |row: &Row| person.at(row.frame).map_or(0.0, |key| key.region.width);
+        let known: Vec<(u32, f64)> = rows
+            .iter()
+            // Places that were filled in before are none to begin with.
+            .filter(|row| row.interpolated != 1 || !row.key)
+            .filter_map(|row| Some((row.frame, row.head_in_camera_m?[2] * size(row))))
+            .collect();
+        for row in rows.iter_mut().filter(|row| row.head_in_camera_m.is_none()) {
+            let (Some(key), Some(product)) = (person.at(row.frame), at_frame(&known, row.frame))
+            else {
+                continue;
+            };
+            let depth_m = product / key.region.width.max(1.0);
+            row.head_in_camera_m = self.film.head(row.frame, &key.region, depth_m);
+            row.interpolated = 1;
+        }
+    }
+
     /// Refuses to replace a file that another program has written since.
     fn check_file(&self) -> Result<(), String> {
         if stamp_of(&self.output) == self.known {
@@ -273,6 +295,19 @@ impl Session {
         self.known = stamp_of(&self.output);
         self.saved = true;
         Ok(())
+    }
+}
+
+/// Returns the value of a frame between those that are known, or that of the nearest one.
+fn at_frame(known: &[(u32, f64)], frame: u32) -> Option<f64> {
+    let after = known.partition_point(|(other, _)| *other < frame);
+    let before = after.checked_sub(1).and_then(|at| known.get(at));
+    match (before, known.get(after)) {
+        (Some((first, a)), Some((last, b))) => {
+            let share = f64::from(frame - first) / f64::from((last - first).max(1));
+            Some(a + (b - a) * share)
+        }
+        (one, other) => one.or(other).map(|(_, value)| *value),
     }
 }
 
@@ -408,6 +443,27 @@ mod tests {
             .unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), text);
         assert!(!home.path().join("walk.people.csv.partial").exists());
+    }
+
+    #[test]
+    fn a_person_whom_depth_does_not_show_is_placed_between_the_frames_around() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("hidden.people.csv");
+        let mut session = session(&path);
+        session.apply(&head(1, None, 160.0)).unwrap();
+        let aside = [20.0, 73.0, 59.0, 59.0];
+        // Before the wall, whose depth is not that of a person of this size.
+        session.apply(&Change::Box { frame: 3, id: Some(1), region: aside }).unwrap();
+        session.apply(&head(5, Some(1), 160.0)).unwrap();
+        let read = || people::parse(&fs::read_to_string(&path).unwrap(), "hidden").unwrap();
+        let rows = read();
+        let [x, _, z] = rows[2].head_in_camera_m.unwrap();
+        assert!((z - 2.5).abs() < 0.05 && x < -0.9, "{:?}", rows[2]);
+        assert_eq!((rows[2].key, rows[2].interpolated), (true, 1));
+        let mut again =
+            Session::new(Arc::new(film(12)), read_people(&path, &film(12)).unwrap(), path.clone());
+        again.save().unwrap();
+        assert_eq!(read(), rows);
     }
 
     #[test]

@@ -53,7 +53,7 @@ impl Page<'_> {
                 (self.missed_by_test())
                 @if !self.moments.is_empty() {
                     p {
-                        "Moments in which people are missed, longest first chosen: white and dashed the people, in colour the "
+                        "Moments in the middle of the longest misses: white and dashed the people, in colour the "
                         "tracks of each pipeline" @if self.view.pipelines.len() > MOST_DRAWN { " (of the " (MOST_DRAWN) " best)" }
                         ", thin and dashed the candidates that were dropped."
                     }

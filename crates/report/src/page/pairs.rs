@@ -61,7 +61,7 @@ impl Page<'_> {
         let Some(place) = place else { return html! {} };
         let names = &self.view.pipelines;
         let head = html! {
-            (column("", None))
+            (column("Pipeline", None))
             @for (rank, name) in names.iter().enumerate() { (self.column_of(rank, name)) }
         };
         let body = html! {
