@@ -192,6 +192,7 @@ Examples:
   tagalong import kitti training --sequence 0013 -o runs/kitti-0013.mcap
   tagalong import mot MOT17-04-FRCNN
   tagalong import images photos --fps 15 --view 69 --height 1.2 --tilt 5
+  tagalong import cvat annotations.xml -o robot.people.csv    (truth for robot.mcap)
   tagalong import images colour --depth depth --depth-unit 0.001 --focal 525";
 
 const FOLLOW_HELP: &str = "\

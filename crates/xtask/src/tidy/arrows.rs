@@ -65,7 +65,7 @@ const ARROWS: &[(&str, &[&str])] = &[
         "benchmark",
         &["app", "scoring", "render", "pipeline", "log", "eval", "report", "reproduce", "tuning"],
     ),
-    ("import", &["app", "log"]),
+    ("import", &["app", "log", "eval"]),
     ("webcams", &["app", "scoring", "log", "sim", "triangulate"]),
     (
         "experiments",
