@@ -2,16 +2,14 @@
 // Called by check_view.sh: a visitor of the page that clicks, scrubs, plays and reads back; axe,
 // requests, script errors and overflow on the way.
 const assert = require("node:assert");
-const { mkdirSync, readFileSync } = require("node:fs");
+const { mkdirSync } = require("node:fs");
 const { pathToFileURL } = require("node:url");
 const path = require("node:path");
-const { chromium } = require("playwright-core");
+const { launch, openPage, violations, tooWidePx, conclude } = require("./pages.cjs");
 
 const url = pathToFileURL(process.argv[2]).href;
-const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 const pictures = process.env.TAGALONG_PICTURES;
 const name = process.env.TAGALONG_PAGE || "page";
-const TIMEOUT_MS = 60_000;
 
 const frameNow = (page) => page.$eval("#frame", (slider) => Number(slider.value));
 const readData = (page) => page.$eval("#data", (element) => JSON.parse(element.textContent));
@@ -141,26 +139,14 @@ const checkLayers = async (page, data) => {
 };
 
 const judge = async (page, way) => {
-  const tooWide = await page.evaluate(
-    () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
-  );
-  await page.evaluate(axe);
-  const { violations } = await page.evaluate(() => globalThis.axe.run());
-  const found = violations.map(({ id, impact, nodes }) => `axe: ${impact} ${id}: ${nodes[0].html.slice(0, 140)} ${nodes[0].any[0] ? nodes[0].any[0].message : ""}`);
+  const tooWide = await tooWidePx(page);
+  const found = (await violations(page)).map(({ text }) => text);
   return tooWide > 0 ? [...found, `${way}: the page is ${tooWide} px too wide`] : found;
 };
 
 const visit = async (browser, { way, colorScheme, viewport }) => {
   const problems = [];
-  const context = await browser.newContext({ colorScheme, viewport });
-  const page = await context.newPage();
-  page.setDefaultTimeout(TIMEOUT_MS);
-  page.on("request", (request) => {
-    const asked = request.url();
-    if (asked !== url && !asked.startsWith("data:")) problems.push(`asks for ${asked}`);
-  });
-  page.on("pageerror", (error) => problems.push(`script error: ${error.message}`));
-  page.on("console", (line) => line.type() === "error" && problems.push(line.text()));
+  const page = await openPage(browser, { colorScheme, viewport }, (asked) => asked === url, problems);
   await page.goto(url);
   const data = await readData(page);
   try {
@@ -176,7 +162,7 @@ const visit = async (browser, { way, colorScheme, viewport }) => {
   }
   problems.push(...(await judge(page, way)));
   if (pictures) await photograph(page, way, data);
-  await context.close();
+  await page.context().close();
   return problems.map((problem) => `${way}: ${problem}`);
 };
 
@@ -189,12 +175,7 @@ const photograph = async (page, way, data) => {
 };
 
 const main = async () => {
-  const browser = await chromium.launch({
-    executablePath: process.env.TAGALONG_CHROMIUM,
-    args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking",
-      "--disable-component-update", "--disable-sync", "--no-first-run"],
-    timeout: TIMEOUT_MS,
-  });
+  const browser = await launch();
   const ways = [
     { way: "light", colorScheme: "light", viewport: { width: 1360, height: 850 } },
     { way: "dark", colorScheme: "dark", viewport: { width: 1360, height: 850 } },
@@ -203,12 +184,7 @@ const main = async () => {
   const problems = [];
   for (const way of ways) problems.push(...(await visit(browser, way)));
   await browser.close();
-  problems.forEach((problem) => console.error(problem));
-  console.log(problems.length ? `${name}: failed` : `${name}: axe and visitor ok`);
-  process.exit(problems.length ? 1 : 0);
+  return problems;
 };
 
-main().catch((error) => {
-  console.error(error);
-  process.exit(1);
-});
+conclude(`${name}: axe and visitor`, main);

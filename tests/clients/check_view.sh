@@ -5,30 +5,16 @@
 #
 #   tests/clients/check_view.sh runs/robot-depth-verified/view.html
 #
-# Without an argument a scene is simulated, and pages of one run and of two are checked. The clients
-# are installed into target/clients-node (or the folder in TAGALONG_NODE); the browser is
-# /usr/bin/chromium (or the one in TAGALONG_CHROMIUM), the program `cargo run` (or the one in
-# TAGALONG). With TAGALONG_PICTURES set to a folder, pictures of the page are left there to look at.
+# Without an argument a scene is simulated, and pages of one run and of two are checked. pages.sh says
+# where clients and browser are; the program is `cargo run` (or the one in TAGALONG). With
+# TAGALONG_PICTURES set to a folder, pictures of the page are left there to look at.
 set -eu
 
-here=$(cd "$(dirname "$0")" && pwd)
-root=$(cd "$here/../.." && pwd)
-node=${TAGALONG_NODE:-$root/target/clients-node}
-chromium=${TAGALONG_CHROMIUM:-/usr/bin/chromium}
-
-for program in node npm "$chromium"; do
-    if ! command -v "$program" > /dev/null; then
-        echo "skipped: $program is not installed" >&2
-        exit 0
-    fi
-done
+. "$(dirname "$0")/pages.sh"
 
 tagalong() {
     if [ -n "${TAGALONG:-}" ]; then "$TAGALONG" "$@"; else (cd "$root" && cargo run --quiet -- "$@"); fi
 }
-
-home=$(mktemp -d)
-trap 'rm -rf "$home"' EXIT
 
 if [ $# -eq 0 ]; then
     tagalong simulate "$root/configs/scenes/crossing.toml" -o "$home/a.mcap" > /dev/null
@@ -39,21 +25,7 @@ if [ $# -eq 0 ]; then
     set -- "$home/one.html" "$home/both.html"
 fi
 
-if [ ! -d "$node/node_modules/axe-core" ]; then
-    mkdir -p "$node"
-    (cd "$node" && timeout 300 npm install --silent --no-save --no-audit --no-fund --prefix . \
-        html-validate@9.7.1 axe-core@4.10 playwright-core@1.55)
-fi
-
-# The pages are made by a program, so the style of writing HTML is not checked.
-cat > "$home/.htmlvalidate.json" << 'END'
-{ "root": true, "extends": ["html-validate:recommended"], "rules": { "long-title": "error" } }
-END
-
 for page in "$@"; do
-    cp "$page" "$home/page.html"
-    (cd "$home" && timeout 120 "$node/node_modules/.bin/html-validate" page.html)
-    echo "html-validate: ok"
-    NODE_PATH="$node/node_modules" TAGALONG_CHROMIUM="$chromium" TAGALONG_PAGE=$(basename "$page" .html) \
-        timeout 300 node "$here/check_view.cjs" "$home/page.html"
+    validate "$page"
+    TAGALONG_PAGE=$(basename "$page" .html) visit "$here/check_view.cjs" "$home/page.html"
 done

@@ -9,6 +9,8 @@ mod args;
 mod export;
 mod folder;
 mod gate;
+mod misses;
+mod moments;
 mod pictures;
 mod plan;
 mod report;

@@ -7,8 +7,10 @@ use base64::engine::general_purpose::STANDARD;
 use tagalong_core::Images;
 use tagalong_eval::Frame;
 use tagalong_geometry::Rect;
+use tagalong_render::{background, jpeg};
 use tagalong_report::EventRow;
 
+use super::misses::moments;
 use super::store::Stored;
 use super::watch::importance;
 
@@ -18,10 +20,17 @@ const MOST: usize = 40;
 /// Longer side of a picture, pixels.
 const SIDE: usize = 96;
 
+/// Width of the images of moments, pixels, and their quality: people are recognised, and an image has
+/// some 25 kB.
+const MOMENT_WIDTH: usize = 480;
+const MOMENT_QUALITY: u8 = 60;
+
 /// Requested pictures: the frame, the event and the part of the image.
 #[derive(Default)]
 pub struct Wanted {
     by_frame: BTreeMap<u64, Vec<Order>>,
+    /// Whole images of moments: the tasks by frame.
+    moments: BTreeMap<u64, Vec<usize>>,
 }
 
 struct Order {
@@ -36,6 +45,9 @@ impl Wanted {
         let mut wanted = Self::default();
         for (task, stored) in stored.iter().enumerate() {
             let Some(recording) = &stored.recording else { continue };
+            for frame in moments(&stored.result.missed) {
+                wanted.moments.entry(frame).or_default().push(task);
+            }
             for event in chosen(&stored.result.events) {
                 let row = &stored.result.events[event];
                 let frame = recording.sequence.frames.get(row.frame as usize - 1);
@@ -50,7 +62,8 @@ impl Wanted {
 
     /// Returns the last requested frame.
     pub fn last(&self) -> Option<u64> {
-        self.by_frame.last_key_value().map(|(frame, _)| *frame)
+        let parts = self.by_frame.last_key_value().map(|(frame, _)| *frame);
+        parts.max(self.moments.last_key_value().map(|(frame, _)| *frame))
     }
 
     /// Cuts the pictures out of a frame.
@@ -58,6 +71,12 @@ impl Wanted {
         for order in self.by_frame.get(&frame).into_iter().flatten() {
             let event = &mut stored[order.task].result.events[order.event];
             event.picture_png_base64 = picture(images, &order.part);
+        }
+        let Some(tasks) = self.moments.get(&frame) else { return };
+        let Some(image) = background(images) else { return };
+        let text = STANDARD.encode(jpeg(&image, MOMENT_WIDTH, MOMENT_QUALITY));
+        for task in tasks {
+            stored[*task].images.insert(frame, text.clone());
         }
     }
 }

@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 use tagalong_app::outcome::Failure;
 use tagalong_report::{Benchmark, Outcome, TaskResult, Timings};
 
+use super::moments;
 use super::plan::Task;
-use super::store::{Store, StoredTiming};
+use super::store::{Store, Stored, StoredTiming};
 use super::work::blank;
 
 /// Gathers the results of a plan.
@@ -16,16 +17,18 @@ use super::work::blank;
 pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
     let plan = store.plan()?;
     let version = plan.first().map_or_else(String::new, |task| task.version.clone());
-    let mut tasks = Vec::new();
+    let mut all = Vec::new();
     let mut missing = Vec::new();
     for task in &plan {
         match result(store, task) {
-            Some(result) => tasks.push(result),
+            Some(stored) => all.push(stored),
             None => missing.push(task.k.to_string()),
         }
     }
     if missing.is_empty() {
-        return Ok(Benchmark { version, tasks });
+        let moments = moments::gather(&all);
+        let tasks = all.into_iter().map(|stored| stored.result).collect();
+        return Ok(Benchmark { version, tasks, moments });
     }
     let (count, first) = (missing.len(), &missing[0]);
     Err(Failure::failed(format!(
@@ -36,13 +39,10 @@ pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
     )))
 }
 
-fn result(store: &Store, task: &Task) -> Option<TaskResult> {
-    match &task.skip {
-        Some(why) => {
-            Some(TaskResult { outcome: Outcome::Skipped { why: why.clone() }, ..blank(task) })
-        }
-        None => store.result(&task.hash).map(|stored| stored.result),
-    }
+fn result(store: &Store, task: &Task) -> Option<Stored> {
+    let Some(why) = &task.skip else { return store.result(&task.hash) };
+    let outcome = Outcome::Skipped { why: why.clone() };
+    Some(Stored { result: TaskResult { outcome, ..blank(task) }, ..Stored::default() })
 }
 
 /// Returns the times, if those of all tasks were taken.

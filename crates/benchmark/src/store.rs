@@ -1,5 +1,6 @@
 //! Files in the folder of a benchmark.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -25,6 +26,9 @@ pub struct Stored {
     pub result: TaskResult,
     /// Scored sequence, for other evaluators; absent if the task failed.
     pub recording: Option<Recording>,
+    /// Images of moments in which people are missed, by frame: JPEG in base64.
+    #[serde(default)]
+    pub images: BTreeMap<u64, String>,
 }
 
 /// Scored sequence, with the facts that the formats need beside it.

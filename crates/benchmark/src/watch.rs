@@ -13,6 +13,7 @@ use tagalong_pipeline::FrameReport;
 use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Trajectory};
 use tagalong_scoring::{Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region};
 
+use super::misses::{DroppedPlaces, missed};
 use super::store::Recording;
 
 /// Confidence of the bounds on the normalised innovation squared.
@@ -27,6 +28,7 @@ pub struct Watch {
     reports: Reports,
     paths: BTreeMap<i64, Vec<(u32, [f64; 2])>>,
     funnel: Funnel,
+    dropped: DroppedPlaces,
     nis: Vec<(f64, u32)>,
     frames: u64,
     times: Timings,
@@ -45,6 +47,7 @@ impl Watch {
         }
         self.frames += 1;
         let number = u32::try_from(report.index).unwrap_or(u32::MAX);
+        self.dropped.take(number, report, &item.frame.camera);
         // A track that is only predicted has no box that could be scored.
         for track in report.tracks.iter().filter(|track| track.confirmed && track.seen) {
             self.track(item, number, track);
@@ -107,7 +110,7 @@ impl Watch {
         result.tracks = paths(self.paths, shots);
         let sequence = assemble(&result.log, truth, shots, self.reports, Rate(1.0));
         result.truth = truth_paths(&sequence, shots);
-        score(&sequence, truth, &mut result)?;
+        score(&sequence, truth, &self.dropped, &mut result)?;
         let size = shots.at(1).map_or((0, 0), |shot| (shot.camera.width, shot.camera.height));
         let (width, height) = (size.0 as u32, size.1 as u32);
         Ok((result, Recording { sequence, rate_hz: shots.rate_hz(), width, height }))
@@ -116,13 +119,22 @@ impl Watch {
 
 /// Fills in figures and events, by boxes and by positions as far as the truth has them; the events
 /// are those of the boxes if it has both.
-fn score(sequence: &Sequence, truth: &TruthFile, result: &mut TaskResult) -> Result<(), String> {
-    let measured = |similarity: Similarity| -> Result<Option<(Tally, Vec<Event>)>, String> {
+fn score(
+    sequence: &Sequence,
+    truth: &TruthFile,
+    dropped: &DroppedPlaces,
+    result: &mut TaskResult,
+) -> Result<(), String> {
+    let mut missed_people = Vec::new();
+    let mut measured = |similarity: Similarity| -> Result<Option<(Tally, Vec<Event>)>, String> {
         let Some(sequence) = comparable(sequence, similarity) else { return Ok(None) };
         let comparison = comparison(truth, similarity);
         let in_words = |error: tagalong_eval::EvalError| error.to_string();
         let prepared = Prepared::new(&sequence, &comparison).map_err(in_words)?;
         let (_, matches) = Clear::measure(&prepared);
+        if similarity == Similarity::Iou {
+            missed_people = missed(&sequence, &prepared, &matches, dropped);
+        }
         let tally = Tally::measure(&sequence, &comparison, &SetDistance::default());
         Ok(Some((tally.map_err(in_words)?, events(&prepared, &matches))))
     };
@@ -135,6 +147,7 @@ fn score(sequence: &Sequence, truth: &TruthFile, result: &mut TaskResult) -> Res
     if let Some((tally, _)) = &image {
         result.lamr_curve = tally.detections.curve();
     }
+    result.missed = missed_people;
     let happened = image.or(metres).map(|(_, events)| events).unwrap_or_default();
     result.events = happened.iter().map(|event| EventRow::new(event, 0)).collect();
     Ok(())

@@ -1,11 +1,12 @@
 //! Runs tasks. Those that see the same frames share one pass over their log.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::outcome::{Failure, say};
+use tagalong_app::remedies;
 use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, Inputs};
@@ -288,7 +289,9 @@ impl Lane {
         let blank = TaskResult { data_lost: lost, ..blank(task) };
         match self.watch.score(truth, shots, blank) {
             Ok((result, recording)) => {
-                (Stored { result, recording: Some(recording) }, Some(timing))
+                let result = TaskResult { deciding: deciding(&self.pipeline, &result), ..result };
+                let stored = Stored { result, recording: Some(recording), ..Stored::default() };
+                (stored, Some(timing))
             }
             Err(why) => failed(task, &why),
         }
@@ -309,7 +312,21 @@ pub fn blank(task: &Task) -> TaskResult {
 
 fn failed(task: &Task, why: &str) -> Kept {
     let outcome = Outcome::Failed { why: why.to_owned() };
-    (Stored { result: TaskResult { outcome, ..blank(task) }, recording: None }, None)
+    let result = TaskResult { outcome, ..blank(task) };
+    (Stored { result, ..Stored::default() }, None)
+}
+
+/// Returns the lines of the config that decide the tests that dropped missed people.
+fn deciding(
+    pipeline: &Result<Pipeline, String>,
+    result: &TaskResult,
+) -> BTreeMap<String, Vec<String>> {
+    let resolved = pipeline.as_ref().ok().map(Pipeline::resolved).unwrap_or_default();
+    let config: toml::Table = toml::from_str(&resolved).unwrap_or_default();
+    let tests: BTreeSet<&String> =
+        result.missed.iter().filter_map(|missed| missed.test.as_ref()).collect();
+    let lines = |test: &String| Some((test.clone(), remedies::of(test)?.lines(&config)));
+    tests.into_iter().filter_map(lines).collect()
 }
 
 /// Goes through the log once more for the pictures of the events.

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
+use tagalong_annotate::{AnnotateArgs, HELP as ANNOTATE_HELP};
 use tagalong_app::format::{Format, TableFormat};
 use tagalong_benchmark::BenchArgs;
 use tagalong_doctor::DoctorArgs;
@@ -49,6 +50,9 @@ pub enum Command {
     /// Makes a page of a run to look at: images, plan, events, and why a person was missed
     #[command(after_help = VIEW_HELP)]
     View(ViewArgs),
+    /// Opens a page to annotate the people of a log: truth for `eval`, `bench` and `view`
+    #[command(after_help = ANNOTATE_HELP)]
+    Annotate(AnnotateArgs),
     /// Lists the plugins
     #[command(after_help = "Example:\n  tagalong list --format json")]
     List {
@@ -188,16 +192,18 @@ Examples:
   tagalong import kitti training --sequence 0013 -o runs/kitti-0013.mcap
   tagalong import mot MOT17-04-FRCNN
   tagalong import images photos --fps 15 --view 69 --height 1.2 --tilt 5
+  tagalong import cvat annotations.xml -o robot.people.csv    (truth for robot.mcap)
   tagalong import images colour --depth depth --depth-unit 0.001 --focal 525";
 
 const FOLLOW_HELP: &str = "\
 Prints how long the right person was followed, and the wrong one, how soon somebody who came back was
 found, the distance, the room to people and things, and how smooth the ride was. The log of a ride has
-its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames).
+its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames); --overlay puts a
+picture per frame beside it.
 
 Examples:
   tagalong follow
-  tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml -o rides
+  tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml -o rides --overlay
   tagalong follow configs/follow-depth.toml --seeds 50 --against configs/follow-as-printed.toml
   tagalong follow configs/follow-depth.toml --latency-ms 150 --drop 0.2 --format markdown";
 

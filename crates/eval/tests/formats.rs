@@ -268,11 +268,42 @@ fn places_that_are_broken_are_named_by_line_and_column() {
     let row = |text: &str| people::parse(&format!("{header}{text}"), "p.csv");
     let read = row("1,4,1,2,3,4,5,6,7,8,0.5,-0.3,2.5,0.75,0,0,300").unwrap()[0].clone();
     assert_eq!((read.ignore, read.interpolated, read.occluder.as_str()), (false, 255, "0"));
-    assert_eq!(read.visible_body, Region::new(5.0, 6.0, 7.0, 8.0));
+    assert_eq!(read.visible_body, Some(Region::new(5.0, 6.0, 7.0, 8.0)));
+    assert!(read.key, "by default");
     for negative in ["1,4,1,2,-3,4,5,6,7,8,0,0,1,1,0,0,0", "1,4,1,2,3,4,5,6,7,-8,0,0,1,1,0,0,0"] {
         assert!(why(row(negative)).contains("p.csv, line 2: a box has a negative size"));
     }
     assert!(row("1,4,1,2,0,0,5,6,0,0,0,0,1,1,0,0,0").is_ok(), "who is out of the image has no box");
+}
+
+#[test]
+fn only_a_box_or_a_place_is_required_of_a_person() {
+    let parse = |text: &str| people::parse(text, "p.csv");
+    let boxes = parse("id,frame,ub_x,ub_y,ub_w,ub_h\n4,2,10,20,30,30\n").unwrap();
+    assert_eq!((boxes[0].frame, boxes[0].id, boxes[0].visible), (2, 4, 1.0));
+    let (_, truth) = boxes[0].truth(|_| panic!("it has no place"));
+    assert_eq!((truth.region, truth.floor_m), (Some(Region::new(10.0, 20.0, 30.0, 30.0)), None));
+    assert_eq!((truth.role, truth.view), (Role::Counts, None));
+    let places = parse("frame,id,head_x,head_y,head_z,ignore\n2,4,0,0,2.5,1\n").unwrap();
+    let (_, truth) = places[0].truth(|[_, _, z]| Some([z, 0.0]));
+    assert_eq!((truth.region, truth.floor_m, truth.role), (None, Some([2.5, 0.0]), Role::Ignored));
+    // Empty cells are those of missing columns.
+    let mixed =
+        "frame,id,ub_x,ub_y,ub_w,ub_h,head_x,head_y,head_z,key\n1,1,5,5,9,9,,,,0\n1,2,,,,,0,0,3,\n";
+    let mixed = parse(mixed).unwrap();
+    assert_eq!((mixed[0].head_in_camera_m, mixed[0].key), (None, false));
+    assert_eq!((mixed[1].upper_body, mixed[1].key), (None, true));
+    assert_eq!(parse(&text(|out| people::write(out, &mixed))).unwrap(), mixed);
+    for (wrong, cause) in [
+        ("frame,id\n1,1\n", "line 1: has neither a box nor a place: add ub_x"),
+        ("frame,ub_x,ub_y,ub_w,ub_h\n", "no column `id`"),
+        ("frame,id,ub_x,ub_y,ub_w\n", "no column `ub_h`"),
+        ("frame,id,head_x,head_y,head_z\n1,1,,,\n", "line 2: has neither a box (ub_*) nor"),
+        ("frame,id,head_x,head_y,head_z\n1,1,2,,3\n", "line 2: fill all of head_x, head_y, head_z"),
+    ] {
+        let error = why(parse(wrong));
+        assert!(error.contains(cause), "{error}");
+    }
 }
 
 #[test]

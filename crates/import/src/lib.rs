@@ -3,6 +3,7 @@
 //! Each kind is a module that reads its layout into a `Sequence`; one writer makes a log of it.
 //! No other part of Tagalong knows these layouts.
 
+mod cvat;
 mod folders;
 mod kitti;
 mod recorded;
@@ -31,6 +32,9 @@ pub enum Kind {
     Mot,
     /// A folder of JPEG or PNG images, in the order of their names.
     Images,
+    /// The XML file of annotations made with CVAT (for video 1.1 or for images 1.1): truth for a log
+    /// instead of a log.
+    Cvat,
 }
 
 /// Arguments of `tagalong import`.
@@ -41,7 +45,7 @@ pub struct ImportArgs {
     pub kind: Kind,
     /// File or folder to import.
     pub path: PathBuf,
-    /// The log to write [default: runs/NAME.mcap].
+    /// The log to write [default: runs/NAME.mcap]; cvat: the truth [default: NAME.people.csv].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
     /// Replace the log if it exists.
@@ -77,6 +81,10 @@ pub struct ImportArgs {
     /// images: metres per unit of depth.
     #[arg(long, value_name = "M", default_value_t = 0.001, requires = "depth", value_parser = positive)]
     pub depth_unit: f64,
+    /// cvat: boxes are of whole bodies, of which the upper bodies are compared: writes
+    /// NAME.boxes.csv.
+    #[arg(long)]
+    pub whole_bodies: bool,
     /// Output format of the result.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
@@ -122,6 +130,9 @@ pub fn import(args: &ImportArgs) -> Outcome {
     if !path.exists() {
         return Err(Failure::failed(format!("{}: no such file or folder", path.display())));
     }
+    if args.kind == Kind::Cvat {
+        return cvat::import(args);
+    }
     let log = args.output.clone().unwrap_or_else(|| default_log(args));
     let signals = Signals::listen()?;
     spare(&log, args.overwrite)?;
@@ -156,6 +167,7 @@ fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
         Kind::Kitti => kitti::read(args)?,
         Kind::Mot => folders::mot(args)?,
         Kind::Images => folders::images(args)?,
+        Kind::Cvat => return Err(Failure::usage("annotations of CVAT are no log")),
     };
     if sequence.moments.is_empty() {
         return Err(Failure::failed(format!("{} has no images", args.path.display())));

@@ -1,7 +1,7 @@
 //! Canvas with lines, boxes and text.
 
-use font8x8::legacy::BASIC_LEGACY;
 use nalgebra::Point2;
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 use tagalong_core::RgbImage;
 use tagalong_geometry::Rect;
 
@@ -26,8 +26,48 @@ impl Ink {
     }
 }
 
-/// Height of a line of text, pixels.
-pub const LINE_PX: f64 = 10.0;
+/// Space around a text on its bar, pixels.
+const BAR_PX: f64 = 1.0;
+
+/// Height of a line of [`Lettering::Small`] text, pixels.
+pub const LINE_PX: f64 = 16.0 + 2.0 * BAR_PX;
+
+/// Length of a dash and the gap after it, pixels.
+const DASH_PX: i64 = 8;
+
+/// Size and weight of a text.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lettering {
+    /// 16 pixels, for notes.
+    #[default]
+    Small,
+    /// 16 pixels, bold, for names in images of up to 1000 columns.
+    Bold,
+    /// 20 pixels, bold, for names in larger images.
+    Large,
+}
+
+impl Lettering {
+    /// Returns the lettering of names in an image.
+    pub const fn of_width(columns: usize) -> Self {
+        if columns > 1000 { Self::Large } else { Self::Bold }
+    }
+
+    /// Returns the width and the height of a line of text with its bar, pixels.
+    pub fn size_px(self, text: &str) -> [f64; 2] {
+        let (weight, height) = self.raster();
+        let columns = get_raster_width(weight, height) * text.chars().count();
+        [columns as f64 + 2.0 * BAR_PX, height.val() as f64 + 2.0 * BAR_PX]
+    }
+
+    const fn raster(self) -> (FontWeight, RasterHeight) {
+        match self {
+            Self::Small => (FontWeight::Regular, RasterHeight::Size16),
+            Self::Bold => (FontWeight::Bold, RasterHeight::Size16),
+            Self::Large => (FontWeight::Bold, RasterHeight::Size20),
+        }
+    }
+}
 
 /// Picture to paint on. Everything outside it is cut off.
 pub struct Canvas {
@@ -38,6 +78,11 @@ impl Canvas {
     /// Returns a canvas of one colour.
     pub fn new(width: usize, height: usize, rgb: [u8; 3]) -> Self {
         Self { image: RgbImage::filled(width, height, rgb) }
+    }
+
+    /// Returns the number of columns.
+    pub fn width(&self) -> usize {
+        self.image.width()
     }
 
     /// Returns the number of rows.
@@ -99,6 +144,13 @@ impl Canvas {
         }
     }
 
+    /// Paints lines through all points, two pixels thick.
+    pub fn thick_path(&mut self, points: &[Point2<f64>], ink: Ink) {
+        self.path(points, ink);
+        let below: Vec<_> = points.iter().map(|p| Point2::new(p.x, p.y + 1.0)).collect();
+        self.path(&below, ink);
+    }
+
     /// Paints the outline of a rectangle, `thick` pixels wide, growing inwards.
     pub fn outline(&mut self, rect: &Rect, thick: u32, ink: Ink) {
         for inset in 0..thick {
@@ -107,6 +159,31 @@ impl Canvas {
             let (right, bottom) = (x + rect.width - by - 1.0, y + rect.height - by - 1.0);
             let corners = [(x, y), (right, y), (right, bottom), (x, bottom), (x, y)];
             self.path(&corners.map(|(x, y)| Point2::new(x, y)), ink);
+        }
+    }
+
+    /// Paints the dashed outline of a rectangle, one pixel wide.
+    pub fn dashed(&mut self, rect: &Rect, ink: Ink) {
+        let (left, top) = (rect.x.floor() as i64, rect.y.floor() as i64);
+        let (right, bottom) =
+            ((rect.right() - 1.0).floor() as i64, (rect.bottom() - 1.0).floor() as i64);
+        let (width, height) = (self.image.width() as i64, self.image.height() as i64);
+        // Only columns and rows of the canvas, however far the rectangle reaches.
+        for x in left.max(0)..=right.min(width - 1) {
+            for y in [top, bottom] {
+                self.dash(x, y, x - left, ink);
+            }
+        }
+        for y in top.max(0)..=bottom.min(height - 1) {
+            for x in [left, right] {
+                self.dash(x, y, y - top, ink);
+            }
+        }
+    }
+
+    fn dash(&mut self, x: i64, y: i64, along: i64, ink: Ink) {
+        if along % DASH_PX < DASH_PX / 2 {
+            self.dot(x, y, ink);
         }
     }
 
@@ -133,26 +210,38 @@ impl Canvas {
         }
     }
 
-    /// Paints a line of text on a dark bar; `at` is its upper left corner. Text that would leave
-    /// the canvas is moved inside.
+    /// Paints a line of small text on a dark bar; `at` is its upper left corner. Text that would
+    /// leave the canvas is moved inside.
     pub fn text(&mut self, at: Point2<f64>, text: &str, ink: Ink) {
-        let width = 8.0 * text.chars().count() as f64;
-        let room = (self.image.width() as f64 - width - 1.0, self.image.height() as f64 - LINE_PX);
-        let x = at.x.min(room.0).max(1.0).floor();
-        let y = at.y.min(room.1).max(1.0).floor();
-        let bar = Rect::new(x - 1.0, y - 1.0, width + 2.0, LINE_PX);
-        self.fill(&bar, Ink::solid([0, 0, 0]).faint(0.6 * ink.opacity));
-        for (index, letter) in text.chars().enumerate() {
-            self.letter(x as i64 + 8 * index as i64, y as i64, letter, ink);
+        self.write(at, text, Lettering::Small, ink);
+    }
+
+    /// Paints a line of text on a dark bar; `at` is the upper left corner of the bar. Text that
+    /// would leave the canvas is moved inside.
+    pub fn write(&mut self, at: Point2<f64>, text: &str, lettering: Lettering, ink: Ink) {
+        let [width, height] = lettering.size_px(text);
+        let room = (self.image.width() as f64 - width, self.image.height() as f64 - height);
+        let x = at.x.min(room.0).max(0.0).floor();
+        let y = at.y.min(room.1).max(0.0).floor();
+        let bar = Rect::new(x, y, width, height);
+        self.fill(&bar, Ink::solid([0, 0, 0]).faint(0.7 * ink.opacity));
+        let (weight, raster) = lettering.raster();
+        let advance = get_raster_width(weight, raster) as i64;
+        let (mut x, y) = ((x + BAR_PX) as i64, (y + BAR_PX) as i64);
+        for letter in text.chars() {
+            self.letter(x, y, letter, lettering, ink);
+            x += advance;
         }
     }
 
-    fn letter(&mut self, x: i64, y: i64, letter: char, ink: Ink) {
-        // The font has ASCII only.
-        let glyph = BASIC_LEGACY.get(letter as usize).unwrap_or(&BASIC_LEGACY['?' as usize]);
-        for (dy, row) in (0..).zip(glyph) {
-            for dx in (0..8).filter(|dx| row >> dx & 1 == 1) {
-                self.dot(x + dx, y + dy, ink);
+    fn letter(&mut self, x: i64, y: i64, letter: char, lettering: Lettering, ink: Ink) {
+        let (weight, height) = lettering.raster();
+        let glyph = |letter| get_raster(letter, weight, height);
+        // The font is built with ASCII only.
+        let Some(glyph) = glyph(letter).or_else(|| glyph('?')) else { return };
+        for (dy, row) in (0..).zip(glyph.rows()) {
+            for (dx, cover) in (0..).zip(row).filter(|(_, cover)| **cover > 0) {
+                self.dot(x + dx, y + dy, ink.faint(ink.opacity * f32::from(*cover) / 255.0));
             }
         }
     }
@@ -204,10 +293,11 @@ mod tests {
 
     #[test]
     fn letters_read_left_to_right() {
-        let mut canvas = Canvas::new(20, 12, [0; 3]);
+        let mut canvas = Canvas::new(20, 20, [0; 3]);
         canvas.text(Point2::new(1.0, 1.0), "L", WHITE);
-        let left = lit(&canvas).iter().filter(|(x, _)| *x < 5).count();
-        let right = lit(&canvas).iter().filter(|(x, _)| *x >= 5).count();
+        let middle = 1 + Lettering::Small.size_px("L")[0] as usize / 2;
+        let left = lit(&canvas).iter().filter(|(x, _)| *x < middle).count();
+        let right = lit(&canvas).iter().filter(|(x, _)| *x >= middle).count();
         assert!(left > right, "the stem of an L is on its left: {left} {right}");
     }
 
@@ -241,6 +331,7 @@ mod tests {
             canvas.disc(Point2::new(x, y), r, WHITE);
             canvas.text(Point2::new(x, y), "far away", WHITE);
             canvas.outline(&Rect::new(x, y, r, r), 2, WHITE);
+            canvas.dashed(&Rect::new(x, y, 1e9 * r, r), WHITE);
             canvas.line(Point2::new(x, y), Point2::new(y, x), WHITE);
             canvas.fill(&Rect::new(x, y, 1e9, 1e9), WHITE);
         }

@@ -4,36 +4,96 @@ use tagalong_geometry::Rect;
 use tagalong_pipeline::Fate;
 use tagalong_vision::{Sketch, SketchMap, SketchPoint};
 
-use super::canvas::{Canvas, Ink, LINE_PX};
+use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
+use super::enlarge::{enlarge, factor};
+use super::labels::Labels;
 use super::trails::Trails;
-use super::{OverlayData, colour_of};
+use super::{OverlayData, TENTATIVE, colour_of};
 
 /// Depth at which the shading of depth images is darkest, m.
 const FAR_M: f32 = 8.0;
 
-const REJECTED: Ink = Ink::solid([200, 200, 200]).faint(0.55);
+/// Colour of dropped candidates.
+pub const DROPPED: Ink = Ink::solid([215, 215, 215]).faint(0.7);
+
 const TITLE: Ink = Ink::solid([255, 255, 255]);
+
+/// Camera's image with all overlays, enlarged.
+struct ImageView {
+    canvas: Canvas,
+    scale: f64,
+}
 
 /// Renders the camera's image with all overlays.
 pub fn draw(scene: &OverlayData, trails: &Trails) -> Canvas {
-    let (width, height) = (scene.camera.width, scene.camera.height);
-    let mut canvas = Canvas::new(width, height, [0; 3]);
+    let by = factor(scene.camera.width);
+    let (width, height) = (by * scene.camera.width, by * scene.camera.height);
+    let mut view = ImageView { canvas: Canvas::new(width, height, [0; 3]), scale: by as f64 };
     if let Some(picture) = background(&scene.images) {
-        canvas.paste(&picture, 0, 0);
+        view.canvas.paste(&enlarge(&picture, by), 0, 0);
     }
+    let mut labels = labels(scene, by);
     // Tracks come last, so that nothing hides them.
     let shown = scene.report.visualisation.as_ref();
     if let Some(sketch) = shown.and_then(|shown| shown.downcast_ref::<Sketch>()) {
-        draw_sketch(&mut canvas, sketch);
+        view.draw_sketch(sketch, &mut labels);
     }
-    draw_rejected(&mut canvas, scene);
-    draw_trails(&mut canvas, scene, trails);
+    view.draw_dropped(scene);
+    view.draw_trails(scene, trails);
     // Far to near, so that near people cover far ones.
     for track in scene.report.tracks.iter().rev() {
-        draw_track(&mut canvas, track);
+        let region = view.scaled(&track.estimate.region);
+        draw_box(&mut view.canvas, &region, track.seen, colour(track));
     }
-    canvas.text(Point2::new(2.0, 2.0), &title(scene), TITLE);
-    canvas
+    add_labels(&mut labels, scene, by);
+    labels.paint(&mut view.canvas);
+    view.canvas
+}
+
+fn colour(track: &Track) -> Ink {
+    if track.confirmed { colour_of(track.id.0) } else { TENTATIVE }
+}
+
+fn scaled(rect: &Rect, by: f64) -> Rect {
+    Rect::new(by * rect.x, by * rect.y, by * rect.width, by * rect.height)
+}
+
+/// Returns the place for the labels, which spare the boxes of tracks.
+fn labels(scene: &OverlayData, by: usize) -> Labels {
+    let (width, height) = (by * scene.camera.width, by * scene.camera.height);
+    let tracks = scene.report.tracks.iter().filter(|track| track.confirmed);
+    let spared = tracks.map(|track| scaled(&track.estimate.region, by as f64)).collect();
+    Labels::within(Rect::new(0.0, 0.0, width as f64, height as f64), spared)
+}
+
+/// Adds the labels of tracks, near to far, and those of dropped candidates where there is room.
+pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize) {
+    let lettering = Lettering::of_width(by * scene.camera.width);
+    for track in &scene.report.tracks {
+        let region = scaled(&track.estimate.region, by as f64);
+        labels.add(&region, name_of(track), lettering, colour(track));
+    }
+    for (region, test) in dropped(scene) {
+        labels.add_if_room(&scaled(&region, by as f64), test, Lettering::Small, DROPPED.faint(1.0));
+    }
+}
+
+/// Returns the labels of a scene as they are placed.
+#[cfg(test)]
+pub fn placed_labels(scene: &OverlayData) -> Labels {
+    let by = factor(scene.camera.width);
+    let mut labels = labels(scene, by);
+    add_labels(&mut labels, scene, by);
+    labels
+}
+
+/// Renders the box of a track, thick if it is seen and thin if it is only predicted, with a dark
+/// rim that sets it off from bright images.
+pub fn draw_box(canvas: &mut Canvas, region: &Rect, seen: bool, ink: Ink) {
+    let thick = if seen { 3 } else { 1 };
+    let rim = Rect::new(region.x - 1.0, region.y - 1.0, region.width + 2.0, region.height + 2.0);
+    canvas.outline(&rim, thick + 2, Ink::solid([0; 3]).faint(0.5));
+    canvas.outline(region, thick, ink);
 }
 
 /// Returns the best picture of the scene in the log: colour, grey, or shaded depth.
@@ -58,87 +118,97 @@ fn shaded(depth: &DepthImage) -> RgbImage {
     })
 }
 
-fn title(scene: &OverlayData) -> String {
-    let people = scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count();
-    format!("frame {}  {} s  {people} seen", scene.report.index, scene.report.stamp)
-}
-
-/// Renders the state of the filter: bodies, particles, and maps in the lower
-/// left corner.
-fn draw_sketch(canvas: &mut Canvas, sketch: &Sketch) {
-    for body in &sketch.silhouettes {
-        let ink = colour_of(body.id.0).faint(0.4);
-        body.runs.iter().for_each(|run| canvas.fill(run, ink));
-    }
-    for SketchPoint { id, pixel, weight } in &sketch.points {
-        let opacity = 0.25 + 0.75 * weight.clamp(0.0, 1.0);
-        canvas.disc(*pixel, 1.5, colour_of(id.0).faint(opacity as f32));
-    }
-    let mut bottom = canvas.height() as f64 - MAP_MARGIN_PX;
-    for map in &sketch.maps {
-        bottom -= draw_map(canvas, map, bottom) + MAP_MARGIN_PX;
-    }
-}
-
-/// Side of a map's cell, and margin around a map, pixels.
+/// Side of a map's cell in the image, and margin around a map, pixels.
 const CELL_PX: f64 = 2.0;
 const MAP_MARGIN_PX: f64 = 4.0;
 
-/// Renders one map with its title, above `bottom`; returns its height, pixels.
-fn draw_map(canvas: &mut Canvas, map: &SketchMap, bottom: f64) -> f64 {
-    let rows = map.values.len().div_ceil(map.columns.max(1));
-    let height = CELL_PX * rows as f64;
-    for (i, value) in map.values.iter().enumerate() {
-        let (x, y) = ((i % map.columns.max(1)) as f64, (i / map.columns.max(1)) as f64);
-        let shade = (255.0 * value.clamp(0.0, 1.0)) as u8;
-        let cell =
-            Rect::new(MAP_MARGIN_PX + CELL_PX * x, bottom - height + CELL_PX * y, CELL_PX, CELL_PX);
-        canvas.fill(&cell, Ink::solid([shade, shade / 2, 255 - shade]));
+impl ImageView {
+    fn scaled(&self, rect: &Rect) -> Rect {
+        scaled(rect, self.scale)
     }
-    canvas.text(Point2::new(MAP_MARGIN_PX, bottom - height - LINE_PX), &map.title, TITLE);
-    height + LINE_PX
-}
 
-/// Renders the dropped candidates, with the test that dropped them.
-fn draw_rejected(canvas: &mut Canvas, scene: &OverlayData) {
-    for candidate in &scene.report.candidates {
-        if let Fate::Dropped(test) = candidate.fate {
-            label(canvas, &candidate.detection.rect_in(&scene.camera), test);
+    fn pixel(&self, point: &Point2<f64>) -> Point2<f64> {
+        point * self.scale
+    }
+
+    /// Renders the state of the filter: bodies, particles, and maps in the lower left corner.
+    fn draw_sketch(&mut self, sketch: &Sketch, labels: &mut Labels) {
+        for body in &sketch.silhouettes {
+            let ink = colour_of(body.id.0).faint(0.4);
+            body.runs.iter().for_each(|run| self.canvas.fill(&scaled(run, self.scale), ink));
+        }
+        for SketchPoint { id, pixel, weight } in &sketch.points {
+            let opacity = 0.25 + 0.75 * weight.clamp(0.0, 1.0);
+            let ink = colour_of(id.0).faint(opacity as f32);
+            self.canvas.disc(self.pixel(pixel), 1.0 + 0.5 * self.scale, ink);
+        }
+        let mut bottom = self.canvas.height() as f64 - MAP_MARGIN_PX;
+        for map in &sketch.maps {
+            let place = self.draw_map(map, bottom);
+            bottom -= place.height + MAP_MARGIN_PX;
+            labels.reserve(place);
         }
     }
-    // A funnel entry without a visible candidate is shown once, with its count.
+
+    /// Renders one map with its title, above `bottom`; returns its place.
+    fn draw_map(&mut self, map: &SketchMap, bottom: f64) -> Rect {
+        let columns = map.columns.max(1);
+        let (cell, left) = (CELL_PX * self.scale, MAP_MARGIN_PX);
+        let height = cell * map.values.len().div_ceil(columns) as f64;
+        for (i, value) in map.values.iter().enumerate() {
+            let (x, y) = ((i % columns) as f64, (i / columns) as f64);
+            let shade = (255.0 * value.clamp(0.0, 1.0)) as u8;
+            let place = Rect::new(left + cell * x, bottom - height + cell * y, cell, cell);
+            self.canvas.fill(&place, Ink::solid([shade, shade / 2, 255 - shade]));
+        }
+        let top = bottom - height - LINE_PX;
+        self.canvas.text(Point2::new(left, top), &map.title, TITLE);
+        let width = (cell * columns as f64).max(Lettering::Small.size_px(&map.title)[0]);
+        Rect::new(left, top, width, height + LINE_PX)
+    }
+
+    fn draw_dropped(&mut self, scene: &OverlayData) {
+        for (region, _) in dropped(scene) {
+            let region = self.scaled(&region);
+            self.canvas.dashed(&region, DROPPED);
+        }
+    }
+
+    fn draw_trails(&mut self, scene: &OverlayData, trails: &Trails) {
+        for (id, trail) in trails.in_robot(scene) {
+            let seen = trail.iter().filter_map(|p| scene.camera.project(p));
+            let points: Vec<_> = seen.map(|p| self.pixel(&p)).collect();
+            self.canvas.thick_path(&points, colour_of(id.0).faint(0.8));
+        }
+    }
+}
+
+/// Returns the regions of dropped candidates, with the test that dropped them.
+fn dropped(scene: &OverlayData) -> Vec<(Rect, String)> {
+    let mut all = Vec::new();
+    for candidate in &scene.report.candidates {
+        if let Fate::Dropped(test) = candidate.fate {
+            all.push((candidate.detection.rect_in(&scene.camera), test.to_owned()));
+        }
+    }
+    // A funnel entry without a visible candidate is shown once; the legend has its count.
     for entry in scene.report.funnel.entries() {
         let shown = scene.report.candidates.iter().any(|c| c.fate == Fate::Dropped(entry.test));
         if let Some(region) = entry.example.filter(|_| !shown) {
-            label(canvas, &region, &format!("{} x{}", entry.test, entry.count));
+            all.push((region, entry.test.to_owned()));
         }
     }
+    all
 }
 
-fn label(canvas: &mut Canvas, region: &Rect, test: &str) {
-    canvas.outline(region, 1, REJECTED);
-    canvas.text(Point2::new(region.x, region.bottom() - LINE_PX), test, REJECTED);
-}
-
-fn draw_trails(canvas: &mut Canvas, scene: &OverlayData, trails: &Trails) {
-    for (id, trail) in trails.in_robot(scene) {
-        let points: Vec<_> = trail.iter().filter_map(|p| scene.camera.project(p)).collect();
-        canvas.path(&points, colour_of(id.0).faint(0.8));
-    }
-}
-
-/// Renders a track. Seen: a thick box; predicted only: a thin one; tentative: grey.
-fn draw_track(canvas: &mut Canvas, track: &Track) {
-    let ink = if track.confirmed { colour_of(track.id.0) } else { REJECTED };
-    let region = &track.estimate.region;
-    canvas.outline(region, if track.seen { 2 } else { 1 }, ink);
+/// Returns the number of a track, its state, and its distance from the robot.
+fn name_of(track: &Track) -> String {
     let state = match (track.confirmed, track.seen, track.occluded) {
-        (false, _, _) => " ?",
+        (false, _, _) => "?",
         (true, true, _) => "",
         (true, false, true) => " hidden",
         (true, false, false) => " unseen",
     };
     let distance = track.estimate.person.position.xy().coords.norm();
-    let text = format!("{}{state} {distance:.1}m", track.id);
-    canvas.text(Point2::new(region.x, region.y - LINE_PX), &text, ink);
+    format!("{}{state} {distance:.1} m", track.id)
 }

@@ -1,11 +1,16 @@
 //! Pictures of the pipeline's detections and tracks, one per frame.
 //!
-//! On the left the camera's image (depth in shades where there is no colour) with upper-body boxes,
-//! ids and trails; dropped candidates are rendered faintly with the test that dropped them. On the
-//! right the same people from above.
+//! On the left the camera's image (depth in shades where there is no colour), enlarged to at least
+//! 640 columns, with upper-body boxes, ids and trails; dropped candidates are dashed, with the test
+//! that dropped them. On the right the same people from above, below a legend. All pictures of a run
+//! have the same size.
 
 pub mod canvas;
+mod enlarge;
 mod image_view;
+mod jpeg;
+mod labels;
+mod legend;
 mod plan_view;
 mod trails;
 
@@ -16,6 +21,7 @@ use std::sync::Arc;
 
 use self::canvas::{Canvas, Ink};
 pub use image_view::background;
+pub use jpeg::jpeg;
 use nalgebra::Isometry2;
 use tagalong_core::{Images, RgbImage};
 use tagalong_geometry::Camera;
@@ -58,13 +64,21 @@ impl Overlay {
     }
 }
 
+/// Least rows of image and plan: below, the numbers in the plan would not be legible.
+const LEAST_ROWS: usize = 360;
+
+const TENTATIVE: Ink = Ink::solid([190, 190, 190]);
+
 fn picture(scene: &OverlayData, trails: &Trails) -> RgbImage {
-    let (width, height) = (scene.camera.width, scene.camera.height);
-    let plan_width = plan_view::width_px(height);
-    let mut canvas = Canvas::new(width + plan_width, height, [24, 24, 28]);
-    plan_view::draw(&mut canvas, width, scene, trails);
-    // The image comes second and covers the parts of the plan view beyond its area.
-    canvas.paste(&image_view::draw(scene, trails).into_image(), 0, 0);
+    let image = image_view::draw(scene, trails).into_image();
+    // Even, because most video formats ask for it.
+    let [left, rows] =
+        [image.width(), image.height().max(LEAST_ROWS)].map(|n| n.next_multiple_of(2));
+    let plan_width = plan_view::width_px(rows);
+    let mut canvas = Canvas::new(left + plan_width, rows + legend::HEIGHT_PX, [24, 24, 28]);
+    canvas.paste(&plan_view::draw(scene, trails, rows).into_image(), left, 0);
+    canvas.paste(&image, 0, 0);
+    legend::draw(&mut canvas, rows, scene);
     canvas.into_image()
 }
 

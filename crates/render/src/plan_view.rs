@@ -1,9 +1,11 @@
 use nalgebra::{Matrix2, Point2, Point3, SymmetricEigen, Vector2};
 use tagalong_core::Track;
+use tagalong_geometry::Rect;
 
-use super::canvas::{Canvas, Ink};
+use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
+use super::labels::Labels;
 use super::trails::Trails;
-use super::{OverlayData, colour_of};
+use super::{OverlayData, TENTATIVE, colour_of};
 
 /// Reach of the view ahead of the robot, m.
 const AHEAD_M: f64 = 8.0;
@@ -11,34 +13,47 @@ const AHEAD_M: f64 = 8.0;
 /// Reach of the view behind the robot, m.
 const BEHIND_M: f64 = 1.0;
 
+/// Half the side of the square around a person that labels spare, pixels.
+const MARK_PX: f64 = 8.0;
+
 const GRID: Ink = Ink::solid([60, 60, 68]);
 const AXIS: Ink = Ink::solid([150, 150, 160]);
 const VIEW: Ink = Ink::solid([110, 130, 170]);
-const TENTATIVE: Ink = Ink::solid([150, 150, 150]);
 
 /// Returns the columns of the view beside an image with `height` rows.
 pub fn width_px(height: usize) -> usize {
-    (height * 4 / 5).max(16)
+    (height * 4 / 5).next_multiple_of(2)
 }
 
 /// Map from metres on the floor to pixels: ahead is up, left is left.
 struct Plan {
     robot: Point2<f64>,
     px_per_m: f64,
-    left_edge: f64,
     width: f64,
 }
 
 impl Plan {
-    fn new(left: usize, height: usize) -> Self {
+    fn new(height: usize) -> Self {
         let px_per_m = height as f64 / (AHEAD_M + BEHIND_M);
         let width = width_px(height) as f64;
-        let robot = Point2::new(left as f64 + 0.5 * width, AHEAD_M * px_per_m);
-        Self { robot, px_per_m, left_edge: left as f64, width }
+        let robot = Point2::new(0.5 * width, AHEAD_M * px_per_m);
+        Self { robot, px_per_m, width }
     }
 
     fn pixel(&self, forward_m: f64, left_m: f64) -> Point2<f64> {
         self.robot - Vector2::new(left_m, forward_m) * self.px_per_m
+    }
+
+    /// Returns the square around a person.
+    fn mark(&self, track: &Track) -> Rect {
+        let at = self.of(&track.estimate.person.position);
+        Rect::new(at.x - MARK_PX, at.y - MARK_PX, 2.0 * MARK_PX, 2.0 * MARK_PX)
+    }
+
+    /// Returns true if a person is within the view.
+    fn shows(&self, track: &Track, height: usize) -> bool {
+        let whole = Rect::new(0.0, 0.0, self.width, height as f64);
+        whole.contains(self.of(&track.estimate.person.position))
     }
 
     fn of(&self, point_in_robot: &Point3<f64>) -> Point2<f64> {
@@ -46,19 +61,39 @@ impl Plan {
     }
 }
 
-/// Renders the people from above, to the right of column `left`.
-pub fn draw(canvas: &mut Canvas, left: usize, scene: &OverlayData, trails: &Trails) {
-    let plan = Plan::new(left, scene.camera.height);
-    draw_grid(canvas, &plan);
-    draw_field_of_view(canvas, &plan, scene);
-    canvas.disc(plan.robot, 4.0, AXIS);
+/// Renders the people from above, `height` pixels high.
+pub fn draw(scene: &OverlayData, trails: &Trails, height: usize) -> Canvas {
+    let plan = Plan::new(height);
+    let mut canvas = Canvas::new(width_px(height), height, [24, 24, 28]);
+    draw_grid(&mut canvas, &plan);
+    draw_field_of_view(&mut canvas, &plan, scene);
+    canvas.disc(plan.robot, 5.0, AXIS);
     for (id, trail) in trails.in_robot(scene) {
         let points: Vec<_> = trail.iter().map(|p| plan.of(p)).collect();
-        canvas.path(&points, colour_of(id.0).faint(0.7));
+        canvas.thick_path(&points, colour_of(id.0).faint(0.7));
     }
+    let is_target = |track: &Track| scene.report.target == Some(track.id);
     for track in scene.report.tracks.iter().rev() {
-        draw_track(canvas, &plan, track, scene.report.target == Some(track.id));
+        draw_track(&mut canvas, &plan, track, is_target(track));
     }
+    let mut labels = labels(scene, &plan, height);
+    for track in scene.report.tracks.iter().filter(|track| plan.shows(track, height)) {
+        let text =
+            if is_target(track) { format!("{} target", track.id) } else { track.id.to_string() };
+        labels.add(&plan.mark(track), text, Lettering::Bold, colour(track));
+    }
+    labels.paint(&mut canvas);
+    canvas
+}
+
+/// Returns the place for the labels, which spare the marks of all tracks.
+fn labels(scene: &OverlayData, plan: &Plan, height: usize) -> Labels {
+    let marks = scene.report.tracks.iter().map(|track| plan.mark(track)).collect();
+    Labels::within(Rect::new(0.0, 0.0, plan.width, height as f64), marks)
+}
+
+fn colour(track: &Track) -> Ink {
+    if track.confirmed { colour_of(track.id.0) } else { TENTATIVE }
 }
 
 /// Renders a line every metre, its number every second one.
@@ -71,11 +106,10 @@ fn draw_grid(canvas: &mut Canvas, plan: &Plan) {
     }
     for metre in -(BEHIND_M as i32)..=AHEAD_M as i32 {
         let row = plan.pixel(f64::from(metre), 0.0).y;
-        let right = plan.left_edge + plan.width;
-        canvas.line(Point2::new(plan.left_edge, row), Point2::new(right, row), GRID);
+        canvas.line(Point2::new(0.0, row), Point2::new(plan.width, row), GRID);
         if metre > 0 && metre % 2 == 0 {
-            let at = Point2::new(plan.left_edge + 2.0, row - 4.0);
-            canvas.text(at, &format!("{metre}m"), AXIS);
+            let at = Point2::new(2.0, row - 0.5 * LINE_PX);
+            canvas.text(at, &format!("{metre} m"), AXIS);
         }
     }
 }
@@ -94,18 +128,16 @@ fn draw_field_of_view(canvas: &mut Canvas, plan: &Plan, scene: &OverlayData) {
 }
 
 fn draw_track(canvas: &mut Canvas, plan: &Plan, track: &Track, target: bool) {
-    let ink = if track.confirmed { colour_of(track.id.0) } else { TENTATIVE };
+    let ink = colour(track);
     let person = &track.estimate.person;
     let at = plan.of(&person.position);
     let opacity = if track.seen { 1.0 } else { 0.5 };
-    canvas.disc(at, if target { 6.0 } else { 4.0 }, ink.faint(opacity));
+    canvas.disc(at, if target { 7.0 } else { 5.0 }, ink.faint(opacity));
     // The line ends where the person will be in one second.
     let soon = person.position.xy() + person.velocity;
     canvas.line(at, plan.pixel(soon.x, soon.y), ink.faint(opacity));
     let covariance = track.estimate.covariance.fixed_view::<2, 2>(0, 0).into_owned();
     canvas.path(&ellipse(plan, &person.position, covariance), ink.faint(0.6));
-    let text = if target { format!("{} target", track.id) } else { track.id.to_string() };
-    canvas.text(at + Vector2::new(8.0, -4.0), &text, ink);
 }
 
 /// Returns the ellipse of two standard deviations around a position on the floor.

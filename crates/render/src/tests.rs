@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use nalgebra::{Point2, Point3, SMatrix, Vector2};
 use tagalong_core::{DepthImage, Detection, Estimate, Person, Stamp, Track, TrackId};
 use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
@@ -39,15 +41,14 @@ fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> OverlayData {
     }
 }
 
-fn changed(a: &RgbImage, b: &RgbImage, columns: std::ops::Range<usize>) -> usize {
-    let rows = 0..a.height();
+fn changed(a: &RgbImage, b: &RgbImage, columns: Range<usize>, rows: Range<usize>) -> usize {
     rows.flat_map(|y| columns.clone().map(move |x| (x, y)))
         .filter(|(x, y)| a.row(*y)[*x] != b.row(*y)[*x])
         .count()
 }
 
 #[test]
-fn what_the_filter_imagines_shows_in_the_image() {
+fn the_state_of_the_filter_shows_in_the_image() {
     let without = picture(&scene(&[], Vec::new()), &Trails::default());
     let mut scene = scene(&[], Vec::new());
     let run = Rect::new(100.0, 60.0, 30.0, 2.0);
@@ -57,23 +58,66 @@ fn what_the_filter_imagines_shows_in_the_image() {
         maps: vec![SketchMap { title: String::new(), columns: 10, values: vec![0.5; 50] }],
     }));
     let with = picture(&scene, &Trails::default());
-    assert_eq!(changed(&without, &with, 100..130), 60, "a run");
-    assert!(changed(&without, &with, 195..206) > 0, "a particle");
+    let changed = |columns| changed(&without, &with, columns, 0..480);
+    assert_eq!(changed(200..260), 4 * 60, "a run, twice as large in both directions");
+    assert!(changed(390..412) > 4, "a particle");
     let title = 2 * LINE_PX as usize;
-    assert_eq!(changed(&without, &with, 0..40), 20 * 10 + title, "a map, and its title's bar");
+    assert_eq!(changed(0..80), 40 * 20 + title, "a map, and its title's bar");
 }
 
 #[test]
 fn a_person_shows_in_the_image_and_from_above() {
     let empty = picture(&scene(&[], Vec::new()), &Trails::default());
     let one = picture(&scene(&[1], Vec::new()), &Trails::default());
-    assert_eq!((one.width(), one.height()), (320 + 192, 240));
-    assert!(changed(&empty, &one, 0..320) > 100);
-    assert!(changed(&empty, &one, 320..512) > 50);
+    assert!(changed(&empty, &one, 0..640, 0..480) > 400);
+    assert!(changed(&empty, &one, 640..1024, 0..480) > 100);
+    // Title and counts are in the strip below.
+    assert!(changed(&empty, &one, 0..640, 480..544) > 10);
 }
 
 #[test]
-fn what_was_dropped_is_drawn_too() {
+fn small_images_are_enlarged_to_640_columns_and_all_pictures_have_one_even_size() {
+    let size = |scene: &OverlayData| {
+        let picture = picture(scene, &Trails::default());
+        (picture.width(), picture.height())
+    };
+    let image = (640, 480);
+    let plan = 480 * 4 / 5;
+    assert_eq!(size(&scene(&[], Vec::new())), (image.0 + plan, image.1 + legend::HEIGHT_PX));
+    assert_eq!(size(&scene(&[1, 2], Vec::new())), size(&scene(&[], Vec::new())));
+    let mut odd = scene(&[1], Vec::new());
+    odd.camera = Arc::new(Camera { width: 217, height: 121, ..(*odd.camera).clone() });
+    let (width, height) = size(&odd);
+    assert!(width >= 640 && width % 2 == 0 && height % 2 == 0, "{width} {height}");
+    // Without a camera there is the plan alone.
+    odd.camera = Arc::new(Camera { width: 0, height: 0, ..(*odd.camera).clone() });
+    odd.images = Images::default();
+    assert_eq!(size(&odd), (LEAST_ROWS * 4 / 5, LEAST_ROWS + legend::HEIGHT_PX));
+}
+
+#[test]
+fn the_labels_of_two_people_side_by_side_do_not_overlap() {
+    let mut scene = scene(&[1, 2, 3], vec![dropped("head width")]);
+    // Beside each other, and the third one at the upper edge of the image.
+    for (track, x, y) in [(0, 100.0, 60.0), (1, 112.0, 62.0), (2, 100.0, -10.0)] {
+        let region = &mut scene.report.tracks[track].estimate.region;
+        (region.x, region.y) = (x, y);
+    }
+    scene.report.tracks[1].seen = false;
+    let labels = image_view::placed_labels(&scene);
+    let bars = labels.bars();
+    let texts: Vec<&str> = bars.iter().map(|(_, text)| *text).collect();
+    assert_eq!(texts, ["1 3.0 m", "2 unseen 3.0 m", "3 3.0 m", "head width"]);
+    for (i, (bar, text)) in bars.iter().enumerate() {
+        assert!(bar.height >= 16.0, "{text}");
+        assert_eq!(bar.clipped(640, 480), *bar, "{text} leaves the image");
+        for (other, name) in &bars[..i] {
+            assert_eq!(bar.intersection(other).area(), 0.0, "{text} is over {name}");
+        }
+    }
+}
+
+fn dropped(test: &'static str) -> Candidate {
     let detection = Detection {
         image: Some(ImageBox::upper_body(Rect::new(20.0, 150.0, 60.0, 60.0))),
         position: Point3::new(4.0, 1.0, 1.0),
@@ -81,11 +125,15 @@ fn what_was_dropped_is_drawn_too() {
         score: -1.0,
         source: "test",
     };
-    let dropped = Candidate { detection, fate: Fate::Dropped("margin") };
+    Candidate { detection, fate: Fate::Dropped(test) }
+}
+
+#[test]
+fn dropped_candidates_are_in_the_picture() {
     let empty = picture(&scene(&[], Vec::new()), &Trails::default());
-    let shown = picture(&scene(&[], vec![dropped]), &Trails::default());
-    assert!(changed(&empty, &shown, 20..80) > 100);
-    assert_eq!(changed(&empty, &shown, 120..512), 0);
+    let shown = picture(&scene(&[], vec![dropped("margin")]), &Trails::default());
+    assert!(changed(&empty, &shown, 40..160, 0..480) > 200);
+    assert_eq!(changed(&empty, &shown, 240..1024, 0..480), 0);
 }
 
 #[test]
@@ -95,7 +143,7 @@ fn the_picture_is_a_png_of_the_frame() {
     overlay.draw(&scene(&[1], Vec::new())).unwrap();
     let file = std::io::BufReader::new(File::open(home.path().join("000003.png")).unwrap());
     let reader = png::Decoder::new(file).read_info().unwrap();
-    assert_eq!((reader.info().width, reader.info().height), (512, 240));
+    assert_eq!((reader.info().width, reader.info().height), (1024, 544));
     let error = Overlay::new(home.path().join("gone")).draw(&scene(&[], Vec::new())).unwrap_err();
     assert!(error.contains("000003.png"), "{error}");
 }

@@ -160,7 +160,7 @@ mod tests {
             task("b", vec![stranger, at(1.4), at(3.0)]),
             task("c", vec![]),
         ];
-        let benchmark = Benchmark { version: String::new(), tasks };
+        let benchmark = Benchmark { tasks, ..Benchmark::default() };
         let told: Vec<_> = compare(&benchmark, "a", "b")
             .iter()
             .map(|d| (d.pipeline, d.event.t_s, d.event.person))

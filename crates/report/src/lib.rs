@@ -9,7 +9,7 @@
 //! use tagalong_report::{Benchmark, TaskResult, html};
 //!
 //! let task = TaskResult { pipeline: "<ekf>".into(), log: "lab".into(), ..Default::default() };
-//! let benchmark = Benchmark { version: "0.1.0".into(), tasks: vec![task] };
+//! let benchmark = Benchmark { version: "0.1.0".into(), tasks: vec![task], ..Benchmark::default() };
 //! let page = html(&benchmark, None);
 //! assert!(page.starts_with("<!DOCTYPE html>") && page.contains("&lt;ekf&gt;"));
 //! ```
@@ -32,7 +32,8 @@ mod view;
 pub use compare::{Difference, SAME_EVENT_S, compare};
 pub use files::{csv, json};
 pub use model::{
-    Benchmark, Dropped, EventRow, Outcome, StageTiming, TaskResult, TaskTiming, Timings, Trajectory,
+    Benchmark, Dropped, EventRow, MissedPerson, Moment, Outcome, StageTiming, TaskResult,
+    TaskTiming, Timings, Trajectory,
 };
 pub use page::{COLOURS, html};
 pub use summary::{Estimate, PairSummary, PipelineSummary, Summary};

@@ -13,6 +13,44 @@ pub struct Benchmark {
     pub version: String,
     /// Results, one per task, in any order.
     pub tasks: Vec<TaskResult>,
+    /// Moments in which people were missed, with their images; for the page alone.
+    #[serde(skip)]
+    pub moments: Vec<Moment>,
+}
+
+/// Moment in which a person was missed, with all that the pipelines made of it.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Moment {
+    /// Name of the log.
+    pub log: String,
+    /// 1-based index of the frame.
+    pub frame: u64,
+    /// Time since the first frame of the log, s.
+    pub t_s: f64,
+    /// Width and height of the image in which boxes are given, pixels.
+    pub size: [u32; 2],
+    /// The whole image, JPEG in base64.
+    pub image_jpeg_base64: String,
+    /// People that count: number and box (left, top, width, height), pixels.
+    pub people: Vec<(i64, [f64; 4])>,
+    /// Tracks of each pipeline: number and box.
+    pub tracks: BTreeMap<String, Vec<(i64, [f64; 4])>>,
+}
+
+/// Person whom a pipeline missed in one frame.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct MissedPerson {
+    /// 1-based index of the frame.
+    pub frame: u64,
+    /// Id of the person in the truth.
+    pub person: i64,
+    /// Test that dropped the candidate at this person; of several the one that comes last, because
+    /// it let the candidate come nearest. None if no recorded candidate was there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test: Option<String>,
+    /// Box of that candidate, pixels: left, top, width, height.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_px: Option<[f64; 4]>,
 }
 
 /// Result of one pipeline on one log with one seed.
@@ -59,6 +97,12 @@ pub struct TaskResult {
     /// Events, in the order of time.
     #[serde(default)]
     pub events: Vec<EventRow>,
+    /// People missed in the image, by frame.
+    #[serde(default)]
+    pub missed: Vec<MissedPerson>,
+    /// Lines of the config that decide the tests that dropped missed people, by test.
+    #[serde(default)]
+    pub deciding: BTreeMap<String, Vec<String>>,
 }
 
 /// Outcome of a task.

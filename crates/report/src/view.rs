@@ -1,12 +1,15 @@
 use std::collections::BTreeSet;
 
+use crate::figures::{ComparisonSpace, MAIN};
 use crate::model::{Benchmark, Outcome, TaskResult};
+use crate::summary::Summary;
 
 /// Benchmark in an order that does not depend on the way its tasks were run.
 pub struct OrderedBenchmark<'a> {
     pub version: &'a str,
     /// Tasks by pipeline, log, seed and hash.
     pub tasks: Vec<&'a TaskResult>,
+    /// Pipelines by name, or best first once they are [ranked](Self::ranked).
     pub pipelines: Vec<&'a str>,
     pub logs: Vec<&'a str>,
 }
@@ -21,6 +24,27 @@ impl<'a> OrderedBenchmark<'a> {
         };
         let (pipelines, logs) = (names(|t| &t.pipeline), names(|t| &t.log));
         Self { version: &benchmark.version, tasks, pipelines, logs }
+    }
+
+    /// Puts the pipelines in the order of their main figure, best first; those with fewer logs after
+    /// those with more, because their means may be of the easier ones.
+    pub fn ranked(mut self, summary: &Summary) -> Self {
+        let place = ComparisonSpace::ALL.into_iter().find(|place| {
+            summary.pipelines.iter().any(|p| p.figures.contains_key(&MAIN.key(*place)))
+        });
+        let Some(place) = place else { return self };
+        let key = MAIN.key(place);
+        let estimate = |name: &str| summary.pipeline(name)?.figures.get(&key).copied();
+        let rank = |name: &str| {
+            let estimate = estimate(name).filter(|estimate| estimate.mean.is_finite());
+            estimate.map_or((0, f64::NEG_INFINITY), |estimate| (estimate.logs, estimate.mean))
+        };
+        // The sort is stable, so that equal ones stay in the order of their names.
+        self.pipelines.sort_by(|a, b| {
+            let (a, b) = (rank(a), rank(b));
+            b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+        });
+        self
     }
 
     /// Returns the finished tasks of a pipeline.

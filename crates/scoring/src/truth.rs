@@ -158,7 +158,9 @@ impl TruthFile {
         let mut file = Self::empty(Kind::People);
         for row in rows {
             let (number, truth) = row.truth(|_| None);
-            file.add(u64::from(number), truth, TruthPosition::HeadInCamera(row.head_in_camera_m));
+            let head = row.head_in_camera_m;
+            let position = head.map_or(TruthPosition::Unknown, TruthPosition::HeadInCamera);
+            file.add(u64::from(number), truth, position);
         }
         Ok(file)
     }

@@ -5,7 +5,7 @@ use nalgebra::Point2;
 use tagalong_app::outcome::{Failure, make_folder, say};
 use tagalong_core::{DepthImage, Images, RgbImage};
 use tagalong_geometry::Rect;
-use tagalong_render::canvas::{Canvas, Ink};
+use tagalong_render::canvas::{Canvas, Ink, LINE_PX};
 use tagalong_render::write_png;
 use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapper;
@@ -102,7 +102,7 @@ fn annotated(image: &RgbImage, truth: &[Truth]) -> RgbImage {
             outline(&mut canvas, whole, width, ink);
             let hidden = person.occluder.map_or(String::new(), |id| format!("<{id}"));
             let text = format!("{} {:.0}%{hidden}", person.id, 100.0 * person.visible_fraction);
-            canvas.text(Point2::new(whole.x, whole.y - 10.0), &text, ink);
+            canvas.text(Point2::new(whole.x, whole.y - LINE_PX), &text, ink);
         }
         if let Some(visible) = &person.visible {
             outline(&mut canvas, visible, width, Ink::solid([0, 200, 255]).faint(0.7));

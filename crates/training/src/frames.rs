@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Point2, Point3};
+use nalgebra::{Point2, Point3};
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::serialize::to_toml;
 use tagalong_app::threads::threads;
@@ -177,8 +177,8 @@ impl RealTruth {
         let is_here = |number: u32| u64::from(number) == frame.index;
         match self {
             Self::People(rows) => {
-                let pose = &frame.camera.robot_from_camera;
-                rows.iter().filter(|row| is_here(row.frame)).map(|row| of_row(row, pose)).collect()
+                let here = rows.iter().filter(|row| is_here(row.frame));
+                here.filter_map(|row| of_row(row, frame)).collect()
             }
             Self::Boxes(rows) => {
                 let here = rows.iter().filter(|row| is_here(row.frame));
@@ -188,15 +188,22 @@ impl RealTruth {
     }
 }
 
-fn of_row(row: &people::Row, robot_from_camera: &Isometry3<f64>) -> AnnotatedPerson {
-    let surface = Point3::from(row.head_in_camera_m);
-    // Depth sees the surface; tracks estimate the centre of the head.
-    let ray = surface.coords.try_normalize(1e-6).unwrap_or_default();
-    AnnotatedPerson {
-        head: robot_from_camera * (surface + ray * HEAD_RADIUS_M),
-        counts: !row.ignore,
-        visible: row.visible,
-    }
+/// Returns an annotated person; `None` if neither the row nor the depth in its box has a place.
+fn of_row(row: &people::Row, frame: &Frame) -> Option<AnnotatedPerson> {
+    let head = match (row.head_in_camera_m, row.upper_body) {
+        (Some(surface), _) => {
+            let surface = Point3::from(surface);
+            // Depth sees the surface; tracks estimate the centre of the head.
+            let ray = surface.coords.try_normalize(1e-6).unwrap_or_default();
+            frame.camera.robot_from_camera * (surface + ray * HEAD_RADIUS_M)
+        }
+        (None, Some(Region { x, y, width, height })) => {
+            let square = tagalong_geometry::Rect::new(x, y, width, height);
+            frame.camera.head_of(&square, frame.depth().ok()?.face_m(&square)?)
+        }
+        (None, None) => return None,
+    };
+    Some(AnnotatedPerson { head, counts: !row.ignore, visible: row.visible })
 }
 
 /// Returns the person in a box, as far away as the trunk; `None` without depth there.

@@ -2,10 +2,8 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use image::codecs::jpeg::JpegEncoder;
-use image::imageops::{FilterType, resize};
-use image::{ExtendedColorType, ImageBuffer, Rgb};
 use tagalong_core::RgbImage;
+use tagalong_render::jpeg;
 
 /// Widths and qualities of JPEG, best first.
 const LEVELS: [(usize, u8); 5] = [(640, 72), (480, 65), (400, 55), (320, 50), (240, 40)];
@@ -69,24 +67,7 @@ impl Pictures {
 
 /// Encodes an image, reduced to a width, as JPEG in base64; empty for an image without pixels.
 fn encode(image: &RgbImage, (width, quality): (usize, u8)) -> String {
-    let (columns, rows) = (image.width() as u32, image.height() as u32);
-    let bytes = image.pixels().as_flattened().to_vec();
-    let Some(whole) = ImageBuffer::<Rgb<u8>, _>::from_raw(columns, rows, bytes) else {
-        return String::new();
-    };
-    let width = (width as u32).min(columns);
-    let height = (rows * width / columns.max(1)).max(1);
-    let small =
-        if width < columns { resize(&whole, width, height, FilterType::Triangle) } else { whole };
-    let mut out = Vec::new();
-    let encoded = JpegEncoder::new_with_quality(&mut out, quality).encode(
-        &small,
-        small.width(),
-        small.height(),
-        ExtendedColorType::Rgb8,
-    );
-    // Encoding into memory fails for images without pixels or with too many.
-    encoded.map_or_else(|_| String::new(), |()| STANDARD.encode(&out))
+    STANDARD.encode(jpeg(image, width, quality))
 }
 
 #[cfg(test)]

@@ -31,6 +31,7 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("LOG.people.csv", "needs an annotated log"),
     ("old/report.json", "needs a report of last week"),
     ("SLURM_", "needs a cluster"),
+    ("annotate", "waits for a browser"),
     ("reproduce", "takes long"),
     ("realism", "takes long"),
     ("train", "takes long"),

@@ -113,3 +113,23 @@ fn a_pipeline_that_steers_nothing_is_refused() {
     let output = follow(folder.path(), "follow-depth.toml", &["--drop", "1.5"]);
     assert_eq!(code(&output), 2);
 }
+
+#[test]
+fn the_pictures_of_a_ride_are_those_of_its_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    let pictures = folder.path().join("rides/walk-follow-depth-2000000000-overlay");
+    fs::create_dir_all(&pictures).unwrap();
+    fs::write(pictures.join("999999.png"), "of a longer ride").unwrap();
+    let more = ["-o", "rides", "--overlay", "--format", "json"];
+    json(&follow(folder.path(), "follow-depth.toml", &more));
+    let mut names: Vec<String> = fs::read_dir(&pictures)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    assert_eq!(names[0], "000001.png");
+    assert_eq!(*names.last().unwrap(), format!("{:06}.png", names.len()), "{names:?}");
+    let output = follow(folder.path(), "follow-depth.toml", &["--overlay"]);
+    assert_eq!(code(&output), 2);
+    assert!(text(&output.stderr).contains("--output"), "{}", text(&output.stderr));
+}

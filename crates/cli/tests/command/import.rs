@@ -239,3 +239,31 @@ fn what_is_not_of_the_layout_is_told() {
     }
     assert!(!home.path().join("runs").exists(), "what fails leaves nothing behind");
 }
+
+#[test]
+fn annotations_of_cvat_become_truth_that_eval_reads() {
+    let home = tempfile::tempdir().unwrap();
+    let shape = |frame: u32| {
+        format!(
+            "<box frame=\"{frame}\" keyframe=\"1\" outside=\"0\" occluded=\"0\" \
+             xtl=\"10\" ytl=\"10\" xbr=\"40\" ybr=\"40\"/>"
+        )
+    };
+    let shapes: String = (0..4).map(shape).collect();
+    let text =
+        format!("<annotations><track id=\"2\" label=\"person\">{shapes}</track></annotations>");
+    fs::write(home.path().join("walk.xml"), text).unwrap();
+    let (code, said) = import(home.path(), &["cvat", "walk.xml"]);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("4 boxes are in walk.people.csv"), "{said}");
+    let tracks: String = (1..=4).map(|frame| format!("{frame},9,10,10,30,30,1\n")).collect();
+    fs::write(home.path().join("tracks.csv"), tracks).unwrap();
+    let output = tagalong()
+        .args(["eval", "--truth", "walk.people.csv", "--tracks", "tracks.csv", "--format", "json"])
+        .current_dir(home.path())
+        .output()
+        .unwrap();
+    let scores: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(scores["MOTA"], 1.0, "{scores}");
+    assert_eq!(import(home.path(), &["cvat", "walk.xml"]).0, 2, "it is not replaced unasked");
+}

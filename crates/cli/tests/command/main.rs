@@ -4,6 +4,7 @@
 
 mod common;
 
+mod annotate;
 mod answers;
 mod bad_input;
 mod bench;

@@ -1,5 +1,6 @@
-//! `people.csv`: upper bodies and heads annotated in a recording. The first
-//! line names the columns; frames are numbered from 1.
+//! `people.csv`: upper bodies and heads annotated in a recording. The first line names the columns,
+//! which may stand in any order; frames are numbered from 1. `frame`, `id` and either a box of the
+//! upper body or the place of the head are required, all else has a default.
 
 use std::io::{self, Write};
 
@@ -8,7 +9,11 @@ use crate::types::{Region, Role, Truth, View};
 
 /// The columns, in the order in which they are written.
 pub const HEADER: &str = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,\
-head_x,head_y,head_z,visible,occluder,ignore,interpolated";
+head_x,head_y,head_z,visible,occluder,ignore,interpolated,key";
+
+const UPPER_BODY: [&str; 4] = ["ub_x", "ub_y", "ub_w", "ub_h"];
+const VISIBLE_BODY: [&str; 4] = ["vis_x", "vis_y", "vis_w", "vis_h"];
+const HEAD: [&str; 3] = ["head_x", "head_y", "head_z"];
 
 /// One annotated person in one frame.
 #[derive(Clone, PartialEq, Debug)]
@@ -18,13 +23,13 @@ pub struct Row {
     /// Id of the person.
     pub id: i64,
     /// The upper-body square in pixels, clipped to the image.
-    pub upper_body: Region,
+    pub upper_body: Option<Region>,
     /// The visible part of the whole body in pixels.
-    pub visible_body: Region,
+    pub visible_body: Option<Region>,
     /// Surface of the head in metres, in the colour camera's optical frame:
     /// right, down, forward.
-    pub head_in_camera_m: [f64; 3],
-    /// Visible fraction of the upper body.
+    pub head_in_camera_m: Option<[f64; 3]>,
+    /// Visible fraction of the upper body; 1 by default.
     pub visible: f64,
     /// Occluder: `0` nothing, a person's id, `border` or `static`.
     pub occluder: String,
@@ -32,6 +37,8 @@ pub struct Row {
     pub ignore: bool,
     /// 0 measured, 1 interpolated or set by eye, 2 depth from the torso.
     pub interpolated: u8,
+    /// True if the box was set by hand, false if it lies between boxes that were; true by default.
+    pub key: bool,
 }
 
 impl Row {
@@ -39,76 +46,116 @@ impl Row {
     /// takes the head's place in the camera to the floor frame that the tracks
     /// use, in metres; it gives nothing where that is not known.
     pub fn truth(&self, floor_from_camera: impl Fn([f64; 3]) -> Option<[f64; 2]>) -> (u32, Truth) {
+        let view = |distance_m| View { visible: self.visible, distance_m };
         let truth = Truth {
             id: self.id,
-            region: Some(self.upper_body),
-            floor_m: floor_from_camera(self.head_in_camera_m),
+            region: self.upper_body,
+            floor_m: self.head_in_camera_m.and_then(floor_from_camera),
             role: if self.ignore { Role::Ignored } else { Role::Counts },
-            view: Some(View { visible: self.visible, distance_m: self.distance_m() }),
+            view: self.distance_m().map(view),
         };
         (self.frame, truth)
     }
 
-    fn distance_m(&self) -> f64 {
-        self.head_in_camera_m.iter().map(|v| v * v).sum::<f64>().sqrt()
+    fn distance_m(&self) -> Option<f64> {
+        let head = self.head_in_camera_m?;
+        Some(head.iter().map(|v| v * v).sum::<f64>().sqrt())
     }
 }
 
-/// Reads `people.csv`; columns are found by name, unknown ones are passed over.
+/// Reads `people.csv`; columns are found by name, unknown ones are passed over. Cells that are not
+/// required may be empty, and their columns missing.
 ///
 /// # Errors
 ///
-/// A missing column, something that is no number, a negative size.
+/// A missing column, a row with neither box nor place, something that is no number, a negative
+/// size.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let table = Table::new(text, file)?;
-    let columns = HEADER
-        .split(',')
-        .map(|name| Ok((name, table.column(name)?)))
-        .collect::<Result<Vec<_>, FormatError>>()?;
-    table.rows.iter().map(|line| Cells { line, columns: &columns }.row()).collect()
+    for required in ["frame", "id"] {
+        table.column(required)?;
+    }
+    for group in [&UPPER_BODY[..], &VISIBLE_BODY, &HEAD] {
+        // A part of a group is a misspelt column.
+        if group.iter().any(|name| table.find(name).is_some()) {
+            group.iter().try_for_each(|name| table.column(name).map(|_| ()))?;
+        }
+    }
+    if table.find(UPPER_BODY[0]).or(table.find(HEAD[0])).is_none() {
+        let wanted = [UPPER_BODY.join(", "), HEAD.join(", ")].join(" or ");
+        return Err(table.header.error(format!("has neither a box nor a place: add {wanted}")));
+    }
+    table.rows.iter().map(|line| Cells { line, table: &table }.row()).collect()
 }
 
-/// A line with its columns in the order of [`HEADER`].
+/// A line with the columns of its table.
 struct Cells<'a> {
     line: &'a Line<'a>,
-    columns: &'a [(&'static str, usize)],
+    table: &'a Table<'a>,
 }
 
 impl Cells<'_> {
-    fn number(&self, column: usize) -> Result<f64, FormatError> {
-        let (name, at) = self.columns[column];
-        self.line.number(at, name)
+    /// Returns the index of a column, if the table has it and its cell is not empty.
+    fn filled(&self, name: &str) -> Result<Option<usize>, FormatError> {
+        let Some(at) = self.table.find(name) else { return Ok(None) };
+        Ok(if self.line.text(at, name)?.is_empty() { None } else { Some(at) })
     }
 
-    fn region(&self, first: usize) -> Result<Region, FormatError> {
-        let region = Region {
-            x: self.number(first)?,
-            y: self.number(first + 1)?,
-            width: self.number(first + 2)?,
-            height: self.number(first + 3)?,
-        };
-        let wrong = || self.line.error("a box has a negative size");
-        if region.width < 0.0 || region.height < 0.0 { Err(wrong()) } else { Ok(region) }
+    fn number_or(&self, name: &str, default: f64) -> Result<f64, FormatError> {
+        self.filled(name)?.map_or(Ok(default), |at| self.line.number(at, name))
+    }
+
+    /// Returns the numbers of some columns, of which all or none are filled.
+    fn group<const N: usize>(&self, names: [&str; N]) -> Result<Option<[f64; N]>, FormatError> {
+        let mut values = [0.0; N];
+        let mut empty = 0;
+        for (value, name) in values.iter_mut().zip(names) {
+            match self.filled(name)? {
+                Some(at) => *value = self.line.number(at, name)?,
+                None => empty += 1,
+            }
+        }
+        match empty {
+            0 => Ok(Some(values)),
+            _ if empty == N => Ok(None),
+            _ => Err(self.line.error(format!("fill all of {}, or none", names.join(", ")))),
+        }
+    }
+
+    fn region(&self, names: [&str; 4]) -> Result<Option<Region>, FormatError> {
+        let Some([x, y, width, height]) = self.group(names)? else { return Ok(None) };
+        if width < 0.0 || height < 0.0 {
+            return Err(self.line.error("a box has a negative size"));
+        }
+        Ok(Some(Region { x, y, width, height }))
     }
 
     fn row(&self) -> Result<Row, FormatError> {
         let line = self.line;
-        let (name, at) = self.columns[14];
-        Ok(Row {
-            frame: line.frame(self.columns[0].1, 1)?,
-            id: line.whole(self.columns[1].1, "id")?,
-            upper_body: self.region(2)?,
-            visible_body: self.region(6)?,
-            head_in_camera_m: [self.number(10)?, self.number(11)?, self.number(12)?],
-            visible: self.number(13)?,
-            occluder: line.text(at, name)?.to_owned(),
-            ignore: self.number(15)? != 0.0,
-            interpolated: self.number(16)?.clamp(0.0, 255.0) as u8,
-        })
+        let occluder = match self.filled("occluder")? {
+            Some(at) => line.text(at, "occluder")?,
+            None => "0",
+        };
+        let row = Row {
+            frame: line.frame(self.table.column("frame")?, 1)?,
+            id: line.whole(self.table.column("id")?, "id")?,
+            upper_body: self.region(UPPER_BODY)?,
+            visible_body: self.region(VISIBLE_BODY)?,
+            head_in_camera_m: self.group(HEAD)?,
+            visible: self.number_or("visible", 1.0)?,
+            occluder: occluder.to_owned(),
+            ignore: self.number_or("ignore", 0.0)? != 0.0,
+            interpolated: self.number_or("interpolated", 0.0)?.clamp(0.0, 255.0) as u8,
+            key: self.number_or("key", 1.0)? != 0.0,
+        };
+        if row.upper_body.is_none() && row.head_in_camera_m.is_none() {
+            return Err(line.error("has neither a box (ub_*) nor a place (head_*)"));
+        }
+        Ok(row)
     }
 }
 
-/// Writes the header and all rows.
+/// Writes the header and all rows; cells without a value are empty.
 ///
 /// # Errors
 ///
@@ -117,12 +164,20 @@ pub fn write(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
     writeln!(out, "{HEADER}")?;
     for row in rows {
         write!(out, "{},{}", row.frame, row.id)?;
-        for Region { x, y, width, height } in [row.upper_body, row.visible_body] {
-            write!(out, ",{x},{y},{width},{height}")?;
+        for region in [row.upper_body, row.visible_body] {
+            write_cells(out, region.map(|r| [r.x, r.y, r.width, r.height]))?;
         }
-        let [x, y, z] = row.head_in_camera_m;
-        let (ignore, interpolated) = (u8::from(row.ignore), row.interpolated);
-        writeln!(out, ",{x},{y},{z},{},{},{ignore},{interpolated}", row.visible, row.occluder)?;
+        write_cells(out, row.head_in_camera_m)?;
+        let (ignore, key) = (u8::from(row.ignore), u8::from(row.key));
+        let (visible, occluder) = (row.visible, &row.occluder);
+        writeln!(out, ",{visible},{occluder},{ignore},{},{key}", row.interpolated)?;
     }
     Ok(())
+}
+
+fn write_cells<const N: usize>(out: &mut impl Write, values: Option<[f64; N]>) -> io::Result<()> {
+    match values {
+        Some(values) => values.iter().try_for_each(|value| write!(out, ",{value}")),
+        None => (0..N).try_for_each(|_| write!(out, ",")),
+    }
 }

@@ -1,17 +1,22 @@
+use std::fs;
+use std::io;
 use std::path::Path;
 
 use serde::Serialize;
 use tagalong_app::signals::Signals;
 use tagalong_log::write::WriteError;
 use tagalong_pipeline::FrameReport;
+use tagalong_render::{Overlay, OverlayData};
 use tagalong_sim::{Event, Scene, Simulation};
 use tagalong_simulate::Recorder;
 use tagalong_trials::{Drawn, TrialError, Witness};
 
-/// Writer of a ride's log, if one is requested; it ends early at a stop signal.
+/// Writer of a ride's log and pictures, as far as they are requested; it ends early at a stop
+/// signal.
 pub struct RideLog {
     recorder: Option<Recorder>,
-    failed: Option<WriteError>,
+    overlay: Option<Overlay>,
+    failed: Option<String>,
     signals: Signals,
 }
 
@@ -37,9 +42,22 @@ impl RideLog {
         let create = |path| Recorder::create(path, scene, &Simulation::new(scene, 1));
         let (recorder, failed) = match file.map(create).transpose() {
             Ok(recorder) => (recorder, None),
-            Err(error) => (None, Some(error)),
+            Err(error) => (None, Some(error.to_string())),
         };
-        Self { recorder, failed, signals }
+        Self { recorder, overlay: None, failed, signals }
+    }
+
+    /// Writes a picture of each frame into a folder, too, in place of those of an earlier ride.
+    ///
+    /// # Errors
+    /// A folder that cannot be made or cleared.
+    pub fn with_overlay(mut self, folder: &Path) -> Result<Self, TrialError> {
+        clear_pictures(folder).map_err(|error| {
+            let shown = folder.display();
+            TrialError::Witness(format!("cannot make the folder {shown} for pictures: {error}"))
+        })?;
+        self.overlay = Some(Overlay::new(folder.to_owned()));
+        Ok(self)
     }
 
     /// Completes the file.
@@ -48,15 +66,28 @@ impl RideLog {
     /// The first error in writing.
     pub fn finish(self) -> Result<(), TrialError> {
         let finished = self.recorder.map_or(Ok(()), Recorder::finish);
-        let failed = self.failed.map_or(finished, Err);
-        failed.map_err(|error| TrialError::Witness(error.to_string()))
+        let failed = self.failed.or(finished.err().map(|error| error.to_string()));
+        failed.map_or(Ok(()), |error| Err(TrialError::Witness(error)))
     }
 
     fn note(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), WriteError>) {
         let Some(recorder) = self.recorder.as_mut().filter(|_| self.failed.is_none()) else {
             return;
         };
-        self.failed = write(recorder).err();
+        self.failed = write(recorder).err().map(|error| error.to_string());
+    }
+
+    fn draw(&mut self, drawn: &Drawn, report: &FrameReport) {
+        let Some(overlay) = self.overlay.as_mut().filter(|_| self.failed.is_none()) else {
+            return;
+        };
+        let scene = OverlayData {
+            camera: drawn.frame.camera.clone(),
+            images: drawn.frame.images(),
+            odom_from_robot: drawn.odom_from_robot,
+            report: report.clone(),
+        };
+        self.failed = overlay.draw(&scene).err();
     }
 }
 
@@ -68,12 +99,27 @@ impl Witness for RideLog {
     fn frame(&mut self, drawn: &Drawn, report: &FrameReport) {
         let at_ns = drawn.frame.stamp.nanos();
         self.note(|recorder| recorder.pursuit(at_ns, &frame_json(report)));
+        self.draw(drawn, report);
     }
 
     fn goes_on(&self) -> bool {
         // A ride without its log is of no use, so a failed disk ends it.
         self.failed.is_none() && self.signals.received().is_none()
     }
+}
+
+/// Makes the folder, or removes the pictures of an earlier ride from it, which could be longer.
+fn clear_pictures(folder: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let is_numbered = stem.len() >= 6 && stem.bytes().all(|byte| byte.is_ascii_digit());
+        if is_numbered && path.extension().is_some_and(|ending| ending == "png") {
+            fs::remove_file(path)?;
+        }
+    }
+    Ok(())
 }
 
 fn frame_json(report: &FrameReport) -> FrameJson {

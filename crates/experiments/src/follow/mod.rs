@@ -73,6 +73,9 @@ pub struct FollowArgs {
     /// tables, to this folder.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+    /// Write a picture of every frame of every ride beside its log, too: boxes, ids, target, plan.
+    #[arg(long, requires = "output")]
+    pub overlay: bool,
     /// Print the settings [target.looks] that fit these rides best; use the split `train`.
     #[arg(long)]
     pub fit: bool,
@@ -231,6 +234,9 @@ fn ride(
     let Job { suite, scene, contender } = job;
     let file = args.output.as_deref().map(|folder| log_file(folder, job));
     let mut log = RideLog::new(file.as_deref(), scene, signals.clone());
+    if let Some(file) = file.filter(|_| args.overlay) {
+        log = log.with_overlay(&overlay_folder(&file))?;
+    }
     let ride = Ride::new(scene, contender, registry, &mut log)?;
     log.finish()?;
     Ok(Followed {
@@ -245,6 +251,12 @@ fn ride(
 fn log_file(folder: &Path, job: &Job) -> PathBuf {
     let suite = job.suite.replace(' ', "-");
     folder.join(format!("{suite}-{}-{}.mcap", job.contender.name, job.scene.seed))
+}
+
+/// Returns the folder of a ride's pictures: that of its log, with `-overlay` at its end.
+fn overlay_folder(log: &Path) -> PathBuf {
+    let stem = log.file_stem().unwrap_or_default().to_string_lossy();
+    log.with_file_name(format!("{stem}-overlay"))
 }
 
 fn bar(rides: usize) -> ProgressBar {

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
-use super::{Page, amount, cell, column, number, table};
+use super::{MOST_DRAWN, Page, amount, cell, column, number, table};
 use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan, series_class};
 use crate::model::TaskResult;
 
@@ -14,9 +14,10 @@ impl Page<'_> {
             p {
                 "People missed against false reports, as the least score that is accepted falls. Lower is better. "
                 "LAMR is the geometric mean of the curve at nine places in the shaded band."
+                (self.of_the_best())
             }
             p class="legend" {
-                @for (series, name) in self.view.pipelines.iter().enumerate() { (key(series, name)) " " }
+                @for (series, name) in self.view.pipelines.iter().take(MOST_DRAWN).enumerate() { (key(series, name)) " " }
             }
             div class="charts" { @for chart in &charts { (chart) } }
         })
@@ -45,7 +46,15 @@ impl Page<'_> {
 
     /// Returns the tasks of a log that stand for their pipelines.
     fn drawn(&self, log: &str) -> impl Iterator<Item = &TaskResult> {
-        self.view.pipelines.iter().filter_map(move |p| self.view.drawn(p, log))
+        let best = self.view.pipelines.iter().take(MOST_DRAWN);
+        best.filter_map(move |p| self.view.drawn(p, log))
+    }
+
+    /// Says that a chart has the best pipelines only, if it does.
+    fn of_the_best(&self) -> Markup {
+        html! {
+            @if self.view.pipelines.len() > MOST_DRAWN { " The " (MOST_DRAWN) " best pipelines are shown." }
+        }
     }
 
     pub(super) fn plans(&self) -> Option<Markup> {
@@ -55,6 +64,7 @@ impl Page<'_> {
             p {
                 "Where people were (wide and pale) and where the tracks put them (thin, with the number of the track at its end), "
                 "in the odometry frame. A change of line along one person is a change of number."
+                (self.of_the_best())
             }
             @for log in &logs { (log) }
         })

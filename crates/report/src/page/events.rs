@@ -1,22 +1,70 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use maud::{Markup, html};
 
 use super::{Page, amount, cell, column, number, optional_cell, table};
 use crate::chart::key;
 use crate::model::{EventRow, TaskResult};
+use crate::view::OrderedBenchmark;
+
+/// Most rows of events on the page.
+const MOST_ROWS: usize = 3000;
+
+/// Most pictures of events on the page, bytes of base64.
+const MOST_PICTURES: usize = 800_000;
+
+/// Tasks whose events the page lists and shows, by their indices.
+#[derive(Default)]
+pub(super) struct Listed {
+    rows: BTreeSet<usize>,
+    pictures: BTreeSet<usize>,
+}
+
+impl Listed {
+    /// Chooses tasks of the best pipelines first, as many as the page has room for.
+    pub(super) fn of(view: &OrderedBenchmark<'_>) -> Self {
+        let mut listed = Self::default();
+        let (mut rows, mut bytes) = (0, 0);
+        for pipeline in &view.pipelines {
+            let tasks = view.tasks.iter().enumerate().filter(|(_, t)| t.pipeline == *pipeline);
+            for (number, task) in tasks.filter(|(_, t)| !t.events.is_empty()) {
+                rows += task.events.len();
+                bytes += task.events.iter().map(picture_bytes).sum::<usize>();
+                if rows <= MOST_ROWS {
+                    listed.rows.insert(number);
+                }
+                if bytes <= MOST_PICTURES {
+                    listed.pictures.insert(number);
+                }
+            }
+        }
+        listed
+    }
+
+    /// Returns true if the events of a task have rows.
+    pub(super) fn has_rows(&self, task: usize) -> bool {
+        self.rows.contains(&task)
+    }
+}
+
+fn picture_bytes(event: &EventRow) -> usize {
+    event.picture_png_base64.as_ref().map_or(0, String::len)
+}
 
 impl Page<'_> {
     pub(super) fn events(&self) -> Option<Markup> {
         let tasks: Vec<&TaskResult> =
             self.view.tasks.iter().copied().filter(|t| !t.events.is_empty()).collect();
         // Numbered among all tasks, as the links from the pairs are.
-        let numbered = self.view.tasks.iter().enumerate().filter(|(_, t)| !t.events.is_empty());
+        let numbered = self.view.tasks.iter().enumerate();
+        let numbered = numbered.filter(|(number, _)| self.listed.has_rows(*number));
+        let more = tasks.len() - numbered.clone().count();
         (!tasks.is_empty()).then(|| {
             html! {
                 (self.event_counts(&tasks))
                 div class="filters" hidden { span class="unseen" { "Show kinds of events" } }
                 @for (number, task) in numbered { (self.events_of(number, task)) }
+                @if more > 0 { p { "The events of " (amount(more, "task")) " of the last pipelines are in report.json." } }
             }
         })
     }
@@ -29,8 +77,8 @@ impl Page<'_> {
                 *counts.entry(&event.kind).or_default().entry(&task.pipeline).or_default() += 1;
             }
         }
-        let head =
-            html! { (column("Kind", None)) @for p in &self.view.pipelines { (column(p, None)) } };
+        let columns = self.view.pipelines.iter().enumerate();
+        let head = html! { (column("Kind", None)) @for (rank, p) in columns { (self.column_of(rank, p)) } };
         let body = html! {
             @for (name, of) in &counts {
                 tr {
@@ -55,8 +103,7 @@ impl Page<'_> {
         };
         let mut events: Vec<(usize, &EventRow)> = task.events.iter().enumerate().collect();
         events.sort_by(|a, b| a.1.t_s.total_cmp(&b.1.t_s));
-        let body =
-            html! { @for (index, event) in events { (row(event, &event_id(number, index))) } };
+        let body = html! { @for (index, event) in events { (row(event, &event_id(number, index), self.listed.pictures.contains(&number))) } };
         let caption = html! { "In time; a time is counted from the first frame of the log." };
         html! {
             details class="events" {
@@ -75,7 +122,7 @@ pub(super) fn event_id(task: usize, event: usize) -> String {
     format!("event-{task}-{event}")
 }
 
-fn row(event: &EventRow, id: &str) -> Markup {
+fn row(event: &EventRow, id: &str, is_shown: bool) -> Markup {
     html! {
         tr id=(id) data-kind=(event.kind) {
             (cell(event.t_s, &html! { (number(event.t_s, 2)) }))
@@ -83,7 +130,7 @@ fn row(event: &EventRow, id: &str) -> Markup {
             td { (kind(&event.kind)) }
             (optional_cell(event.person.map(|id| id as f64), 0))
             (optional_cell(event.track.map(|id| id as f64), 0))
-            td { (picture(event)) (event.text) }
+            td { @if is_shown { (picture(event)) } (event.text) }
         }
     }
 }
@@ -114,7 +161,7 @@ pub(super) fn picture(event: &EventRow) -> Markup {
     }
 }
 
-fn is_base64(data: &str) -> bool {
+pub(super) fn is_base64(data: &str) -> bool {
     !data.is_empty()
         && data.len().is_multiple_of(4)
         && data

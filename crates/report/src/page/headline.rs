@@ -139,7 +139,7 @@ impl Page<'_> {
             self.view.logs.iter().filter(|log| columns.iter().any(|(_, v)| v.contains_key(*log)));
         let head = html! {
             (column("Log", None))
-            @for (name, _) in &columns { (column(name, None)) }
+            @for (rank, (name, _)) in columns.iter().enumerate() { (self.column_of(rank, name)) }
         };
         let row = |log: &str| {
             let best = columns

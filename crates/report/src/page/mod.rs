@@ -4,6 +4,7 @@ mod charts;
 mod events;
 mod explain;
 mod headline;
+mod moments;
 mod pairs;
 mod speed;
 mod tasks;
@@ -11,7 +12,7 @@ mod tasks;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::chart::minus;
-use crate::model::{Benchmark, Outcome, Timings};
+use crate::model::{Benchmark, Moment, Outcome, Timings};
 use crate::summary::Summary;
 use crate::view::OrderedBenchmark;
 
@@ -22,10 +23,17 @@ pub const COLOURS: &str = include_str!("colours.css");
 const STYLE: &str = concat!(include_str!("colours.css"), include_str!("page.css"));
 const SCRIPT: &str = include_str!("page.js");
 
+/// Most pipelines that are told apart in one chart or image; of more the best ones are shown.
+const MOST_DRAWN: usize = 8;
+
 /// Data that the sections are made from.
 struct Page<'a> {
     view: OrderedBenchmark<'a>,
     summary: Summary,
+    /// Moments in which people were missed, as many as the page may hold.
+    moments: Vec<&'a Moment>,
+    /// Events that the page lists.
+    listed: events::Listed,
     /// Times, if the machine was otherwise idle.
     timings: Option<&'a Timings>,
     /// True if there are times but the machine was busy.
@@ -37,9 +45,15 @@ struct Page<'a> {
 /// Times are shown only if [`Timings::exclusive`] is set; without them the page depends on the
 /// benchmark only, and not on the order of its tasks.
 pub fn html(benchmark: &Benchmark, timings: Option<&Timings>) -> String {
+    let mut summary = Summary::new(benchmark);
+    let view = OrderedBenchmark::new(benchmark).ranked(&summary);
+    let position = |name: &str| view.pipelines.iter().position(|p| *p == name);
+    summary.pipelines.sort_by_key(|p| position(&p.pipeline));
     let page = Page {
-        view: OrderedBenchmark::new(benchmark),
-        summary: Summary::new(benchmark),
+        moments: moments::shown(&benchmark.moments, &view),
+        listed: events::Listed::of(&view),
+        view,
+        summary,
         timings: timings.filter(|t| t.exclusive),
         timings_left_out: timings.is_some_and(|t| !t.exclusive),
     };
@@ -95,15 +109,23 @@ impl Page<'_> {
         let some = |anchor, heading, body: Option<Markup>| {
             body.map(|body| Section { anchor, heading, body })
         };
+        let speed = || section("speed", "Accuracy and time", self.speed());
+        // The plot comes first if there is one; the remark that there is none does not.
+        let (first, later) = match self.timings {
+            Some(_) => (speed(), None),
+            None => (None, speed()),
+        };
         [
+            first,
             section(
                 "results",
                 "Results",
                 html! { (self.headline()) @if let Some(note) = self.constant_scores() { (note) } },
             ),
             some("failed", "Failed and skipped", self.failed()),
+            some("missed", "Missed people, and why", self.missed()),
             some("pairs", "Pipelines side by side", self.pairs()),
-            section("speed", "Accuracy and time", self.speed()),
+            later,
             some("miss-rate", "Miss rate", self.miss_rates()),
             some("floor", "Seen from above", self.plans()),
             some("funnel", "Why candidates were dropped", self.funnels()),

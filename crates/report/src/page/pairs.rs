@@ -5,14 +5,17 @@ use super::headline::{ends_of, place_where};
 use super::{Page, amount, cell, column, no_cell, number, signed, table};
 use crate::chart::key;
 use crate::compare::{Difference, SAME_EVENT_S, compare_in};
-use crate::figures::{ComparisonSpace, Figure};
+use crate::figures::{ComparisonSpace, Figure, MAIN};
 use crate::summary::PairSummary;
 
-/// Maximum number of differences listed per pair; the rest is counted.
-const MOST_LISTED: usize = 200;
+/// Most differences listed of all pairs together; the rest is counted.
+const MOST_LISTED: usize = 1200;
 
-/// Maximum number of pairs with listed differences.
-const MOST_PAIRS: usize = 45;
+/// Most pipelines of which each pair is described; of more it is the best one against others.
+const ALL_PAIRS_OF: usize = 4;
+
+/// Most pairs that are described.
+const MOST_PAIRS: usize = 10;
 
 impl Page<'_> {
     pub(super) fn pairs(&self) -> Option<Markup> {
@@ -31,19 +34,74 @@ impl Page<'_> {
                 }
                 ". The figures are not corrected for each other: choose the one that matters before looking."
             }
-            @for (a, b) in self.pair_names().take(MOST_PAIRS) { (self.pair(a, b)) }
-            @if self.pair_names().count() > MOST_PAIRS {
-                p { "Further pairs are in report.json." }
+            @if self.view.pipelines.len() > 2 { (self.matrix()) }
+            @let pairs = self.described_pairs();
+            @for (a, b) in &pairs { (self.pair(a, b, MOST_LISTED / pairs.len())) }
+            @if self.view.pipelines.len() > ALL_PAIRS_OF {
+                p { "Described is the best pipeline against the next ones; all pairs are in report.json." }
             }
         })
     }
 
-    fn pair_names(&self) -> impl Iterator<Item = (&str, &str)> {
+    /// Returns the pairs that are described, each in the order of the names.
+    fn described_pairs(&self) -> Vec<(&str, &str)> {
         let names = &self.view.pipelines;
-        names.iter().enumerate().flat_map(|(i, a)| names[i + 1..].iter().map(move |b| (*a, *b)))
+        // Of many pipelines only the first one is compared with each other one.
+        let firsts = if names.len() > ALL_PAIRS_OF { 1 } else { names.len() };
+        let pairs = (0..firsts).flat_map(|i| names[i + 1..].iter().map(move |b| (names[i], *b)));
+        pairs.map(|(a, b)| (a.min(b), a.max(b))).take(MOST_PAIRS).collect()
     }
 
-    fn pair(&self, a: &str, b: &str) -> Markup {
+    /// Renders what each pipeline gains on each other one in the main figure.
+    fn matrix(&self) -> Markup {
+        let shown = ComparisonSpace::ALL.into_iter();
+        let place = shown
+            .into_iter()
+            .find(|place| self.summary.pairs.iter().any(|pair| pair.figure == MAIN.key(*place)));
+        let Some(place) = place else { return html! {} };
+        let names = &self.view.pipelines;
+        let head = html! {
+            (column("Pipeline", None))
+            @for (rank, name) in names.iter().enumerate() { (self.column_of(rank, name)) }
+        };
+        let body = html! {
+            @for (rank, row) in names.iter().enumerate() {
+                tr {
+                    th scope="row" { (rank + 1) " " (key(rank, row)) }
+                    @for other in names { (self.gain_cell(row, other, place)) }
+                }
+            }
+        };
+        let caption = html! {
+            (MAIN.name) " " (place_where(place)) ": the pipeline of the row less that of the column, over the logs in common, "
+            "best pipeline first. Bold with an arrow: clear."
+        };
+        html! { div class="matrix" { (table("Each pipeline against each other", &caption, &head, &body)) } }
+    }
+
+    fn gain_cell(&self, row: &str, other: &str, place: ComparisonSpace) -> Markup {
+        let (a, b) = (row.min(other), row.max(other));
+        let figure = MAIN.key(place);
+        let pair = self.summary.pairs.iter().find(|p| p.a == a && p.b == b && p.figure == figure);
+        let Some(pair) = pair.filter(|_| row != other) else { return no_cell() };
+        // A pair holds the difference of `b` from `a`.
+        let gain = if row == b { pair.difference } else { -pair.difference };
+        let shown = signed(gain, MAIN.decimals);
+        cell(
+            gain,
+            &match (pair.is_clear(), gain > 0.0) {
+                (false, _) => html! { (shown) },
+                (true, true) => {
+                    html! { span class="clear-win" { "▲ " (shown) span class="unseen" { " clear" } } }
+                }
+                (true, false) => {
+                    html! { span class="clear-loss" { "▼ " (shown) span class="unseen" { " clear" } } }
+                }
+            },
+        )
+    }
+
+    fn pair(&self, a: &str, b: &str, most: usize) -> Markup {
         let rows: Vec<&PairSummary> =
             self.summary.pairs.iter().filter(|p| p.a == a && p.b == b).collect();
         let clear = rows.iter().filter(|p| p.is_clear()).count();
@@ -58,12 +116,12 @@ impl Page<'_> {
                     }
                 }
                 @if !rows.is_empty() { (gain_table(a, b, &rows)) }
-                (self.differences(a, b, &differences))
+                (self.differences(a, b, &differences, most))
             }
         }
     }
 
-    fn differences(&self, a: &str, b: &str, all: &[Difference<'_>]) -> Markup {
+    fn differences(&self, a: &str, b: &str, all: &[Difference<'_>], most: usize) -> Markup {
         if all.is_empty() {
             return html! { p { "No event happened to one of them only." } };
         }
@@ -85,18 +143,20 @@ impl Page<'_> {
                 }
             }
         };
-        let body = html! { @for d in all.iter().take(MOST_LISTED) { (row(d)) } };
+        let body = html! { @for d in all.iter().take(most) { (row(d)) } };
         let caption = html! {
             "Events that happened to one of them only, in time. Events of one kind and person within "
             (number(SAME_EVENT_S, 1)) " s of each other count as the same."
-            @if all.len() > MOST_LISTED { " The first " (MOST_LISTED) " of " (all.len()) "." }
+            @if all.len() > most { " The first " (most) " of " (all.len()) "." }
         };
         table(&name, &caption, &head, &body)
     }
 
     /// Renders the frame of an event, as a link to its row and picture.
     fn link(&self, d: &Difference<'_>) -> Markup {
-        let found = self.view.tasks.iter().enumerate().find_map(|(task, of)| {
+        let listed = self.view.tasks.iter().enumerate();
+        let mut listed = listed.filter(|(task, _)| self.listed.has_rows(*task));
+        let found = listed.find_map(|(task, of)| {
             // Events have no id of their own, but the difference refers to the event itself.
             let index = of.events.iter().position(|event| std::ptr::eq(event, d.event))?;
             Some(event_id(task, index))

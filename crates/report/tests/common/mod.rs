@@ -1,10 +1,11 @@
 //! Invented results, shaped like real ones. None of them was measured.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tagalong_eval::{Consistency, CurvePoint, Scores};
 use tagalong_report::{
-    Benchmark, Dropped, EventRow, Outcome, StageTiming, TaskResult, TaskTiming, Timings, Trajectory,
+    Benchmark, Dropped, EventRow, MissedPerson, Moment, Outcome, StageTiming, TaskResult,
+    TaskTiming, Timings, Trajectory,
 };
 
 /// Picture of a person in a frame, 48 x 64 pixels: PNG in base64.
@@ -29,6 +30,14 @@ impl Wobble {
     }
 }
 
+/// Sixteen by twelve pixels of a gradient as JPEG.
+const IMAGE: &str = "\
+    /9j/4AAQSkZJRgABAQAAAQABAAD/2wBDABQODxIPDRQSEBIXFRQYHjIhHhwcHj0sLiQySUBMS0dARkVQWnNiUFVt\
+    VkVGZIhlbXd7gYKBTmCNl4x9lnN+gXz/2wBDARUXFx4aHjshITt8U0ZTfHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8\
+    fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHz/wAARCAAMABADASIAAhEBAxEB/8QAFQABAQAAAAAAAAAAAAAAAAAA\
+    AwX/xAAXEAEBAQEAAAAAAAAAAAAAAAACAAED/8QAFQEBAQAAAAAAAAAAAAAAAAAAAgP/xAAXEQADAQAAAAAAAAAA\
+    AAAAAAAAAQID/9oADAMBAAIRAxEAPwCYeMx4zk5KTkKtkstGf//Z";
+
 /// Returns results of invented pipelines on invented logs.
 pub fn benchmark(pipelines: &[&str], logs: &[&str]) -> Benchmark {
     let mut tasks = Vec::new();
@@ -37,7 +46,7 @@ pub fn benchmark(pipelines: &[&str], logs: &[&str]) -> Benchmark {
             tasks.push(task(pipeline, log, 0.55 + 0.08 * p as f64, 97 * p as u64, l as u64));
         }
     }
-    Benchmark { version: "0.0.0-sample".into(), tasks }
+    Benchmark { version: "0.0.0-sample".into(), moments: moments(&tasks), tasks }
 }
 
 fn task(pipeline: &str, log: &str, level: f64, seed: u64, place: u64) -> TaskResult {
@@ -66,6 +75,12 @@ fn task(pipeline: &str, log: &str, level: f64, seed: u64, place: u64) -> TaskRes
         tracks: tracks(&truth, &mut wobble),
         truth,
         events: events(&mut wobble),
+        missed: missed(seed),
+        deciding: [(
+            "margin".to_owned(),
+            vec!["[[verifiers]] config.least_margin = 0.2".to_owned()],
+        )]
+        .into(),
         ..TaskResult::default()
     }
 }
@@ -142,6 +157,37 @@ fn tracks(truth: &[Trajectory], wobble: &mut Wobble) -> Vec<Trajectory> {
         }
     }
     tracks
+}
+
+/// Frame of the moment of each log.
+const MOMENT: u64 = 61;
+
+/// Returns people missed around the moment, by one test or another.
+fn missed(seed: u64) -> Vec<MissedPerson> {
+    let test = ["margin", "size"][seed as usize % 2].to_owned();
+    let miss = |(i, frame)| MissedPerson {
+        frame,
+        person: 1,
+        test: (i != 2).then(|| test.clone()),
+        box_px: (i != 2).then_some([200.0, 90.0, 70.0, 70.0]),
+    };
+    (0u64..4).zip(MOMENT..).map(miss).collect()
+}
+
+/// Returns one moment for each log.
+fn moments(tasks: &[TaskResult]) -> Vec<Moment> {
+    let logs: BTreeSet<&str> = tasks.iter().map(|task| task.log.as_str()).collect();
+    let track = |task: &TaskResult| (task.pipeline.clone(), vec![(12, [390.0, 100.0, 62.0, 60.0])]);
+    let moment = |log: &str| Moment {
+        log: log.to_owned(),
+        frame: MOMENT,
+        t_s: 4.0,
+        size: [640, 480],
+        image_jpeg_base64: IMAGE.into(),
+        people: vec![(1, [210.0, 85.0, 64.0, 64.0]), (2, [392.0, 98.0, 60.0, 60.0])],
+        tracks: tasks.iter().filter(|task| task.log == log).map(track).collect(),
+    };
+    logs.into_iter().map(moment).collect()
 }
 
 fn events(wobble: &mut Wobble) -> Vec<EventRow> {

@@ -84,28 +84,28 @@ fn moment(frame: &Frame, known: &[Annotated]) -> Moment {
     let pose = &frame.camera.robot_from_camera;
     Moment {
         stamp: frame.stamp,
-        truth: known.iter().map(|row| somebody(row, pose)).collect(),
+        truth: known.iter().filter_map(|row| annotated(row, pose)).collect(),
         odom_from_robot: Isometry2::identity(),
         world_from_robot: Isometry2::identity(),
     }
 }
 
-/// Converts an annotation; heads are annotated at their surface.
-fn somebody(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Truth {
-    let surface = Point3::from(row.head_in_camera_m);
+/// Converts an annotation; heads are annotated at their surface. `None` without a place.
+fn annotated(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Option<Truth> {
+    let surface = Point3::from(row.head_in_camera_m?);
     let ray = surface.coords.try_normalize(1e-6).unwrap_or_default();
     let head = robot_from_camera * (surface + ray * HEAD_RADIUS_M);
     let rect = |r: &tagalong_eval::Region| Rect::new(r.x, r.y, r.width, r.height);
-    Truth {
+    Some(Truth {
         id: u16::try_from(row.id).unwrap_or(u16::MAX),
         head_in_robot: head,
         torso_in_robot: head,
-        upper_body: Some(rect(&row.upper_body)),
-        visible: Some(rect(&row.visible_body)),
+        upper_body: row.upper_body.as_ref().map(rect),
+        visible: row.visible_body.as_ref().map(rect),
         visible_fraction: row.visible,
         occluder: None,
         ignore: row.ignore,
-    }
+    })
 }
 
 #[cfg(test)]
@@ -119,9 +119,10 @@ mod tests {
         let row = Annotated {
             frame: 1,
             id: 3,
-            upper_body: tagalong_eval::Region::new(10.0, 20.0, 30.0, 40.0),
-            visible_body: tagalong_eval::Region::default(),
-            head_in_camera_m: [0.0, 0.0, 2.0],
+            upper_body: Some(tagalong_eval::Region::new(10.0, 20.0, 30.0, 40.0)),
+            visible_body: None,
+            head_in_camera_m: Some([0.0, 0.0, 2.0]),
+            key: true,
             visible: 0.5,
             occluder: "0".into(),
             ignore: true,
@@ -133,7 +134,7 @@ mod tests {
             nalgebra::Rotation3::from_basis_unchecked(&[forward, -Vector3::z(), Vector3::x()]);
         let turn = UnitQuaternion::from_rotation_matrix(&turn);
         let pose = Isometry3::from_parts(Translation3::new(0.1, 0.0, 1.0), turn);
-        let found = somebody(&row, &pose);
+        let found = annotated(&row, &pose).unwrap();
         let expected = Point3::new(2.1 + HEAD_RADIUS_M, 0.0, 1.0);
         assert!((found.head_in_robot - expected).norm() < 1e-9, "{}", found.head_in_robot);
         assert!(found.ignore && found.id == 3);

@@ -71,7 +71,7 @@ fn recording(log: &Path) -> Option<Vec<Sample>> {
         let Ok(depth) = item.frame.depth() else { continue };
         let here = rows.iter().filter(|row| u64::from(row.frame) == item.frame.index);
         for row in here.filter(|row| row.visible > 0.95) {
-            let at = row.upper_body;
+            let Some(at) = row.upper_body else { continue };
             let square = Rect::new(at.x, at.y, at.width, at.height);
             samples.extend(features(depth, &square));
         }

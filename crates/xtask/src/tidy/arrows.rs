@@ -58,10 +58,14 @@ const ARROWS: &[(&str, &[&str])] = &[
         &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
     ),
     ("doctor", &["app", "render", "vision", "pipeline", "log"]),
+    ("annotate", &["app", "render", "log", "eval", "pipeline"]),
     ("view", &["app", "scoring", "render", "report", "log", "eval", "pipeline"]),
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
-    ("benchmark", &["app", "scoring", "pipeline", "log", "eval", "report", "reproduce", "tuning"]),
-    ("import", &["app", "log"]),
+    (
+        "benchmark",
+        &["app", "scoring", "render", "pipeline", "log", "eval", "report", "reproduce", "tuning"],
+    ),
+    ("import", &["app", "log", "eval"]),
     ("webcams", &["app", "scoring", "log", "sim", "triangulate"]),
     (
         "experiments",
@@ -69,6 +73,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "app",
             "simulate",
             "pipeline",
+            "render",
             "log",
             "sim",
             "eval",
@@ -81,6 +86,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
+            "annotate",
             "app",
             "benchmark",
             "catalog",

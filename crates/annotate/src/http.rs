@@ -1,0 +1,262 @@
+//! As much of HTTP/1.1 as one page on this computer needs: requests with bounds on everything, and
+//! an answer per connection.
+
+use std::io::{self, Read, Write};
+use std::time::{Duration, Instant};
+
+/// Longest request line with all headers, bytes.
+const HEAD_BYTES: usize = 16 << 10;
+
+/// Longest body, bytes: changes are short.
+const BODY_BYTES: usize = 16 << 10;
+
+/// Most header lines.
+const HEADERS: usize = 100;
+
+/// Time for a whole request: a slower one keeps a thread for nothing.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// A request.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Request {
+    /// `GET` or `POST`, or another method.
+    pub method: String,
+    /// Path with the query, as it was sent.
+    pub path: String,
+    headers: Vec<(String, String)>,
+    /// The body.
+    pub body: Vec<u8>,
+}
+
+impl Request {
+    /// Returns a header by its name in lower case.
+    pub fn header(&self, name: &str) -> Option<&str> {
+        self.headers.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+    }
+}
+
+/// An answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Response {
+    /// Status code.
+    pub status: u16,
+    /// Type of the body.
+    pub kind: &'static str,
+    /// The body.
+    pub body: Vec<u8>,
+}
+
+impl Response {
+    /// Returns a body with status 200.
+    pub fn ok(kind: &'static str, body: impl Into<Vec<u8>>) -> Self {
+        Self { status: 200, kind, body: body.into() }
+    }
+
+    /// Returns a refusal with its reason.
+    pub fn refusal(status: u16, why: impl Into<String>) -> Self {
+        Self { status, kind: "text/plain; charset=utf-8", body: why.into().into_bytes() }
+    }
+
+    /// Writes the answer, and says that the connection ends.
+    ///
+    /// # Errors
+    /// Those of the connection.
+    pub fn send(&self, out: &mut impl Write, head_only: bool) -> io::Result<()> {
+        let reason = match self.status {
+            200 => "OK",
+            400 => "Bad Request",
+            403 => "Forbidden",
+            404 => "Not Found",
+            405 => "Method Not Allowed",
+            408 => "Request Timeout",
+            409 => "Conflict",
+            411 => "Length Required",
+            413 => "Content Too Large",
+            415 => "Unsupported Media Type",
+            431 => "Request Header Fields Too Large",
+            503 => "Service Unavailable",
+            _ => "Internal Server Error",
+        };
+        let (status, kind, length) = (self.status, self.kind, self.body.len());
+        // Nothing but the files of this server runs in the page, and no other page may frame it.
+        write!(
+            out,
+            "HTTP/1.1 {status} {reason}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n\
+             Connection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n\
+             Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\
+             Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; \
+             img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; \
+             frame-ancestors 'none'\r\n\r\n"
+        )?;
+        if !head_only {
+            out.write_all(&self.body)?;
+        }
+        out.flush()
+    }
+}
+
+/// Reads a request.
+///
+/// # Errors
+/// The refusal to answer with; `None` inside for a connection that is gone or sent nothing.
+pub fn read(from: &mut impl Read) -> Result<Request, Option<Response>> {
+    let deadline = Instant::now() + PATIENCE;
+    let mut bytes = Vec::new();
+    let head_end = loop {
+        if let Some(end) = find(&bytes, b"\r\n\r\n") {
+            break end;
+        }
+        if bytes.len() > HEAD_BYTES {
+            return Err(Some(Response::refusal(431, "the headers are too long")));
+        }
+        more(from, &mut bytes, deadline)?;
+    };
+    if head_end > HEAD_BYTES {
+        return Err(Some(Response::refusal(431, "the headers are too long")));
+    }
+    let mut request = parse_head(&bytes[..head_end]).map_err(Some)?;
+    let length = body_length(&request).map_err(Some)?;
+    let mut body = bytes.split_off(head_end + 4);
+    while body.len() < length {
+        more(from, &mut body, deadline)?;
+    }
+    body.truncate(length);
+    request.body = body;
+    Ok(request)
+}
+
+/// Reads what is there.
+fn more(
+    from: &mut impl Read,
+    into: &mut Vec<u8>,
+    deadline: Instant,
+) -> Result<(), Option<Response>> {
+    let late = || Some(Response::refusal(408, "the request came too slowly"));
+    if Instant::now() > deadline {
+        return Err(late());
+    }
+    let mut part = [0; 4096];
+    match from.read(&mut part) {
+        Ok(0) => Err(None),
+        Ok(count) => {
+            into.extend(&part[..count]);
+            Ok(())
+        }
+        Err(error) => match error.kind() {
+            io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => Err(late()),
+            io::ErrorKind::Interrupted => Ok(()),
+            _ => Err(None),
+        },
+    }
+}
+
+fn find(bytes: &[u8], part: &[u8]) -> Option<usize> {
+    bytes.windows(part.len()).position(|window| window == part)
+}
+
+fn parse_head(bytes: &[u8]) -> Result<Request, Response> {
+    let wrong = |why: &str| Response::refusal(400, why);
+    let text = std::str::from_utf8(bytes).map_err(|_| wrong("the headers are no text"))?;
+    if text.chars().any(|c| c.is_control() && c != '\r' && c != '\n' && c != '\t') {
+        return Err(wrong("the headers have control characters"));
+    }
+    let mut lines = text.split("\r\n");
+    let first: Vec<&str> = lines.next().unwrap_or_default().split(' ').collect();
+    let [method, path, version] = first[..] else {
+        return Err(wrong("the first line is not `METHOD PATH VERSION`"));
+    };
+    if !matches!(version, "HTTP/1.1" | "HTTP/1.0") {
+        return Err(wrong("the version is neither HTTP/1.1 nor HTTP/1.0"));
+    }
+    if !path.starts_with('/') {
+        return Err(wrong("the path does not begin with a slash"));
+    }
+    let mut headers: Vec<(String, String)> = Vec::new();
+    for line in lines {
+        let (name, value) = line.split_once(':').ok_or_else(|| wrong("a header has no colon"))?;
+        let is_name = |b: u8| b.is_ascii_alphanumeric() || b"-_".contains(&b);
+        if name.is_empty() || !name.bytes().all(is_name) || value.contains(['\r', '\n']) {
+            return Err(wrong("a header has a name or a value that is none"));
+        }
+        let name = name.to_ascii_lowercase();
+        // Two of them could be read in two ways.
+        let is_single = matches!(name.as_str(), "host" | "content-length" | "origin");
+        if is_single && headers.iter().any(|(other, _)| *other == name) {
+            return Err(wrong("a header is there twice"));
+        }
+        headers.push((name, value.trim().to_owned()));
+        if headers.len() > HEADERS {
+            return Err(Response::refusal(431, "there are too many headers"));
+        }
+    }
+    let (method, path) = (method.to_owned(), path.to_owned());
+    Ok(Request { method, path, headers, body: Vec::new() })
+}
+
+fn body_length(request: &Request) -> Result<usize, Response> {
+    if request.header("transfer-encoding").is_some() {
+        return Err(Response::refusal(411, "send the length of the body"));
+    }
+    let Some(text) = request.header("content-length") else { return Ok(0) };
+    // `parse` alone would take a plus sign.
+    let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    if !is_number {
+        return Err(Response::refusal(400, "the length of the body is no number"));
+    }
+    match text.parse::<usize>() {
+        Ok(length) if length <= BODY_BYTES => Ok(length),
+        _ => Err(Response::refusal(413, "the body is too long")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn status(bytes: &[u8]) -> Option<u16> {
+        read(&mut &bytes[..]).err().map(|refusal| refusal.map_or(0, |refusal| refusal.status))
+    }
+
+    #[test]
+    fn a_request_is_read_with_its_headers_and_its_body() {
+        let text = b"POST /a?b HTTP/1.1\r\nHost: x:1\r\nCONTENT-length: 3\r\n\r\nabcdef";
+        let request = read(&mut &text[..]).unwrap();
+        assert_eq!((request.method.as_str(), request.path.as_str()), ("POST", "/a?b"));
+        assert_eq!(request.header("host"), Some("x:1"));
+        assert_eq!(request.body, b"abc");
+    }
+
+    #[test]
+    fn hostile_requests_are_refused() {
+        for (bytes, wanted) in [
+            (&b""[..], 0),
+            (b"GET /", 0),
+            (b"GET  / HTTP/1.1\r\n\r\n", 400),
+            (b"GET / HTTP/2.0\r\n\r\n", 400),
+            (b"GET http://x/ HTTP/1.1\r\n\r\n", 400),
+            (b"\x16\x03\x01\x02\x00\r\n\r\n", 400),
+            (b"GET / HTTP/1.1\r\nno colon\r\n\r\n", 400),
+            (b"GET / HTTP/1.1\r\nHost: a\r\n b: c\r\n\r\n", 400),
+            (b"GET / HTTP/1.1\r\nHost: a\nX: b\r\n\r\n", 400),
+            (b"GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n", 400),
+            (b"GET /\0 HTTP/1.1\r\n\r\n", 400),
+            (b"GET /\xff HTTP/1.1\r\n\r\n", 400),
+            (b"POST / HTTP/1.1\r\nContent-Length: +3\r\n\r\nabc", 400),
+            (b"POST / HTTP/1.1\r\nContent-Length: -1\r\n\r\n", 400),
+            (b"POST / HTTP/1.1\r\nContent-Length: 3\r\nContent-Length: 4\r\n\r\nabc", 400),
+            (b"POST / HTTP/1.1\r\nContent-Length: 99999999999999999999\r\n\r\n", 413),
+            (b"POST / HTTP/1.1\r\nContent-Length: 16385\r\n\r\n", 413),
+            (b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 411),
+            (b"POST / HTTP/1.1\r\nContent-Length: 9\r\n\r\nabc", 0),
+        ] {
+            let shown = String::from_utf8_lossy(bytes);
+            assert_eq!(status(bytes), Some(wanted), "{shown:?}");
+        }
+        let long = format!("GET /{} HTTP/1.1\r\n\r\n", "a".repeat(HEAD_BYTES));
+        assert_eq!(status(long.as_bytes()), Some(431));
+        let endless = "a".repeat(4 * HEAD_BYTES);
+        assert_eq!(status(endless.as_bytes()), Some(431));
+        let many = format!("GET / HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(HEADERS + 1));
+        assert_eq!(status(many.as_bytes()), Some(431));
+    }
+}

@@ -1,0 +1,318 @@
+//! `tagalong annotate`: truth for one's own log.
+//!
+//! A pipeline passes the log once and proposes tracks, while `film` keeps images and depth. Then
+//! `server` answers one page, on this computer alone: the page shows a frame and asks for changes,
+//! `document` makes them and takes them back, and `session` measures places by depth and writes the
+//! whole file after each. The page decides nothing, so that all of it can be tested without one.
+
+mod document;
+mod film;
+mod http;
+mod person;
+mod server;
+mod session;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+use clap::Args;
+use tagalong_app::choice::fitting;
+use tagalong_app::config_file::ConfigFile;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, say};
+use tagalong_app::progress::Progress;
+use tagalong_app::signals::Signals;
+use tagalong_app::suggest::check_log_path;
+use tagalong_config::Registry;
+use tagalong_eval::Region;
+use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
+use tagalong_pipeline::{FrameReport, Pipeline};
+use tagalong_render::background;
+
+use crate::film::Film;
+use crate::person::{Person, sparse};
+use crate::server::{App, Server};
+use crate::session::{Session, read_people};
+
+/// Longest time without a detection over which a proposed person is taken to be there, s.
+const BRIDGED_S: f64 = 2.0;
+
+/// Fewest detections of a proposed person.
+const LEAST_DETECTIONS: usize = 3;
+
+/// Arguments of `tagalong annotate`.
+#[derive(Args, Debug)]
+pub struct AnnotateArgs {
+    /// The log.
+    pub log: PathBuf,
+    /// Pipeline that proposes tracks: a config, or the name of a built-in one [default: the one for
+    /// what the log has].
+    pub config: Option<PathBuf>,
+    /// The file to write, or to go on with [default: LOG.people.csv].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Port of the page on this computer; 0 takes a free one.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub port: u16,
+    /// Begin without proposed tracks.
+    #[arg(long)]
+    pub empty: bool,
+}
+
+/// Examples for `tagalong annotate --help`.
+pub const HELP: &str = "\
+Opens a page for your browser on this computer; nothing leaves it. A pipeline proposes tracks, unless the
+file exists: then that is continued. Click a head or drag a box; a digit is the number of the person;
+between two boxes that were set the others are interpolated; depth fills in the places. The file is
+written whole after every change, so a kill loses nothing. `Finish` in the page ends with exit code 0,
+Ctrl-C with 130; the file is whole in both cases. `eval`, `bench` and `view` find it beside the log.
+
+Examples:
+  tagalong annotate robot.mcap
+  tagalong annotate robot.mcap depth-ekf -o robot.people.csv --port 8080
+  tagalong annotate robot.mcap --empty
+  ssh -L 8080:127.0.0.1:8080 robot tagalong annotate robot.mcap --port 8080    (log on another computer)";
+
+/// Serves the page until it is finished, or a signal comes.
+///
+/// # Errors
+/// A log or a config that cannot be used, a log without images, a file that cannot be continued or
+/// written, a port that is taken.
+pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
+    let signals = Signals::listen()?;
+    check_log_path(&args.log)?;
+    let output = args.output.clone().unwrap_or_else(|| default_output(&args.log));
+    check_writable(&output)?;
+    let server = Server::open(args.port).map_err(|error| {
+        let port = args.port;
+        Failure::usage(format!("cannot listen on port {port}: {error}; choose another with --port"))
+    })?;
+    let continues = output.exists();
+    let material = Material::of(args, registry, continues || args.empty, &signals)?;
+    if let Some(signal) = signals.received() {
+        return Ok(Ended::BySignal(signal));
+    }
+    let film = Arc::new(material.film);
+    let people = match continues {
+        true => read_people(&output, &film).map_err(Failure::failed)?,
+        false => material.people,
+    };
+    let origin = match continues {
+        true => format!("{} is continued", output.display()),
+        false => material.origin,
+    };
+    say(&origin);
+    let app = app(args, film, people, &output, origin);
+    print(&format!(
+        "{}\nopen this address in a browser on this computer; it is the key to the page\nevery change \
+         is written to {}; Ctrl-C ends\n",
+        server.address(),
+        output.display()
+    ))?;
+    server.serve(&app, || signals.received().is_some());
+    if !app.finished.load(Ordering::Relaxed) {
+        return Ok(signals.received().map_or(Ended::Well, Ended::BySignal));
+    }
+    let shown = output.display();
+    say(&format!("finished: `tagalong eval --truth {shown} --tracks RUN` scores a run with it"));
+    Ok(Ended::Well)
+}
+
+fn app(
+    args: &AnnotateArgs,
+    film: Arc<Film>,
+    people: BTreeMap<i64, Person>,
+    output: &Path,
+    origin: String,
+) -> Arc<App> {
+    let mut session = Session::new(Arc::clone(&film), people, output.to_owned());
+    let progress = Progress::titled("places");
+    session.measure(|share, number| progress.advance(share, u64::from(number)));
+    Arc::new(App {
+        film,
+        session: Mutex::new(session),
+        log: args.log.clone(),
+        origin,
+        finished: AtomicBool::new(false),
+    })
+}
+
+/// Returns the file beside the log in which `eval` and `bench` look for truth.
+fn default_output(log: &Path) -> PathBuf {
+    log.with_extension("people.csv")
+}
+
+/// Refuses a file that could not be written, before an hour of work is put into it.
+fn check_writable(output: &Path) -> Result<(), Failure> {
+    make_room_for(output)?;
+    let shown = output.display();
+    let refused = |error| {
+        Failure::usage(format!("cannot write {shown}: {error}; choose another file with -o"))
+    };
+    if output.is_dir() {
+        return Err(Failure::usage(format!("{shown} is a folder; name a file with -o")));
+    }
+    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
+    tempfile::tempfile_in(folder.unwrap_or(Path::new("."))).map_err(refused)?;
+    Ok(())
+}
+
+/// All that is taken from the log in one pass.
+struct Material {
+    film: Film,
+    people: BTreeMap<i64, Person>,
+    origin: String,
+}
+
+impl Material {
+    fn of(
+        args: &AnnotateArgs,
+        registry: &Registry,
+        only_images: bool,
+        signals: &Signals,
+    ) -> Result<Self, Failure> {
+        let named = args.config.as_deref().map(ConfigFile::read).transpose()?;
+        let config = match (named, only_images) {
+            (Some(config), _) => Some(config),
+            (None, true) => None,
+            // Without a pipeline that fits, the people are set by hand.
+            (None, false) => {
+                fitting(&args.log, registry, 1).fitting.pop().map(|found| found.config)
+            }
+        };
+        let outer = config.as_ref().map(ConfigFile::outer).transpose()?.unwrap_or_default();
+        let proposing = config.filter(|_| !only_images);
+        let mut pipeline = match &proposing {
+            Some(config) => Some(config.pipeline(registry, None)?.0),
+            None => None,
+        };
+        let inputs = pipeline.as_ref().map_or(Inputs::NONE, Pipeline::inputs);
+        let inputs = inputs.accept(Input::Colour).accept(Input::Depth);
+        let mut source = FrameSource::open(&args.log, &outer.input, &outer.limits, inputs)?;
+        let mut pass = Pass::new()?;
+        let progress = Progress::new();
+        while let Some(item) = source.next_frame() {
+            if signals.received().is_some() {
+                break;
+            }
+            let report = pipeline.as_mut().map(|pipeline| pipeline.step(&item.frame)).transpose();
+            pass.take(&item, report.map_err(Failure::failed)?.as_ref())?;
+            progress.advance(source.progress(), item.frame.index);
+        }
+        let origin = match &proposing {
+            Some(config) => format!("the boxes are proposed by {}", config.stem()),
+            None => "no boxes are proposed".to_owned(),
+        };
+        let Pass { film, tracks, .. } = pass;
+        check_images(&args.log, &film)?;
+        let people = proposals(&film, tracks);
+        Ok(Self { film, people, origin })
+    }
+}
+
+fn check_images(log: &Path, film: &Film) -> Result<(), Failure> {
+    let has_images = film.shots().iter().any(|shot| !shot.camera.is_blind());
+    if has_images {
+        return Ok(());
+    }
+    let log = log.display();
+    Err(Failure::failed(format!(
+        "{log}: no image to annotate people in; `tagalong inspect {log}` lists its topics, and \
+         [input] of a config names those to take"
+    )))
+}
+
+/// Boxes of the tracks by their numbers.
+type Boxes = BTreeMap<u32, Vec<(u32, Region)>>;
+
+/// Pass over the log.
+struct Pass {
+    film: Film,
+    tracks: Boxes,
+    first_ns: Option<u64>,
+}
+
+impl Pass {
+    fn new() -> Result<Self, Failure> {
+        let film = Film::new().map_err(no_room)?;
+        Ok(Self { film, tracks: Boxes::new(), first_ns: None })
+    }
+
+    fn take(&mut self, item: &LogFrame, report: Option<&FrameReport>) -> Result<(), Failure> {
+        let frame = &item.frame;
+        let number = u32::try_from(frame.index).unwrap_or(u32::MAX);
+        let first_ns = *self.first_ns.get_or_insert(frame.stamp.nanos());
+        let t_s = frame.stamp.nanos().saturating_sub(first_ns) as f64 * 1e-9;
+        let image = background(&frame.images());
+        let depth = frame.depth().ok();
+        self.film.push(number, t_s, &frame.camera, image.as_ref(), depth).map_err(no_room)?;
+        let tracks = report.iter().flat_map(|report| &report.tracks);
+        for track in tracks.filter(|track| track.confirmed && track.seen) {
+            let at = &track.estimate.region;
+            let region = Region { x: at.x, y: at.y, width: at.width, height: at.height };
+            let is_inside = at.clipped(frame.camera.width, frame.camera.height).area() > 0.0;
+            if is_inside {
+                self.tracks.entry(track.id.0).or_default().push((number, region));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn no_room(error: std::io::Error) -> Failure {
+    let folder = std::env::temp_dir();
+    Failure::failed(format!(
+        "cannot keep the images in {}: {error}; TMPDIR names another folder",
+        folder.display()
+    ))
+}
+
+/// Returns people with few keys from the boxes of tracks, numbered from 1 in the order in which they
+/// come.
+fn proposals(film: &Film, tracks: Boxes) -> BTreeMap<i64, Person> {
+    let mut tracks: Vec<_> = tracks.into_values().collect();
+    tracks.retain(|boxes| boxes.len() >= LEAST_DETECTIONS);
+    tracks.sort_by_key(|boxes| boxes[0].0);
+    (1..).zip(tracks.iter().map(|boxes| proposal(film, boxes))).collect()
+}
+
+fn proposal(film: &Film, boxes: &[(u32, Region)]) -> Person {
+    let time_s = |number: u32| film.shot(number).map_or(0.0, |shot| shot.t_s);
+    let mut keys = BTreeMap::new();
+    let mut shown = BTreeSet::new();
+    for part in boxes.chunk_by(|a, b| time_s(b.0) - time_s(a.0) <= BRIDGED_S) {
+        keys.extend(sparse(part));
+        shown.extend(part[0].0..=part[part.len() - 1].0);
+    }
+    Person::of(keys, &shown)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn proposals_bridge_short_pauses_and_not_long_ones() {
+        let film = film::tests::film(40);
+        let square = |x: u32| Region { x: f64::from(x), y: 9.0, width: 50.0, height: 50.0 };
+        let boxes = |frames: &[u32]| frames.iter().map(|f| (*f, square(*f))).collect::<Vec<_>>();
+        let tracks = Boxes::from([
+            (7, boxes(&[3, 4, 5, 10, 30, 31])),
+            (9, boxes(&[1, 2, 3, 4])),
+            (12, boxes(&[8, 9])),
+        ]);
+        let people = proposals(&film, tracks);
+        assert_eq!(people.keys().copied().collect::<Vec<_>>(), [1, 2], "too short is left out");
+        assert_eq!(people[&1].frames().collect::<Vec<_>>(), [1, 2, 3, 4]);
+        let frames: Vec<u32> = people[&2].frames().collect();
+        assert_eq!(frames, [3, 4, 5, 6, 7, 8, 9, 10, 30, 31]);
+        assert_eq!(people[&2].at(7).unwrap().region.x, 7.0);
+        assert!(people[&2].key(7).is_none());
+    }
+
+    #[test]
+    fn the_file_is_beside_the_log() {
+        assert_eq!(default_output(Path::new("a/walk.mcap")), Path::new("a/walk.people.csv"));
+    }
+}

@@ -1,0 +1,376 @@
+//! One annotated person: boxes set by hand, and boxes between them.
+
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
+
+use tagalong_eval::Region;
+
+/// Box of a person that was set by hand or proposed, with the notes on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Key {
+    /// Upper body, pixels; it may reach beyond the image.
+    pub region: Region,
+    /// Visible fraction of the upper body.
+    pub visible: f64,
+    /// Neither a miss nor a false alarm.
+    pub ignore: bool,
+    /// Occluder: `0` nothing, a person's id, `border` or `static`.
+    pub occluder: String,
+    /// Visible part of the whole body, pixels.
+    pub visible_body: Option<Region>,
+    /// Surface of the head in the camera frame as a file has it, m; measured anew once the box
+    /// moves.
+    pub head_in_camera_m: Option<[f64; 3]>,
+    /// Origin of that place, as the file has it.
+    pub interpolated: u8,
+}
+
+impl Key {
+    /// Returns a wholly visible person in a box.
+    pub fn new(region: Region) -> Self {
+        Self {
+            region: tenths(region),
+            visible: 1.0,
+            ignore: false,
+            occluder: "0".into(),
+            visible_body: None,
+            head_in_camera_m: None,
+            interpolated: 0,
+        }
+    }
+
+    /// Moves the box; what was measured in the old one goes.
+    pub fn move_to(&mut self, region: Region) {
+        self.region = tenths(region);
+        self.visible_body = None;
+        self.head_in_camera_m = None;
+        self.interpolated = 0;
+    }
+}
+
+/// Returns a box in tenths of a pixel, which are finer than a hand: so the file has the same keys as
+/// the page, and what lies between them comes back the same.
+pub fn tenths(region: Region) -> Region {
+    let [x, y, width, height] = [region.x, region.y, region.width, region.height]
+        // Adding 0 removes the sign of -0.
+        .map(|v| (v * 10.0).round() / 10.0 + 0.0);
+    Region { x, y, width, height }
+}
+
+/// Boxes of one person over time.
+///
+/// Between two keys the box is interpolated, but for the `holes`: frames without the person.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Person {
+    keys: BTreeMap<u32, Key>,
+    holes: BTreeSet<u32>,
+}
+
+impl Person {
+    /// Returns the person with these keys, who is in no frame between two keys that `shown` lacks.
+    pub fn of(keys: BTreeMap<u32, Key>, shown: &BTreeSet<u32>) -> Self {
+        let mut person = Self { keys, holes: BTreeSet::new() };
+        let is_gone = |frame: &u32| !shown.contains(frame) && !person.keys.contains_key(frame);
+        person.holes = person.span().filter(is_gone).collect();
+        person
+    }
+
+    /// Returns true if there is no box.
+    pub fn is_empty(&self) -> bool {
+        self.keys.is_empty()
+    }
+
+    /// Returns the frames from the first key to the last; none without a key.
+    fn span(&self) -> RangeInclusive<u32> {
+        match (self.keys.first_key_value(), self.keys.last_key_value()) {
+            (Some((first, _)), Some((last, _))) => *first..=*last,
+            // An empty range.
+            _ => RangeInclusive::new(1, 0),
+        }
+    }
+
+    /// Returns the frames with a box, in their order.
+    pub fn frames(&self) -> impl Iterator<Item = u32> {
+        self.span().filter(|frame| !self.holes.contains(frame))
+    }
+
+    /// Returns the key of a frame.
+    pub fn key(&self, frame: u32) -> Option<&Key> {
+        self.keys.get(&frame)
+    }
+
+    /// Returns the person in a frame: the key, or what lies between two keys.
+    pub fn at(&self, frame: u32) -> Option<Key> {
+        if let Some(key) = self.keys.get(&frame) {
+            return Some(key.clone());
+        }
+        if self.holes.contains(&frame) {
+            return None;
+        }
+        let (before, old) = self.keys.range(..frame).next_back()?;
+        let (after, new) = self.keys.range(frame..).next()?;
+        let share = f64::from(frame - before) / f64::from(after - before);
+        let region = between(&old.region, &new.region, share);
+        // The notes hold until the next key changes them.
+        let notes = Key { visible_body: None, head_in_camera_m: None, ..old.clone() };
+        Some(Key { region, interpolated: 1, ..notes })
+    }
+
+    /// Sets the key of a frame.
+    pub fn set(&mut self, frame: u32, key: Key) {
+        // A key beyond the ends does not fill the frames that the person was not in.
+        let old = self.span();
+        self.holes.remove(&frame);
+        self.keys.insert(frame, key);
+        if old.is_empty() || old.contains(&frame) {
+            return;
+        }
+        let gap = if frame > *old.end() { *old.end() + 1..frame } else { frame + 1..*old.start() };
+        // Keys a few frames apart are meant to be joined; that is the use of interpolation.
+        if gap.len() as u32 > JOINED_FRAMES {
+            self.holes.extend(gap);
+        }
+    }
+
+    /// Makes a key of an interpolated box; false if the frame has no box.
+    pub fn pin(&mut self, frame: u32) -> bool {
+        let Some(mut key) = self.at(frame) else { return false };
+        if let Entry::Vacant(place) = self.keys.entry(frame) {
+            key.interpolated = 0;
+            place.insert(key);
+        }
+        true
+    }
+
+    /// Takes a key back, so that the box is interpolated; at an end the person begins later or ends
+    /// earlier.
+    pub fn unpin(&mut self, frame: u32) {
+        self.keys.remove(&frame);
+        self.trim();
+    }
+
+    /// Takes the person out of frames; the boxes in all others stay where they are.
+    pub fn remove(&mut self, frames: RangeInclusive<u32>) {
+        for edge in [frames.start().checked_sub(1), frames.end().checked_add(1)] {
+            edge.map(|edge| self.pin(edge));
+        }
+        let span = self.span();
+        let first = (*frames.start()).max(*span.start());
+        let last = (*frames.end()).min(*span.end());
+        self.keys.retain(|frame, _| !frames.contains(frame));
+        self.holes.extend(first..=last);
+        self.trim();
+    }
+
+    /// Lets the person be in all frames between the keys around a frame.
+    pub fn fill(&mut self, frame: u32) {
+        let before = self.keys.range(..frame).next_back().map(|(frame, _)| *frame);
+        let after = self.keys.range(frame..).next().map(|(frame, _)| *frame);
+        if let (Some(before), Some(after)) = (before, after) {
+            self.holes.retain(|hole| !(before..=after).contains(hole));
+        }
+    }
+
+    /// Splits off the frames from `frame` on; no box moves.
+    #[must_use]
+    pub fn split_off(&mut self, frame: u32) -> Self {
+        self.pin_edges();
+        if let Some(before) = frame.checked_sub(1) {
+            self.pin(before);
+        }
+        self.pin(frame);
+        let mut late =
+            Self { keys: self.keys.split_off(&frame), holes: self.holes.split_off(&frame) };
+        self.trim();
+        late.trim();
+        late
+    }
+
+    /// Returns true if both are in the same frame somewhere.
+    pub fn meets(&self, other: &Self) -> bool {
+        let frames: BTreeSet<u32> = self.frames().collect();
+        other.frames().any(|frame| frames.contains(&frame))
+    }
+
+    /// Adds the boxes of another person, who is in none of the same frames; no box moves.
+    pub fn join(&mut self, mut other: Self) {
+        self.pin_edges();
+        other.pin_edges();
+        let shown: BTreeSet<u32> = self.frames().chain(other.frames()).collect();
+        let mut keys = std::mem::take(&mut self.keys);
+        keys.append(&mut other.keys);
+        *self = Self::of(keys, &shown);
+    }
+
+    /// Makes keys of all boxes beside a frame without one, so that new neighbours do not move them.
+    fn pin_edges(&mut self) {
+        let beside = self.holes.iter().flat_map(|hole| [hole.saturating_sub(1), hole + 1]);
+        let edges: Vec<u32> = beside.filter(|frame| !self.holes.contains(frame)).collect();
+        for frame in edges {
+            self.pin(frame);
+        }
+    }
+
+    /// Forgets frames without the person before the first key and after the last.
+    fn trim(&mut self) {
+        let span = self.span();
+        self.holes.retain(|hole| span.contains(hole));
+    }
+}
+
+/// Longest pause between two keys over which the person is taken to be there, frames.
+const JOINED_FRAMES: u32 = 30;
+
+/// Returns the region that is a share of the way from one to another.
+fn between(from: &Region, to: &Region, share: f64) -> Region {
+    let mix = |a: f64, b: f64| a + (b - a) * share;
+    Region {
+        x: mix(from.x, to.x),
+        y: mix(from.y, to.y),
+        width: mix(from.width, to.width),
+        height: mix(from.height, to.height),
+    }
+}
+
+/// Fraction of a box's width by which an interpolated box may be off a proposed one.
+const TOLERANCE: f64 = 0.04;
+
+/// Returns as few keys as bring all boxes back by interpolation, to within a twenty-fifth of their
+/// width.
+pub fn sparse(boxes: &[(u32, Region)]) -> BTreeMap<u32, Key> {
+    let mut keys = BTreeMap::new();
+    let (Some(first), Some(last)) = (boxes.first(), boxes.last()) else { return keys };
+    for (frame, region) in [first, last] {
+        keys.insert(*frame, Key::new(*region));
+    }
+    let mut parts = vec![boxes];
+    while let Some(part) = parts.pop() {
+        let worst = (0..part.len()).map(|i| (off(part, i), i)).max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, at)) = worst.filter(|(off, _)| *off > TOLERANCE) else { continue };
+        keys.insert(part[at].0, Key::new(part[at].1));
+        parts.extend([&part[..=at], &part[at..]]);
+    }
+    keys
+}
+
+/// Returns by how much of its width a box is off the line between the ends of its part.
+fn off(part: &[(u32, Region)], at: usize) -> f64 {
+    let ((first, from), (last, to), (frame, region)) = (part[0], part[part.len() - 1], part[at]);
+    let share = f64::from(frame - first) / f64::from((last - first).max(1));
+    let guess = between(&from, &to, share);
+    let parts = [region.x - guess.x, region.y - guess.y, region.width - guess.width];
+    parts.iter().fold(0.0, |most: f64, part| most.max(part.abs())) / region.width.max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(x: f64) -> Region {
+        Region { x, y: 10.0, width: 50.0, height: 50.0 }
+    }
+
+    fn person(keys: &[(u32, f64)]) -> Person {
+        let mut person = Person::default();
+        for (frame, x) in keys {
+            person.set(*frame, Key::new(square(*x)));
+        }
+        person
+    }
+
+    fn columns(person: &Person) -> Vec<(u32, f64)> {
+        person.frames().map(|frame| (frame, person.at(frame).unwrap().region.x)).collect()
+    }
+
+    #[test]
+    fn boxes_between_keys_are_interpolated() {
+        let person = person(&[(2, 100.0), (6, 140.0)]);
+        let wanted = [(2, 100.0), (3, 110.0), (4, 120.0), (5, 130.0), (6, 140.0)];
+        assert_eq!(columns(&person), wanted);
+        assert_eq!(person.at(4).unwrap().interpolated, 1);
+        assert_eq!((person.at(1), person.at(7)), (None, None));
+        assert!(person.key(4).is_none() && person.key(2).is_some());
+    }
+
+    #[test]
+    fn notes_hold_until_the_next_key() {
+        let mut person = person(&[(2, 100.0), (6, 140.0)]);
+        let ignored = Key { ignore: true, visible: 0.5, ..Key::new(square(100.0)) };
+        person.set(2, ignored);
+        let between = person.at(5).unwrap();
+        assert_eq!((between.ignore, between.visible), (true, 0.5));
+        assert!(!person.at(6).unwrap().ignore);
+    }
+
+    #[test]
+    fn a_person_taken_out_of_a_frame_stays_put_in_the_others() {
+        let mut person = person(&[(1, 0.0), (5, 40.0)]);
+        person.remove(3..=3);
+        assert_eq!(columns(&person), [(1, 0.0), (2, 10.0), (4, 30.0), (5, 40.0)]);
+        person.fill(3);
+        assert_eq!(columns(&person).len(), 5);
+        person.remove(4..=u32::MAX);
+        assert_eq!(columns(&person), [(1, 0.0), (2, 10.0), (3, 20.0)]);
+        person.remove(0..=1);
+        assert_eq!(columns(&person), [(2, 10.0), (3, 20.0)]);
+        person.remove(1..=9);
+        assert!(person.is_empty() && person.frames().count() == 0);
+    }
+
+    #[test]
+    fn a_key_taken_back_is_interpolated_again() {
+        let mut person = person(&[(1, 0.0), (3, 99.0), (5, 40.0)]);
+        person.unpin(3);
+        assert_eq!(columns(&person)[2], (3, 20.0));
+        person.unpin(5);
+        assert_eq!(columns(&person), [(1, 0.0)]);
+    }
+
+    #[test]
+    fn a_key_far_beyond_the_end_does_not_fill_the_pause() {
+        let mut near = person(&[(1, 0.0), (31, 30.0)]);
+        assert_eq!(near.frames().count(), 31);
+        near.set(63, Key::new(square(62.0)));
+        assert_eq!(near.frames().count(), 32);
+        assert_eq!(near.at(40), None);
+        near.fill(40);
+        assert_eq!(near.at(40).unwrap().region.x, 39.0);
+    }
+
+    #[test]
+    fn splitting_and_joining_moves_no_box() {
+        let whole = person(&[(1, 0.0), (9, 80.0)]);
+        let mut early = whole.clone();
+        let late = early.split_off(4);
+        assert_eq!(columns(&early), columns(&whole)[..3]);
+        assert_eq!(columns(&late), columns(&whole)[3..]);
+        assert!(!early.meets(&late) && early.meets(&whole));
+        early.join(late);
+        assert_eq!(columns(&early), columns(&whole));
+        // Another person in a pause of the first.
+        let mut torn = whole.clone();
+        torn.remove(4..=6);
+        let wanted = columns(&torn);
+        torn.join(person(&[(5, 7.0)]));
+        assert_eq!(columns(&torn).len(), wanted.len() + 1);
+        assert!(wanted.iter().all(|one| columns(&torn).contains(one)), "{torn:?}");
+    }
+
+    #[test]
+    fn few_keys_bring_all_boxes_back() {
+        let straight = |frame: u32| square(f64::from(frame));
+        let bent = |frame: u32| square(f64::from(frame.abs_diff(30)) * 5.0);
+        let boxes: Vec<_> = (1..60).map(|frame| (frame, straight(frame))).collect();
+        assert_eq!(sparse(&boxes).into_keys().collect::<Vec<_>>(), [1, 59]);
+        let boxes: Vec<_> = (1..60).map(|frame| (frame, bent(frame))).collect();
+        let keys = sparse(&boxes);
+        assert_eq!(keys.keys().copied().collect::<Vec<_>>(), [1, 30, 59]);
+        let person = Person::of(keys, &(1..60).collect());
+        for (frame, region) in boxes {
+            let at = person.at(frame).unwrap().region;
+            assert!((at.x - region.x).abs() <= TOLERANCE * 50.0, "{frame}");
+        }
+        assert!(sparse(&[]).is_empty());
+    }
+}

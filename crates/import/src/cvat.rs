@@ -1,0 +1,258 @@
+//! Annotations of CVAT, as its formats "CVAT for video 1.1" and "CVAT for images 1.1" export them:
+//! <https://docs.cvat.ai/docs/manual/advanced/xml_format/>.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use roxmltree::{Document, Node, TextPos};
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
+use tagalong_eval::Region;
+use tagalong_eval::formats::people::{self, Row};
+
+use super::ImportArgs;
+
+/// Longest file that is read, bytes.
+const MOST_BYTES: u64 = 256 << 20;
+
+/// Visible part of a person whose box is marked as occluded: CVAT says no more.
+const OCCLUDED: f64 = 0.5;
+
+/// Writes the boxes of an XML file as truth for a log.
+///
+/// # Errors
+/// A file that cannot be read or holds something else: exit code 1; an output that exists: 2.
+pub fn import(args: &ImportArgs) -> Outcome {
+    let ending = if args.whole_bodies { "boxes.csv" } else { "people.csv" };
+    let output = args.output.clone().unwrap_or_else(|| default_output(&args.path, ending));
+    spare(&output, args.overwrite)?;
+    let rows = read(&args.path)?;
+    let text = if args.whole_bodies { mot(&rows) } else { csv(&rows)? };
+    make_room_for(&output)?;
+    let shown = output.display();
+    fs::write(&output, text)
+        .map_err(|error| Failure::failed(format!("cannot write {shown}: {error}")))?;
+    let count = rows.len();
+    print(&match args.format {
+        Format::Json => format!("{:#}\n", serde_json::json!({ "truth": output, "boxes": count })),
+        Format::Text => format!(
+            "{count} boxes are in {shown}; beside LOG.mcap `eval` and `bench` look for LOG.{ending}\n"
+        ),
+    })?;
+    Ok(Ended::Well)
+}
+
+fn default_output(path: &Path, ending: &str) -> PathBuf {
+    path.with_extension(ending)
+}
+
+/// Reads the boxes, by frame and number.
+fn read(path: &Path) -> Result<Vec<Row>, Failure> {
+    let name = path.display().to_string();
+    let cannot = |why: String| Failure::failed(format!("cannot read {name}: {why}"));
+    let about = fs::metadata(path).map_err(|error| cannot(error.to_string()))?;
+    if !about.is_file() || about.len() > MOST_BYTES {
+        let most = MOST_BYTES >> 20;
+        return Err(cannot(format!("give the XML file that CVAT exports, of at most {most} MiB")));
+    }
+    let text = fs::read_to_string(path).map_err(|error| cannot(error.to_string()))?;
+    parse(&text).map_err(|why| Failure::failed(format!("{name}{why}")))
+}
+
+/// Reads the boxes; an error begins with the line.
+fn parse(text: &str) -> Result<Vec<Row>, String> {
+    let document = Document::parse(text).map_err(|error| format!(": {error}"))?;
+    let root = document.root_element();
+    if !root.has_tag_name("annotations") {
+        let found = root.tag_name().name();
+        return Err(format!(
+            ": holds `{found}` and not `annotations`; export \"CVAT for video 1.1\" or \"CVAT for \
+             images 1.1\""
+        ));
+    }
+    let mut rows = Vec::new();
+    for node in root.children().filter(Node::is_element) {
+        match node.tag_name().name() {
+            "track" => track(&node, &mut rows)?,
+            "image" => image(&node, &mut rows)?,
+            _ => {}
+        }
+    }
+    rows.sort_by_key(|row| (row.frame, row.id));
+    if let Some(pair) =
+        rows.windows(2).find(|pair| (pair[0].frame, pair[0].id) == (pair[1].frame, pair[1].id))
+    {
+        let (id, frame) = (pair[0].id, pair[0].frame - 1);
+        return Err(format!(": person {id} is in CVAT's frame {frame} twice; number them apart"));
+    }
+    Ok(rows)
+}
+
+fn boxes<'a, 'b>(node: &Node<'a, 'b>) -> impl Iterator<Item = Node<'a, 'b>> {
+    node.children().filter(|child| child.has_tag_name("box"))
+}
+
+/// Adds the boxes of a person in a video. CVAT exports those between key frames, too.
+fn track(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
+    // CVAT counts tracks from 0, and 0 is no number of a person.
+    let id = number(node, "id")? as i64 + 1;
+    for shape in boxes(node).filter(|shape| !is_set(shape, "outside")) {
+        let key = shape.attribute("keyframe") != Some("0");
+        let id = id_of(&shape)?.unwrap_or(id);
+        rows.push(row(node, &shape, number(&shape, "frame")?, id, key)?);
+    }
+    Ok(())
+}
+
+/// Adds the boxes of an image, which need numbers of their own.
+fn image(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
+    let frame = number(node, "id")?;
+    for shape in boxes(node) {
+        let none = || {
+            let why = "a box without a number: give it an attribute `id`, or a group";
+            at(&shape, why)
+        };
+        let id = id_of(&shape)?.ok_or_else(none)?;
+        rows.push(row(&shape, &shape, frame, id, true)?);
+    }
+    Ok(())
+}
+
+/// Returns the number that the annotator gave: the attribute `id`, or the group.
+fn id_of(shape: &Node<'_, '_>) -> Result<Option<i64>, String> {
+    let own = attribute(shape, "id").or_else(|| attribute(shape, "track_id"));
+    let group = shape.attribute("group_id").filter(|group| *group != "0");
+    let Some(text) = own.or(group) else { return Ok(None) };
+    let wrong = || at(shape, &format!("the number of a person is `{text}`, expected 1 or more"));
+    text.trim().parse().ok().filter(|id| *id > 0).map(Some).ok_or_else(wrong)
+}
+
+/// Returns an attribute that the annotator gave a box.
+fn attribute<'a>(shape: &Node<'a, '_>, name: &str) -> Option<&'a str> {
+    let mut all = shape.children().filter(|child| child.has_tag_name("attribute"));
+    all.find(|child| child.attribute("name") == Some(name))?.text()
+}
+
+fn is_set(node: &Node<'_, '_>, name: &str) -> bool {
+    node.attribute(name) == Some("1")
+}
+
+fn row(
+    labelled: &Node<'_, '_>,
+    shape: &Node<'_, '_>,
+    frame: f64,
+    id: i64,
+    key: bool,
+) -> Result<Row, String> {
+    let [x, y] = [number(shape, "xtl")?, number(shape, "ytl")?];
+    let [width, height] = [number(shape, "xbr")? - x, number(shape, "ybr")? - y];
+    if width <= 0.0 || height <= 0.0 {
+        return Err(at(shape, "a box without an area"));
+    }
+    let is_frame = frame.fract() == 0.0 && (0.0..4e9).contains(&frame);
+    if !is_frame {
+        return Err(at(shape, &format!("`{frame}` is no number of a frame")));
+    }
+    let ignored = attribute(shape, "ignore").is_some_and(|text| text.trim() == "true");
+    Ok(Row {
+        // CVAT counts frames from 0.
+        frame: frame as u32 + 1,
+        id,
+        upper_body: Some(Region { x, y, width, height }),
+        visible_body: None,
+        head_in_camera_m: None,
+        visible: if is_set(shape, "occluded") { OCCLUDED } else { 1.0 },
+        occluder: "0".into(),
+        ignore: ignored || labelled.attribute("label") == Some("ignore"),
+        interpolated: 1,
+        key,
+    })
+}
+
+fn number(node: &Node<'_, '_>, name: &str) -> Result<f64, String> {
+    let text = node.attribute(name).unwrap_or_default();
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+    value.ok_or_else(|| at(node, &format!("`{name}` is `{text}`, expected a number")))
+}
+
+fn at(node: &Node<'_, '_>, why: &str) -> String {
+    let TextPos { row, .. } = node.document().text_pos_at(node.range().start);
+    format!(", line {row}: {why}")
+}
+
+fn csv(rows: &[Row]) -> Result<String, Failure> {
+    let mut out = Vec::new();
+    people::write(&mut out, rows).map_err(Failure::failed)?;
+    String::from_utf8(out).map_err(Failure::failed)
+}
+
+/// Returns MOTChallenge text of whole bodies, of which `eval` compares the upper bodies.
+fn mot(rows: &[Row]) -> String {
+    let mut out = String::new();
+    for row in rows {
+        let Some(Region { x, y, width, height }) = row.upper_body else { continue };
+        let counts = u8::from(!row.ignore);
+        let (frame, id, visible) = (row.frame, row.id, row.visible);
+        let _ = writeln!(out, "{frame},{id},{x},{y},{width},{height},{counts},1,{visible}");
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VIDEO: &str = r#"<?xml version="1.0" encoding="utf-8"?>
+<annotations><version>1.1</version><meta><task><name>walk</name></task></meta>
+<track id="0" label="person" source="manual">
+  <box frame="0" keyframe="1" outside="0" occluded="0" xtl="10.5" ytl="20" xbr="60.5" ybr="70" z_order="0"></box>
+  <box frame="1" keyframe="0" outside="0" occluded="1" xtl="12.5" ytl="20" xbr="62.5" ybr="70" z_order="0"></box>
+  <box frame="2" keyframe="1" outside="1" occluded="0" xtl="14" ytl="20" xbr="64" ybr="70" z_order="0"></box>
+</track>
+<track id="4" label="ignore"><box frame="1" keyframe="1" outside="0" occluded="0" xtl="1" ytl="2" xbr="31" ybr="32"/></track>
+</annotations>"#;
+
+    const IMAGES: &str = r#"<annotations><image id="7" name="a.png" width="640" height="480">
+<box label="person" occluded="0" xtl="1" ytl="2" xbr="31" ybr="32"><attribute name="id">3</attribute></box>
+<box label="person" occluded="0" xtl="9" ytl="2" xbr="39" ybr="32" group_id="5"><attribute name="ignore">true</attribute></box>
+</image></annotations>"#;
+
+    #[test]
+    fn tracks_of_a_video_become_people() {
+        let rows = parse(VIDEO).unwrap();
+        let seen: Vec<_> =
+            rows.iter().map(|r| (r.frame, r.id, r.key, r.visible, r.ignore)).collect();
+        let wanted = [(1, 1, true, 1.0, false), (2, 1, false, 0.5, false), (2, 5, true, 1.0, true)];
+        assert_eq!(seen, wanted);
+        let region = Region { x: 10.5, y: 20.0, width: 50.0, height: 50.0 };
+        assert_eq!(rows[0].upper_body, Some(region));
+        assert_eq!(people::parse(&csv(&rows).unwrap(), "made").unwrap(), rows);
+        assert_eq!(mot(&rows).lines().next(), Some("1,1,10.5,20,50,50,1,1,1"));
+    }
+
+    #[test]
+    fn boxes_of_images_take_the_numbers_that_they_were_given() {
+        let rows = parse(IMAGES).unwrap();
+        let seen: Vec<_> = rows.iter().map(|row| (row.frame, row.id, row.ignore)).collect();
+        assert_eq!(seen, [(8, 3, false), (8, 5, true)]);
+    }
+
+    #[test]
+    fn files_that_are_something_else_are_refused_with_line_and_reason() {
+        for (text, cause) in [
+            ("no xml", ": "),
+            ("<a/>", "holds `a` and not `annotations`"),
+            (&VIDEO.replace("xtl=\"12.5\"", "xtl=\"wide\""), ", line 5: `xtl` is `wide`"),
+            (&VIDEO.replace("xbr=\"62.5\"", "xbr=\"2\""), ", line 5: a box without an area"),
+            (&VIDEO.replace("frame=\"1\" keyframe=\"0\"", "frame=\"-1\""), "`-1` is no number"),
+            (&VIDEO.replace("id=\"4\"", "id=\"0\""), "person 1 is in CVAT's frame 1 twice"),
+            (&IMAGES.replace(">3<", ">me<"), ", line 2: the number of a person is `me`"),
+            (&IMAGES.replace(" group_id=\"5\"", ""), ", line 3: a box without a number"),
+            (&format!("<!DOCTYPE a [<!ENTITY b \"c\">]>{IMAGES}"), "DTD"),
+        ] {
+            let error = parse(text).unwrap_err();
+            assert!(error.contains(cause), "{error}");
+        }
+    }
+}

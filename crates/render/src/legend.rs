@@ -1,0 +1,132 @@
+use nalgebra::Point2;
+use tagalong_geometry::Rect;
+use tagalong_vision::Sketch;
+
+use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
+use super::image_view::{DROPPED, draw_box};
+use super::{OverlayData, TENTATIVE};
+
+/// Height of the strip under image and plan, pixels: the same for all frames, so that pictures make
+/// a video.
+pub const HEIGHT_PX: usize = 64;
+
+const MARGIN_PX: f64 = 6.0;
+const WHITE: Ink = Ink::solid([235, 235, 235]);
+const QUIET: Ink = Ink::solid([190, 190, 190]);
+/// Colour of the examples, which is that of no track.
+const EXAMPLE: Ink = Ink::solid([120, 190, 255]);
+
+/// Renders frame, meaning of the lines, and counts of dropped candidates in the strip below `top`.
+pub fn draw(canvas: &mut Canvas, top: usize, scene: &OverlayData) {
+    let rows = [0.0, 1.0, 2.0].map(|row| top as f64 + 4.0 + row * (LINE_PX + 1.0));
+    canvas.write(Point2::new(MARGIN_PX, rows[0]), &title(scene), Lettering::Bold, WHITE);
+    let mut at = Point2::new(MARGIN_PX, rows[1]);
+    for (sample, meaning) in entries(scene) {
+        at.x += draw_entry(canvas, at, sample, meaning);
+    }
+    let columns =
+        (canvas.width() as f64 - 2.0 * MARGIN_PX) / Lettering::Small.size_px("m")[0].max(1.0);
+    let dropped = counts(scene, columns as usize);
+    canvas.text(Point2::new(MARGIN_PX, rows[2]), &dropped, QUIET);
+}
+
+fn title(scene: &OverlayData) -> String {
+    let people = scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count();
+    let people = if people == 1 { "1 person".to_owned() } else { format!("{people} people") };
+    let ms = scene.report.stamp.nanos() / 1_000_000;
+    let (s, ms) = (ms / 1000, ms % 1000);
+    format!("frame {}   {s}.{ms:03} s   {people} seen", scene.report.index)
+}
+
+/// Line or mark in the picture.
+#[derive(Clone, Copy)]
+enum Sample {
+    Seen,
+    Predicted,
+    Tentative,
+    Dropped,
+    Trail,
+    Particles,
+    Ellipse,
+    Velocity,
+}
+
+/// Returns the marks with their meanings, most important first.
+fn entries(scene: &OverlayData) -> Vec<(Sample, &'static str)> {
+    let sketch = scene.report.visualisation.as_ref().and_then(|shown| shown.downcast_ref());
+    let has_particles = sketch.is_some_and(|sketch: &Sketch| !sketch.points.is_empty());
+    let image = [
+        (Sample::Seen, "seen"),
+        (Sample::Predicted, "predicted"),
+        (Sample::Tentative, "tentative"),
+        (Sample::Dropped, "dropped, by test"),
+        (Sample::Trail, "trail"),
+    ];
+    let plan = [(Sample::Velocity, "place in 1 s"), (Sample::Ellipse, "2 sigma")];
+    let particles = has_particles.then_some((Sample::Particles, "particles"));
+    image.into_iter().chain(particles).chain(plan).collect()
+}
+
+/// Renders a mark and its meaning; returns the columns of both.
+fn draw_entry(canvas: &mut Canvas, at: Point2<f64>, sample: Sample, meaning: &str) -> f64 {
+    let side = 14.0;
+    let mark = Rect::new(at.x, at.y + 2.0, side, side);
+    draw_sample(canvas, &mark, sample);
+    let text_at = Point2::new(at.x + side + 4.0, at.y);
+    let [width, _] = Lettering::Small.size_px(meaning);
+    // An entry beyond the edge is left out instead of moved over the one before it.
+    if text_at.x + width <= canvas.width() as f64 {
+        canvas.text(text_at, meaning, QUIET);
+    }
+    side + 4.0 + width + 10.0
+}
+
+fn draw_sample(canvas: &mut Canvas, mark: &Rect, sample: Sample) {
+    let (centre, middle) = (mark.centre(), mark.y + 0.5 * mark.height);
+    let ends = [Point2::new(mark.x, middle), Point2::new(mark.right(), middle)];
+    match sample {
+        Sample::Seen => draw_box(canvas, mark, true, EXAMPLE),
+        Sample::Predicted => draw_box(canvas, mark, false, EXAMPLE),
+        Sample::Tentative => draw_box(canvas, mark, true, TENTATIVE),
+        Sample::Dropped => canvas.dashed(mark, DROPPED.faint(1.0)),
+        Sample::Trail => canvas.line(ends[0], ends[1], EXAMPLE),
+        Sample::Velocity => {
+            canvas.disc(ends[0], 3.0, EXAMPLE);
+            canvas.line(ends[0], ends[1], EXAMPLE);
+        }
+        Sample::Particles => {
+            for (x, y) in [(-4.0, -3.0), (3.0, -4.0), (0.0, 1.0), (-3.0, 4.0), (4.0, 3.0)] {
+                canvas.disc(Point2::new(centre.x + x, centre.y + y), 1.5, EXAMPLE);
+            }
+        }
+        Sample::Ellipse => {
+            let circle: Vec<_> = (0..=24)
+                .map(|i| (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos())
+                .map(|(sin, cos)| Point2::new(centre.x + 7.0 * cos, centre.y + 4.0 * sin))
+                .collect();
+            canvas.path(&circle, EXAMPLE);
+        }
+    }
+}
+
+/// Returns the counts of the tests that dropped candidates, largest last test first, as many as fit
+/// into `columns` letters.
+fn counts(scene: &OverlayData, columns: usize) -> String {
+    let entries = scene.report.funnel.entries();
+    if entries.is_empty() {
+        return "nothing dropped".into();
+    }
+    let mut text = "dropped:".to_owned();
+    // The last tests saw the candidates that were nearest to people.
+    for (index, entry) in entries.iter().rev().enumerate() {
+        let part = format!("  {} {}", entry.test, entry.count);
+        let more = format!("  and by {} more tests", entries.len() - index);
+        let rest = if index + 1 < entries.len() { more.len() } else { 0 };
+        if text.len() + part.len() + rest > columns {
+            text += &more;
+            break;
+        }
+        text += &part;
+    }
+    text
+}

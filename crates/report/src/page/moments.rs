@@ -1,0 +1,237 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use maud::{Markup, html};
+
+use super::events::is_base64;
+use super::{MOST_DRAWN, Page, amount, cell, column, no_cell, number, table};
+use crate::chart::{key, px, series_class};
+use crate::model::{MissedPerson, Moment, TaskResult};
+use crate::view::OrderedBenchmark;
+
+/// Most images of the page together, bytes of base64.
+const MOST_BYTES: usize = 1_800_000;
+
+/// Most moments of the page.
+const MOST_MOMENTS: usize = 24;
+
+/// Overlap from which a track is on a person, as in the figures.
+const SAME_IOU: f64 = 0.5;
+
+/// Name of the row of people without a recorded candidate.
+const NO_CANDIDATE: &str = "no candidate";
+
+/// Box in pixels: left, top, width, height.
+type Box = [f64; 4];
+
+/// Returns the moments that the page has room for; those that come first matter most.
+pub(super) fn shown<'a>(all: &'a [Moment], view: &OrderedBenchmark<'_>) -> Vec<&'a Moment> {
+    let mut bytes = 0;
+    let usable = all.iter().filter(|m| is_base64(&m.image_jpeg_base64) && m.size[0] > 0);
+    let mut kept: Vec<&Moment> = usable
+        .take_while(|moment| {
+            bytes += moment.image_jpeg_base64.len();
+            bytes <= MOST_BYTES
+        })
+        .take(MOST_MOMENTS)
+        .collect();
+    let place = |moment: &Moment| view.logs.iter().position(|log| *log == moment.log);
+    kept.sort_by_key(|moment| (place(moment), moment.frame));
+    kept
+}
+
+impl Page<'_> {
+    pub(super) fn missed(&self) -> Option<Markup> {
+        let any = self.view.tasks.iter().any(|task| !task.missed.is_empty());
+        any.then(|| {
+            html! {
+                p {
+                    "Each frame in which an annotated person has no track, by the test that dropped the candidate "
+                    "at that person: the last such test, which the candidate came nearest to passing. "
+                    em { (NO_CANDIDATE) } ": nothing that was recorded was dropped there; the detector did not look, "
+                    "or dropped so many places that not all were recorded."
+                }
+                (self.missed_by_test())
+                @if !self.moments.is_empty() {
+                    p {
+                        "Moments in the middle of the longest misses: white and dashed the people, in colour the "
+                        "tracks of each pipeline" @if self.view.pipelines.len() > MOST_DRAWN { " (of the " (MOST_DRAWN) " best)" }
+                        ", thin and dashed the candidates that were dropped."
+                    }
+                }
+                @for moment in &self.moments { (self.moment(moment)) }
+            }
+        })
+    }
+
+    /// Renders the number of missed people in frames, by test and pipeline.
+    fn missed_by_test(&self) -> Markup {
+        let mut counts: BTreeMap<&str, BTreeMap<&str, u64>> = BTreeMap::new();
+        for task in &self.view.tasks {
+            for missed in &task.missed {
+                let test = missed.test.as_deref().unwrap_or(NO_CANDIDATE);
+                *counts.entry(test).or_default().entry(&task.pipeline).or_default() += 1;
+            }
+        }
+        let mut tests: Vec<(&str, BTreeMap<&str, u64>)> = counts.into_iter().collect();
+        // The test that costs most comes first.
+        tests.sort_by_key(|(test, of)| (std::cmp::Reverse(of.values().sum::<u64>()), *test));
+        let head = html! {
+            (column("Test", None)) (column("Decided by", Some("As the first pipeline has it that has the test")))
+            @for (rank, p) in self.view.pipelines.iter().enumerate() { (self.column_of(rank, p)) }
+        };
+        let body = html! {
+            @for (test, of) in &tests {
+                tr {
+                    th scope="row" { (test) }
+                    td { (self.deciding_anywhere(test)) }
+                    @for p in &self.view.pipelines {
+                        @if let Some(count) = of.get(p) { (cell(*count as f64, &html! { (count) })) } @else { (no_cell()) }
+                    }
+                }
+            }
+        };
+        let caption = html! { "Frames with a missed person, over all logs and seeds." };
+        table("Missed people by test", &caption, &head, &body)
+    }
+
+    /// Renders the heading of a pipeline: its name, or its rank where many stand beside each other.
+    pub(super) fn column_of(&self, rank: usize, pipeline: &str) -> Markup {
+        if self.view.pipelines.len() <= MOST_DRAWN {
+            return column(pipeline, None);
+        }
+        html! {
+            th scope="col" title=(pipeline) { (rank + 1) span class="unseen" { " " (pipeline) } }
+        }
+    }
+
+    fn deciding_anywhere(&self, test: &str) -> Markup {
+        let tasks = self.view.pipelines.iter().flat_map(|p| self.view.done(p));
+        lines(tasks.filter_map(|task| task.deciding.get(test)).next())
+    }
+
+    fn moment(&self, moment: &Moment) -> Markup {
+        let missed = self.missed_at(moment);
+        let people: BTreeSet<i64> = missed.iter().map(|(_, missed)| missed.person).collect();
+        let by: BTreeSet<&str> = missed.iter().map(|(task, _)| task.pipeline.as_str()).collect();
+        let names: Vec<String> = people.iter().map(ToString::to_string).collect();
+        html! {
+            details class="moment" {
+                summary {
+                    (moment.log) ", frame " (moment.frame) " at " (number(moment.t_s, 2)) " s"
+                    span class="aside" {
+                        @if names.len() == 1 { "person " } @else { "people " } (names.join(", ")) " missed by " (amount(by.len(), "pipeline"))
+                    }
+                }
+                div class="moment-body" {
+                    (self.picture(moment, &missed))
+                    (self.moment_table(moment, &missed, &people))
+                }
+            }
+        }
+    }
+
+    /// Returns the missed people of the moment with their tasks, best pipelines first.
+    fn missed_at(&self, moment: &Moment) -> Vec<(&TaskResult, &MissedPerson)> {
+        let tasks = self.view.pipelines.iter().filter_map(|p| self.view.drawn(p, &moment.log));
+        let here = |missed: &&MissedPerson| missed.frame == moment.frame;
+        tasks.flat_map(|task| task.missed.iter().filter(here).map(move |m| (task, m))).collect()
+    }
+
+    fn picture(&self, moment: &Moment, missed: &[(&TaskResult, &MissedPerson)]) -> Markup {
+        let [width, height] = moment.size;
+        let drawn = self.view.pipelines.iter().take(MOST_DRAWN).enumerate();
+        let tracks = drawn.flat_map(|(series, name)| {
+            moment.tracks.get(*name).into_iter().flatten().map(move |(_, b)| (series, b))
+        });
+        let dropped = missed.iter().filter_map(|(task, missed)| {
+            let series = self.series(&task.pipeline);
+            (series < MOST_DRAWN).then_some((series, missed.box_px.as_ref()?))
+        });
+        let title = format!("{}, frame {}", moment.log, moment.frame);
+        let line = f64::from(width) / 320.0;
+        html! {
+            svg class="scene" role="img" viewBox=(format!("0 0 {width} {height}")) {
+                title { (title) }
+                image href=(format!("data:image/jpeg;base64,{}", moment.image_jpeg_base64)) width=(width) height=(height) {}
+                @for (id, b) in &moment.people {
+                    (outline(b, "scene-person", 1.5 * line))
+                    text class="scene-name" x=(px(b[0] + 2.0 * line)) y=(px(b[1] + 10.0 * line)) style=(format!("font-size:{}px", px(10.0 * line))) { (id) }
+                }
+                @for (series, b) in dropped { (outline(b, &format!("scene-dropped {}", series_class(series)), line)) }
+                @for (series, b) in tracks { (outline(b, &format!("scene-track {}", series_class(series)), 1.5 * line)) }
+            }
+        }
+    }
+
+    fn moment_table(
+        &self,
+        moment: &Moment,
+        missed: &[(&TaskResult, &MissedPerson)],
+        people: &BTreeSet<i64>,
+    ) -> Markup {
+        let head = html! {
+            (column("Pipeline", None))
+            @for id in people { (column(&format!("Person {id}"), None)) }
+        };
+        let fate = |pipeline: &str, id: i64| {
+            let miss = missed.iter().find(|(t, m)| t.pipeline == pipeline && m.person == id);
+            match miss {
+                Some((task, miss)) => html! {
+                    strong class="bad" { "✕ " (miss.test.as_deref().unwrap_or(NO_CANDIDATE)) }
+                    (lines(miss.test.as_ref().and_then(|test| task.deciding.get(test))))
+                },
+                None => match track_on(moment, pipeline, id) {
+                    Some(track) => html! { "● track " (track) },
+                    None => html! { "●" },
+                },
+            }
+        };
+        let has = |p: &str| self.view.drawn(p, &moment.log).is_some();
+        let body = html! {
+            @for p in self.view.pipelines.iter().filter(|p| has(p)) {
+                tr {
+                    th scope="row" { (key(self.series(p), p)) }
+                    @for id in people { td { (fate(p, *id)) } }
+                }
+            }
+        };
+        let name = format!("Pipelines on {} in frame {}", moment.log, moment.frame);
+        table(
+            &name,
+            &html! { "✕ missed, by the test that dropped the candidate; ● found." },
+            &head,
+            &body,
+        )
+    }
+}
+
+/// Renders the lines of a config that decide a test.
+fn lines(all: Option<&Vec<String>>) -> Markup {
+    html! { @for line in all.into_iter().flatten() { code class="line" { (line) } } }
+}
+
+fn outline([x, y, width, height]: &Box, class: &str, stroke: f64) -> Markup {
+    html! {
+        rect class=(class) x=(px(*x)) y=(px(*y)) width=(px(*width)) height=(px(*height)) stroke-width=(px(stroke)) {}
+    }
+}
+
+/// Returns the number of the pipeline's track on a person of the moment.
+fn track_on(moment: &Moment, pipeline: &str, person: i64) -> Option<i64> {
+    let (_, at) = moment.people.iter().find(|(id, _)| *id == person)?;
+    let tracks = moment.tracks.get(pipeline)?.iter();
+    let overlaps = tracks.map(|(id, b)| (overlap(at, b), *id));
+    let (best, id) = overlaps.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (best >= SAME_IOU).then_some(id)
+}
+
+/// Returns the intersection over union of two boxes.
+fn overlap(a: &Box, b: &Box) -> f64 {
+    let common = |axis: usize| {
+        let end = (a[axis] + a[axis + 2]).min(b[axis] + b[axis + 2]);
+        (end - a[axis].max(b[axis])).max(0.0)
+    };
+    let both = common(0) * common(1);
+    let union = a[2] * a[3] + b[2] * b[3] - both;
+    if union > 0.0 { both / union } else { 0.0 }
+}
