@@ -9,6 +9,7 @@ use std::time::SystemTime;
 
 use nalgebra::Point2;
 use serde::Serialize;
+use tagalong_config::{FileLimit, read_text};
 use tagalong_eval::Region;
 use tagalong_eval::formats::people::{self, Row};
 
@@ -347,7 +348,8 @@ fn write_whole(path: &Path, rows: &[Row]) -> io::Result<()> {
 /// a person twice in a frame.
 pub fn read_people(path: &Path, film: &Film) -> Result<BTreeMap<i64, Person>, String> {
     let name = path.display().to_string();
-    let text = fs::read_to_string(path).map_err(|error| format!("cannot read {name}: {error}"))?;
+    let text = read_text(path, FileLimit::Table)
+        .map_err(|error| format!("cannot read {name}: {error}"))?;
     let rows = people::parse(&text, &name).map_err(|error| error.to_string())?;
     let mut keys: BTreeMap<i64, BTreeMap<u32, Key>> = BTreeMap::new();
     let mut shown: BTreeMap<i64, BTreeSet<u32>> = BTreeMap::new();

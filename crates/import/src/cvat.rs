@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use roxmltree::{Document, Node, TextPos};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
+use tagalong_config::{FileLimit, read_text};
 use tagalong_eval::Region;
 use tagalong_eval::formats::people::{self, Row};
 
@@ -51,12 +52,8 @@ fn default_output(path: &Path, ending: &str) -> PathBuf {
 fn read(path: &Path) -> Result<Vec<Row>, Failure> {
     let name = path.display().to_string();
     let cannot = |why: String| Failure::failed(format!("cannot read {name}: {why}"));
-    let about = fs::metadata(path).map_err(|error| cannot(error.to_string()))?;
-    if !about.is_file() || about.len() > MOST_BYTES {
-        let most = MOST_BYTES >> 20;
-        return Err(cannot(format!("give the XML file that CVAT exports, of at most {most} MiB")));
-    }
-    let text = fs::read_to_string(path).map_err(|error| cannot(error.to_string()))?;
+    let text = read_text(path, FileLimit::Bytes(MOST_BYTES))
+        .map_err(|error| cannot(format!("{error}; give the XML file that CVAT exports")))?;
     parse(&text).map_err(|why| Failure::failed(format!("{name}{why}")))
 }
 
