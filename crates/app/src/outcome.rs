@@ -1,5 +1,6 @@
 //! Ends of a command: exit codes, failures, and printing.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
@@ -111,6 +112,20 @@ pub fn spare(file: &Path, overwrite: bool) -> Result<(), Failure> {
 /// Message after a signal ended the writing of a log.
 pub const CUT_SHORT: &str = "stopped; the log is whole, but ends early";
 
+/// Returns a text without characters that steer a terminal: names in a log come from anywhere.
+fn harmless(text: &str) -> Cow<'_, str> {
+    let steers = |c: char| {
+        // The second part turns the direction of writing round.
+        (c.is_control() && !matches!(c, '\n' | '\t'))
+            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(steers) {
+        return Cow::Borrowed(text);
+    }
+    let shown = |c: char| if steers(c) { c.escape_unicode().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(shown).collect())
+}
+
 /// Prints to stdout. A closed pipe is a quiet end.
 ///
 /// # Errors
@@ -118,8 +133,8 @@ pub const CUT_SHORT: &str = "stopped; the log is whole, but ends early";
 pub fn print(text: &str) -> Result<(), Failure> {
     // Flushed here, so that a full disk or a closed pipe is noticed before the exit code is chosen.
     let mut out = io::stdout().lock();
-    let written =
-        io::Write::write_all(&mut out, text.as_bytes()).and_then(|()| io::Write::flush(&mut out));
+    let written = io::Write::write_all(&mut out, harmless(text).as_bytes())
+        .and_then(|()| io::Write::flush(&mut out));
     written.map_err(|error| match error.kind() {
         io::ErrorKind::BrokenPipe => Failure::nobody_listens(),
         _ => Failure::failed(format!("cannot write to stdout: {error}")),
@@ -130,5 +145,19 @@ pub fn print(text: &str) -> Result<(), Failure> {
 pub fn say(text: &str) {
     // A failed stderr leaves no place to report the failure.
     // One write for the whole line, so that lines of several threads do not mix.
-    let _ = io::Write::write_all(&mut io::stderr().lock(), format!("{text}\n").as_bytes());
+    let line = format!("{}\n", harmless(text));
+    let _ = io::Write::write_all(&mut io::stderr().lock(), line.as_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_steer_a_terminal() {
+        let plain = "Grüße\tan alle\n";
+        assert!(matches!(harmless(plain), Cow::Borrowed(text) if text == plain));
+        assert_eq!(harmless("/a\u{1b}[2J"), "/a\\u{1b}[2J");
+        assert_eq!(harmless("b\r\u{9b}1m\u{202e}c"), "b\\u{d}\\u{9b}1m\\u{202e}c");
+    }
 }

@@ -19,11 +19,12 @@ mod demo;
 mod keys;
 mod run;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use args::{Cli, Command};
 use clap::{CommandFactory as _, Parser};
-use tagalong_app::outcome::{Outcome, say};
+use tagalong_app::outcome::{Failure, Outcome, say};
 use tagalong_config::Registry;
 
 /// Runs the whole program: registers the plugins, parses the command line, dispatches the command.
@@ -31,18 +32,40 @@ pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
     tell_panics_briefly();
     let mut registry = Registry::default();
     register(&mut registry);
-    // Wrong usage and --help end in here, with exit codes 2 and 0.
-    let cli = Cli::parse();
+    let for_programs = wants_json(std::env::args_os());
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) if for_programs && error.use_stderr() => {
+            let message = error.render().to_string();
+            return tell(&Failure::usage(message.trim_start_matches("error: ").trim_end()), true);
+        }
+        // Wrong usage and --help end in here, with exit codes 2 and 0.
+        Err(error) => error.exit(),
+    };
     match dispatch(&cli.command, &registry) {
         Ok(ended) => ExitCode::from(ended.code()),
-        Err(failure) => {
-            // An empty message: stdout was closed, and there is no reader to inform.
-            if !failure.message.is_empty() {
-                say(&format!("error: {}", failure.message));
-            }
-            ExitCode::from(failure.code)
-        }
+        Err(failure) => tell(&failure, for_programs),
     }
+}
+
+/// Returns true where the output is asked for as JSON, even if other arguments are wrong.
+fn wants_json(arguments: impl Iterator<Item = OsString>) -> bool {
+    let arguments: Vec<OsString> = arguments.collect();
+    arguments.iter().any(|argument| argument == "--format=json")
+        || arguments.windows(2).any(|pair| pair == ["--format", "json"])
+}
+
+/// Tells a failure, for programs as the last line of stderr.
+fn tell(failure: &Failure, for_programs: bool) -> ExitCode {
+    let Failure { message, code } = failure;
+    // An empty message: stdout was closed, and there is no reader to inform.
+    if !message.is_empty() {
+        say(&match for_programs {
+            true => serde_json::json!({ "error": message, "exit_code": code }).to_string(),
+            false => format!("error: {message}"),
+        });
+    }
+    ExitCode::from(*code)
 }
 
 /// Reports a panic in a line or two, unless `RUST_BACKTRACE` is set.

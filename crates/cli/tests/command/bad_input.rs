@@ -183,6 +183,29 @@ fn every_command_answers_bad_input_with_a_clear_message() {
     assert!(left.is_empty(), "refused commands left {left:?}");
 }
 
+/// The last line on stderr is the error, whoever found it.
+#[test]
+fn errors_are_json_where_the_output_is() {
+    let home = tempfile::tempdir().unwrap();
+    lay_out(home.path());
+    let lines = [
+        ("check typo.toml --format json", 2, "typo.toml:4"),
+        ("inspect words.mcap --format=json", 1, "words.mcap"),
+        ("inspect --format json", 2, "<LOG>"),
+    ];
+    for (line, expected, says) in lines {
+        let output = own_plugin().args(line.split(' ')).current_dir(home.path()).output().unwrap();
+        assert_eq!(code(&output), expected, "{line}");
+        let told = text(&output.stderr);
+        let last = told.lines().next_back().unwrap_or_default();
+        let error: serde_json::Value = serde_json::from_str(last).unwrap();
+        assert!(error["error"].as_str().unwrap().contains(says), "{line}: {told}");
+        assert_eq!(error["exit_code"], expected, "{line}");
+    }
+    let output = own_plugin().args(["list", "--help", "--format", "json"]).output().unwrap();
+    assert_eq!(code(&output), 0);
+}
+
 /// `| head -1` ends a command quietly, for all output.
 #[test]
 fn a_closed_pipe_is_a_quiet_end_for_every_command_that_prints() {
