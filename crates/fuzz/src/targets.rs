@@ -1,0 +1,219 @@
+//! Parsers of foreign bytes, each with small valid files to begin with.
+
+use std::path::Path;
+
+use tagalong_config::Registry;
+use tagalong_eval::formats::{floor, kitti, metres, mot, people};
+use tagalong_log::images::{decode_compressed, decode_raw};
+use tagalong_log::msgs::{self, decode};
+use tagalong_log::{FrameSource, InputSettings, Inputs, Limits, LogWalker};
+use tagalong_pipeline::Pipeline;
+use tagalong_sim::Scene;
+
+/// A parser.
+pub struct Target {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it reads.
+    pub about: &'static str,
+    /// Valid files.
+    pub seeds: Vec<Vec<u8>>,
+    /// Parses bytes and drops the result; a panic is a finding. The path is that of a file of its
+    /// own, for parsers that read files.
+    pub parse: fn(&[u8], &Path),
+}
+
+const MCAP: &[u8] = include_bytes!("../seeds/tiny.mcap");
+const BAG: &[u8] = include_bytes!("../seeds/tiny.bag");
+const DATABASE: &[u8] = include_bytes!("../seeds/tiny.db3");
+const ONNX: &[u8] = include_bytes!("../../../configs/models/depth-net.onnx");
+
+/// Returns all parsers.
+pub fn targets() -> Vec<Target> {
+    let model = |name, text: &str, parse| Target {
+        name,
+        about: "a model file",
+        seeds: vec![text.as_bytes().to_vec()],
+        parse,
+    };
+    let text = |name, seed: &str, parse| Target {
+        name,
+        about: "a text format",
+        seeds: vec![seed.as_bytes().to_vec()],
+        parse,
+    };
+    vec![
+        Target {
+            name: "mcap",
+            about: "records of an MCAP file",
+            seeds: vec![MCAP.to_vec()],
+            parse: |bytes, _| walk(LogWalker::new(bytes, &small()).ok()),
+        },
+        Target {
+            name: "bag",
+            about: "records of a ROS 1 bag",
+            seeds: vec![BAG.to_vec()],
+            parse: |bytes, _| walk(LogWalker::new(bytes, &small()).ok()),
+        },
+        Target {
+            name: "database",
+            about: "rows of a rosbag2 database",
+            seeds: vec![DATABASE.to_vec()],
+            parse: |bytes, path| {
+                if std::fs::write(path, bytes).is_ok() {
+                    walk(LogWalker::open(path, &small()).ok());
+                }
+            },
+        },
+        Target {
+            name: "frames",
+            about: "an MCAP file, its messages and images, to frames",
+            seeds: vec![MCAP.to_vec()],
+            parse: |bytes, path| {
+                if std::fs::write(path, bytes).is_ok() {
+                    frames(path);
+                }
+            },
+        },
+        Target { name: "cdr", about: "ROS messages", seeds: payloads(), parse: messages },
+        Target { name: "images", about: "image messages", seeds: pictures(), parse: images },
+        Target {
+            name: "onnx",
+            about: "the survey of an ONNX file",
+            seeds: vec![ONNX.to_vec()],
+            parse: |bytes, _| {
+                let limits = tagalong_network::Limits::default();
+                drop(tagalong_network::check_file(bytes, &limits));
+            },
+        },
+        Target {
+            name: "config",
+            about: "the TOML of a pipeline",
+            seeds: vec![
+                include_bytes!("../../../configs/depth-verified.toml").to_vec(),
+                include_bytes!("../../../configs/follow-depth.toml").to_vec(),
+                include_bytes!("../../../configs/mono.toml").to_vec(),
+            ],
+            parse: config,
+        },
+        Target {
+            name: "scene",
+            about: "the TOML of a scene",
+            seeds: vec![include_bytes!("../../../configs/scenes/follow-passing.toml").to_vec()],
+            parse: |bytes, _| as_text(bytes, |text| drop(Scene::parse(text))),
+        },
+        model("cascade", include_str!("../../../configs/models/cascade.xml"), |bytes, _| {
+            as_text(bytes, |text| drop(tagalong_face_rgbd::Cascade::from_xml(text)));
+        }),
+        model("body-net", include_str!("../../../configs/models/body-net.toml"), |bytes, _| {
+            as_text(bytes, |text| drop(tagalong_body_net::Model::from_text(text)));
+        }),
+        model("depth-net", include_str!("../../../configs/models/depth-net.toml"), |bytes, _| {
+            as_text(bytes, |text| drop(tagalong_depth_net::Model::from_text(text)));
+        }),
+        model("hog", include_str!("../../../configs/models/hog-upper-body.toml"), |bytes, _| {
+            as_text(bytes, |text| drop(tagalong_hog_upper_body::Model::from_text(text)));
+        }),
+        model("svm-patch", include_str!("../../../configs/models/svm-patch.toml"), |bytes, _| {
+            as_text(bytes, |text| drop(tagalong_svm_patch::Model::from_text(text)));
+        }),
+        model("laser-legs", include_str!("../../../configs/models/laser-legs.toml"), |bytes, _| {
+            as_text(bytes, |text| drop(tagalong_laser_legs::Model::from_text(text)));
+        }),
+        text("mot", "1,1,10,20,30,40,1,1,0.5\n2,-1,1e1,2.5,3,4,0.9,-1,-1,-1\n", |bytes, _| {
+            as_text(bytes, |text| {
+                drop(mot::parse(text, "x"));
+                drop(mot::parse_truth(text, "x", mot::Rules::Mot17));
+                drop(mot::parse_tracks(text, "x"));
+                drop(mot::parse_info(text, "x"));
+            });
+        }),
+        text("kitti", "0 1 Pedestrian 0 0 -1.5 10 20 30 40 1.7 0.6 0.8 1 2 9 0.1\n", |bytes, _| {
+            as_text(bytes, |text| drop(kitti::parse(text, "x")));
+        }),
+        text("people", "frame,id,x,y,w,h\n1,1,10,20,30,40\n2,1,11,20,30,40\n", |bytes, _| {
+            as_text(bytes, |text| {
+                drop(people::parse(text, "x"));
+                drop(metres::parse(text, "x"));
+                drop(floor::parse(text, "x"));
+            });
+        }),
+    ]
+}
+
+/// Limits at which a parser that obeys them cannot take much memory or time.
+fn small() -> Limits {
+    Limits { record_bytes: 1 << 20, ..Limits::default() }
+}
+
+fn as_text(bytes: &[u8], parse: impl FnOnce(&str)) {
+    if let Ok(text) = std::str::from_utf8(bytes) {
+        parse(text);
+    }
+}
+
+fn walk<R: std::io::Read>(walker: Option<LogWalker<R>>) {
+    let Some(mut walker) = walker else { return };
+    while walker.next().is_some() {}
+}
+
+fn frames(path: &Path) {
+    let inputs = Inputs::ANY;
+    let Ok(mut source) = FrameSource::open(path, &InputSettings::default(), &small(), inputs)
+    else {
+        return;
+    };
+    while source.next_frame().is_some() {}
+}
+
+/// Returns the messages of the seed.
+fn payloads() -> Vec<Vec<u8>> {
+    let mut payloads = Vec::new();
+    if let Ok(mut walker) = LogWalker::new(MCAP, &small()) {
+        while let Some(message) = walker.next() {
+            payloads.push(message.data.to_vec());
+        }
+    }
+    payloads
+}
+
+/// Returns those of its messages that are images.
+fn pictures() -> Vec<Vec<u8>> {
+    let is_picture = |data: &Vec<u8>| {
+        decode::<msgs::Image<'_>>(data).is_ok_and(|image| image.width > 0)
+            || decode::<msgs::CompressedImage<'_>>(data).is_ok_and(|image| image.data.len() > 20)
+    };
+    payloads().into_iter().filter(is_picture).collect()
+}
+
+fn messages(bytes: &[u8], _: &Path) {
+    drop(decode::<msgs::Image<'_>>(bytes));
+    drop(decode::<msgs::CompressedImage<'_>>(bytes));
+    drop(decode::<msgs::CameraInfo>(bytes));
+    drop(decode::<msgs::TFMessage>(bytes));
+    drop(decode::<msgs::Odometry>(bytes));
+    drop(decode::<msgs::LaserScan>(bytes));
+    drop(decode::<msgs::StringMsg>(bytes));
+}
+
+fn images(bytes: &[u8], _: &Path) {
+    if let Ok(image) = decode::<msgs::Image<'_>>(bytes) {
+        drop(decode_raw(&image, None, &small()));
+    }
+    if let Ok(image) = decode::<msgs::CompressedImage<'_>>(bytes) {
+        drop(decode_compressed(&image, None, &small()));
+    }
+}
+
+fn config(bytes: &[u8], _: &Path) {
+    thread_local! {
+        static REGISTRY: Registry = {
+            let mut registry = Registry::default();
+            tagalong_catalog::register(&mut registry);
+            registry
+        };
+    }
+    as_text(bytes, |text| {
+        REGISTRY.with(|registry| drop(Pipeline::from_toml(text, Path::new("."), registry)));
+    });
+}
