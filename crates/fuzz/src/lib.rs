@@ -24,7 +24,7 @@ const SLOW: Duration = Duration::from_secs(1);
 pub struct Finding {
     /// The mutated file.
     pub bytes: Vec<u8>,
-    /// What happened.
+    /// Description of the panic, or of the time.
     pub why: String,
 }
 
@@ -53,7 +53,7 @@ pub fn run(target: &Target, files: u64, seed: u64, path: &Path, mut tick: impl F
     outcome
 }
 
-/// Parses one file; returns the time, and what went wrong.
+/// Parses one file; returns the time, and the fault if there is one.
 pub fn tried(target: &Target, bytes: &[u8], path: &Path) -> (Duration, Option<String>) {
     // Of the processor, because a busy machine is no finding.
     let start = ThreadTime::now();

@@ -14,7 +14,7 @@ use tagalong_sim::Scene;
 pub struct Target {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it reads.
+    /// Kind of its input.
     pub about: &'static str,
     /// Valid files.
     pub seeds: Vec<Vec<u8>>,
