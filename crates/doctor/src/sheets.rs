@@ -67,11 +67,12 @@ mod tests {
 
     #[test]
     fn pictures_stand_in_rows() {
-        let example = |frame| Example { frame, picture: RgbImage::filled(20, 20, [200, 0, 0]) };
+        let example = |frame| Example { frame, picture: RgbImage::filled(60, 60, [200, 0, 0]) };
         let sheet = sheet("a test", &(1..6).map(example).collect::<Vec<_>>()).into_image();
-        assert_eq!((sheet.width(), sheet.height()), (4 * 24 + 4, 2 * 24 + 22 + 4));
+        assert_eq!((sheet.width(), sheet.height()), (4 * 64 + 4, 2 * 64 + 22 + 4));
         let red = sheet.pixels().iter().filter(|pixel| **pixel == [200, 0, 0]).count();
-        assert!(red > 5 * 150, "{red}");
+        // The number of the frame covers a strip of each.
+        assert!(red > 5 * 2400, "{red}");
     }
 
     #[test]
