@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use tagalong_config::Registry;
-use tagalong_log::FrameSource;
+use tagalong_log::{FrameSource, InputSettings, Limits};
+use tagalong_pipeline::Sources;
 
 use crate::config_file::ConfigFile;
 use crate::outcome::Failure;
@@ -96,10 +97,30 @@ pub struct Fittings {
 impl Fittings {
     /// Returns the failure of a log that no pipeline fits.
     pub fn none_fits(&self, log: &Path) -> Failure {
+        let damage = damage(log);
         let (log, refusals) = (log.display(), &self.refusals);
         let hint = format!("`tagalong inspect {log}` lists its topics");
-        Failure::failed(format!("{log}: no built-in pipeline fits:{refusals}\n{hint}"))
+        Failure::failed(format!("{log}: no built-in pipeline fits:{refusals}\n{damage}{hint}"))
     }
+}
+
+/// Returns the data of a log that a controller may need.
+pub fn sources(source: &FrameSource) -> Sources {
+    let facts = source.facts();
+    Sources {
+        depth: facts.depth_topic.is_some(),
+        right: facts.right_topic.is_some(),
+        laser: facts.laser_topic.is_some(),
+        odometry: source.has_odometry(),
+    }
+}
+
+/// Returns a line about a log of which part was lost; nothing for a whole one.
+fn damage(log: &Path) -> String {
+    let found = tagalong_log::inspect(log, &InputSettings::default(), &Limits::default());
+    let Some(found) = found.ok().filter(|found| found.data_lost) else { return String::new() };
+    let first = found.notes.first().map_or("", String::as_str);
+    format!("part of the log was lost ({first}): record it again, or look for a whole copy\n")
 }
 
 /// Returns the first pipelines that fit a log, at most `most`, by trying each on its first frame.

@@ -121,8 +121,8 @@ Try next:
       both runs side by side in the browser, frame by frame
   tagalong trials --seeds 10
       are the differences luck? Ten draws of each hard scene
-  tagalong run {shown}/depth-ekf.toml YOUR.mcap --overlay
-      the log of your own robot
+  tagalong run YOUR.mcap --overlay
+      the log of your own robot, by the pipeline that is best for what it has
   tagalong simulate {shown}/demo-scene.toml --gallery pictures
       change the scene, and look at it
 "

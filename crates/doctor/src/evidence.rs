@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tagalong_core::{DepthImage, Frame, LaserScan};
 use tagalong_geometry::Camera;
 use tagalong_log::{InputSettings, Inputs, Inspection, LogError, LogFrame};
-use tagalong_pipeline::Suits;
+use tagalong_pipeline::{MissingSource, Suits};
 use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use tagalong_vision::quality::Exposure;
 use tagalong_vision::registration::{EdgeOverlap, OverlapSettings};
@@ -29,6 +29,8 @@ pub struct Evidence {
     pub inspection: Inspection,
     /// Reason for which the pipeline lacks an input that it requires.
     pub refusal: Option<LogError>,
+    /// Source that the controller lacks.
+    pub missing: Option<MissingSource>,
     /// `[input]` of the config.
     pub input: InputSettings,
     /// `[suits]` of the config.

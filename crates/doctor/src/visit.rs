@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tagalong_app::choice::{CHOICES, fitting};
+use tagalong_app::choice::{CHOICES, fitting, sources};
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::outcome::Failure;
 use tagalong_app::progress::Progress;
@@ -67,6 +67,7 @@ impl Visit {
             samples: Samples::of(expected),
             inspection: found.inspection,
             refusal: found.refusal,
+            missing: None,
             input: outer.input.clone(),
             suits: settings.suits,
             inputs,
@@ -81,6 +82,7 @@ impl Visit {
         };
         let mut views = Views::of(expected);
         if let Some(frames) = found.frames {
+            evidence.missing = pipeline.check_sources(sources(&frames)).err();
             let progress = Progress::titled(&config.stem());
             look(frames, &mut pipeline, scope, &mut evidence, &mut views, &progress);
         }

@@ -108,7 +108,7 @@ pub fn numbers<'a>(
         .collect()
 }
 
-/// Returns the JPEG and PNG files of a folder, by name.
+/// Returns the JPEG and PNG files of a folder, by name, and by number where names are numbered.
 ///
 /// # Errors
 /// A folder that cannot be read.
@@ -122,8 +122,24 @@ pub fn pictures(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut files: Vec<_> =
         entries.flatten().map(|entry| entry.path()).filter(is_picture).collect();
     // The order of a directory depends on the file system.
-    files.sort();
+    files.sort_by_cached_key(|path| (counted(path), path.clone()));
     Ok(files)
+}
+
+/// Returns the words and numbers of a name: `img2` comes before `img10`.
+fn counted(path: &Path) -> Vec<(String, u64)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut parts = Vec::new();
+    let mut rest = name.as_str();
+    while !rest.is_empty() {
+        let word = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let behind = &rest[word..];
+        let digits = behind.find(|c: char| !c.is_ascii_digit()).unwrap_or(behind.len());
+        // A number beyond the range is the last one.
+        parts.push((rest[..word].to_owned(), behind[..digits].parse().unwrap_or(u64::MAX)));
+        rest = &behind[digits..];
+    }
+    parts
 }
 
 /// Returns files at a steady rate.

@@ -222,6 +222,10 @@ impl fmt::Display for Inspection {
 impl Inspection {
     fn write_camera(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let facts = &self.facts;
+        if facts.width == 0 {
+            writeln!(f, "\nno camera: each laser scan makes a frame")?;
+            return writeln!(f, "\na pipeline can use: {}", self.usable.join(", "));
+        }
         writeln!(f, "\ncamera")?;
         writeln!(f, "  {}x{}, focal {:.1} px", facts.width, facts.height, facts.focal_px)?;
         writeln!(

@@ -50,7 +50,11 @@ impl Cell {
     pub fn mean(values: &[f64], digits: usize) -> Self {
         tagalong_stats::mean_and_deviation(values).map_or_else(
             Self::default,
-            |(mean, deviation)| Self { deviation: Some(deviation), ..Self::number(mean, digits) },
+            |(mean, deviation)| Self {
+                // One value does not spread.
+                deviation: (values.len() > 1).then_some(deviation),
+                ..Self::number(mean, digits)
+            },
         )
     }
 

@@ -1,6 +1,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use tagalong_app::choice::sources;
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
@@ -8,8 +9,6 @@ use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Inputs, Usage};
 use tagalong_pipeline::Pipeline;
-
-use crate::run::sources;
 
 /// Frames of the log that are tried.
 const FRAMES: u64 = 3;

@@ -16,6 +16,7 @@ pub use args::RunArgs;
 use frames::{Frames, Item};
 use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
+use tagalong_app::choice::sources;
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
@@ -30,7 +31,7 @@ use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog, WriteError};
 use tagalong_log::{FrameSource, Input};
-use tagalong_pipeline::{FrameReport, Pipeline, Sources, StepError};
+use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
 
@@ -102,17 +103,6 @@ impl Job {
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let report = blank_report(&config, settings.seed, log);
         Ok(Self { pipeline, outer, source, resolved, folder, report })
-    }
-}
-
-/// Returns the data of a log that a controller may need.
-pub(crate) fn sources(source: &FrameSource) -> Sources {
-    let facts = source.facts();
-    Sources {
-        depth: facts.depth_topic.is_some(),
-        right: facts.right_topic.is_some(),
-        laser: facts.laser_topic.is_some(),
-        odometry: source.has_odometry(),
     }
 }
 

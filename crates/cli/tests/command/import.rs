@@ -267,3 +267,17 @@ fn annotations_of_cvat_become_truth_that_eval_reads() {
     assert_eq!(scores["MOTA"], 1.0, "{scores}");
     assert_eq!(import(home.path(), &["cvat", "walk.xml"]).0, 2, "it is not replaced unasked");
 }
+
+#[test]
+fn numbered_images_are_in_the_order_of_their_numbers() {
+    let home = tempfile::tempdir().unwrap();
+    for number in [1, 2, 9, 10, 11] {
+        colour(&home.path().join(format!("photos/img{number}.png")), SMALL, 10 * number);
+    }
+    let (code, said) = import(home.path(), &["images", "photos", "--view", "60"]);
+    assert_eq!(code, 0, "{said}");
+    let found = frames(&home.path().join("runs/photos.mcap"), Inputs::ANY.require(Input::Colour));
+    let levels: Vec<u8> =
+        found.iter().map(|item| item.frame.colour().unwrap().pixels()[0][0]).collect();
+    assert_eq!(levels, [10, 20, 90, 100, 110]);
+}

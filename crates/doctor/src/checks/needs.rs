@@ -6,6 +6,10 @@ use super::super::finding::{Finding, Severity};
 /// Checks that the log has the inputs that the config needs.
 pub fn needs(evidence: &Evidence) -> Option<Finding> {
     let usable = evidence.inspection.usable.join(", ");
+    if let Some(missing) = &evidence.missing {
+        let finding = Finding::new("needs", Severity::Bad, missing.to_string());
+        return Some(finding.why("`tagalong run` and a robot refuse this pipeline"));
+    }
     let Some(LogError::Missing { wanted, hint, .. }) = &evidence.refusal else {
         let measured = format!("the config needs {}; the log has {usable}", words(evidence.inputs));
         return Some(Finding::new("needs", Severity::Ok, measured));
