@@ -39,12 +39,7 @@ pub fn write(visit: &Visit, scope: Scope, folder: &Path) -> Result<(), Failure> 
         if !wanted.contains(&report.index) || item.frame.camera.is_blind() {
             continue;
         }
-        let scene = OverlayData {
-            camera: item.frame.camera.clone(),
-            images: item.frame.images(),
-            odom_from_robot: item.odom_from_robot,
-            report: report.clone(),
-        };
+        let scene = OverlayData::of(&item.frame, item.odom_from_robot, report.clone());
         overlay.draw(&scene).map_err(Failure::failed)?;
     }
     Ok(())

@@ -22,8 +22,8 @@ use std::sync::Arc;
 use self::canvas::{Canvas, Ink};
 pub use image_view::background;
 pub use jpeg::jpeg;
-use nalgebra::Isometry2;
-use tagalong_core::{Images, RgbImage};
+use nalgebra::{Isometry2, Point2};
+use tagalong_core::{Frame, Images, RgbImage};
 use tagalong_geometry::Camera;
 use tagalong_pipeline::FrameReport;
 use trails::Trails;
@@ -34,10 +34,22 @@ pub struct OverlayData {
     pub camera: Arc<Camera>,
     /// Images of the frame; shared, not copied.
     pub images: Images,
+    /// Points of the laser scan in the robot frame, m.
+    pub scan: Vec<Point2<f64>>,
     /// Pose of the robot in the odometry frame.
     pub odom_from_robot: Isometry2<f64>,
     /// Report of the pipeline.
     pub report: FrameReport,
+}
+
+impl OverlayData {
+    /// Returns the data of a frame.
+    pub fn of(frame: &Frame, odom_from_robot: Isometry2<f64>, report: FrameReport) -> Self {
+        let points = frame.scan().map_or(&[][..], |scan| &scan.points);
+        let scan = points.iter().map(|point| point.xy()).collect();
+        let (camera, images) = (frame.camera.clone(), frame.images());
+        Self { camera, images, scan, odom_from_robot, report }
+    }
 }
 
 /// Renderer of the pictures of a run, into a folder.
@@ -67,13 +79,16 @@ impl Overlay {
 /// Least rows of image and plan: below, the numbers in the plan would not be legible.
 const LEAST_ROWS: usize = 360;
 
+/// Rows of the plan where there is no image: it is as wide as an image then.
+const ROWS_ALONE: usize = 800;
+
 const TENTATIVE: Ink = Ink::solid([190, 190, 190]);
 
 fn picture(scene: &OverlayData, trails: &Trails) -> RgbImage {
     let image = image_view::draw(scene, trails).into_image();
     // Even, because most video formats ask for it.
-    let [left, rows] =
-        [image.width(), image.height().max(LEAST_ROWS)].map(|n| n.next_multiple_of(2));
+    let least = if image.width() == 0 { ROWS_ALONE } else { LEAST_ROWS };
+    let [left, rows] = [image.width(), image.height().max(least)].map(|n| n.next_multiple_of(2));
     let plan_width = plan_view::width_px(rows);
     let mut canvas = Canvas::new(left + plan_width, rows + legend::HEIGHT_PX, [24, 24, 28]);
     canvas.paste(&plan_view::draw(scene, trails, rows).into_image(), left, 0);

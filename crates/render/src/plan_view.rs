@@ -18,6 +18,7 @@ const MARK_PX: f64 = 8.0;
 
 const GRID: Ink = Ink::solid([60, 60, 68]);
 const AXIS: Ink = Ink::solid([150, 150, 160]);
+const SCAN: Ink = Ink::solid([200, 160, 90]);
 const VIEW: Ink = Ink::solid([110, 130, 170]);
 
 /// Returns the columns of the view beside an image with `height` rows.
@@ -67,6 +68,9 @@ pub fn draw(scene: &OverlayData, trails: &Trails, height: usize) -> Canvas {
     let mut canvas = Canvas::new(width_px(height), height, [24, 24, 28]);
     draw_grid(&mut canvas, &plan);
     draw_field_of_view(&mut canvas, &plan, scene);
+    for point in &scene.scan {
+        canvas.disc(plan.pixel(point.x, point.y), 1.0, SCAN);
+    }
     canvas.disc(plan.robot, 5.0, AXIS);
     for (id, trail) in trails.in_robot(scene) {
         let points: Vec<_> = trail.iter().map(|p| plan.of(p)).collect();

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use nalgebra::{Point2, Point3, SMatrix, Vector2};
+use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{DepthImage, Detection, Estimate, Person, Stamp, Track, TrackId};
 use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 use tagalong_pipeline::{Candidate, Fate};
@@ -30,6 +30,7 @@ fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> OverlayData {
     let camera = Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0);
     let depth = Some(Arc::new(DepthImage::filled(320, 240, 4.0)));
     OverlayData {
+        scan: Vec::new(),
         images: Images { depth, ..Images::default() },
         odom_from_robot: Isometry2::identity(),
         report: FrameReport {
@@ -92,7 +93,20 @@ fn small_images_are_enlarged_to_640_columns_and_all_pictures_have_one_even_size(
     // Without a camera there is the plan alone.
     odd.camera = Arc::new(Camera { width: 0, height: 0, ..(*odd.camera).clone() });
     odd.images = Images::default();
-    assert_eq!(size(&odd), (LEAST_ROWS * 4 / 5, LEAST_ROWS + legend::HEIGHT_PX));
+    assert_eq!(size(&odd), (640, ROWS_ALONE + legend::HEIGHT_PX));
+}
+
+#[test]
+fn points_of_a_scan_are_in_the_plan() {
+    let empty = scene(&[], Vec::new());
+    let scanned = OverlayData { scan: vec![Point2::new(3.0, 1.0)], ..scene(&[], Vec::new()) };
+    let plan = |scene: &OverlayData| plan_view::draw(scene, &Trails::default(), 450).into_image();
+    let (without, with) = (plan(&empty), plan(&scanned));
+    let changed: Vec<usize> =
+        (0..without.pixels().len()).filter(|k| without.pixels()[*k] != with.pixels()[*k]).collect();
+    // 3 m ahead and 1 m to the left, by 50 pixels a metre, of a robot at column 180 and row 400.
+    let at = |k: &usize| (k % 360).abs_diff(130) <= 1 && (k / 360).abs_diff(250) <= 1;
+    assert!(!changed.is_empty() && changed.iter().all(at), "{changed:?}");
 }
 
 #[test]

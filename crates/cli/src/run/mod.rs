@@ -170,13 +170,7 @@ fn work(
 }
 
 fn scene(item: &Item, report: FrameReport) -> OverlayData {
-    let frame = &item.frame.frame;
-    OverlayData {
-        camera: frame.camera.clone(),
-        images: frame.images(),
-        odom_from_robot: item.frame.odom_from_robot,
-        report,
-    }
+    OverlayData::of(&item.frame.frame, item.frame.odom_from_robot, report)
 }
 
 fn ms_since(start: Instant) -> f64 {

@@ -81,12 +81,7 @@ impl RideLog {
         let Some(overlay) = self.overlay.as_mut().filter(|_| self.failed.is_none()) else {
             return;
         };
-        let scene = OverlayData {
-            camera: drawn.frame.camera.clone(),
-            images: drawn.frame.images(),
-            odom_from_robot: drawn.odom_from_robot,
-            report: report.clone(),
-        };
+        let scene = OverlayData::of(&drawn.frame, drawn.odom_from_robot, report.clone());
         self.failed = overlay.draw(&scene).err();
     }
 }
