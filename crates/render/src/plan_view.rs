@@ -67,7 +67,10 @@ pub fn draw(scene: &OverlayData, trails: &Trails, height: usize) -> Canvas {
     let plan = Plan::new(height);
     let mut canvas = Canvas::new(width_px(height), height, [24, 24, 28]);
     draw_grid(&mut canvas, &plan);
-    draw_field_of_view(&mut canvas, &plan, scene);
+    // A frame without an image has a camera that sees nothing.
+    if !scene.camera.is_blind() {
+        draw_field_of_view(&mut canvas, &plan, scene);
+    }
     for point in &scene.scan {
         canvas.disc(plan.pixel(point.x, point.y), 1.0, SCAN);
     }
