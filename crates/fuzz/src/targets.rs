@@ -26,7 +26,6 @@ pub struct Target {
 const MCAP: &[u8] = include_bytes!("../seeds/tiny.mcap");
 const BAG: &[u8] = include_bytes!("../seeds/tiny.bag");
 const DATABASE: &[u8] = include_bytes!("../seeds/tiny.db3");
-const ONNX: &[u8] = include_bytes!("../../../configs/models/depth-net.onnx");
 
 /// Returns all parsers.
 pub fn targets() -> Vec<Target> {
@@ -77,15 +76,6 @@ pub fn targets() -> Vec<Target> {
         },
         Target { name: "cdr", about: "ROS messages", seeds: payloads(), parse: messages },
         Target { name: "images", about: "image messages", seeds: pictures(), parse: images },
-        Target {
-            name: "onnx",
-            about: "the survey of an ONNX file",
-            seeds: vec![ONNX.to_vec()],
-            parse: |bytes, _| {
-                let limits = tagalong_network::Limits::default();
-                drop(tagalong_network::check_file(bytes, &limits));
-            },
-        },
         Target {
             name: "config",
             about: "the TOML of a pipeline",

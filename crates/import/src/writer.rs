@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use image::{DynamicImage, GenericImageView as _};
 use nalgebra::Isometry3;
 use tagalong_app::outcome::Failure;
 use tagalong_app::signals::Signals;
@@ -13,7 +14,7 @@ use tagalong_log::msgs::{
 };
 use tagalong_log::write::{MessageLog, WriteError};
 
-use super::sequence::{Eye, Moment, Placed, Sequence, size};
+use super::sequence::{Eye, Moment, Placed, Sequence};
 
 const CAMERA_FRAME: &str = "camera_optical_frame";
 const RIGHT_FRAME: &str = "camera_right_optical_frame";
@@ -81,13 +82,13 @@ fn picture(log: &mut MessageLog, sequence: &Sequence, moment: &Moment) -> Result
         Eye::Depth => ("/camera/aligned_depth_to_color", CAMERA_FRAME, 0.0),
     };
     let header = Header::new(moment.stamp, frame);
-    if let Some(info) = info(sequence, &header, size(&moment.file)?, aside_m) {
+    let (data, decoded) = whole_image(&moment.file)?;
+    if let Some(info) = info(sequence, &header, decoded.dimensions(), aside_m) {
         log.send(&format!("{camera}/camera_info"), moment.stamp, &info).map_err(Failure::failed)?;
     }
     if moment.eye == Eye::Depth {
-        return depth(log, sequence.depth_unit_m, moment, header);
+        return depth(log, sequence.depth_unit_m, moment, decoded, header);
     }
-    let data = whole_image(&moment.file)?;
     // By content: file endings in data sets are not reliable.
     let format = if data.starts_with(b"\x89PNG") { "png" } else { "jpeg" }.to_owned();
     let image = if is_pair { "image_rect_color" } else { "image_raw" };
@@ -112,14 +113,14 @@ fn info(
     Some(CameraInfo::of_lens(header, &lens, (width as usize, height as usize), aside_m))
 }
 
-/// Reads the bytes of an image that can be decoded to its end.
-fn whole_image(file: &Path) -> Result<Vec<u8>, Failure> {
+/// Reads the bytes of an image, and decodes it to its end.
+fn whole_image(file: &Path) -> Result<(Vec<u8>, DynamicImage), Failure> {
     let unusable = |why: &dyn std::fmt::Display| {
         Failure::failed(format!("cannot use {}: {why}", file.display()))
     };
     let data = read_bytes(file, FileLimit::Image).map_err(|error| unusable(&error))?;
-    image::load_from_memory(&data).map_err(|error| unusable(&error))?;
-    Ok(data)
+    let decoded = image::load_from_memory(&data).map_err(|error| unusable(&error))?;
+    Ok((data, decoded))
 }
 
 /// Writes a 16-bit PNG as millimetres.
@@ -127,19 +128,15 @@ fn depth(
     log: &mut MessageLog,
     unit_m: f64,
     moment: &Moment,
+    decoded: DynamicImage,
     header: Header,
 ) -> Result<(), Failure> {
-    let shown = moment.file.display();
-    let unusable =
-        |why: &dyn std::fmt::Display| Failure::failed(format!("cannot use {shown}: {why}"));
-    let data = read_bytes(&moment.file, FileLimit::Image).map_err(|error| unusable(&error))?;
-    let image = match image::load_from_memory(&data).map_err(|error| unusable(&error))? {
-        image::DynamicImage::ImageLuma16(image) => image,
+    let image = match decoded {
+        DynamicImage::ImageLuma16(image) => image,
         other => {
-            return Err(unusable(&format!(
-                "depth is a 16-bit grey PNG, this is {:?}",
-                other.color()
-            )));
+            let (shown, colour) = (moment.file.display(), other.color());
+            let why = format!("depth is a 16-bit grey PNG, this is {colour:?}");
+            return Err(Failure::failed(format!("cannot use {shown}: {why}")));
         }
     };
     // Saturates at 65.535 m, the largest value of 16 bits in millimetres.

@@ -107,7 +107,7 @@ const ARROWS: &[(&str, &[&str])] = &[
         ],
     ),
     ("testdata", &[]),
-    ("fuzz", &["log", "eval", "network", "pipeline", "sim", "catalog", "plugins"]),
+    ("fuzz", &["log", "eval", "pipeline", "sim", "catalog", "plugins"]),
     ("xtask", &[]),
 ];
 

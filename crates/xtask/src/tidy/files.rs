@@ -48,7 +48,7 @@ fn unbounded<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = String> 
     let tests = text.find("#[cfg(test)]").unwrap_or(text.len());
     let lines = (1..).zip(text[..tests].lines()).filter(move |_| is_program);
     let reads = lines.filter(|(_, line)| UNBOUNDED.iter().any(|read| line.contains(read)));
-    // What the system itself writes is short.
+    // Files that the system itself writes are short.
     reads.filter(|(_, line)| !line.contains("\"/proc/")).map(|(number, _)| {
         format!(
             "{}:{number}: read it with `tagalong_config::read_text`, which has a limit",
