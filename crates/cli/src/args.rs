@@ -208,7 +208,7 @@ Examples:
   tagalong follow configs/follow-depth.toml --latency-ms 150 --drop 0.2 --format markdown";
 
 const REPRODUCE_HELP: &str = "\
-Everything is drawn with seeds of the test split. The whole of a system takes minutes to an hour.
+Everything is simulated with seeds of the test split. The whole of a system takes minutes to an hour.
 
 Examples:
   tagalong reproduce
@@ -243,7 +243,7 @@ pixels), tracks-metres.csv, report.json (what was dropped and why), timings.json
 with --overlay overlay/000001.png and so on.
 
 Examples:
-  tagalong run --overlay --overwrite       (built-in config, drawn log)
+  tagalong run --overlay --overwrite       (built-in config, simulated log)
   tagalong run robot.mcap                  (the pipeline for what the log has)
   tagalong run depth-verified robot.mcap   (a built-in pipeline, from any folder)
   tagalong run configs/depth-ekf.toml robot.mcap
@@ -310,7 +310,7 @@ Examples:
   tagalong simulate configs/scenes/crossing.toml --gallery pictures";
 
 const TRAIN_HELP: &str = "\
-Candidates are what the template detector proposes in drawn rooms and annotated logs. Same seed and
+Candidates are what the template detector proposes in simulated rooms and annotated logs. Same seed and
 data, same bytes. The card beside the model has the counts, the cross-validation and the figures on
 held-out rooms and logs.
 

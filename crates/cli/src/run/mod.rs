@@ -43,7 +43,7 @@ use tagalong_simulate::sample;
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     if !args.has_log() {
         sample::write(args.log()).map_err(refused)?;
-        say(&format!("no log given: two drawn people walk through {}", args.log().display()));
+        say(&format!("no log given: two simulated people walk through {}", args.log().display()));
     }
     let job = Progress::waiting(&format!("looking through {}", args.log().display()), || {
         Job::prepare(args, registry)
