@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use ros2_client::Publisher;
@@ -13,9 +14,12 @@ use tagalong_log::{Listening, LiveSource, LogFrame};
 use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, Sources};
 
 use crate::diagnostics::{Diagnostics, Status};
+use crate::http::HttpServer;
 use crate::inbox::{Inbox, Traffic};
 use crate::network::{Ear, Network};
 use crate::options::Setup;
+use crate::services;
+use crate::skill::{Desk, Request, Verb};
 use crate::stamps::StampClock;
 use crate::wheels::{CommandCounts, Wheels};
 use crate::{BridgeError, Options};
@@ -94,19 +98,27 @@ pub fn run_with(
     tell: &dyn Fn(&str),
 ) -> Result<Summary, BridgeError> {
     let setup = options.setup(registry)?;
+    let (desk, requests) = Desk::new();
+    // Before the topics are there, so that a supervisor can ask how the bridge is.
+    let http = options.http.map(|address| HttpServer::start(address, desk.clone())).transpose()?;
+    if let Some(http) = &http {
+        tell(&format!("answers at {}", http.address()));
+    }
     let mut network = Network::join(options.domain, &options.namespace)?;
     let inbox = Arc::new(Inbox::default());
     let clock = Arc::new(StampClock::new(options.clock));
     let started = start(options, &setup, &mut network, &inbox, &clock, stop, tell)?;
     let Some((source, ears)) = started else { return Ok(Summary::default()) };
     source.notes().iter().for_each(|note| tell(note));
-    let mut bridge = Bridge::new(options, setup, source, network, inbox, clock)?;
+    let callers = Callers { desk, requests };
+    let mut bridge = Bridge::new(options, setup, source, network, inbox, clock, callers)?;
     let switch = bridge.listen_to_switch()?;
+    let services = bridge.offer_services()?;
     bridge.tell_topics(tell);
     let ended = bridge.work(stop, tell);
     // The robot is stopped before the node leaves the network.
     let (summary, network) = bridge.finish();
-    drop((ears, switch));
+    drop((ears, switch, services, http));
     drop(network);
     ended.map(|()| summary)
 }
@@ -185,6 +197,7 @@ struct Bridge {
     inbox: Arc<Inbox>,
     clock: Arc<StampClock>,
     wheels: Option<Wheels>,
+    callers: Callers,
     out: Out,
     /// Last permission that was told.
     told: Option<Permission>,
@@ -197,6 +210,12 @@ struct Bridge {
     frames: u64,
     heard: Instant,
     quiet: bool,
+}
+
+/// Desk of the skill, and the requests that were left there.
+struct Callers {
+    desk: Desk,
+    requests: Receiver<Request>,
 }
 
 /// Publishers of the results.
@@ -215,6 +234,7 @@ impl Bridge {
         mut network: Network,
         inbox: Arc<Inbox>,
         clock: Arc<StampClock>,
+        callers: Callers,
     ) -> Result<Self, BridgeError> {
         let base_frame = source.facts().robot_frame;
         let out = Out {
@@ -241,6 +261,7 @@ impl Bridge {
             inbox,
             clock,
             wheels,
+            callers,
             out,
             told: None,
             rivals: 0,
@@ -284,7 +305,16 @@ impl Bridge {
         Ok(vec![enable, reset])
     }
 
+    /// Offers the verbs of the skill as services; not without a controller.
+    fn offer_services(&mut self) -> Result<Vec<Ear>, BridgeError> {
+        if self.wheels.is_none() {
+            return Ok(Vec::new());
+        }
+        services::offer(&mut self.network, self.options.rmw, &self.callers.desk)
+    }
+
     fn work(&mut self, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
+        self.callers.desk.open();
         while !stop.load(Ordering::Relaxed) {
             for (topic, data) in self.inbox.take(TURN) {
                 match topic == self.options.reset {
@@ -292,6 +322,7 @@ impl Bridge {
                     false => self.source.take(&topic, &data),
                 }
             }
+            self.serve_callers(tell);
             self.check_calibration()?;
             // Only the newest frame: a slow pipeline must not fall behind the robot.
             match self.source.newest_frame() {
@@ -301,6 +332,26 @@ impl Bridge {
             self.report_state(tell);
         }
         Ok(())
+    }
+
+    /// Answers the requests that were left at the desk.
+    fn serve_callers(&mut self, tell: &dyn Fn(&str)) {
+        while let Ok(Request { verb, answer }) = self.callers.requests.try_recv() {
+            let done = match verb {
+                Verb::Enroll(enrollment) => self.pipeline.enroll(&enrollment),
+                Verb::Clear => {
+                    self.pipeline.clear();
+                    Ok(())
+                }
+            };
+            let done = done.map_err(|refusal| refusal.to_string());
+            tell(&match &done {
+                Ok(()) => format!("{verb}"),
+                Err(reason) => format!("{verb}: refused: {reason}"),
+            });
+            // A caller that is gone needs no answer.
+            let _gone = answer.send(done);
+        }
     }
 
     /// Ends a drive by a calibration that is no longer that of the camera: the places of people and
@@ -330,6 +381,7 @@ impl Bridge {
             self.looked = Instant::now();
             self.look_for_rivals(tell);
         }
+        self.callers.desk.turn(permission, self.pipeline.fault());
         let header = Header::new(self.clock.now(), "tagalong");
         let _lost = self.out.heartbeat.publish(header);
         self.diagnostics.update(Status {
@@ -389,6 +441,7 @@ impl Bridge {
         // Returned only now, so that the wheels hear of a failed step.
         let report = report?;
         self.frames += 1;
+        self.callers.desk.frame(self.pipeline.status(), self.frames);
         self.publish(found, &report);
         Ok(())
     }

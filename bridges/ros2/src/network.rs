@@ -10,7 +10,7 @@ use ros2_client::dds::rustdds::RTPSEntity;
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
     Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
-    QosProfile, Subscription,
+    QosProfile, Server, ServiceMapping, ServiceTypeName, Subscription,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -28,6 +28,8 @@ use crate::stamps::StampClock;
 const IMAGES: usize = 2;
 /// Number of other messages that wait.
 const OTHERS: usize = 64;
+/// Number of answers of a service that are kept for callers that missed them.
+const ANSWERS: usize = 10;
 
 /// The node of the bridge.
 pub(crate) struct Network {
@@ -44,6 +46,10 @@ pub(crate) struct Ear {
 }
 
 impl Ear {
+    pub(crate) fn new(topic: &str, abort: AbortHandle, thread: JoinHandle<()>) -> Self {
+        Self { topic: topic.to_owned(), abort, thread: Some(thread) }
+    }
+
     pub(crate) fn topic(&self) -> &str {
         &self.topic
     }
@@ -245,7 +251,25 @@ impl Network {
             // The stream ends by being aborted.
             let _aborted = block_on(Abortable::new(put, registration));
         });
-        Ok(Ear { topic: topic.to_owned(), abort, thread: Some(thread) })
+        Ok(Ear::new(topic, abort, thread))
+    }
+
+    /// Creates the server of a service.
+    pub(crate) fn server<Q, A>(
+        &mut self,
+        service: &str,
+        service_type: &str,
+        mapping: ServiceMapping,
+    ) -> Result<Server<Q, A>, BridgeError>
+    where
+        Q: ros2_client::Message + Clone + 'static,
+        A: ros2_client::Message + 'static,
+    {
+        let (package, kind) = service_type.split_once("/srv/").unwrap_or(("", service_type));
+        let name = name(self.node.namespace(), service)?;
+        let kind = ServiceTypeName::new(package, kind);
+        let answers = reliable().history(History::KeepLast { depth: ANSWERS });
+        self.node.create_server(mapping, &name, &kind, commands(), answers).map_err(failed)
     }
 
     /// Creates a publisher of this type.

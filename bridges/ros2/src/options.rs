@@ -1,10 +1,11 @@
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use tagalong_config::{FileLimit, Registry, read_text};
 use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{Pipeline, RobotSettings};
 
-use crate::{BridgeError, ClockSource};
+use crate::{BridgeError, ClockSource, Middleware};
 
 /// Follows people live: ROS 2 images and odometry in, tracks and commands out.
 ///
@@ -70,6 +71,13 @@ pub struct Options {
     /// Topic of commands (geometry_msgs/TwistStamped).
     #[arg(long, value_name = "TOPIC", default_value = "cmd_vel")]
     pub command: String,
+    /// Address on this computer for HTTP with JSON: POST /enroll and /clear, GET /status and
+    /// /healthz; none if left out.
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub http: Option<SocketAddr>,
+    /// Middleware of the nodes that call the services people/enroll and so on.
+    #[arg(long, env = "RMW_IMPLEMENTATION", value_enum, default_value_t)]
+    pub rmw: Middleware,
     /// Commands per second.
     #[arg(long, value_name = "HZ", default_value_t = 25.0, value_parser = rate)]
     pub rate: f64,

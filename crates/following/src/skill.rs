@@ -8,6 +8,9 @@ use tagalong_geometry::{Camera, Rect};
 use crate::target_lock::{bearing_deg, distance_m, nearest_in_front};
 use crate::{ChoiceRule, LockReport, LockState, TargetSettings};
 
+/// Height of the top of the head above its centre, m.
+const HALF_HEAD_M: f64 = 0.12;
+
 /// Person to follow, in a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -265,7 +268,7 @@ impl PersonStatus {
 fn standing(track: &Track) -> Rect {
     // A head that is believed below the floor would turn the box upside down.
     let head_m = track.estimate.person.position.z.clamp(0.8, 2.2);
-    track.estimate.region.standing_of_upper_body(head_m)
+    track.estimate.region.standing_of_upper_body(head_m + HALF_HEAD_M)
 }
 
 /// Returns the settings with the patience of a request.
@@ -364,7 +367,7 @@ mod tests {
         assert_eq!(chosen(pixel(2.0, 0.0, 1.3)), Ok(Some(1)), "not the one behind");
         assert_eq!(chosen(pixel(3.0, 1.0, 0.9)), Ok(Some(3)), "at the hips");
         // The far one's head is above the near one's, from a camera below both.
-        assert_eq!(chosen(pixel(3.0, 1.0, 1.75)), Ok(Some(3)), "at the top of the head");
+        assert_eq!(chosen(pixel(3.0, 1.0, 1.68)), Ok(Some(3)), "at the top of the head");
         let refusal = chosen(pixel(3.0, -1.0, 1.3)).unwrap_err();
         assert!(refusal.starts_with("no person is seen at the point ("), "{refusal}");
         assert!(refusal.ends_with("tracks are 1, 2, 3, 5"), "{refusal}");
