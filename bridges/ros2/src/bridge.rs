@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 use ros2_client::Publisher;
 use tagalong_config::Registry;
 use tagalong_core::{Stamp, WheelSpeeds};
-use tagalong_log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg, TwistStamped};
+use tagalong_log::msgs::{
+    Detection3DArray, Header, PoseStamped, StringMsg, Twist as TwistMessage, TwistStamped,
+};
 use tagalong_log::write::{self, FrameRecord};
 use tagalong_log::{Listening, LiveSource, LogFrame};
 use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, Sources};
@@ -16,8 +18,9 @@ use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline,
 use crate::diagnostics::{Diagnostics, Status};
 use crate::http::HttpServer;
 use crate::inbox::{Inbox, Traffic};
+use crate::messages::SpeedLimit;
 use crate::network::{Ear, Network};
-use crate::options::Setup;
+use crate::options::{CommandType, Setup};
 use crate::services;
 use crate::skill::{Desk, Request, Verb};
 use crate::stamps::StampClock;
@@ -199,6 +202,8 @@ struct Bridge {
     wheels: Option<Wheels>,
     callers: Callers,
     out: Out,
+    /// Largest speed of the config, m/s.
+    max_speed_mps: f64,
     /// Last permission that was told.
     told: Option<Permission>,
     /// Number of other publishers of commands that was told.
@@ -253,6 +258,7 @@ impl Bridge {
             network.publisher_of(&options.diagnostics, "diagnostic_msgs/msg/DiagnosticArray")?;
         let diagnostics = Diagnostics::start(publisher, Arc::clone(&clock));
         Ok(Self {
+            max_speed_mps: setup.robot.max_speed_mps,
             network,
             options: options.clone(),
             diagnostics,
@@ -302,7 +308,14 @@ impl Bridge {
             theirs.push(&topic, nanos.to_le_bytes().to_vec(), 1);
         };
         let reset = self.network.listen_to_reset(reset, inbox, on)?;
-        Ok(vec![enable, reset])
+        let (topic, theirs) = (&self.options.speed_limit, Arc::clone(inbox));
+        let (key, max_speed_mps) = (topic.clone(), self.max_speed_mps);
+        // Only the newest limit holds.
+        let on = move |limit: SpeedLimit| {
+            theirs.push(&key, limit.mps(max_speed_mps).to_le_bytes().to_vec(), 1);
+        };
+        let limit = self.network.listen_to_speed_limit(topic, inbox, on)?;
+        Ok(vec![enable, reset, limit])
     }
 
     /// Offers the verbs of the skill as services; not without a controller.
@@ -317,9 +330,10 @@ impl Bridge {
         self.callers.desk.open();
         while !stop.load(Ordering::Relaxed) {
             for (topic, data) in self.inbox.take(TURN) {
-                match topic == self.options.reset {
-                    true => self.reset(&data, tell),
-                    false => self.source.take(&topic, &data),
+                match topic {
+                    topic if topic == self.options.reset => self.reset(&data, tell),
+                    topic if topic == self.options.speed_limit => self.limit_speed(&data, tell),
+                    topic => self.source.take(&topic, &data),
                 }
             }
             self.serve_callers(tell);
@@ -485,6 +499,16 @@ impl Bridge {
         }
     }
 
+    /// Takes in a speed limit of a planner.
+    fn limit_speed(&mut self, data: &[u8], tell: &dyn Fn(&str)) {
+        let most_mps = <[u8; 8]>::try_from(data).map_or(0.0, f64::from_le_bytes);
+        self.pipeline.allow_speed(most_mps);
+        tell(&match most_mps.is_finite() {
+            true => format!("speed limit: {most_mps:.2} m/s"),
+            false => "no speed limit beside that of the config".to_owned(),
+        });
+    }
+
     fn disarm(&mut self, why: &'static str, tell: &dyn Fn(&str)) {
         self.pipeline.disarm(why);
         self.obey(false);
@@ -550,8 +574,8 @@ fn drive(
     network: &mut Network,
     clock: &Arc<StampClock>,
 ) -> Result<Wheels, BridgeError> {
-    let publisher: Publisher<TwistStamped> = network.publisher(&options.command)?;
     let half_m = setup.robot.wheels().half_separation_m;
+    let publish = command_publisher(options, network)?;
     let (base_frame, clock) = (base_frame.to_owned(), Arc::clone(clock));
     let now = {
         let clock = Arc::clone(&clock);
@@ -559,16 +583,39 @@ fn drive(
     };
     let tell = move |wheels| {
         let header = Header::new(clock.now(), base_frame.as_str());
-        // A full queue means that the previous command has not been read.
-        let _lost = publisher.publish(twist(header, wheels, half_m));
+        publish(TwistStamped { header, twist: twist(wheels, half_m) });
     };
     Ok(Wheels::start(Duration::from_secs_f64(1.0 / options.rate), switch, now, tell))
 }
 
+/// Returns a function that publishes commands as the type that the options name.
+fn command_publisher(
+    options: &Options,
+    network: &mut Network,
+) -> Result<Box<dyn Fn(TwistStamped) + Send>, BridgeError> {
+    let topic = &options.command;
+    // A full queue means that the previous command has not been read.
+    Ok(match options.command_type {
+        CommandType::TwistStamped => {
+            let publisher: Publisher<TwistStamped> = network.publisher(topic)?;
+            Box::new(move |command| {
+                let _lost = publisher.publish(command);
+            })
+        }
+        CommandType::Twist => {
+            let publisher: Publisher<TwistMessage> =
+                network.publisher_of(topic, "geometry_msgs/msg/Twist")?;
+            Box::new(move |command| {
+                let _lost = publisher.publish(command.twist);
+            })
+        }
+    })
+}
+
 /// Converts wheel speeds to the velocity of the robot's centre.
-fn twist(header: Header, WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> TwistStamped {
-    let mut twist = TwistStamped { header, ..TwistStamped::default() };
-    twist.twist.linear.x = 0.5 * (left + right);
-    twist.twist.angular.z = 0.5 * (right - left) / half_m;
+fn twist(WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> TwistMessage {
+    let mut twist = TwistMessage::default();
+    twist.linear.x = 0.5 * (left + right);
+    twist.angular.z = 0.5 * (right - left) / half_m;
     twist
 }

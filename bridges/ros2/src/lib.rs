@@ -37,7 +37,7 @@ mod stamps;
 pub mod wheels;
 
 pub use bridge::{Summary, run, run_with};
-pub use options::Options;
+pub use options::{CommandType, Options};
 pub use services::Middleware;
 pub use stamps::ClockSource;
 

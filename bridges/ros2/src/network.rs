@@ -21,7 +21,9 @@ use tagalong_log::msgs::{
 
 use crate::BridgeError;
 use crate::inbox::Inbox;
-use crate::messages::{Bool, Empty, OwnedCompressedImage, OwnedImage, ros_topic, ros_type};
+use crate::messages::{
+    Bool, Empty, OwnedCompressedImage, OwnedImage, SpeedLimit, ros_topic, ros_type,
+};
 use crate::stamps::StampClock;
 
 /// Number of images that wait for the thread that makes frames.
@@ -188,6 +190,22 @@ impl Network {
             None => inbox.count_malformed(&name),
         };
         self.hear(topic, "std_msgs/msg/Empty", commands(), take)
+    }
+
+    /// Calls `on` for each message of the topic of speed limits. A message that cannot be read changes
+    /// nothing.
+    pub(crate) fn listen_to_speed_limit(
+        &mut self,
+        topic: &str,
+        inbox: &Arc<Inbox>,
+        on: impl Fn(SpeedLimit) + Send + 'static,
+    ) -> Result<Ear, BridgeError> {
+        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        let take = move |message: Option<SpeedLimit>| match message {
+            Some(limit) if limit.speed_limit >= 0.0 => on(limit),
+            _ => inbox.count_malformed(&name),
+        };
+        self.hear(topic, "nav2_msgs/msg/SpeedLimit", commands(), take)
     }
 
     /// Returns the number of other participants' publishers on a topic.

@@ -32,7 +32,7 @@ pub use command_limiter::{
     CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource, Orders,
 };
 pub use enable::{Enable, EnableSwitch, Permission};
-pub use settings::{FollowSettings, OdometrySource, RobotSettings};
+pub use settings::{Base, FollowSettings, OdometrySource, RobotSettings};
 pub use skill::{Choice, Enrollment, EnrollmentError, FollowStatus, PersonStatus};
 pub use steering::{Steered, Steering};
 pub use target_lock::{

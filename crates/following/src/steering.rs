@@ -9,8 +9,8 @@ use crate::command_limiter::{Aim, CommandLimiter, ObstacleMemory, Wish};
 use crate::skill::{View, before_any_frame};
 use crate::target_lock::{Search, TargetLock};
 use crate::{
-    ChoiceRule, Enrollment, EnrollmentError, FollowSettings, FollowStatus, LockReport, LockState,
-    Orders, RobotSettings, SearchSettings, TargetSettings,
+    Base, ChoiceRule, Enrollment, EnrollmentError, FollowSettings, FollowStatus, LockReport,
+    LockState, Orders, RobotSettings, SearchSettings, TargetSettings,
 };
 
 /// Frames that must be processed after a reset before the robot may move.
@@ -68,12 +68,7 @@ impl Steering {
             lock: TargetLock::new(target, describer),
             search: Search::default(),
             obstacles: ObstacleMemory::default(),
-            limiter: CommandLimiter::new(
-                command_limiter,
-                collision_monitor,
-                robot.wheels(),
-                robot.max_speed_mps,
-            ),
+            limiter: CommandLimiter::new(command_limiter, collision_monitor, robot.clone()),
             robot,
             fresh: FRESH_FRAMES,
             last: None,
@@ -110,6 +105,12 @@ impl Steering {
         self.search = Search::default();
         self.search_settings = settings.search.clone();
         self.lock.restart(settings, why);
+    }
+
+    /// Limits the speed to this, m/s, beside all other limits, until the next call; infinite for no
+    /// limit.
+    pub fn allow_speed(&mut self, most_mps: f64) {
+        self.limiter.allow_speed(most_mps);
     }
 
     /// Returns the state of the pursuit after the last frame.
@@ -226,7 +227,12 @@ impl Steering {
             },
             state => {
                 self.search = Search::default();
-                let wheels = self.robot.wheels().wheels_within(twist, self.robot.max_speed_mps);
+                let drive = self.robot.wheels();
+                let wheels = match self.robot.base {
+                    // Its limits are those of speed and turn rate, not of a wheel.
+                    Base::Holonomic => drive.wheels(twist),
+                    _ => drive.wheels_within(twist, self.robot.max_speed_mps),
+                };
                 (wheels, if state.doubts() { Aim::Perhaps } else { Aim::Person })
             }
         }

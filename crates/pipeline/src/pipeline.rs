@@ -93,6 +93,14 @@ impl Pipeline {
         }
     }
 
+    /// Limits the speed to this, m/s, beside all limits of the config, until the next call; infinite
+    /// for no limit. A planner asks for it, in a crowd or near a door.
+    pub fn allow_speed(&mut self, most_mps: f64) {
+        if let Some(steering) = &mut self.steering {
+            steering.allow_speed(most_mps);
+        }
+    }
+
     /// Returns the state of the pursuit after the last frame, and the people to choose from; `None`
     /// without a controller.
     pub fn status(&self) -> Option<FollowStatus> {

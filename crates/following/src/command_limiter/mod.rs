@@ -21,6 +21,8 @@ pub use settings::{CollisionMonitorSettings, CommandLimiterSettings, ObstacleSou
 use ramp::{Axis, AxisLimits};
 use tagalong_core::{Command, DiffDrive, EgoMotion, Reason, Stamp, Twist, WheelSpeeds};
 
+use crate::{Base, RobotSettings};
+
 /// Longest time over which the robot may have changed its speed, s. A pause of frames must not
 /// allow a large step of the speed.
 const LONGEST_STEP_S: f64 = 0.2;
@@ -110,8 +112,11 @@ impl Orders {
 pub(crate) struct CommandLimiter {
     settings: CommandLimiterSettings,
     monitor: CollisionMonitorSettings,
+    robot: RobotSettings,
     wheels: DiffDrive,
     max_speed_mps: f64,
+    /// Largest speed that another program allows, m/s.
+    allowed_mps: f64,
     last: Option<Command>,
     /// Motion of the last command.
     motion: Motion,
@@ -140,14 +145,15 @@ impl CommandLimiter {
     pub(crate) fn new(
         settings: CommandLimiterSettings,
         monitor: CollisionMonitorSettings,
-        wheels: DiffDrive,
-        max_speed_mps: f64,
+        robot: RobotSettings,
     ) -> Self {
         Self {
             settings,
             monitor,
-            wheels,
-            max_speed_mps,
+            wheels: robot.wheels(),
+            max_speed_mps: robot.max_speed_mps,
+            robot,
+            allowed_mps: f64::INFINITY,
             last: None,
             motion: Motion::default(),
             fault: None,
@@ -167,7 +173,7 @@ impl CommandLimiter {
             None => self.limited(wish, look),
         };
         self.motion = motion;
-        let wheels = self.in_reach(self.wheels.wheels(motion.twist()));
+        let wheels = self.in_reach(motion.twist());
         let valid_until = wish.stamp.plus_seconds(self.settings.valid_s);
         let twist = self.wheels.twist(wheels);
         let command = Command { twist, wheels, stamp: wish.stamp, valid_until, reason };
@@ -188,6 +194,12 @@ impl CommandLimiter {
         if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
             self.latch("odometry jumped");
         }
+    }
+
+    /// Limits the speed to this, m/s, beside all other limits.
+    pub(crate) fn allow_speed(&mut self, most_mps: f64) {
+        // A limit that is no number is a mistake of another program, which must not drive faster.
+        self.allowed_mps = if most_mps >= 0.0 { most_mps } else { 0.0 };
     }
 
     /// Returns the settings of the obstacle corridor.
@@ -320,26 +332,36 @@ impl CommandLimiter {
         let (wanted, as_wished) = self.within_drive(wish.wheels);
         let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
         let is_late = wish.pause_s > self.settings.slow_after_s;
-        let cap = if is_late || wish.aim != Aim::Person { 0.5 } else { 1.0 } * self.max_speed_mps;
+        let half = is_late || wish.aim != Aim::Person;
+        let cap = if half { 0.5 } else { 1.0 } * self.max_speed_mps;
         let speed = wanted.linear_mps.abs();
-        if speed <= cap {
+        if speed <= cap.min(self.allowed_mps) {
             return (wanted, reason, false);
         }
-        let why = if is_late { Reason::Slow } else { wish.aim.reason() };
+        let why = match () {
+            () if self.allowed_mps < cap => Reason::Limited,
+            () if is_late => Reason::Slow,
+            () => wish.aim.reason(),
+        };
+        let cap = cap.min(self.allowed_mps);
         (wanted.scaled(cap / speed), why, true)
     }
 
-    /// Limits the wheel speeds to the drive and the turn rate, on the same arc, and returns whether
-    /// they are as wished.
+    /// Limits the wheel speeds to the drive and the turn rate, on the same arc where the base can drive
+    /// it, and returns whether they are as wished.
     fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, bool) {
-        let twist = self.wheels.twist(self.in_reach(wheels));
+        let twist = self.wheels.twist(self.in_reach(self.wheels.twist(wheels)));
         let twist = match self.settings.reverse {
             false if twist.linear_mps < 0.0 => Twist { linear_mps: 0.0, ..twist },
             _ => twist,
         };
         let limit = self.settings.max_turn_radps;
         // Forward speed and turn rate shrink by the same factor, which keeps the curvature.
-        let slower = twist.scaled(limit / twist.angular_rps.abs().max(limit));
+        let mut slower = twist.scaled(limit / twist.angular_rps.abs().max(limit));
+        if self.robot.base == Base::Ackermann {
+            let most = slower.linear_mps.abs() / self.robot.min_turn_radius_m;
+            slower.angular_rps = slower.angular_rps.clamp(-most, most);
+        }
         let WheelSpeeds { left, right } = self.wheels.wheels(slower);
         let as_wished = (left - wheels.left).abs() + (right - wheels.right).abs() < STILL_MPS;
         (slower, as_wished)
@@ -360,9 +382,12 @@ impl CommandLimiter {
     /// Moves the speed towards the wish as far as the limits allow, on the wished arc as far as those
     /// of the turn allow.
     fn ramped(&self, before: &Motion, wanted: Twist, dt: f64) -> Motion {
-        let half_m = self.wheels.half_separation_m;
         // The turn that is under way takes its part of the speed of the outer wheel.
-        let most = self.max_speed_mps - half_m * before.turn.peak(&self.turn_limits());
+        let rim = match self.robot.base {
+            Base::Holonomic => 0.0,
+            _ => self.wheels.half_separation_m * before.turn.peak(&self.turn_limits()),
+        };
+        let most = self.max_speed_mps - rim;
         let target = wanted.linear_mps.clamp(-most.max(0.0), most.max(0.0));
         let forward = before.forward.track(target, dt, &self.forward_limits(), target.abs());
         // A robot that stops stays on the arc that it drives.
@@ -374,18 +399,32 @@ impl CommandLimiter {
         Motion { forward, turn: self.turned(before, turn, &forward, dt) }
     }
 
-    /// Moves the turn rate towards `turn` as far as its limits and the outer wheel allow, beside this
-    /// speed.
+    /// Moves the turn rate towards `turn` as far as its limits and the base allow at this speed.
     fn turned(&self, before: &Motion, turn: f64, forward: &Axis, dt: f64) -> Axis {
-        let free_mps = self.max_speed_mps - forward.peak(&self.forward_limits());
-        let rim = (free_mps / self.wheels.half_separation_m).max(0.0);
-        let most = rim.min(self.settings.max_turn_radps);
-        before.turn.track(turn.clamp(-rim, rim), dt, &self.turn_limits(), most)
+        let (limits, peak) = (self.turn_limits(), forward.peak(&self.forward_limits()));
+        let most = self.robot.turn_at(peak).min(self.settings.max_turn_radps);
+        let turn = before.turn.track(turn.clamp(-most, most), dt, &limits, most);
+        if self.robot.base != Base::Ackermann {
+            return turn;
+        }
+        // Steered wheels turn no faster than they roll, however suddenly they slow down.
+        let most = self.robot.turn_at(forward.speed);
+        match turn.speed.abs() <= most {
+            true => turn,
+            false => Axis { speed: most.copysign(turn.speed), accel: 0.0 },
+        }
     }
 
-    /// Scales the wheel speeds to the limit of the faster wheel, on the same arc.
-    fn in_reach(&self, WheelSpeeds { left, right }: WheelSpeeds) -> WheelSpeeds {
+    /// Returns the wheel speeds of a motion: scaled to the limit of the faster wheel, on the same arc,
+    /// or, for a holonomic base, with both parts limited on their own.
+    fn in_reach(&self, twist: Twist) -> WheelSpeeds {
         let most = self.max_speed_mps;
+        if self.robot.base == Base::Holonomic {
+            let (speed, turn) = (most, self.settings.max_turn_radps);
+            let forward = twist.linear_mps.clamp(-speed, speed);
+            return self.wheels.wheels(Twist::new(forward, twist.angular_rps.clamp(-turn, turn)));
+        }
+        let WheelSpeeds { left, right } = self.wheels.wheels(twist);
         let scale = most / left.abs().max(right.abs()).max(most);
         // The clamp removes the rounding error of the scale.
         let limit = |speed: f64| (speed * scale).clamp(-most, most);

@@ -16,7 +16,14 @@ fn abrupt() -> CommandLimiterSettings {
 }
 
 fn limiter_of(settings: CommandLimiterSettings) -> CommandLimiter {
-    CommandLimiter::new(settings, CollisionMonitorSettings::default(), DRIVE, MAX_MPS)
+    CommandLimiter::new(settings, CollisionMonitorSettings::default(), RobotSettings::default())
+}
+
+/// Returns a command limiter of another base, with a least radius of 0.8 m.
+fn limiter_on(base: Base) -> CommandLimiter {
+    let robot = RobotSettings { base, min_turn_radius_m: 0.8, ..RobotSettings::default() };
+    let settings = CommandLimiterSettings::default();
+    CommandLimiter::new(settings, CollisionMonitorSettings::default(), robot)
 }
 
 fn limiter() -> CommandLimiter {
@@ -157,6 +164,48 @@ fn the_turn_rate_changes_no_faster_than_it_may() {
     }
     let back = limiter.limit(&wish(45, 0.2, -0.2), free);
     assert!((back.twist.angular_rps - (0.2 / 0.167 - 0.4)).abs() < 1e-9, "{back:?}");
+}
+
+#[test]
+fn a_holonomic_base_drives_and_turns_at_full_speed_at_once() {
+    let mut limiter = limiter_on(Base::Holonomic);
+    let wheels = DRIVE.wheels(Twist::new(0.9, 1.5));
+    let commands =
+        (1..60).map(|frame| limiter.limit(&wish(frame, wheels.left, wheels.right), free));
+    let last = commands.last().unwrap();
+    assert!((last.twist.linear_mps - 0.9).abs() < 1e-9, "{last:?}");
+    assert!((last.twist.angular_rps - 1.5).abs() < 1e-9, "{last:?}");
+    assert_eq!(last.reason, Reason::Follow);
+}
+
+#[test]
+fn a_base_that_steers_like_a_car_turns_by_its_radius_and_not_on_the_spot() {
+    let mut limiter = limiter_on(Base::Ackermann);
+    let spot = limiter.limit(&wish(1, -0.3, 0.3), free);
+    assert_eq!((spot.wheels, spot.reason), (WheelSpeeds::STOP, Reason::Limited));
+    let commands = (2..60).map(|frame| limiter.limit(&wish(frame, 0.1, 0.5), free));
+    let last = commands.last().unwrap();
+    assert!((last.twist.linear_mps - 0.3).abs() < 1e-9, "{last:?}");
+    assert!((last.twist.angular_rps - 0.3 / 0.8).abs() < 1e-9, "{last:?}");
+    let blocked = limiter.limit(&wish(60, 0.1, 0.5), |_, _| Some(Ahead::Something(0.1)));
+    assert_eq!((blocked.wheels, blocked.reason), (WheelSpeeds::STOP, Reason::Blocked));
+}
+
+#[test]
+fn the_speed_that_a_planner_allows_holds_within_the_limits_of_the_robot() {
+    let (mut limiter, _) = at_speed(0.8, 0.8);
+    limiter.allow_speed(0.5);
+    let commands = go_on(&mut limiter, &wish(0, 0.8, 0.8), 6);
+    assert!((commands[0].twist.linear_mps - 0.7).abs() < 1e-9, "no leap: {commands:?}");
+    assert!((commands[5].twist.linear_mps - 0.5).abs() < 1e-9, "{commands:?}");
+    assert_eq!(commands[5].reason, Reason::Limited);
+    for wrong in [-1.0, f64::NAN] {
+        limiter.allow_speed(wrong);
+        assert_eq!(limiter.allowed_mps, 0.0);
+    }
+    limiter.allow_speed(f64::INFINITY);
+    let last = (46..90).map(|frame| limiter.limit(&wish(frame, 0.8, 0.8), free)).last().unwrap();
+    assert!((last.twist.linear_mps - 0.8).abs() < 1e-9, "{last:?}");
 }
 
 /// A robot that drives at a wall brakes early enough to do so within the limit of the jerk.
@@ -541,6 +590,27 @@ proptest! {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2_000, ..ProptestConfig::default() })]
+
+    /// The limits of each base, for any wish.
+    #[test]
+    fn each_base_is_driven_within_its_geometry(
+        wishes in prop::collection::vec(any_wish(), 50)
+    ) {
+        for base in [Base::Holonomic, Base::Ackermann] {
+            let mut limiter = limiter_on(base);
+            for (frame, (wish, ahead)) in wishes.iter().enumerate() {
+                let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
+                let command = limiter.limit(&Wish { stamp, ..wish.clone() }, |_, _| *ahead);
+                let Twist { linear_mps, angular_rps, .. } = command.twist;
+                prop_assert!(linear_mps.abs() <= MAX_MPS + 1e-9, "{command:?}");
+                prop_assert!(angular_rps.abs() <= 1.5 + 1e-9, "{command:?}");
+                prop_assert!(stops_before(&command, *ahead), "{command:?} {ahead:?}");
+                if base == Base::Ackermann {
+                    prop_assert!(angular_rps.abs() <= linear_mps.abs() / 0.8 + 1e-9, "{command:?}");
+                }
+            }
+        }
+    }
 
     /// From every state the robot is at rest within the stated distance, by the time that it takes
     /// to answer and the deceleration that it may have.
