@@ -219,12 +219,11 @@ impl Desk {
     /// Adds the report of a frame.
     fn take(&mut self, item: &Item, report: &FrameReport) -> Result<(), Failure> {
         self.tally.add(report);
-        for (stage, ms) in &report.timings {
-            self.timings.add(stage, *ms);
-        }
         if !report.outcome.is_processed() {
+            report.timings.iter().for_each(|(stage, ms)| self.timings.add(stage, *ms));
             return Ok(());
         }
+        self.timings.add_frame(&report.timings);
         let writing = Instant::now();
         let record = FrameRecord {
             index: report.index,
@@ -279,7 +278,7 @@ impl Desk {
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,
-            Format::Text => print(&summary::text(&report, &folder, args.overlay))?,
+            Format::Text => print(&summary::text(&report, &self.timings, &folder, args.overlay))?,
         }
         verdict(args, &report, stopped, signals)
     }
