@@ -43,7 +43,7 @@ use tagalong_simulate::sample;
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     if !args.has_log() {
         sample::write(args.log()).map_err(refused)?;
-        say(&format!("no log given: two drawn people walk through {}", args.log().display()));
+        say(&format!("no log given: two simulated people walk through {}", args.log().display()));
     }
     let job = Progress::waiting(&format!("looking through {}", args.log().display()), || {
         Job::prepare(args, registry)
@@ -101,9 +101,21 @@ impl Job {
         }
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
-        let report = blank_report(&config, settings.seed, log);
+        let mut report = blank_report(&config, settings.seed, log);
+        if settings.suits.odometry && !source.has_odometry() {
+            report.notes.push(without_odometry(&config));
+        }
         Ok(Self { pipeline, outer, source, resolved, folder, report })
     }
+}
+
+/// Returns the note on a config for a robot with odometry and a log without.
+fn without_odometry(config: &ConfigFile) -> String {
+    format!(
+        "{} is for a robot with odometry ([suits]), and the log has none: things that the robot \
+         passes seem to move; without a config `tagalong run LOG` takes one that does without",
+        config.name()
+    )
 }
 
 /// Returns `runs/<log>-<config>`.

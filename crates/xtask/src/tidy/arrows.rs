@@ -26,6 +26,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("pipeline", &["stereo", "odometry", "tracking", "following", "network", "vision"]),
     ("log", &["vision"]),
     ("sim", &[]),
+    ("serve", &[]),
     ("triangulate", &[]),
     ("eval", &["matching"]),
     ("report", &["eval"]),
@@ -59,7 +60,7 @@ const ARROWS: &[(&str, &[&str])] = &[
         &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
     ),
     ("doctor", &["app", "render", "vision", "pipeline", "log"]),
-    ("annotate", &["app", "render", "log", "eval", "pipeline"]),
+    ("annotate", &["app", "render", "log", "eval", "pipeline", "serve"]),
     ("view", &["app", "scoring", "render", "report", "log", "eval", "pipeline"]),
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
     (
