@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 use std::fmt;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -7,9 +8,10 @@ use std::time::{Duration, Instant};
 use ros2_client::Publisher;
 use tagalong_config::Registry;
 use tagalong_core::{Stamp, WheelSpeeds};
+use tagalong_live::Live;
 use tagalong_log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg, TwistStamped};
 use tagalong_log::write::{self, FrameRecord};
-use tagalong_log::{Listening, LiveSource, LogFrame};
+use tagalong_log::{Input, Listening, LiveSource, LogFrame};
 use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, Sources};
 
 use crate::diagnostics::{Diagnostics, Status};
@@ -94,6 +96,8 @@ pub fn run_with(
     tell: &dyn Fn(&str),
 ) -> Result<Summary, BridgeError> {
     let setup = options.setup(registry)?;
+    // Before the network, so that a port that is taken ends the program at once.
+    let live = options.serve.map(|at| serve(at, options, &setup, tell)).transpose()?;
     let mut network = Network::join(options.domain, &options.namespace)?;
     let inbox = Arc::new(Inbox::default());
     let clock = Arc::new(StampClock::new(options.clock));
@@ -101,14 +105,35 @@ pub fn run_with(
     let Some((source, ears)) = started else { return Ok(Summary::default()) };
     source.notes().iter().for_each(|note| tell(note));
     let mut bridge = Bridge::new(options, setup, source, network, inbox, clock)?;
+    bridge.live = live;
     let switch = bridge.listen_to_switch()?;
     bridge.tell_topics(tell);
     let ended = bridge.work(stop, tell);
     // The robot is stopped before the node leaves the network.
+    let live = bridge.live.take();
     let (summary, network) = bridge.finish();
+    if let Some(live) = live {
+        live.finish("The bridge has ended.");
+    }
     drop((ears, switch));
     drop(network);
     ended.map(|()| summary)
+}
+
+/// Begins to serve the page of what happens now.
+fn serve(
+    at: SocketAddr,
+    options: &Options,
+    setup: &Setup,
+    tell: &dyn Fn(&str),
+) -> Result<Live, BridgeError> {
+    let config = setup.pipeline.resolved().parse().unwrap_or_default();
+    let name = options.config.file_stem().unwrap_or_default().to_string_lossy();
+    let input = format!("ROS domain {}", options.domain);
+    let live = Live::start(at, &name, &input, &config);
+    let live = live.map_err(|error| BridgeError::Serve(at, error))?;
+    tell(&format!("live: open {} in a browser; it is the key to the page", live.address()));
+    Ok(live)
 }
 
 /// Listens until all inputs of the pipeline are there; returns `None` if stopped before.
@@ -122,8 +147,10 @@ fn start(
     tell: &dyn Fn(&str),
 ) -> Result<Option<(LiveSource, Vec<Ear>)>, BridgeError> {
     let name = format!("ROS domain {}", options.domain);
-    let mut listening =
-        Listening::new(&name, &setup.input, &setup.limits, setup.pipeline.inputs())?;
+    let inputs = setup.pipeline.inputs();
+    // The page shows colour, whether or not the pipeline uses it.
+    let inputs = if options.serve.is_some() { inputs.accept(Input::Colour) } else { inputs };
+    let mut listening = Listening::new(&name, &setup.input, &setup.limits, inputs)?;
     let mut ears: Vec<Ear> = Vec::new();
     let deadline = Instant::now() + Duration::from_secs_f64(options.wait);
     let mut attempt = Instant::now() + ATTEMPT;
@@ -180,6 +207,7 @@ struct Bridge {
     network: Network,
     options: Options,
     diagnostics: Diagnostics,
+    live: Option<Live>,
     pipeline: Pipeline,
     source: LiveSource,
     inbox: Arc<Inbox>,
@@ -236,6 +264,7 @@ impl Bridge {
             network,
             options: options.clone(),
             diagnostics,
+            live: None,
             pipeline: setup.pipeline,
             source,
             inbox,
@@ -390,6 +419,9 @@ impl Bridge {
         let report = report?;
         self.frames += 1;
         self.publish(found, &report);
+        if let Some(live) = &self.live {
+            live.offer(&found.frame, &found.odom_from_robot, &report);
+        }
         Ok(())
     }
 
