@@ -27,15 +27,19 @@
 
 mod bridge;
 mod diagnostics;
+mod http;
 pub mod inbox;
 mod messages;
 mod network;
 mod options;
+mod services;
+mod skill;
 mod stamps;
 pub mod wheels;
 
 pub use bridge::{Summary, run, run_with};
-pub use options::Options;
+pub use options::{CommandType, Options};
+pub use services::Middleware;
 pub use stamps::ClockSource;
 
 /// Failure to start or to continue the bridge.

@@ -1,7 +1,6 @@
 //! Annotations of CVAT, as its formats "CVAT for video 1.1" and "CVAT for images 1.1" export them:
 //! <https://docs.cvat.ai/docs/manual/advanced/xml_format/>.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -10,9 +9,10 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_config::{FileLimit, read_text};
 use tagalong_eval::Region;
-use tagalong_eval::formats::people::{self, Row};
+use tagalong_eval::formats::people::Row;
 
 use super::ImportArgs;
+use super::truth::{WholeBody, boxes_csv, people_csv};
 
 /// Longest file that is read, bytes.
 const MOST_BYTES: u64 = 256 << 20;
@@ -30,7 +30,7 @@ pub fn import(args: &ImportArgs) -> Outcome {
     spare(&output, args.overwrite)?;
     let Read { rows, note } = read(&args.path)?;
     note.iter().for_each(|note| say(note));
-    let text = if args.whole_bodies { mot(&rows) } else { csv(&rows)? };
+    let text = if args.whole_bodies { mot(&rows) } else { people_csv(&rows)? };
     make_room_for(&output)?;
     let shown = output.display();
     fs::write(&output, text)
@@ -212,26 +212,19 @@ fn at(node: &Node<'_, '_>, why: &str) -> String {
     format!(", line {row}: {why}")
 }
 
-fn csv(rows: &[Row]) -> Result<String, Failure> {
-    let mut out = Vec::new();
-    people::write(&mut out, rows).map_err(Failure::failed)?;
-    String::from_utf8(out).map_err(Failure::failed)
-}
-
 /// Returns MOTChallenge text of whole bodies, of which `eval` compares the upper bodies.
 fn mot(rows: &[Row]) -> String {
-    let mut out = String::new();
-    for row in rows {
-        let Some(Region { x, y, width, height }) = row.upper_body else { continue };
-        let counts = u8::from(!row.ignore);
-        let (frame, id, visible) = (row.frame, row.id, row.visible);
-        let _ = writeln!(out, "{frame},{id},{x},{y},{width},{height},{counts},1,{visible}");
-    }
-    out
+    let body = |row: &Row| {
+        let (frame, id, visible, counts) = (row.frame, row.id, row.visible, !row.ignore);
+        Some(WholeBody { frame, id, region: row.upper_body?, visible, counts })
+    };
+    boxes_csv(&rows.iter().filter_map(body).collect::<Vec<_>>())
 }
 
 #[cfg(test)]
 mod tests {
+    use tagalong_eval::formats::people;
+
     use super::*;
 
     const VIDEO: &str = r#"<?xml version="1.0" encoding="utf-8"?>
@@ -259,7 +252,7 @@ mod tests {
         assert_eq!(seen, wanted);
         let region = Region { x: 10.5, y: 20.0, width: 50.0, height: 50.0 };
         assert_eq!(rows[0].upper_body, Some(region));
-        assert_eq!(people::parse(&csv(&rows).unwrap(), "made").unwrap(), rows);
+        assert_eq!(people::parse(&people_csv(&rows).unwrap(), "made").unwrap(), rows);
         assert_eq!(mot(&rows).lines().next(), Some("1,1,10.5,20,50,50,1,1,1"));
     }
 

@@ -52,7 +52,7 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     }
     if !args.has_log() {
         sample::write(args.log()).map_err(refused)?;
-        say(&format!("no log given: two drawn people walk through {}", args.log().display()));
+        say(&format!("no log given: two simulated people walk through {}", args.log().display()));
     }
     let job = Progress::waiting(&format!("looking through {}", args.log().display()), || {
         Job::prepare(args, registry)
@@ -118,9 +118,21 @@ impl Job {
         }
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
-        let report = blank_report(&config, settings.seed, log);
+        let mut report = blank_report(&config, settings.seed, log);
+        if settings.suits.odometry && !source.has_odometry() {
+            report.notes.push(without_odometry(&config));
+        }
         Ok(Self { pipeline, outer, source, resolved, folder, report })
     }
+}
+
+/// Returns the note on a config for a robot with odometry and a log without.
+fn without_odometry(config: &ConfigFile) -> String {
+    format!(
+        "{} is for a robot with odometry ([suits]), and the log has none: things that the robot \
+         passes seem to move; without a config `tagalong run LOG` takes one that does without",
+        config.name()
+    )
 }
 
 /// Returns `runs/<log>-<config>`.
@@ -259,12 +271,11 @@ impl Desk {
     /// Adds the report of a frame.
     fn take(&mut self, item: &Item, report: &FrameReport) -> Result<(), Failure> {
         self.tally.add(report);
-        for (stage, ms) in &report.timings {
-            self.timings.add(stage, *ms);
-        }
         if !report.outcome.is_processed() {
+            report.timings.iter().for_each(|(stage, ms)| self.timings.add(stage, *ms));
             return Ok(());
         }
+        self.timings.add_frame(&report.timings);
         let writing = Instant::now();
         let record = FrameRecord {
             index: report.index,
@@ -319,7 +330,7 @@ impl Desk {
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,
-            Format::Text => print(&summary::text(&report, &folder, args.overlay))?,
+            Format::Text => print(&summary::text(&report, &self.timings, &folder, args.overlay))?,
         }
         verdict(args, &report, stopped, signals)
     }

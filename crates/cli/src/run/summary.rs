@@ -1,6 +1,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use tagalong_app::timings::{Timings, WHOLE_FRAME};
+
 use super::report::RunReport;
 
 /// Lines of the funnel that are shown.
@@ -9,11 +11,14 @@ const FUNNEL_LINES: usize = 6;
 /// Persons that are listed one by one.
 const PERSON_LINES: usize = 12;
 
+/// Stages whose times are shown beside those of whole frames.
+const STAGE_LINES: usize = 3;
+
 /// Counters of read items, as opposed to lost ones.
 const NO_LOSS: [&str; 3] = ["chunks_verified", "frames", "messages"];
 
 /// Returns the results of a run, for a terminal.
-pub fn text(report: &RunReport, folder: &Path, overlay: bool) -> String {
+pub fn text(report: &RunReport, timings: &Timings, folder: &Path, overlay: bool) -> String {
     let mut out = String::new();
     let frames = &report.frames;
     let _ = writeln!(
@@ -28,6 +33,7 @@ pub fn text(report: &RunReport, folder: &Path, overlay: bool) -> String {
     );
     persons(&mut out, report);
     funnel(&mut out, report);
+    times(&mut out, timings);
     losses(&mut out, report);
     files(&mut out, folder, overlay);
     out
@@ -70,6 +76,20 @@ fn funnel(out: &mut String, report: &RunReport) {
     }
     for line in lines.iter().take(FUNNEL_LINES) {
         let _ = writeln!(out, "  {} {}", line.test, line.count);
+    }
+}
+
+/// Writes the times of whole frames and of the stages whose worst frames were slowest.
+fn times(out: &mut String, timings: &Timings) {
+    let summary = timings.summary();
+    let Some(whole) = summary.get(WHOLE_FRAME) else { return };
+    let mut stages: Vec<_> = summary.iter().filter(|(name, _)| **name != WHOLE_FRAME).collect();
+    stages.sort_by(|a, b| b.1.max_ms.total_cmp(&a.1.max_ms));
+    let _ =
+        writeln!(out, "{:<14}{:>8}{:>8}{:>8}{:>8}", "ms per frame", "p50", "p95", "p99", "worst");
+    for (name, t) in std::iter::once((&WHOLE_FRAME, whole)).chain(stages).take(1 + STAGE_LINES) {
+        let [p50, p95, p99] = [t.p50_ms, t.p95_ms, t.p99_ms];
+        let _ = writeln!(out, "  {name:<12}{p50:>8.2}{p95:>8.2}{p99:>8.2}{:>8.2}", t.max_ms);
     }
 }
 

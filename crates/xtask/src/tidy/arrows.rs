@@ -9,6 +9,7 @@ use crate::workspace::Workspace;
 /// `crates/README.md` says why.
 const ARROWS: &[(&str, &[&str])] = &[
     ("stats", &[]),
+    ("matching", &[]),
     ("geometry", &[]),
     ("core", &[]),
     ("config", &[]),
@@ -19,7 +20,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("steering", &[]),
     ("stereo", &["vision"]),
     ("odometry", &[]),
-    ("assignment", &[]),
+    ("assignment", &["matching"]),
     ("tracking", &["vision"]),
     ("following", &["tracking", "vision"]),
     ("pipeline", &["stereo", "odometry", "tracking", "following", "network", "vision"]),
@@ -27,7 +28,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sim", &[]),
     ("serve", &[]),
     ("triangulate", &[]),
-    ("eval", &[]),
+    ("eval", &["matching"]),
     ("report", &["eval"]),
     ("trials", &["vision", "stereo", "pipeline", "sim", "eval"]),
     ("tuning", &["pipeline", "eval"]),
