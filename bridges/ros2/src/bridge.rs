@@ -9,14 +9,10 @@ use std::time::{Duration, Instant};
 use ros2_client::Publisher;
 use tagalong_config::Registry;
 use tagalong_core::{Stamp, WheelSpeeds};
-<<<<<<< HEAD
 use tagalong_live::Live;
-use tagalong_log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg, TwistStamped};
-=======
 use tagalong_log::msgs::{
     Detection3DArray, Header, PoseStamped, StringMsg, Twist as TwistMessage, TwistStamped,
 };
->>>>>>> main
 use tagalong_log::write::{self, FrameRecord};
 use tagalong_log::{Input, Listening, LiveSource, LogFrame};
 use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, Sources};
@@ -107,30 +103,23 @@ pub fn run_with(
     tell: &dyn Fn(&str),
 ) -> Result<Summary, BridgeError> {
     let setup = options.setup(registry)?;
-<<<<<<< HEAD
     // Before the network, so that a port that is taken ends the program at once.
     let live = options.serve.map(|at| serve(at, options, &setup, tell)).transpose()?;
-=======
     let (desk, requests) = Desk::new();
     // Before the topics are there, so that a supervisor can ask how the bridge is.
     let http = options.http.map(|address| HttpServer::start(address, desk.clone())).transpose()?;
     if let Some(http) = &http {
         tell(&format!("answers at {}", http.address()));
     }
->>>>>>> main
     let mut network = Network::join(options.domain, &options.namespace)?;
     let inbox = Arc::new(Inbox::default());
     let clock = Arc::new(StampClock::new(options.clock));
     let started = start(options, &setup, &mut network, &inbox, &clock, stop, tell)?;
     let Some((source, ears)) = started else { return Ok(Summary::default()) };
     source.notes().iter().for_each(|note| tell(note));
-<<<<<<< HEAD
-    let mut bridge = Bridge::new(options, setup, source, network, inbox, clock)?;
-    bridge.live = live;
-=======
     let callers = Callers { desk, requests };
     let mut bridge = Bridge::new(options, setup, source, network, inbox, clock, callers)?;
->>>>>>> main
+    bridge.live = live;
     let switch = bridge.listen_to_switch()?;
     let services = bridge.offer_services()?;
     bridge.tell_topics(tell);
@@ -138,14 +127,10 @@ pub fn run_with(
     // The robot is stopped before the node leaves the network.
     let live = bridge.live.take();
     let (summary, network) = bridge.finish();
-<<<<<<< HEAD
     if let Some(live) = live {
         live.finish("The bridge has ended.");
     }
-    drop((ears, switch));
-=======
     drop((ears, switch, services, http));
->>>>>>> main
     drop(network);
     ended.map(|()| summary)
 }
