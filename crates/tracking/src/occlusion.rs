@@ -184,6 +184,17 @@ fn may_hide(occluder: &Rect, region: &Rect, camera: &Camera) -> bool {
     !(is_beside || is_above_or_below)
 }
 
+/// Returns samples spread evenly over head, shoulders and trunk.
+fn silhouette(region: &Rect) -> impl Iterator<Item = Point2<f64>> {
+    let region = *region;
+    let step = 1.0 / SAMPLES as f64;
+    let grid = (0..SAMPLES * SAMPLES).map(move |i| {
+        let (u, v) = ((i % SAMPLES) as f64 + 0.5, (i / SAMPLES) as f64 + 0.5);
+        Point2::new(region.x + u * step * region.width, region.y + v * step * region.height)
+    });
+    grid.filter(move |point| is_on_body(&region, *point))
+}
+
 /// Returns true on the silhouette of the person with the upper-body square `region`: head and
 /// shoulders as wide as the upper-body template of Jafari et al. (ICRA 2014), and the trunk below
 /// them.
