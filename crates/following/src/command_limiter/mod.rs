@@ -1,4 +1,4 @@
-//! Governor of the commands: every command of the controller passes it on the way to the wheels.
+//! Limiter of the commands: every command of the controller passes it on the way to the wheels.
 //!
 //! It does not depend on the source of the wish. It lets the robot move only while frames arrive, a
 //! target is followed or searched for and the path is free; it limits the speed, the turn rate, and the
@@ -108,7 +108,7 @@ impl Orders {
     }
 }
 
-/// Governor of the commands; see the [module](self).
+/// Limiter of the commands; see the [module](self).
 pub(crate) struct CommandLimiter {
     settings: CommandLimiterSettings,
     monitor: CollisionMonitorSettings,
