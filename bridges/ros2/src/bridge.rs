@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 use std::fmt;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
@@ -8,11 +9,12 @@ use std::time::{Duration, Instant};
 use ros2_client::Publisher;
 use tagalong_config::Registry;
 use tagalong_core::{Stamp, WheelSpeeds};
+use tagalong_live::Live;
 use tagalong_log::msgs::{
     Detection3DArray, Header, PoseStamped, StringMsg, Twist as TwistMessage, TwistStamped,
 };
 use tagalong_log::write::{self, FrameRecord};
-use tagalong_log::{Listening, LiveSource, LogFrame};
+use tagalong_log::{Input, Listening, LiveSource, LogFrame};
 use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, Sources};
 
 use crate::diagnostics::{Diagnostics, Status};
@@ -101,6 +103,8 @@ pub fn run_with(
     tell: &dyn Fn(&str),
 ) -> Result<Summary, BridgeError> {
     let setup = options.setup(registry)?;
+    // Before the network, so that a port that is taken ends the program at once.
+    let live = options.serve.map(|at| serve(at, options, &setup, tell)).transpose()?;
     let (desk, requests) = Desk::new();
     // Before the topics are there, so that a supervisor can ask how the bridge is.
     let http = options.http.map(|address| HttpServer::start(address, desk.clone())).transpose()?;
@@ -115,15 +119,36 @@ pub fn run_with(
     source.notes().iter().for_each(|note| tell(note));
     let callers = Callers { desk, requests };
     let mut bridge = Bridge::new(options, setup, source, network, inbox, clock, callers)?;
+    bridge.live = live;
     let switch = bridge.listen_to_switch()?;
     let services = bridge.offer_services()?;
     bridge.tell_topics(tell);
     let ended = bridge.work(stop, tell);
     // The robot is stopped before the node leaves the network.
+    let live = bridge.live.take();
     let (summary, network) = bridge.finish();
+    if let Some(live) = live {
+        live.finish("The bridge has ended.");
+    }
     drop((ears, switch, services, http));
     drop(network);
     ended.map(|()| summary)
+}
+
+/// Begins to serve the page of what happens now.
+fn serve(
+    at: SocketAddr,
+    options: &Options,
+    setup: &Setup,
+    tell: &dyn Fn(&str),
+) -> Result<Live, BridgeError> {
+    let config = setup.pipeline.resolved().parse().unwrap_or_default();
+    let name = options.config.file_stem().unwrap_or_default().to_string_lossy();
+    let input = format!("ROS domain {}", options.domain);
+    let live = Live::start(at, &name, &input, &config);
+    let live = live.map_err(|error| BridgeError::Serve(at, error))?;
+    tell(&format!("live: open {} in a browser; it is the key to the page", live.address()));
+    Ok(live)
 }
 
 /// Listens until all inputs of the pipeline are there; returns `None` if stopped before.
@@ -137,8 +162,10 @@ fn start(
     tell: &dyn Fn(&str),
 ) -> Result<Option<(LiveSource, Vec<Ear>)>, BridgeError> {
     let name = format!("ROS domain {}", options.domain);
-    let mut listening =
-        Listening::new(&name, &setup.input, &setup.limits, setup.pipeline.inputs())?;
+    let inputs = setup.pipeline.inputs();
+    // The page shows colour, whether or not the pipeline uses it.
+    let inputs = if options.serve.is_some() { inputs.accept(Input::Colour) } else { inputs };
+    let mut listening = Listening::new(&name, &setup.input, &setup.limits, inputs)?;
     let mut ears: Vec<Ear> = Vec::new();
     let deadline = Instant::now() + Duration::from_secs_f64(options.wait);
     let mut attempt = Instant::now() + ATTEMPT;
@@ -195,6 +222,7 @@ struct Bridge {
     network: Network,
     options: Options,
     diagnostics: Diagnostics,
+    live: Option<Live>,
     pipeline: Pipeline,
     source: LiveSource,
     inbox: Arc<Inbox>,
@@ -262,6 +290,7 @@ impl Bridge {
             network,
             options: options.clone(),
             diagnostics,
+            live: None,
             pipeline: setup.pipeline,
             source,
             inbox,
@@ -457,6 +486,9 @@ impl Bridge {
         self.frames += 1;
         self.callers.desk.frame(self.pipeline.status(), self.frames);
         self.publish(found, &report);
+        if let Some(live) = &self.live {
+            live.offer(&found.frame, &found.odom_from_robot, &report);
+        }
         Ok(())
     }
 

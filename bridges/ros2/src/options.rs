@@ -91,6 +91,17 @@ pub struct Options {
     /// Longest wait for topics and their first messages, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 15.0, value_parser = seconds)]
     pub wait: f64,
+    /// Serve a page with what happens now, as `tagalong run --serve` does: on this computer alone and
+    /// a free port, unless a port or an address is given. Nothing can be changed through it.
+    #[arg(
+        long,
+        value_name = "[ADDRESS:]PORT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0",
+        value_parser = tagalong_live::parse_address
+    )]
+    pub serve: Option<SocketAddr>,
     /// Clock for the age of a frame.
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockSource,

@@ -114,6 +114,13 @@ pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
     let is_finished = || app.finished.load(Ordering::Relaxed);
     server.serve(&app, || signals.received().is_some() || is_finished());
     if !app.finished.load(Ordering::Relaxed) {
+        if !output.exists() {
+            say(&format!(
+                "nothing was changed, so {} is not written; `Finish` in the page takes the proposed \
+                 boxes as they are",
+                output.display()
+            ));
+        }
         return Ok(signals.received().map_or(Ended::Well, Ended::BySignal));
     }
     let shown = output.display();

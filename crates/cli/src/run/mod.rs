@@ -4,16 +4,19 @@ mod args;
 mod choice;
 mod frames;
 mod images;
+mod pace;
 mod pictures;
 mod report;
 mod summary;
 
 use std::collections::BTreeMap;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub use args::RunArgs;
 use frames::{Frames, Item};
+use pace::Pace;
 use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
 use tagalong_app::choice::sources;
@@ -21,26 +24,45 @@ use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, say};
 use tagalong_app::progress::Progress;
+use tagalong_app::remedies;
 use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
 use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
-use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog, WriteError};
+use tagalong_live::Live;
+use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
 
-/// Runs a pipeline over a log.
+/// Runs a pipeline over a log, until a signal comes.
 ///
 /// # Errors
 /// A config, log or output directory that cannot be used; a plugin that fails on a frame; a disk
 /// that fails.
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
+    run_until(args, registry, Signals::listen)
+}
+
+/// Runs a pipeline over a log, for a program with signals of its own: `listen` is called once the
+/// log has been looked through, before anything is written.
+///
+/// # Errors
+/// As for [`run`].
+pub fn run_until(
+    args: &RunArgs,
+    registry: &Registry,
+    listen: impl FnOnce() -> Result<Signals, Failure>,
+) -> Outcome {
+    // A name that is no config must not cost a simulation.
+    if let Some(path) = args.config().filter(|_| !args.has_log()) {
+        ConfigFile::read(path)?;
+    }
     if !args.has_log() {
         sample::write(args.log()).map_err(refused)?;
         say(&format!("no log given: two simulated people walk through {}", args.log().display()));
@@ -49,7 +71,10 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
         Job::prepare(args, registry)
     })?;
     // Until here nothing is written: a signal ends the program at once, however long the log is.
-    let signals = Signals::listen()?;
+    let signals = listen()?;
+    if let Some(signal) = signals.received() {
+        return Ok(Ended::BySignal(signal));
+    }
     let mut desk = Desk::open(args, &job)?;
     // Reading ahead pays from the second core on, rendering in parallel from the third.
     let threads = threads(args.threads);
@@ -57,7 +82,15 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     let mut frames = Frames::new(job.source, threads);
     let mut pipeline = job.pipeline;
     pipeline.visualise(args.overlay);
-    let stopped = work(&mut pipeline, &mut frames, &mut desk, &mut pictures, &signals);
+    let live = args.serve.map(|at| serve(at, args, &job.resolved, &job.report)).transpose()?;
+    let mut pace = Pace::new(args.realtime);
+    let stopped = {
+        let stage = Stage { desk: &mut desk, pictures: &mut pictures, live: live.as_ref() };
+        work(&mut pipeline, &mut frames, &mut pace, stage, &signals)
+    };
+    if let Some(live) = live {
+        live.finish("The run has ended.");
+    }
     // An error of the run is returned only after the threads have finished.
     pictures.finish()?;
     let source = frames.finish()?;
@@ -90,7 +123,7 @@ impl Job {
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();
         // A picture shows colour, whether or not the pipeline uses it.
-        let wants_pictures = args.overlay || args.with_images;
+        let wants_pictures = args.overlay || args.with_images || args.serve.is_some();
         let inputs = if wants_pictures { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
             .map_err(|error| config.refusal(error))?;
@@ -146,9 +179,34 @@ fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
     }
 }
 
-/// Returns the failure of a directory that cannot be made or filled: the user may choose another.
-fn refused(error: WriteError) -> Failure {
-    Failure::usage(error)
+/// Begins to serve the page of what happens now, and prints its address.
+fn serve(
+    at: SocketAddr,
+    args: &RunArgs,
+    resolved: &str,
+    report: &RunReport,
+) -> Result<Live, Failure> {
+    // It was made from settings that were read; without it the page quotes none.
+    let config = toml::from_str(resolved).unwrap_or_default();
+    let name = report.config.name.trim_end_matches(".toml");
+    let live = Live::start(at, name, &log_name(args), &config).map_err(|error| {
+        Failure::usage(format!(
+            "cannot serve on {at}: {error}; name another port with --serve=PORT"
+        ))
+    })?;
+    say(&format!("live: open {} in a browser; it is the key to the page", live.address()));
+    if !at.ip().is_loopback() {
+        say("live: others in this network who know the address see the images; open it there \
+             by the number of this computer in place of 0.0.0.0");
+    }
+    Ok(live)
+}
+
+/// Everything that takes the report of a frame.
+struct Stage<'a> {
+    desk: &'a mut Desk,
+    pictures: &'a mut Pictures,
+    live: Option<&'a Live>,
 }
 
 /// Processes one frame after the other until the log ends, the pipeline fails or a signal comes.
@@ -156,18 +214,23 @@ fn refused(error: WriteError) -> Failure {
 fn work(
     pipeline: &mut Pipeline,
     frames: &mut Frames,
-    desk: &mut Desk,
-    pictures: &mut Pictures,
+    pace: &mut Pace,
+    stage: Stage<'_>,
     signals: &Signals,
 ) -> Result<Option<StepError>, Failure> {
+    let Stage { desk, pictures, live } = stage;
     let progress = Progress::new();
     loop {
         let waiting = Instant::now();
         let Some(item) = frames.next(signals) else { return Ok(None) };
+        pace.wait_for(item.frame.frame.stamp, signals);
         desk.timings.add("read", ms_since(waiting));
         desk.tally.read(item.frame.odom_stale);
         if item.frame.odom_jumped {
             pipeline.disarm("odometry jumped");
+        }
+        if item.frame.calibration_changed {
+            pipeline.disarm("the calibration changed");
         }
         let report = match pipeline.step(&item.frame.frame) {
             Ok(report) => report,
@@ -176,6 +239,9 @@ fn work(
         let people = report.tracks.iter().filter(|track| track.confirmed && track.seen).count();
         progress.show(item.progress, report.index, people);
         desk.take(&item, &report)?;
+        if let Some(live) = live {
+            live.offer(&item.frame.frame, &item.frame.odom_from_robot, &report);
+        }
         desk.pass_image(&item, &report)?;
         pictures.draw(|| scene(&item, report))?;
     }
@@ -234,9 +300,9 @@ impl Desk {
             target: report.target,
             command: report.command.map(|command| command.wheels),
         };
-        self.log.write(&record).map_err(Failure::failed)?;
+        self.log.write(&record)?;
         let notes = FrameNotes::of(report, &item.frame.frame.camera, &item.frame.odom_from_robot);
-        self.log.write_json(FRAME_NOTES_TOPIC, report.stamp, &notes).map_err(Failure::failed)?;
+        self.log.write_json(FRAME_NOTES_TOPIC, report.stamp, &notes)?;
         self.timings.add("write", ms_since(writing));
         Ok(())
     }
@@ -248,7 +314,7 @@ impl Desk {
         }
         let Some(image) = background(&item.frame.frame.images()) else { return Ok(()) };
         let jpeg = images::jpeg(&image)?;
-        self.log.write_image(report.stamp, &jpeg).map_err(Failure::failed)
+        Ok(self.log.write_image(report.stamp, &jpeg)?)
     }
 
     /// Finishes the files and prints a summary.
@@ -267,14 +333,14 @@ impl Desk {
         // result.
         let is_empty = report.frames.read == 0 && signals.received().is_none();
         if report.frames.processed == 0 && (stopped.is_some() || is_empty) {
-            self.log.discard().map_err(Failure::failed)?;
+            self.log.discard()?;
             return verdict(args, &report, stopped, signals);
         }
         let times = to_json("timings.json", &self.timings.summary())?;
         let json = to_json("report.json", &report)?;
         let origin = to_json("origin.json", &Origin::of(args.log(), args.config()))?;
         let texts = RunTexts { report: &json, timings: &times, origin: &origin };
-        let folder = self.log.finish(about(&report), &texts).map_err(Failure::failed)?;
+        let folder = self.log.finish(about(&report), &texts)?;
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,
@@ -337,6 +403,20 @@ fn no_frame(report: &RunReport) -> String {
     format!("not one frame could be made of {name}: {why}; `tagalong doctor` tells more")
 }
 
+/// Returns the message about a run that could detect nobody, because a detector has no model.
+fn without_model(report: &RunReport) -> Option<String> {
+    let lacks = report.funnel.iter().any(|line| line.test == NO_MODEL);
+    let remedy = remedies::of(NO_MODEL).filter(|_| lacks && report.persons.is_empty())?;
+    let (name, key) = (&report.config.name, remedy.settings.join(", "));
+    Some(format!(
+        "{name}: a detector has no model (`{key}`), so nobody was detected: {}",
+        remedy.look
+    ))
+}
+
+/// Test of the funnel by which a detector says that it has no model.
+const NO_MODEL: &str = "no model";
+
 /// Returns the exit code, and the reason for a failure.
 fn verdict(
     args: &RunArgs,
@@ -360,6 +440,9 @@ fn verdict(
     }
     if report.frames.read == 0 {
         return Err(Failure::failed(no_frame(report)));
+    }
+    if let Some(why) = without_model(report) {
+        return Err(Failure::failed(why));
     }
     match (report.data_lost, args.strict) {
         (false, _) => Ok(Ended::Well),

@@ -23,8 +23,13 @@ pub fn text(report: &RunReport, timings: &Timings, folder: &Path, overlay: bool)
     let frames = &report.frames;
     let _ = writeln!(
         out,
-        "{}: {} frames, people in {} of them ({})",
-        report.log.name, frames.read, frames.with_person, report.ended
+        "{}: {} frames, people in {} of them ({}{})",
+        report.log.name,
+        frames.read,
+        frames.with_person,
+        report.ended,
+        // The end that was reached is not the one of the recording.
+        if report.data_lost { ", but part of the log was lost" } else { "" }
     );
     persons(&mut out, report);
     funnel(&mut out, report);
@@ -102,10 +107,9 @@ fn files(out: &mut String, folder: &Path, overlay: bool) {
     let shown = folder.display();
     let _ = writeln!(out, "files in {shown}; to look at them:");
     let _ = writeln!(out, "  tagalong view {}", quoted(&shown.to_string()));
-    let _ = writeln!(
-        out,
-        "  {shown}/tracks.mcap opens in Foxglove (people in 3D, boxes) and Rerun (camera, images)"
-    );
+    let mcap = quoted(&folder.join("tracks.mcap").display().to_string());
+    let _ = writeln!(out, "  rerun {mcap}    (people in space, camera; images with --with-images)");
+    let _ = writeln!(out, "  Foxglove opens the same file: people in 3D, boxes in the image");
     if overlay {
         let _ = writeln!(out, "  {shown}/overlay/ has a picture of every frame");
     }

@@ -58,6 +58,18 @@ impl LockState {
         }
     }
 
+    /// Returns one sentence for a person who watches the robot.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Initial => "no person was chosen yet",
+            Self::Training => "the person is followed, and the appearance is learned",
+            Self::Locked => "the person is followed",
+            Self::Suspect => "a track is followed slowly that may not be the person",
+            Self::Lost => "no track is followed; the person is searched for",
+            Self::Refound => "a track that seems to be the person is followed slowly",
+        }
+    }
+
     /// Returns true if a track is followed.
     pub fn follows(self) -> bool {
         matches!(self, Self::Training | Self::Locked | Self::Suspect | Self::Refound)
