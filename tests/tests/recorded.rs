@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use tagalong_config::Registry;
-use tagalong_reproduce::{DrawnScenes, Lab, Progress, Table, system};
+use tagalong_reproduce::{Lab, Progress, SimulatedScenes, Table, system};
 
 /// Published MOTA of SORT for its six validation sequences together, per cent (its README).
 const SORT_MOTA: f64 = 34.0;
@@ -28,7 +28,7 @@ fn table(data: PathBuf) -> Table {
         quick: false,
         seeds: None,
         first_seed: 0,
-        drawn: DrawnScenes::default(),
+        simulated: SimulatedScenes::default(),
         jobs: 1,
         progress: &Silent,
     };

@@ -1,21 +1,30 @@
 use std::collections::BTreeMap;
 use std::fmt;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use ros2_client::Publisher;
 use tagalong_config::Registry;
 use tagalong_core::{Stamp, WheelSpeeds};
-use tagalong_log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg, TwistStamped};
+use tagalong_live::Live;
+use tagalong_log::msgs::{
+    Detection3DArray, Header, PoseStamped, StringMsg, Twist as TwistMessage, TwistStamped,
+};
 use tagalong_log::write::{self, FrameRecord};
-use tagalong_log::{Listening, LiveSource, LogFrame};
+use tagalong_log::{Input, Listening, LiveSource, LogFrame};
 use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, Sources};
 
 use crate::diagnostics::{Diagnostics, Status};
+use crate::http::HttpServer;
 use crate::inbox::{Inbox, Traffic};
+use crate::messages::SpeedLimit;
 use crate::network::{Ear, Network};
-use crate::options::Setup;
+use crate::options::{CommandType, Setup};
+use crate::services;
+use crate::skill::{Desk, Request, Verb};
 use crate::stamps::StampClock;
 use crate::wheels::{CommandCounts, Wheels};
 use crate::{BridgeError, Options};
@@ -94,21 +103,52 @@ pub fn run_with(
     tell: &dyn Fn(&str),
 ) -> Result<Summary, BridgeError> {
     let setup = options.setup(registry)?;
+    // Before the network, so that a port that is taken ends the program at once.
+    let live = options.serve.map(|at| serve(at, options, &setup, tell)).transpose()?;
+    let (desk, requests) = Desk::new();
+    // Before the topics are there, so that a supervisor can ask how the bridge is.
+    let http = options.http.map(|address| HttpServer::start(address, desk.clone())).transpose()?;
+    if let Some(http) = &http {
+        tell(&format!("answers at {}", http.address()));
+    }
     let mut network = Network::join(options.domain, &options.namespace)?;
     let inbox = Arc::new(Inbox::default());
     let clock = Arc::new(StampClock::new(options.clock));
     let started = start(options, &setup, &mut network, &inbox, &clock, stop, tell)?;
     let Some((source, ears)) = started else { return Ok(Summary::default()) };
     source.notes().iter().for_each(|note| tell(note));
-    let mut bridge = Bridge::new(options, setup, source, network, inbox, clock)?;
+    let callers = Callers { desk, requests };
+    let mut bridge = Bridge::new(options, setup, source, network, inbox, clock, callers)?;
+    bridge.live = live;
     let switch = bridge.listen_to_switch()?;
+    let services = bridge.offer_services()?;
     bridge.tell_topics(tell);
     let ended = bridge.work(stop, tell);
     // The robot is stopped before the node leaves the network.
+    let live = bridge.live.take();
     let (summary, network) = bridge.finish();
-    drop((ears, switch));
+    if let Some(live) = live {
+        live.finish("The bridge has ended.");
+    }
+    drop((ears, switch, services, http));
     drop(network);
     ended.map(|()| summary)
+}
+
+/// Begins to serve the page of what happens now.
+fn serve(
+    at: SocketAddr,
+    options: &Options,
+    setup: &Setup,
+    tell: &dyn Fn(&str),
+) -> Result<Live, BridgeError> {
+    let config = setup.pipeline.resolved().parse().unwrap_or_default();
+    let name = options.config.file_stem().unwrap_or_default().to_string_lossy();
+    let input = format!("ROS domain {}", options.domain);
+    let live = Live::start(at, &name, &input, &config);
+    let live = live.map_err(|error| BridgeError::Serve(at, error))?;
+    tell(&format!("live: open {} in a browser; it is the key to the page", live.address()));
+    Ok(live)
 }
 
 /// Listens until all inputs of the pipeline are there; returns `None` if stopped before.
@@ -122,8 +162,10 @@ fn start(
     tell: &dyn Fn(&str),
 ) -> Result<Option<(LiveSource, Vec<Ear>)>, BridgeError> {
     let name = format!("ROS domain {}", options.domain);
-    let mut listening =
-        Listening::new(&name, &setup.input, &setup.limits, setup.pipeline.inputs())?;
+    let inputs = setup.pipeline.inputs();
+    // The page shows colour, whether or not the pipeline uses it.
+    let inputs = if options.serve.is_some() { inputs.accept(Input::Colour) } else { inputs };
+    let mut listening = Listening::new(&name, &setup.input, &setup.limits, inputs)?;
     let mut ears: Vec<Ear> = Vec::new();
     let deadline = Instant::now() + Duration::from_secs_f64(options.wait);
     let mut attempt = Instant::now() + ATTEMPT;
@@ -180,12 +222,16 @@ struct Bridge {
     network: Network,
     options: Options,
     diagnostics: Diagnostics,
+    live: Option<Live>,
     pipeline: Pipeline,
     source: LiveSource,
     inbox: Arc<Inbox>,
     clock: Arc<StampClock>,
     wheels: Option<Wheels>,
+    callers: Callers,
     out: Out,
+    /// Largest speed of the config, m/s.
+    max_speed_mps: f64,
     /// Last permission that was told.
     told: Option<Permission>,
     /// Number of other publishers of commands that was told.
@@ -197,6 +243,12 @@ struct Bridge {
     frames: u64,
     heard: Instant,
     quiet: bool,
+}
+
+/// Desk of the skill, and the requests that were left there.
+struct Callers {
+    desk: Desk,
+    requests: Receiver<Request>,
 }
 
 /// Publishers of the results.
@@ -215,6 +267,7 @@ impl Bridge {
         mut network: Network,
         inbox: Arc<Inbox>,
         clock: Arc<StampClock>,
+        callers: Callers,
     ) -> Result<Self, BridgeError> {
         let base_frame = source.facts().robot_frame;
         let out = Out {
@@ -233,14 +286,17 @@ impl Bridge {
             network.publisher_of(&options.diagnostics, "diagnostic_msgs/msg/DiagnosticArray")?;
         let diagnostics = Diagnostics::start(publisher, Arc::clone(&clock));
         Ok(Self {
+            max_speed_mps: setup.robot.max_speed_mps,
             network,
             options: options.clone(),
             diagnostics,
+            live: None,
             pipeline: setup.pipeline,
             source,
             inbox,
             clock,
             wheels,
+            callers,
             out,
             told: None,
             rivals: 0,
@@ -281,17 +337,35 @@ impl Bridge {
             theirs.push(&topic, nanos.to_le_bytes().to_vec(), 1);
         };
         let reset = self.network.listen_to_reset(reset, inbox, on)?;
-        Ok(vec![enable, reset])
+        let (topic, theirs) = (&self.options.speed_limit, Arc::clone(inbox));
+        let (key, max_speed_mps) = (topic.clone(), self.max_speed_mps);
+        // Only the newest limit holds.
+        let on = move |limit: SpeedLimit| {
+            theirs.push(&key, limit.mps(max_speed_mps).to_le_bytes().to_vec(), 1);
+        };
+        let limit = self.network.listen_to_speed_limit(topic, inbox, on)?;
+        Ok(vec![enable, reset, limit])
+    }
+
+    /// Offers the verbs of the skill as services; not without a controller.
+    fn offer_services(&mut self) -> Result<Vec<Ear>, BridgeError> {
+        if self.wheels.is_none() {
+            return Ok(Vec::new());
+        }
+        services::offer(&mut self.network, self.options.rmw, &self.callers.desk)
     }
 
     fn work(&mut self, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
+        self.callers.desk.open();
         while !stop.load(Ordering::Relaxed) {
             for (topic, data) in self.inbox.take(TURN) {
-                match topic == self.options.reset {
-                    true => self.reset(&data, tell),
-                    false => self.source.take(&topic, &data),
+                match topic {
+                    topic if topic == self.options.reset => self.reset(&data, tell),
+                    topic if topic == self.options.speed_limit => self.limit_speed(&data, tell),
+                    topic => self.source.take(&topic, &data),
                 }
             }
+            self.serve_callers(tell);
             self.check_calibration()?;
             // Only the newest frame: a slow pipeline must not fall behind the robot.
             match self.source.newest_frame() {
@@ -301,6 +375,26 @@ impl Bridge {
             self.report_state(tell);
         }
         Ok(())
+    }
+
+    /// Answers the requests that were left at the desk.
+    fn serve_callers(&mut self, tell: &dyn Fn(&str)) {
+        while let Ok(Request { verb, answer }) = self.callers.requests.try_recv() {
+            let done = match verb {
+                Verb::Enroll(enrollment) => self.pipeline.enroll(&enrollment),
+                Verb::Clear => {
+                    self.pipeline.clear();
+                    Ok(())
+                }
+            };
+            let done = done.map_err(|refusal| refusal.to_string());
+            tell(&match &done {
+                Ok(()) => format!("{verb}"),
+                Err(reason) => format!("{verb}: refused: {reason}"),
+            });
+            // A caller that is gone needs no answer.
+            let _gone = answer.send(done);
+        }
     }
 
     /// Ends a drive by a calibration that is no longer that of the camera: the places of people and
@@ -330,6 +424,7 @@ impl Bridge {
             self.looked = Instant::now();
             self.look_for_rivals(tell);
         }
+        self.callers.desk.turn(permission, self.pipeline.fault());
         let header = Header::new(self.clock.now(), "tagalong");
         let _lost = self.out.heartbeat.publish(header);
         self.diagnostics.update(Status {
@@ -389,7 +484,11 @@ impl Bridge {
         // Returned only now, so that the wheels hear of a failed step.
         let report = report?;
         self.frames += 1;
+        self.callers.desk.frame(self.pipeline.status(), self.frames);
         self.publish(found, &report);
+        if let Some(live) = &self.live {
+            live.offer(&found.frame, &found.odom_from_robot, &report);
+        }
         Ok(())
     }
 
@@ -430,6 +529,16 @@ impl Bridge {
             wheels.switch().take(Enable::Reset, Duration::from_nanos(nanos));
             tell("reset");
         }
+    }
+
+    /// Takes in a speed limit of a planner.
+    fn limit_speed(&mut self, data: &[u8], tell: &dyn Fn(&str)) {
+        let most_mps = <[u8; 8]>::try_from(data).map_or(0.0, f64::from_le_bytes);
+        self.pipeline.allow_speed(most_mps);
+        tell(&match most_mps.is_finite() {
+            true => format!("speed limit: {most_mps:.2} m/s"),
+            false => "no speed limit beside that of the config".to_owned(),
+        });
     }
 
     fn disarm(&mut self, why: &'static str, tell: &dyn Fn(&str)) {
@@ -497,8 +606,8 @@ fn drive(
     network: &mut Network,
     clock: &Arc<StampClock>,
 ) -> Result<Wheels, BridgeError> {
-    let publisher: Publisher<TwistStamped> = network.publisher(&options.command)?;
     let half_m = setup.robot.wheels().half_separation_m;
+    let publish = command_publisher(options, network)?;
     let (base_frame, clock) = (base_frame.to_owned(), Arc::clone(clock));
     let now = {
         let clock = Arc::clone(&clock);
@@ -506,16 +615,39 @@ fn drive(
     };
     let tell = move |wheels| {
         let header = Header::new(clock.now(), base_frame.as_str());
-        // A full queue means that the previous command has not been read.
-        let _lost = publisher.publish(twist(header, wheels, half_m));
+        publish(TwistStamped { header, twist: twist(wheels, half_m) });
     };
     Ok(Wheels::start(Duration::from_secs_f64(1.0 / options.rate), switch, now, tell))
 }
 
+/// Returns a function that publishes commands as the type that the options name.
+fn command_publisher(
+    options: &Options,
+    network: &mut Network,
+) -> Result<Box<dyn Fn(TwistStamped) + Send>, BridgeError> {
+    let topic = &options.command;
+    // A full queue means that the previous command has not been read.
+    Ok(match options.command_type {
+        CommandType::TwistStamped => {
+            let publisher: Publisher<TwistStamped> = network.publisher(topic)?;
+            Box::new(move |command| {
+                let _lost = publisher.publish(command);
+            })
+        }
+        CommandType::Twist => {
+            let publisher: Publisher<TwistMessage> =
+                network.publisher_of(topic, "geometry_msgs/msg/Twist")?;
+            Box::new(move |command| {
+                let _lost = publisher.publish(command.twist);
+            })
+        }
+    })
+}
+
 /// Converts wheel speeds to the velocity of the robot's centre.
-fn twist(header: Header, WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> TwistStamped {
-    let mut twist = TwistStamped { header, ..TwistStamped::default() };
-    twist.twist.linear.x = 0.5 * (left + right);
-    twist.twist.angular.z = 0.5 * (right - left) / half_m;
+fn twist(WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> TwistMessage {
+    let mut twist = TwistMessage::default();
+    twist.linear.x = 0.5 * (left + right);
+    twist.angular.z = 0.5 * (right - left) / half_m;
     twist
 }

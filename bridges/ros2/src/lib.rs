@@ -18,6 +18,7 @@
 //!   directly.
 //!
 //! * One publishes diagnostics every second, also while a frame takes long.
+//! * With `--serve`, some answer browsers from the newest frame; no frame waits for them.
 //!
 //! If [`run`] ends by an error, a signal or a panic, the owner of the last thread is dropped, and
 //! with it the last command on the wire is zero.
@@ -26,15 +27,19 @@
 
 mod bridge;
 mod diagnostics;
+mod http;
 pub mod inbox;
 mod messages;
 mod network;
 mod options;
+mod services;
+mod skill;
 mod stamps;
 pub mod wheels;
 
 pub use bridge::{Summary, run, run_with};
-pub use options::Options;
+pub use options::{CommandType, Options};
+pub use services::Middleware;
 pub use stamps::ClockSource;
 
 /// Failure to start or to continue the bridge.
@@ -47,6 +52,9 @@ pub enum BridgeError {
     /// DDS reported an error.
     #[error("ROS 2: {0}")]
     Network(String),
+    /// The page of what happens now cannot be served.
+    #[error("cannot serve on {0}: {1}; name another port with --serve=PORT")]
+    Serve(std::net::SocketAddr, std::io::Error),
     /// An input of the pipeline did not arrive, or cannot be used.
     #[error(transparent)]
     Input(#[from] tagalong_log::LogError),
@@ -67,6 +75,6 @@ pub enum BridgeError {
 impl BridgeError {
     /// Returns the exit code of a program that ends with this error: 2 for wrong usage, else 1.
     pub fn exit_code(&self) -> u8 {
-        if matches!(self, Self::Config(_)) { 2 } else { 1 }
+        if matches!(self, Self::Config(_) | Self::Serve(..)) { 2 } else { 1 }
     }
 }

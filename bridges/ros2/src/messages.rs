@@ -40,6 +40,28 @@ pub(crate) struct Empty {
     structure_needs_at_least_one_member: u8,
 }
 
+/// `nav2_msgs/SpeedLimit`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct SpeedLimit {
+    pub(crate) header: Header,
+    /// True for a part of the largest speed, in percent.
+    pub(crate) percentage: bool,
+    /// The limit, m/s or percent; 0 for none.
+    pub(crate) speed_limit: f64,
+}
+
+impl SpeedLimit {
+    /// Returns the limit of a robot with this largest speed, m/s; infinite for none.
+    pub(crate) fn mps(&self, max_speed_mps: f64) -> f64 {
+        match self.speed_limit {
+            // As Nav2 has it.
+            0.0 => f64::INFINITY,
+            percent if self.percentage => percent / 100.0 * max_speed_mps,
+            speed => speed,
+        }
+    }
+}
+
 /// `diagnostic_msgs/DiagnosticArray`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct DiagnosticArray {
@@ -122,6 +144,15 @@ mod tests {
         let data = ByteBuf::from([9; 5]);
         let compressed = OwnedCompressedImage { header, format: "jpeg".into(), data };
         assert_eq!(compressed.encode(), encode(&compressed));
+    }
+
+    #[test]
+    fn a_speed_limit_is_a_speed_a_part_or_none() {
+        let limit = |percentage, speed_limit| {
+            SpeedLimit { header: Header::default(), percentage, speed_limit }.mps(0.8)
+        };
+        assert_eq!((limit(false, 0.3), limit(true, 50.0)), (0.3, 0.4));
+        assert_eq!((limit(false, 0.0), limit(true, 0.0)), (f64::INFINITY, f64::INFINITY));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use ros2_client::dds::rustdds::RTPSEntity;
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
     Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
-    QosProfile, Subscription,
+    QosProfile, Server, ServiceMapping, ServiceTypeName, Subscription,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -21,13 +21,17 @@ use tagalong_log::msgs::{
 
 use crate::BridgeError;
 use crate::inbox::Inbox;
-use crate::messages::{Bool, Empty, OwnedCompressedImage, OwnedImage, ros_topic, ros_type};
+use crate::messages::{
+    Bool, Empty, OwnedCompressedImage, OwnedImage, SpeedLimit, ros_topic, ros_type,
+};
 use crate::stamps::StampClock;
 
 /// Number of images that wait for the thread that makes frames.
 const IMAGES: usize = 2;
 /// Number of other messages that wait.
 const OTHERS: usize = 64;
+/// Number of answers of a service that are kept for callers that missed them.
+const ANSWERS: usize = 10;
 
 /// The node of the bridge.
 pub(crate) struct Network {
@@ -44,6 +48,10 @@ pub(crate) struct Ear {
 }
 
 impl Ear {
+    pub(crate) fn new(topic: &str, abort: AbortHandle, thread: JoinHandle<()>) -> Self {
+        Self { topic: topic.to_owned(), abort, thread: Some(thread) }
+    }
+
     pub(crate) fn topic(&self) -> &str {
         &self.topic
     }
@@ -184,6 +192,22 @@ impl Network {
         self.hear(topic, "std_msgs/msg/Empty", commands(), take)
     }
 
+    /// Calls `on` for each message of the topic of speed limits. A message that cannot be read changes
+    /// nothing.
+    pub(crate) fn listen_to_speed_limit(
+        &mut self,
+        topic: &str,
+        inbox: &Arc<Inbox>,
+        on: impl Fn(SpeedLimit) + Send + 'static,
+    ) -> Result<Ear, BridgeError> {
+        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        let take = move |message: Option<SpeedLimit>| match message {
+            Some(limit) if limit.speed_limit >= 0.0 => on(limit),
+            _ => inbox.count_malformed(&name),
+        };
+        self.hear(topic, "nav2_msgs/msg/SpeedLimit", commands(), take)
+    }
+
     /// Returns the number of other participants' publishers on a topic.
     pub(crate) fn others_on(&self, topic: &str) -> usize {
         let participant = self.context.domain_participant();
@@ -245,7 +269,25 @@ impl Network {
             // The stream ends by being aborted.
             let _aborted = block_on(Abortable::new(put, registration));
         });
-        Ok(Ear { topic: topic.to_owned(), abort, thread: Some(thread) })
+        Ok(Ear::new(topic, abort, thread))
+    }
+
+    /// Creates the server of a service.
+    pub(crate) fn server<Q, A>(
+        &mut self,
+        service: &str,
+        service_type: &str,
+        mapping: ServiceMapping,
+    ) -> Result<Server<Q, A>, BridgeError>
+    where
+        Q: ros2_client::Message + Clone + 'static,
+        A: ros2_client::Message + 'static,
+    {
+        let (package, kind) = service_type.split_once("/srv/").unwrap_or(("", service_type));
+        let name = name(self.node.namespace(), service)?;
+        let kind = ServiceTypeName::new(package, kind);
+        let answers = reliable().history(History::KeepLast { depth: ANSWERS });
+        self.node.create_server(mapping, &name, &kind, commands(), answers).map_err(failed)
     }
 
     /// Creates a publisher of this type.

@@ -1,10 +1,11 @@
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use tagalong_config::{FileLimit, Registry, read_text};
 use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{Pipeline, RobotSettings};
 
-use crate::{BridgeError, ClockSource};
+use crate::{BridgeError, ClockSource, Middleware};
 
 /// Follows people live: ROS 2 images and odometry in, tracks and commands out.
 ///
@@ -67,18 +68,53 @@ pub struct Options {
     /// Topic of the bridge's state (diagnostic_msgs/DiagnosticArray).
     #[arg(long, value_name = "TOPIC", default_value = "/diagnostics")]
     pub diagnostics: String,
-    /// Topic of commands (geometry_msgs/TwistStamped).
+    /// Topic of commands.
     #[arg(long, value_name = "TOPIC", default_value = "cmd_vel")]
     pub command: String,
+    /// Type of the commands: geometry_msgs/TwistStamped, or geometry_msgs/Twist for bases and Nav2 of
+    /// Humble.
+    #[arg(long, value_enum, default_value_t)]
+    pub command_type: CommandType,
+    /// Topic of speed limits (nav2_msgs/SpeedLimit).
+    #[arg(long, value_name = "TOPIC", default_value = "speed_limit")]
+    pub speed_limit: String,
+    /// Address on this computer for HTTP with JSON: POST /enroll and /clear, GET /status and
+    /// /healthz; none if left out.
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub http: Option<SocketAddr>,
+    /// Middleware of the nodes that call the services people/enroll and so on.
+    #[arg(long, env = "RMW_IMPLEMENTATION", value_enum, default_value_t)]
+    pub rmw: Middleware,
     /// Commands per second.
     #[arg(long, value_name = "HZ", default_value_t = 25.0, value_parser = rate)]
     pub rate: f64,
     /// Longest wait for topics and their first messages, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 15.0, value_parser = seconds)]
     pub wait: f64,
+    /// Serve a page with what happens now, as `tagalong run --serve` does: on this computer alone and
+    /// a free port, unless a port or an address is given. Nothing can be changed through it.
+    #[arg(
+        long,
+        value_name = "[ADDRESS:]PORT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0",
+        value_parser = tagalong_live::parse_address
+    )]
+    pub serve: Option<SocketAddr>,
     /// Clock for the age of a frame.
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockSource,
+}
+
+/// Type of the command messages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum CommandType {
+    /// `geometry_msgs/TwistStamped`.
+    #[default]
+    TwistStamped,
+    /// `geometry_msgs/Twist`.
+    Twist,
 }
 
 /// Parses the rate; commands must come at 20 Hz or more.

@@ -7,7 +7,6 @@
 
 mod document;
 mod film;
-mod http;
 mod person;
 mod server;
 mod session;
@@ -29,10 +28,11 @@ use tagalong_eval::Region;
 use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
 use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_render::background;
+use tagalong_serve::{Access, Changes, Server};
 
 use crate::film::Film;
 use crate::person::{Person, sparse};
-use crate::server::{App, Server};
+use crate::server::App;
 use crate::session::{Session, read_people};
 
 /// Longest time without a detection over which a proposed person is taken to be there, s.
@@ -84,7 +84,8 @@ pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
     check_log_path(&args.log)?;
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.log));
     check_writable(&output)?;
-    let server = Server::open(args.port).map_err(|error| {
+    let access = Access::loopback(args.port).with_changes(Changes::FromPage);
+    let server = Server::open(access).map_err(|error| {
         let port = args.port;
         Failure::usage(format!("cannot listen on port {port}: {error}; choose another with --port"))
     })?;
@@ -110,8 +111,16 @@ pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
         server.address(),
         output.display()
     ))?;
-    server.serve(&app, || signals.received().is_some());
+    let is_finished = || app.finished.load(Ordering::Relaxed);
+    server.serve(&app, || signals.received().is_some() || is_finished());
     if !app.finished.load(Ordering::Relaxed) {
+        if !output.exists() {
+            say(&format!(
+                "nothing was changed, so {} is not written; `Finish` in the page takes the proposed \
+                 boxes as they are",
+                output.display()
+            ));
+        }
         return Ok(signals.received().map_or(Ended::Well, Ended::BySignal));
     }
     let shown = output.display();

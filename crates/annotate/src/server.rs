@@ -1,28 +1,15 @@
-//! The server of the page: on this computer alone, for the owner of the address alone.
+//! Content of the server: the page, the images, and the changes that the page sends.
 
-use std::io;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
-use std::time::Duration;
 
 use serde::Serialize;
+use tagalong_serve::{Request, Response, Site};
 
 use crate::document::Change;
 use crate::film::Film;
-use crate::http::{self, Request, Response};
 use crate::session::Session;
-
-/// Connections at once; browsers open about six.
-const CONNECTIONS: usize = 32;
-
-/// Pause between two looks for a connection or a reason to stop.
-const PAUSE: Duration = Duration::from_millis(20);
-
-/// Longest wait for the next bytes of a connection.
-const SILENCE: Duration = Duration::from_secs(5);
 
 const PAGE: &str = include_str!("page/page.html");
 const SCRIPT: &str = include_str!("page/page.js");
@@ -43,127 +30,19 @@ pub struct App {
     pub finished: AtomicBool,
 }
 
-/// Server that listens and has not answered yet.
-pub struct Server {
-    listener: TcpListener,
-    guard: Guard,
-}
-
-/// Conditions on a request: any page that a browser shows could send one to this computer.
-#[derive(Clone, Debug)]
-struct Guard {
-    port: u16,
-    token: String,
-}
-
-impl Server {
-    /// Listens on this computer; port 0 takes a free one.
-    ///
-    /// # Errors
-    /// A port that is taken, a system without random numbers.
-    pub fn open(port: u16) -> io::Result<Self> {
-        let listener = TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port)))?;
-        listener.set_nonblocking(true)?;
-        let port = listener.local_addr()?.port();
-        Ok(Self { listener, guard: Guard { port, token: random_token()? } })
-    }
-
-    /// Returns the address of the page, which is the key to it.
-    pub fn address(&self) -> String {
-        format!("http://127.0.0.1:{}/{}/", self.guard.port, self.guard.token)
-    }
-
-    /// Answers requests until `stop` says so or the page is finished.
-    pub fn serve(&self, app: &Arc<App>, stop: impl Fn() -> bool) {
-        let open = Arc::new(AtomicUsize::new(0));
-        while !stop() && !app.finished.load(Ordering::Relaxed) {
-            match self.listener.accept() {
-                Ok((stream, _)) => self.take(stream, app, &open),
-                // An attempt that failed is not the end of the server.
-                Err(_) => thread::sleep(PAUSE),
-            }
+impl Site for App {
+    fn answer(&self, request: &Request, path: &str) -> Response {
+        match (request.is_read(), path) {
+            (true, "") => Response::ok("text/html; charset=utf-8", PAGE),
+            (true, "page.js") => Response::ok("text/javascript; charset=utf-8", SCRIPT),
+            (true, "page.css") => Response::ok("text/css; charset=utf-8", STYLE),
+            (true, "icon.svg") => Response::ok("image/svg+xml", ICON),
+            (true, "state") => self.state(),
+            (true, image) if image.starts_with("frame/") => self.image(image),
+            (false, "change") => self.change(&request.body),
+            (false, "finish") => self.finish(),
+            _ => Response::not_found(),
         }
-        // The answer to the last request is still under way.
-        for _ in 0..50 {
-            if open.load(Ordering::Relaxed) == 0 {
-                break;
-            }
-            thread::sleep(PAUSE);
-        }
-    }
-
-    /// Answers one connection in a thread.
-    fn take(&self, mut stream: TcpStream, app: &Arc<App>, open: &Arc<AtomicUsize>) {
-        let prepared = stream
-            .set_nonblocking(false)
-            .and_then(|()| stream.set_read_timeout(Some(SILENCE)))
-            .and_then(|()| stream.set_write_timeout(Some(SILENCE)));
-        if prepared.is_err() {
-            return;
-        }
-        if open.load(Ordering::Relaxed) >= CONNECTIONS {
-            let _ = Response::refusal(503, "too many connections").send(&mut stream, false);
-            return;
-        }
-        open.fetch_add(1, Ordering::Relaxed);
-        let (guard, app, open) = (self.guard.clone(), Arc::clone(app), Arc::clone(open));
-        thread::spawn(move || {
-            let (answer, head_only) = match http::read(&mut stream) {
-                Ok(request) => (guard.answer(&request, &app), request.method == "HEAD"),
-                Err(Some(refusal)) => (refusal, false),
-                Err(None) => (Response::refusal(400, "the request is cut off"), false),
-            };
-            // A browser that is gone needs no answer.
-            let _ = answer.send(&mut stream, head_only);
-            open.fetch_sub(1, Ordering::Relaxed);
-        });
-    }
-}
-
-impl Guard {
-    fn answer(&self, request: &Request, app: &App) -> Response {
-        let path = match self.admit(request) {
-            Ok(path) => path,
-            Err(refusal) => return refusal,
-        };
-        match (request.method.as_str(), path) {
-            ("GET" | "HEAD", "") => Response::ok("text/html; charset=utf-8", PAGE),
-            ("GET" | "HEAD", "page.js") => Response::ok("text/javascript; charset=utf-8", SCRIPT),
-            ("GET" | "HEAD", "page.css") => Response::ok("text/css; charset=utf-8", STYLE),
-            ("GET" | "HEAD", "icon.svg") => Response::ok("image/svg+xml", ICON),
-            ("GET" | "HEAD", "state") => app.state(),
-            ("GET" | "HEAD", image) if image.starts_with("frame/") => app.image(image),
-            ("POST", "change") => app.change(&request.body),
-            ("POST", "finish") => app.finish(),
-            ("GET" | "HEAD" | "POST", _) => Response::refusal(404, "there is no such page"),
-            _ => Response::refusal(405, "GET and POST are all there is"),
-        }
-    }
-
-    /// Returns the path behind the token of a request that may be answered.
-    fn admit<'a>(&self, request: &'a Request) -> Result<&'a str, Response> {
-        let refuse = |why: &str| Err(Response::refusal(403, why));
-        let names = [format!("127.0.0.1:{}", self.port), format!("localhost:{}", self.port)];
-        // A foreign name that resolves to this computer (DNS rebinding) stops here.
-        let host = request.header("host").unwrap_or_default();
-        if !names.iter().any(|name| name == host) {
-            return refuse("the host is not this computer");
-        }
-        let is_own = |origin: &str| names.iter().any(|name| origin == format!("http://{name}"));
-        let origin = request.header("origin");
-        let is_change = request.method == "POST";
-        if origin.map_or(is_change, |origin| !is_own(origin)) {
-            return refuse("the request comes from another page");
-        }
-        let inside = request.path[1..].split_once('/');
-        let Some((_, path)) = inside.filter(|(token, _)| same(token, &self.token)) else {
-            return refuse("open the address that `tagalong annotate` printed");
-        };
-        let kind = request.header("content-type").unwrap_or_default();
-        if is_change && !kind.starts_with("application/json") {
-            return Err(Response::refusal(415, "changes are application/json"));
-        }
-        Ok(path)
     }
 }
 
@@ -175,7 +54,10 @@ impl App {
             all: crate::session::Answer,
         }
         let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
-        json(&State { about: session.about(&self.log, &self.origin), all: session.everything() })
+        Response::json(&State {
+            about: session.about(&self.log, &self.origin),
+            all: session.everything(),
+        })
     }
 
     fn image(&self, path: &str) -> Response {
@@ -197,7 +79,7 @@ impl App {
         };
         let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
         match session.apply(&change) {
-            Ok(answer) => json(&answer),
+            Ok(answer) => Response::json(&answer),
             Err(why) => Response::refusal(409, why),
         }
     }
@@ -214,32 +96,16 @@ impl App {
     }
 }
 
-fn json(data: &impl Serialize) -> Response {
-    match serde_json::to_vec(data) {
-        Ok(bytes) => Response::ok("application/json", bytes),
-        Err(error) => Response::refusal(500, error.to_string()),
-    }
-}
-
-/// Compares in a time that does not depend on where two texts differ.
-fn same(a: &str, b: &str) -> bool {
-    let differences = a.bytes().zip(b.bytes()).fold(0, |sum, (a, b)| sum | (a ^ b));
-    a.len() == b.len() && differences == 0
-}
-
-/// Returns 128 random bits of the system, hexadecimal.
-fn random_token() -> io::Result<String> {
-    let mut bytes = [0; 16];
-    getrandom::fill(&mut bytes)
-        .map_err(|error| io::Error::other(format!("no random numbers: {error}")))?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
     use std::fs;
     use std::io::{Read, Write};
+    use std::net::TcpStream;
+    use std::thread;
+    use std::time::Duration;
+
+    use tagalong_serve::{Access, Changes, Server};
 
     use super::*;
     use crate::film::tests::film;
@@ -268,8 +134,10 @@ mod tests {
                 origin: "nothing".into(),
                 finished: AtomicBool::new(false),
             });
-            let server = Server::open(0).unwrap();
-            let (port, token) = (server.guard.port, server.guard.token.clone());
+            let access = Access::loopback(0).with_changes(Changes::FromPage);
+            let server = Server::open(access).unwrap();
+            let port = server.bound().port();
+            let token = server.address().split('/').nth(3).unwrap().to_owned();
             let stop = Arc::new(AtomicBool::new(false));
             let (app_of, stop_of) = (Arc::clone(&app), Arc::clone(&stop));
             let thread = Some(thread::spawn(move || {
@@ -416,12 +284,5 @@ mod tests {
         assert_eq!(running.send(request.as_bytes()).0, 200);
         assert!(running.app.finished.load(Ordering::Relaxed));
         assert!(running.file.exists());
-    }
-
-    #[test]
-    fn two_servers_have_different_keys() {
-        let tokens = [Server::open(0).unwrap(), Server::open(0).unwrap()].map(|s| s.guard.token);
-        assert_ne!(tokens[0], tokens[1]);
-        assert!(tokens.iter().all(|token| token.len() == 32));
     }
 }

@@ -12,9 +12,6 @@ use crate::outcome::Failure;
 /// The config for a camera below a conical mirror.
 const PANORAMIC: &str = "omni-rich";
 
-/// The config for laser scans that concludes from motion over ground.
-const BY_MOTION: &str = "laser-legs";
-
 /// A pipeline for logs of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Choice {
@@ -66,7 +63,7 @@ pub const CHOICES: [Choice; 9] = [
         reason: "nothing else works without depth; places in metres are rough",
     },
     Choice {
-        config: BY_MOTION,
+        config: "laser-legs",
         has: "laser scans and odometry",
         reason: "it believes in what moves where nothing was; people who stand may be missed",
     },
@@ -149,7 +146,7 @@ fn refusal(config: &str, log: &Path, why: &Failure) -> String {
 
 /// Takes the first frame of a log through a pipeline.
 fn try_config(config: &ConfigFile, log: &Path, registry: &Registry) -> Result<(), Failure> {
-    let (mut pipeline, _) = config.pipeline(registry, None)?;
+    let (mut pipeline, settings) = config.pipeline(registry, None)?;
     let outer = config.outer()?;
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
     let Some(item) = source.next_frame() else {
@@ -160,7 +157,7 @@ fn try_config(config: &ConfigFile, log: &Path, registry: &Registry) -> Result<()
         return Err(Failure::failed("another kind of camera"));
     }
     // Without odometry the robot is taken to be at rest, and all things seem to move.
-    if config.stem() == BY_MOTION && source.facts().odometry_topic.is_none() {
+    if settings.suits.odometry && !source.has_odometry() {
         return Err(Failure::failed("no odometry"));
     }
     pipeline.step(&item.frame).map_err(Failure::failed)?;

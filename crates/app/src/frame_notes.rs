@@ -27,6 +27,32 @@ pub struct FrameNotes {
     pub dropped: Vec<DroppedNote>,
     /// Numbers of the tracks that ended in this frame.
     pub ended: Vec<u32>,
+    /// The target lock and the command, where the pipeline has a controller.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveNote>,
+}
+
+/// State of the target lock, and the command for the wheels.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DriveNote {
+    /// Name of the lock's state, for example `locked`.
+    pub lock: String,
+    /// Meaning of the state, in a sentence.
+    pub lock_about: String,
+    /// Cause of the last change of state.
+    pub why: String,
+    /// Time since that change, s.
+    pub since_s: f64,
+    /// Probability that the followed track is the person.
+    pub belief: Option<f64>,
+    /// Name of the command's reason, for example `limited`.
+    pub reason: String,
+    /// Meaning of the reason, in a sentence.
+    pub reason_about: String,
+    /// Commanded speed, m/s.
+    pub forward_mps: f64,
+    /// Commanded rate of turn, to the left, rad/s.
+    pub turn_rps: f64,
 }
 
 /// Detection with its fate.
@@ -86,7 +112,25 @@ impl FrameNotes {
             candidates: report.candidates.iter().map(note).collect(),
             dropped: dropped(&report.funnel),
             ended: report.ended.iter().map(|id| id.0).collect(),
+            drive: DriveNote::of(report),
         }
+    }
+}
+
+impl DriveNote {
+    fn of(report: &FrameReport) -> Option<Self> {
+        let (lock, command) = (report.lock.as_ref()?, report.command?);
+        Some(Self {
+            lock: lock.state.name().to_owned(),
+            lock_about: lock.state.about().to_owned(),
+            why: lock.why.to_owned(),
+            since_s: rounded(lock.since_s, 1e2),
+            belief: lock.belief.map(|belief| rounded(belief, 1e3)),
+            reason: command.reason.name().to_owned(),
+            reason_about: command.reason.about().to_owned(),
+            forward_mps: rounded(command.twist.linear_mps, 1e3),
+            turn_rps: rounded(command.twist.angular_rps, 1e3),
+        })
     }
 }
 

@@ -1,8 +1,11 @@
 //! Progress of a pass over a log.
 
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::outcome::say;
 
 /// Time between two pictures of a spinner.
 const TICK: Duration = Duration::from_millis(100);
@@ -65,5 +68,65 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// Duration from which on it is told beforehand.
+const LONG: Duration = Duration::from_secs(60);
+
+/// Forecast of the time of many tasks, told once, also where no bar is visible.
+pub struct Forecast {
+    total: u64,
+    kind: &'static str,
+    done: AtomicU64,
+    start: Instant,
+    /// Number of tasks done when the forecast was last considered.
+    told: AtomicU64,
+}
+
+impl Forecast {
+    /// Begins, and says how many tasks there are.
+    pub fn new(total: usize, kind: &'static str) -> Self {
+        if total > 1 {
+            say(&format!("{total} {kind}"));
+        }
+        let (done, told) = (AtomicU64::new(0), AtomicU64::new(0));
+        Self { total: total as u64, kind, done, start: Instant::now(), told }
+    }
+
+    /// Notes that a task is done; after one in twenty it says how long all will take, if that is
+    /// more than a minute.
+    pub fn advance(&self) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        let due = self.total.div_ceil(20);
+        if done < due || self.told.swap(done, Ordering::Relaxed) > 0 {
+            return;
+        }
+        if let Some(sentence) = sentence(done, self.total, self.start.elapsed(), self.kind) {
+            say(&sentence);
+        }
+    }
+}
+
+/// Returns the forecast in words; none for less than a minute.
+fn sentence(done: u64, total: u64, took: Duration, kind: &str) -> Option<String> {
+    let left = took.mul_f64(total.saturating_sub(done) as f64 / done.max(1) as f64);
+    let minutes = (left.as_secs_f64() / 60.0).ceil();
+    let seconds = took.as_secs_f64();
+    (left >= LONG).then(|| {
+        format!("{done} of {total} {kind} took {seconds:.0} s: about {minutes} minutes more")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_work_is_told_beforehand_and_a_short_one_is_not() {
+        let after = |seconds| sentence(20, 384, Duration::from_secs(seconds), "tasks");
+        assert_eq!(after(33).unwrap(), "20 of 384 tasks took 33 s: about 11 minutes more");
+        assert_eq!(after(3), None);
+        assert_eq!(sentence(1, 1, Duration::from_secs(900), "tasks"), None);
     }
 }

@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+/// Name of the sum over the stages of a frame.
+pub const WHOLE_FRAME: &str = "whole frame";
+
 /// Resolution of times, ms.
 const SHORTEST_MS: f64 = 1e-3;
 
@@ -26,7 +29,7 @@ struct Histogram {
 }
 
 /// Times of one stage.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StageTimes {
     /// Number of measured frames.
     pub frames: u64,
@@ -34,6 +37,8 @@ pub struct StageTimes {
     pub p50_ms: f64,
     /// 95th percentile, ms.
     pub p95_ms: f64,
+    /// 99th percentile, ms.
+    pub p99_ms: f64,
     /// Mean, ms.
     pub mean_ms: f64,
     /// Slowest frame, ms.
@@ -49,6 +54,12 @@ impl Timings {
         if let Some(histogram) = self.stages.get_mut(stage) {
             histogram.add(ms);
         }
+    }
+
+    /// Adds the stages of a frame, and their sum as [`WHOLE_FRAME`].
+    pub fn add_frame(&mut self, stages: &[(&'static str, f64)]) {
+        stages.iter().for_each(|(stage, ms)| self.add(stage, *ms));
+        self.add(WHOLE_FRAME, stages.iter().map(|(_, ms)| ms).sum());
     }
 
     /// Returns the times, by stage.
@@ -76,6 +87,7 @@ impl Histogram {
             frames,
             p50_ms: rounded(self.quantile(frames, 0.50)),
             p95_ms: rounded(self.quantile(frames, 0.95)),
+            p99_ms: rounded(self.quantile(frames, 0.99)),
             mean_ms: rounded(self.sum_ms / frames.max(1) as f64),
             max_ms: rounded(self.max_ms),
         }
@@ -117,8 +129,17 @@ mod tests {
             let at = |fraction: f64| times[(fraction * times.len() as f64).ceil() as usize - 1];
             prop_assert!((told.p50_ms / at(0.5) - 1.0).abs() < 0.05, "{told:?} {}", at(0.5));
             prop_assert!((told.p95_ms / at(0.95) - 1.0).abs() < 0.05, "{told:?} {}", at(0.95));
+            prop_assert!((told.p99_ms / at(0.99) - 1.0).abs() < 0.05, "{told:?} {}", at(0.99));
             prop_assert_eq!(told.frames, times.len() as u64);
         }
+    }
+
+    #[test]
+    fn a_frame_takes_as_long_as_its_stages() {
+        let mut timings = Timings::default();
+        timings.add_frame(&[("track", 1.0), ("update", 2.5)]);
+        let summary = timings.summary();
+        assert_eq!((summary[WHOLE_FRAME].max_ms, summary["update"].max_ms), (3.5, 2.5));
     }
 
     #[test]

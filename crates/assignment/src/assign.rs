@@ -1,13 +1,9 @@
-//! Global assignment with gates.
-//!
-//! Shortest augmenting paths with potentials (Jonker and Volgenant, "A Shortest Augmenting Path
-//! Algorithm for Dense and Sparse Linear Assignment Problems", Computing 38, 1987). A row may stay
-//! unassigned: each row has a private column that stands for it.
+use tagalong_matching::{Edge, Matcher};
 
 /// Assigns rows (tracks) to columns (detections) so that the sum of costs is minimal. `cost(row,
 /// column)` is `None` for a forbidden pair; a row without a column costs `miss[row]`. Returns the
 /// column of each row. Among equally good assignments the choice depends on the order of rows and
-/// columns only. Costs must be finite.
+/// columns only; a pair that costs as much as the miss is not formed. Costs must be finite.
 ///
 /// ```
 /// use tagalong_assignment::assign;
@@ -20,107 +16,21 @@ pub fn assign(
     miss: &[f64],
     cost: impl Fn(usize, usize) -> Option<f64>,
 ) -> Vec<Option<usize>> {
-    let padded = |row: usize, column: usize| {
-        if column < columns {
-            cost(row, column).unwrap_or(f64::INFINITY)
-        } else if column - columns == row {
-            // The private column of the row, which stands for no assignment.
-            miss[row]
-        } else {
-            f64::INFINITY
-        }
+    let rows = 0..miss.len() as u32;
+    let edge = |row: u32, col: u32| {
+        let weight = miss[row as usize] - cost(row as usize, col as usize)?;
+        Some(Edge { row, col, weight })
     };
-    let mut search = Search::new(miss.len(), columns + miss.len());
-    for row in 0..miss.len() {
-        search.augment(row, &padded);
+    let edge = &edge;
+    let edges: Vec<Edge> =
+        rows.flat_map(|row| (0..columns as u32).filter_map(move |col| edge(row, col))).collect();
+    let mut matched = Vec::new();
+    Matcher::new().best(miss.len(), columns, &edges, &mut matched);
+    let mut column_of = vec![None; miss.len()];
+    for edge in matched.iter().map(|index| edges[*index as usize]) {
+        column_of[edge.row as usize] = Some(edge.col as usize);
     }
-    search.columns_of_rows().map(|column| column.filter(|c| *c < columns)).collect()
-}
-
-struct Search {
-    row_potential: Vec<f64>,
-    column_potential: Vec<f64>,
-    row_of_column: Vec<Option<usize>>,
-}
-
-impl Search {
-    fn new(rows: usize, columns: usize) -> Self {
-        Self {
-            row_potential: vec![0.0; rows],
-            column_potential: vec![0.0; columns],
-            row_of_column: vec![None; columns],
-        }
-    }
-
-    /// Assigns a column to `start` along the shortest alternating path (Dijkstra on reduced costs).
-    /// A path always exists, because each row can stay unassigned.
-    fn augment(&mut self, start: usize, cost: &impl Fn(usize, usize) -> f64) {
-        let columns = self.row_of_column.len();
-        let mut distance = vec![f64::INFINITY; columns];
-        let mut before: Vec<Option<usize>> = vec![None; columns];
-        let mut settled: Vec<usize> = Vec::new();
-        let mut open: Vec<usize> = (0..columns).collect();
-        let (mut row, mut reached, mut via) = (start, 0.0, None);
-        let end = loop {
-            for &column in &open {
-                let reduced =
-                    cost(row, column) - self.row_potential[row] - self.column_potential[column]
-                        + reached;
-                if reduced < distance[column] {
-                    distance[column] = reduced;
-                    before[column] = via;
-                }
-            }
-            let Some(place) = nearest_column(&open, &distance) else { return };
-            let column = open.remove(place);
-            reached = distance[column];
-            match self.row_of_column[column] {
-                None => break column,
-                Some(next) => {
-                    settled.push(column);
-                    (row, via) = (next, Some(column));
-                }
-            }
-        };
-        self.adjust(start, &settled, &distance, reached);
-        self.flip(start, end, &before);
-    }
-
-    fn adjust(&mut self, start: usize, settled: &[usize], distance: &[f64], reached: f64) {
-        // Without this step some reduced costs become negative, for which Dijkstra is not valid.
-        self.row_potential[start] += reached;
-        for &column in settled {
-            let slack = reached - distance[column];
-            self.column_potential[column] -= slack;
-            if let Some(row) = self.row_of_column[column] {
-                self.row_potential[row] += slack;
-            }
-        }
-    }
-
-    fn flip(&mut self, start: usize, end: usize, before: &[Option<usize>]) {
-        let mut column = end;
-        while let Some(previous) = before[column] {
-            self.row_of_column[column] = self.row_of_column[previous];
-            column = previous;
-        }
-        self.row_of_column[column] = Some(start);
-    }
-
-    fn columns_of_rows(&self) -> impl Iterator<Item = Option<usize>> {
-        let mut columns = vec![None; self.row_potential.len()];
-        for (column, row) in self.row_of_column.iter().enumerate() {
-            if let Some(row) = row {
-                columns[*row] = Some(column);
-            }
-        }
-        columns.into_iter()
-    }
-}
-
-fn nearest_column(open: &[usize], distance: &[f64]) -> Option<usize> {
-    let place = (0..open.len()).min_by(|a, b| distance[open[*a]].total_cmp(&distance[open[*b]]))?;
-    distance[open[place]].is_finite().then_some(place)
+    column_of
 }
 
 #[cfg(test)]

@@ -91,8 +91,12 @@ impl PairCost {
     /// Computes d² = ν' S⁻¹ ν with S = P + R.
     fn mahalanobis(&self, track: &Track, detection: &Detection, dt_s: f64) -> Option<Fit> {
         let innovation = detection.position - track.estimate.person.position;
-        // A track with a large covariance admits detections at any distance by d² alone.
-        if innovation.xy().norm() > self.gate_m + self.gate_speed_mps * dt_s {
+        // A track with a large covariance admits detections at any distance by d² alone. Most pairs
+        // are too far apart along one axis, which needs no root.
+        let most_m = self.gate_m + self.gate_speed_mps * dt_s;
+        if innovation.x.abs().max(innovation.y.abs()) > 1.01 * most_m
+            || innovation.xy().norm() > most_m
+        {
             return None;
         }
         let position = track.estimate.covariance.fixed_view::<3, 3>(0, 0);

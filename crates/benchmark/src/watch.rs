@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tagalong_app::timings::Timings;
+use tagalong_app::timings::{StageTimes, Timings, WHOLE_FRAME};
 use tagalong_core::{Funnel, Track};
 use tagalong_eval::{
     Clear, Consistency, Event, Prepared, Role, Scores, Sequence, SetDistance, Similarity, Tally,
@@ -18,9 +18,6 @@ use super::store::Recording;
 
 /// Confidence of the bounds on the normalised innovation squared.
 const CONFIDENCE: f64 = 0.95;
-
-/// Name under which the time of a whole frame is kept.
-const WHOLE_FRAME: &str = "frame";
 
 /// Collector of a pipeline's reports, frame by frame.
 #[derive(Default)]
@@ -70,25 +67,30 @@ impl Watch {
     }
 
     fn time(&mut self, report: &FrameReport) {
-        for (stage, ms) in &report.timings {
+        for (stage, _) in &report.timings {
             if !self.stages.contains(stage) {
                 self.stages.push(stage);
             }
-            self.times.add(stage, *ms);
         }
-        self.times.add(WHOLE_FRAME, report.timings.iter().map(|(_, ms)| ms).sum());
+        self.times.add_frame(&report.timings);
     }
 
     /// Returns the times of the frames.
     pub fn timing(&self) -> TaskTiming {
         let all = self.times.summary();
-        let of = |stage: &str| all.get(stage).map_or((0.0, 0.0), |t| (t.p50_ms, t.p95_ms));
-        let (frame_ms_p50, frame_ms_p95) = of(WHOLE_FRAME);
+        let of = |stage: &str| all.get(stage).cloned().unwrap_or_default();
+        let whole = of(WHOLE_FRAME);
         let stages = self.stages.iter().map(|stage| {
-            let (p50_ms, p95_ms) = of(stage);
-            StageTiming { stage: (*stage).to_owned(), p50_ms, p95_ms }
+            let StageTimes { p50_ms, p95_ms, p99_ms, max_ms, .. } = of(stage);
+            StageTiming { stage: (*stage).to_owned(), p50_ms, p95_ms, p99_ms, max_ms }
         });
-        TaskTiming { frame_ms_p50, frame_ms_p95, stages: stages.collect() }
+        TaskTiming {
+            frame_ms_p50: whole.p50_ms,
+            frame_ms_p95: whole.p95_ms,
+            frame_ms_p99: whole.p99_ms,
+            frame_ms_max: whole.max_ms,
+            stages: stages.collect(),
+        }
     }
 
     /// Scores everything. `result` already names the task.

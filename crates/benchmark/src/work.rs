@@ -6,6 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::outcome::{Failure, say};
+use tagalong_app::progress::Forecast;
 use tagalong_app::remedies;
 use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
@@ -58,7 +59,10 @@ pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally,
     let jobs = jobs(args);
     let groups = groups(pending, registry, args.timing, jobs)?;
     let bar = bar(ran);
-    let desk = Desk { store, registry, signals: &signals, bar: &bar, timing: args.timing };
+    let forecast = Forecast::new(ran, "tasks");
+    let (signals_of, timing) = (&signals, args.timing);
+    let desk =
+        Desk { store, registry, signals: signals_of, bar: &bar, forecast: &forecast, timing };
     run_all(groups, jobs, &desk)?;
     bar.finish_and_clear();
     let mut tally =
@@ -158,6 +162,7 @@ struct Desk<'a> {
     registry: &'a Registry,
     signals: &'a Signals,
     bar: &'a ProgressBar,
+    forecast: &'a Forecast,
     timing: bool,
 }
 
@@ -208,6 +213,7 @@ impl Desk<'_> {
                 self.store.put_timing(&ready.task.hash, &timing)?;
             }
             self.bar.inc(1);
+            self.forecast.advance();
         }
         Ok(())
     }

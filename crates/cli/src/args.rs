@@ -191,6 +191,10 @@ Examples:
   tagalong import tum rgbd_dataset_freiburg3_walking_xyz
   tagalong import kitti training --sequence 0013 -o runs/kitti-0013.mcap
   tagalong import mot MOT17-04-FRCNN
+  tagalong import ktp KTP_dataset_images/images/Still
+  tagalong import jrdb train_dataset/images/image_0/bytes-cafe-2019-02-07_0
+  tagalong import tpt-bench TPT-Bench/panoramic_images/0015 -o runs/tpt-0015.mcap
+  tagalong import leg-tracker general_tracking_moving_1.bag   (truth for that bag)
   tagalong import images photos --fps 15 --view 69 --height 1.2 --tilt 5
   tagalong import cvat annotations.xml -o robot.people.csv    (truth for robot.mcap)
   tagalong import images colour --depth depth --depth-unit 0.001 --focal 525";
@@ -208,7 +212,7 @@ Examples:
   tagalong follow configs/follow-depth.toml --latency-ms 150 --drop 0.2 --format markdown";
 
 const REPRODUCE_HELP: &str = "\
-Everything is drawn with seeds of the test split. The whole of a system takes minutes to an hour.
+Everything is simulated with seeds of the test split. The whole of a system takes minutes to an hour.
 
 Examples:
   tagalong reproduce
@@ -243,7 +247,7 @@ pixels), tracks-metres.csv, report.json (what was dropped and why), timings.json
 with --overlay overlay/000001.png and so on.
 
 Examples:
-  tagalong run --overlay --overwrite       (built-in config, drawn log)
+  tagalong run --overlay --overwrite       (built-in config, simulated log)
   tagalong run robot.mcap                  (the pipeline for what the log has)
   tagalong run depth-verified robot.mcap   (a built-in pipeline, from any folder)
   tagalong run configs/depth-ekf.toml robot.mcap
@@ -310,7 +314,7 @@ Examples:
   tagalong simulate configs/scenes/crossing.toml --gallery pictures";
 
 const TRAIN_HELP: &str = "\
-Candidates are what the template detector proposes in drawn rooms and annotated logs. Same seed and
+Candidates are what the template detector proposes in simulated rooms and annotated logs. Same seed and
 data, same bytes. The card beside the model has the counts, the cross-validation and the figures on
 held-out rooms and logs.
 

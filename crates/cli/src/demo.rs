@@ -88,6 +88,8 @@ fn put(path: &Path, text: &str) -> Result<PathBuf, Failure> {
 
 fn run_args(folder: &Path, name: &str, config: PathBuf, log: &Path) -> RunArgs {
     RunArgs {
+        serve: None,
+        realtime: false,
         config: Some(config),
         log: Some(log.to_owned()),
         output: Some(folder.join(name)),

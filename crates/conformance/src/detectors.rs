@@ -44,7 +44,7 @@ fn look(
     match detector.detect(frame, search, &mut Funnel::default()) {
         Ok(people) => Ok(SearchOutcome::People(people)),
         Err(Error::MissingImage { .. }) => Ok(SearchOutcome::Lacks),
-        Err(error) => Err(format!("it fails on a drawn frame: {error}")),
+        Err(error) => Err(format!("it fails on a simulated frame: {error}")),
     }
 }
 

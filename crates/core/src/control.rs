@@ -120,6 +120,29 @@ impl Reason {
         }
     }
 
+    /// Returns one sentence for a person who watches the robot.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Follow => "drives as the controller asks",
+            Self::Limited => {
+                "drives slower than the controller asks: a limit of speed, acceleration or turn rate applies"
+            }
+            Self::Unsure => "at most half as fast: the followed track may be another person",
+            Self::Search => "searches for the lost person, at most half as fast",
+            Self::Obstacle => "slower: an obstacle is ahead",
+            Self::Slow => "slower: frames arrive late",
+            Self::Stopping => "brakes: there is no target",
+            Self::Blocked => "stands: an obstacle ahead is too near",
+            Self::Blind => "stands: depth has no readings, or a sensor of obstacles is missing",
+            Self::NoTarget => "stands: there is no target",
+            Self::Settling => "stands: too few frames since the start or a jump of the clock",
+            Self::Stalled => "stands: no frame came for too long",
+            Self::NotFinite => "stands: the controller asked for speeds that are no numbers",
+            Self::Expired => "stands: the last command has expired",
+            Self::Fault => "stands: a fault persists until the pipeline is armed again",
+        }
+    }
+
     /// Returns true if the robot may move for this reason.
     pub fn moves(self) -> bool {
         matches!(

@@ -35,6 +35,8 @@ pub struct Evidence {
     pub input: InputSettings,
     /// `[suits]` of the config.
     pub suits: Suits,
+    /// True if the log tells the robot's motion.
+    pub has_odometry: bool,
     /// Inputs of the pipeline.
     pub inputs: Inputs,
     /// Measurements in frames.

@@ -70,6 +70,7 @@ impl Visit {
             missing: None,
             input: outer.input.clone(),
             suits: settings.suits,
+            has_odometry: found.frames.as_ref().is_none_or(FrameSource::has_odometry),
             inputs,
             reading: Reading::default(),
             driven: Driven::default(),

@@ -1,8 +1,8 @@
 use serde::{Deserialize, Serialize};
 
-use crate::assign::{Edge, Matcher};
 use crate::prepare::{Prepared, PreparedFrame};
 use crate::ratio;
+use tagalong_matching::{Edge, Matcher};
 
 /// The similarity from which on a match counts in CLEAR MOT and Identity.
 pub const MATCH_SIMILARITY: f64 = 0.5;

@@ -1,9 +1,9 @@
 use serde::{Deserialize, Serialize};
 
-use crate::assign::{Edge, Matcher};
 use crate::pairs::PairTable;
 use crate::prepare::{Prepared, PreparedFrame};
 use crate::ratio;
+use tagalong_matching::{Edge, Matcher};
 
 /// Number of similarity thresholds.
 pub const LEVELS: usize = 19;

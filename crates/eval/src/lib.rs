@@ -39,7 +39,6 @@
 //! everything after that works on short lists. Scoring is so cheap that it can stand inside a
 //! jackknife or a parameter search.
 
-mod assign;
 mod clear;
 mod consistency;
 mod error;
@@ -58,7 +57,6 @@ mod times;
 mod types;
 mod visibility;
 
-pub use assign::{Edge, Matcher};
 pub use clear::{Clear, MATCH_SIMILARITY, Match};
 pub use consistency::{Consistency, chi_square_quantile};
 pub use error::EvalError;
@@ -72,6 +70,7 @@ pub use position::{PositionError, position_errors_m};
 pub use prepare::{Comparison, Prepared, PreparedFrame};
 pub use scores::{Scores, Tally};
 pub use sets::{FrameDistance, GospaParts, SetDistance, SetTally};
+pub use tagalong_matching::{Edge, Matcher};
 pub use tagalong_stats::{
     CONFIDENCE, Gain, Interval, clustered_share, draws_interval, holm, is_significant,
     mean_interval, paired_gain, percentile, sign_flip, wilson,

@@ -1,8 +1,8 @@
 use serde::{Deserialize, Serialize};
 
-use crate::assign::{Edge, Matcher};
 use crate::prepare::{Prepared, PreparedFrame};
 use crate::types::{Frame, Sequence, Similarity, distance_m};
+use tagalong_matching::{Edge, Matcher};
 
 /// Settings of the distances between sets.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -11,7 +11,7 @@ use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_reproduce::{
-    DrawnScenes, Experiment, ExperimentFindings, Lab, Progress, SYSTEMS, System, Table, system,
+    Experiment, ExperimentFindings, Lab, Progress, SYSTEMS, SimulatedScenes, System, Table, system,
 };
 use tagalong_sim::Split;
 
@@ -90,7 +90,7 @@ fn lab<'a>(args: &ReproduceArgs, registry: &'a Registry, progress: &'a Bar) -> L
         quick: args.quick,
         seeds: args.seeds,
         first_seed: args.first_seed,
-        drawn: DrawnScenes::default(),
+        simulated: SimulatedScenes::default(),
         jobs: threads(args.jobs),
         progress,
     }
@@ -219,7 +219,7 @@ mod tests {
         let table = Table { title: "A table".into(), ..Table::default() };
         let picture = tagalong_reproduce::Picture { name: "plot".into(), svg: "<svg/>".into() };
         let findings = Findings { tables: vec![table], pictures: vec![picture] };
-        let found = ExperimentFindings { experiment: "one", drawn: Vec::new(), findings };
+        let found = ExperimentFindings { experiment: "one", simulated: Vec::new(), findings };
         write(folder.path(), &[found]).unwrap();
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
         assert!(read("tables.md").contains("**A table**"));

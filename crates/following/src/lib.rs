@@ -9,6 +9,9 @@
 //! | obstacles around the robot | `command_limiter` | [`CollisionMonitorSettings`] |
 //! | limits of the command | `command_limiter` | [`CommandLimiterSettings`] |
 //!
+//! A program calls following as a skill: [`Steering::enroll`] with an [`Enrollment`],
+//! [`Steering::status`], [`Steering::clear`].
+//!
 //! # Invariants
 //!
 //! * A fault, a pause of the frames and a number that is not finite end in a stop.
@@ -21,6 +24,7 @@
 mod command_limiter;
 mod enable;
 mod settings;
+mod skill;
 mod steering;
 mod target_lock;
 
@@ -28,8 +32,10 @@ pub use command_limiter::{
     CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource, Orders,
 };
 pub use enable::{Enable, EnableSwitch, Permission};
-pub use settings::{FollowSettings, OdometrySource, RobotSettings};
+pub use settings::{Base, FollowSettings, OdometrySource, RobotSettings};
+pub use skill::{Choice, Enrollment, EnrollmentError, FollowStatus, PersonStatus};
 pub use steering::{Steered, Steering};
 pub use target_lock::{
-    Differences, Likeness, LockReport, LockState, LooksSettings, SearchSettings, TargetSettings,
+    ChoiceRule, Differences, Likeness, LockReport, LockState, LooksSettings, SearchSettings,
+    TargetSettings,
 };

@@ -27,12 +27,31 @@ pub struct RobotSettings {
     /// Standard deviation of a wheel's travel, as a fraction of it.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub wheel_slip: f64,
-    /// Speed limit of a wheel, m/s.
+    /// Speed limit of a wheel, m/s; of the middle of a base that is holonomic.
     #[schemars(range(min = 0.05, max = 0.9))]
     pub max_speed_mps: f64,
+    /// Kind of the base: "differential"; "holonomic", which drives and turns independently (it is not
+    /// driven sideways); or "ackermann", which steers like a car and does not turn on the spot.
+    pub base: Base,
+    /// Least radius of the turn of an "ackermann" base, at the middle of its driven axle, m.
+    #[schemars(range(min = 0.1, max = 20.0))]
+    pub min_turn_radius_m: f64,
     /// Source of the robot's motion: "required", or "none" for a controller that is to drive without
     /// odometry, as if the robot were always at rest.
     pub odometry: OdometrySource,
+}
+
+/// Kind of a robot's base.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Base {
+    /// Two driven wheels with a speed each.
+    #[default]
+    Differential,
+    /// Speed and turn rate are independent.
+    Holonomic,
+    /// Steered wheels: the turn rate is at most the speed by the least radius.
+    Ackermann,
 }
 
 /// Source of the robot's motion that a controller has.
@@ -52,6 +71,8 @@ impl Default for RobotSettings {
             wheel_half_separation_m: 0.167,
             wheel_slip: 0.02,
             max_speed_mps: 0.9,
+            base: Base::Differential,
+            min_turn_radius_m: 0.5,
             odometry: OdometrySource::Required,
         }
     }
@@ -61,5 +82,16 @@ impl RobotSettings {
     /// Returns the drive as the type of the core crate.
     pub fn wheels(&self) -> DiffDrive {
         DiffDrive { half_separation_m: self.wheel_half_separation_m, slip: self.wheel_slip }
+    }
+
+    /// Returns the largest amount of the turn rate at a speed, rad/s, by the geometry of the base:
+    /// the speed that the outer wheel has left, or the least radius.
+    pub(crate) fn turn_at(&self, speed_mps: f64) -> f64 {
+        let rim = (self.max_speed_mps - speed_mps.abs()).max(0.0) / self.wheel_half_separation_m;
+        match self.base {
+            Base::Differential => rim,
+            Base::Holonomic => f64::INFINITY,
+            Base::Ackermann => rim.min(speed_mps.abs() / self.min_turn_radius_m),
+        }
     }
 }

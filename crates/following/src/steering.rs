@@ -6,8 +6,12 @@ use tagalong_tracking::{Guarded, StepError};
 use tagalong_vision::Describer;
 
 use crate::command_limiter::{Aim, CommandLimiter, ObstacleMemory, Wish};
+use crate::skill::{View, before_any_frame};
 use crate::target_lock::{Search, TargetLock};
-use crate::{FollowSettings, LockReport, LockState, Orders, RobotSettings, SearchSettings};
+use crate::{
+    Base, ChoiceRule, Enrollment, EnrollmentError, FollowSettings, FollowStatus, LockReport,
+    LockState, Orders, RobotSettings, SearchSettings, TargetSettings,
+};
 
 /// Frames that must be processed after a reset before the robot may move.
 const FRESH_FRAMES: u32 = 3;
@@ -16,8 +20,13 @@ const FRESH_FRAMES: u32 = 3;
 pub struct Steering {
     controller: Guarded<dyn Controller>,
     lock: TargetLock,
+    /// Choice and search as in the config, whatever an enrollment says.
+    configured: TargetSettings,
     search: Search,
     search_settings: SearchSettings,
+    /// Last frame, in which an enrollment finds its person.
+    view: Option<View>,
+    status: FollowStatus,
     obstacles: ObstacleMemory,
     limiter: CommandLimiter,
     robot: RobotSettings,
@@ -47,16 +56,19 @@ impl Steering {
         let FollowSettings { robot, command_limiter, collision_monitor, target } = settings;
         Self {
             controller: Guarded::new(name, controller),
+            configured: target.clone(),
+            view: None,
+            status: View::default().status(
+                &before_any_frame("no frame yet"),
+                None,
+                Reason::Settling.name(),
+                None,
+            ),
             search_settings: target.search.clone(),
             lock: TargetLock::new(target, describer),
             search: Search::default(),
             obstacles: ObstacleMemory::default(),
-            limiter: CommandLimiter::new(
-                command_limiter,
-                collision_monitor,
-                robot.wheels(),
-                robot.max_speed_mps,
-            ),
+            limiter: CommandLimiter::new(command_limiter, collision_monitor, robot.clone()),
             robot,
             fresh: FRESH_FRAMES,
             last: None,
@@ -65,14 +77,45 @@ impl Steering {
 
     /// Forgets all positions after a jump of the clock, and starts the wait of `FRESH_FRAMES`.
     pub fn reset(&mut self) {
+        self.view = None;
         self.lock.reset();
         self.obstacles.clear();
         self.fresh = 0;
     }
 
-    /// Follows this track from now on.
-    pub fn follow(&mut self, track: TrackId) {
-        self.lock.choose(track);
+    /// Follows the person of a request from the next frame on, and forgets the previous one.
+    ///
+    /// # Errors
+    /// [`EnrollmentError`], and the robot goes on as before.
+    pub fn enroll(&mut self, enrollment: &Enrollment) -> Result<(), EnrollmentError> {
+        let view = self.view.as_ref().ok_or(EnrollmentError::NoFrame)?;
+        let settings = view.settings(enrollment, &self.configured)?;
+        self.restart(settings, "enrolled");
+        Ok(())
+    }
+
+    /// Forgets the person, and follows none until the next request: the robot slows down and stands.
+    pub fn clear(&mut self) {
+        let none =
+            TargetSettings { track: None, choose: ChoiceRule::None, ..self.configured.clone() };
+        self.restart(none, "cleared");
+    }
+
+    fn restart(&mut self, settings: TargetSettings, why: &'static str) {
+        self.search = Search::default();
+        self.search_settings = settings.search.clone();
+        self.lock.restart(settings, why);
+    }
+
+    /// Limits the speed to this, m/s, beside all other limits, until the next call; infinite for no
+    /// limit.
+    pub fn allow_speed(&mut self, most_mps: f64) {
+        self.limiter.allow_speed(most_mps);
+    }
+
+    /// Returns the state of the pursuit after the last frame.
+    pub fn status(&self) -> FollowStatus {
+        FollowStatus { fault: self.fault(), ..self.status.clone() }
     }
 
     /// Returns the distance that the controller keeps, m, if it keeps one.
@@ -148,7 +191,11 @@ impl Steering {
         let command = self.limiter.limit(&wish, look);
         // The search learns only now that its wish was blocked; it reacts in the next frame.
         self.search.add_block(command.reason == Reason::Blocked, motion.dt);
-        Ok(Steered { command, target: target.map(|track| track.id), lock })
+        let target = target.map(|track| track.id);
+        let view = View::new(tracks, &frame.camera, frame.stamp);
+        self.status = view.status(&lock, target, command.reason.name(), self.fault());
+        self.view = Some(view);
+        Ok(Steered { command, target, lock })
     }
 
     fn ask(
@@ -180,7 +227,12 @@ impl Steering {
             },
             state => {
                 self.search = Search::default();
-                let wheels = self.robot.wheels().wheels_within(twist, self.robot.max_speed_mps);
+                let drive = self.robot.wheels();
+                let wheels = match self.robot.base {
+                    // Its limits are those of speed and turn rate, not of a wheel.
+                    Base::Holonomic => drive.wheels(twist),
+                    _ => drive.wheels_within(twist, self.robot.max_speed_mps),
+                };
                 (wheels, if state.doubts() { Aim::Perhaps } else { Aim::Person })
             }
         }

@@ -1,18 +1,18 @@
 //! Annotations of CVAT, as its formats "CVAT for video 1.1" and "CVAT for images 1.1" export them:
 //! <https://docs.cvat.ai/docs/manual/advanced/xml_format/>.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Node, TextPos};
 use tagalong_app::format::Format;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_config::{FileLimit, read_text};
 use tagalong_eval::Region;
-use tagalong_eval::formats::people::{self, Row};
+use tagalong_eval::formats::people::Row;
 
 use super::ImportArgs;
+use super::truth::{WholeBody, boxes_csv, people_csv};
 
 /// Longest file that is read, bytes.
 const MOST_BYTES: u64 = 256 << 20;
@@ -28,8 +28,9 @@ pub fn import(args: &ImportArgs) -> Outcome {
     let ending = if args.whole_bodies { "boxes.csv" } else { "people.csv" };
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.path, ending));
     spare(&output, args.overwrite)?;
-    let rows = read(&args.path)?;
-    let text = if args.whole_bodies { mot(&rows) } else { csv(&rows)? };
+    let Read { rows, note } = read(&args.path)?;
+    note.iter().for_each(|note| say(note));
+    let text = if args.whole_bodies { mot(&rows) } else { people_csv(&rows)? };
     make_room_for(&output)?;
     let shown = output.display();
     fs::write(&output, text)
@@ -48,8 +49,15 @@ fn default_output(path: &Path, ending: &str) -> PathBuf {
     path.with_extension(ending)
 }
 
+/// Boxes of a file, and a note on shapes that are none.
+#[derive(Debug)]
+struct Read {
+    rows: Vec<Row>,
+    note: Option<String>,
+}
+
 /// Reads the boxes, by frame and number.
-fn read(path: &Path) -> Result<Vec<Row>, Failure> {
+fn read(path: &Path) -> Result<Read, Failure> {
     let name = path.display().to_string();
     let cannot = |why: String| Failure::failed(format!("cannot read {name}: {why}"));
     let text = read_text(path, FileLimit::Bytes(MOST_BYTES))
@@ -58,7 +66,7 @@ fn read(path: &Path) -> Result<Vec<Row>, Failure> {
 }
 
 /// Reads the boxes; an error begins with the line.
-fn parse(text: &str) -> Result<Vec<Row>, String> {
+fn parse(text: &str) -> Result<Read, String> {
     let document = Document::parse(text).map_err(|error| format!(": {error}"))?;
     let root = document.root_element();
     if !root.has_tag_name("annotations") {
@@ -83,7 +91,33 @@ fn parse(text: &str) -> Result<Vec<Row>, String> {
         let (id, frame) = (pair[0].id, pair[0].frame - 1);
         return Err(format!(": person {id} is in CVAT's frame {frame} twice; number them apart"));
     }
-    Ok(rows)
+    let note = other_shapes(&root);
+    match (rows.is_empty(), note) {
+        (false, note) => Ok(Read { rows, note }),
+        (true, Some(note)) => Err(format!(": holds no box: {note}")),
+        (true, None) => Err(": holds no box of a person; annotate with rectangles".to_owned()),
+    }
+}
+
+/// Kinds of shapes besides rectangles.
+const OTHER_SHAPES: [&str; 7] =
+    ["polygon", "polyline", "points", "mask", "cuboid", "ellipse", "skeleton"];
+
+/// Returns a note on the shapes that are no rectangles; none without any.
+fn other_shapes(root: &Node<'_, '_>) -> Option<String> {
+    let counted = OTHER_SHAPES
+        .map(|kind| (root.descendants().filter(|node| node.has_tag_name(kind)).count(), kind));
+    let found: Vec<String> = counted
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, kind)| format!("{count} of kind {kind}"))
+        .collect();
+    (!found.is_empty()).then(|| {
+        format!(
+            "shapes that are no rectangles are left out ({}); draw rectangles",
+            found.join(", ")
+        )
+    })
 }
 
 fn boxes<'a, 'b>(node: &Node<'a, 'b>) -> impl Iterator<Item = Node<'a, 'b>> {
@@ -178,26 +212,19 @@ fn at(node: &Node<'_, '_>, why: &str) -> String {
     format!(", line {row}: {why}")
 }
 
-fn csv(rows: &[Row]) -> Result<String, Failure> {
-    let mut out = Vec::new();
-    people::write(&mut out, rows).map_err(Failure::failed)?;
-    String::from_utf8(out).map_err(Failure::failed)
-}
-
 /// Returns MOTChallenge text of whole bodies, of which `eval` compares the upper bodies.
 fn mot(rows: &[Row]) -> String {
-    let mut out = String::new();
-    for row in rows {
-        let Some(Region { x, y, width, height }) = row.upper_body else { continue };
-        let counts = u8::from(!row.ignore);
-        let (frame, id, visible) = (row.frame, row.id, row.visible);
-        let _ = writeln!(out, "{frame},{id},{x},{y},{width},{height},{counts},1,{visible}");
-    }
-    out
+    let body = |row: &Row| {
+        let (frame, id, visible, counts) = (row.frame, row.id, row.visible, !row.ignore);
+        Some(WholeBody { frame, id, region: row.upper_body?, visible, counts })
+    };
+    boxes_csv(&rows.iter().filter_map(body).collect::<Vec<_>>())
 }
 
 #[cfg(test)]
 mod tests {
+    use tagalong_eval::formats::people;
+
     use super::*;
 
     const VIDEO: &str = r#"<?xml version="1.0" encoding="utf-8"?>
@@ -217,22 +244,36 @@ mod tests {
 
     #[test]
     fn tracks_of_a_video_become_people() {
-        let rows = parse(VIDEO).unwrap();
+        let Read { rows, note } = parse(VIDEO).unwrap();
+        assert_eq!(note, None);
         let seen: Vec<_> =
             rows.iter().map(|r| (r.frame, r.id, r.key, r.visible, r.ignore)).collect();
         let wanted = [(1, 1, true, 1.0, false), (2, 1, false, 0.5, false), (2, 5, true, 1.0, true)];
         assert_eq!(seen, wanted);
         let region = Region { x: 10.5, y: 20.0, width: 50.0, height: 50.0 };
         assert_eq!(rows[0].upper_body, Some(region));
-        assert_eq!(people::parse(&csv(&rows).unwrap(), "made").unwrap(), rows);
+        assert_eq!(people::parse(&people_csv(&rows).unwrap(), "made").unwrap(), rows);
         assert_eq!(mot(&rows).lines().next(), Some("1,1,10.5,20,50,50,1,1,1"));
     }
 
     #[test]
     fn boxes_of_images_take_the_numbers_that_they_were_given() {
-        let rows = parse(IMAGES).unwrap();
+        let rows = parse(IMAGES).unwrap().rows;
         let seen: Vec<_> = rows.iter().map(|row| (row.frame, row.id, row.ignore)).collect();
         assert_eq!(seen, [(8, 3, false), (8, 5, true)]);
+    }
+
+    #[test]
+    fn polygons_are_told_and_a_file_of_them_alone_is_refused() {
+        let polygon = r#"<polygon label="person" points="1,2;3,4;5,6"/>"#;
+        let mixed = IMAGES.replace("</image>", &format!("{polygon}{polygon}</image>"));
+        let read = parse(&mixed).unwrap();
+        assert_eq!(read.rows.len(), 2);
+        assert!(read.note.unwrap().contains("2 of kind polygon"));
+        let alone = format!(r#"<annotations><image id="0">{polygon}</image></annotations>"#);
+        let error = parse(&alone).unwrap_err();
+        assert!(error.contains("no box") && error.contains("1 of kind polygon"), "{error}");
+        assert!(parse("<annotations/>").unwrap_err().contains("no box"));
     }
 
     #[test]

@@ -5,9 +5,15 @@
 
 mod cvat;
 mod folders;
+mod jrdb;
+mod json;
 mod kitti;
+mod ktp;
+mod leg_bags;
 mod recorded;
 mod sequence;
+mod tpt;
+mod truth;
 mod tum;
 mod writer;
 
@@ -30,11 +36,19 @@ pub enum Kind {
     Kitti,
     /// A sequence of the MOTChallenge: seqinfo.ini and its images.
     Mot,
+    /// A folder images/NAME of the Kinect Tracking Precision dataset.
+    Ktp,
+    /// A folder images/image_N/NAME or images/image_stitched/NAME of JRDB.
+    Jrdb,
+    /// A folder panoramic_images/NAME of TPT-Bench.
+    TptBench,
     /// A folder of JPEG or PNG images, in the order of their names.
     Images,
     /// The XML file of annotations made with CVAT (for video 1.1 or for images 1.1): truth for a log
     /// instead of a log.
     Cvat,
+    /// An annotated bag of leg_tracker_benchmarks: truth for the bag instead of a log.
+    LegTracker,
 }
 
 /// Arguments of `tagalong import`.
@@ -45,7 +59,8 @@ pub struct ImportArgs {
     pub kind: Kind,
     /// File or folder to import.
     pub path: PathBuf,
-    /// The log to write [default: runs/NAME.mcap]; cvat: the truth [default: NAME.people.csv].
+    /// The log to write [default: runs/NAME.mcap]; of cvat and leg-tracker the truth
+    /// [default: NAME.people.csv, NAME.people-floor.csv].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
     /// Replace the log if it exists.
@@ -85,6 +100,9 @@ pub struct ImportArgs {
     /// NAME.boxes.csv.
     #[arg(long)]
     pub whole_bodies: bool,
+    /// leg-tracker: topic of the annotated scans, where the bag has several.
+    #[arg(long, value_name = "TOPIC")]
+    pub scan: Option<String>,
     /// Output format of the result.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
@@ -130,8 +148,10 @@ pub fn import(args: &ImportArgs) -> Outcome {
     if !path.exists() {
         return Err(Failure::failed(format!("{}: no such file or folder", path.display())));
     }
-    if args.kind == Kind::Cvat {
-        return cvat::import(args);
+    match args.kind {
+        Kind::Cvat => return cvat::import(args),
+        Kind::LegTracker => return leg_bags::import(args),
+        _ => {}
     }
     let log = args.output.clone().unwrap_or_else(|| default_log(args));
     let signals = Signals::listen()?;
@@ -167,7 +187,10 @@ fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
         Kind::Kitti => kitti::read(args)?,
         Kind::Mot => folders::mot(args)?,
         Kind::Images => folders::images(args)?,
-        Kind::Cvat => return Err(Failure::usage("annotations of CVAT are no log")),
+        Kind::Ktp => ktp::read(args)?,
+        Kind::Jrdb => jrdb::read(args)?,
+        Kind::TptBench => tpt::read(args)?,
+        Kind::Cvat | Kind::LegTracker => return Err(Failure::usage("annotations are no log")),
     };
     if sequence.moments.is_empty() {
         return Err(Failure::failed(format!("{} has no images", args.path.display())));
@@ -197,12 +220,13 @@ fn beside(sequence: &Sequence, log: &Path) -> Result<(), Failure> {
 }
 
 fn default_log(args: &ImportArgs) -> PathBuf {
+    let whole = args.path.canonicalize().unwrap_or_else(|_| args.path.clone());
+    let named = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let name = match args.kind {
         Kind::Kitti => format!("kitti-{}", args.sequence),
-        _ => {
-            let whole = args.path.canonicalize().unwrap_or_else(|_| args.path.clone());
-            whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
-        }
+        // The cameras of a sequence are logs of their own.
+        Kind::Jrdb => format!("{}-{}", named(&whole), whole.parent().map_or(String::new(), named)),
+        _ => named(&whole),
     };
     Path::new("runs").join(name + ".mcap")
 }

@@ -91,6 +91,21 @@ pub fn text(path: &Path, layout: &str) -> Result<String, Failure> {
     })
 }
 
+/// Returns the lines of a text that are neither empty nor comments, with their numbers from 1.
+pub fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let numbered = (1..).zip(text.lines().map(str::trim));
+    numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+/// Parses seconds with a fraction, without rounding them.
+pub fn stamp(word: &str) -> Option<Stamp> {
+    // A double cannot hold nanoseconds of today's times, so the digits are parsed as integers.
+    let (seconds, fraction) = word.split_once('.').unwrap_or((word, "0"));
+    let seconds: u64 = seconds.parse().ok()?;
+    let nanos: u64 = format!("{fraction:0<9}").get(..9)?.parse().ok()?;
+    seconds.checked_mul(1_000_000_000)?.checked_add(nanos).map(Stamp::from_nanos)
+}
+
 /// Returns the blank-separated numbers of a line.
 ///
 /// # Errors
@@ -108,19 +123,30 @@ pub fn numbers<'a>(
         .collect()
 }
 
+/// Endings of the images that are taken as they are.
+pub const PICTURES: [&str; 3] = ["jpg", "jpeg", "png"];
+
 /// Returns the JPEG and PNG files of a folder, by name, and by number where names are numbered.
 ///
 /// # Errors
 /// A folder that cannot be read.
 pub fn pictures(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    files(folder, &PICTURES)
+}
+
+/// Returns the files of a folder with one of the endings, by name, and by number where names are
+/// numbered.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn files(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>, Failure> {
     let entries = fs::read_dir(folder)
         .map_err(|error| Failure::failed(format!("cannot read {}: {error}", folder.display())))?;
-    let is_picture = |path: &PathBuf| {
+    let is_wanted = |path: &PathBuf| {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        ["jpg", "jpeg", "png"].contains(&extension.to_lowercase().as_str())
+        endings.contains(&extension.to_lowercase().as_str())
     };
-    let mut files: Vec<_> =
-        entries.flatten().map(|entry| entry.path()).filter(is_picture).collect();
+    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).filter(is_wanted).collect();
     // The order of a directory depends on the file system.
     files.sort_by_cached_key(|path| (counted(path), path.clone()));
     Ok(files)
@@ -165,4 +191,18 @@ impl ImportArgs {
 pub fn size(file: &Path) -> Result<(u32, u32), Failure> {
     image::image_dimensions(file)
         .map_err(|error| Failure::failed(format!("cannot read {}: {error}", file.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_keep_every_digit() {
+        let at = |word| stamp(word).map(Stamp::nanos);
+        assert_eq!(at("1305031102.175304"), Some(1_305_031_102_175_304_000));
+        assert_eq!(at("1339064317.986969085"), Some(1_339_064_317_986_969_085));
+        assert_eq!(at("7"), Some(7_000_000_000));
+        assert!(at("x.5").is_none() && at("1.x").is_none() && at("").is_none());
+    }
 }

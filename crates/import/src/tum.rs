@@ -14,7 +14,9 @@ use tagalong_core::Stamp;
 
 use super::ImportArgs;
 use super::folders::level;
-use super::sequence::{Calibration, Eye, Moment, Placed, Sequence, numbers, text};
+use super::sequence::{
+    Calibration, Eye, Moment, Placed, Sequence, lines, numbers, stamp as seconds, text,
+};
 
 const LAYOUT: &str = "a folder of the TUM RGB-D benchmark";
 const DEPTH_UNIT_M: f64 = 1.0 / 5000.0;
@@ -87,12 +89,6 @@ fn calibration(folder: &Path, notes: &mut Vec<String>) -> Calibration {
     of([525.0, 525.0], [319.5, 239.5], [0.0; 5])
 }
 
-/// Returns the lines of a list that are no comments, with their numbers.
-fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let numbered = (1..).zip(text.lines().map(str::trim));
-    numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-}
-
 /// Reads a list of images. Images that are not there, as in parts of a sequence, are left out.
 fn images(
     folder: &Path,
@@ -123,16 +119,9 @@ fn images(
     Ok(present)
 }
 
-/// Parses seconds with a fraction, without rounding them.
 fn stamp(word: &str, path: &Path, line: usize) -> Result<Stamp, Failure> {
     let wrong = || Failure::failed(format!("{}:{line}: `{word}` is no time", path.display()));
-    // A double cannot hold nanoseconds of today's times, so the digits are parsed as integers.
-    let (seconds, fraction) = word.split_once('.').unwrap_or((word, "0"));
-    let nanos = format!("{fraction:0<9}");
-    let seconds: u64 = seconds.parse().map_err(|_| wrong())?;
-    let nanos: u64 = nanos.get(..9).and_then(|digits| digits.parse().ok()).ok_or_else(wrong)?;
-    let all = seconds.checked_mul(1_000_000_000).and_then(|all| all.checked_add(nanos));
-    all.map(Stamp::from_nanos).ok_or_else(wrong)
+    seconds(word).ok_or_else(wrong)
 }
 
 /// Returns the poses of the robot: the point on the floor below the camera, heading where it looks.
@@ -164,14 +153,6 @@ fn below(stamp: Stamp, room_from_camera: &Isometry3<f64>) -> Placed {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn times_keep_every_digit() {
-        let at = |word| stamp(word, Path::new("rgb.txt"), 1).map(Stamp::nanos);
-        assert_eq!(at("1305031102.175304"), Ok(1_305_031_102_175_304_000));
-        assert_eq!(at("7"), Ok(7_000_000_000));
-        assert!(at("x.5").is_err() && at("1.x").is_err() && at("").is_err());
-    }
 
     #[test]
     fn the_robot_is_below_the_camera_and_looks_where_it_looks() {

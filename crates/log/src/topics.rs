@@ -144,6 +144,8 @@ struct Requirement<'a> {
     /// Message types in words.
     types: String,
     fits: Box<dyn Fn(&Topic) -> bool + 'a>,
+    /// Topic that another input has, so that it cannot be meant.
+    taken: Option<&'a str>,
 }
 
 /// Checks that there is a topic for each required input, and one that makes the frames.
@@ -162,6 +164,7 @@ fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
         key: key.to_owned(),
         types: types.to_owned(),
         fits: Box::new(if key == "depth_topic" { could_be_depth } else { is_usable_picture }),
+        taken: chosen.colour.as_deref().filter(|_| key == "right_topic"),
     };
     let lacks_right = lacks(Input::Right, &chosen.right);
     let images = [
@@ -175,6 +178,7 @@ fn check(scan: &Scan, chosen: &Chosen, inputs: Inputs) -> Result<(), LogError> {
         key: sensor.key(),
         types: sensor.messages.join(" or "),
         fits: Box::new(|topic| is_of(sensor, topic)),
+        taken: None,
     });
     let has_no_clock = is_blind && chosen.sensor(Input::Laser).is_none();
     let any = image(has_no_clock, "images at all", "colour_topic", COLOUR);
@@ -188,13 +192,15 @@ impl Requirement<'_> {
     /// Returns the error of a log that lacks the topic, with the first topic that could be meant, or
     /// the first one that cannot be read.
     fn error(&self, scan: &Scan) -> LogError {
-        let Self { wanted, key, types, fits, .. } = self;
+        let Self { wanted, key, types, fits, taken, .. } = self;
         let is_image = key.ends_with("_topic") && types.contains("Image");
         let unreadable = scan.topics.iter().find_map(|(name, topic)| {
             let why = unreadable(topic).filter(|_| is_image)?;
             Some(format!("; {name} ({}) cannot be read: {why}", kind_of(topic)))
         });
-        let meant = scan.topics.iter().find(|(_, topic)| fits(topic)).map(|(name, topic)| {
+        let is_free = |name: &str| *taken != Some(name);
+        let mut free = scan.topics.iter().filter(|(name, _)| is_free(name));
+        let meant = free.find(|(_, topic)| fits(topic)).map(|(name, topic)| {
             let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
             match remedy_as_depth(topic).filter(|_| key == "depth_topic") {
                 Some(remedy) => format!("; if {name} ({kind}) is meant, {remedy}"),
@@ -202,7 +208,8 @@ impl Requirement<'_> {
             }
         });
         let depth = (key == "depth_topic").then(|| DEPTH_REMEDY.to_owned());
-        let hint = unreadable.or(meant).or(depth).unwrap_or_default();
+        let other = (key == "right_topic").then(|| RIGHT_REMEDY.to_owned());
+        let hint = unreadable.or(meant).or(depth).or(other).unwrap_or_default();
         missing(scan, format!("{wanted} ({types})"), hint)
     }
 }
@@ -222,6 +229,9 @@ const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, sensor_msgs/Compress
 
 const DEPTH_REMEDY: &str = "; name a topic that has them as `depth_topic` under [input], or take \
                             a config without depth";
+
+const RIGHT_REMEDY: &str = ": this is no log of a stereo pair; take a config for what it has, which \
+                            `tagalong run LOG` chooses by itself and `tagalong doctor LOG` lists";
 
 pub(crate) fn missing(scan: &Scan, wanted: String, hint: String) -> LogError {
     LogError::Missing { path: scan.path.clone(), wanted, hint, present: scan.listing() }

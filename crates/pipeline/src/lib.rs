@@ -53,9 +53,10 @@ pub use report::FrameReport;
 pub use settings::{PipelineSettings, PluginSettings};
 pub use sources::{MissingSource, Sources};
 pub use tagalong_following::{
-    CollisionMonitorSettings, CommandLimiterSettings, Differences, Enable, EnableSwitch, Likeness,
-    LockReport, LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission,
-    RobotSettings, SearchSettings, TargetSettings,
+    Base, Choice, ChoiceRule, CollisionMonitorSettings, CommandLimiterSettings, Differences,
+    Enable, EnableSwitch, Enrollment, EnrollmentError, FollowStatus, Likeness, LockReport,
+    LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission, RobotSettings,
+    SearchSettings, TargetSettings,
 };
 pub use tagalong_odometry::{MotionSource, OdometrySettings};
 pub use tagalong_stereo::StereoSettings;

@@ -1,11 +1,11 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use tagalong_core::{Command, Frame, Inputs, Reason, Stamp, TrackId};
+use tagalong_core::{Command, Frame, Inputs, Reason, Stamp};
 use tagalong_tracking::StepError;
 use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 
-use crate::{FrameReport, Orders, PipelineSettings};
+use crate::{Enrollment, EnrollmentError, FollowStatus, FrameReport, Orders, PipelineSettings};
 use tagalong_following::{EnableSwitch, Steered, Steering};
 use tagalong_vision::Describer;
 
@@ -76,11 +76,35 @@ impl Pipeline {
         self.has_controller().then(|| EnableSwitch::new(timeout))
     }
 
-    /// Follows the person of this track from the next frame on, and forgets the previous target.
-    pub fn choose_target(&mut self, track: TrackId) {
+    /// Follows the person of a request from the next frame on, and forgets the previous one.
+    ///
+    /// # Errors
+    /// [`EnrollmentError`] if the person is not there, a time of the request is beyond its bounds, or
+    /// there is no controller. The robot goes on as before.
+    pub fn enroll(&mut self, enrollment: &Enrollment) -> Result<(), EnrollmentError> {
+        self.steering.as_mut().ok_or(EnrollmentError::NoController)?.enroll(enrollment)
+    }
+
+    /// Forgets the person, and follows none until the next [`Pipeline::enroll`]: the robot slows down
+    /// and stands.
+    pub fn clear(&mut self) {
         if let Some(steering) = &mut self.steering {
-            steering.follow(track);
+            steering.clear();
         }
+    }
+
+    /// Limits the speed to this, m/s, beside all limits of the config, until the next call; infinite
+    /// for no limit. A planner asks for it, in a crowd or near a door.
+    pub fn allow_speed(&mut self, most_mps: f64) {
+        if let Some(steering) = &mut self.steering {
+            steering.allow_speed(most_mps);
+        }
+    }
+
+    /// Returns the state of the pursuit after the last frame, and the people to choose from; `None`
+    /// without a controller.
+    pub fn status(&self) -> Option<FollowStatus> {
+        Some(self.steering.as_ref()?.status())
     }
 
     /// Returns true if the config has a controller: frames lead to commands.

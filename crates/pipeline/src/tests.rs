@@ -7,6 +7,7 @@ mod faults;
 mod inputs;
 mod memo;
 mod odometry;
+mod skill;
 mod stereo;
 mod target;
 mod tracking;

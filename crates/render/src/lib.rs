@@ -5,6 +5,7 @@
 //! that dropped them. On the right the same people from above, below a legend. All pictures of a run
 //! have the same size.
 
+mod animation;
 pub mod canvas;
 mod enlarge;
 mod image_view;
@@ -18,6 +19,8 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+pub use animation::Animation;
 
 use self::canvas::{Canvas, Ink};
 pub use image_view::background;

@@ -224,6 +224,12 @@ pub struct TaskTiming {
     pub frame_ms_p50: f64,
     /// 95th percentile of the time per frame, in milliseconds.
     pub frame_ms_p95: f64,
+    /// 99th percentile of the time per frame, in milliseconds.
+    #[serde(default)]
+    pub frame_ms_p99: f64,
+    /// Time of the slowest frame, in milliseconds.
+    #[serde(default)]
+    pub frame_ms_max: f64,
     /// Times of the stages, in the order of the pipeline.
     pub stages: Vec<StageTiming>,
 }
@@ -237,4 +243,10 @@ pub struct StageTiming {
     pub p50_ms: f64,
     /// 95th percentile of the time per frame, in milliseconds.
     pub p95_ms: f64,
+    /// 99th percentile of the time per frame, in milliseconds.
+    #[serde(default)]
+    pub p99_ms: f64,
+    /// Time in the slowest frame, in milliseconds.
+    #[serde(default)]
+    pub max_ms: f64,
 }

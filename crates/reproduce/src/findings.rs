@@ -1,7 +1,7 @@
 use serde::Serialize;
 use tagalong_sim::Seeds;
 
-use crate::lab::Drawn;
+use crate::lab::SimulatedScene;
 use crate::{
     Lab, ReproduceError, Table, joint_particle, laser, omni_appearance, rgbd_compressive, stereo,
 };
@@ -45,26 +45,29 @@ impl Experiment {
     /// As the experiment.
     pub fn find(&self, lab: &Lab) -> Result<ExperimentFindings, ReproduceError> {
         let mut findings = (self.run)(lab)?;
-        let drawn = lab.drawn.take();
-        if !drawn.is_empty() {
-            let note = seeds_note(&drawn);
+        let simulated = lab.simulated.take();
+        if !simulated.is_empty() {
+            let note = seeds_note(&simulated);
             findings.tables.iter_mut().for_each(|table| table.notes.push(note.clone()));
         }
-        Ok(ExperimentFindings { experiment: self.name, drawn, findings })
+        Ok(ExperimentFindings { experiment: self.name, simulated, findings })
     }
 }
 
 /// Formats the note on seeds; scenes with the same seeds are listed together.
-fn seeds_note(drawn: &[Drawn]) -> String {
+fn seeds_note(simulated: &[SimulatedScene]) -> String {
     let mut groups: Vec<(Seeds, Vec<&str>)> = Vec::new();
-    for Drawn { scene, seeds } in drawn {
+    for SimulatedScene { scene, seeds } in simulated {
         match groups.iter_mut().find(|(of, _)| of == seeds) {
             Some((_, scenes)) => scenes.push(scene),
             None => groups.push((*seeds, vec![scene])),
         }
     }
     let group = |(seeds, scenes): &(Seeds, Vec<&str>)| format!("{}: {seeds}", scenes.join(", "));
-    format!("Drawn for this. {}.", groups.iter().map(group).collect::<Vec<_>>().join("; "))
+    format!(
+        "Simulated for this table. {}.",
+        groups.iter().map(group).collect::<Vec<_>>().join("; ")
+    )
 }
 
 /// An experiment with its findings.
@@ -73,7 +76,7 @@ pub struct ExperimentFindings {
     /// Name of the experiment.
     pub experiment: &'static str,
     /// Scenes that were simulated for it.
-    pub drawn: Vec<Drawn>,
+    pub simulated: Vec<SimulatedScene>,
     /// Its findings.
     #[serde(flatten)]
     pub findings: Findings,
@@ -119,12 +122,13 @@ mod tests {
 
     #[test]
     fn scenes_with_the_same_seeds_are_named_together() {
-        let drawn = |scene: &str, first| Drawn {
+        let simulated = |scene: &str, first| SimulatedScene {
             scene: scene.into(),
             seeds: Split::Test.seeds(first, 5).unwrap(),
         };
-        let note = seeds_note(&[drawn("crowd", 0), drawn("turntable", 7), drawn("walk", 0)]);
-        let expected = "Drawn for this. crowd, walk: 5 seeds of the split test from 0 on; \
+        let note =
+            seeds_note(&[simulated("crowd", 0), simulated("turntable", 7), simulated("walk", 0)]);
+        let expected = "Simulated for this table. crowd, walk: 5 seeds of the split test from 0 on; \
                         turntable: 5 seeds of the split test from 7 on.";
         assert_eq!(note, expected);
     }
@@ -150,11 +154,11 @@ mod tests {
         let (here, again, there) = (find(30), find(30), find(31));
         assert_eq!(here, again);
         assert_ne!(here.findings.tables[0].rows, there.findings.tables[0].rows);
-        let note = "Drawn for this. turntable: 2 seeds of the split test from 30 on.";
+        let note = "Simulated for this table. turntable: 2 seeds of the split test from 30 on.";
         assert!(here.findings.tables.iter().all(|table| table.notes == [note]));
         let json = serde_json::to_value(&here).unwrap();
-        assert_eq!(json["drawn"][0]["scene"], "turntable");
-        assert_eq!(json["drawn"][0]["seeds"]["first"], 30);
+        assert_eq!(json["simulated"][0]["scene"], "turntable");
+        assert_eq!(json["simulated"][0]["seeds"]["first"], 30);
         let none = Experiment { run: |_| Ok(Table::default().into()), ..experiment };
         assert_eq!(none.find(&lab).unwrap().findings.tables[0].notes, [""; 0]);
     }

@@ -208,7 +208,9 @@ fn fit(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     let seeds = lab.seeds(14);
     let scenes = lab.scenes_of(Split::Validation, "crossing-parallel", &SEEN_BY, seeds)?;
     let mut trials = Trials::new(lab, "crossing-parallel", &scenes, contenders?)?;
-    trials.notes.push("Drawn of the split validation: the settings are chosen here.".into());
+    trials
+        .notes
+        .push("Simulated with seeds of the split validation: the settings are chosen here.".into());
     Ok(trials.table("Free parameters of the printed form", false).into())
 }
 
@@ -255,10 +257,10 @@ impl Trials {
             format!("{} draws of {name}, depth by stereo, no colour", scenes.len()),
             "Success: each head within 22 cm, half the shoulders, in all frames, by one track; \
              across the line of sight (as P3, who looked at images), or on the floor; \"while \
-             seen\": in the frames in which 40 % of the upper body is seen. Where somebody is \
+             seen\": in the frames in which 40 % of the upper body is seen. Where a person is \
              who turned back or stopped while hidden cannot be known."
                 .into(),
-            "No trial is a draw in which somebody had no track before silhouettes overlapped: P3 \
+            "No trial is a draw in which a person had no track before silhouettes overlapped: P3 \
              starts from tracks."
                 .into(),
             "Errors: the nearest confirmed track within 1 m, hidden people included; over \

@@ -45,7 +45,7 @@ pub trait Progress: Sync {
 
 /// A simulated scene with its seeds.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Drawn {
+pub struct SimulatedScene {
     /// Name of the scene.
     pub scene: String,
     /// Seeds of the scene.
@@ -54,19 +54,19 @@ pub struct Drawn {
 
 /// Scenes that a lab has simulated.
 #[derive(Debug, Default)]
-pub struct DrawnScenes(Mutex<Vec<Drawn>>);
+pub struct SimulatedScenes(Mutex<Vec<SimulatedScene>>);
 
-impl DrawnScenes {
-    fn add(&self, drawn: Drawn) {
+impl SimulatedScenes {
+    fn add(&self, simulated: SimulatedScene) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         // Several tables of one experiment may use the same scenes.
-        if !all.contains(&drawn) {
-            all.push(drawn);
+        if !all.contains(&simulated) {
+            all.push(simulated);
         }
     }
 
     /// Returns the scenes simulated since the last call.
-    pub(crate) fn take(&self) -> Vec<Drawn> {
+    pub(crate) fn take(&self) -> Vec<SimulatedScene> {
         std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
@@ -86,7 +86,7 @@ pub struct Lab<'a> {
     /// First seed within the split: others give other draws.
     pub first_seed: u64,
     /// Scenes simulated so far.
-    pub drawn: DrawnScenes,
+    pub simulated: SimulatedScenes,
     /// Number of trials that run at once.
     pub jobs: usize,
     /// Receiver of the progress.
@@ -138,7 +138,7 @@ impl Lab<'_> {
         let seeds = split
             .seeds(self.first_seed, seeds)
             .map_err(|error| ReproduceError::Other(error.to_string()))?;
-        self.drawn.add(Drawn { scene: name.to_owned(), seeds });
+        self.simulated.add(SimulatedScene { scene: name.to_owned(), seeds });
         let scene = |seed| {
             let variant = Variant { seed: Some(seed), split: Some(split), set: set.clone() };
             Scene::parse_with(&text, &variant).map_err(|error| {
@@ -231,9 +231,9 @@ pub(crate) mod testing {
 
     pub(crate) fn lab(registry: &Registry, quick: bool, seeds: Option<u64>) -> Lab<'_> {
         let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
-        let (first_seed, drawn) = (0, DrawnScenes::default());
+        let (first_seed, simulated) = (0, SimulatedScenes::default());
         let (jobs, progress) = (1, &Silent);
-        Lab { registry, configs, data: None, quick, seeds, first_seed, drawn, jobs, progress }
+        Lab { registry, configs, data: None, quick, seeds, first_seed, simulated, jobs, progress }
     }
 }
 
@@ -272,10 +272,12 @@ mod tests {
         assert_eq!(seeds(&lab), [2_000_000_000, 2_000_000_001]);
         lab.first_seed = 40;
         assert_eq!(seeds(&lab), [2_000_000_040, 2_000_000_041]);
-        let of =
-            |first| Drawn { scene: "crowd".into(), seeds: Split::Test.seeds(first, 2).unwrap() };
-        assert_eq!(lab.drawn.take(), [of(0), of(40)]);
-        assert_eq!(lab.drawn.take(), []);
+        let of = |first| SimulatedScene {
+            scene: "crowd".into(),
+            seeds: Split::Test.seeds(first, 2).unwrap(),
+        };
+        assert_eq!(lab.simulated.take(), [of(0), of(40)]);
+        assert_eq!(lab.simulated.take(), []);
         lab.first_seed = 999_999_999;
         let error = lab.scenes("crowd", &[], 2).unwrap_err().to_string();
         assert!(error.contains("leave the split test"), "{error}");

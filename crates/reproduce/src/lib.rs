@@ -25,5 +25,5 @@ mod table;
 mod variant;
 
 pub use findings::{Experiment, ExperimentFindings, Findings, Picture, SYSTEMS, System, system};
-pub use lab::{Drawn, DrawnScenes, Lab, Progress, ReproduceError};
+pub use lab::{Lab, Progress, ReproduceError, SimulatedScene, SimulatedScenes};
 pub use table::{Cell, Row, Table};

@@ -77,7 +77,7 @@ const ROOMS: [&str; 3] = ["office", "corridor", "cafeteria"];
 /// Pipeline for which boxes are counted.
 const FOLLOWER: &str = "rgbd-compressive";
 /// Duration of each log; see the experiment `length`.
-const DRAWN: [(&str, &str); 1] = [("duration_s", "12")];
+const SIMULATED: [(&str, &str); 1] = [("duration_s", "12")];
 /// Number of logs for the miss rate by length, and their full duration.
 const GROWING_LOGS: u64 = 4;
 const GROWING_S: &str = "48";
@@ -174,7 +174,7 @@ impl Work {
 }
 
 fn fixed(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
-    let scenes = lab.scenes("static-high", &DRAWN, lab.seeds(STATIC_LOGS))?;
+    let scenes = lab.scenes("static-high", &SIMULATED, lab.seeds(STATIC_LOGS))?;
     let title = "Log-average miss rate before a fixed camera (P2, Fig. 6)";
     table(lab, title, &scenes, 23.8)
 }
@@ -184,7 +184,7 @@ fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let seeds = lab.seeds(MOVING_LOGS).div_ceil(ROOMS.len() as u64);
     let mut scenes = Vec::new();
     for room in ROOMS {
-        scenes.extend(lab.scenes(room, &DRAWN, seeds)?);
+        scenes.extend(lab.scenes(room, &SIMULATED, seeds)?);
     }
     table(lab, "Log-average miss rate from a robot (P2, Fig. 7)", &scenes, 22.2)
 }
@@ -200,19 +200,20 @@ fn table(
     let trials = lab.trials(title, scenes, &contenders, done)?;
     let mut rows = vec![published("P2", published_hz, 6), published("RJ-MCMC, on a GPU", 4.0, 6)];
     for (at, (name, real)) in PIPELINES.iter().zip(&real).enumerate() {
-        let drawn: Vec<&PipelineResult> = trials.iter().map(|runs| &runs[at]).collect();
+        let simulated: Vec<&PipelineResult> = trials.iter().map(|runs| &runs[at]).collect();
         let mut cells = scores(real.iter().map(|log| &log.tally)).to_vec();
-        cells.extend(scores(drawn.iter().map(|done| &done.tally)));
-        cells.extend(Work::sum(drawn.iter().map(|done| done.work)).cells());
+        cells.extend(scores(simulated.iter().map(|done| &done.tally)));
+        cells.extend(Work::sum(simulated.iter().map(|done| done.work)).cells());
         rows.push(Row::ours(*name, cells));
     }
     let scores = ["LAMR", "IDF1", "MOTA"];
-    let scores = ["real", "drawn"].into_iter().flat_map(|w| scores.map(|s| format!("{s}, {w}")));
+    let scores =
+        ["real", "simulated"].into_iter().flat_map(|w| scores.map(|s| format!("{s}, {w}")));
     let columns = scores.chain(WORK.map(String::from)).collect();
     let notes = vec![
         describe(&real),
         format!(
-            "{} drawn scenes; boxes, IoU 0.5; people within 6 m; predicted boxes count",
+            "{} simulated scenes; boxes, IoU 0.5; people within 6 m; predicted boxes count",
             scenes.len()
         ),
         "The paper's curves are pictures; it says that it is better than RJ-MCMC by 8.0 (static) \

@@ -184,7 +184,7 @@ mod tests {
                     vec![Cell::estimate(Some(interval), 3).percent(), Cell::default()],
                 ),
             ],
-            notes: vec!["drawn".into()],
+            notes: vec!["simulated".into()],
         }
     }
 
@@ -195,7 +195,7 @@ mod tests {
             "                          success %   ms",
             "  published: 625               97.8  247",
             "  all             97.1 [93.0, 98.8]    -",
-            "  * drawn\n",
+            "  * simulated\n",
         ];
         assert_eq!(table().text(), expected.join("\n"));
     }
@@ -205,7 +205,7 @@ mod tests {
         let markdown = table().markdown();
         assert!(markdown.contains("|  | success % | ms |\n| --- | --- | --- |\n"), "{markdown}");
         assert!(markdown.contains("| all | 97.1 [93.0, 98.8] | - |\n"), "{markdown}");
-        assert!(markdown.ends_with("\n* drawn\n"));
+        assert!(markdown.ends_with("\n* simulated\n"));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3};
 use tagalong_app::outcome::Failure;
 use tagalong_eval::formats::mot::{self, SequenceInfo};
-use tagalong_eval::formats::{Timeline, kitti, people};
+use tagalong_eval::formats::{Timeline, floor, kitti, people};
 use tagalong_eval::{Region, Role, Truth};
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
@@ -58,6 +58,8 @@ enum TruthPosition {
 enum Kind {
     Mot,
     People,
+    /// People annotated in laser scans.
+    Floor,
     Kitti,
     Log,
     /// Messages of a log's truth channel, as text lines.
@@ -112,6 +114,7 @@ impl TruthFile {
             Kind::Log => Self::of_log(path)?,
             Kind::Lines => Self::of_frames(Kind::Lines, read_truth_lines(path)?),
             Kind::People => Self::of_people(path)?,
+            Kind::Floor => Self::of_floor(path)?,
             Kind::Kitti => Self::of_kitti(path)?,
             Kind::Mot => Self::of_mot(path, options.rules)?,
         };
@@ -161,6 +164,21 @@ impl TruthFile {
             let head = row.head_in_camera_m;
             let position = head.map_or(TruthPosition::Unknown, TruthPosition::HeadInCamera);
             file.add(u64::from(number), truth, position);
+        }
+        Ok(file)
+    }
+
+    /// Reads people in laser scans. Scans count from 0, frames from 1.
+    fn of_floor(path: &Path) -> Result<Self, Failure> {
+        let text = read_text(path)?;
+        let rows = floor::parse(&text, &path.display().to_string()).map_err(Failure::failed)?;
+        let mut file = Self::empty(Kind::Floor);
+        for row in rows {
+            let role = if row.ignore { Role::Ignored } else { Role::Counts };
+            let truth = Truth { id: row.person.id, role, ..Truth::default() };
+            // A run takes a scanner that tf does not place to be at the robot's origin.
+            let place = TruthPosition::Floor(row.robot_m.unwrap_or(row.person.at_m));
+            file.add(u64::from(row.scan) + 1, truth, place);
         }
         Ok(file)
     }
@@ -336,6 +354,7 @@ fn kind_of(path: &Path) -> Result<Kind, Failure> {
     let blank_separated: Vec<&str> = first.split_whitespace().collect();
     let has_class = |fields: &[&str]| fields.get(2).is_some_and(|f| f.parse::<f64>().is_err());
     Ok(match first {
+        _ if first.contains("x_laser_m") => Kind::Floor,
         _ if first.contains("ub_x") || first.contains("head_x") => Kind::People,
         _ if !first.contains(',') && has_class(&blank_separated) => Kind::Kitti,
         _ => Kind::Mot,

@@ -1,4 +1,4 @@
-//! Scenes as TOML: everything that a drawn log depends on, the seed included.
+//! Scenes as TOML: everything that a simulated log depends on, the seed included.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 41] = [
+const BUILT_IN: [(&str, &str); 47] = [
     ("cafeteria", include_str!("../../../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../../../configs/scenes/cafeteria-high.toml")),
     ("corridor", include_str!("../../../configs/scenes/corridor.toml")),
@@ -17,17 +17,23 @@ const BUILT_IN: [(&str, &str); 41] = [
     ("crowd", include_str!("../../../configs/scenes/crowd.toml")),
     ("demo", include_str!("../../../configs/scenes/demo.toml")),
     ("empty-clutter", include_str!("../../../configs/scenes/empty-clutter.toml")),
+    ("follow-alike", include_str!("../../../configs/scenes/follow-alike.toml")),
     ("follow-around", include_str!("../../../configs/scenes/follow-around.toml")),
     ("follow-between", include_str!("../../../configs/scenes/follow-between.toml")),
+    ("follow-child", include_str!("../../../configs/scenes/follow-child.toml")),
     ("follow-coat-stand", include_str!("../../../configs/scenes/follow-coat-stand.toml")),
     ("follow-corner", include_str!("../../../configs/scenes/follow-corner.toml")),
     ("follow-crowd", include_str!("../../../configs/scenes/follow-crowd.toml")),
+    ("follow-crowd-ten", include_str!("../../../configs/scenes/follow-crowd-ten.toml")),
+    ("follow-doors", include_str!("../../../configs/scenes/follow-doors.toml")),
     ("follow-dropped", include_str!("../../../configs/scenes/follow-dropped.toml")),
+    ("follow-fast", include_str!("../../../configs/scenes/follow-fast.toml")),
     ("follow-latency", include_str!("../../../configs/scenes/follow-latency.toml")),
     ("follow-passing", include_str!("../../../configs/scenes/follow-passing.toml")),
     ("follow-return-15", include_str!("../../../configs/scenes/follow-return-15.toml")),
     ("follow-return-30", include_str!("../../../configs/scenes/follow-return-30.toml")),
     ("follow-return-5", include_str!("../../../configs/scenes/follow-return-5.toml")),
+    ("follow-return-two", include_str!("../../../configs/scenes/follow-return-two.toml")),
     ("follow-step-in", include_str!("../../../configs/scenes/follow-step-in.toml")),
     ("follow-swap", include_str!("../../../configs/scenes/follow-swap.toml")),
     ("follow-tilt", include_str!("../../../configs/scenes/follow-tilt.toml")),

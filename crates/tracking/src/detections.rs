@@ -185,13 +185,17 @@ fn is_same_person(a: &Detection, b: &Detection, settings: &MergeSettings) -> boo
     if apart.norm() < settings.same_person_m {
         return true;
     }
+    // Most pairs overlap nowhere, which is quicker to see than a contradiction.
+    let overlap = a.rect().zip(b.rect()).map_or(0.0, |(a, b)| a.iou(&b));
+    if overlap.is_nan() || overlap <= settings.same_person_iou {
+        return false;
+    }
     // Two people in one line of sight overlap as well; they are kept apart if their positions
     // differ by more than their covariances allow.
     let spread = (a.covariance + b.covariance).fixed_view::<2, 2>(0, 0).into_owned();
     let contradicts =
         spread.cholesky().is_none_or(|s| apart.dot(&s.solve(&apart)) > CHI_SQUARED_2_99);
-    let overlap = a.rect().zip(b.rect()).map_or(0.0, |(a, b)| a.iou(&b));
-    !contradicts && overlap > settings.same_person_iou
+    !contradicts
 }
 
 /// 99 % point of chi-squared with two degrees of freedom.

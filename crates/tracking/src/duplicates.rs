@@ -34,8 +34,15 @@ impl DuplicateFinder {
             for (younger, b) in places.range((Bound::Excluded(*older), Bound::Unbounded)) {
                 let pair = (*older, *younger);
                 let before = self.near.get(&pair).copied().unwrap_or_default();
-                let is_near =
-                    (a - b).norm() < duplicate_m && !is_hidden(*older) && !is_hidden(*younger);
+                // Most pairs are far apart along one axis already.
+                let may_be_near = (a.x - b.x).abs() <= 1.01 * duplicate_m;
+                let is_near = may_be_near
+                    && (a - b).norm() < duplicate_m
+                    && !is_hidden(*older)
+                    && !is_hidden(*younger);
+                if !is_near && self.near.is_empty() {
+                    continue;
+                }
                 let now = before << 1 & WINDOW | u8::from(is_near);
                 if now > 0 {
                     near.insert(pair, now);

@@ -1,9 +1,11 @@
 //! Occlusion of people by nearer ones (P4, section III-C): silhouettes are rendered at the
 //! predicted positions, from near to far.
 
+use std::sync::LazyLock;
+
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use tagalong_core::{Detection, Estimate, Frame};
-use tagalong_geometry::{Camera, Rect};
+use tagalong_geometry::{Camera, Lens, Rect};
 
 use crate::OcclusionSettings;
 
@@ -123,11 +125,21 @@ fn shown(
     settings: &OcclusionSettings,
 ) -> Shown {
     let range = range_m(position, camera);
-    let in_front: Vec<&Occluder> = occluders
-        .iter()
-        .filter(|c| range - c.range_m > settings.min_gap_m.max(settings.min_gap_sigmas * c.sigma_m))
-        .collect();
+    let is_nearer = |c: &Occluder| {
+        range - c.range_m > settings.min_gap_m.max(settings.min_gap_sigmas * c.sigma_m)
+    };
+    let in_front: Vec<&Occluder> =
+        occluders.iter().filter(|c| is_nearer(c) && may_hide(&c.region, region, camera)).collect();
     let image = Rect::new(0.0, 0.0, camera.width as f64, camera.height as f64);
+    // Most people are wholly in the image with nobody before them; their samples need no look.
+    if in_front.is_empty() && is_within(region, &image) && is_plain(region) {
+        return Shown { all: *ON_BODY, inside: *ON_BODY, visible: *ON_BODY };
+    }
+    count(region, &image, &in_front, camera)
+}
+
+/// Counts the samples one by one.
+fn count(region: &Rect, image: &Rect, in_front: &[&Occluder], camera: &Camera) -> Shown {
     let (mut all, mut inside, mut visible) = (0_u32, 0_u32, 0_u32);
     for point in silhouette(region) {
         all += 1;
@@ -140,6 +152,36 @@ fn shown(
         }
     }
     Shown { all, inside, visible }
+}
+
+/// Number of samples on the silhouette, which is the same in all regions.
+static ON_BODY: LazyLock<u32> =
+    LazyLock::new(|| silhouette(&Rect::new(0.0, 0.0, 1.0, 1.0)).count() as u32);
+
+/// Returns true for a region so large that rounding moves no sample across the silhouette's edge.
+fn is_plain(region: &Rect) -> bool {
+    let is_coarse = |from: f64, length: f64| length > 1e-6 * (1.0 + from.abs());
+    is_coarse(region.x, region.width) && is_coarse(region.y, region.height)
+}
+
+/// Returns true if all samples of a region are inside of the image, with a pixel to spare.
+fn is_within(region: &Rect, image: &Rect) -> bool {
+    region.x > 1.0
+        && region.y > 1.0
+        && region.right() < image.right() - 1.0
+        && region.bottom() < image.bottom() - 1.0
+}
+
+/// Returns false if the body of an occluder lies wholly beside the upper body in `region`.
+fn may_hide(occluder: &Rect, region: &Rect, camera: &Camera) -> bool {
+    // The trunk reaches down to 2.5 times the height of the square. A pixel more on each side, so
+    // that rounding cannot decide.
+    let trunk = occluder.y + 2.5 * occluder.height;
+    let is_beside = region.x > occluder.right() + 1.0 || occluder.x > region.right() + 1.0;
+    let is_above_or_below = region.y > trunk + 1.0 || occluder.y > region.bottom() + 1.0;
+    // Columns of a panorama are on both sides of each other.
+    let is_beside = is_beside && !matches!(camera.lens, Lens::Panorama(_));
+    !(is_beside || is_above_or_below)
 }
 
 /// Returns samples spread evenly over head, shoulders and trunk.
@@ -186,7 +228,8 @@ pub(crate) fn occluder_of_detection(
 
 #[cfg(test)]
 mod tests {
-    use tagalong_geometry::{ConicalMirror, Distortion, Lens, Panorama, Pinhole};
+    use proptest::prelude::*;
+    use tagalong_geometry::{ConicalMirror, Distortion, Panorama, Pinhole};
 
     use super::*;
 
@@ -194,6 +237,29 @@ mod tests {
         let lens =
             Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+    }
+
+    proptest! {
+        #[test]
+        fn what_shows_is_counted_as_sample_by_sample(
+            boxes in prop::collection::vec(
+                (prop::array::uniform2(-200.0..800.0f64), 0.0..300.0f64, 0.5..9.0f64), 1..9),
+        ) {
+            let camera = camera();
+            let region = |([x, y], side, _): &([f64; 2], f64, f64)| Rect::new(*x, *y, *side, *side);
+            let at = |ahead_m: f64| Point3::new(ahead_m, 0.0, 1.2);
+            let occluder = |b| Occluder::new(region(b), &at(b.2), &Matrix3::zeros(), &camera);
+            let occluders: Vec<Occluder> = boxes[1..].iter().map(occluder).collect();
+            let settings = OcclusionSettings::default();
+            let (region, range_m) = (region(&boxes[0]), boxes[0].2);
+            let fast = shown(&region, &at(range_m), &occluders, &camera, &settings);
+            let nearer = occluders.iter().filter(|c| range_m - c.range_m > settings.min_gap_m);
+            let image = Rect::new(0.0, 0.0, 640.0, 480.0);
+            let slow = count(&region, &image, &nearer.collect::<Vec<_>>(), &camera);
+            prop_assert_eq!(
+                [fast.all, fast.inside, fast.visible], [slow.all, slow.inside, slow.visible]
+            );
+        }
     }
 
     fn behind(near: Point3<f64>, sigma_m: f64, far: Point3<f64>) -> Visibility {

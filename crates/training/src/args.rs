@@ -24,8 +24,9 @@ pub struct TrainArgs {
     /// A quick training, to see that it works; the model is poor.
     #[arg(long)]
     pub quick: bool,
-    /// Scenes that are simulated for the first round of a verifier [default: 256]; more of them
-    /// take longer, and help a large model.
+    /// Scenes that are simulated for the first round of a verifier [default: 256], or for
+    /// `laser-legs` beside its bags [default: none]; more of them take longer, and help a large
+    /// model.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(4..=900))]
     pub scenes: Option<u64>,
     /// Further rounds of a verifier, each of which adds the model's mistakes to the training data

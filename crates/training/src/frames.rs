@@ -118,9 +118,9 @@ fn without(model: &Path, room: &str) -> PathBuf {
 fn show_scene(number: u64, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {
     let scene = wide_scene(Split::Train, number, LOOK).map_err(Failure::failed)?;
     let mut draw = Draw::new(&scene, threads(None));
-    while let Some(drawn) = draw.next_frame() {
-        let people: Vec<AnnotatedPerson> = drawn.truth.iter().map(of_truth).collect();
-        trainer.add_frame(&drawn.frame, &people, None, group).map_err(Failure::failed)?;
+    while let Some(simulated) = draw.next_frame() {
+        let people: Vec<AnnotatedPerson> = simulated.truth.iter().map(of_truth).collect();
+        trainer.add_frame(&simulated.frame, &people, None, group).map_err(Failure::failed)?;
     }
     Ok(())
 }

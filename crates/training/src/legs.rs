@@ -1,17 +1,16 @@
-//! Training of `laser-legs` on laser scans with annotated legs.
+//! Training of `laser-legs` on laser scans with annotated legs, and on simulated ones.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3};
+use nalgebra::{Matrix3, Point3};
 use serde::Serialize;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_config::{Example, Trainer};
-use tagalong_core::{Detection, EgoMotion, Frame, Images, LaserScan, Stamp};
-use tagalong_geometry::Camera;
+use tagalong_core::Detection;
 use tagalong_log::{LegScan, Limits, read_leg_scans};
 
+use super::leg_scenes::{self, frame};
 use super::photos::fingerprint;
 use crate::session::{Session, write};
 
@@ -33,6 +32,8 @@ struct LegCard {
     seed: u64,
     trained_on: Vec<String>,
     scans: usize,
+    /// Number of the simulated scans among them.
+    simulated_scans: usize,
     fit: toml::Table,
 }
 
@@ -49,6 +50,8 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
         scans += add_bag(bag, session.args.quick, trainer)?;
         session.bar.inc(1);
     }
+    let simulated = add_scenes(session, trainer)?;
+    scans += simulated;
     session.tell(0, "fitting");
     session.bar.set_length(1000);
     let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
@@ -65,6 +68,7 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
         seed: session.args.seed,
         trained_on: bags.iter().map(name).collect(),
         scans,
+        simulated_scans: simulated,
         fit: fitted.figures,
     };
     let text = toml::to_string(&card).map_err(Failure::failed)?;
@@ -77,6 +81,20 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     print(&text)?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)
+}
+
+/// Passes the scans of simulated scenes to the trainer, if any are asked for; returns their number.
+fn add_scenes(session: &Session<'_>, trainer: &mut dyn Trainer) -> Result<usize, Failure> {
+    let Some(count) = session.args.scenes else { return Ok(0) };
+    session.tell(0, "simulating");
+    session.bar.set_length(count);
+    let first = session.args.seed.wrapping_mul(1000) % 1_000_000;
+    let mut scans = 0;
+    for number in first..first + count {
+        scans += leg_scenes::add(number, trainer)?;
+        session.bar.inc(1);
+    }
+    Ok(scans)
 }
 
 /// Returns the bags in the order of their names.
@@ -121,7 +139,7 @@ fn add_bag(bag: &Path, quick: bool, trainer: &mut dyn Trainer) -> Result<usize, 
 
 /// Passes the legs of a scan to the trainer, and then the scan as a whole.
 fn add_scan(scan: &LegScan, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {
-    let frame = frame(&scan.scan);
+    let frame = frame(scan.scan.clone());
     let mut add = |x: f64, y: f64, is_person: bool| {
         let candidate = Detection {
             image: None,
@@ -134,10 +152,4 @@ fn add_scan(scan: &LegScan, group: u64, trainer: &mut dyn Trainer) -> Result<(),
     };
     scan.legs.iter().try_for_each(|leg| add(leg.x, leg.y, true))?;
     add(0.0, 0.0, false)
-}
-
-fn frame(scan: &LaserScan) -> Frame {
-    let camera = Arc::new(Camera::blind(Isometry3::identity()));
-    Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.0), Images::default())
-        .with_laser(Some(scan.clone()))
 }

@@ -11,6 +11,7 @@ mod faces;
 mod frames;
 mod held_out;
 mod in_use;
+mod leg_scenes;
 mod legs;
 #[cfg(test)]
 mod overlap;

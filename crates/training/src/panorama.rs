@@ -100,8 +100,8 @@ fn show(session: &Session<'_>, room: &Room, trainer: &mut dyn Trainer) -> Result
     // Each room has its own range of group numbers, because ids of people begin anew.
     let first = if room.seed == session.args.seed { 0 } else { STRANGER * (1 + room.seed) };
     let mut draw = Draw::new(&scene, threads(None));
-    while let Some(drawn) = draw.next_frame() {
-        take(&drawn.frame, &drawn.truth, first, trainer)?;
+    while let Some(simulated) = draw.next_frame() {
+        take(&simulated.frame, &simulated.truth, first, trainer)?;
         session.bar.inc(1);
     }
     Ok(())

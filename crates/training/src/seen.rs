@@ -89,11 +89,11 @@ pub fn in_scene(
 ) -> Result<(), Failure> {
     let mut draw = Draw::new(scene, threads);
     let mut stereo = StereoDepth::new(stereo).map_err(Failure::failed)?;
-    while let Some(drawn) = draw.next_frame() {
-        let people = drawn.truth.iter().map(known).collect();
-        let frame = match drawn.frame.depth() {
-            Ok(_) => drawn.frame,
-            Err(_) => with_depth(drawn.frame, &mut stereo)?,
+    while let Some(simulated) = draw.next_frame() {
+        let people = simulated.truth.iter().map(known).collect();
+        let frame = match simulated.frame.depth() {
+            Ok(_) => simulated.frame,
+            Err(_) => with_depth(simulated.frame, &mut stereo)?,
         };
         see(&AnnotatedFrame { frame, people })?;
     }

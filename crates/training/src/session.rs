@@ -71,7 +71,7 @@ impl<'a> Session<'a> {
 
     /// Returns the names of the training data.
     pub fn sources(&self) -> Vec<String> {
-        let mut names = vec!["drawn rooms".to_owned()];
+        let mut names = vec!["simulated rooms".to_owned()];
         if self.args.data.is_some() {
             names.extend(self.train_logs().map(|log| format!("logs/{log}.mcap")));
             names.extend(

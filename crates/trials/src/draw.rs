@@ -17,7 +17,7 @@ const REORDERED: usize = 3;
 const KEPT_NS: u64 = 1_000_000_000;
 
 /// Input of a pipeline at one moment of a scene, and the truth at that moment.
-pub struct Drawn {
+pub struct SimulatedFrame {
     /// The frame.
     pub frame: Frame,
     /// Everybody.
@@ -83,7 +83,7 @@ impl Draw {
     }
 
     /// The next frame; `None` at the end of the scene.
-    pub fn next_frame(&mut self) -> Option<Drawn> {
+    pub fn next_frame(&mut self) -> Option<SimulatedFrame> {
         self.next_frame_while(|_, _| None)
     }
 
@@ -92,7 +92,7 @@ impl Draw {
     pub fn next_frame_while(
         &mut self,
         mut at_wheels: impl FnMut(&Simulation, &Event) -> Option<WheelSpeeds>,
-    ) -> Option<Drawn> {
+    ) -> Option<SimulatedFrame> {
         while self.waiting.len() <= self.patience {
             let event = self.simulation.next_event();
             if let Some(wheels) = event.as_ref().and_then(|e| at_wheels(&self.simulation, e)) {
@@ -110,10 +110,10 @@ impl Draw {
             }
         }
         let (_, shot) = self.waiting.pop_first()?;
-        Some(self.drawn(shot))
+        Some(self.simulated(shot))
     }
 
-    fn drawn(&mut self, shot: Shot) -> Drawn {
+    fn simulated(&mut self, shot: Shot) -> SimulatedFrame {
         self.index += 1;
         let stamp = Stamp::from_nanos(shot.captured_ns);
         // The odometry speaks at every step of the simulation, so at this one.
@@ -127,7 +127,7 @@ impl Draw {
         let scan = self.simulation.laser().zip(shot.laser.as_deref());
         let laser = scan.map(|(laser, ranges)| laser.scan(ranges));
         let frame = Frame::new(self.index, stamp, camera, motion, self.as_logged(shot.images));
-        Drawn {
+        SimulatedFrame {
             frame: frame.with_laser(laser),
             truth: shot.truth,
             odom_from_robot,
@@ -182,12 +182,12 @@ mod tests {
         rate_hz = 20.0\n[robot]\npath = [[6.0, 4.0]]\n[faults]\nlate = 0.4\ndropped = 0.2\n\
         [[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
 
-    fn drawn(mut draw: Draw) -> Vec<Drawn> {
+    fn simulated(mut draw: Draw) -> Vec<SimulatedFrame> {
         std::iter::from_fn(|| draw.next_frame()).collect()
     }
 
-    fn stamps(all: &[Drawn]) -> Vec<u64> {
-        all.iter().map(|drawn| drawn.frame.stamp.nanos() / 1_000_000).collect()
+    fn stamps(all: &[SimulatedFrame]) -> Vec<u64> {
+        all.iter().map(|simulated| simulated.frame.stamp.nanos() / 1_000_000).collect()
     }
 
     fn scene() -> Scene {
@@ -196,8 +196,9 @@ mod tests {
 
     #[test]
     fn late_frames_are_in_order_in_a_log_and_not_on_a_robot() {
-        let (log, live) = (drawn(Draw::new(&scene(), 1)), drawn(Draw::live(&scene(), 1)));
-        let sorted = |all: &[Drawn]| all.windows(2).all(|p| p[0].frame.stamp < p[1].frame.stamp);
+        let (log, live) = (simulated(Draw::new(&scene(), 1)), simulated(Draw::live(&scene(), 1)));
+        let sorted =
+            |all: &[SimulatedFrame]| all.windows(2).all(|p| p[0].frame.stamp < p[1].frame.stamp);
         assert!(sorted(&log), "{:?}", stamps(&log));
         assert!(!sorted(&live), "{:?}", stamps(&live));
         assert!(log.len() == live.len() && log.len() < 80);
@@ -206,7 +207,7 @@ mod tests {
     #[test]
     fn motions_add_up_to_the_odometry() {
         for draw in [Draw::new(&scene(), 1), Draw::live(&scene(), 1)] {
-            let all = drawn(draw);
+            let all = simulated(draw);
             let sum =
                 all.iter().fold(all[0].odom_from_robot, |pose, d| pose * d.frame.motion.isometry());
             let last = all.iter().max_by_key(|d| d.frame.stamp).unwrap();
@@ -221,8 +222,8 @@ mod tests {
     fn a_steered_robot_goes_where_it_is_told() {
         let mut draw = Draw::live(&scene(), 1);
         let mut last = Isometry2::identity();
-        while let Some(drawn) = draw.next_frame() {
-            last = drawn.world_from_robot;
+        while let Some(simulated) = draw.next_frame() {
+            last = simulated.world_from_robot;
             draw.steer(WheelSpeeds { left: -0.2, right: -0.2 });
         }
         assert!(last.translation.x < 0.85, "{last}");

@@ -38,7 +38,7 @@ mod trial;
 
 pub use contender::Contender;
 pub use crossing::{Crossing, Failing, Span, crossing};
-pub use draw::{Draw, Drawn, ODOMETRY_SIGMA};
+pub use draw::{Draw, ODOMETRY_SIGMA, SimulatedFrame};
 pub use given::{GivenSequence, GivenTracks, for_given_boxes};
 pub use judge::{Judge, Judged};
 pub use occlusion::{Occlusion, Outcome, occlusions, outcome};

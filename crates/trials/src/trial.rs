@@ -8,7 +8,7 @@ use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 use tagalong_sim::{Furniture, Scene, Truth};
 use tagalong_stereo::{StereoDepth, StereoSettings};
 
-use crate::{Contender, Draw, Drawn};
+use crate::{Contender, Draw, SimulatedFrame};
 
 /// Why a trial has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -112,10 +112,10 @@ impl Trial {
         let settings = StereoSettings { threads: 1, ..stereo.clone() };
         let stereo = StereoDepth::new(settings);
         let mut stereo = stereo.map_err(|error| TrialError::Config(error.to_string()))?;
-        Self::prepared(scene, contenders, registry, 1, |drawn: Drawn| {
-            let depth = stereo.depth(&drawn.frame, &mut Funnel::default());
+        Self::prepared(scene, contenders, registry, 1, |simulated: SimulatedFrame| {
+            let depth = stereo.depth(&simulated.frame, &mut Funnel::default());
             let depth = depth.map_err(|error| TrialError::Pair(error.to_string()))?;
-            Ok(Drawn { frame: drawn.frame.with_depth(depth), ..drawn })
+            Ok(SimulatedFrame { frame: simulated.frame.with_depth(depth), ..simulated })
         })
     }
 
@@ -124,17 +124,17 @@ impl Trial {
         contenders: &[Contender],
         registry: &Registry,
         threads: usize,
-        mut prepare: impl FnMut(Drawn) -> Result<Drawn, TrialError>,
+        mut prepare: impl FnMut(SimulatedFrame) -> Result<SimulatedFrame, TrialError>,
     ) -> Result<Self, TrialError> {
         let mut draw = Draw::new(scene, threads);
         let furniture = draw.simulation().furniture().to_vec();
         let camera = draw.camera().clone();
         let mut lanes = Lane::all(scene, contenders, registry)?;
         let mut moments = Vec::new();
-        while let Some(drawn) = draw.next_frame() {
-            let drawn = prepare(drawn)?;
-            lanes.iter_mut().try_for_each(|lane| lane.step(&drawn))?;
-            moments.push(Moment::of(drawn));
+        while let Some(simulated) = draw.next_frame() {
+            let simulated = prepare(simulated)?;
+            lanes.iter_mut().try_for_each(|lane| lane.step(&simulated))?;
+            moments.push(Moment::of(simulated));
         }
         let runs = lanes.into_iter().map(|lane| lane.run).collect();
         Ok(Self { seed: scene.seed, camera, furniture, moments, runs })
@@ -142,8 +142,8 @@ impl Trial {
 }
 
 impl Moment {
-    pub(crate) fn of(drawn: Drawn) -> Self {
-        let Drawn { frame, truth, odom_from_robot, world_from_robot } = drawn;
+    pub(crate) fn of(simulated: SimulatedFrame) -> Self {
+        let SimulatedFrame { frame, truth, odom_from_robot, world_from_robot } = simulated;
         Self { stamp: frame.stamp, truth, odom_from_robot, world_from_robot }
     }
 }
@@ -170,9 +170,9 @@ impl Lane {
         contenders.iter().map(|contender| Self::new(scene, contender, registry)).collect()
     }
 
-    fn step(&mut self, drawn: &Drawn) -> Result<(), TrialError> {
+    fn step(&mut self, simulated: &SimulatedFrame) -> Result<(), TrialError> {
         let before = ThreadTime::now();
-        let report = self.pipeline.step(&drawn.frame).map_err(|error| TrialError::Step {
+        let report = self.pipeline.step(&simulated.frame).map_err(|error| TrialError::Step {
             pipeline: self.run.pipeline.clone(),
             seed: self.seed,
             error,

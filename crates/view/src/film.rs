@@ -3,24 +3,22 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry2, Point2, Point3};
+use nalgebra::Isometry2;
 use tagalong_app::config_file::OuterSettings;
 use tagalong_app::outcome::Failure;
 use tagalong_app::progress::Progress;
 use tagalong_geometry::Camera;
 use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
+use tagalong_page::data::{FrameData, RunData};
+use tagalong_page::frame::{add_trails, scan_points, view_edges};
 use tagalong_render::background;
 use tagalong_scoring::{Shot, Shots};
 
-use crate::page_data::{FrameData, RunData};
 use crate::pictures::Pictures;
 use crate::recording::Recording;
 
 /// Frames of a trail.
 const TRAIL_FRAMES: usize = 40;
-
-/// Points kept of a laser scan.
-const SCAN_POINTS: usize = 240;
 
 /// Parts of the page that come from the log.
 pub struct Film {
@@ -124,7 +122,7 @@ impl Film {
             self.view_rad = Some(view_edges(&frame.camera));
         }
         for run in runs {
-            add_trails(&mut run.frames, at, &frame.camera, &item.odom_from_robot);
+            add_trails_at(&mut run.frames, at, &frame.camera, &item.odom_from_robot);
         }
     }
 
@@ -134,25 +132,8 @@ impl Film {
     }
 }
 
-/// Returns evenly chosen points of a scan in the odometry frame, cm.
-fn scan_points(points: &[Point3<f64>], odom_from_robot: &Isometry2<f64>) -> Vec<i32> {
-    let every = points.len().div_ceil(SCAN_POINTS).max(1);
-    let chosen = points.iter().step_by(every).map(|point| odom_from_robot * point.xy());
-    chosen.flat_map(|point| [point.x, point.y].map(|v| (100.0 * v).round() as i32)).collect()
-}
-
-/// Returns the directions of the left and right edge of the image, from the robot's heading.
-fn view_edges(camera: &Camera) -> [f64; 2] {
-    let middle = 0.5 * camera.height as f64;
-    [0.0, camera.width as f64 - 1.0].map(|column| {
-        let ray = camera.robot_from_camera.rotation * camera.ray(Point2::new(column, middle));
-        let angle = ray.y.atan2(ray.x);
-        (angle * 1e4).round() / 1e4
-    })
-}
-
-/// Projects the past heads of the tracks of a frame into its image.
-fn add_trails(
+/// Adds the trails of one frame of a run.
+fn add_trails_at(
     frames: &mut [Option<FrameData>],
     at: usize,
     camera: &Camera,
@@ -162,25 +143,16 @@ fn add_trails(
     let Some(Some(frame)) = rest.first_mut() else { return };
     let from = past.len().saturating_sub(TRAIL_FRAMES);
     let before: Vec<&FrameData> = past[from..].iter().flatten().collect();
-    for track in frame.tracks.iter_mut().filter(|track| track.state != "tentative") {
-        let heads =
-            before.iter().filter_map(|frame| frame.tracks.iter().find(|t| t.id == track.id));
-        let heads = heads.map(|t| {
-            let floor = odom_from_robot.inverse_transform_point(&Point2::from(t.at));
-            Point3::new(floor.x, floor.y, t.z)
-        });
-        let pixels = heads.filter_map(|head| camera.project(&head));
-        track.trail = pixels.flat_map(|p| [p.x, p.y].map(|v| v.round() as i32)).collect();
-    }
+    add_trails(&before, frame, camera, odom_from_robot);
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector2;
     use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_page::data::TrackData;
 
     use super::*;
-    use crate::page_data::TrackData;
 
     fn camera() -> Camera {
         let lens =
@@ -193,27 +165,11 @@ mod tests {
         let person = |at| TrackData { id: 1, state: "seen", at, z: 1.6, ..TrackData::default() };
         let frame = |at| Some(FrameData { tracks: vec![person(at)], ..FrameData::default() });
         let mut frames = vec![frame([4.0, 0.0]), None, frame([4.0, 0.5])];
-        add_trails(&mut frames, 2, &camera(), &Isometry2::identity());
+        add_trails_at(&mut frames, 2, &camera(), &Isometry2::identity());
         assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [320, 240], "straight ahead");
         // Turned to the left, the place is to the right in the image.
         let turned = Isometry2::new(Vector2::zeros(), 0.1);
-        add_trails(&mut frames, 2, &camera(), &turned);
+        add_trails_at(&mut frames, 2, &camera(), &turned);
         assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [370, 240]);
-    }
-
-    #[test]
-    fn the_edges_of_the_view_are_left_and_right() {
-        let [left, right] = view_edges(&camera());
-        assert!((left - 0.5686).abs() < 0.01 && (right + 0.5686).abs() < 0.01, "{left} {right}");
-    }
-
-    #[test]
-    fn scans_are_thinned_and_moved_into_the_odometry_frame() {
-        let points: Vec<Point3<f64>> =
-            (0..1000).map(|i| Point3::new(f64::from(i), 0.0, 0.2)).collect();
-        let turned = Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2);
-        let shown = scan_points(&points, &turned);
-        assert!(shown.len() <= 2 * SCAN_POINTS, "{}", shown.len());
-        assert_eq!(shown[..4], [100, 0, 100, 500]);
     }
 }

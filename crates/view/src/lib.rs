@@ -6,10 +6,8 @@
 //! time in the browser but the answer to a click.
 
 mod assemble;
-mod events;
+mod clip;
 mod film;
-mod page;
-mod page_data;
 mod pictures;
 mod recording;
 mod truth;
@@ -19,12 +17,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
+use tagalong_page::data::{PageData, RunData};
+use tagalong_page::html::{Heading, html};
 use tagalong_scoring::TruthFile;
 
 use crate::assemble::{Span, run_data, stamps, times};
 use crate::film::Film;
-use crate::page::{Heading, html};
-use crate::page_data::{PageData, RunData};
 use crate::recording::Recording;
 use crate::truth::PageTruth;
 
@@ -57,6 +55,15 @@ pub struct ViewArgs {
     /// that does not suffice.
     #[arg(long, value_name = "MB", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub max_mb: u32,
+    /// Write an animation (GIF) of the pictures of `run --overlay` instead of the page.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["other", "output", "log", "truth"])]
+    pub animation: Option<PathBuf>,
+    /// Width of the animation, in pixels.
+    #[arg(long, value_name = "PX", default_value_t = 480, requires = "animation", value_parser = clap::value_parser!(u32).range(64..=4096))]
+    pub width: u32,
+    /// Pictures of the animation for each second of the log, shown at that pace.
+    #[arg(long, value_name = "HZ", default_value_t = 8, requires = "animation", value_parser = clap::value_parser!(u32).range(1..=50))]
+    pub fps: u32,
 }
 
 /// Examples for `tagalong view --help`.
@@ -69,7 +76,8 @@ Examples:
   tagalong run robot.mcap && tagalong view runs/robot-depth-verified
   tagalong view runs/robot-depth-verified runs/robot-depth-ekf -o compare.html
   tagalong view runs/robot-depth-verified --from 30 --to 60 --max-mb 50
-  tagalong view runs/robot-depth-verified --log /data/robot.mcap --truth robot.people.csv";
+  tagalong view runs/robot-depth-verified --log /data/robot.mcap --truth robot.people.csv
+  tagalong view runs/robot-depth-verified --from 30 --to 36 --animation clip.gif    (after run --overlay)";
 
 /// Writes the page of one run or two.
 ///
@@ -77,6 +85,9 @@ Examples:
 /// A folder that is no run, two runs of different logs, a log or a truth that was named and cannot
 /// be used, a page that exists.
 pub fn view(args: &ViewArgs) -> Outcome {
+    if let Some(file) = &args.animation {
+        return clip::write(args, file);
+    }
     let output = args.output.clone().unwrap_or_else(|| args.run.join("view.html"));
     let folders = [Some(&args.run), args.other.as_ref()];
     let runs: Vec<Recording> = folders
@@ -136,10 +147,21 @@ impl Page {
         name_apart(&mut data.runs, runs);
         let left = budget.saturating_sub(length_of(&data));
         add_log(&mut data, runs, &stamps, args, left, &mut notes)?;
-        let heading = Heading::of(runs, &data, &notes);
+        let heading = heading(runs, &data, &notes);
         let text = html(&heading, &data).map_err(Failure::failed)?;
         Ok(Self { text, frames: data.t.len(), notes })
     }
+}
+
+/// Describes the runs of a page.
+fn heading(runs: &[Recording], data: &PageData, notes: &[String]) -> Heading {
+    let log = runs.first().map(|run| run.report.log.name.clone()).unwrap_or_default();
+    let described = runs.iter().zip(&data.runs).map(|(run, shown)| {
+        let frames = shown.frames.iter().flatten().count();
+        let (name, folder) = (&shown.name, run.folder.display());
+        format!("{name}: {frames} frames, {}, from {folder}", run.report.ended)
+    });
+    Heading { log, runs: described.collect(), notes: notes.to_vec() }
 }
 
 /// Returns the frames of the runs, every second or third where all would be too long.

@@ -10,6 +10,7 @@ use tagalong_app::outcome::Failure;
 use tagalong_config::{FileLimit, read_text};
 use tagalong_log::msgs::{StringMsg, decode};
 use tagalong_log::{Limits, LogWalker, read_attachment};
+use tagalong_page::moment::{Moment, TrackState};
 use toml::Table;
 
 /// Topic of the tracks as JSON in `tracks.mcap`.
@@ -50,48 +51,12 @@ pub struct FileFacts {
     pub sha256: String,
 }
 
-/// Frame of a run.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Moment {
-    /// Candidates, funnel and pose.
-    pub notes: FrameNotes,
-    /// All tracks.
-    pub tracks: Vec<TrackState>,
-    /// Track of the person to follow.
-    pub target: Option<u32>,
-}
-
 /// Message on [`TRACKS_TOPIC`].
 #[derive(Deserialize)]
 struct TracksMessage {
     stamp_ns: u64,
     target: Option<u32>,
     tracks: Vec<TrackState>,
-}
-
-/// Track in one frame.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-pub struct TrackState {
-    /// Number of the track.
-    pub id: u32,
-    /// True once the track is reported.
-    pub confirmed: bool,
-    /// True if evidence of this frame supports it.
-    pub seen: bool,
-    /// True if a nearer tracked person hides it.
-    pub occluded: bool,
-    /// Time since evidence supported it, s.
-    pub unseen_s: f64,
-    /// Probability that it is a person.
-    pub probability: f64,
-    /// Centre of the head in the robot frame, m.
-    pub head_robot_m: [f64; 3],
-    /// Centre of the head in the odometry frame, m.
-    pub head_odom_m: [f64; 3],
-    /// Velocity along the axes of the robot frame, m/s.
-    pub velocity_robot_mps: [f64; 2],
-    /// Upper-body square, pixels.
-    pub upper_body_px: [f64; 4],
 }
 
 impl Recording {

@@ -174,7 +174,7 @@ fn true_places(log: &Path, seen: &CameraSightings) -> Result<Places, Failure> {
         }
     }
     if places.is_empty() {
-        let text = "nothing says where the hat really was: give places with --known; a drawn log \
+        let text = "nothing says where the hat really was: give places with --known; a simulated log \
                     knows them if there is one person in it";
         return Err(Failure::usage(text));
     }

@@ -1,4 +1,4 @@
-//! Generates one plugin of each kind in a copy of the workspace, and the one of the walk-through,
+//! Generates one plugin of each kind in a copy of the workspace, and those of the walk-throughs,
 //! and runs the checks of every plugin on them.
 
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use clap::ValueEnum as _;
 
 use crate::metadata::Metadata;
 use crate::new_plugin::{Kind, create, format};
-use crate::walk_through;
+use crate::walk_through::GUIDES;
 use crate::workspace::{Workspace, remove_folder, succeed};
 
 /// Where the copy lives: where `cargo clean` removes it.
@@ -34,9 +34,11 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
         format(&copy, &name)?;
         names.push(name);
     }
-    walk_through::walk(&copy)?;
-    format(&copy, walk_through::NAME)?;
-    names.push(walk_through::NAME.to_owned());
+    for guide in &GUIDES {
+        guide.walk(&copy)?;
+        format(&copy, guide.name)?;
+        names.push(guide.name.to_owned());
+    }
     lend(&target(workspace).join(BUILT), &workspace.root().join(BUILD).join("debug"))?;
     let packages: Vec<String> =
         names.iter().flat_map(|name| ["-p".to_owned(), format!("tagalong-{name}")]).collect();
@@ -63,7 +65,7 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
             cargo(&format!("{config} is a valid config"), &run, &[])?;
         }
     }
-    eprintln!("new-plugin --try: all six kinds work, and so does the walk-through");
+    eprintln!("new-plugin --try: all six kinds work, and so do the walk-throughs");
     Ok(())
 }
 

@@ -1,43 +1,119 @@
-//! The walk-through of `plugins/README.md`, done as it says.
+//! The walk-throughs of the documents, done as they say.
 
 use anyhow::{Context as _, Result};
 
 use crate::new_plugin::{Kind, create};
 use crate::workspace::Workspace;
 
-/// The plugin that the walk-through writes.
-pub const NAME: &str = "contrast";
-
-const GUIDE: &str = "plugins/README.md";
-
-/// Generates the plugin and puts in the code of the guide.
-pub fn walk(workspace: &Workspace) -> Result<()> {
-    create(workspace, Kind::Verifier, NAME)?;
-    let guide = workspace.read(GUIDE)?;
-    let mut code = fences(&guide, "rust").into_iter();
-    let field = code.next().with_context(|| format!("{GUIDE} shows no setting"))?;
-    let method = code.next().with_context(|| format!("{GUIDE} shows no method"))?;
-    let (_, after) =
-        guide.split_once("in `Default` by `").with_context(|| format!("{GUIDE}: no default"))?;
-    let default = after.split('`').next().unwrap_or_default();
-    edit(workspace, "config.rs", |text| {
-        // The guide shows the changed parts only; the template has the rest.
-        let text =
-            replace_between(text, "    /// Added to all log-odds", "pub bias: f64,\n", &field)?;
-        Some(text.replace("bias: 0.0", default))
-    })?;
-    edit(workspace, "verify.rs", |text| {
-        replace_between(text, "    fn log_odds(", "\n    }\n", &method)
-    })
+/// Page that writes a plugin.
+pub struct Guide {
+    page: &'static str,
+    kind: Kind,
+    /// Name of the plugin.
+    pub name: &'static str,
+    edits: &'static [Edit],
 }
 
-fn edit(workspace: &Workspace, file: &str, change: impl Fn(&str) -> Option<String>) -> Result<()> {
-    let path = format!("plugins/{NAME}/src/{file}");
-    let text = workspace.read(&path)?;
-    let changed = change(&text).with_context(|| {
-        format!("{path} is not as {GUIDE} expects: guide or template has changed")
-    })?;
-    workspace.write(&path, &changed)
+/// Change of a source file by the next code block of the page.
+enum Edit {
+    /// Replaces the part from one text to another, both included: the page shows the changed parts
+    /// only, and the template has the rest.
+    Replace { file: &'static str, from: &'static str, to: &'static str },
+    /// Replaces a default by the code in the sentence that begins so; takes no block.
+    Default { file: &'static str, from: &'static str, sentence: &'static str },
+    /// Adds the block at the end.
+    Append { file: &'static str },
+}
+
+/// End of a function of an `impl`.
+const END_OF_FN: &str = "\n    }\n";
+
+/// All walk-throughs.
+pub const GUIDES: [Guide; 3] = [
+    Guide {
+        page: "plugins/README.md",
+        kind: Kind::Verifier,
+        name: "contrast",
+        edits: &[
+            Edit::Replace {
+                file: "config.rs",
+                from: "    /// Added to all log-odds",
+                to: "pub bias: f64,\n",
+            },
+            Edit::Default { file: "config.rs", from: "bias: 0.0", sentence: "in `Default` by `" },
+            Edit::Replace { file: "verify.rs", from: "    fn log_odds(", to: END_OF_FN },
+        ],
+    },
+    Guide {
+        page: "docs/walk-through-filter.md",
+        kind: Kind::Filter,
+        name: "steady",
+        edits: &[
+            Edit::Replace {
+                file: "config.rs",
+                from: "    /// How fast the height of a head wanders",
+                to: "pub height_wander: f64,\n}\n",
+            },
+            Edit::Replace { file: "config.rs", from: "impl Default for Config {", to: "\n}\n" },
+            Edit::Replace { file: "filter.rs", from: "    fn correct(", to: END_OF_FN },
+            Edit::Append { file: "filter.rs" },
+        ],
+    },
+    Guide {
+        page: "docs/walk-through-associator.md",
+        kind: Kind::Associator,
+        name: "seniority",
+        edits: &[
+            Edit::Replace { file: "config.rs", from: "    pub gate_m: f64,\n", to: "}\n" },
+            Edit::Replace { file: "config.rs", from: "impl Default for Config {", to: "\n}\n" },
+            Edit::Replace { file: "associate.rs", from: "    fn associate(", to: END_OF_FN },
+            Edit::Append { file: "associate.rs" },
+        ],
+    },
+];
+
+impl Guide {
+    /// Generates the plugin and puts in the code of the page.
+    pub fn walk(&self, workspace: &Workspace) -> Result<()> {
+        create(workspace, self.kind, self.name)?;
+        let text = workspace.read(self.page)?;
+        let mut blocks = fences(&text, "rust").into_iter();
+        for edit in self.edits {
+            let file = edit.file();
+            let path = format!("plugins/{}/src/{file}", self.name);
+            let source = workspace.read(&path)?;
+            let changed = edit.apply(&source, &text, &mut blocks).with_context(|| {
+                format!("{path} is not as {} expects: page or template has changed", self.page)
+            })?;
+            workspace.write(&path, &changed)?;
+        }
+        Ok(())
+    }
+}
+
+impl Edit {
+    fn file(&self) -> &'static str {
+        match self {
+            Self::Replace { file, .. } | Self::Default { file, .. } | Self::Append { file } => file,
+        }
+    }
+
+    /// Returns the changed source; none if page and source do not fit together.
+    fn apply(
+        &self,
+        source: &str,
+        page: &str,
+        blocks: &mut impl Iterator<Item = String>,
+    ) -> Option<String> {
+        match self {
+            Self::Replace { from, to, .. } => replace_between(source, from, to, &blocks.next()?),
+            Self::Default { from, sentence, .. } => {
+                let code = page.split_once(sentence)?.1.split('`').next()?;
+                source.contains(from).then(|| source.replace(from, code))
+            }
+            Self::Append { .. } => Some(format!("{source}\n{}", blocks.next()?)),
+        }
+    }
 }
 
 /// The contents of the fences with that word.
@@ -68,5 +144,15 @@ mod tests {
     fn a_part_is_replaced_with_its_ends() {
         assert_eq!(replace_between("a<b>c", "<", ">", "-").unwrap(), "a-c");
         assert_eq!(replace_between("abc", "<", ">", "-"), None);
+    }
+
+    #[test]
+    fn a_page_that_does_not_fit_its_template_is_refused() {
+        let none = || std::iter::empty();
+        let default = Edit::Default { file: "", from: "bias: 0.0", sentence: "by `" };
+        let changed = default.apply("Self { bias: 0.0 }", "by `even: 1.0`", &mut none());
+        assert_eq!(changed.unwrap(), "Self { even: 1.0 }");
+        assert_eq!(default.apply("Self {}", "by `even: 1.0`", &mut none()), None);
+        assert_eq!(Edit::Append { file: "" }.apply("a", "", &mut none()), None, "no block left");
     }
 }

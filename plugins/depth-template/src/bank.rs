@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::LazyLock;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -92,7 +93,8 @@ impl Pose {
     /// downwards, a person whose upward direction leans `roll_rad` to the right
     /// in the image, and a scale in pixels per metre.
     pub fn nearest(direction: Direction, pitch_rad: f64, roll_rad: f64, px_per_m: f64) -> Self {
-        let pitch = (pitch_rad.to_degrees() / PITCH_STEP_DEG).round().clamp(-1.0, 4.0);
+        let pitch = (pitch_rad.to_degrees() / PITCH_STEP_DEG).round();
+        let pitch = pitch.clamp(f64::from(FIRST_PITCH), f64::from(FIRST_PITCH + PITCHES - 1));
         let roll = (roll_rad.to_degrees() / ROLL_STEP_DEG).round().clamp(-15.0, 15.0);
         let step = (px_per_m.clamp(1.0, 4000.0).ln() / SCALE_STEP).round();
         Self { direction, pitch: pitch as i8, roll: roll as i8, scale_step: step as u16 }
@@ -104,14 +106,29 @@ impl Pose {
 }
 
 /// Silhouettes in all body directions, viewing angles and scales. They are
-/// rendered from the body model, not typed in; each is made when first asked
-/// for and kept.
+/// rendered from the body model, not typed in. Its reliefs are rendered when the first bank is
+/// made, and shared by all; each silhouette is cut when first asked for and kept.
 pub struct Bank {
-    reliefs: BTreeMap<(Direction, i8), Relief>,
+    reliefs: &'static Reliefs,
     templates: BTreeMap<Pose, Template>,
     max_rows: usize,
 }
 
+/// The body in each direction, at each pitch from the first one on.
+type Reliefs = [[Relief; PITCHES as usize]; Direction::ALL.len()];
+
+// Nothing but constants is in them. A pipeline that rendered them within a frame was late with it.
+static RELIEFS: LazyLock<Reliefs> = LazyLock::new(|| {
+    Direction::ALL.map(|direction| {
+        std::array::from_fn(|step| {
+            let pitch = f64::from(FIRST_PITCH + step as i8) * PITCH_STEP_DEG;
+            render(direction.yaw_rad(), pitch.to_radians())
+        })
+    })
+});
+
+const FIRST_PITCH: i8 = -1;
+const PITCHES: i8 = 6;
 const PITCH_STEP_DEG: f64 = 15.0;
 const ROLL_STEP_DEG: f64 = 6.0;
 /// Scales of the bank are 2 % apart.
@@ -127,49 +144,79 @@ impl Bank {
     /// A bank whose templates have at most `max_rows` rows each: of a larger
     /// silhouette every second, third, ... row is used.
     pub fn new(max_rows: usize) -> Self {
-        Self { reliefs: BTreeMap::new(), templates: BTreeMap::new(), max_rows: max_rows.max(1) }
+        Self { reliefs: &RELIEFS, templates: BTreeMap::new(), max_rows: max_rows.max(1) }
     }
 
     /// The template of a pose.
     pub fn template(&mut self, pose: Pose) -> &Template {
         let Self { reliefs, templates, max_rows } = self;
-        templates.entry(pose).or_insert_with(|| {
-            let relief = reliefs.entry((pose.direction, pose.pitch)).or_insert_with(|| {
-                let pitch = f64::from(pose.pitch) * PITCH_STEP_DEG;
-                render(pose.direction.yaw_rad(), pitch.to_radians())
-            });
-            cut(relief, pose, *max_rows)
-        })
+        templates.entry(pose).or_insert_with(|| cut(reliefs, pose, *max_rows))
+    }
+
+    /// Cuts the template of a pose without keeping it.
+    pub(crate) fn cut(&self, pose: Pose) -> Template {
+        cut(self.reliefs, pose, self.max_rows)
     }
 }
 
-/// Cuts a relief into runs at the scale and roll of `pose`.
-fn cut(relief: &Relief, pose: Pose, max_rows: usize) -> Template {
+/// Cuts the relief of a pose into runs at its scale and roll.
+fn cut(reliefs: &Reliefs, pose: Pose, max_rows: usize) -> Template {
+    let relief = &reliefs[pose.direction as usize][(pose.pitch - FIRST_PITCH) as usize];
     let scale = pose.px_per_m();
     let (first, last) = ((-ABOVE_M * scale).round() as i64, (BELOW_M * scale).round() as i64);
     let half_width = (HALF_WIDTH_M * scale).round() as i64;
     let step = ((last - first + 1) as usize).div_ceil(max_rows).max(1);
-    let (sin, cos) = (f64::from(pose.roll) * ROLL_STEP_DEG).to_radians().sin_cos();
-    let face = relief.at(0.0, 0.0);
-    let row = |dy: i64| {
-        let seen = (-half_width..=half_width).filter_map(|dx| {
-            let (x, y) = (dx as f64 / scale, dy as f64 / scale);
-            let behind = relief.at(x * cos + y * sin, y * cos - x * sin);
-            behind.is_finite().then_some((dx, behind))
-        });
+    let cutter = Cutter::new(relief, pose, half_width);
+    Template::new((first..=last).step_by(step).map(|dy| cutter.row(dy)).collect(), half_width)
+}
+
+/// A relief under the pixels of a template. A turned person shifts along a row by the same steps
+/// in all rows, so that those are computed once.
+struct Cutter<'a> {
+    relief: &'a Relief,
+    scale: f64,
+    /// Sine and cosine of the roll.
+    turn: (f64, f64),
+    half_width: i64,
+    /// Steps right and up on the relief of each column of the window, m.
+    columns: Vec<(f64, f64)>,
+    /// Depth of the face, m.
+    face: f64,
+}
+
+impl<'a> Cutter<'a> {
+    fn new(relief: &'a Relief, pose: Pose, half_width: i64) -> Self {
+        let scale = pose.px_per_m();
+        let (sin, cos) = (f64::from(pose.roll) * ROLL_STEP_DEG).to_radians().sin_cos();
+        let column = |dx: i64| {
+            let x = dx as f64 / scale;
+            (x * cos, x * sin)
+        };
+        let columns = (-half_width..=half_width).map(column).collect();
+        Self { relief, scale, turn: (sin, cos), half_width, columns, face: relief.at(0.0, 0.0) }
+    }
+
+    /// Returns the row of the template `dy` pixels below the head centre.
+    fn row(&self, dy: i64) -> TemplateRow {
+        let y = dy as f64 / self.scale;
+        let (right, down) = (y * self.turn.0, y * self.turn.1);
         let (mut from, mut to, mut sum, mut count) = (0, 0, 0.0, 0.0);
-        for (dx, behind) in seen {
+        for (dx, column) in (-self.half_width..).zip(&self.columns) {
+            let behind = self.relief.at(column.0 + right, down - column.1);
+            if behind.is_nan() {
+                continue;
+            }
             if count == 0.0 {
                 from = dx;
             }
             to = dx + 1;
-            sum += behind - face;
+            sum += behind - self.face;
             count += 1.0;
         }
         if count == 0.0 {
             return TemplateRow { dy, from: 0, to: 0, guard_from: 0, guard_to: 0, relief_m: 0.0 };
         }
-        let guard = ((GUARD_M * scale).round() as i64).max(1).min((to - from) / 4);
+        let guard = ((GUARD_M * self.scale).round() as i64).max(1).min((to - from) / 4);
         TemplateRow {
             dy,
             from: from + guard,
@@ -178,13 +225,58 @@ fn cut(relief: &Relief, pose: Pose, max_rows: usize) -> Template {
             guard_to: to + guard,
             relief_m: sum / count,
         }
-    };
-    Template::new((first..=last).step_by(step).map(row).collect(), half_width)
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    /// Returns a row pixel by pixel, straight from the definition.
+    fn slow_row(relief: &Relief, pose: Pose, dy: i64, half_width: i64) -> TemplateRow {
+        let scale = pose.px_per_m();
+        let (sin, cos) = (f64::from(pose.roll) * ROLL_STEP_DEG).to_radians().sin_cos();
+        let behind = |dx: i64| {
+            let (x, y) = (dx as f64 / scale, dy as f64 / scale);
+            relief.at(x * cos + y * sin, y * cos - x * sin)
+        };
+        let person: Vec<i64> =
+            (-half_width..=half_width).filter(|x| !behind(*x).is_nan()).collect();
+        let [Some(first), Some(last)] = [person.first(), person.last()] else {
+            return TemplateRow { dy, from: 0, to: 0, guard_from: 0, guard_to: 0, relief_m: 0.0 };
+        };
+        let (from, to) = (*first, last + 1);
+        let guard = ((GUARD_M * scale).round() as i64).max(1).min((to - from) / 4);
+        let sum: f64 = person.iter().map(|dx| behind(*dx) - relief.at(0.0, 0.0)).sum();
+        TemplateRow {
+            dy,
+            from: from + guard,
+            to: to - guard,
+            guard_from: from - guard,
+            guard_to: to + guard,
+            relief_m: sum / person.len() as f64,
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+
+        #[test]
+        fn a_template_is_cut_as_its_definition_says(
+            which in 0usize..3, pitch in -1.0..1.5f64, roll in -2.0..2.0f64, scale in 5.0..300.0f64,
+        ) {
+            let pose = Pose::nearest(Direction::ALL[which], pitch, roll, scale);
+            let template = Bank::new(usize::MAX).cut(pose);
+            let relief = render(pose.direction.yaw_rad(), (f64::from(pose.pitch) * PITCH_STEP_DEG).to_radians());
+            for row in &template.rows {
+                let slow = slow_row(&relief, pose, row.dy, template.half_width);
+                prop_assert!((row.relief_m - slow.relief_m).abs() < 1e-12);
+                prop_assert_eq!(*row, TemplateRow { relief_m: row.relief_m, ..slow });
+            }
+        }
+    }
 
     fn widths(direction: Direction, roll_deg: f64) -> Template {
         let pose = Pose::nearest(direction, 0.0, f64::to_radians(roll_deg), 100.0);

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// An ellipsoid of the body, relative to the centre of the head: x forward,
@@ -47,11 +49,13 @@ impl Relief {
 
     /// The relief at `right`, `down` of the head centre, m; NaN beside the body.
     pub fn at(&self, right_m: f64, down_m: f64) -> f64 {
-        let cell = |m: f64| ((m / Self::SIDE_M + 0.5) * Self::SIZE as f64).floor();
+        // Within the relief no cell is negative, and the cast rounds as `floor` would, which is a
+        // call on processors without an instruction for it.
+        let cell = |m: f64| (m / Self::SIDE_M + 0.5) * Self::SIZE as f64;
         let (x, y) = (cell(right_m), cell(down_m));
         let inside = |v: f64| 0.0 <= v && v < Self::SIZE as f64;
         if inside(x) && inside(y) {
-            self.cells[y as usize * Self::SIZE + x as usize]
+            self.cells[y as i32 as usize * Self::SIZE + x as i32 as usize]
         } else {
             f64::NAN
         }
@@ -64,35 +68,135 @@ impl Relief {
 pub fn render(yaw_rad: f64, pitch_rad: f64) -> Relief {
     let (sin, cos) = pitch_rad.sin_cos();
     let forward = Vector3::new(cos, 0.0, -sin);
-    let right = Vector3::new(0.0, -1.0, 0.0);
-    let down = Vector3::new(-sin, 0.0, -cos);
+    let [right, down] = [Vector3::new(0.0, -1.0, 0.0), Vector3::new(-sin, 0.0, -cos)];
     let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
-    let ellipsoids = body_parts().map(|p| {
-        let inverse = Vector3::from(p.radii).map(|r| 1.0 / (r * r));
-        let shape =
-            turned.matrix() * Matrix3::from_diagonal(&inverse) * turned.matrix().transpose();
-        (turned * Vector3::from(p.centre), shape)
-    });
-    let step = Relief::SIDE_M / Relief::SIZE as f64;
-    let metre = |cell: usize| (cell as f64 + 0.5) * step - 0.5 * Relief::SIDE_M;
-    let mut cells = Vec::with_capacity(Relief::SIZE * Relief::SIZE);
-    for y in 0..Relief::SIZE {
-        for x in 0..Relief::SIZE {
-            let origin = right * metre(x) + down * metre(y);
-            let hits = ellipsoids
-                .iter()
-                .filter_map(|(centre, shape)| first_hit(&(origin - centre), &forward, shape));
-            cells.push(hits.fold(f64::NAN, f64::min));
+    let mut cells = vec![f64::NAN; Relief::SIZE * Relief::SIZE];
+    for part in body_parts() {
+        let ellipsoid = Ellipsoid::new(&part, &turned, &forward);
+        let [columns, lines] = [right, down].map(|axis| ellipsoid.cells(&axis));
+        for y in lines {
+            for x in columns.clone() {
+                let origin = right * middle_m(x) + down * middle_m(y);
+                if let Some(hit) = ellipsoid.first_hit(&origin) {
+                    let cell = &mut cells[y * Relief::SIZE + x];
+                    *cell = cell.min(hit);
+                }
+            }
         }
     }
     Relief { cells }
 }
 
-/// Where a ray first meets the ellipsoid `xᵀ S x = 1`, in steps of `direction`.
-fn first_hit(origin: &Vector3<f64>, direction: &Vector3<f64>, shape: &Matrix3<f64>) -> Option<f64> {
-    let a = direction.dot(&(shape * direction));
-    let b = origin.dot(&(shape * direction));
-    let c = origin.dot(&(shape * origin)) - 1.0;
-    let discriminant = b * b - a * c;
-    (discriminant >= 0.0).then(|| (-b - discriminant.sqrt()) / a)
+/// Returns the middle of a cell along one side of the relief, m.
+fn middle_m(cell: usize) -> f64 {
+    (cell as f64 + 0.5) * (Relief::SIDE_M / Relief::SIZE as f64) - 0.5 * Relief::SIDE_M
+}
+
+/// Part of the body, `(x - centre)ᵀ S (x - centre) = 1`, before parallel rays.
+struct Ellipsoid {
+    centre: Vector3<f64>,
+    shape: Matrix3<f64>,
+    /// The inverse of `shape`.
+    spread: Matrix3<f64>,
+    /// `S d` of the direction `d` of the rays.
+    shape_along: Vector3<f64>,
+    /// `dᵀ S d`.
+    along: f64,
+}
+
+impl Ellipsoid {
+    fn new(part: &Part, turned: &Rotation3<f64>, direction: &Vector3<f64>) -> Self {
+        let squared = Vector3::from(part.radii).map(|r| r * r);
+        let turn = |diagonal: Vector3<f64>| {
+            turned.matrix() * Matrix3::from_diagonal(&diagonal) * turned.matrix().transpose()
+        };
+        let shape = turn(squared.map(|r| 1.0 / r));
+        let shape_along = shape * direction;
+        Self {
+            centre: turned * Vector3::from(part.centre),
+            shape,
+            spread: turn(squared),
+            shape_along,
+            along: direction.dot(&shape_along),
+        }
+    }
+
+    /// Returns the cells along an axis of the image in which the ellipsoid can lie.
+    fn cells(&self, axis: &Vector3<f64>) -> Range<usize> {
+        let (middle, reach) = (axis.dot(&self.centre), axis.dot(&(self.spread * axis)).sqrt());
+        // A cell more on each side, so that rounding cannot cut the border off.
+        let cell = |m: f64| (m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64;
+        let from = (cell(middle - reach).floor() - 1.0).max(0.0) as usize;
+        let to = (cell(middle + reach).ceil() + 1.0).max(0.0) as usize;
+        from..to.min(Relief::SIZE)
+    }
+
+    /// Returns the distance to where the ray from `origin` first meets the ellipsoid.
+    fn first_hit(&self, origin: &Vector3<f64>) -> Option<f64> {
+        let origin = origin - self.centre;
+        let a = self.along;
+        let b = origin.dot(&self.shape_along);
+        let c = origin.dot(&(self.shape * origin)) - 1.0;
+        let discriminant = b * b - a * c;
+        (discriminant >= 0.0).then(|| (-b - discriminant.sqrt()) / a)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Meets every cell with every part, straight from the definition.
+    fn slow(yaw_rad: f64, pitch_rad: f64) -> Vec<f64> {
+        let (sin, cos) = pitch_rad.sin_cos();
+        let forward = Vector3::new(cos, 0.0, -sin);
+        let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+        let hit = |part: &Part, origin: &Vector3<f64>| {
+            let inverse = Vector3::from(part.radii).map(|r| 1.0 / (r * r));
+            let diagonal = Matrix3::from_diagonal(&inverse);
+            let shape = turned.matrix() * diagonal * turned.matrix().transpose();
+            let origin = origin - turned * Vector3::from(part.centre);
+            let a = forward.dot(&(shape * forward));
+            let b = origin.dot(&(shape * forward));
+            let c = origin.dot(&(shape * origin)) - 1.0;
+            let discriminant = b * b - a * c;
+            (discriminant >= 0.0).then(|| (-b - discriminant.sqrt()) / a)
+        };
+        let cell = |i: usize| {
+            let (x, y) = (middle_m(i % Relief::SIZE), middle_m(i / Relief::SIZE));
+            let origin = Vector3::new(0.0, -1.0, 0.0) * x + Vector3::new(-sin, 0.0, -cos) * y;
+            body_parts().iter().filter_map(|part| hit(part, &origin)).fold(f64::NAN, f64::min)
+        };
+        (0..Relief::SIZE * Relief::SIZE).map(cell).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(6))]
+
+        #[test]
+        fn a_relief_is_that_of_all_parts_in_all_cells(yaw in -4.0..4.0f64, pitch in -0.3..1.1f64) {
+            let bits = |cells: &[f64]| cells.iter().map(|cell| cell.to_bits()).collect::<Vec<_>>();
+            prop_assert_eq!(bits(&render(yaw, pitch).cells), bits(&slow(yaw, pitch)));
+        }
+    }
+
+    #[test]
+    fn a_point_is_found_without_rounding_towards_minus_infinity() {
+        let relief = render(0.0, 0.0);
+        let slow = |right_m: f64, down_m: f64| {
+            let cell = |m: f64| ((m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64).floor();
+            let (x, y) = (cell(right_m), cell(down_m));
+            let inside = |v: f64| 0.0 <= v && v < Relief::SIZE as f64;
+            let is_inside = inside(x) && inside(y);
+            if is_inside { relief.cells[y as usize * Relief::SIZE + x as usize] } else { f64::NAN }
+        };
+        for i in -130..130 {
+            for j in -130..130 {
+                let (x, y) = (f64::from(i) * 0.004_99, f64::from(j) * 0.005);
+                assert_eq!(relief.at(x, y).to_bits(), slow(x, y).to_bits(), "{x} {y}");
+            }
+        }
+    }
 }

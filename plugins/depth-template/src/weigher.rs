@@ -443,7 +443,7 @@ impl Silhouettes {
         let found = self.kept.binary_search_by(|(kept, _)| kept.cmp(&pose));
         let at = found.unwrap_or_else(|at| {
             let number = self.kept.len();
-            let silhouette = Arc::new(Silhouette::new(self.bank.template(pose), number));
+            let silhouette = Arc::new(Silhouette::new(self.bank.cut(pose), number));
             self.kept.insert(at, (pose, silhouette));
             at
         });
@@ -452,8 +452,8 @@ impl Silhouettes {
 }
 
 impl Silhouette {
-    fn new(template: &Template, number: usize) -> Self {
-        let Template { rows, half_width, .. } = template.clone();
+    fn new(template: Template, number: usize) -> Self {
+        let Template { rows, half_width, .. } = template;
         let pixels: i64 = rows.iter().map(|row| (row.to - row.from).max(0)).sum();
         let step = ROW_STEPS[usize::from(rows.len() >= MANY_ROWS)];
         let every = |from| rows.iter().skip(from).step_by(step as usize).copied().collect();

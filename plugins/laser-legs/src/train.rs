@@ -1,10 +1,11 @@
 //! Trainer of a [`Model`] from scans with annotated legs.
 //!
 //! The legs of a scan come first, as candidates at their places; a candidate that is no person
-//! closes the scan, and labels its other segments as clutter.
+//! closes the scan, and labels its other segments as clutter. Simulated scans come as whole frames
+//! with the heads in them; they are fitted, and never held out.
 
 use nalgebra::Point2;
-use tagalong_config::{Example, Fitted, Trainer};
+use tagalong_config::{AnnotatedPerson, Example, Fitted, Trainer};
 use tagalong_core::{Detection, Error, Frame, LaserScan, Result};
 use tagalong_learn::boost::{Boosting, Levels, Next, Question};
 use tagalong_learn::{Line, accepted, area, parts, platt};
@@ -13,6 +14,9 @@ use crate::config::Config;
 use crate::model::{Node, Tree};
 use crate::{Beams, COUNT, Features, Model, Segment, Segmentation, Training, features};
 
+/// Farthest distance of the middle of a leg from the place below the head of its person, m.
+const BELOW_M: f64 = 0.5;
+
 /// Features of a segment with its label.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -20,6 +24,15 @@ pub struct Sample {
     pub features: Features,
     /// Label and group.
     pub example: Example,
+    /// False for a sample of a simulated scan, which is no measure of a model.
+    pub is_real: bool,
+}
+
+/// Places of legs in a scan, or of people, with the distance of a leg from them.
+struct Labels<'a> {
+    places: &'a [Point2<f64>],
+    within_m: f64,
+    is_real: bool,
 }
 
 /// Collector of segments that fits models to them.
@@ -49,8 +62,10 @@ impl LegTrainer {
         Ok(Self { training, segments, seed, legs: Vec::new(), samples: Vec::new() })
     }
 
-    /// Adds the segments of a scan, as they are and with fewer rays.
-    fn add_scan(&mut self, scan: &LaserScan, group: u64) {
+    /// Adds the segments of a scan, as they are and with fewer rays. Segments between once and twice
+    /// the distance of a leg are left out.
+    fn add_scan(&mut self, scan: &LaserScan, group: u64, labels: &Labels<'_>) {
+        let &Labels { places, within_m, is_real } = labels;
         let steps: Vec<u32> = std::iter::once(1).chain(self.training.every_ray.clone()).collect();
         let scanner = scan.robot_from_scanner.translation.vector.xy();
         for step in steps {
@@ -59,12 +74,13 @@ impl LegTrainer {
             let is_narrow = |s: &&Segment| beams.width((*s).clone()) <= self.segments.max_width_m;
             for segment in segments.iter().filter(is_narrow) {
                 let at = beams.middle(segment.clone()) + scanner;
-                let apart = self.legs.iter().map(|leg| (leg - at).norm());
+                let apart = places.iter().map(|place| (place - at).norm());
                 let nearest = apart.fold(f64::INFINITY, f64::min);
-                let is_person = nearest <= self.training.label_m;
-                if is_person || nearest > 2.0 * self.training.label_m {
+                let is_person = nearest <= within_m;
+                if is_person || nearest > 2.0 * within_m {
                     let features = features(&beams, segment, &segments);
-                    self.samples.push(Sample { features, example: Example { is_person, group } });
+                    let example = Example { is_person, group };
+                    self.samples.push(Sample { features, example, is_real });
                 }
             }
         }
@@ -83,12 +99,13 @@ impl LegTrainer {
     /// Tries all numbers of trees on held-out groups.
     fn trials(&self, progress: &mut dyn FnMut(f64)) -> Vec<Trial> {
         let Training { trees: counts, folds, .. } = &self.training;
-        let parts = parts(self.samples.iter().map(|s| s.example), *folds, self.seed);
+        let real = || self.samples.iter().filter(|sample| sample.is_real);
+        let parts = parts(real().map(|sample| sample.example), *folds, self.seed);
         let most = counts.iter().copied().max().unwrap_or(0);
         let mut trials: Vec<Trial> =
             counts.iter().map(|&trees| Trial { trees, held_out: Vec::new() }).collect();
         for fold in 0..*folds {
-            let is_out = |sample: &Sample| parts.get(&sample.example.group) == Some(&fold);
+            let is_out = |s: &Sample| s.is_real && parts.get(&s.example.group) == Some(&fold);
             let trees = self.grow(most, |sample| !is_out(sample));
             for trial in &mut trials {
                 let trees = trees[..trial.trees.min(trees.len())].to_vec();
@@ -104,6 +121,7 @@ impl LegTrainer {
 
     fn figures(&self, trials: &[Trial], model: &Model) -> toml::Table {
         let legs = self.samples.iter().filter(|sample| sample.example.is_person).count();
+        let simulated = self.samples.iter().filter(|sample| !sample.is_real).count();
         let number = |n: usize| toml::Value::Integer(n as i64);
         let row = |trial: &Trial| {
             toml::Value::Table(toml::Table::from_iter([
@@ -116,6 +134,7 @@ impl LegTrainer {
         toml::Table::from_iter([
             ("legs".to_owned(), number(legs)),
             ("others".to_owned(), number(self.samples.len() - legs)),
+            ("of_them_simulated".to_owned(), number(simulated)),
             ("trees".to_owned(), number(model.trees.len())),
             ("slope".to_owned(), rounded(model.slope)),
             ("offset".to_owned(), rounded(model.offset)),
@@ -130,8 +149,23 @@ impl Trainer for LegTrainer {
             self.legs.push(candidate.position.xy());
             return Ok(());
         }
-        self.add_scan(frame.scan()?, example.group);
-        self.legs.clear();
+        let places = std::mem::take(&mut self.legs);
+        let within_m = self.training.label_m;
+        let labels = Labels { places: &places, within_m, is_real: true };
+        self.add_scan(frame.scan()?, example.group, &labels);
+        Ok(())
+    }
+
+    fn add_frame(
+        &mut self,
+        frame: &Frame,
+        people: &[AnnotatedPerson],
+        room: Option<&str>,
+        group: u64,
+    ) -> Result<()> {
+        let places: Vec<Point2<f64>> = people.iter().map(|person| person.head.xy()).collect();
+        let labels = Labels { places: &places, within_m: BELOW_M, is_real: room.is_some() };
+        self.add_scan(frame.scan()?, group, &labels);
         Ok(())
     }
 
@@ -196,6 +230,7 @@ mod tests {
             .map(|k| Sample {
                 features: std::array::from_fn(|_| random.uniform() as f32),
                 example: Example { is_person: k < legs, group: k as u64 % 12 },
+                is_real: true,
             })
             .collect();
         trainer
@@ -211,6 +246,17 @@ mod tests {
         let found = area(&trials[0].held_out);
         assert!((0.3..0.7).contains(&found), "{found}");
         assert!(parts.is_sorted() && parts.iter().all(|part| *part <= 1.0), "{parts:?}");
+    }
+
+    #[test]
+    fn simulated_samples_are_fitted_and_never_held_out() {
+        let mut both = trainer(60, 60);
+        let alone = both.trials(&mut |_| ());
+        let simulated = trainer(40, 20).samples;
+        both.samples.extend(simulated.iter().map(|s| Sample { is_real: false, ..*s }));
+        let trials = both.trials(&mut |_| ());
+        assert_eq!(trials[0].held_out.len(), 120, "the real ones, each once");
+        assert_ne!(trials[0].held_out, alone[0].held_out, "other trees");
     }
 
     #[test]

@@ -1,3 +1,4 @@
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -35,6 +36,21 @@ pub struct RunArgs {
     /// Use this seed instead of the config's.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    /// Serve a page with what happens now: images with people, the plan from above, target and
+    /// command, events. On this computer alone and a free port, unless a port or an address is
+    /// given; the address that is printed is the key to the page. The run does not wait for browsers.
+    #[arg(
+        long,
+        value_name = "[ADDRESS:]PORT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0",
+        value_parser = tagalong_live::parse_address
+    )]
+    pub serve: Option<SocketAddr>,
+    /// Take frames no faster than they were recorded, to watch the run with --serve.
+    #[arg(long)]
+    pub realtime: bool,
     /// Output format of the results.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

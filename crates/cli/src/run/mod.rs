@@ -4,16 +4,19 @@ mod args;
 mod choice;
 mod frames;
 mod images;
+mod pace;
 mod pictures;
 mod report;
 mod summary;
 
 use std::collections::BTreeMap;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub use args::RunArgs;
 use frames::{Frames, Item};
+use pace::Pace;
 use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
 use tagalong_app::choice::sources;
@@ -23,12 +26,14 @@ use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, say};
 use tagalong_app::progress::Progress;
+use tagalong_app::remedies;
 use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
 use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
+use tagalong_live::Live;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
@@ -54,9 +59,13 @@ pub fn run_until(
     registry: &Registry,
     listen: impl FnOnce() -> Result<Signals, Failure>,
 ) -> Outcome {
+    // A name that is no config must not cost a simulation.
+    if let Some(path) = args.config().filter(|_| !args.has_log()) {
+        ConfigFile::read(path)?;
+    }
     if !args.has_log() {
         sample::write(args.log()).map_err(refused)?;
-        say(&format!("no log given: two drawn people walk through {}", args.log().display()));
+        say(&format!("no log given: two simulated people walk through {}", args.log().display()));
     }
     let job = Progress::waiting(&format!("looking through {}", args.log().display()), || {
         Job::prepare(args, registry)
@@ -73,7 +82,15 @@ pub fn run_until(
     let mut frames = Frames::new(job.source, threads);
     let mut pipeline = job.pipeline;
     pipeline.visualise(args.overlay);
-    let stopped = work(&mut pipeline, &mut frames, &mut desk, &mut pictures, &signals);
+    let live = args.serve.map(|at| serve(at, args, &job.resolved, &job.report)).transpose()?;
+    let mut pace = Pace::new(args.realtime);
+    let stopped = {
+        let stage = Stage { desk: &mut desk, pictures: &mut pictures, live: live.as_ref() };
+        work(&mut pipeline, &mut frames, &mut pace, stage, &signals)
+    };
+    if let Some(live) = live {
+        live.finish("The run has ended.");
+    }
     // An error of the run is returned only after the threads have finished.
     pictures.finish()?;
     let source = frames.finish()?;
@@ -106,7 +123,7 @@ impl Job {
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();
         // A picture shows colour, whether or not the pipeline uses it.
-        let wants_pictures = args.overlay || args.with_images;
+        let wants_pictures = args.overlay || args.with_images || args.serve.is_some();
         let inputs = if wants_pictures { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
             .map_err(|error| config.refusal(error))?;
@@ -117,9 +134,21 @@ impl Job {
         }
         let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
-        let report = blank_report(&config, settings.seed, log);
+        let mut report = blank_report(&config, settings.seed, log);
+        if settings.suits.odometry && !source.has_odometry() {
+            report.notes.push(without_odometry(&config));
+        }
         Ok(Self { pipeline, outer, source, resolved, folder, report })
     }
+}
+
+/// Returns the note on a config for a robot with odometry and a log without.
+fn without_odometry(config: &ConfigFile) -> String {
+    format!(
+        "{} is for a robot with odometry ([suits]), and the log has none: things that the robot \
+         passes seem to move; without a config `tagalong run LOG` takes one that does without",
+        config.name()
+    )
 }
 
 /// Returns `runs/<log>-<config>`.
@@ -150,19 +179,51 @@ fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
     }
 }
 
+/// Begins to serve the page of what happens now, and prints its address.
+fn serve(
+    at: SocketAddr,
+    args: &RunArgs,
+    resolved: &str,
+    report: &RunReport,
+) -> Result<Live, Failure> {
+    // It was made from settings that were read; without it the page quotes none.
+    let config = toml::from_str(resolved).unwrap_or_default();
+    let name = report.config.name.trim_end_matches(".toml");
+    let live = Live::start(at, name, &log_name(args), &config).map_err(|error| {
+        Failure::usage(format!(
+            "cannot serve on {at}: {error}; name another port with --serve=PORT"
+        ))
+    })?;
+    say(&format!("live: open {} in a browser; it is the key to the page", live.address()));
+    if !at.ip().is_loopback() {
+        say("live: others in this network who know the address see the images; open it there \
+             by the number of this computer in place of 0.0.0.0");
+    }
+    Ok(live)
+}
+
+/// Everything that takes the report of a frame.
+struct Stage<'a> {
+    desk: &'a mut Desk,
+    pictures: &'a mut Pictures,
+    live: Option<&'a Live>,
+}
+
 /// Processes one frame after the other until the log ends, the pipeline fails or a signal comes.
 /// `Some` is the error of the plugin that ended it.
 fn work(
     pipeline: &mut Pipeline,
     frames: &mut Frames,
-    desk: &mut Desk,
-    pictures: &mut Pictures,
+    pace: &mut Pace,
+    stage: Stage<'_>,
     signals: &Signals,
 ) -> Result<Option<StepError>, Failure> {
+    let Stage { desk, pictures, live } = stage;
     let progress = Progress::new();
     loop {
         let waiting = Instant::now();
         let Some(item) = frames.next(signals) else { return Ok(None) };
+        pace.wait_for(item.frame.frame.stamp, signals);
         desk.timings.add("read", ms_since(waiting));
         desk.tally.read(item.frame.odom_stale);
         if item.frame.odom_jumped {
@@ -178,6 +239,9 @@ fn work(
         let people = report.tracks.iter().filter(|track| track.confirmed && track.seen).count();
         progress.show(item.progress, report.index, people);
         desk.take(&item, &report)?;
+        if let Some(live) = live {
+            live.offer(&item.frame.frame, &item.frame.odom_from_robot, &report);
+        }
         desk.pass_image(&item, &report)?;
         pictures.draw(|| scene(&item, report))?;
     }
@@ -221,12 +285,11 @@ impl Desk {
     /// Adds the report of a frame.
     fn take(&mut self, item: &Item, report: &FrameReport) -> Result<(), Failure> {
         self.tally.add(report);
-        for (stage, ms) in &report.timings {
-            self.timings.add(stage, *ms);
-        }
         if !report.outcome.is_processed() {
+            report.timings.iter().for_each(|(stage, ms)| self.timings.add(stage, *ms));
             return Ok(());
         }
+        self.timings.add_frame(&report.timings);
         let writing = Instant::now();
         let record = FrameRecord {
             index: report.index,
@@ -281,7 +344,7 @@ impl Desk {
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,
-            Format::Text => print(&summary::text(&report, &folder, args.overlay))?,
+            Format::Text => print(&summary::text(&report, &self.timings, &folder, args.overlay))?,
         }
         verdict(args, &report, stopped, signals)
     }
@@ -340,6 +403,20 @@ fn no_frame(report: &RunReport) -> String {
     format!("not one frame could be made of {name}: {why}; `tagalong doctor` tells more")
 }
 
+/// Returns the message about a run that could detect nobody, because a detector has no model.
+fn without_model(report: &RunReport) -> Option<String> {
+    let lacks = report.funnel.iter().any(|line| line.test == NO_MODEL);
+    let remedy = remedies::of(NO_MODEL).filter(|_| lacks && report.persons.is_empty())?;
+    let (name, key) = (&report.config.name, remedy.settings.join(", "));
+    Some(format!(
+        "{name}: a detector has no model (`{key}`), so nobody was detected: {}",
+        remedy.look
+    ))
+}
+
+/// Test of the funnel by which a detector says that it has no model.
+const NO_MODEL: &str = "no model";
+
 /// Returns the exit code, and the reason for a failure.
 fn verdict(
     args: &RunArgs,
@@ -363,6 +440,9 @@ fn verdict(
     }
     if report.frames.read == 0 {
         return Err(Failure::failed(no_frame(report)));
+    }
+    if let Some(why) = without_model(report) {
+        return Err(Failure::failed(why));
     }
     match (report.data_lost, args.strict) {
         (false, _) => Ok(Ended::Well),

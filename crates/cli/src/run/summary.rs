@@ -1,6 +1,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use tagalong_app::timings::{Timings, WHOLE_FRAME};
+
 use super::report::RunReport;
 
 /// Lines of the funnel that are shown.
@@ -9,20 +11,29 @@ const FUNNEL_LINES: usize = 6;
 /// Persons that are listed one by one.
 const PERSON_LINES: usize = 12;
 
+/// Stages whose times are shown beside those of whole frames.
+const STAGE_LINES: usize = 3;
+
 /// Counters of read items, as opposed to lost ones.
 const NO_LOSS: [&str; 3] = ["chunks_verified", "frames", "messages"];
 
 /// Returns the results of a run, for a terminal.
-pub fn text(report: &RunReport, folder: &Path, overlay: bool) -> String {
+pub fn text(report: &RunReport, timings: &Timings, folder: &Path, overlay: bool) -> String {
     let mut out = String::new();
     let frames = &report.frames;
     let _ = writeln!(
         out,
-        "{}: {} frames, people in {} of them ({})",
-        report.log.name, frames.read, frames.with_person, report.ended
+        "{}: {} frames, people in {} of them ({}{})",
+        report.log.name,
+        frames.read,
+        frames.with_person,
+        report.ended,
+        // The end that was reached is not the one of the recording.
+        if report.data_lost { ", but part of the log was lost" } else { "" }
     );
     persons(&mut out, report);
     funnel(&mut out, report);
+    times(&mut out, timings);
     losses(&mut out, report);
     files(&mut out, folder, overlay);
     out
@@ -68,6 +79,20 @@ fn funnel(out: &mut String, report: &RunReport) {
     }
 }
 
+/// Writes the times of whole frames and of the stages whose worst frames were slowest.
+fn times(out: &mut String, timings: &Timings) {
+    let summary = timings.summary();
+    let Some(whole) = summary.get(WHOLE_FRAME) else { return };
+    let mut stages: Vec<_> = summary.iter().filter(|(name, _)| **name != WHOLE_FRAME).collect();
+    stages.sort_by(|a, b| b.1.max_ms.total_cmp(&a.1.max_ms));
+    let _ =
+        writeln!(out, "{:<14}{:>8}{:>8}{:>8}{:>8}", "ms per frame", "p50", "p95", "p99", "worst");
+    for (name, t) in std::iter::once((&WHOLE_FRAME, whole)).chain(stages).take(1 + STAGE_LINES) {
+        let [p50, p95, p99] = [t.p50_ms, t.p95_ms, t.p99_ms];
+        let _ = writeln!(out, "  {name:<12}{p50:>8.2}{p95:>8.2}{p99:>8.2}{:>8.2}", t.max_ms);
+    }
+}
+
 fn losses(out: &mut String, report: &RunReport) {
     if !report.data_lost {
         return;
@@ -82,10 +107,9 @@ fn files(out: &mut String, folder: &Path, overlay: bool) {
     let shown = folder.display();
     let _ = writeln!(out, "files in {shown}; to look at them:");
     let _ = writeln!(out, "  tagalong view {}", quoted(&shown.to_string()));
-    let _ = writeln!(
-        out,
-        "  {shown}/tracks.mcap opens in Foxglove (people in 3D, boxes) and Rerun (camera, images)"
-    );
+    let mcap = quoted(&folder.join("tracks.mcap").display().to_string());
+    let _ = writeln!(out, "  rerun {mcap}    (people in space, camera; images with --with-images)");
+    let _ = writeln!(out, "  Foxglove opens the same file: people in 3D, boxes in the image");
     if overlay {
         let _ = writeln!(out, "  {shown}/overlay/ has a picture of every frame");
     }

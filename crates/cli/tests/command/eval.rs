@@ -53,6 +53,26 @@ fn a_run_is_scored_in_the_image_and_on_the_floor() {
 }
 
 #[test]
+fn people_annotated_in_laser_scans_are_truth_on_the_floor() {
+    let folder = home();
+    let header = "scan,id,x_laser_m,y_laser_m,x_robot_m,y_robot_m,ignore,source\n";
+    // Scans count from 0. Without a place in the robot frame that in the frame of the laser is taken;
+    // the last row is neither a miss nor a false alarm.
+    let rows = format!(
+        "{header}15,7,90,90,2.88,-0.18,0,annotated\n19,7,2.88,-0.1,,,0,annotated\n\
+         18,7,90,90,,,1,gap\n"
+    );
+    fs::write(folder.path().join("walk.people-floor.csv"), rows).unwrap();
+    let files = ["--truth", "walk.people-floor.csv", "--tracks", "out", "--format", "json"];
+    let image = in_home(folder.path(), &files);
+    assert_eq!(code(&image), 2);
+    let said = text(&image.stderr);
+    assert!(said.contains("--similarity metres"), "{said}");
+    let floor = json(&in_home(folder.path(), &[&files[..], &["--similarity", "metres"]].concat()));
+    assert_eq!((floor["truths"].as_u64(), floor["FN"].as_u64()), (Some(2), Some(0)), "{floor}");
+}
+
+#[test]
 fn a_log_that_is_not_beside_the_truth_can_be_named() {
     let folder = home();
     fs::create_dir(folder.path().join("elsewhere")).unwrap();

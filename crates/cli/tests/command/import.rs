@@ -281,3 +281,338 @@ fn numbered_images_are_in_the_order_of_their_numbers() {
         found.iter().map(|item| item.frame.colour().unwrap().pixels()[0][0]).collect();
     assert_eq!(levels, [10, 20, 90, 100, 110]);
 }
+
+#[test]
+fn a_ktp_folder_has_colour_depth_and_the_boxes_of_its_ground_truth() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("ktp/images/Still");
+    for (i, stamp) in ["1339064317.986969085", "1339064318.020102411"].into_iter().enumerate() {
+        colour(&folder.join(format!("rgb/{stamp}.jpg")), (640, 480), 40 * (i as u8 + 1));
+        depth(&folder.join(format!("depth/{stamp}.pgm")), (640, 480), 2000);
+    }
+    let truth = home.path().join("ktp/ground_truth/Still_gt2D.txt");
+    fs::create_dir_all(truth.parent().unwrap()).unwrap();
+    let lines = "1339064317.986969085: 2 10 11 20 30, 3 40 11 12 30\n\
+                 1339064318.020102411: 3 38 11 12 30, 4 0 0 0 0\n\
+                 1339064319.000000000: 3 38 11 12 30\n";
+    fs::write(&truth, lines).unwrap();
+    let args = ["ktp", "ktp/images/Still", "--height", "0.9"];
+    let (code, said) = import(home.path(), &args);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("1 annotated images") && said.contains("525 pixels"), "{said}");
+    let found = frames(&home.path().join("runs/Still.mcap"), DEPTH);
+    assert_eq!(found.len(), 2);
+    assert_eq!(found[1].frame.stamp.nanos(), 1_339_064_318_020_102_411);
+    assert_eq!(found[0].frame.depth().unwrap().get(5, 5), Some(2.0), "millimetres");
+    assert!((found[0].frame.camera.height_m() - 0.9).abs() < 1e-6);
+    let boxes = fs::read_to_string(home.path().join("runs/Still.boxes.csv")).unwrap();
+    assert_eq!(boxes, "1,2,10,11,20,30,1,1,1\n1,3,40,11,12,30,1,1,1\n2,3,38,11,12,30,1,1,1\n");
+    for (wrong, cause) in [
+        (lines.replace(", 3 40 11 12 30", ", 3 40 11 12"), "Still_gt2D.txt:1: not `TIME: ID X Y"),
+        (lines.replace("318.020102411:", "x:"), "Still_gt2D.txt:2: `1339064x` is no time"),
+        (lines.replace("4 0 0", "4 left 0"), "Still_gt2D.txt:2: `left` is no number"),
+    ] {
+        fs::write(&truth, wrong).unwrap();
+        let (code, said) = import(home.path(), &[&args[..], &["--overwrite"]].concat());
+        assert_eq!(code, 1, "{said}");
+        assert!(said.contains(cause), "{cause}: {said}");
+    }
+    // Truth and depth are optional.
+    fs::remove_file(&truth).unwrap();
+    fs::remove_dir_all(folder.join("depth")).unwrap();
+    fs::remove_file(home.path().join("runs/Still.boxes.csv")).unwrap();
+    let (code, said) = import(home.path(), &[&args[..], &["--overwrite"]].concat());
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("colour alone") && said.contains("no truth"), "{said}");
+    assert!(!home.path().join("runs/Still.boxes.csv").exists());
+    colour(&folder.join("rgb/first.jpg"), SMALL, 9);
+    let (code, said) = import(home.path(), &[&args[..], &["--overwrite"]].concat());
+    assert_eq!(code, 1, "{said}");
+    assert!(said.contains("first.jpg: the name is no time in seconds"), "{said}");
+}
+
+#[test]
+fn a_sequence_of_tpt_bench_has_its_target() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("TPT-Bench/panoramic_images/0015");
+    let stamps = ["1727602424143298027", "1727602424209298027", "1727602424275298027"];
+    for stamp in stamps {
+        colour(&folder.join(format!("{stamp}.jpg")), SMALL, 40);
+    }
+    let truth = home.path().join("TPT-Bench/GTs/0015.json");
+    fs::create_dir_all(truth.parent().unwrap()).unwrap();
+    // The members are in no order, one image is absent, and the target is not in the second one.
+    let text = format!(
+        r#"{{"{}": {{"is_exist": true, "bbox": [8, 2, 10.5, 30]}},
+ "{}": {{"is_exist": false, "bbox": [0, 0, 0, 0]}},
+ "1727602424341298027": {{"is_exist": true, "bbox": [8, 2, 10, 30]}},
+ "{}": {{"is_exist": true, "bbox": [6, 2, 10, 30]}}}}"#,
+        stamps[2], stamps[1], stamps[0]
+    );
+    fs::write(&truth, &text).unwrap();
+    let args = ["tpt-bench", "TPT-Bench/panoramic_images/0015"];
+    let (code, said) = import(home.path(), &args);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("1 annotated images") && said.contains("only the target"), "{said}");
+    let found = frames(&home.path().join("runs/0015.mcap"), Inputs::ANY.require(Input::Colour));
+    assert_eq!(found.len(), 3);
+    assert_eq!(found[1].frame.stamp.nanos(), 1_727_602_424_209_298_027);
+    let boxes = fs::read_to_string(home.path().join("runs/0015.boxes.csv")).unwrap();
+    assert_eq!(boxes, "1,1,6,2,10,30,1,1,1\n3,1,8,2,10.5,30,1,1,1\n");
+    for (wrong, cause) in [
+        (
+            text.replace("10.5", "-1"),
+            "image `1727602424275298027`: `bbox` is [8,2,-1,30], expected",
+        ),
+        (text.replace("false", "0"), "`1727602424209298027`: `is_exist` is neither true nor false"),
+        (text.replace("\n \"1727602424341298027", " 1727602424341298027"), "at line 2 column"),
+        ("[]".into(), "expected an object"),
+    ] {
+        fs::write(&truth, wrong).unwrap();
+        let (code, said) = import(home.path(), &[&args[..], &["--overwrite"]].concat());
+        assert_eq!(code, 1, "{said}");
+        assert!(said.contains(cause), "{cause}: {said}");
+    }
+}
+
+/// Calibration of one camera that looks along X from 0.08 m above the frame of the boxes.
+fn jrdb_calibration(root: &Path) {
+    let folder = root.join("calibration");
+    fs::create_dir_all(&folder).unwrap();
+    let cameras = "cameras:\n  sensor_0:\n    width: 64\n    K: 50 0 31.5 0 50 23.5 0 0 1\n    D: 0 0 \
+                   0 0 0\n  sensor_2:\n    K: 70 0 31.5 0 70 23.5 0 0 1\n";
+    fs::write(folder.join("cameras.yaml"), cameras).unwrap();
+    let rigs = "sensor_0:\n  cam2ego:\n  - [0.0, 0.0, 1.0, 0.06]\n  - [-1.0, 0.0, 0.0, 0.0]\n  - [0.0, \
+                -1.0, 0.0, 0.08]\n  - [0.0, 0.0, 0.0, 1.0]\n";
+    fs::write(folder.join("lidars.yaml"), rigs).unwrap();
+}
+
+/// A sequence of JRDB with two images, of which the first has two people and a car.
+fn jrdb(home: &Path) -> std::path::PathBuf {
+    let root = home.join("train_dataset");
+    for i in 0..2u8 {
+        colour(&root.join(format!("images/image_0/cafe_0/{i:06}.jpg")), SMALL, 40);
+    }
+    for folder in ["labels/labels_2d", "labels/labels_3d", "timestamps/cafe_0"] {
+        fs::create_dir_all(root.join(folder)).unwrap();
+    }
+    let person = |id: u8, place: &str, occlusion: &str| {
+        format!(
+            r#"{{"label_id": "pedestrian:{id}", "box": {place}, "attributes": {{"occlusion": "{occlusion}"}}}}"#
+        )
+    };
+    let labels = format!(
+        r#"{{"labels": {{"000000.jpg": [{}, {}, {{"label_id": "car:1", "box": [0, 0, 9, 9]}}],
+ "000001.jpg": [], "000002.jpg": [{}]}}}}"#,
+        person(5, "[20, 10, 8, 34]", "Mostly_visible"),
+        person(6, "[40, 10, 8, 34]", "Severely_occluded"),
+        person(5, "[20, 10, 8, 34]", "Fully_visible"),
+    );
+    fs::write(root.join("labels/labels_2d/cafe_0_image0.json"), labels).unwrap();
+    // Longer than wide; the middle of the box is 0.2 m below the camera, its feet 1.05 m.
+    let place =
+        r#"{"cx": 3.06, "cy": 0.5, "cz": -0.12, "l": 0.9, "w": 0.5, "h": 1.7, "rot_z": 0.3}"#;
+    let spatial =
+        format!(r#"{{"labels": {{"000000.pcd": [{}]}}}}"#, person(5, place, "Fully_visible"));
+    fs::write(root.join("labels/labels_3d/cafe_0.json"), spatial).unwrap();
+    let at = |name: &str, seconds: &str| {
+        format!(
+            r#"{{"name": "{name}", "url": "images/{name}/cafe_0/000001.jpg", "timestamp": {seconds}}}"#
+        )
+    };
+    let stamps = format!(
+        r#"{{"data": [{{"frame_id": 0, "cameras": [{{"name": "image0", "url": "a/000000.jpg", "timestamp": 1549566000.25}}]}},
+ {{"frame_id": 1, "cameras": [{}, {}]}}]}}"#,
+        at("image2", "7"),
+        at("image0", "\"1549566000.5\"")
+    );
+    fs::write(root.join("timestamps/cafe_0/frames_img.json"), stamps).unwrap();
+    jrdb_calibration(&root);
+    root
+}
+
+#[test]
+fn a_sequence_of_jrdb_has_boxes_and_heads_as_one_camera_sees_them() {
+    let home = tempfile::tempdir().unwrap();
+    let root = jrdb(home.path());
+    let args = ["jrdb", "train_dataset/images/image_0/cafe_0"];
+    let (code, said) = import(home.path(), &args);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("1 annotated images"), "{said}");
+    let log = home.path().join("runs/cafe_0-image_0.mcap");
+    let found = frames(&log, Inputs::ANY.require(Input::Colour));
+    assert_eq!(found.len(), 2);
+    assert_eq!(found[1].frame.stamp.nanos(), 1_549_566_000_500_000_000);
+    let camera = &found[0].frame.camera;
+    assert!((camera.focal_px() - 50.0).abs() < 1e-9);
+    assert!((camera.height_m() - 1.05).abs() < 1e-6, "{}", camera.height_m());
+    let boxes = fs::read_to_string(log.with_extension("boxes.csv")).unwrap();
+    assert_eq!(boxes, "1,5,20,10,8,34,1,1,0.75\n1,6,40,10,8,34,0,1,0.25\n");
+    let text = fs::read_to_string(log.with_extension("people.csv")).unwrap();
+    let people = tagalong_eval::formats::people::parse(&text, "made").unwrap();
+    assert_eq!((people.len(), people[1].head_in_camera_m, people[1].ignore), (2, None, true));
+    // Left of the camera is -X, up is -Y; the surface is 8 cm in front of the centre.
+    let centre = nalgebra::Vector3::new(-0.5_f64, -0.53, 3.0);
+    let surface = nalgebra::Vector3::<f64>::from(people[0].head_in_camera_m.unwrap());
+    let off: nalgebra::Vector3<f64> = surface - centre * (1.0 - 0.08 / centre.norm());
+    assert!(off.norm() < 1e-3, "{surface}");
+    // The upper body is a square at the top of the box.
+    let upper = people[0].upper_body.unwrap();
+    assert!((upper.width - 34.0 * 0.57 / 1.7).abs() < 1e-3 && upper.y < 10.0, "{upper:?}");
+    // Labels, times and calibration are optional.
+    for folder in ["labels", "timestamps", "calibration"] {
+        fs::remove_dir_all(root.join(folder)).unwrap();
+    }
+    let (code, said) = import(home.path(), &[&args[..], &["--overwrite"]].concat());
+    assert_eq!(code, 0, "{said}");
+    for note in ["15 Hz", "no lens", "no truth", "height of the camera"] {
+        assert!(said.contains(note), "{note}: {said}");
+    }
+}
+
+#[test]
+fn wrong_files_of_jrdb_are_named_with_the_image() {
+    let home = tempfile::tempdir().unwrap();
+    let root = jrdb(home.path());
+    let flat = "labels/labels_2d/cafe_0_image0.json";
+    let spatial = "labels/labels_3d/cafe_0.json";
+    for (file, from, to, cause) in [
+        (
+            flat,
+            "[20, 10, 8, 34]",
+            "[20, 10, 8]",
+            "image `000000.jpg`: pedestrian:5: `box` is [20,10,8]",
+        ),
+        (flat, "Mostly_visible", "Hidden", "pedestrian:5: `occlusion` is `Hidden`, not known"),
+        (flat, "pedestrian:6", "pedestrian:six", "expected pedestrian:NUMBER"),
+        (flat, "\"labels\"", "\"label\"", "there is no `labels`"),
+        (
+            spatial,
+            "\"cz\"",
+            "\"cq\"",
+            "image `000000.pcd`: pedestrian:5: `cz` of `box` is no number",
+        ),
+        ("timestamps/cafe_0/frames_img.json", "1549566000.25", "\"noon\"", "is no time in seconds"),
+        ("calibration/cameras.yaml", "50 0 31.5", "50", "no `K` of nine numbers in sensor_0"),
+        ("calibration/lidars.yaml", "0.06]", "six]", "no `cam2ego` of 4 x 4 in sensor_0"),
+    ] {
+        let path = root.join(file);
+        let right = fs::read_to_string(&path).unwrap();
+        assert!(right.contains(from), "{from}");
+        fs::write(&path, right.replace(from, to)).unwrap();
+        let args = ["jrdb", "train_dataset/images/image_0/cafe_0", "--overwrite"];
+        let (code, said) = import(home.path(), &args);
+        assert_eq!(code, 1, "{cause}: {said}");
+        assert!(said.contains(cause), "{cause}: {said}");
+        fs::write(&path, right).unwrap();
+    }
+    let (code, said) = import(home.path(), &["jrdb", "train_dataset", "-o", "x.mcap"]);
+    assert_eq!(code, 1);
+    assert!(said.contains("give images/image_0/NAME"), "{said}");
+}
+
+/// A ROS 1 bag, record by record: two scans 0.1 s apart, and people half way after each.
+fn leg_bag(topics: &[&str]) -> Vec<u8> {
+    let field = |name: &str, value: &[u8]| {
+        let body = [name.as_bytes(), b"=", value].concat();
+        [&(body.len() as u32).to_le_bytes()[..], &body].concat()
+    };
+    let record = |header: &[Vec<u8>], data: &[u8]| {
+        let header = header.concat();
+        let lengths = [header.len(), data.len()].map(|length| (length as u32).to_le_bytes());
+        [&lengths[0][..], &header, &lengths[1], data].concat()
+    };
+    let connection = |id: u32, topic: &str, kind: &str| {
+        let head =
+            [field("op", &[7]), field("conn", &id.to_le_bytes()), field("topic", topic.as_bytes())];
+        let data = [field("topic", topic.as_bytes()), field("type", kind.as_bytes())].concat();
+        record(&head, &data)
+    };
+    let message = |id: u32, tenths: u32, data: &[u8]| {
+        let time = [9_u32.to_le_bytes(), (tenths * 50_000_000).to_le_bytes()].concat();
+        record(&[field("op", &[2]), field("conn", &id.to_le_bytes()), field("time", &time)], data)
+    };
+    // The clock of the scanner is another one than that of the recorder.
+    let scan = |sec: u32| {
+        let mut out = [sec, 1400 + sec, 500].map(u32::to_le_bytes).concat();
+        out.extend([&5_u32.to_le_bytes()[..], b"laser"].concat());
+        let fixed = [-0.1_f32, 0.1, 0.1, 0.0, 0.1, 0.05, 9.0];
+        out.extend(fixed.iter().flat_map(|value| value.to_le_bytes()));
+        out.extend(3_u32.to_le_bytes());
+        out.extend([2.0_f32, 2.0, f32::INFINITY].iter().flat_map(|v| v.to_le_bytes()));
+        out.extend(0_u32.to_le_bytes());
+        out
+    };
+    let person = |id: u32, x: f64, y: f64| {
+        let pose = [x, y, 0.0, 0.0, 0.0, 0.0, 1.0].map(f64::to_le_bytes).concat();
+        [&pose[..], &id.to_le_bytes()].concat()
+    };
+    let mut records = connection(0, "/ground_truth_people_tracks", "leg_tracker/Person");
+    for (id, topic) in (1..).zip(topics) {
+        records.extend(connection(id, topic, "sensor_msgs/LaserScan"));
+    }
+    for (at, step) in [(0, 0), (2, 1)] {
+        for id in 1..=topics.len() as u32 {
+            records.extend(message(id, at, &scan(step)));
+        }
+        records.extend(message(0, at + 1, &person(4, 2.0, -0.1)));
+        if step == 1 {
+            records.extend(message(0, at + 1, &person(1000, 5.0, 1.25)));
+        }
+    }
+    let head = [
+        field("op", &[5]),
+        field("compression", b"none"),
+        field("size", &(records.len() as u32).to_le_bytes()),
+    ];
+    let magic: &[u8] = b"#ROSBAG V2.0\n";
+    let end = record(&[field("op", &[6])], &[0; 8]);
+    [magic, &record(&[field("op", &[3])], &[b' '; 40]), &record(&head, &records), &end].concat()
+}
+
+#[test]
+fn annotated_bags_of_the_leg_tracker_become_truth_on_the_floor() {
+    let home = tempfile::tempdir().unwrap();
+    fs::write(home.path().join("walk.bag"), leg_bag(&["/scan"])).unwrap();
+    let (code, said) = import(home.path(), &["leg-tracker", "walk.bag"]);
+    assert_eq!(code, 0, "{said}");
+    let text = fs::read_to_string(home.path().join("walk.people-floor.csv")).unwrap();
+    assert_eq!(
+        text,
+        "stamp_s,scan,id,x_laser_m,y_laser_m,points,ignore,source\n\
+         1400.000000500,0,4,2.0000,-0.1000,2,0,annotated\n\
+         1401.000000500,1,4,2.0000,-0.1000,2,0,annotated\n\
+         1401.000000500,1,1000,5.0000,1.2500,0,0,annotated\n"
+    );
+    let rows = tagalong_eval::formats::floor::parse(&text, "made").unwrap();
+    assert!(rows.len() == 3 && rows.iter().all(|row| row.annotated && !row.ignore));
+    // Two scanners: which one was annotated has to be told.
+    fs::write(home.path().join("two.bag"), leg_bag(&["/left", "/right"])).unwrap();
+    let (code, said) = import(home.path(), &["leg-tracker", "two.bag"]);
+    assert!(code == 1 && said.contains("scans on /left, /right; name one with --scan"), "{said}");
+    let (code, said) = import(home.path(), &["leg-tracker", "two.bag", "--scan", "/rear"]);
+    assert!(code == 1 && said.contains("there are: /left, /right"), "{said}");
+    let (code, said) = import(home.path(), &["leg-tracker", "two.bag", "--scan", "/right"]);
+    assert_eq!(code, 0, "{said}");
+}
+
+#[test]
+fn bags_whose_people_cannot_be_told_are_refused() {
+    let home = tempfile::tempdir().unwrap();
+    let whole = leg_bag(&["/scan"]);
+    let other = String::from_utf8_lossy(b"ground_truth_people_tracks").into_owned();
+    let mut renamed = whole.clone();
+    while let Some(at) = renamed.windows(other.len()).position(|part| part == other.as_bytes()) {
+        renamed[at] = b'x';
+    }
+    for (bytes, cause) in [
+        (&whole[..whole.len() - 40], "damaged"),
+        (&renamed, "no annotations on /ground_truth_people_tracks"),
+        (b"no bag at all, but text".as_slice(), "walk.bag"),
+    ] {
+        fs::write(home.path().join("walk.bag"), bytes).unwrap();
+        let (code, said) = import(home.path(), &["leg-tracker", "walk.bag"]);
+        assert!(code == 1 && said.contains(cause), "{cause}: {said}");
+        assert!(!home.path().join("walk.people-floor.csv").exists());
+    }
+}

@@ -146,3 +146,20 @@ fn a_log_of_a_scanner_alone_gets_a_pipeline_by_its_odometry() {
         assert!(tracks.lines().count() > 300, "{} lines", tracks.lines().count());
     }
 }
+
+#[test]
+fn a_config_that_asks_for_odometry_says_where_there_is_none() {
+    let Some(log) = tagalong_testdata::find("laser/laser-following.mcap") else { return };
+    let home = tempfile::tempdir().unwrap();
+    let ran = |args: &[&str]| {
+        let output = tagalong().args(args).arg(&log).current_dir(&home).output().unwrap();
+        (code(&output), text(&output.stderr) + &text(&output.stdout))
+    };
+    let (code, said) = ran(&["run", "laser-legs", "-o", "out"]);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("is for a robot with odometry"), "{said}");
+    let (_, said) = ran(&["doctor", "laser-legs"]);
+    assert!(said.contains("the log has no odometry"), "{said}");
+    let (_, said) = ran(&["run", "laser-follow", "-o", "other"]);
+    assert!(!said.contains("is for a robot with odometry"), "{said}");
+}

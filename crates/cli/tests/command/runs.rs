@@ -116,6 +116,8 @@ fn the_report_tells_frames_persons_and_hashes() {
     assert!(report["log"]["sha256"].as_str().is_some_and(|hash| hash.len() == 64), "{report}");
     assert!(report["nis"]["mean"].as_f64().is_some_and(f64::is_finite));
     let timings = json(&home.path("out/timings.json"));
+    let worst = &timings["whole frame"]["max_ms"];
+    assert!(worst.as_f64() >= timings["update"]["p99_ms"].as_f64().map(|ms| 0.9 * ms), "{timings}");
     assert!(timings["read"]["p95_ms"].as_f64().is_some_and(|ms| ms > 0.0), "{timings}");
 }
 

@@ -6,8 +6,25 @@ use super::super::finding::{Finding, Severity};
 const HEIGHT_M: (f64, f64) = (0.1, 0.5);
 const PITCH_DEG: (f64, f64) = (3.0, 15.0);
 
-/// Checks that the camera is one of those that the config states (`[suits]`).
+/// Checks that the robot and the camera are among those that the config states (`[suits]`).
 pub fn suits(evidence: &Evidence) -> Option<Finding> {
+    odometry(evidence).or_else(|| camera(evidence))
+}
+
+/// Checks that a config that needs odometry gets it.
+fn odometry(evidence: &Evidence) -> Option<Finding> {
+    if !evidence.suits.odometry || evidence.has_odometry {
+        return None;
+    }
+    let measured = "the log has no odometry, and the config is for a robot with it".to_owned();
+    let finding = Finding::new("suits", Severity::Bad, measured)
+        .why("motion over ground is evidence there; without odometry furniture moves like people");
+    Some(finding.remedy(
+        "record odometry or tf from odom; or take a config without: `tagalong run LOG` chooses one",
+    ))
+}
+
+fn camera(evidence: &Evidence) -> Option<Finding> {
     let camera = evidence.samples.camera.as_ref()?;
     let stated = &evidence.suits;
     let height = stated.camera_height_m.map(|range| (camera.height_m(), range));

@@ -11,6 +11,8 @@ pub struct Row {
     pub scan: u32,
     /// The person at a place in the frame of the laser.
     pub person: FloorPoint,
+    /// Position of the person in the robot frame, m; `None` where the laser's place on it is not known.
+    pub robot_m: Option<[f64; 2]>,
     /// The person in the odometry frame, m; `None` without odometry.
     pub odom_m: Option<[f64; 2]>,
     /// Neither a miss nor a false alarm.
@@ -30,18 +32,23 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let [scan, id, ignore, source] =
         [column("scan")?, column("id")?, column("ignore")?, column("source")?];
     let [x, y] = [column("x_laser_m")?, column("y_laser_m")?];
-    let odom = [table.find("x_odom_m"), table.find("y_odom_m")];
     let row = |line: &super::Line<'_>| {
         // An empty field is a place that is not known.
-        let known = |at: Option<usize>| {
+        let known = |name: &str| {
+            let at = table.find(name);
             let at = at.filter(|at| line.fields.get(*at).is_some_and(|text| !text.is_empty()));
-            at.map(|at| line.number(at, "x_odom_m or y_odom_m")).transpose()
+            at.map(|at| line.number(at, name)).transpose()
         };
-        let odom_m = known(odom[0])?.zip(known(odom[1])?).map(|(x, y)| [x, y]);
+        let both = |[x, y]: [&str; 2]| {
+            Ok::<_, FormatError>(known(x)?.zip(known(y)?).map(<[f64; 2]>::from))
+        };
+        let robot_m = both(["x_robot_m", "y_robot_m"])?;
+        let odom_m = both(["x_odom_m", "y_odom_m"])?;
         let at_m = [line.number(x.1, x.0)?, line.number(y.1, y.0)?];
         Ok(Row {
             scan: line.frame(scan.1, 0)?,
             person: FloorPoint { id: line.whole(id.1, id.0)?, at_m },
+            robot_m,
             odom_m,
             ignore: line.number(ignore.1, ignore.0)? != 0.0,
             annotated: line.text(source.1, source.0)? == "annotated",
@@ -61,9 +68,18 @@ mod tests {
         let text = format!("{HEADER}\n1.5,3,1000,2.0,-1.0,,,1,gap\n1.6,4,2,1,2,3,4,0,annotated\n");
         let rows = parse(&text, "a.csv").unwrap();
         let person = FloorPoint { id: 1000, at_m: [2.0, -1.0] };
-        assert_eq!(rows[0], Row { scan: 3, person, odom_m: None, ignore: true, annotated: false });
+        let known =
+            Row { robot_m: None, odom_m: None, ignore: true, annotated: false, scan: 3, person };
+        assert_eq!(rows[0], known);
         assert_eq!((rows[1].odom_m, rows[1].ignore), (Some([3.0, 4.0]), false));
         assert!(rows[1].annotated);
+    }
+
+    #[test]
+    fn the_place_in_the_robot_frame_is_read_where_it_is_there() {
+        let header = HEADER.replace("x_odom_m", "x_robot_m").replace("y_odom_m", "y_robot_m");
+        let rows = parse(&format!("{header}\n1.5,3,1,2,-1,5,6,0,annotated\n"), "a.csv").unwrap();
+        assert_eq!((rows[0].robot_m, rows[0].odom_m), (Some([5.0, 6.0]), None));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use tagalong_pipeline::FrameReport;
 use tagalong_render::{Overlay, OverlayData};
 use tagalong_sim::{Event, Scene, Simulation};
 use tagalong_simulate::Recorder;
-use tagalong_trials::{Drawn, TrialError, Witness};
+use tagalong_trials::{SimulatedFrame, TrialError, Witness};
 
 /// Writer of a ride's log and pictures, as far as they are requested; it ends early at a stop
 /// signal.
@@ -77,11 +77,11 @@ impl RideLog {
         self.failed = write(recorder).err().map(|error| error.to_string());
     }
 
-    fn draw(&mut self, drawn: &Drawn, report: &FrameReport) {
+    fn draw(&mut self, simulated: &SimulatedFrame, report: &FrameReport) {
         let Some(overlay) = self.overlay.as_mut().filter(|_| self.failed.is_none()) else {
             return;
         };
-        let scene = OverlayData::of(&drawn.frame, drawn.odom_from_robot, report.clone());
+        let scene = OverlayData::of(&simulated.frame, simulated.odom_from_robot, report.clone());
         self.failed = overlay.draw(&scene).err();
     }
 }
@@ -91,10 +91,10 @@ impl Witness for RideLog {
         self.note(|recorder| recorder.write(event));
     }
 
-    fn frame(&mut self, drawn: &Drawn, report: &FrameReport) {
-        let at_ns = drawn.frame.stamp.nanos();
+    fn frame(&mut self, simulated: &SimulatedFrame, report: &FrameReport) {
+        let at_ns = simulated.frame.stamp.nanos();
         self.note(|recorder| recorder.pursuit(at_ns, &frame_json(report)));
-        self.draw(drawn, report);
+        self.draw(simulated, report);
     }
 
     fn goes_on(&self) -> bool {

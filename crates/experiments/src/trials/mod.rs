@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::progress::Forecast;
 use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
@@ -72,7 +73,12 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let scenes = or_default(&args.scenes, "configs/scenes", &HARD);
     let suites =
         scenes.iter().map(|path| suite(path, args, seeds)).collect::<Result<Vec<_>, _>>()?;
-    let bar = bar(suites.iter().map(|(_, scenes)| scenes.len()).sum());
+    let trials = suites.iter().map(|(_, scenes)| scenes.len()).sum();
+    let (bar, forecast) = (bar(trials), Forecast::new(trials, "trials"));
+    let advance = || {
+        bar.inc(1);
+        forecast.advance();
+    };
     let names = suites.iter().map(|(name, _)| name);
     let mut table = table::Table::new(seeds, names, contenders.iter().map(|c| &c.name));
     let tell = |text: String| match args.format {
@@ -83,8 +89,8 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     for (name, scenes) in &suites {
         bar.set_message(name.clone());
         let jobs = threads(args.jobs);
-        let results = contest::run(scenes, &contenders, registry, jobs, || bar.inc(1))
-            .map_err(Failure::failed)?;
+        let results =
+            contest::run(scenes, &contenders, registry, jobs, &advance).map_err(Failure::failed)?;
         table.add(name, &contenders, &results);
         tell(table.last_rows())?;
     }

@@ -2,8 +2,9 @@ use nalgebra::{Point2, Point3};
 
 use super::CollisionMonitorSettings;
 
-/// Resolution of obstacle distances, m.
-const BIN_M: f64 = 0.05;
+/// Resolution of obstacle distances, m. The speed before an obstacle follows them; at walking pace
+/// steps of 5 cm would be steps of 0.1 m/s.
+const BIN_M: f64 = 0.01;
 /// Growth of the floor's height limit with the distance, m per m.
 const FLOOR_SLOPE: f64 = 0.03;
 /// Curvature below which a path is straight, 1/m.
@@ -215,9 +216,9 @@ mod tests {
             ahead(&settings, signs.iter().map(at), 0.0, None)
         };
         assert_eq!(seen(&[(1.22, 5)]), Ahead::Free);
-        assert_eq!(seen(&[(2.02, 9), (1.22, 6)]), Ahead::Something(20.0 * BIN_M));
-        assert_eq!(seen(&[(0.72, 3), (1.22, 3)]), Ahead::Something(20.0 * BIN_M), "both together");
-        assert_eq!(seen(&[(3.199, 6)]), Ahead::Something(59.0 * BIN_M), "the last one");
+        assert_eq!(seen(&[(2.02, 9), (1.22, 6)]), Ahead::Something(102.0 * BIN_M));
+        assert_eq!(seen(&[(0.72, 3), (1.22, 3)]), Ahead::Something(102.0 * BIN_M), "both together");
+        assert_eq!(seen(&[(3.199, 6)]), Ahead::Something(299.0 * BIN_M), "the last one");
         assert_eq!(seen(&[(9.0, 99)]), Ahead::Free);
     }
 

@@ -1,8 +1,8 @@
-//! Governor of the commands: every command of the controller passes it on the way to the wheels.
+//! Limiter of the commands: every command of the controller passes it on the way to the wheels.
 //!
 //! It does not depend on the source of the wish. It lets the robot move only while frames arrive, a
-//! target is followed or searched for and the path is free; it limits the speed, the turn rate and the
-//! acceleration of both, and keeps the curvature; each command carries its reason and the time until
+//! target is followed or searched for and the path is free; it limits the speed, the turn rate, and the
+//! acceleration and the jerk of both, and keeps the curvature as far as these allow; each command carries its reason and the time until
 //! which it is valid.
 //!
 //! Without a target the robot slows down within the limits. Emergencies stop the wheels at once: a
@@ -11,13 +11,17 @@
 
 mod collision_monitor;
 mod obstacle_memory;
+mod ramp;
 mod settings;
 
 pub(crate) use collision_monitor::Ahead;
 pub(crate) use obstacle_memory::ObstacleMemory;
 pub use settings::{CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource};
 
+use ramp::{Axis, AxisLimits};
 use tagalong_core::{Command, DiffDrive, EgoMotion, Reason, Stamp, Twist, WheelSpeeds};
+
+use crate::{Base, RobotSettings};
 
 /// Longest time over which the robot may have changed its speed, s. A pause of frames must not
 /// allow a large step of the speed.
@@ -104,14 +108,32 @@ impl Orders {
     }
 }
 
-/// Governor of the commands; see the [module](self).
+/// Limiter of the commands; see the [module](self).
 pub(crate) struct CommandLimiter {
     settings: CommandLimiterSettings,
     monitor: CollisionMonitorSettings,
+    robot: RobotSettings,
     wheels: DiffDrive,
     max_speed_mps: f64,
+    /// Largest speed that another program allows, m/s.
+    allowed_mps: f64,
     last: Option<Command>,
+    /// Motion of the last command.
+    motion: Motion,
     fault: Option<&'static str>,
+}
+
+/// Motion of a command, with the accelerations that led to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Motion {
+    forward: Axis,
+    turn: Axis,
+}
+
+impl Motion {
+    fn twist(&self) -> Twist {
+        Twist::new(self.forward.speed, self.turn.speed)
+    }
 }
 
 /// Returns the curvature, 1/m; 0 for a turn in place.
@@ -123,10 +145,19 @@ impl CommandLimiter {
     pub(crate) fn new(
         settings: CommandLimiterSettings,
         monitor: CollisionMonitorSettings,
-        wheels: DiffDrive,
-        max_speed_mps: f64,
+        robot: RobotSettings,
     ) -> Self {
-        Self { settings, monitor, wheels, max_speed_mps, last: None, fault: None }
+        Self {
+            settings,
+            monitor,
+            wheels: robot.wheels(),
+            max_speed_mps: robot.max_speed_mps,
+            robot,
+            allowed_mps: f64::INFINITY,
+            last: None,
+            motion: Motion::default(),
+            fault: None,
+        }
     }
 
     /// Returns the command for a frame. `look` returns the nearest obstacle in the corridor along
@@ -137,10 +168,12 @@ impl CommandLimiter {
         wish: &Wish,
         look: impl FnOnce(&CollisionMonitorSettings, f64) -> Option<Ahead>,
     ) -> Command {
-        let (wheels, reason) = match self.must_stop(wish) {
-            Some(reason) => (WheelSpeeds::STOP, reason),
+        let (motion, reason) = match self.must_stop(wish) {
+            Some(reason) => (Motion::default(), reason),
             None => self.limited(wish, look),
         };
+        self.motion = motion;
+        let wheels = self.in_reach(motion.twist());
         let valid_until = wish.stamp.plus_seconds(self.settings.valid_s);
         let twist = self.wheels.twist(wheels);
         let command = Command { twist, wheels, stamp: wish.stamp, valid_until, reason };
@@ -161,6 +194,12 @@ impl CommandLimiter {
         if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
             self.latch("odometry jumped");
         }
+    }
+
+    /// Limits the speed to this, m/s, beside all other limits.
+    pub(crate) fn allow_speed(&mut self, most_mps: f64) {
+        // A limit that is no number is a mistake of another program, which must not drive faster.
+        self.allowed_mps = if most_mps >= 0.0 { most_mps } else { 0.0 };
     }
 
     /// Returns the settings of the obstacle corridor.
@@ -187,7 +226,7 @@ impl CommandLimiter {
     /// Clears the fault, after a person has checked the robot.
     pub(crate) fn arm(&mut self) {
         self.fault = None;
-        self.last = None;
+        (self.last, self.motion) = (None, Motion::default());
     }
 
     /// Returns the reason for an emergency stop, if there is one: the wheels stop at once.
@@ -212,55 +251,76 @@ impl CommandLimiter {
 
     /// Returns the motion after which the command of this frame comes, and the time that it has to
     /// change it, s.
-    fn before(&self, now: Stamp) -> (Twist, f64) {
-        let Some(last) = self.last else { return (Twist::STOP, LONGEST_STEP_S) };
+    fn before(&self, now: Stamp) -> (Motion, f64) {
+        let Some(last) = self.last else { return (Motion::default(), LONGEST_STEP_S) };
         // Stamps may stand still or step back; both allow no change of speed.
         let dt = now.seconds_since(last.stamp).clamp(0.0, LONGEST_STEP_S);
         // An expired command was followed by a stop.
         let holds = now <= last.valid_until;
-        (if holds { last.twist } else { Twist::STOP }, dt)
+        (if holds { self.motion } else { Motion::default() }, dt)
     }
 
     fn limited(
         &self,
         wish: &Wish,
         look: impl FnOnce(&CollisionMonitorSettings, f64) -> Option<Ahead>,
-    ) -> (WheelSpeeds, Reason) {
+    ) -> (Motion, Reason) {
         let (before, dt) = self.before(wish.stamp);
         let (wanted, why, is_capped) = self.wanted(wish);
-        let next = self.ramped(before, wanted, dt);
-        let reason = match () {
-            () if wish.aim == Aim::Nobody && next != Twist::STOP => Reason::Stopping,
-            () if next == wanted || is_capped => why,
-            () => Reason::Limited,
+        let next = self.ramped(&before, wanted, dt);
+        let reason = match next.twist() {
+            twist if wish.aim == Aim::Nobody && twist != Twist::STOP => Reason::Stopping,
+            twist if twist == wanted || is_capped => why,
+            _ => Reason::Limited,
         };
         // A turn in place stays in place, and the corridor shows nothing behind the robot.
-        if next.linear_mps <= STILL_MPS {
-            return (self.in_reach(self.wheels.wheels(next)), reason);
+        if next.forward.speed <= STILL_MPS {
+            return (next, reason);
         }
-        let cap = match look(&self.monitor, curvature(next)) {
-            Some(Ahead::Blind) => return (WheelSpeeds::STOP, Reason::Blind),
-            Some(Ahead::Something(at_m)) => self.speed_before(at_m),
-            Some(Ahead::Free) | None => f64::INFINITY,
-        };
-        if cap <= STILL_MPS {
+        match look(&self.monitor, curvature(next.twist())) {
+            Some(Ahead::Blind) => (Motion::default(), Reason::Blind),
+            Some(Ahead::Something(at_m)) => {
+                let slower = self.before_obstacle(&before, next, wanted, at_m, dt);
+                slower.unwrap_or((next, reason))
+            }
+            Some(Ahead::Free) | None => (next, reason),
+        }
+    }
+
+    /// Returns the motion before an obstacle at a distance, if it is slower than `next`.
+    fn before_obstacle(
+        &self,
+        before: &Motion,
+        next: Motion,
+        wanted: Twist,
+        at_m: f64,
+        dt: f64,
+    ) -> Option<(Motion, Reason)> {
+        let room_m = at_m - self.monitor.stop_m;
+        let (gentle, most) =
+            (self.settings.gentle_within(room_m), self.settings.speed_within(room_m));
+        if most <= STILL_MPS {
             // Turning stays allowed: it may free the path.
-            let turn = self.turn_towards(before, wanted.angular_rps, dt);
-            return (self.in_reach(self.wheels.wheels(Twist::new(0.0, turn))), Reason::Blocked);
+            let turn = self.turned(before, wanted.angular_rps, &Axis::default(), dt);
+            return Some((Motion { forward: Axis::default(), turn }, Reason::Blocked));
         }
-        if next.linear_mps <= cap {
-            return (self.in_reach(self.wheels.wheels(next)), reason);
+        if next.forward.speed <= gentle {
+            return None;
         }
-        let slower = next.scaled(cap / next.linear_mps);
-        let is_emergency = cap < before.linear_mps - self.settings.max_decel_mps2 * dt;
-        // An emergency brakes harder than `max_decel_mps2`, and stays on the arc that was looked
-        // along.
-        let turn = match is_emergency {
-            true => slower.angular_rps,
-            false => self.turn_towards(before, slower.angular_rps, dt),
+        let target = wanted.scaled((gentle / wanted.linear_mps.max(gentle)).min(1.0));
+        let slower = self.ramped(before, target, dt);
+        if slower.forward.speed <= most {
+            return Some((slower, Reason::Obstacle));
+        }
+        // An emergency brakes harder than the limits of deceleration and jerk allow, and stays on the
+        // arc that was looked along where it brakes so hard that the turn cannot follow.
+        let forward = before.forward.braked(most, dt, &self.forward_limits());
+        let brakes_hard = most < before.forward.speed - self.settings.max_decel_mps2 * dt;
+        let turn = match brakes_hard {
+            true => Axis { speed: next.turn.speed * most / next.forward.speed, accel: 0.0 },
+            false => self.turned(before, slower.turn.speed, &forward, dt),
         };
-        let slower = Twist::new(slower.linear_mps, turn);
-        (self.in_reach(self.wheels.wheels(slower)), Reason::Obstacle)
+        Some((Motion { forward, turn }, Reason::Obstacle))
     }
 
     /// Returns the motion that is aimed at, within the limits of the drive and those of a doubt or of
@@ -272,79 +332,99 @@ impl CommandLimiter {
         let (wanted, as_wished) = self.within_drive(wish.wheels);
         let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
         let is_late = wish.pause_s > self.settings.slow_after_s;
-        let cap = if is_late || wish.aim != Aim::Person { 0.5 } else { 1.0 } * self.max_speed_mps;
+        let half = is_late || wish.aim != Aim::Person;
+        let cap = if half { 0.5 } else { 1.0 } * self.max_speed_mps;
         let speed = wanted.linear_mps.abs();
-        if speed <= cap {
+        if speed <= cap.min(self.allowed_mps) {
             return (wanted, reason, false);
         }
-        let why = if is_late { Reason::Slow } else { wish.aim.reason() };
+        let why = match () {
+            () if self.allowed_mps < cap => Reason::Limited,
+            () if is_late => Reason::Slow,
+            () => wish.aim.reason(),
+        };
+        let cap = cap.min(self.allowed_mps);
         (wanted.scaled(cap / speed), why, true)
     }
 
-    /// Limits the wheel speeds to the drive and the turn rate, on the same arc, and returns whether
-    /// they are as wished.
+    /// Limits the wheel speeds to the drive and the turn rate, on the same arc where the base can drive
+    /// it, and returns whether they are as wished.
     fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, bool) {
-        let twist = self.wheels.twist(self.in_reach(wheels));
+        let twist = self.wheels.twist(self.in_reach(self.wheels.twist(wheels)));
         let twist = match self.settings.reverse {
             false if twist.linear_mps < 0.0 => Twist { linear_mps: 0.0, ..twist },
             _ => twist,
         };
         let limit = self.settings.max_turn_radps;
         // Forward speed and turn rate shrink by the same factor, which keeps the curvature.
-        let slower = twist.scaled(limit / twist.angular_rps.abs().max(limit));
+        let mut slower = twist.scaled(limit / twist.angular_rps.abs().max(limit));
+        if self.robot.base == Base::Ackermann {
+            let most = slower.linear_mps.abs() / self.robot.min_turn_radius_m;
+            slower.angular_rps = slower.angular_rps.clamp(-most, most);
+        }
         let WheelSpeeds { left, right } = self.wheels.wheels(slower);
         let as_wished = (left - wheels.left).abs() + (right - wheels.right).abs() < STILL_MPS;
         (slower, as_wished)
     }
 
-    /// Returns the speed from which the robot still stops in time, m/s, with its reaction.
-    fn speed_before(&self, at_m: f64) -> f64 {
-        self.settings.speed_within(at_m - self.monitor.stop_m)
+    fn forward_limits(&self) -> AxisLimits {
+        let CommandLimiterSettings { max_accel_mps2, max_decel_mps2, max_jerk_mps3, .. } =
+            self.settings;
+        AxisLimits { accel: max_accel_mps2, decel: max_decel_mps2, jerk: max_jerk_mps3 }
     }
 
-    /// Moves the speed towards the wish as far as the accelerations allow, on the wished arc as far
-    /// as that of the turn allows.
-    fn ramped(&self, before: Twist, wanted: Twist, dt: f64) -> Twist {
-        let CommandLimiterSettings { max_accel_mps2, max_decel_mps2, .. } = self.settings;
-        // Away from standstill is acceleration, towards it is deceleration.
-        let up = if before.linear_mps < 0.0 { max_decel_mps2 } else { max_accel_mps2 };
-        let down = if before.linear_mps > 0.0 { max_decel_mps2 } else { max_accel_mps2 };
-        let (least, most) = (before.linear_mps - down * dt, before.linear_mps + up * dt);
-        let forward = wanted.linear_mps.clamp(least, most);
+    fn turn_limits(&self) -> AxisLimits {
+        let CommandLimiterSettings { max_turn_accel_radps2: most, max_turn_jerk_radps3, .. } =
+            self.settings;
+        AxisLimits { accel: most, decel: most, jerk: max_turn_jerk_radps3 }
+    }
+
+    /// Moves the speed towards the wish as far as the limits allow, on the wished arc as far as those
+    /// of the turn allow.
+    fn ramped(&self, before: &Motion, wanted: Twist, dt: f64) -> Motion {
+        // The turn that is under way takes its part of the speed of the outer wheel.
+        let rim = match self.robot.base {
+            Base::Holonomic => 0.0,
+            _ => self.wheels.half_separation_m * before.turn.peak(&self.turn_limits()),
+        };
+        let most = self.max_speed_mps - rim;
+        let target = wanted.linear_mps.clamp(-most.max(0.0), most.max(0.0));
+        let forward = before.forward.track(target, dt, &self.forward_limits(), target.abs());
         // A robot that stops stays on the arc that it drives.
-        let arc = if wanted == Twist::STOP { before } else { wanted };
+        let arc = if wanted == Twist::STOP { before.twist() } else { wanted };
         let turn = match arc.linear_mps.abs() > STILL_MPS {
-            true => arc.angular_rps * (forward / arc.linear_mps).clamp(0.0, 1.0),
+            true => arc.angular_rps * (forward.speed / arc.linear_mps).clamp(0.0, 1.0),
             false => wanted.angular_rps,
         };
-        let turn = self.turn_towards(before, turn, dt);
-        self.within_wheels(Twist::new(forward, turn), least, most)
+        Motion { forward, turn: self.turned(before, turn, &forward, dt) }
     }
 
-    /// Moves the turn rate towards `turn` as far as its acceleration allows.
-    fn turn_towards(&self, before: Twist, turn: f64, dt: f64) -> f64 {
-        let step = self.settings.max_turn_accel_radps2 * dt;
-        turn.clamp(before.angular_rps - step, before.angular_rps + step)
-    }
-
-    /// Slows down a motion that is too fast for the outer wheel: first the forward speed as far as it
-    /// may lie between `least` and `most`, then the turn rate.
-    fn within_wheels(&self, twist: Twist, least: f64, most: f64) -> Twist {
-        let half_m = self.wheels.half_separation_m;
-        let Twist { linear_mps: forward, angular_rps: turn, .. } = twist;
-        let over = forward.abs() + half_m * turn.abs() - self.max_speed_mps;
-        if over <= 0.0 {
-            return twist;
+    /// Moves the turn rate towards `turn` as far as its limits and the base allow at this speed.
+    fn turned(&self, before: &Motion, turn: f64, forward: &Axis, dt: f64) -> Axis {
+        let (limits, peak) = (self.turn_limits(), forward.peak(&self.forward_limits()));
+        let most = self.robot.turn_at(peak).min(self.settings.max_turn_radps);
+        let turn = before.turn.track(turn.clamp(-most, most), dt, &limits, most);
+        if self.robot.base != Base::Ackermann {
+            return turn;
         }
-        let slower = forward - over.min(forward.abs()).copysign(forward);
-        let slower = slower.clamp(least, most);
-        let rim = ((self.max_speed_mps - slower.abs()) / half_m).max(0.0);
-        Twist::new(slower, turn.clamp(-rim, rim))
+        // Steered wheels turn no faster than they roll, however suddenly they slow down.
+        let most = self.robot.turn_at(forward.speed);
+        match turn.speed.abs() <= most {
+            true => turn,
+            false => Axis { speed: most.copysign(turn.speed), accel: 0.0 },
+        }
     }
 
-    /// Scales the wheel speeds to the limit of the faster wheel, on the same arc.
-    fn in_reach(&self, WheelSpeeds { left, right }: WheelSpeeds) -> WheelSpeeds {
+    /// Returns the wheel speeds of a motion: scaled to the limit of the faster wheel, on the same arc,
+    /// or, for a holonomic base, with both parts limited on their own.
+    fn in_reach(&self, twist: Twist) -> WheelSpeeds {
         let most = self.max_speed_mps;
+        if self.robot.base == Base::Holonomic {
+            let (speed, turn) = (most, self.settings.max_turn_radps);
+            let forward = twist.linear_mps.clamp(-speed, speed);
+            return self.wheels.wheels(Twist::new(forward, twist.angular_rps.clamp(-turn, turn)));
+        }
+        let WheelSpeeds { left, right } = self.wheels.wheels(twist);
         let scale = most / left.abs().max(right.abs()).max(most);
         // The clamp removes the rounding error of the scale.
         let limit = |speed: f64| (speed * scale).clamp(-most, most);

@@ -22,6 +22,12 @@ pub struct CommandLimiterSettings {
     /// Largest change of the turn rate, rad/s².
     #[schemars(range(min = 0.5, max = 10.0))]
     pub max_turn_accel_radps2: f64,
+    /// Largest change of the acceleration, m/s³; only an emergency changes it faster.
+    #[schemars(range(min = 1.0, max = 50.0))]
+    pub max_jerk_mps3: f64,
+    /// Largest change of the acceleration of the turn, rad/s³.
+    #[schemars(range(min = 5.0, max = 500.0))]
+    pub max_turn_jerk_radps3: f64,
     /// The robot may drive backwards, where no camera looks.
     pub reverse: bool,
     /// Delay from an image to wheels that move accordingly, s; part of the stopping distance. At
@@ -56,6 +62,8 @@ impl Default for CommandLimiterSettings {
             max_decel_mps2: 1.0,
             max_turn_radps: 1.5,
             max_turn_accel_radps2: 4.0,
+            max_jerk_mps3: 5.0,
+            max_turn_jerk_radps3: 40.0,
             reverse: false,
             reaction_s: 0.5,
             margin_m: 0.3,
@@ -69,16 +77,33 @@ impl Default for CommandLimiterSettings {
 }
 
 impl CommandLimiterSettings {
-    /// Returns the distance in which a robot of this speed stops, m: reaction, braking and margin.
+    /// Returns the distance in which a robot of this speed stops, m: reaction, braking with the rise of
+    /// the deceleration, and margin.
     pub fn stopping_m(&self, speed_mps: f64) -> f64 {
         let braking = speed_mps * speed_mps / (2.0 * self.max_decel_mps2);
-        speed_mps * self.reaction_s + braking + self.margin_m
+        speed_mps * self.gentle_reaction_s() + braking + self.margin_m
+    }
+
+    /// Returns the reaction with the time by which the rise of the deceleration, at the limit of the
+    /// jerk, delays the stop, s. A robot that brakes with a from the start needs v²/2a; with the rise
+    /// and fall of a at the jerk j it needs v/2 (v/a + a/j), which is v a/2j more.
+    fn gentle_reaction_s(&self) -> f64 {
+        self.reaction_s + self.max_decel_mps2 / (2.0 * self.max_jerk_mps3)
     }
 
     /// Returns the largest speed from which the robot stops within this distance, m/s: reaction and
-    /// braking without the margin.
+    /// braking at once, without the margin.
     pub(super) fn speed_within(&self, distance_m: f64) -> f64 {
-        let (decel, reaction_s) = (self.max_decel_mps2, self.reaction_s);
+        self.speed_after(self.reaction_s, distance_m)
+    }
+
+    /// Returns the largest speed from which it does so within the limit of the jerk, m/s.
+    pub(super) fn gentle_within(&self, distance_m: f64) -> f64 {
+        self.speed_after(self.gentle_reaction_s(), distance_m)
+    }
+
+    fn speed_after(&self, reaction_s: f64, distance_m: f64) -> f64 {
+        let decel = self.max_decel_mps2;
         // The positive root of v t + v² / 2 a = s.
         let root = (reaction_s * reaction_s + 2.0 * distance_m.max(0.0) / decel).sqrt();
         decel * (root - reaction_s)

@@ -6,13 +6,28 @@ const DRIVE: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
 const MAX_MPS: f64 = 0.9;
 const PERIOD_S: f64 = 0.1;
 
+/// Returns settings without a limit of the jerk, so that speeds are plain numbers.
+fn abrupt() -> CommandLimiterSettings {
+    CommandLimiterSettings {
+        max_jerk_mps3: 1e15,
+        max_turn_jerk_radps3: 1e15,
+        ..CommandLimiterSettings::default()
+    }
+}
+
+fn limiter_of(settings: CommandLimiterSettings) -> CommandLimiter {
+    CommandLimiter::new(settings, CollisionMonitorSettings::default(), RobotSettings::default())
+}
+
+/// Returns a command limiter of another base, with a least radius of 0.8 m.
+fn limiter_on(base: Base) -> CommandLimiter {
+    let robot = RobotSettings { base, min_turn_radius_m: 0.8, ..RobotSettings::default() };
+    let settings = CommandLimiterSettings::default();
+    CommandLimiter::new(settings, CollisionMonitorSettings::default(), robot)
+}
+
 fn limiter() -> CommandLimiter {
-    CommandLimiter::new(
-        CommandLimiterSettings::default(),
-        CollisionMonitorSettings::default(),
-        DRIVE,
-        MAX_MPS,
-    )
+    limiter_of(abrupt())
 }
 
 fn wish(frame: u64, left: f64, right: f64) -> Wish {
@@ -152,6 +167,76 @@ fn the_turn_rate_changes_no_faster_than_it_may() {
 }
 
 #[test]
+fn a_holonomic_base_drives_and_turns_at_full_speed_at_once() {
+    let mut limiter = limiter_on(Base::Holonomic);
+    let wheels = DRIVE.wheels(Twist::new(0.9, 1.5));
+    let commands =
+        (1..60).map(|frame| limiter.limit(&wish(frame, wheels.left, wheels.right), free));
+    let last = commands.last().unwrap();
+    assert!((last.twist.linear_mps - 0.9).abs() < 1e-9, "{last:?}");
+    assert!((last.twist.angular_rps - 1.5).abs() < 1e-9, "{last:?}");
+    assert_eq!(last.reason, Reason::Follow);
+}
+
+#[test]
+fn a_base_that_steers_like_a_car_turns_by_its_radius_and_not_on_the_spot() {
+    let mut limiter = limiter_on(Base::Ackermann);
+    let spot = limiter.limit(&wish(1, -0.3, 0.3), free);
+    assert_eq!((spot.wheels, spot.reason), (WheelSpeeds::STOP, Reason::Limited));
+    let commands = (2..60).map(|frame| limiter.limit(&wish(frame, 0.1, 0.5), free));
+    let last = commands.last().unwrap();
+    assert!((last.twist.linear_mps - 0.3).abs() < 1e-9, "{last:?}");
+    assert!((last.twist.angular_rps - 0.3 / 0.8).abs() < 1e-9, "{last:?}");
+    let blocked = limiter.limit(&wish(60, 0.1, 0.5), |_, _| Some(Ahead::Something(0.1)));
+    assert_eq!((blocked.wheels, blocked.reason), (WheelSpeeds::STOP, Reason::Blocked));
+}
+
+#[test]
+fn the_speed_that_a_planner_allows_holds_within_the_limits_of_the_robot() {
+    let (mut limiter, _) = at_speed(0.8, 0.8);
+    limiter.allow_speed(0.5);
+    let commands = go_on(&mut limiter, &wish(0, 0.8, 0.8), 6);
+    assert!((commands[0].twist.linear_mps - 0.7).abs() < 1e-9, "no leap: {commands:?}");
+    assert!((commands[5].twist.linear_mps - 0.5).abs() < 1e-9, "{commands:?}");
+    assert_eq!(commands[5].reason, Reason::Limited);
+    for wrong in [-1.0, f64::NAN] {
+        limiter.allow_speed(wrong);
+        assert_eq!(limiter.allowed_mps, 0.0);
+    }
+    limiter.allow_speed(f64::INFINITY);
+    let last = (46..90).map(|frame| limiter.limit(&wish(frame, 0.8, 0.8), free)).last().unwrap();
+    assert!((last.twist.linear_mps - 0.8).abs() < 1e-9, "{last:?}");
+}
+
+/// A robot that drives at a wall brakes early enough to do so within the limit of the jerk.
+#[test]
+fn before_a_wall_the_robot_stops_without_an_emergency() {
+    for period_s in [0.03, 0.1] {
+        let mut limiter = limiter_of(CommandLimiterSettings::default());
+        let (mut tape, mut place_m, mut speeds) = (Motion::default(), 0.0, Vec::new());
+        for frame in 1..600_u32 {
+            let stamp = Stamp::from_nanos(1_000_000_000).plus_seconds(f64::from(frame) * period_s);
+            // In steps of a centimetre, as the corridor tells it.
+            let at_m = ((6.0_f64 - place_m) * 100.0).floor() / 100.0;
+            let wish = Wish { stamp, pause_s: period_s, ..wish(0, 0.9, 0.9) };
+            let command = limiter.limit(&wish, |_, _| Some(Ahead::Something(at_m)));
+            let change = (limiter.motion.forward.accel - tape.forward.accel).abs();
+            let longest_s = if frame == 1 { LONGEST_STEP_S } else { period_s };
+            // A robot that creeps follows the centimetres of the corridor.
+            if command.twist.linear_mps > 0.1 {
+                // Stamps are whole nanoseconds.
+                assert!(change <= 5.0 * longest_s + 1e-6, "{frame} {at_m} {command:?} {tape:?}");
+            }
+            tape = limiter.motion;
+            place_m += command.twist.linear_mps * period_s;
+            speeds.push(command.twist.linear_mps);
+        }
+        assert!(speeds.contains(&0.9), "it has reached its full speed");
+        assert!((0.4..0.5).contains(&(6.0 - place_m)), "{place_m}");
+    }
+}
+
+#[test]
 fn an_obstacle_slows_and_then_stops() {
     let speed = |at_m| {
         let (mut limiter, _) = at_speed(0.8, 0.8);
@@ -183,9 +268,8 @@ fn a_blind_camera_stops() {
 fn backwards_only_where_it_is_allowed() {
     let (_, command) = at_speed(-0.4, -0.2);
     assert!((command.wheels.left + command.wheels.right).abs() < 1e-9, "{command:?}");
-    let settings = CommandLimiterSettings { reverse: true, ..CommandLimiterSettings::default() };
-    let mut limiter =
-        CommandLimiter::new(settings, CollisionMonitorSettings::default(), DRIVE, MAX_MPS);
+    let settings = CommandLimiterSettings { reverse: true, ..abrupt() };
+    let mut limiter = limiter_of(settings);
     let back = (1..40).map(|frame| limiter.limit(&wish(frame, -0.4, -0.2), free)).last();
     assert!((back.unwrap().wheels.left + 0.4).abs() < 1e-9);
 }
@@ -218,6 +302,8 @@ fn a_jump_of_odometry_lasts_until_armed() {
 #[test]
 fn stopping_takes_what_physics_says() {
     let settings = CommandLimiterSettings { margin_m: 0.0, ..CommandLimiterSettings::default() };
+    assert!((settings.stopping_m(0.9) - 0.945).abs() < 1e-9, "with the rise of the deceleration");
+    let settings = CommandLimiterSettings { margin_m: 0.0, ..abrupt() };
     assert!((settings.stopping_m(0.9) - 0.855).abs() < 1e-9);
 }
 
@@ -257,9 +343,8 @@ fn what_is_ahead_is_looked_for_on_the_arc_and_only_if_the_robot_drives_ahead() {
     assert!((curvature - 0.05 / DRIVE.half_separation_m / 0.35).abs() < 1e-9, "{curvature}");
     let nobody_asks = |_: &CollisionMonitorSettings, _: f64| -> Option<Ahead> { panic!("asked") };
     limiter().limit(&wish(1, -0.2, 0.2), nobody_asks);
-    let settings = CommandLimiterSettings { reverse: true, ..CommandLimiterSettings::default() };
-    CommandLimiter::new(settings, CollisionMonitorSettings::default(), DRIVE, MAX_MPS)
-        .limit(&wish(1, -0.2, -0.2), nobody_asks);
+    let settings = CommandLimiterSettings { reverse: true, ..abrupt() };
+    limiter_of(settings).limit(&wish(1, -0.2, -0.2), nobody_asks);
 }
 
 #[test]
@@ -288,9 +373,8 @@ fn a_pause_gives_no_licence_for_a_leap() {
 
 #[test]
 fn backwards_it_speeds_up_and_slows_down_as_it_does_ahead() {
-    let settings = CommandLimiterSettings { reverse: true, ..CommandLimiterSettings::default() };
-    let mut limiter =
-        CommandLimiter::new(settings, CollisionMonitorSettings::default(), DRIVE, MAX_MPS);
+    let settings = CommandLimiterSettings { reverse: true, ..abrupt() };
+    let mut limiter = limiter_of(settings);
     let mut speed = |frame, wished| limiter.limit(&wish(frame, wished, wished), free).wheels.left;
     let faster: Vec<f64> = (1..4).map(|frame| speed(frame, -0.9)).collect();
     for (found, expected) in faster.iter().zip([-0.1, -0.15, -0.2]) {
@@ -346,10 +430,11 @@ fn stopping_takes_reaction_braking_and_a_margin() {
     let settings = CommandLimiterSettings {
         reaction_s: 0.4,
         max_decel_mps2: 2.0,
+        max_jerk_mps3: 10.0,
         margin_m: 0.25,
         ..CommandLimiterSettings::default()
     };
-    assert!((settings.stopping_m(2.0) - (0.8 + 1.0 + 0.25)).abs() < 1e-12);
+    assert!((settings.stopping_m(2.0) - (0.8 + 0.2 + 1.0 + 0.25)).abs() < 1e-12);
 }
 
 /// Any number, with NaN, infinite and tiny ones often.
@@ -366,30 +451,55 @@ fn any_number() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// Returns true if the motion changes no faster than it may, or if it is an emergency: then it may
-/// only end sooner.
-fn is_gentle(before: Twist, command: &Command, ahead: Option<Ahead>, dt: f64) -> bool {
-    let settings = CommandLimiterSettings::default();
-    let Twist { linear_mps, angular_rps, .. } = command.twist;
-    let braked = before.linear_mps - linear_mps;
-    let is_stop = command.wheels == WheelSpeeds::STOP;
-    let emergencies =
-        [Reason::Settling, Reason::Stalled, Reason::Blind, Reason::NotFinite, Reason::Fault];
-    if emergencies.contains(&command.reason) {
-        return is_stop;
-    }
-    let gentle_turn =
-        (angular_rps - before.angular_rps).abs() <= settings.max_turn_accel_radps2 * dt + 1e-9;
-    let faster = -braked <= settings.max_accel_mps2 * dt + 1e-9;
-    let brakes_hard = braked > settings.max_decel_mps2 * dt + 1e-9;
-    match (command.reason, ahead) {
-        (Reason::Blocked, Some(Ahead::Something(_))) => linear_mps.abs() < 1e-9 && gentle_turn,
-        // No slower than the obstacle demands.
-        (Reason::Obstacle, Some(Ahead::Something(at_m))) if brakes_hard => {
-            let stop_m = CollisionMonitorSettings::default().stop_m;
-            (linear_mps - settings.speed_within(at_m - stop_m)).abs() < 1e-9
+/// Motions of the last commands, for checks of their changes by differences alone.
+#[derive(Default)]
+struct Tape {
+    before: Twist,
+    /// Accelerations of the step before; none after an emergency, which may have any.
+    accels: Option<[f64; 2]>,
+}
+
+/// Allowed error of a change of the acceleration: a speed within 1e-6 of its target is set to it.
+const ROUNDING: f64 = 4.0 * 1e-6 / (PERIOD_S * PERIOD_S);
+
+impl Tape {
+    /// Returns true if the motion changes no faster than it may, or if this is an emergency: then it
+    /// may only end sooner.
+    fn is_gentle(&mut self, command: &Command, ahead: Option<Ahead>, dt: f64) -> bool {
+        let settings = CommandLimiterSettings::default();
+        let before = std::mem::replace(&mut self.before, command.twist);
+        let Twist { linear_mps, angular_rps, .. } = command.twist;
+        let accel = (linear_mps - before.linear_mps) / dt;
+        let turn = (angular_rps - before.angular_rps) / dt;
+        let known = self.accels.replace([accel, turn]);
+        let within = |change: f64, jerk: f64| change.abs() <= jerk * dt + ROUNDING;
+        let smooth = known.is_none_or(|[then, _]| within(accel - then, settings.max_jerk_mps3));
+        let smooth_turn =
+            known.is_none_or(|[_, then]| within(turn - then, settings.max_turn_jerk_radps3));
+        let gentle_turn = turn.abs() <= settings.max_turn_accel_radps2 + ROUNDING && smooth_turn;
+        let gentle = accel <= settings.max_accel_mps2 + ROUNDING
+            && -accel <= settings.max_decel_mps2 + ROUNDING
+            && smooth;
+        let emergencies =
+            [Reason::Settling, Reason::Stalled, Reason::Blind, Reason::NotFinite, Reason::Fault];
+        let is_stop = command.wheels == WheelSpeeds::STOP;
+        match (command.reason, ahead) {
+            (reason, _) if emergencies.contains(&reason) => {
+                self.accels = None;
+                is_stop
+            }
+            (Reason::Blocked, Some(Ahead::Something(_))) => {
+                self.accels = None;
+                linear_mps.abs() < 1e-9 && gentle_turn
+            }
+            // No slower than the obstacle demands.
+            (Reason::Obstacle, Some(Ahead::Something(at_m))) if !gentle => {
+                let stop_m = CollisionMonitorSettings::default().stop_m;
+                self.accels = None;
+                accel < 0.0 && (linear_mps - settings.speed_within(at_m - stop_m)).abs() < 1e-6
+            }
+            _ => gentle && gentle_turn,
         }
-        _ => faster && !brakes_hard && gentle_turn,
     }
 }
 
@@ -398,7 +508,8 @@ fn stops_before(command: &Command, ahead: Option<Ahead>) -> bool {
     let speed = command.twist.linear_mps;
     match ahead {
         Some(Ahead::Something(at_m)) if speed > STILL_MPS => {
-            let limits = CommandLimiterSettings { margin_m: 0.0, ..Default::default() };
+            // At once, as in an emergency.
+            let limits = CommandLimiterSettings { margin_m: 0.0, ..abrupt() };
             limits.stopping_m(speed) + CollisionMonitorSettings::default().stop_m <= at_m + 1e-9
         }
         Some(Ahead::Blind) => speed <= STILL_MPS,
@@ -440,8 +551,8 @@ proptest! {
     fn commands_are_finite_limited_and_gentle_but_for_emergencies(
         wishes in prop::collection::vec(any_wish(), 50)
     ) {
-        let mut limiter = limiter();
-        let mut before = Twist::STOP;
+        let mut limiter = limiter_of(CommandLimiterSettings::default());
+        let mut tape = Tape::default();
         for (frame, (wish, ahead)) in wishes.into_iter().enumerate() {
             let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
             let wish = Wish { stamp, ..wish };
@@ -451,20 +562,23 @@ proptest! {
             if !command.reason.moves() && command.reason != Reason::Blocked {
                 prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
             }
+            let (before, accels) = (tape.before, tape.accels);
             if wish.aim == Aim::Nobody {
+                // An acceleration fades first.
+                let fades = accels.is_none_or(|[accel, _]| accel > 0.0);
                 let slower = command.twist.linear_mps.abs() <= before.linear_mps.abs() + 1e-9;
-                prop_assert!(slower, "{before:?} {command:?}");
+                prop_assert!(slower || fades, "{before:?} {command:?}");
             }
             let dt = if frame == 0 { LONGEST_STEP_S } else { PERIOD_S };
-            prop_assert!(is_gentle(before, &command, ahead, dt), "{before:?} {command:?}");
+            prop_assert!(tape.is_gentle(&command, ahead, dt), "{before:?} {accels:?} {command:?}");
             prop_assert!(stops_before(&command, ahead), "{command:?} {ahead:?}");
-            before = command.twist;
         }
     }
 
     #[test]
     fn a_mirrored_wish_gives_mirrored_wheels(wishes in prop::collection::vec((any_number(), any_number()), 20)) {
-        let (mut one, mut other) = (limiter(), limiter());
+        let new = || limiter_of(CommandLimiterSettings::default());
+        let (mut one, mut other) = (new(), new());
         for (frame, (left, right)) in wishes.into_iter().enumerate() {
             let a = one.limit(&wish(frame as u64, left, right), free).wheels;
             let b = other.limit(&wish(frame as u64, right, left), free).wheels;
@@ -477,13 +591,34 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2_000, ..ProptestConfig::default() })]
 
+    /// The limits of each base, for any wish.
+    #[test]
+    fn each_base_is_driven_within_its_geometry(
+        wishes in prop::collection::vec(any_wish(), 50)
+    ) {
+        for base in [Base::Holonomic, Base::Ackermann] {
+            let mut limiter = limiter_on(base);
+            for (frame, (wish, ahead)) in wishes.iter().enumerate() {
+                let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
+                let command = limiter.limit(&Wish { stamp, ..wish.clone() }, |_, _| *ahead);
+                let Twist { linear_mps, angular_rps, .. } = command.twist;
+                prop_assert!(linear_mps.abs() <= MAX_MPS + 1e-9, "{command:?}");
+                prop_assert!(angular_rps.abs() <= 1.5 + 1e-9, "{command:?}");
+                prop_assert!(stops_before(&command, *ahead), "{command:?} {ahead:?}");
+                if base == Base::Ackermann {
+                    prop_assert!(angular_rps.abs() <= linear_mps.abs() / 0.8 + 1e-9, "{command:?}");
+                }
+            }
+        }
+    }
+
     /// From every state the robot is at rest within the stated distance, by the time that it takes
     /// to answer and the deceleration that it may have.
     #[test]
     fn rest_is_reached_within_the_stated_distance(
         wishes in prop::collection::vec(any_wish(), 20)
     ) {
-        let mut limiter = limiter();
+        let mut limiter = limiter_of(CommandLimiterSettings::default());
         let mut frame = 0;
         let mut last = None;
         for (wish, ahead) in wishes {

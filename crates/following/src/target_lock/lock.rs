@@ -4,6 +4,7 @@ use nalgebra::{Point2, Vector2};
 use tagalong_core::{EgoMotion, Frame, Person, Result, Track, TrackId};
 use tagalong_vision::{Appearance, Describer};
 
+use super::chooser::Chooser;
 use super::memory::{Differences, Memory, logit, probability};
 use super::settings::TargetSettings;
 
@@ -54,6 +55,18 @@ impl LockState {
             Self::Suspect => "suspect",
             Self::Lost => "lost",
             Self::Refound => "re-found",
+        }
+    }
+
+    /// Returns one sentence for a person who watches the robot.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Initial => "no person was chosen yet",
+            Self::Training => "the person is followed, and the appearance is learned",
+            Self::Locked => "the person is followed",
+            Self::Suspect => "a track is followed slowly that may not be the person",
+            Self::Lost => "no track is followed; the person is searched for",
+            Self::Refound => "a track that seems to be the person is followed slowly",
         }
     }
 
@@ -116,8 +129,7 @@ pub(crate) struct TargetLock {
     memory: Memory,
     /// Log-odds that the followed track is the person.
     belief: f64,
-    /// Time for which there has been a track to choose, s.
-    waited_s: f64,
+    chooser: Chooser,
     /// True after another track came near or the track was out of sight: it may have changed over.
     doubtful: bool,
     sightings: u32,
@@ -140,7 +152,7 @@ impl TargetLock {
             track: None,
             memory: Memory::default(),
             belief: 0.0,
-            waited_s: 0.0,
+            chooser: Chooser::default(),
             doubtful: false,
             sightings: 0,
             last: None,
@@ -152,10 +164,9 @@ impl TargetLock {
         }
     }
 
-    /// Chooses this track anew, and forgets the previous target.
-    pub(crate) fn choose(&mut self, track: TrackId) {
-        let settings = TargetSettings { track: Some(track.0), ..self.settings.clone() };
-        *self = Self::new(settings, self.describer.clone());
+    /// Forgets the previous target, and chooses one by these settings from the next frame on.
+    pub(crate) fn restart(&mut self, settings: TargetSettings, why: &'static str) {
+        *self = Self { why, ..Self::new(settings, self.describer.clone()) };
     }
 
     /// Discards all positions after a jump of the clock: a remembered person is lost, otherwise a
@@ -265,22 +276,9 @@ impl TargetLock {
         looks.iter().filter_map(of).collect()
     }
 
-    /// Chooses the nearest track in front, or the one of the settings.
+    /// Follows the track that the chooser picks, if it picks one.
     fn start(&mut self, tracks: &[Track], dt_s: f64) {
-        let far_m = |track: &Track| track.estimate.person.position.xy().coords.norm();
-        let fits = |track: &&Track| {
-            let place = track.estimate.person.position.xy();
-            let bearing = place.y.atan2(place.x).abs().to_degrees();
-            let near = bearing <= self.settings.choose_within_deg
-                && far_m(track) <= self.settings.choose_within_m;
-            track.confirmed && self.settings.track.map_or(near, |id| id == track.id.0)
-        };
-        let nearest = tracks.iter().filter(fits).min_by(|a, b| far_m(a).total_cmp(&far_m(b)));
-        let Some(track) = nearest else { return self.waited_s = 0.0 };
-        if self.settings.track.is_none() && self.waited_s < self.settings.choose_after_s {
-            self.waited_s += dt_s;
-            return;
-        }
+        let Some(track) = self.chooser.choose(&self.settings, tracks, dt_s) else { return };
         self.track = Some(track.id);
         // The chosen track is the person by definition.
         self.belief = CERTAIN;

@@ -6,11 +6,14 @@
 //! only on evidence in several frames in a row, and only if the person can have got there; never to
 //! one that was seen at the same time as the person, nor to one that stands where such a one stood.
 
+mod chooser;
 mod lock;
 mod memory;
 mod search;
 mod settings;
 
+pub use chooser::ChoiceRule;
+pub(crate) use chooser::{bearing_deg, distance_m, nearest_in_front};
 pub(crate) use lock::TargetLock;
 pub use lock::{Likeness, LockReport, LockState};
 pub use memory::Differences;

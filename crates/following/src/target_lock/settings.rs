@@ -1,13 +1,18 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::ChoiceRule;
+
 /// Choice of the target, doubts about its identity, and the search for a lost person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TargetSettings {
-    /// Number of the track to follow; the nearest one in front if left out.
+    /// Number of the track to follow; one that `choose` picks if left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub track: Option<u32>,
+    /// Choice of a person while there is none: "nearest" in front; "approach", the one that walks up to
+    /// the robot and stands still before it; or "none", to wait for an enrollment.
+    pub choose: ChoiceRule,
     /// Largest bearing to either side of a track that may be chosen, degrees.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub choose_within_deg: f64,
@@ -18,6 +23,15 @@ pub struct TargetSettings {
     /// not always seen first.
     #[schemars(range(min = 0.0))]
     pub choose_after_s: f64,
+    /// Distance within which a person that walked up to the robot stands before it, m.
+    #[schemars(range(min = 0.5, max = 5.0))]
+    pub approach_within_m: f64,
+    /// Distance by which that person came nearer, m.
+    #[schemars(range(min = 0.1, max = 5.0))]
+    pub approach_by_m: f64,
+    /// Time for which that person stands still, s.
+    #[schemars(range(min = 0.2, max = 30.0))]
+    pub approach_stands_s: f64,
     /// Remember the person's appearance, doubt a track that looks different, and recognise the
     /// person again. Without it a track is followed while it lives, and no other after that.
     pub remember: bool,
@@ -61,9 +75,13 @@ impl Default for TargetSettings {
     fn default() -> Self {
         Self {
             track: None,
+            choose: ChoiceRule::Nearest,
             choose_within_deg: 45.0,
             choose_within_m: 5.0,
             choose_after_s: 0.0,
+            approach_within_m: 2.0,
+            approach_by_m: 0.5,
+            approach_stands_s: 1.0,
             remember: true,
             training_sightings: 15,
             belief_weight: 0.25,

@@ -26,7 +26,8 @@ pub use scene::{
     TextPrimitive,
 };
 pub use sensor::{
-    CameraInfo, CompressedImage, DisparityImage, Image, JointState, LaserScan, RegionOfInterest,
+    CameraInfo, CompressedImage, DisparityImage, Image, JointState, LaserScan, PointCloud2,
+    PointField, RegionOfInterest,
 };
 use serde::{Deserialize, Serialize};
 pub use vision::{

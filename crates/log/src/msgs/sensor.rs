@@ -149,3 +149,46 @@ pub struct JointState {
 }
 
 message!(JointState, "sensor_msgs/msg/JointState", "JointState.msg");
+
+/// `sensor_msgs/PointCloud2`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointCloud2 {
+    /// Time and frame.
+    pub header: Header,
+    /// Number of rows; 1 for points without an order.
+    pub height: u32,
+    /// Number of points of a row.
+    pub width: u32,
+    /// Layout of a point.
+    pub fields: Vec<PointField>,
+    /// True if values of more than one byte have the high byte first.
+    pub is_bigendian: bool,
+    /// Number of bytes of a point.
+    pub point_step: u32,
+    /// Number of bytes of a row.
+    pub row_step: u32,
+    /// Points, `row_step * height` bytes.
+    pub data: Vec<u8>,
+    /// True if all points are finite.
+    pub is_dense: bool,
+}
+
+message!(PointCloud2, "sensor_msgs/msg/PointCloud2", "PointCloud2.msg");
+
+/// `sensor_msgs/PointField`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointField {
+    /// Name, for example `x`.
+    pub name: String,
+    /// Number of bytes before it in a point.
+    pub offset: u32,
+    /// Type of its values.
+    pub datatype: u8,
+    /// Number of values.
+    pub count: u32,
+}
+
+impl PointField {
+    /// Type of single-precision floats.
+    pub const FLOAT32: u8 = 7;
+}

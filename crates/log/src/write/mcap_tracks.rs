@@ -6,12 +6,13 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapResult, WriteOptions, Writer};
 use tagalong_core::{Stamp, TrackId};
 
+use super::body::Body;
 use super::messages;
 use super::record::FrameRecord;
 use super::scene;
 use crate::msgs::{
     CameraInfo, CompressedImage, Detection3DArray, Header, ImageAnnotations, MarkerArray, Message,
-    PoseStamped, SceneUpdate, StringMsg, TFMessage, encode,
+    PointCloud2, PoseStamped, SceneUpdate, StringMsg, TFMessage, encode,
 };
 
 /// Maximum number of pose topics: a file has 65,535 channels, and more would not be viewed. Further
@@ -42,8 +43,15 @@ pub(super) struct McapTracks<W: Write + Seek> {
     camera_info: Option<Channel>,
     images: Option<Channel>,
     target: Option<Channel>,
-    people: BTreeMap<TrackId, Channel>,
+    people: BTreeMap<TrackId, Person>,
     texts: BTreeMap<String, Channel>,
+}
+
+/// Topics of one person.
+struct Person {
+    pose: Channel,
+    points: Channel,
+    body: Body,
 }
 
 /// Topic with its number of messages.
@@ -153,10 +161,8 @@ impl<W: Write + Seek> McapTracks<W> {
     fn write_poses(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {
         for track in record.confirmed() {
             let pose = encode(&messages::pose(record, track, &self.frames.odom));
-            if let Some(channel) = self.person(track.id)? {
-                channel.sequence += 1;
-                let (id, sequence) = (channel.id, channel.sequence);
-                write_to(&mut self.writer, id, sequence, record.stamp, &pose)?;
+            if let Some(person) = person(&mut self.people, &mut self.writer, track.id)? {
+                person.pose.send(&mut self.writer, record.stamp, &pose)?;
             }
             if record.target == Some(track.id) {
                 let mut channel = match self.target.take() {
@@ -167,17 +173,20 @@ impl<W: Write + Seek> McapTracks<W> {
                 self.target = Some(channel);
             }
         }
-        Ok(())
+        self.write_bodies(record)
     }
 
-    /// Returns the pose topic of a person, opened on first use.
-    fn person(&mut self, id: TrackId) -> McapResult<Option<&mut Channel>> {
-        if !self.people.contains_key(&id) && self.people.len() < MAX_POSE_TOPICS {
-            let topic = format!("/people/person_{id}");
-            let channel = open::<PoseStamped, W>(&mut self.writer, &topic)?;
-            self.people.insert(id, channel);
+    /// Writes the bodies that have changed, and empties those of tracks that have ended.
+    fn write_bodies(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {
+        let heads: BTreeMap<TrackId, f64> =
+            record.confirmed().map(|t| (t.id, record.head_in_odom(t).z)).collect();
+        for (id, person) in &mut self.people {
+            if person.body.update(heads.get(id).copied()) {
+                let cloud = person.body.cloud(record.stamp, &format!("person_{id}"));
+                person.points.send(&mut self.writer, record.stamp, &encode(&cloud))?;
+            }
         }
-        Ok(self.people.get_mut(&id))
+        Ok(())
     }
 
     #[cfg(test)]
@@ -214,6 +223,20 @@ impl Channel {
         self.sequence += 1;
         write_to(writer, self.id, self.sequence, at, message)
     }
+}
+
+/// Returns the topics of a person, opened on first use.
+fn person<'a, W: Write + Seek>(
+    people: &'a mut BTreeMap<TrackId, Person>,
+    writer: &mut Writer<W>,
+    id: TrackId,
+) -> McapResult<Option<&'a mut Person>> {
+    if !people.contains_key(&id) && people.len() < MAX_POSE_TOPICS {
+        let pose = open::<PoseStamped, W>(writer, &format!("/people/person_{id}"))?;
+        let points = open::<PointCloud2, W>(writer, &format!("/people/person_{id}/body"))?;
+        people.insert(id, Person { pose, points, body: Body::default() });
+    }
+    Ok(people.get_mut(&id))
 }
 
 fn write_to<W: Write + Seek>(

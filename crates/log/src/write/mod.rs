@@ -6,6 +6,7 @@
 //! everything written so far is handed to the operating system, so that a killed run loses no more
 //! than that. The contents do not depend on the time of day: the same frames give the same bytes.
 
+mod body;
 mod csv;
 mod error;
 mod mcap_tracks;

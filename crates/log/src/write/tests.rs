@@ -8,7 +8,7 @@ use super::mcap_tracks::McapTracks;
 use super::testing::{camera, track};
 use super::*;
 use crate::msgs::{
-    CameraInfo, Detection3DArray, ImageAnnotations, Marker, MarkerArray, PoseStamped,
+    CameraInfo, Detection3DArray, ImageAnnotations, Marker, MarkerArray, PointCloud2, PoseStamped,
     SceneEntityDeletion, SceneUpdate, StringMsg, TFMessage, decode,
 };
 
@@ -109,6 +109,10 @@ fn the_log_carries_what_viewers_draw() {
     assert_eq!((person.cylinders.len(), person.arrows.len()), (1, 1));
     let drawn: ImageAnnotations = decode(&read(&bytes, "/people/annotations")[1]).unwrap();
     assert_eq!((drawn.points[0].points.len(), drawn.texts[0].text.as_str()), (4, "12 3.0 m"));
+    let bodies = read(&bytes, "/people/person_12/body");
+    let [body] = &bodies[..] else { panic!("the transforms move it: it is written once") };
+    let body: PointCloud2 = decode(body).unwrap();
+    assert_eq!((body.header.frame_id.as_str(), body.width > 100), ("person_12", true));
     let info: CameraInfo = decode(&read(&bytes, "/camera/camera_info")[1]).unwrap();
     assert_eq!((info.header.frame_id.as_str(), info.width, info.k[0]), ("eye", 640, 525.0));
 }

@@ -5,8 +5,8 @@ use tagalong_config::{ConfigError, Value, parse_settings};
 /// Name of the table.
 pub(super) const TABLE: &str = "suits";
 
-/// Cameras that a config was fitted to and tried on. A run takes no notice of it; `tagalong doctor`
-/// warns of others.
+/// Cameras and robots that a config was fitted to and tried on. A run with others goes on, with a note
+/// on missing odometry; `tagalong doctor` warns of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Suits {
@@ -14,6 +14,8 @@ pub struct Suits {
     pub camera_height_m: Option<[f64; 2]>,
     /// Least and greatest angle of the optical axis below the horizon, degrees.
     pub pitch_down_deg: Option<[f64; 2]>,
+    /// True if motion over ground is evidence, so that the robot's own has to be known.
+    pub odometry: bool,
 }
 
 /// Reads `[suits]`.

@@ -4,7 +4,7 @@ use super::pairs::p_text;
 use super::{Page, amount, cell, column, no_cell, number, table};
 use crate::chart::{interval, key, series_class};
 use crate::figures::{ComparisonSpace, Figure, MAIN};
-use crate::summary::{Estimate, PipelineSummary, per_log};
+use crate::summary::{Estimate, PairSummary, PipelineSummary, per_log};
 
 impl Page<'_> {
     pub(super) fn headline(&self) -> Markup {
@@ -51,9 +51,9 @@ impl Page<'_> {
             (number(first.1.mean, 3)) ", then " strong { (second.0.pipeline) } " with "
             (number(second.1.mean, 3)) ". "
             @if let Some(pair) = pair.filter(|pair| pair.is_clear()) {
-                "The difference is clear (p " (p_equals(pair.p_corrected)) ")."
+                "The difference is clear (" (p_of(pair)) ")."
             } @else if let Some(pair) = pair {
-                "These logs do not tell the two apart (p " (p_equals(pair.p_corrected)) ", "
+                "These logs do not tell the two apart (" (p_of(pair)) ", "
                 (amount(pair.logs as usize, "log")) " in common; it takes at least six)."
             } @else { "No log in common tells the two apart." }
         })
@@ -234,6 +234,15 @@ pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {
 pub(super) fn span_of([low, high]: [f64; 2], decimals: usize) -> String {
     let between = if low < 0.0 || high < 0.0 { " to " } else { "–" };
     format!("{}{between}{}", number(low, decimals), number(high, decimals))
+}
+
+/// Returns both p-values of a pair where they differ, as the table of pairs has both.
+fn p_of(pair: &PairSummary) -> String {
+    let [alone, corrected] = [pair.p_value, pair.p_corrected].map(p_equals);
+    match alone == corrected {
+        true => format!("p {alone}"),
+        false => format!("p {alone} for this pair alone, p {corrected} corrected for all pairs"),
+    }
 }
 
 fn p_equals(p: f64) -> String {

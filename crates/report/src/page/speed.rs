@@ -75,6 +75,7 @@ impl Page<'_> {
         let head = html! {
             (column("Pipeline", None)) (column("Stage", None))
             (column("p50 [ms]", Some("Half of the frames took less"))) (column("p95 [ms]", Some("95 % of the frames took less")))
+            (column("p99 [ms]", Some("99 % of the frames took less"))) (column("worst [ms]", Some("The slowest frame of all tasks")))
             th scope="col" class="picture" { "p50 as a bar, p95 as a line" }
         };
         let body = html! {
@@ -84,13 +85,15 @@ impl Page<'_> {
                     td { (row.stage) }
                     (cell(row.p50_ms, &html! { (number(row.p50_ms, 2)) }))
                     (cell(row.p95_ms, &html! { (number(row.p95_ms, 2)) }))
+                    (cell(row.p99_ms, &html! { (number(row.p99_ms, 2)) }))
+                    (cell(row.max_ms, &html! { (number(row.max_ms, 2)) }))
                     td { (bar(row.p50_ms, Some(row.p95_ms), most)) }
                 }
             }
         };
         table(
             "Times of the stages",
-            &html! { "Time per frame and stage, mean over the tasks of a pipeline." },
+            &html! { "Time per frame and stage, mean over the tasks of a pipeline; of the slowest frames the slowest." },
             &head,
             &body,
         )
@@ -101,10 +104,20 @@ struct StageRow {
     stage: String,
     p50_ms: f64,
     p95_ms: f64,
+    p99_ms: f64,
+    max_ms: f64,
     is_total: bool,
 }
 
 impl StageRow {
+    /// Creates a row of the times of one stage in all tasks: p50, p95, p99 and worst, ms.
+    fn new(stage: &str, times: &[[f64; 4]], is_total: bool) -> Self {
+        let of = |i: usize| mean(times.iter().map(|t| t[i])).unwrap_or(f64::NAN);
+        let max_ms = times.iter().map(|t| t[3]).fold(f64::NAN, f64::max);
+        let (p50_ms, p95_ms, p99_ms) = (of(0), of(1), of(2));
+        Self { stage: stage.to_owned(), p50_ms, p95_ms, p99_ms, max_ms, is_total }
+    }
+
     fn class(&self, series: usize) -> String {
         let total = if self.is_total { "total " } else { "" };
         format!("{total}{}", series_class(series))
@@ -113,25 +126,23 @@ impl StageRow {
 
 /// Returns the row of the whole frame, then those of the stages in their order.
 fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
-    let Some(p50_ms) = mean(times.iter().map(|t| t.frame_ms_p50)) else { return Vec::new() };
-    let p95_ms = mean(times.iter().map(|t| t.frame_ms_p95)).unwrap_or(f64::NAN);
-    let mut rows = vec![StageRow { stage: "whole frame".into(), p50_ms, p95_ms, is_total: true }];
-    let mut by_stage: BTreeMap<&str, Vec<[f64; 2]>> = BTreeMap::new();
+    if !times.iter().any(|t| t.frame_ms_p50.is_finite()) {
+        return Vec::new();
+    }
+    let whole = |t: &&TaskTiming| [t.frame_ms_p50, t.frame_ms_p95, t.frame_ms_p99, t.frame_ms_max];
+    let whole: Vec<_> = times.iter().map(whole).collect();
+    let mut by_stage: BTreeMap<&str, Vec<[f64; 4]>> = BTreeMap::new();
     // The map sorts by name; the rows keep the order of the pipeline.
     let mut order: Vec<&str> = Vec::new();
     for stage in times.iter().flat_map(|t| &t.stages) {
         if !order.contains(&stage.stage.as_str()) {
             order.push(&stage.stage);
         }
-        by_stage.entry(&stage.stage).or_default().push([stage.p50_ms, stage.p95_ms]);
+        let of_task = [stage.p50_ms, stage.p95_ms, stage.p99_ms, stage.max_ms];
+        by_stage.entry(&stage.stage).or_default().push(of_task);
     }
-    rows.extend(order.into_iter().map(|stage| StageRow {
-        stage: stage.to_owned(),
-        p50_ms: mean(by_stage[stage].iter().map(|t| t[0])).unwrap_or(f64::NAN),
-        p95_ms: mean(by_stage[stage].iter().map(|t| t[1])).unwrap_or(f64::NAN),
-        is_total: false,
-    }));
-    rows
+    let stages = order.into_iter().map(|stage| StageRow::new(stage, &by_stage[stage], false));
+    std::iter::once(StageRow::new("whole frame", &whole, true)).chain(stages).collect()
 }
 
 /// Returns the mean of the finite values.

@@ -95,16 +95,16 @@ fn room(lab: &Lab, scene: &Scene, shipped: &[Shipped; 2]) -> Result<Room, Reprod
     let collector = |shipped: &Shipped| Collector::new(shipped.config.clone()).map_err(failed);
     let mut collectors = [collector(&shipped[0])?, collector(&shipped[1])?];
     let mut draw = Draw::new(scene, lab.jobs);
-    while let Some(drawn) = draw.next_frame() {
+    while let Some(simulated) = draw.next_frame() {
         let seen = |truth: &&Truth| !truth.ignore;
-        let people: Vec<_> = drawn
+        let people: Vec<_> = simulated
             .truth
             .iter()
             .filter(seen)
             .map(|truth| (u64::from(truth.id), truth.head_in_robot))
             .collect();
         for collector in &mut collectors {
-            collector.add(&drawn.frame, &people).map_err(failed)?;
+            collector.add(&simulated.frame, &people).map_err(failed)?;
         }
     }
     lab.progress.step();
@@ -297,7 +297,7 @@ fn bearings(rooms: &[Room]) -> Table {
         notes: vec![
             "The mount is off by up to 0.4 degrees about each axis, the centre of the mirror by \
              a third of a pixel, and the detector does not know. What is farther off than 7 \
-             degrees is nobody for either detector: the printed one at the seam, above all."
+             degrees is no detection for either detector: the printed one at the seam, above all."
                 .into(),
         ],
     }

@@ -118,7 +118,7 @@ pub(super) fn calibration(lab: &Lab) -> Result<Findings, ReproduceError> {
         columns: ["calibrated with", "held out"].map(String::from).to_vec(),
         rows: std::iter::once(published).chain(ours).collect(),
         notes: vec![format!(
-            "{places} places of somebody who walks in {} rooms; four webcams of 320x240, which \
+            "{places} places of a person who walks in {} rooms; four webcams of 320x240, which \
              hang and look otherwise in each; the first guess is off by {} m each way, {:.0} \
              degrees and {:.0} % of the focal length. Intervals are over rooms.",
             rooms.len(),

@@ -82,7 +82,7 @@ fn table(title: &str, trials: &[Vec<PipelineResult>]) -> Table {
         columns: columns.map(String::from).to_vec(),
         rows: PIPELINES.iter().enumerate().map(row).collect(),
         notes: vec![format!(
-            "{} draws; a report is right within half a metre; nobody counts beyond 6 m. {FRESH} \
+            "{} draws; a report is right within half a metre; people beyond 6 m do not count. {FRESH} \
              The printed method is one for one person.",
             trials.len()
         )],

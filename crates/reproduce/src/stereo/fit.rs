@@ -167,7 +167,10 @@ fn fitted(
         columns: columns.map(str::to_owned).to_vec(),
         rows,
         notes: vec![
-            format!("{} drawn walks of the split `validation`, 6 pieces of clutter", walks.len()),
+            format!(
+                "{} simulated walks of the split `validation`, 6 pieces of clutter",
+                walks.len()
+            ),
             "One step after the other, with what was chosen before it: thresholds by MOTA, the \
              rest by the error of the place of the one who is followed, predicted places \
              included, to the millimetre, and by MOTA where that is the same; a frame without a \
@@ -191,20 +194,20 @@ impl Walk {
         let mut draw = Draw::new(scene, 1);
         let mut stereo = StereoDepth::new(stereo.clone()).map_err(failed)?;
         let (camera, mut shots) = (draw.camera().clone(), Vec::new());
-        while let Some(drawn) = draw.next_frame() {
+        while let Some(simulated) = draw.next_frame() {
             // The images of a depth camera need no stereo matching.
-            let frame = match drawn.frame.depth() {
-                Ok(_) => drawn.frame,
+            let frame = match simulated.frame.depth() {
+                Ok(_) => simulated.frame,
                 Err(_) => {
-                    let depth = stereo.depth(&drawn.frame, &mut Funnel::default());
-                    drawn.frame.with_depth(depth.map_err(failed)?)
+                    let depth = stereo.depth(&simulated.frame, &mut Funnel::default());
+                    simulated.frame.with_depth(depth.map_err(failed)?)
                 }
             };
             let moment = Moment {
                 stamp: frame.stamp,
-                truth: drawn.truth,
-                odom_from_robot: drawn.odom_from_robot,
-                world_from_robot: drawn.world_from_robot,
+                truth: simulated.truth,
+                odom_from_robot: simulated.odom_from_robot,
+                world_from_robot: simulated.world_from_robot,
             };
             shots.push((frame, moment));
         }

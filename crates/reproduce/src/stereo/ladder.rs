@@ -29,7 +29,7 @@ pub fn ladder(lab: &Lab) -> Result<Findings, ReproduceError> {
         1e3 * errors.iter().sum::<f64>() / errors.len() as f64
     };
     let tables = vec![
-        table("IDF1: is everybody found, under one number?", &draws, 3, |j| {
+        table("IDF1: are all people found, each under one number?", &draws, 3, |j| {
             j.tally.identity.idf1()
         }),
         table("MOTA: misses, false alarms, switched numbers", &draws, 3, |j| j.tally.clear.mota()),
@@ -56,7 +56,10 @@ fn table(title: &str, draws: &[Vec<Vec<Judged>>], digits: usize, figure: Figure)
         columns: columns.map(str::to_owned).to_vec(),
         rows,
         notes: vec![
-            format!("{} drawn stereo scenes; intervals: 95 %, over scenes, in pairs", all.len()),
+            format!(
+                "{} simulated stereo scenes; intervals: 95 %, over scenes, in pairs",
+                all.len()
+            ),
             "Each interval stands for itself: of twenty, one misses what it is of.".into(),
             format!("printed, corrected, best: {}", PIPELINES.join(", ")),
         ],

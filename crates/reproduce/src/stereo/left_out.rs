@@ -165,7 +165,7 @@ fn table(
         rows,
         notes: vec![
             format!(
-                "Fitted to {persons} proposals of people and {others} of others in {} drawn stereo \
+                "Fitted to {persons} proposals of people and {others} of others in {} simulated stereo \
                  scenes of the split `train`, judged in {} of `test`; Wilson intervals, over \
                  sightings",
                 2 * seeds * ROOMS.len() as u64,
@@ -223,14 +223,14 @@ fn in_scene(
     let mut stereo = StereoDepth::new(variants::stereo_settings(detects)?).map_err(other)?;
     let mut draw = Draw::new(scene, lab.jobs);
     let furniture: Vec<Furniture> = draw.simulation().furniture().to_vec();
-    while let Some(drawn) = draw.next_frame() {
-        let depth = stereo.depth(&drawn.frame, &mut Funnel::default()).map_err(other)?;
-        let frame = drawn.frame.with_depth(depth);
+    while let Some(simulated) = draw.next_frame() {
+        let depth = stereo.depth(&simulated.frame, &mut Funnel::default()).map_err(other)?;
+        let frame = simulated.frame.with_depth(depth);
         let report = pipeline.step(&frame).map_err(other)?;
         for candidate in &report.candidates {
             let detection = &candidate.detection;
-            let Some(is_person) = is_person(detection, &drawn.truth) else { continue };
-            let at = drawn.world_from_robot * detection.position.xy();
+            let Some(is_person) = is_person(detection, &simulated.truth) else { continue };
+            let at = simulated.world_from_robot * detection.position.xy();
             let thing = (!is_person).then(|| what_stands_at(at, &furniture));
             let is_believed = !matches!(candidate.fate, Fate::Dropped(_));
             // Candidates of one scene share a group, which cross-validation does not split.

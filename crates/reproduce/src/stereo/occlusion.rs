@@ -56,7 +56,10 @@ fn table(cases: &[Case], draws: usize) -> Table {
         columns: PIPELINES.iter().map(|name| (*name).to_owned()).collect(),
         rows,
         notes: vec![
-            format!("{draws} drawn stereo scenes; {} occlusions; Wilson intervals", cases.len()),
+            format!(
+                "{draws} simulated stereo scenes; {} occlusions; Wilson intervals",
+                cases.len()
+            ),
             "The paper shows one occlusion in pictures and counts none.".into(),
             "Who had no track before the occlusion is not counted.".into(),
         ],

@@ -17,7 +17,7 @@ type Sequence = (&'static str, &'static str, &'static [(&'static str, &'static s
 
 /// Sequences with no, one and two people among objects that resemble people.
 const SEQUENCES: [Sequence; 3] = [
-    ("nobody", "empty-clutter", &[STEREO, ("duration_s", "8")]),
+    ("no person", "empty-clutter", &[STEREO, ("duration_s", "8")]),
     ("one person", "turntable", &[STEREO, ("duration_s", "8"), ("room.clutter", "9")]),
     ("two people", "square-walk", &[STEREO, ("duration_s", "10"), ("room.clutter", "9")]),
 ];
@@ -40,8 +40,8 @@ const REAL_VERIFIERS: [(&str, Option<&str>); 5] = [
 
 /// Note on the rows of real rooms.
 const REAL_ROOMS: &str = "Real rooms: annotated logs of colour and depth images, left out \
-    where they are not there. `svm-patch`, `color-texture` and `body-net` were trained in drawn \
-    rooms and in the logs `filinha` and `um`, the verifier as printed in drawn rooms alone.";
+    where they are not there. `svm-patch`, `color-texture` and `body-net` were trained in simulated \
+    rooms and in the logs `filinha` and `um`, the verifier as printed in simulated rooms alone.";
 
 /// Largest distance on the floor at which a detection belongs to a person, m, ...
 const SAME_M: f64 = 0.5;
@@ -92,27 +92,28 @@ pub fn verifier(lab: &Lab) -> Result<Findings, ReproduceError> {
     let published = [f64::NAN, 100.0, 6.0].map(|number| Cell::number(number, 0));
     sightings.push(Row::published("three sequences, counts lost", published.to_vec()));
     let mut everything = vec![Tally::default(); PIPELINES.len()];
-    let mut scenes_drawn = 0;
+    let mut scenes_simulated = 0;
     for (name, scene, set) in SEQUENCES {
         let scenes = lab.scenes(scene, set, lab.seeds(50))?;
-        scenes_drawn += scenes.len();
+        scenes_simulated += scenes.len();
         let all = lab.trials(name, &scenes, &contenders, tallies)?;
         let mut tallies = vec![Tally::default(); PIPELINES.len()];
         for trial in &all {
             tallies.iter_mut().zip(trial).for_each(|(sum, one)| sum.add(one));
         }
         everything.iter_mut().zip(&tallies).for_each(|(sum, one)| sum.add(one));
-        let name = format!("drawn, {name}");
+        let name = format!("simulated, {name}");
         sightings.extend(rows(&name, &PIPELINES, &tallies, Tally::sighting_cells));
         tracks.extend(rows(&name, &PIPELINES, &tallies, Tally::track_cells));
     }
-    sightings.extend(rows("drawn, all", &PIPELINES, &everything, Tally::sighting_cells));
-    tracks.extend(rows("drawn, all", &PIPELINES, &everything, Tally::track_cells));
-    let drawn = format!("{scenes_drawn} drawn stereo scenes that nothing was trained on; Wilson");
+    sightings.extend(rows("simulated, all", &PIPELINES, &everything, Tally::sighting_cells));
+    tracks.extend(rows("simulated, all", &PIPELINES, &everything, Tally::track_cells));
+    let simulated =
+        format!("{scenes_simulated} simulated stereo scenes that nothing was trained on; Wilson");
     let tables = vec![
-        sightings_table(sightings, &drawn),
+        sightings_table(sightings, &simulated),
         things_table(&everything),
-        tracks_table(tracks, &drawn),
+        tracks_table(tracks, &simulated),
     ];
     Ok(Findings { tables, pictures: Vec::new() })
 }
@@ -153,14 +154,14 @@ fn rows(
     pipelines.iter().zip(tallies).map(row).collect()
 }
 
-fn sightings_table(rows: Vec<Row>, drawn: &str) -> Table {
+fn sightings_table(rows: Vec<Row>, simulated: &str) -> Table {
     let columns = ["false sightings a frame", "false ones removed %", "people's rejected %"];
     Table {
         title: "Single sightings: what the verifier rejects (P4, Table I; P1, Fig. 5)".into(),
         columns: columns.map(str::to_owned).to_vec(),
         rows,
         notes: vec![
-            format!("{drawn} intervals take sightings as independent: they are too narrow"),
+            format!("{simulated} intervals take sightings as independent: they are too narrow"),
             REAL_ROOMS.into(),
             "False sightings a frame: before the verifier. People's: of head and shoulders; \
              an arm is neither."
@@ -185,13 +186,13 @@ fn things_table(tallies: &[Tally]) -> Table {
         columns: std::iter::once(format!("{}: sightings", PIPELINES[0])).chain(removed).collect(),
         rows: kinds.into_iter().map(row).collect(),
         notes: vec![format!(
-            "Drawn to be taken for people: {}.",
+            "Shaped to be taken for people: {}.",
             LOOK_ALIKES.map(FurnitureKind::name).join(", ")
         )],
     }
 }
 
-fn tracks_table(rows: Vec<Row>, drawn: &str) -> Table {
+fn tracks_table(rows: Vec<Row>, simulated: &str) -> Table {
     let columns = [
         "false tracks",
         "their frames",
@@ -204,7 +205,9 @@ fn tracks_table(rows: Vec<Row>, drawn: &str) -> Table {
         columns: columns.map(str::to_owned).to_vec(),
         rows,
         notes: vec![
-            format!("{drawn} intervals take people and frames as independent: they are too narrow"),
+            format!(
+                "{simulated} intervals take people and frames as independent: they are too narrow"
+            ),
             REAL_ROOMS.into(),
             "Lost: had a track in the same frame without the verifier.".into(),
         ],

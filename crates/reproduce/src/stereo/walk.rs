@@ -190,11 +190,11 @@ fn table(walks: &[Walk], variants: &[Variant]) -> Table {
         rows,
         notes: vec![
             format!(
-                "{} drawn walks in front of a stereo camera; intervals: 95 %, over walks",
+                "{} simulated walks in front of a stereo camera; intervals: 95 %, over walks",
                 walks.len()
             ),
             "Predicted places count, too: the other person passes between. Without a place: \
-             nobody is believed to be within half a metre of the person in view."
+             no track is within half a metre of the person in view."
                 .into(),
             "The robot keeps 2 m behind, by the true place: the same way for all, with the \
              errors of its wheels, which `stereo-verified` corrects by what stands still \

@@ -4,9 +4,9 @@
 use tagalong_core::DepthImage;
 use tagalong_geometry::Rect;
 use tagalong_sim::Truth;
-use tagalong_trials::{Drawn, TrialError};
+use tagalong_trials::{SimulatedFrame, TrialError};
 
-use super::{Check, depth, deviation, drawn, mean, scene};
+use super::{Check, depth, deviation, mean, scene, simulated};
 
 /// Camera, and the limits of its check.
 pub struct Rig {
@@ -50,7 +50,8 @@ pub fn checks(rig: &Rig, seeds: u64) -> Result<Vec<Check>, TrialError> {
             3.3 + 0.2 * (seed % 9) as f64,
             40 * seed % 360
         );
-        drawn(&scene(&standing)).for_each(|drawn| offsets.extend(displacements(&drawn)));
+        simulated(&scene(&standing))
+            .for_each(|simulated| offsets.extend(displacements(&simulated)));
     }
     let share = |wanted: i64| {
         let held = |o: &&f64| (o.round() as i64).clamp(-BINS, BINS) == wanted;
@@ -75,11 +76,11 @@ fn name(bin: i64) -> String {
 }
 
 /// Returns the displacements of the left, right and upper edge of every wholly visible person.
-fn displacements(drawn: &Drawn) -> Vec<f64> {
-    let Some(depth) = depth(&drawn.frame) else { return Vec::new() };
+fn displacements(simulated: &SimulatedFrame) -> Vec<f64> {
+    let Some(depth) = depth(&simulated.frame) else { return Vec::new() };
     let of = |person: &Truth| {
         let (whole, seen) = (person.upper_body?, person.visible?);
-        let trunk = drawn.frame.camera.depth_of(&person.torso_in_robot) as f32;
+        let trunk = simulated.frame.camera.depth_of(&person.torso_in_robot) as f32;
         let measured = extent(depth, &seen, trunk)?;
         // An edge of the square is no edge of the person.
         let free = [
@@ -89,7 +90,7 @@ fn displacements(drawn: &Drawn) -> Vec<f64> {
         ];
         (person.visible_fraction > 0.95).then_some(free)
     };
-    drawn.truth.iter().filter_map(of).flatten().flatten().collect()
+    simulated.truth.iter().filter_map(of).flatten().flatten().collect()
 }
 
 /// Returns the bounds of the pixels that are as far away as the trunk.

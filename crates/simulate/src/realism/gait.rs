@@ -5,7 +5,7 @@
 use nalgebra::Point3;
 use tagalong_trials::TrialError;
 
-use super::{Check, drawn, mean, scene};
+use super::{Check, mean, scene, simulated};
 
 const GROUP: &str = "gait";
 /// Requested speeds of the people, m/s.
@@ -65,7 +65,7 @@ fn heads(speed_mps: f64) -> Vec<Point3<f64>> {
          [[people]]\npath = [[1.5, 4.5], [17.0, 4.5]]\nspeed_mps = {speed_mps:.2}\n\
          height_m = {HEIGHT_M:.2}\n"
     );
-    let all = drawn(&scene(&text)).filter_map(|d| d.truth.first().map(|t| t.head_in_robot));
+    let all = simulated(&scene(&text)).filter_map(|d| d.truth.first().map(|t| t.head_in_robot));
     // The first two seconds are those in which the person gathers speed.
     all.skip((2.0 * RATE_HZ) as usize).collect()
 }

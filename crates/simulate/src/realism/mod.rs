@@ -20,7 +20,7 @@ use tagalong_config::Registry;
 use tagalong_core::{DepthImage, Frame, Funnel};
 use tagalong_sim::{CameraKind, Scene, Variant};
 use tagalong_stereo::{StereoDepth, StereoSettings};
-use tagalong_trials::{Draw, Drawn, TrialError};
+use tagalong_trials::{Draw, SimulatedFrame, TrialError};
 
 /// Figure with its limits.
 #[derive(Clone, Debug, Serialize)]
@@ -158,20 +158,23 @@ fn scenes(text: &str, seeds: u64) -> Vec<Scene> {
 
 /// Returns all frames of a scene; those of a stereo pair with the depth that the stage of the
 /// pipelines computes.
-fn drawn(scene: &Scene) -> impl Iterator<Item = Drawn> + use<> {
-    drawn_with(scene, StereoSettings::default())
+fn simulated(scene: &Scene) -> impl Iterator<Item = SimulatedFrame> + use<> {
+    simulated_with(scene, StereoSettings::default())
 }
 
 /// Returns the same with depth by other settings of the stage.
-fn drawn_with(scene: &Scene, settings: StereoSettings) -> impl Iterator<Item = Drawn> + use<> {
+fn simulated_with(
+    scene: &Scene,
+    settings: StereoSettings,
+) -> impl Iterator<Item = SimulatedFrame> + use<> {
     let mut draw = Draw::new(scene, threads(None));
     let is_pair = scene.camera.kind == CameraKind::Stereo;
     let mut stereo = StereoDepth::new(settings).ok().filter(|_| is_pair);
     std::iter::from_fn(move || {
-        let drawn = draw.next_frame()?;
-        let depth = stereo.as_mut().map(|s| s.depth(&drawn.frame, &mut Funnel::default()));
-        let Some(Ok(depth)) = depth else { return Some(drawn) };
-        Some(Drawn { frame: drawn.frame.with_depth(depth), ..drawn })
+        let simulated = draw.next_frame()?;
+        let depth = stereo.as_mut().map(|s| s.depth(&simulated.frame, &mut Funnel::default()));
+        let Some(Ok(depth)) = depth else { return Some(simulated) };
+        Some(SimulatedFrame { frame: simulated.frame.with_depth(depth), ..simulated })
     })
 }
 

@@ -16,9 +16,9 @@ use tagalong_geometry::Rect;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_trials::TrialError;
 
-use super::{Check, drawn, mean, scene};
+use super::{Check, mean, scene, simulated};
 
-const GROUP: &str = "drawn against real depth patches";
+const GROUP: &str = "simulated against real depth patches";
 /// Folder of the recordings with annotated people, relative to the repository.
 const LOGS: &str = "../shared/data/logs";
 /// Recordings with depth and annotated people.
@@ -47,7 +47,7 @@ pub fn checks(seeds: u64) -> Result<Vec<Check>, TrialError> {
     let limit = [f64::NEG_INFINITY, 0.8];
     Ok(vec![
         Check::told(GROUP, "real patches", count(&real), ""),
-        Check::told(GROUP, "drawn patches", count(&sim), ""),
+        Check::told(GROUP, "simulated patches", count(&sim), ""),
         Check::between(GROUP, what, cross_validated(&real, &sim), "", limit),
         Check::told(GROUP, "for comparison: one recording against another", within(&real), ""),
     ])
@@ -90,9 +90,9 @@ fn rooms(folds: usize, seeds: u64) -> Vec<Vec<Sample>> {
              rate_hz = 1.0\nheight_m = {height}\npitch_down_deg = {pitch:.1}\n\
              [robot]\nstart = [0.6, 3.0]\n"
         );
-        for drawn in drawn(&scene(&text)) {
-            let Ok(depth) = drawn.frame.depth() else { continue };
-            let seen = drawn.truth.iter().filter(|person| person.visible_fraction > 0.95);
+        for simulated in simulated(&scene(&text)) {
+            let Ok(depth) = simulated.frame.depth() else { continue };
+            let seen = simulated.truth.iter().filter(|person| person.visible_fraction > 0.95);
             let squares = seen.filter_map(|person| person.upper_body);
             all[seed as usize % folds].extend(squares.filter_map(|at| features(depth, &at)));
         }

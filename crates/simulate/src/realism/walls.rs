@@ -7,7 +7,7 @@ use tagalong_core::DepthImage;
 use tagalong_stereo::StereoSettings;
 use tagalong_trials::TrialError;
 
-use super::{Check, depth, deviation, drawn_with, mean, scene};
+use super::{Check, depth, deviation, mean, scene, simulated_with};
 
 /// Distances of the wall, m.
 const RANGES_M: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
@@ -122,9 +122,9 @@ fn measure(rig: &Rig, range_m: f64, wallpaper: bool) -> Option<Wall> {
     // The pipelines' texture threshold rejects the faint wallpaper; here the matcher itself is
     // under test.
     let settings = StereoSettings { texture: 0, ..StereoSettings::default() };
-    for drawn in drawn_with(&scene(&text), settings) {
-        focal_px = drawn.frame.camera.focal_px();
-        fits.extend(fit(depth(&drawn.frame)?, rig.window));
+    for simulated in simulated_with(&scene(&text), settings) {
+        focal_px = simulated.frame.camera.focal_px();
+        fits.extend(fit(depth(&simulated.frame)?, rig.window));
     }
     if fits.is_empty() {
         return None;

@@ -10,7 +10,7 @@ use tagalong_core::{Frame, Stamp, WheelSpeeds};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources};
 use tagalong_sim::{Clearance, Event, Scene, Simulation};
 
-use crate::{Contender, Draw, Drawn, Moment, TrialError};
+use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
 
 /// The robot's body is a disc of this radius, m: somewhat more than the robot of
 /// the papers, which is 0.38 m wide and 0.47 m long.
@@ -22,7 +22,7 @@ pub trait Witness {
     fn event(&mut self, _event: &Event) {}
 
     /// Takes a frame and the report of the pipeline on it.
-    fn frame(&mut self, _drawn: &Drawn, _report: &FrameReport) {}
+    fn frame(&mut self, _drawn: &SimulatedFrame, _report: &FrameReport) {}
 
     /// False ends the ride.
     fn goes_on(&self) -> bool {
@@ -91,21 +91,21 @@ impl Ride {
         };
         let failed =
             |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
-        while let Some(drawn) = ride.next_frame(&mut draw, &pipeline, witness) {
+        while let Some(simulated) = ride.next_frame(&mut draw, &pipeline, witness) {
             if ride.reports.is_empty() {
-                let missing = pipeline.check_sources(sources(&drawn.frame));
+                let missing = pipeline.check_sources(sources(&simulated.frame));
                 missing.map_err(|why| TrialError::Config(format!("{}: {why}", contender.name)))?;
             }
             // Of the processor: a busy machine must not change a table.
             let before = ThreadTime::now();
-            let report = pipeline.step(&drawn.frame).map_err(failed)?;
+            let report = pipeline.step(&simulated.frame).map_err(failed)?;
             ride.took_ms.push(before.elapsed().as_secs_f64() * 1e3);
             // Between frames `command_at` steers; this is the fresh command.
             if let Some(command) = report.command {
                 draw.steer(command.wheels);
             }
-            witness.frame(&drawn, &report);
-            ride.moments.push(Moment::of(drawn));
+            witness.frame(&simulated, &report);
+            ride.moments.push(Moment::of(simulated));
             ride.reports.push(report);
         }
         Ok(ride)
@@ -116,7 +116,7 @@ impl Ride {
         draw: &mut Draw,
         pipeline: &Pipeline,
         witness: &mut dyn Witness,
-    ) -> Option<Drawn> {
+    ) -> Option<SimulatedFrame> {
         if !witness.goes_on() {
             return None;
         }

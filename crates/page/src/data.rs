@@ -21,6 +21,9 @@ pub struct PageData {
     pub truth: Option<Vec<Vec<TruthBox>>>,
     /// The runs, one or two.
     pub runs: Vec<RunData>,
+    /// True for a run that happens now: the page asks for its frames.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub live: bool,
 }
 
 /// Annotated person in one frame.
@@ -68,6 +71,28 @@ pub struct FrameData {
     /// Track of the person to follow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<u32>,
+    /// Target lock and command, where there is a controller.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveData>,
+}
+
+/// State of the target lock and command for the wheels in one frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct DriveData {
+    /// State of the lock, and its meaning.
+    pub lock: [String; 2],
+    /// Cause of the last change of state.
+    pub why: String,
+    /// Time since that change, s.
+    pub since: f64,
+    /// Probability that the followed track is the person.
+    pub belief: Option<f64>,
+    /// Reason of the command, and its meaning.
+    pub reason: [String; 2],
+    /// Commanded speed, m/s.
+    pub v: f64,
+    /// Commanded rate of turn, to the left, rad/s.
+    pub w: f64,
 }
 
 /// Track in one frame.

@@ -1,14 +1,13 @@
-//! As much of HTTP/1.1 as one page on this computer needs: requests with bounds on everything, and
+//! As much of HTTP/1.1 as a page on this computer needs: requests with bounds on everything, and
 //! an answer per connection.
 
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
+
 /// Longest request line with all headers, bytes.
 const HEAD_BYTES: usize = 16 << 10;
-
-/// Longest body, bytes: changes are short.
-const BODY_BYTES: usize = 16 << 10;
 
 /// Most header lines.
 const HEADERS: usize = 100;
@@ -16,7 +15,7 @@ const HEADERS: usize = 100;
 /// Time for a whole request: a slower one keeps a thread for nothing.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// A request.
+/// Request of a browser or a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     /// `GET` or `POST`, or another method.
@@ -29,13 +28,18 @@ pub struct Request {
 }
 
 impl Request {
+    /// Returns true for `GET` and `HEAD`, which change nothing.
+    pub fn is_read(&self) -> bool {
+        matches!(self.method.as_str(), "GET" | "HEAD")
+    }
+
     /// Returns a header by its name in lower case.
     pub fn header(&self, name: &str) -> Option<&str> {
         self.headers.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 }
 
-/// An answer.
+/// Answer to a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Response {
     /// Status code.
@@ -50,6 +54,19 @@ impl Response {
     /// Returns a body with status 200.
     pub fn ok(kind: &'static str, body: impl Into<Vec<u8>>) -> Self {
         Self { status: 200, kind, body: body.into() }
+    }
+
+    /// Returns data as JSON with status 200.
+    pub fn json(data: &impl Serialize) -> Self {
+        match serde_json::to_vec(data) {
+            Ok(bytes) => Self::ok("application/json", bytes),
+            Err(error) => Self::refusal(500, error.to_string()),
+        }
+    }
+
+    /// Returns the refusal of a path that the site does not have.
+    pub fn not_found() -> Self {
+        Self::refusal(404, "there is no such page")
     }
 
     /// Returns a refusal with its reason.
@@ -85,7 +102,7 @@ impl Response {
              Connection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n\
              Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\
              Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; \
-             img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; \
+             img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
              frame-ancestors 'none'\r\n\r\n"
         )?;
         if !head_only {
@@ -95,11 +112,11 @@ impl Response {
     }
 }
 
-/// Reads a request.
+/// Reads a request with a body of at most `body_bytes`.
 ///
 /// # Errors
 /// The refusal to answer with; `None` inside for a connection that is gone or sent nothing.
-pub fn read(from: &mut impl Read) -> Result<Request, Option<Response>> {
+pub fn read(from: &mut impl Read, body_bytes: usize) -> Result<Request, Option<Response>> {
     let deadline = Instant::now() + PATIENCE;
     let mut bytes = Vec::new();
     let head_end = loop {
@@ -115,7 +132,7 @@ pub fn read(from: &mut impl Read) -> Result<Request, Option<Response>> {
         return Err(Some(Response::refusal(431, "the headers are too long")));
     }
     let mut request = parse_head(&bytes[..head_end]).map_err(Some)?;
-    let length = body_length(&request).map_err(Some)?;
+    let length = body_length(&request, body_bytes).map_err(Some)?;
     let mut body = bytes.split_off(head_end + 4);
     while body.len() < length {
         more(from, &mut body, deadline)?;
@@ -193,7 +210,7 @@ fn parse_head(bytes: &[u8]) -> Result<Request, Response> {
     Ok(Request { method, path, headers, body: Vec::new() })
 }
 
-fn body_length(request: &Request) -> Result<usize, Response> {
+fn body_length(request: &Request, most: usize) -> Result<usize, Response> {
     if request.header("transfer-encoding").is_some() {
         return Err(Response::refusal(411, "send the length of the body"));
     }
@@ -204,7 +221,7 @@ fn body_length(request: &Request) -> Result<usize, Response> {
         return Err(Response::refusal(400, "the length of the body is no number"));
     }
     match text.parse::<usize>() {
-        Ok(length) if length <= BODY_BYTES => Ok(length),
+        Ok(length) if length <= most => Ok(length),
         _ => Err(Response::refusal(413, "the body is too long")),
     }
 }
@@ -214,13 +231,15 @@ mod tests {
     use super::*;
 
     fn status(bytes: &[u8]) -> Option<u16> {
-        read(&mut &bytes[..]).err().map(|refusal| refusal.map_or(0, |refusal| refusal.status))
+        read(&mut &bytes[..], 16 << 10)
+            .err()
+            .map(|refusal| refusal.map_or(0, |refusal| refusal.status))
     }
 
     #[test]
     fn a_request_is_read_with_its_headers_and_its_body() {
         let text = b"POST /a?b HTTP/1.1\r\nHost: x:1\r\nCONTENT-length: 3\r\n\r\nabcdef";
-        let request = read(&mut &text[..]).unwrap();
+        let request = read(&mut &text[..], 16 << 10).unwrap();
         assert_eq!((request.method.as_str(), request.path.as_str()), ("POST", "/a?b"));
         assert_eq!(request.header("host"), Some("x:1"));
         assert_eq!(request.body, b"abc");

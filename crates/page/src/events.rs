@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::page_data::EventData;
-use crate::recording::Moment;
+use crate::data::EventData;
+use crate::moment::Moment;
 
 /// Time without evidence from which on a person counts as lost, s.
 const LOST_AFTER_S: f64 = 0.5;
@@ -41,15 +41,24 @@ pub fn of_run(times: &[f64], moments: &[Option<&Moment>]) -> Vec<EventData> {
     watch.events
 }
 
+/// Watch over a run, frame by frame.
 #[derive(Default)]
-struct Watch {
+pub struct Watch {
     events: Vec<EventData>,
     courses: BTreeMap<u32, Course>,
     target: Option<u32>,
+    lock: Option<String>,
 }
 
 impl Watch {
-    fn take(&mut self, at: usize, t_s: f64, moment: &Moment) {
+    /// Takes the events since the last call. One that is noticed late has the position of the frame
+    /// in which it began.
+    pub fn drain(&mut self) -> Vec<EventData> {
+        std::mem::take(&mut self.events)
+    }
+
+    /// Takes a frame at a position and time of the page.
+    pub fn take(&mut self, at: usize, t_s: f64, moment: &Moment) {
         for track in moment.tracks.iter().filter(|track| track.confirmed) {
             match track.seen {
                 true => self.see(at, t_s, track.id),
@@ -64,6 +73,17 @@ impl Watch {
                 None => "the target is lost".to_owned(),
             };
             self.tell(at, "target", moment.target, text);
+        }
+        self.compare_lock(at, moment);
+    }
+
+    /// Tells a change of the target lock's state with its cause.
+    fn compare_lock(&mut self, at: usize, moment: &Moment) {
+        let Some(drive) = &moment.notes.drive else { return };
+        let before = self.lock.replace(drive.lock.clone());
+        if before.is_some_and(|before| before != drive.lock) {
+            let text = format!("{}: {}; {}", drive.lock, drive.lock_about, drive.why);
+            self.tell(at, "lock", moment.target, text);
         }
     }
 
@@ -120,8 +140,10 @@ impl Watch {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_app::frame_notes::DriveNote;
+
     use super::*;
-    use crate::recording::TrackState;
+    use crate::moment::TrackState;
 
     fn moment(tracks: &[(u32, bool)]) -> Moment {
         let state = |&(id, seen): &(u32, bool)| TrackState {
@@ -166,5 +188,24 @@ mod tests {
         let expected =
             ["person 1 is tracked", "person 1 is followed from now on", "the target is lost"];
         assert_eq!(texts, expected);
+    }
+
+    #[test]
+    fn a_change_of_the_lock_is_told_with_its_cause() {
+        let of = |lock: &str| {
+            let mut moment = moment(&[]);
+            let (lock, why) = (lock.to_owned(), "out of sight".to_owned());
+            moment.notes.drive = Some(DriveNote { lock, why, ..DriveNote::default() });
+            moment
+        };
+        let mut watch = Watch::default();
+        for (at, state) in ["locked", "locked", "lost"].into_iter().enumerate() {
+            watch.take(at, 0.1 * at as f64, &of(state));
+        }
+        let events = watch.drain();
+        let [event] = &events[..] else { panic!("{events:?}") };
+        assert_eq!((event.i, event.kind), (2, "lock"));
+        assert!(event.text.contains("lost") && event.text.contains("out of sight"));
+        assert!(watch.drain().is_empty(), "told once");
     }
 }

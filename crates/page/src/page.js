@@ -3,8 +3,8 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const SVG = "http://www.w3.org/2000/svg";
   const COLOURS = 8;
-  const [WIDTH, HEIGHT] = data.image_px;
-  const last = data.t.length - 1;
+  let [WIDTH, HEIGHT] = data.image_px;
+  let last = data.t.length - 1;
   const id = (name) => document.getElementById(name);
 
   // Elements are made from names and texts alone, so that no text is read as markup.
@@ -164,7 +164,7 @@
     const [[left, right], [low, high]] = [ends(xs), ends(ys)];
     return { x: (left + right) / 2, y: (low + high) / 2, w: right - left + 2, h: high - low + 2 };
   };
-  const whole = extent();
+  let whole = extent();
   const windowAt = (frame) => {
     const fits = Math.max(whole.w, whole.h) <= WHOLE_M;
     const centre = fits || !frame ? [whole.x, whole.y] : frame.robot;
@@ -363,6 +363,22 @@
     return node;
   };
 
+  // The state of the target lock and the reason of the command, each with its meaning.
+  const drive = (run, place) => {
+    const frame = frameOf(run, state.at);
+    const now = frame && frame.drive;
+    if (!now) return place.replaceChildren(el("p", { class: "soft" }, "The run has no controller: it follows nobody."));
+    const target = frame.target === undefined || frame.target === null ? "no person" : `person ${frame.target}`;
+    const sure = now.belief === null ? "" : `, the same person with probability ${fixed(now.belief, 2)}`;
+    const row = (name, sign, text) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, el("strong", {}, sign)), el("td", {}, text));
+    return place.replaceChildren(table(`Target and command of ${run.name}`, ["Part", "State", "Meaning"], [
+      row("Target", target, `${now.lock[1]}${sure}`),
+      row("Lock", now.lock[0], `for ${fixed(now.since, 1)} s: ${now.why}`),
+      row("Command", now.reason[0], now.reason[1]),
+      row("Speed", `${fixed(now.v, 2)} m/s`, `turns ${now.w < 0 ? "right" : "left"} by ${fixed(Math.abs(now.w), 2)} rad/s`),
+    ]));
+  };
+
   // ---- why was a person missed? ------------------------------------------------------------------
 
   const AROUND = 7;
@@ -467,9 +483,10 @@
 
   const events = data.runs.flatMap((run, number) => run.events.map((event) => ({ ...event, run: number })))
     .sort((a, b) => a.i - b.i || a.run - b.run);
-  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", target: "◎", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
+  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", target: "◎", lock: "⚿", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
   const BAD = ["missed", "switched", "wrong person", "false track"];
   const hiddenKinds = new Set();
+  const knownKinds = new Set();
 
   const goToEvent = (event) => {
     pause();
@@ -492,6 +509,8 @@
 
   const fillKinds = () => {
     for (const kind of [...new Set(events.map((event) => event.kind))].sort()) {
+      if (knownKinds.has(kind)) continue;
+      knownKinds.add(kind);
       const box = el("input", { type: "checkbox" });
       box.checked = true;
       box.addEventListener("change", () => {
@@ -519,6 +538,7 @@
   // ---- time ------------------------------------------------------------------------------------
 
   const draw = () => {
+    if (last < 0) return;
     followQuestion();
     data.runs.forEach((run, number) => {
       drawImage(run, number);
@@ -527,6 +547,7 @@
       const seen = frame ? frame.tracks.filter((track) => track.state === "seen").length : 0;
       id(`now-${number}`).textContent = frame ? `${seen} seen` : "no frame";
       people(run, id(`people-${number}`));
+      drive(run, id(`drive-${number}`));
       funnel(run, id(`funnel-${number}`));
       explain(run, id(`why-${number}`));
     });
@@ -536,6 +557,7 @@
   };
 
   const show = (at) => {
+    if (last < 0) return;
     state.at = Math.max(0, Math.min(last, at));
     id("frame").value = state.at;
     const frame = frameOf(data.runs[0], state.at);
@@ -554,10 +576,14 @@
   const pause = () => setPlaying(false);
 
   const play = () => {
+    if (data.live) {
+      setPlaying(true);
+      return show(last);
+    }
     if (state.at >= last) show(0);
     setPlaying(true);
     [state.from, state.since] = [data.t[state.at], performance.now()];
-    requestAnimationFrame(tick);
+    return requestAnimationFrame(tick);
   };
 
   const tick = (now) => {
@@ -611,6 +637,14 @@
     show(Math.round(((event.clientX - area.left) / area.width) * last));
   };
 
+  const fitImage = (number) => {
+    const image = id(`image-${number}`);
+    image.setAttribute("viewBox", `0 0 ${WIDTH || 4} ${HEIGHT || 3}`);
+    id(`picture-${number}`).hidden = !WIDTH;
+    image.closest(".views").classList.toggle("alone", !WIDTH);
+    id("why").hidden = !WIDTH;
+  };
+
   const prepare = () => {
     id("frame").max = last;
     id("frame").addEventListener("input", (event) => {
@@ -622,15 +656,10 @@
     for (const [name, act] of [["back", () => move(-1)], ["ahead", () => move(1)], ["before", () => step(-1)], ["next", () => step(1)]]) id(name).addEventListener("click", act);
     for (const name of ["show-dropped", "show-trails", "show-truth"]) id(name).addEventListener("change", draw);
     id("truth-label").hidden = !data.truth;
+    id("drive").hidden = !data.live && !data.runs.some((run) => run.frames.some((frame) => frame && frame.drive));
     data.runs.forEach((run, number) => {
-      const image = id(`image-${number}`);
-      image.setAttribute("viewBox", `0 0 ${WIDTH || 4} ${HEIGHT || 3}`);
-      image.addEventListener("click", askAt);
-      id(`picture-${number}`).hidden = !WIDTH;
-      if (!WIDTH) {
-        image.closest(".views").classList.add("alone");
-        id("why").hidden = true;
-      }
+      id(`image-${number}`).addEventListener("click", askAt);
+      fitImage(number);
       drawStrip(run, number);
       id(`strip-${number}`).addEventListener("click", jump);
     });
@@ -641,5 +670,23 @@
   };
 
   prepare();
-  show(0);
+  if (last >= 0) show(0);
+
+  // For live.js, which appends frames as they come.
+  const resize = (size) => {
+    if (size[0] === WIDTH && size[1] === HEIGHT) return;
+    [WIDTH, HEIGHT] = size;
+    data.runs.forEach((run, number) => fitImage(number));
+  };
+  const extended = () => {
+    last = data.t.length - 1;
+    id("frame").max = last;
+    whole = extent();
+  };
+  const strips = () => data.runs.forEach(drawStrip);
+  const listEvents = () => {
+    fillKinds();
+    fillEvents();
+  };
+  if (data.live) globalThis.tagalong = { data, state, events, id, show, play, resize, extended, strips, listEvents };
 })();

@@ -1,14 +1,14 @@
-//! HTML of the page: its frame, with style, script and data inlined.
+//! HTML of the page: its frame, with data, and with style and script inlined or beside it.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use tagalong_report::COLOURS;
 
-use crate::page_data::PageData;
-use crate::recording::Recording;
+use crate::data::PageData;
 
 // Inlined, so that the page is one file.
 const STYLE: &str = concat!(include_str!("page.css"), "\n");
 const SCRIPT: &str = include_str!("page.js");
+const LIVE_SCRIPT: &str = include_str!("live.js");
 
 /// Keys of the page, and what they do.
 const KEYS: [(&str, &str); 8] = [
@@ -24,29 +24,51 @@ const KEYS: [(&str, &str); 8] = [
 
 /// Texts above the page.
 pub struct Heading {
-    log: String,
-    runs: Vec<String>,
-    notes: Vec<String>,
+    /// Name of the log.
+    pub log: String,
+    /// One line for each run.
+    pub runs: Vec<String>,
+    /// Further lines.
+    pub notes: Vec<String>,
 }
 
-impl Heading {
-    /// Describes the runs of a page.
-    pub fn of(runs: &[Recording], data: &PageData, notes: &[String]) -> Self {
-        let log = runs.first().map(|run| run.report.log.name.clone()).unwrap_or_default();
-        let described = runs.iter().zip(&data.runs).map(|(run, shown)| {
-            let frames = shown.frames.iter().flatten().count();
-            let (name, folder) = (&shown.name, run.folder.display());
-            format!("{name}: {frames} frames, {}, from {folder}", run.report.ended)
-        });
-        Self { log, runs: described.collect(), notes: notes.to_vec() }
-    }
-}
-
-/// Returns the page as one text without any reference to another file.
+/// Returns the page of recorded runs as one text without any reference to another file.
 ///
 /// # Errors
 /// Data that JSON cannot express.
 pub fn html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
+    let style = html! { style { (PreEscaped(COLOURS)) (PreEscaped(STYLE)) } };
+    whole(heading, data, &style, &html! { script { (PreEscaped(SCRIPT)) } })
+}
+
+/// Returns the page of a run that happens now; a server has [`style`] as `page.css`, [`scripts`],
+/// and answers to what they ask.
+///
+/// # Errors
+/// Data that JSON cannot express.
+pub fn live_html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
+    let style = html! { link rel="stylesheet" href="page.css"; };
+    let names = scripts().map(|(name, _)| name);
+    let scripts = html! { @for name in names { script src=(name) {} } };
+    whole(heading, data, &style, &scripts)
+}
+
+/// Returns the style of [`live_html`].
+pub fn style() -> String {
+    [COLOURS, STYLE].concat()
+}
+
+/// Returns names and texts of the scripts of [`live_html`], in their order.
+pub fn scripts() -> [(&'static str, &'static str); 2] {
+    [("page.js", SCRIPT), ("live.js", LIVE_SCRIPT)]
+}
+
+fn whole(
+    heading: &Heading,
+    data: &PageData,
+    style: &Markup,
+    scripts: &Markup,
+) -> serde_json::Result<String> {
     let json = script_safe(&serde_json::to_string(data)?);
     let names: Vec<&str> = data.runs.iter().map(|run| run.name.as_str()).collect();
     let page = html! {
@@ -57,20 +79,21 @@ pub fn html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 title { (format!("{} - Tagalong", heading.log)) }
-                style { (PreEscaped(COLOURS)) (PreEscaped(STYLE)) }
+                (style)
             }
             body {
                 a class="skip" href="#main" { "Skip to the images" }
                 (top(heading))
                 main id="main" tabindex="-1" {
                     noscript { p { "This page needs JavaScript, which is inside it." } }
+                    @if data.live { p id="alive" class="alive" role="status" { "Waiting for the first frame." } }
                     (stage(&names))
                     (time_line(names.len()))
                     (answers(&names))
                 }
                 footer { p { "Made by Tagalong " (env!("CARGO_PKG_VERSION")) "." } }
                 script type="application/json" id="data" { (PreEscaped(json)) }
-                script { (PreEscaped(SCRIPT)) }
+                (scripts)
             }
         }
     };
@@ -143,7 +166,7 @@ fn time_line(runs: usize) -> Markup {
                 (button("ahead", "▸", "One frame ahead"))
                 (button("next", "▸|", "Next event"))
                 output id="clock" for="frame" {}
-                label { "Speed " select id="speed" {
+                label id="speed-label" { "Speed " select id="speed" {
                     option value="0.25" { "¼" } option value="0.5" { "½" }
                     option value="1" selected { "1" } option value="2" { "2" } option value="4" { "4" }
                 } }
@@ -167,6 +190,10 @@ fn answers(names: &[&str]) -> Markup {
                 p id="question" aria-live="polite" { "Click on the image where a person was missed." }
                 p class="missed" id="missed" hidden { }
                 (columns("why", names))
+            }
+            section id="drive" aria-labelledby="h-drive" {
+                h2 id="h-drive" { "Target and command" }
+                (columns("drive", names))
             }
             section id="people" aria-labelledby="h-people" {
                 h2 id="h-people" { "People in this frame" }
@@ -206,7 +233,7 @@ fn columns(id: &str, names: &[&str]) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::page_data::{CandidateData, FrameData, RunData, TestData};
+    use crate::data::{CandidateData, FrameData, RunData, TestData};
 
     const HOSTILE: &str = "</script><img src=x onerror=alert(1)>&\u{2028}\"'";
 

@@ -1,0 +1,228 @@
+//! Desk at which callers leave their requests: enroll, clear, status, health.
+//!
+//! Services and HTTP have threads of their own; the pipeline belongs to another one, which takes a
+//! request between two frames. A status is a copy of that after the last frame, so that it comes also
+//! while a frame takes long.
+
+use std::fmt;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use tagalong_pipeline::{Choice, Enrollment, FollowStatus, Permission};
+
+/// Longest wait for an answer of the pipeline.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Requests that wait; more are refused.
+const WAITING: usize = 16;
+/// Time without a frame from which on the bridge is not well.
+const SILENCE: Duration = Duration::from_secs(2);
+
+/// Change that a caller asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Verb {
+    /// Follow the person of this request.
+    Enroll(Enrollment),
+    /// Follow no person.
+    Clear,
+}
+
+impl fmt::Display for Verb {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Clear => write!(f, "clear"),
+            Self::Enroll(Enrollment { person, .. }) => match person {
+                Choice::Track(id) => write!(f, "enroll track {}", id.0),
+                Choice::Point([x, y]) => write!(f, "enroll the person at ({x}, {y})"),
+                Choice::Nearest => write!(f, "enroll the nearest person in front"),
+                Choice::Approach => write!(f, "enroll the person that walks up"),
+            },
+        }
+    }
+}
+
+/// Verb with the channel of its answer, which is a refusal in words.
+pub(crate) struct Request {
+    pub(crate) verb: Verb,
+    pub(crate) answer: SyncSender<Result<(), String>>,
+}
+
+/// Refusal of a request.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// The pipeline refuses it, for this reason.
+    Refused(String),
+    /// The pipeline did not answer in time.
+    Busy(&'static str),
+}
+
+impl Refusal {
+    /// Returns the reason in words.
+    pub(crate) fn reason(&self) -> &str {
+        match self {
+            Self::Refused(reason) => reason,
+            Self::Busy(reason) => reason,
+        }
+    }
+}
+
+/// State of the bridge for a caller.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct BridgeStatus {
+    /// State of the pursuit; null without a controller or before the first frame.
+    #[serde(flatten)]
+    pub(crate) follow: Option<FollowStatus>,
+    /// Permission of the deadman's switch to move, in words.
+    pub(crate) permission: Option<&'static str>,
+    /// Frames that the pipeline processed.
+    pub(crate) frames: u64,
+    /// Time since the last frame, s; null before the first.
+    pub(crate) frame_age_s: Option<f64>,
+}
+
+/// Health of the bridge.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Health {
+    /// True while frames are processed and no fault holds the robot.
+    pub(crate) ok: bool,
+    /// Cause if not.
+    pub(crate) reason: Option<String>,
+}
+
+/// The desk; clones are the same one.
+#[derive(Clone)]
+pub(crate) struct Desk {
+    requests: SyncSender<Request>,
+    shared: Arc<Mutex<Shared>>,
+}
+
+#[derive(Default)]
+struct Shared {
+    follow: Option<FollowStatus>,
+    permission: Option<Permission>,
+    frames: u64,
+    frame: Option<Instant>,
+    /// True once the pipeline takes requests.
+    is_open: bool,
+}
+
+impl Desk {
+    /// Returns a desk, and the requests for the thread of the pipeline.
+    pub(crate) fn new() -> (Self, Receiver<Request>) {
+        let (requests, waiting) = sync_channel(WAITING);
+        (Self { requests, shared: Arc::default() }, waiting)
+    }
+
+    /// Lets requests in.
+    pub(crate) fn open(&self) {
+        self.lock().is_open = true;
+    }
+
+    /// Sets the state after a frame.
+    pub(crate) fn frame(&self, follow: Option<FollowStatus>, frames: u64) {
+        let mut shared = self.lock();
+        (shared.follow, shared.frames, shared.frame) = (follow, frames, Some(Instant::now()));
+    }
+
+    /// Sets the state after a turn of the loop, and after a request.
+    pub(crate) fn turn(&self, permission: Option<Permission>, fault: Option<&'static str>) {
+        let mut shared = self.lock();
+        shared.permission = permission;
+        if let Some(follow) = &mut shared.follow {
+            follow.fault = fault;
+        }
+    }
+
+    /// Hands a verb to the pipeline and waits for its answer.
+    pub(crate) fn ask(&self, verb: Verb) -> Result<(), Refusal> {
+        if !self.lock().is_open {
+            return Err(Refusal::Busy("the topics of the robot are still waited for"));
+        }
+        let (answer, answered) = sync_channel(1);
+        self.requests.try_send(Request { verb, answer }).map_err(|error| match error {
+            TrySendError::Full(_) => Refusal::Busy("too many requests wait"),
+            TrySendError::Disconnected(_) => Refusal::Busy("the bridge ends"),
+        })?;
+        match answered.recv_timeout(PATIENCE) {
+            Ok(answer) => answer.map_err(Refusal::Refused),
+            Err(_) => Err(Refusal::Busy("the pipeline is stuck in a frame: it may answer later")),
+        }
+    }
+
+    /// Returns the state after the last frame.
+    pub(crate) fn status(&self) -> BridgeStatus {
+        let shared = self.lock();
+        BridgeStatus {
+            follow: shared.follow.clone(),
+            permission: shared.permission.map(Permission::cause),
+            frames: shared.frames,
+            frame_age_s: shared.frame.map(|at| at.elapsed().as_secs_f64()),
+        }
+    }
+
+    /// Returns whether the bridge does its work.
+    pub(crate) fn health(&self) -> Health {
+        let shared = self.lock();
+        let fault = shared.follow.as_ref().and_then(|follow| follow.fault);
+        let reason = match (shared.frame, fault) {
+            (None, _) => Some("no frame yet".to_owned()),
+            (Some(at), _) if at.elapsed() > SILENCE => {
+                Some(format!("no frame for {:.1} s", at.elapsed().as_secs_f64()))
+            }
+            (_, Some(fault)) => Some(format!("fault: {fault}")),
+            _ => None,
+        };
+        Health { ok: reason.is_none(), reason }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Shared> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+
+    use super::*;
+
+    #[test]
+    fn a_request_waits_for_the_pipeline_and_brings_its_answer_back() {
+        let (desk, requests) = Desk::new();
+        let before = desk.ask(Verb::Clear).unwrap_err();
+        assert_eq!(before.reason(), "the topics of the robot are still waited for");
+        desk.open();
+        let pipeline = thread::spawn(move || {
+            let answers = [Ok(()), Err("no person".to_owned())];
+            let verbs = answers.map(|answer| {
+                let request = requests.recv().unwrap();
+                request.answer.send(answer).unwrap();
+                request.verb
+            });
+            (verbs, requests)
+        });
+        let nearest = Verb::Enroll(Enrollment::of(Choice::Nearest));
+        assert_eq!(desk.ask(Verb::Clear), Ok(()));
+        assert_eq!(desk.ask(nearest), Err(Refusal::Refused("no person".into())));
+        let (verbs, requests) = pipeline.join().unwrap();
+        assert_eq!(verbs, [Verb::Clear, nearest]);
+        // The pipeline is stuck, and then gone.
+        let stuck = desk.ask(Verb::Clear).unwrap_err();
+        assert!(stuck.reason().contains("stuck in a frame"), "{stuck:?}");
+        drop(requests);
+        assert_eq!(desk.ask(Verb::Clear), Err(Refusal::Busy("the bridge ends")));
+    }
+
+    #[test]
+    fn the_bridge_is_well_while_frames_come() {
+        let (desk, _requests) = Desk::new();
+        assert_eq!(desk.health().reason.as_deref(), Some("no frame yet"));
+        desk.frame(None, 1);
+        desk.turn(Some(Permission::NotEnabled), None);
+        assert_eq!(desk.health(), Health { ok: true, reason: None });
+        assert_eq!(desk.status().permission, Some("not enabled"));
+        thread::sleep(SILENCE + Duration::from_millis(50));
+        assert!(desk.health().reason.unwrap().starts_with("no frame for 2."));
+    }
+}

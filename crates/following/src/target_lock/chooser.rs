@@ -1,0 +1,220 @@
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_core::{Track, TrackId};
+
+use super::settings::TargetSettings;
+
+/// Speed below which a person stands before the robot, m/s.
+const STANDS_MPS: f64 = 0.3;
+
+/// Rule by which a target is chosen while there is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ChoiceRule {
+    /// The nearest person in front.
+    #[default]
+    Nearest,
+    /// The person that walks up to the robot and stands still before it.
+    Approach,
+    /// No person: the robot waits for an enrollment.
+    None,
+}
+
+/// Choice of the target among the tracks, by the settings of the lock.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Chooser {
+    /// Time for which there has been a track to choose, s.
+    waited_s: f64,
+    /// Confirmed tracks that may be walking up to the robot.
+    approaches: BTreeMap<TrackId, Approach>,
+}
+
+/// Way of a track towards the robot.
+#[derive(Clone, Copy, Debug)]
+struct Approach {
+    /// Largest distance at which the track was seen, m.
+    farthest_m: f64,
+    /// Time for which it has stood near the robot, s.
+    stands_s: f64,
+}
+
+/// Returns the distance of a track from the middle of the robot, m.
+pub(crate) fn distance_m(track: &Track) -> f64 {
+    track.estimate.person.position.xy().coords.norm()
+}
+
+/// Returns the direction of a track, degrees to the left.
+pub(crate) fn bearing_deg(track: &Track) -> f64 {
+    let place = track.estimate.person.position.xy();
+    place.y.atan2(place.x).to_degrees()
+}
+
+/// Returns the nearest confirmed track in front, within the bearing and the distance of the settings.
+pub(crate) fn nearest_in_front<'a>(
+    settings: &TargetSettings,
+    tracks: &'a [Track],
+) -> Option<&'a Track> {
+    let fits = |track: &&Track| {
+        track.confirmed
+            && bearing_deg(track).abs() <= settings.choose_within_deg
+            && distance_m(track) <= settings.choose_within_m
+    };
+    nearest(tracks.iter().filter(fits))
+}
+
+fn nearest<'a>(tracks: impl Iterator<Item = &'a Track>) -> Option<&'a Track> {
+    tracks.min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)))
+}
+
+impl Chooser {
+    /// Returns the track to follow from now on, if there is one; `dt_s` is the time since the last
+    /// call.
+    pub(super) fn choose<'a>(
+        &mut self,
+        settings: &TargetSettings,
+        tracks: &'a [Track],
+        dt_s: f64,
+    ) -> Option<&'a Track> {
+        if let Some(number) = settings.track {
+            return tracks.iter().find(|track| track.confirmed && track.id.0 == number);
+        }
+        match settings.choose {
+            ChoiceRule::Nearest => self.wait_for_nearest(settings, tracks, dt_s),
+            ChoiceRule::Approach => self.wait_for_approach(settings, tracks, dt_s),
+            ChoiceRule::None => None,
+        }
+    }
+
+    fn wait_for_nearest<'a>(
+        &mut self,
+        settings: &TargetSettings,
+        tracks: &'a [Track],
+        dt_s: f64,
+    ) -> Option<&'a Track> {
+        let track = nearest_in_front(settings, tracks);
+        let is_due = self.waited_s >= settings.choose_after_s;
+        self.waited_s = if track.is_some() { self.waited_s + dt_s } else { 0.0 };
+        track.filter(|_| is_due)
+    }
+
+    /// Returns the nearest track that came nearer by `approach_by_m` and has stood within
+    /// `approach_within_m` for `approach_stands_s`. A person that stood there from the start, passes
+    /// by, or is a coat stand, did not ask to be followed.
+    fn wait_for_approach<'a>(
+        &mut self,
+        settings: &TargetSettings,
+        tracks: &'a [Track],
+        dt_s: f64,
+    ) -> Option<&'a Track> {
+        // Tracks that ended are forgotten: their numbers do not come back.
+        self.approaches.retain(|id, _| tracks.iter().any(|track| track.id == *id));
+        let seen = tracks.iter().filter(|track| track.confirmed && track.seen);
+        let arrived = seen.filter(|track| self.has_arrived(settings, track, dt_s));
+        // Collected first, so that the time of every track goes on.
+        let arrived: Vec<&Track> = arrived.collect();
+        nearest(arrived.into_iter())
+    }
+
+    fn has_arrived(&mut self, settings: &TargetSettings, track: &Track, dt_s: f64) -> bool {
+        let far_m = distance_m(track);
+        let new = Approach { farthest_m: far_m, stands_s: 0.0 };
+        let approach = self.approaches.entry(track.id).or_insert(new);
+        approach.farthest_m = approach.farthest_m.max(far_m);
+        let stands = track.estimate.person.velocity.norm() < STANDS_MPS
+            && far_m <= settings.approach_within_m
+            && bearing_deg(track).abs() <= settings.choose_within_deg;
+        approach.stands_s = if stands { approach.stands_s + dt_s } else { 0.0 };
+        approach.farthest_m - far_m >= settings.approach_by_m
+            && approach.stands_s >= settings.approach_stands_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector2;
+    use tagalong_conformance::target;
+
+    use super::*;
+
+    /// Time between two frames, s.
+    const DT_S: f64 = 0.1;
+
+    fn approaching() -> TargetSettings {
+        TargetSettings { choose: ChoiceRule::Approach, ..TargetSettings::default() }
+    }
+
+    fn track(id: u32, x: f64, y: f64, speed_mps: f64) -> Track {
+        let track = target(x, y, Vector2::new(-speed_mps, 0.0));
+        Track { id: TrackId(id), seen: true, confirmed: true, occluded: false, ..track }
+    }
+
+    /// Returns the index of the frame in which a track is chosen, and its number.
+    fn chosen(frames: impl IntoIterator<Item = Vec<Track>>) -> Option<(usize, u32)> {
+        let (settings, mut chooser) = (approaching(), Chooser::default());
+        let mut at = frames.into_iter().enumerate().map(|(index, tracks)| {
+            let found = chooser.choose(&settings, &tracks, DT_S);
+            found.map(|track| (index, track.id.0))
+        });
+        at.find_map(|found| found)
+    }
+
+    /// Returns a person that walks up to a distance within twenty frames and then stands.
+    fn walk_up(id: u32, to_m: f64, y: f64) -> impl Iterator<Item = Track> {
+        let at = move |i: u32| match i {
+            0..20 => track(id, to_m + 0.1 * f64::from(20 - i), y, 1.0),
+            _ => track(id, to_m, y, 0.0),
+        };
+        (0..60).map(at)
+    }
+
+    #[test]
+    fn a_person_that_walks_up_and_stands_for_a_second_is_chosen() {
+        let (index, id) = chosen(walk_up(4, 1.5, 0.2).map(|track| vec![track])).unwrap();
+        assert_eq!(id, 4);
+        assert!((29..=31).contains(&index), "ten frames after it stopped: {index}");
+        assert_eq!(chosen(walk_up(4, 2.1, 0.0).map(|track| vec![track])), None, "too far away");
+        assert_eq!(chosen(walk_up(4, 1.0, 1.5).map(|track| vec![track])), None, "too far aside");
+    }
+
+    #[test]
+    fn standing_from_the_start_passing_and_noise_are_no_approach() {
+        let stands = (0..80).map(|_| vec![track(1, 1.5, 0.0, 0.0)]);
+        assert_eq!(chosen(stands), None, "stood there from the start");
+        let passes = (0..60).map(|i| vec![track(1, 4.0 - 0.1 * f64::from(i), 0.6, 1.0)]);
+        assert_eq!(chosen(passes), None, "walks past the robot");
+        let unseen = walk_up(1, 1.5, 0.0).map(|track| vec![Track { seen: false, ..track }]);
+        assert_eq!(chosen(unseen), None, "predicted only");
+        let noise = walk_up(1, 1.5, 0.0).map(|track| vec![Track { confirmed: false, ..track }]);
+        assert_eq!(chosen(noise), None, "not confirmed");
+    }
+
+    #[test]
+    fn of_a_bystander_and_a_person_that_walks_up_the_latter_is_chosen() {
+        let frames = walk_up(7, 1.6, -0.3).map(|track| vec![bystander(), track]);
+        assert_eq!(chosen(frames).map(|(_, id)| id), Some(7));
+        // A step back begins the second anew.
+        let swaying = (0..60).map(|i| match i {
+            0..20 => vec![track(1, 3.5 - 0.1 * f64::from(i), 0.0, 1.0)],
+            _ => vec![track(1, 1.5, 0.0, if i % 8 == 0 { 0.5 } else { 0.0 })],
+        });
+        assert_eq!(chosen(swaying), None);
+    }
+
+    fn bystander() -> Track {
+        track(2, 1.2, 0.5, 0.0)
+    }
+
+    #[test]
+    fn without_a_rule_no_person_is_chosen_but_the_one_by_number() {
+        let none = TargetSettings { choose: ChoiceRule::None, ..TargetSettings::default() };
+        let tracks = [bystander()];
+        let chosen = |settings: &TargetSettings| {
+            Chooser::default().choose(settings, &tracks, DT_S).map(|track| track.id.0)
+        };
+        assert_eq!(chosen(&none), None);
+        let numbered = TargetSettings { track: Some(2), ..none };
+        assert_eq!(chosen(&numbered), Some(2));
+    }
+}

@@ -1,0 +1,127 @@
+//! The page of a run that happens now, for `tagalong run --serve` and the bridges.
+//!
+//! [`Live::offer`] puts a frame into the place of the newest one and returns at once; browsers are
+//! answered by threads of their own, which encode the image only when one asks for it. So a browser
+//! that is slow, silent or absent costs the pipeline nothing: it gets fewer frames, and no frame
+//! waits for it. Nothing can be changed through the page.
+
+mod newest;
+mod site;
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use nalgebra::Isometry2;
+use tagalong_core::Frame;
+use tagalong_page::html::Heading;
+use tagalong_pipeline::FrameReport;
+use tagalong_serve::{Access, Server};
+use toml::Table;
+
+use crate::newest::Newest;
+use crate::site::Page;
+
+/// Time after the end for which browsers are told of it.
+const FAREWELL: Duration = Duration::from_millis(400);
+
+/// Server of the page of one run.
+pub struct Live {
+    newest: Arc<Newest>,
+    address: String,
+    bound: SocketAddr,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Live {
+    /// Begins to serve. `name` is that of the pipeline, `input` that of the log or the robot, and
+    /// `config` the resolved one, whose settings the page quotes.
+    ///
+    /// # Errors
+    /// A port that is taken, an interface that this computer does not have.
+    pub fn start(at: SocketAddr, name: &str, input: &str, config: &Table) -> io::Result<Self> {
+        let server = Server::open(Access::at(at))?;
+        let (address, bound) = (server.address(), server.bound());
+        let heading = Heading {
+            log: input.to_owned(),
+            runs: vec![format!("{name}, as it happens")],
+            notes: Vec::new(),
+        };
+        let newest = Arc::new(Newest::new(config.clone()));
+        let page = Page::new(&heading, name, Arc::clone(&newest)).map_err(io::Error::other)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let serve = move || server.serve(&Arc::new(page), || stopped.load(Ordering::Relaxed));
+        let thread = thread::Builder::new().name("live page".into()).spawn(serve)?;
+        Ok(Self { newest, address, bound, stop, thread: Some(thread) })
+    }
+
+    /// Returns the address to open in a browser, which is the key to the page.
+    pub fn address(&self) -> &str {
+        &self.address
+    }
+
+    /// Returns interface and port.
+    pub fn bound(&self) -> SocketAddr {
+        self.bound
+    }
+
+    /// Shows a frame from now on. Never waits for a browser.
+    pub fn offer(&self, frame: &Frame, odom_from_robot: &Isometry2<f64>, report: &FrameReport) {
+        if report.outcome.is_processed() {
+            self.newest.put(frame, odom_from_robot, report);
+        }
+    }
+
+    /// Tells the browsers that asked lately how the run ended, and ends.
+    pub fn finish(mut self, ended: &str) {
+        self.newest.end(ended);
+        let start = Instant::now();
+        while self.newest.is_watched() && start.elapsed() < FAREWELL {
+            thread::sleep(Duration::from_millis(20));
+        }
+        self.close();
+    }
+
+    fn close(&mut self) {
+        self.newest.end("The run has ended.");
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // A panic of the server is none of the run.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// Reads `PORT`, `ADDRESS` or `ADDRESS:PORT`; without an address it is this computer alone, and
+/// without a port a free one.
+///
+/// # Errors
+/// A sentence with the forms that are understood.
+pub fn parse_address(text: &str) -> Result<SocketAddr, String> {
+    if let Ok(port) = text.parse() {
+        return Ok((Ipv4Addr::LOCALHOST, port).into());
+    }
+    let bare = text.trim_start_matches('[').trim_end_matches(']');
+    if let Ok(ip) = bare.parse() {
+        return Ok(SocketAddr::new(ip, 0));
+    }
+    text.parse().map_err(|_| {
+        "no address: give a port (8080), a number of an interface (192.0.2.7), or both \
+         (192.0.2.7:8080, 0.0.0.0:8080 for all interfaces)"
+            .to_owned()
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,90 @@
+use proptest::prelude::*;
+
+use super::*;
+
+/// Returns the greatest total weight, by trying everything.
+fn best_total(row: u32, rows: u32, edges: &[Edge], taken: &mut Vec<u32>) -> f64 {
+    if row == rows {
+        return 0.0;
+    }
+    let mut best = best_total(row + 1, rows, edges, taken);
+    for edge in edges.iter().filter(|edge| edge.row == row && edge.weight > 0.0) {
+        if !taken.contains(&edge.col) {
+            taken.push(edge.col);
+            best = best.max(edge.weight + best_total(row + 1, rows, edges, taken));
+            taken.pop();
+        }
+    }
+    best
+}
+
+/// Rows, columns, and edges with some equal weights.
+fn problem() -> impl Strategy<Value = (u32, u32, Vec<Edge>)> {
+    (1..7u32, 1..7u32).prop_flat_map(|(rows, cols)| {
+        let weight = prop_oneof![
+            2 => Just(0.0), 3 => -2.0..9.0f64, 2 => (0..3u8).prop_map(f64::from)
+        ];
+        let edges =
+            prop::collection::vec(weight, (rows * cols) as usize).prop_map(move |weights| {
+                let pair =
+                    |(i, weight)| Edge { row: i as u32 / cols, col: i as u32 % cols, weight };
+                weights.into_iter().enumerate().map(pair).collect()
+            });
+        (Just(rows), Just(cols), edges)
+    })
+}
+
+/// Returns the total weight of a matching, after a look that it is one.
+fn total(edges: &[Edge], matched: &[u32]) -> f64 {
+    let chosen: Vec<Edge> = matched.iter().map(|e| edges[*e as usize]).collect();
+    for (i, a) in chosen.iter().enumerate() {
+        assert!(chosen[..i].iter().all(|b| a.row < b.row || b.row < a.row && a.col != b.col));
+    }
+    chosen.iter().map(|edge| edge.weight).sum()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn no_matching_weighs_more((rows, cols, edges) in problem()) {
+        let mut matched = Vec::new();
+        Matcher::new().best(rows as usize, cols as usize, &edges, &mut matched);
+        let best = best_total(0, rows, &edges, &mut Vec::new());
+        prop_assert!((total(&edges, &matched) - best).abs() < 1e-9, "{best}");
+    }
+
+    /// Prices prove it: with all reduced costs at least 0, those of the pairs 0 and free columns
+    /// without a price, no other assignment costs less.
+    #[test]
+    fn prices_prove_that_a_large_answer_is_best(
+        rows in 1usize..40, more in 0usize..20, seed in 0u64..1000, levels in 2u64..100_000,
+    ) {
+        let cols = rows + more;
+        let mixed = |i: usize| {
+            let mixed = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(seed);
+            (mixed ^ mixed >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 33
+        };
+        let cost: Vec<f64> = (0..rows * cols).map(|i| (mixed(i) % levels) as f64).collect();
+        let mut solver = Solver::default();
+        solver.solve(rows, cols, &cost);
+        let Solver { row_price, col_price, row_of, .. } = solver;
+        let mut placed: Vec<u32> = row_of.iter().copied().filter(|row| *row != NONE).collect();
+        placed.sort_unstable();
+        prop_assert_eq!(placed, (0..rows as u32).collect::<Vec<_>>());
+        for (i, cost) in cost.iter().enumerate() {
+            let (row, col) = (i / cols, i % cols);
+            let reduced = cost - row_price[row] - col_price[col];
+            prop_assert!(reduced > -1e-6, "{}", reduced);
+            prop_assert!(row_of[col] != row as u32 || reduced < 1e-6, "{}", reduced);
+            prop_assert!(col_price[col] <= 0.0 && (row_of[col] != NONE || col_price[col] == 0.0));
+        }
+    }
+}
+
+#[test]
+fn the_least_of_many_is_found_beside_nan() {
+    let mut values: Vec<f64> = (0..21).map(|i| f64::from((i * 7) % 21) + 3.0).collect();
+    values[0] = f64::NAN;
+    assert_eq!((least(&values), place_of(&values, least(&values))), (3.0, 3));
+}

@@ -1,0 +1,231 @@
+//! Data of one frame from a moment.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Isometry2, Point2, Point3};
+use tagalong_app::frame_notes::{CandidateNote, DriveNote, DroppedNote, FateNote, FrameNotes};
+use tagalong_app::remedies;
+use tagalong_geometry::Camera;
+use toml::Table;
+
+use crate::data::{CandidateData, DriveData, DroppedData, FrameData, TestData, TrackData};
+use crate::moment::{Moment, TrackState};
+
+/// Points kept of a laser scan.
+const SCAN_POINTS: usize = 240;
+
+/// Returns all tests that dropped anything, with the settings that decide them.
+pub fn tests<'a>(
+    notes: impl Iterator<Item = &'a FrameNotes>,
+    config: &Table,
+) -> BTreeMap<String, TestData> {
+    let names: BTreeSet<&str> = notes.flat_map(dropping_tests).collect();
+    let data = |name: &str| match remedies::of(name) {
+        Some(remedy) => TestData { settings: remedy.lines(config), look: remedy.look },
+        None => TestData::default(),
+    };
+    names.into_iter().map(|name| (name.to_owned(), data(name))).collect()
+}
+
+fn dropping_tests(notes: &FrameNotes) -> impl Iterator<Item = &str> {
+    let of_funnel = notes.dropped.iter().map(|dropped| dropped.test.as_str());
+    of_funnel.chain(notes.candidates.iter().filter_map(dropping_test))
+}
+
+fn dropping_test(candidate: &CandidateNote) -> Option<&str> {
+    match &candidate.fate {
+        FateNote::Dropped(test) => Some(test),
+        _ => None,
+    }
+}
+
+/// Returns the data of a frame, without trails.
+pub fn frame_data(moment: &Moment) -> FrameData {
+    let notes = &moment.notes;
+    FrameData {
+        n: notes.frame,
+        robot: notes.robot_odom,
+        tracks: moment.tracks.iter().map(|track| track_data(track, notes.robot_odom[2])).collect(),
+        found: notes.candidates.iter().map(candidate_data).collect(),
+        dropped: dropped_data(notes),
+        target: moment.target,
+        drive: notes.drive.as_ref().map(drive_data),
+    }
+}
+
+fn track_data(track: &TrackState, heading: f64) -> TrackData {
+    let (sin, cos) = heading.sin_cos();
+    let [forward, left] = track.velocity_robot_mps;
+    let [x, y, z] = track.head_odom_m;
+    TrackData {
+        id: track.id,
+        state: match (track.confirmed, track.seen, track.occluded) {
+            (false, _, _) => "tentative",
+            (true, true, _) => "seen",
+            (true, false, true) => "hidden",
+            (true, false, false) => "unseen",
+        },
+        box_px: track.upper_body_px.map(|v| rounded(v, 10.0)),
+        at: [x, y].map(|v| rounded(v, 1e3)),
+        v: [cos * forward - sin * left, sin * forward + cos * left].map(|v| rounded(v, 1e2)),
+        z: rounded(z, 1e2),
+        d: rounded(track.head_robot_m[0].hypot(track.head_robot_m[1]), 1e2),
+        p: rounded(track.probability, 1e2),
+        trail: Vec::new(),
+    }
+}
+
+fn candidate_data(note: &CandidateNote) -> CandidateData {
+    let [x, y, _] = note.head_odom_m;
+    let (track, starts) = match note.fate {
+        FateNote::Matched(id) => (Some(id), false),
+        FateNote::Started(id) => (Some(id), true),
+        FateNote::Dropped(_) => (None, false),
+    };
+    CandidateData {
+        box_px: note.box_px,
+        at: [x, y],
+        score: rounded(note.score, 1e2),
+        by: note.source.clone(),
+        test: dropping_test(note).map(str::to_owned),
+        track,
+        starts,
+    }
+}
+
+/// Returns the funnel; the places of candidates are left to the candidates, which say more.
+fn dropped_data(notes: &FrameNotes) -> Vec<DroppedData> {
+    let of_candidates: BTreeSet<&str> = notes.candidates.iter().filter_map(dropping_test).collect();
+    let data = |dropped: &DroppedNote| {
+        let is_known = of_candidates.contains(dropped.test.as_str());
+        DroppedData {
+            test: dropped.test.clone(),
+            n: dropped.count,
+            boxes: if is_known { Vec::new() } else { dropped.boxes_px.clone() },
+        }
+    };
+    notes.dropped.iter().map(data).collect()
+}
+
+fn rounded(value: f64, parts: f64) -> f64 {
+    (value * parts).round() / parts + 0.0
+}
+
+fn drive_data(note: &DriveNote) -> DriveData {
+    DriveData {
+        lock: [note.lock.clone(), note.lock_about.clone()],
+        why: note.why.clone(),
+        since: note.since_s,
+        belief: note.belief,
+        reason: [note.reason.clone(), note.reason_about.clone()],
+        v: note.forward_mps,
+        w: note.turn_rps,
+    }
+}
+
+/// Returns evenly chosen points of a scan in the odometry frame, cm.
+pub fn scan_points(points: &[Point3<f64>], odom_from_robot: &Isometry2<f64>) -> Vec<i32> {
+    let every = points.len().div_ceil(SCAN_POINTS).max(1);
+    let chosen = points.iter().step_by(every).map(|point| odom_from_robot * point.xy());
+    chosen.flat_map(|point| [point.x, point.y].map(|v| (100.0 * v).round() as i32)).collect()
+}
+
+/// Returns the directions of the left and right edge of the image, from the robot's heading.
+pub fn view_edges(camera: &Camera) -> [f64; 2] {
+    let middle = 0.5 * camera.height as f64;
+    [0.0, camera.width as f64 - 1.0].map(|column| {
+        let ray = camera.robot_from_camera.rotation * camera.ray(Point2::new(column, middle));
+        let angle = ray.y.atan2(ray.x);
+        (angle * 1e4).round() / 1e4
+    })
+}
+
+/// Projects the past heads of the tracks of a frame into its image.
+pub fn add_trails(
+    past: &[&FrameData],
+    frame: &mut FrameData,
+    camera: &Camera,
+    odom_from_robot: &Isometry2<f64>,
+) {
+    for track in frame.tracks.iter_mut().filter(|track| track.state != "tentative") {
+        let heads = past.iter().filter_map(|frame| frame.tracks.iter().find(|t| t.id == track.id));
+        let heads = heads.map(|t| {
+            let floor = odom_from_robot.inverse_transform_point(&Point2::from(t.at));
+            Point3::new(floor.x, floor.y, t.z)
+        });
+        let pixels = heads.filter_map(|head| camera.project(&head));
+        track.trail = pixels.flat_map(|p| [p.x, p.y].map(|v| v.round() as i32)).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests_of_data {
+    use nalgebra::Vector2;
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.6, 0.0, 0.0)
+    }
+
+    #[test]
+    fn a_test_comes_with_the_setting_that_decides_it() {
+        let mut moment = Moment::default();
+        moment.notes.dropped =
+            vec![DroppedNote { test: "head width".into(), count: 3, ..DroppedNote::default() }];
+        let config = toml::from_str(
+            "[[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_head_width_m = 0.1\n",
+        )
+        .unwrap();
+        let tests = tests([&moment.notes].into_iter(), &config);
+        let lines = &tests["head width"].settings;
+        assert!(lines.iter().any(|line| line.contains("min_head_width_m = 0.1")), "{lines:?}");
+        assert!(!tests["head width"].look.is_empty());
+    }
+
+    #[test]
+    fn velocities_are_turned_into_the_odometry_frame() {
+        let track = TrackState {
+            confirmed: true,
+            velocity_robot_mps: [1.0, 0.0],
+            head_robot_m: [3.0, 4.0, 1.6],
+            ..TrackState::default()
+        };
+        let data = track_data(&track, std::f64::consts::FRAC_PI_2);
+        assert_eq!((data.v, data.d, data.state), ([0.0, 1.0], 5.0, "unseen"));
+    }
+
+    #[test]
+    fn places_of_candidates_are_not_shown_twice() {
+        let mut notes = FrameNotes::default();
+        let fate = FateNote::Dropped("verifier".into());
+        notes.candidates = vec![CandidateNote { fate, ..CandidateNote::default() }];
+        let note = |test: &str| DroppedNote {
+            test: test.into(),
+            count: 1,
+            boxes_px: vec![[1.0, 2.0, 3.0, 4.0]],
+        };
+        notes.dropped = vec![note("verifier"), note("head width")];
+        let boxes: Vec<usize> = dropped_data(&notes).iter().map(|d| d.boxes.len()).collect();
+        assert_eq!(boxes, [0, 1]);
+    }
+
+    #[test]
+    fn the_edges_of_the_view_are_left_and_right() {
+        let [left, right] = view_edges(&camera());
+        assert!((left - 0.5686).abs() < 0.01 && (right + 0.5686).abs() < 0.01, "{left} {right}");
+    }
+
+    #[test]
+    fn scans_are_thinned_and_moved_into_the_odometry_frame() {
+        let points: Vec<Point3<f64>> =
+            (0..1000).map(|i| Point3::new(f64::from(i), 0.0, 0.2)).collect();
+        let turned = Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2);
+        let shown = scan_points(&points, &turned);
+        assert!(shown.len() <= 2 * SCAN_POINTS, "{}", shown.len());
+        assert_eq!(shown[..4], [100, 0, 100, 500]);
+    }
+}

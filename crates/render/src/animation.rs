@@ -1,0 +1,121 @@
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use image::codecs::gif::{GifEncoder, Repeat};
+use image::imageops::{FilterType, resize};
+use image::{Delay, Frame, ImageReader, Rgba, RgbaImage};
+
+/// Largest difference of a channel between two pictures that counts as none: what changes by less is
+/// left as it was, which a GIF stores in almost no bytes.
+const SAME: u8 = 10;
+
+/// Speed of the search for colours, 1 (best) to 30.
+const QUANTISING_SPEED: i32 = 10;
+
+/// Animation of pictures of a run, as a GIF that is repeated.
+#[derive(Clone, Copy, Debug)]
+pub struct Animation {
+    /// Largest width, pixels.
+    pub width: u32,
+    /// Time of each picture, ms.
+    pub delay_ms: u32,
+}
+
+impl Animation {
+    /// Writes the pictures, in their order.
+    ///
+    /// # Errors
+    /// A sentence that names the file: a picture that cannot be read, a disk that is full.
+    pub fn write<P: AsRef<Path>>(&self, pictures: &[P], to: &Path) -> Result<(), String> {
+        let cannot =
+            |error: &dyn std::fmt::Display| format!("cannot write {}: {error}", to.display());
+        let file = BufWriter::new(File::create(to).map_err(|error| cannot(&error))?);
+        let mut encoder = GifEncoder::new_with_speed(file, QUANTISING_SPEED);
+        encoder.set_repeat(Repeat::Infinite).map_err(|error| cannot(&error))?;
+        let delay = Delay::from_numer_denom_ms(self.delay_ms, 1);
+        let mut shown: Option<RgbaImage> = None;
+        for path in pictures {
+            let picture = self.read(path.as_ref())?;
+            let part = changed(shown.as_mut(), &picture);
+            encoder
+                .encode_frame(Frame::from_parts(part, 0, 0, delay))
+                .map_err(|error| cannot(&error))?;
+            shown.get_or_insert(picture);
+        }
+        Ok(())
+    }
+
+    fn read(&self, path: &Path) -> Result<RgbaImage, String> {
+        let cannot =
+            |error: &dyn std::fmt::Display| format!("cannot read {}: {error}", path.display());
+        let reader = ImageReader::open(path).map_err(|error| cannot(&error))?;
+        let whole = reader.decode().map_err(|error| cannot(&error))?.into_rgba8();
+        if whole.width() <= self.width {
+            return Ok(whole);
+        }
+        let height = (u64::from(whole.height()) * u64::from(self.width)) / u64::from(whole.width());
+        let height = u32::try_from(height).unwrap_or(u32::MAX).max(1);
+        Ok(resize(&whole, self.width, height, FilterType::Triangle))
+    }
+}
+
+/// Returns a picture with the pixels left transparent that are shown already, and notes what is
+/// shown then.
+fn changed(shown: Option<&mut RgbaImage>, picture: &RgbaImage) -> RgbaImage {
+    let mut part = picture.clone();
+    let Some(shown) = shown.filter(|shown| shown.dimensions() == picture.dimensions()) else {
+        return part;
+    };
+    for (new, old) in part.pixels_mut().zip(shown.pixels_mut()) {
+        let is_same = new.0.iter().zip(old.0).all(|(a, b)| a.abs_diff(b) <= SAME);
+        match is_same {
+            true => *new = Rgba([0, 0, 0, 0]),
+            false => *old = *new,
+        }
+    }
+    part
+}
+
+#[cfg(test)]
+mod tests {
+    use image::AnimationDecoder;
+    use image::codecs::gif::GifDecoder;
+
+    use super::*;
+
+    #[test]
+    fn an_animation_shows_each_picture() {
+        let home = tempfile::tempdir().unwrap();
+        let pictures: Vec<_> = (0..3)
+            .map(|i| {
+                let path = home.path().join(format!("{i}.png"));
+                let square = |x, _| {
+                    if x / 20 == i { Rgba([250, 10, 10, 255]) } else { Rgba([9, 9, 9, 255]) }
+                };
+                RgbaImage::from_fn(80, 40, square).save(&path).unwrap();
+                path
+            })
+            .collect();
+        let to = home.path().join("a.gif");
+        Animation { width: 40, delay_ms: 100 }.write(&pictures, &to).unwrap();
+        let file = std::io::BufReader::new(File::open(&to).unwrap());
+        let frames = GifDecoder::new(file).unwrap().into_frames().collect_frames().unwrap();
+        assert_eq!(frames.len(), 3);
+        for (i, frame) in frames.iter().enumerate() {
+            assert_eq!(frame.buffer().dimensions(), (40, 20));
+            let red: Vec<bool> =
+                (0..3).map(|part| frame.buffer().get_pixel(10 * part + 5, 10).0[0] > 200).collect();
+            assert_eq!(red, [i == 0, i == 1, i == 2], "picture {i}");
+        }
+    }
+
+    #[test]
+    fn a_picture_that_is_missing_is_named() {
+        let home = tempfile::tempdir().unwrap();
+        let gone = home.path().join("gone.png");
+        let animation = Animation { width: 40, delay_ms: 100 };
+        let error = animation.write(&[&gone], &home.path().join("a.gif")).unwrap_err();
+        assert!(error.contains("gone.png"), "{error}");
+    }
+}

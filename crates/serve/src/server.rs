@@ -1,0 +1,283 @@
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use crate::http::{self, Request, Response};
+
+/// Connections at once; browsers open about six.
+const CONNECTIONS: usize = 32;
+
+/// Pause between two looks for a connection or a reason to stop.
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// Longest wait for the next bytes of a connection.
+const SILENCE: Duration = Duration::from_secs(5);
+
+/// Turns of [`PAUSE`] to wait at the end for answers that are under way.
+const LAST_TURNS: usize = 50;
+
+/// Changes that a server takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Changes {
+    /// None: every `POST` is refused.
+    Refused,
+    /// Those that the server's own page sends: the `Origin` is required.
+    FromPage,
+    /// Those of programs, too, which send no `Origin`.
+    FromPrograms,
+}
+
+/// Place where a server listens, and the requests that it answers.
+#[derive(Clone, Debug)]
+pub struct Access {
+    /// Interface and port; port 0 takes a free one.
+    pub address: SocketAddr,
+    /// True for an address with a random key, which keeps other users of this computer out.
+    pub key: bool,
+    /// Changes that it takes.
+    pub changes: Changes,
+    /// Longest body of a request, bytes.
+    pub body_bytes: usize,
+}
+
+impl Access {
+    /// Returns the access to a page on this computer: with a key, and without changes.
+    pub fn loopback(port: u16) -> Self {
+        Self::at(SocketAddr::from((Ipv4Addr::LOCALHOST, port)))
+    }
+
+    /// Returns the same for any interface.
+    pub fn at(address: SocketAddr) -> Self {
+        Self { address, key: true, changes: Changes::Refused, body_bytes: 16 << 10 }
+    }
+
+    /// Allows changes.
+    #[must_use]
+    pub fn with_changes(mut self, changes: Changes) -> Self {
+        self.changes = changes;
+        self
+    }
+}
+
+/// Content of a server.
+pub trait Site: Send + Sync + 'static {
+    /// Answers a request that has passed all checks. The path is the one behind the key, without
+    /// the slash at its beginning and with the query. A `HEAD` is answered like a `GET`; the server
+    /// leaves the body out.
+    fn answer(&self, request: &Request, path: &str) -> Response;
+}
+
+impl<F: Fn(&Request, &str) -> Response + Send + Sync + 'static> Site for F {
+    fn answer(&self, request: &Request, path: &str) -> Response {
+        self(request, path)
+    }
+}
+
+/// Server that listens.
+pub struct Server {
+    listener: TcpListener,
+    guard: Arc<Guard>,
+}
+
+/// Conditions on a request.
+#[derive(Debug)]
+struct Guard {
+    bound: SocketAddr,
+    token: Option<String>,
+    changes: Changes,
+    body_bytes: usize,
+}
+
+impl Server {
+    /// Listens; requests wait until [`Server::serve`] answers them.
+    ///
+    /// # Errors
+    /// A port that is taken, an interface that this computer does not have, a system without random
+    /// numbers.
+    pub fn open(access: Access) -> io::Result<Self> {
+        let listener = TcpListener::bind(access.address)?;
+        listener.set_nonblocking(true)?;
+        let token = access.key.then(random_token).transpose()?;
+        let Access { changes, body_bytes, .. } = access;
+        let guard = Guard { bound: listener.local_addr()?, token, changes, body_bytes };
+        Ok(Self { listener, guard: Arc::new(guard) })
+    }
+
+    /// Returns the address to open, with the key. For a server on all interfaces it is the one that
+    /// this computer itself can open.
+    pub fn address(&self) -> String {
+        let mut at = self.guard.bound;
+        if at.ip().is_unspecified() {
+            let is_v4 = at.is_ipv4();
+            at.set_ip(if is_v4 {
+                Ipv4Addr::LOCALHOST.into()
+            } else {
+                "::1".parse().unwrap_or(at.ip())
+            });
+        }
+        match &self.guard.token {
+            Some(token) => format!("http://{at}/{token}/"),
+            None => format!("http://{at}/"),
+        }
+    }
+
+    /// Returns interface and port.
+    pub fn bound(&self) -> SocketAddr {
+        self.guard.bound
+    }
+
+    /// Answers requests until `stop` returns true, which is asked at least 50 times a second; then
+    /// waits up to a second for answers that are under way.
+    pub fn serve<S: Site>(&self, site: &Arc<S>, stop: impl Fn() -> bool) {
+        let open = Arc::new(AtomicUsize::new(0));
+        while !stop() {
+            match self.listener.accept() {
+                Ok((stream, _)) => self.take(stream, site, &open),
+                // An attempt that failed is not the end of the server.
+                Err(_) => thread::sleep(PAUSE),
+            }
+        }
+        for _ in 0..LAST_TURNS {
+            if open.load(Ordering::Relaxed) == 0 {
+                break;
+            }
+            thread::sleep(PAUSE);
+        }
+    }
+
+    /// Answers one connection in a thread.
+    fn take<S: Site>(&self, mut stream: TcpStream, site: &Arc<S>, open: &Arc<AtomicUsize>) {
+        let prepared = stream
+            .set_nonblocking(false)
+            .and_then(|()| stream.set_read_timeout(Some(SILENCE)))
+            .and_then(|()| stream.set_write_timeout(Some(SILENCE)));
+        if prepared.is_err() {
+            return;
+        }
+        if open.load(Ordering::Relaxed) >= CONNECTIONS {
+            let _ = Response::refusal(503, "too many connections").send(&mut stream, false);
+            return;
+        }
+        let seat = Seat::take(open);
+        let (guard, site) = (Arc::clone(&self.guard), Arc::clone(site));
+        thread::spawn(move || {
+            let _seat = seat;
+            let (answer, head_only) = match http::read(&mut stream, guard.body_bytes) {
+                Ok(request) => (guard.answer(&request, &*site), request.method == "HEAD"),
+                Err(Some(refusal)) => (refusal, false),
+                Err(None) => (Response::refusal(400, "the request is cut off"), false),
+            };
+            // A browser that is gone needs no answer.
+            let _ = answer.send(&mut stream, head_only);
+        });
+    }
+}
+
+/// Place of one connection, given back also by a thread that panics.
+struct Seat(Arc<AtomicUsize>);
+
+impl Seat {
+    fn take(open: &Arc<AtomicUsize>) -> Self {
+        open.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(open))
+    }
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+impl Guard {
+    fn answer(&self, request: &Request, site: &impl Site) -> Response {
+        match self.admit(request) {
+            Ok(path) => site.answer(request, path),
+            Err(refusal) => refusal,
+        }
+    }
+
+    /// Returns the path behind the key of a request that may be answered.
+    fn admit<'a>(&self, request: &'a Request) -> Result<&'a str, Response> {
+        let refuse = |why: &str| Err(Response::refusal(403, why));
+        let host = request.header("host").unwrap_or_default();
+        if !self.is_own(host) {
+            return refuse("the host is not this server; open its address as numbers");
+        }
+        let is_change = request.method == "POST";
+        let needs_origin = is_change && self.changes != Changes::FromPrograms;
+        // Where a browser speaks, the page must be the one of this very address.
+        let is_same = |origin: &str| origin.strip_prefix("http://") == Some(host);
+        if request.header("origin").map_or(needs_origin, |origin| !is_same(origin)) {
+            return refuse("the request comes from another page");
+        }
+        let Some(path) = self.behind_key(&request.path) else {
+            return refuse("open the address with the key that the program printed");
+        };
+        self.check_method(request, is_change)?;
+        Ok(path)
+    }
+
+    fn check_method(&self, request: &Request, is_change: bool) -> Result<(), Response> {
+        if !is_change {
+            let is_read = request.is_read();
+            let refusal = Response::refusal(405, "GET and POST are all there is");
+            return if is_read { Ok(()) } else { Err(refusal) };
+        }
+        if self.changes == Changes::Refused {
+            return Err(Response::refusal(405, "there is nothing to change here"));
+        }
+        let kind = request.header("content-type").unwrap_or_default();
+        match kind.split(';').next().map(str::trim) {
+            Some("application/json") => Ok(()),
+            _ => Err(Response::refusal(415, "changes are application/json")),
+        }
+    }
+
+    /// Returns true for a name of this server. A page of another name could have a name of its own
+    /// resolve to this computer, but no number.
+    fn is_own(&self, host: &str) -> bool {
+        let port = self.bound.port();
+        if host == format!("localhost:{port}") {
+            return true;
+        }
+        let Ok(named) = host.parse::<SocketAddr>() else { return false };
+        let is_reached = match self.bound.ip() {
+            ip if ip.is_unspecified() => true,
+            ip => same_host(ip, named.ip()),
+        };
+        named.port() == port && is_reached
+    }
+
+    fn behind_key<'a>(&self, path: &'a str) -> Option<&'a str> {
+        let inside = path.strip_prefix('/')?;
+        let Some(token) = &self.token else { return Some(inside) };
+        let (key, path) = inside.split_once('/')?;
+        same(key, token).then_some(path)
+    }
+}
+
+/// Returns true for two names of one interface.
+fn same_host(bound: IpAddr, named: IpAddr) -> bool {
+    bound == named || (bound.is_loopback() && named.is_loopback())
+}
+
+/// Compares in a time that does not depend on where two texts differ.
+fn same(a: &str, b: &str) -> bool {
+    let differences = a.bytes().zip(b.bytes()).fold(0, |sum, (a, b)| sum | (a ^ b));
+    a.len() == b.len() && differences == 0
+}
+
+/// Returns 128 random bits of the system, hexadecimal.
+fn random_token() -> io::Result<String> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes)
+        .map_err(|error| io::Error::other(format!("no random numbers: {error}")))?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+#[cfg(test)]
+mod tests;

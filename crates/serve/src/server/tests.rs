@@ -1,0 +1,224 @@
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::net::Ipv6Addr;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use super::*;
+
+/// Server that notes the changes it was asked for.
+struct Running {
+    bound: SocketAddr,
+    token: Option<String>,
+    changes: Arc<Mutex<Vec<String>>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl Running {
+    fn new(access: Access) -> Self {
+        let server = Server::open(access).unwrap();
+        let (bound, token) = (server.bound(), server.guard.token.clone());
+        let (changes, stop) = (Arc::new(Mutex::new(Vec::new())), Arc::new(AtomicBool::new(false)));
+        let (theirs, stopped) = (Arc::clone(&changes), Arc::clone(&stop));
+        let site = move |request: &Request, path: &str| match path {
+            "panic" => panic!("a site with a mistake"),
+            "slow" => {
+                thread::sleep(Duration::from_millis(300));
+                Response::ok("text/plain", "late")
+            }
+            _ => {
+                if !request.is_read() {
+                    theirs.lock().unwrap().push(path.to_owned());
+                }
+                Response::json(&path)
+            }
+        };
+        let serve = move || server.serve(&Arc::new(site), || stopped.load(Ordering::Relaxed));
+        Self { bound, token, changes, stop, thread: Some(thread::spawn(serve)) }
+    }
+
+    /// Sends bytes, and returns the status and the whole answer.
+    fn send(&self, bytes: &[u8]) -> (u16, String) {
+        let mut stream = TcpStream::connect(self.bound).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        // A server that refuses early may close before all is sent.
+        let _ = stream.write_all(bytes);
+        let _ = stream.shutdown(std::net::Shutdown::Write);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        let text = String::from_utf8_lossy(&answer).into_owned();
+        let status = text.split(' ').nth(1).and_then(|code| code.parse().ok());
+        (status.unwrap_or(0), text)
+    }
+
+    /// Sends a request with some of its usual headers replaced, or left out where they are empty.
+    fn ask(&self, method: &str, path: &str, replaced: &[(&str, &str)]) -> (u16, String) {
+        let host = self.bound.to_string();
+        let mut headers = BTreeMap::from([("Host", host.as_str())]);
+        if method == "POST" {
+            headers.extend([("Content-Type", "application/json"), ("Content-Length", "0")]);
+        }
+        headers.extend(replaced.iter().copied());
+        let key = self.token.as_ref().map(|token| format!("{token}/")).unwrap_or_default();
+        let key = headers.remove("key").map_or(key, str::to_owned);
+        let mut text = format!("{method} /{key}{path} HTTP/1.1\r\n");
+        for (name, value) in headers.iter().filter(|(_, value)| !value.is_empty()) {
+            text += &format!("{name}: {value}\r\n");
+        }
+        self.send((text + "\r\n").as_bytes())
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap();
+        }
+    }
+}
+
+fn open_access(changes: Changes) -> Access {
+    Access { key: false, ..Access::loopback(0).with_changes(changes) }
+}
+
+#[test]
+fn a_site_answers_behind_the_key() {
+    let running = Running::new(Access::loopback(0));
+    let (status, answer) = running.ask("GET", "a/b?c", &[]);
+    assert_eq!(status, 200);
+    assert!(answer.ends_with("\"a/b?c\""), "{answer}");
+    assert!(answer.contains("default-src 'none'") && answer.contains("no-referrer"));
+    let (status, answer) = running.ask("HEAD", "a", &[]);
+    assert!(status == 200 && answer.ends_with("\r\n\r\n"), "{answer}");
+    let token = running.token.clone().unwrap();
+    for key in ["", "x/", &format!("{}/", &token[1..]), &format!("{}/", "0".repeat(32))] {
+        assert_eq!(running.ask("GET", "a", &[("key", key)]).0, 403, "{key}");
+    }
+}
+
+#[test]
+fn a_foreign_host_or_origin_is_refused() {
+    for changes in [Changes::Refused, Changes::FromPage, Changes::FromPrograms] {
+        let running = Running::new(open_access(changes));
+        let port = running.bound.port();
+        for host in [format!("127.0.0.1:{port}"), format!("localhost:{port}")] {
+            let own = format!("http://{host}");
+            let headers = [("Host", host.as_str()), ("Origin", own.as_str())];
+            assert_eq!(running.ask("GET", "a", &headers[..1]).0, 200, "{host}");
+            assert_eq!(running.ask("GET", "a", &headers).0, 200, "{host}");
+        }
+        let other = format!("evil.example:{port}");
+        let elsewhere = format!("192.0.2.1:{port}");
+        for host in ["", "evil.example", "127.0.0.1", "127.0.0.1:1", &other, &elsewhere] {
+            assert_eq!(running.ask("GET", "a", &[("Host", host)]).0, 403, "{host}");
+        }
+        let secure = format!("https://127.0.0.1:{port}");
+        for origin in ["null", "http://evil.example", "http://127.0.0.1:1", &secure] {
+            for method in ["GET", "POST"] {
+                let status = running.ask(method, "a", &[("Origin", origin)]).0;
+                assert_eq!(status, 403, "{method} {origin}");
+            }
+        }
+        assert!(running.changes.lock().unwrap().is_empty());
+    }
+}
+
+#[test]
+fn changes_come_in_only_where_they_are_allowed() {
+    for (changes, own, none) in [
+        (Changes::Refused, 405, 403),
+        (Changes::FromPage, 200, 403),
+        (Changes::FromPrograms, 200, 200),
+    ] {
+        let running = Running::new(open_access(changes));
+        let origin = format!("http://{}", running.bound);
+        assert_eq!(running.ask("POST", "own", &[("Origin", &origin)]).0, own, "{changes:?}");
+        assert_eq!(running.ask("POST", "none", &[]).0, none, "{changes:?}");
+        let expected = [("own", own), ("none", none)].into_iter().filter(|(_, code)| *code == 200);
+        let expected: Vec<&str> = expected.map(|(path, _)| path).collect();
+        assert_eq!(*running.changes.lock().unwrap(), expected);
+        let form = [("Origin", origin.as_str()), ("Content-Type", "text/plain")];
+        let status = running.ask("POST", "form", &form).0;
+        assert_eq!(status, if own == 200 { 415 } else { own }, "{changes:?}");
+        for method in ["PUT", "DELETE", "OPTIONS", "PATCH"] {
+            assert_eq!(running.ask(method, "a", &[]).0, 405, "{method}");
+        }
+        assert_eq!(*running.changes.lock().unwrap(), expected);
+    }
+}
+
+#[test]
+fn only_the_loopback_interface_listens_unless_told_otherwise() {
+    let server = Server::open(Access::loopback(0)).unwrap();
+    assert!(server.bound().ip().is_loopback());
+    let all = Server::open(Access::at((Ipv4Addr::UNSPECIFIED, 0).into())).unwrap();
+    assert!(all.bound().ip().is_unspecified());
+    let port = all.bound().port();
+    assert!(all.address().starts_with(&format!("http://127.0.0.1:{port}/")), "{}", all.address());
+    // Reached over any interface, by its number; a name could be that of another page.
+    assert!(all.guard.is_own(&format!("192.0.2.7:{port}")));
+    assert!(all.guard.is_own(&format!("localhost:{port}")));
+    assert!(!all.guard.is_own(&format!("robot.example:{port}")));
+    assert!(!all.guard.is_own("192.0.2.7:1"));
+}
+
+#[test]
+fn an_address_of_version_six_is_printed_as_browsers_take_it() {
+    let Ok(server) = Server::open(Access::at((Ipv6Addr::LOCALHOST, 0).into())) else {
+        return eprintln!("skipped: this computer has no IPv6");
+    };
+    let port = server.bound().port();
+    assert!(server.address().starts_with(&format!("http://[::1]:{port}/")));
+    assert!(server.guard.is_own(&format!("[::1]:{port}")));
+}
+
+#[test]
+fn hostile_bytes_are_answered_and_the_server_goes_on() {
+    let running = Running::new(open_access(Changes::FromPrograms));
+    for bytes in [&b"\0\xff\xfe\r\n\r\n"[..], b"GET\r\n\r\n", b"\r\n\r\n", b"G"] {
+        assert_eq!(running.send(bytes).0, 400, "{bytes:?}");
+    }
+    assert_eq!(running.ask("POST", "a", &[("Content-Length", "16385")]).0, 413);
+    assert_eq!(running.send(&vec![b'a'; 1 << 20]).0 / 100 % 4, 0, "refused or cut off");
+    assert_eq!(running.ask("GET", "a", &[]).0, 200);
+    assert!(running.changes.lock().unwrap().is_empty());
+}
+
+#[test]
+fn a_site_that_panics_or_is_slow_holds_up_no_other_request() {
+    let running = Running::new(open_access(Changes::Refused));
+    for _ in 0..2 * CONNECTIONS {
+        assert_eq!(running.ask("GET", "panic", &[]).0, 0, "no answer");
+    }
+    thread::scope(|scope| {
+        let slow = scope.spawn(|| running.ask("GET", "slow", &[]).0);
+        let start = Instant::now();
+        assert_eq!(running.ask("GET", "a", &[]).0, 200);
+        assert!(start.elapsed() < Duration::from_millis(250), "{:?}", start.elapsed());
+        assert_eq!(slow.join().unwrap(), 200);
+    });
+}
+
+#[test]
+fn connections_are_bounded_and_the_end_does_not_wait_for_silent_ones() {
+    let running = Running::new(open_access(Changes::Refused));
+    let silent: Vec<TcpStream> =
+        (0..CONNECTIONS).map(|_| TcpStream::connect(running.bound).unwrap()).collect();
+    let status = running.ask("GET", "a", &[]).0;
+    assert!(status == 503 || status == 0, "{status}");
+    let start = Instant::now();
+    drop(running);
+    assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
+    drop(silent);
+}
+
+#[test]
+fn two_servers_have_different_keys() {
+    let servers = [(); 2].map(|()| Server::open(Access::loopback(0)).unwrap());
+    let tokens = servers.map(|server| server.guard.token.clone().unwrap());
+    assert_ne!(tokens[0], tokens[1]);
+    assert!(tokens.iter().all(|token| token.len() == 32));
+}

@@ -1,0 +1,71 @@
+//! Animation of the pictures of a run.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
+use tagalong_app::progress::Progress;
+use tagalong_render::Animation;
+
+use crate::ViewArgs;
+use crate::assemble::{Span, stamps, times};
+use crate::recording::Recording;
+
+/// Writes the animation of a run.
+///
+/// # Errors
+/// A run without pictures, a span without frames, a file that exists.
+pub fn write(args: &ViewArgs, file: &Path) -> Outcome {
+    let run = [Recording::read(&args.run)?];
+    spare(file, args.overwrite)?;
+    let span = Span { from_s: args.from, to_s: args.to };
+    let shown = stamps(&run, span);
+    if shown.is_empty() {
+        return Err(Failure::usage("no frame lies between --from and --to"));
+    }
+    let chosen = paced(&times(&shown), args.fps);
+    let wanted: Vec<u64> = chosen.into_iter().map(|at| shown[at]).collect();
+    let moments = run[0].moments.iter().filter(|m| wanted.contains(&m.notes.stamp_ns));
+    let overlay = args.run.join("overlay");
+    let picture = |frame: u64| overlay.join(format!("{frame:06}.png"));
+    let pictures: Vec<PathBuf> = moments.map(|m| picture(m.notes.frame)).collect();
+    if !pictures.iter().any(|path| path.is_file()) {
+        return Err(Failure::usage(format!(
+            "{} has no pictures: repeat the run with --overlay",
+            args.run.display()
+        )));
+    }
+    make_room_for(file)?;
+    let animation = Animation { width: args.width, delay_ms: 1000 / args.fps };
+    Progress::waiting("encoding", || animation.write(&pictures, file)).map_err(Failure::failed)?;
+    let bytes = fs::metadata(file).map_or(0, |facts| facts.len());
+    let (shown, count) = (file.display(), pictures.len());
+    print(&format!("{shown}: {count} pictures, {:.1} MB\n", bytes as f64 / 1e6))?;
+    Ok(Ended::Well)
+}
+
+/// Returns the positions of the frames to show, at most `fps` of them a second.
+fn paced(times_s: &[f64], fps: u32) -> Vec<usize> {
+    let mut due_s = f64::NEG_INFINITY;
+    let mut out = Vec::new();
+    for (at, time_s) in times_s.iter().enumerate() {
+        // Times are rounded to a millisecond.
+        if *time_s + 1e-3 >= due_s {
+            out.push(at);
+            due_s = time_s.max(due_s) + 1.0 / f64::from(fps);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_left_out_evenly() {
+        let times: Vec<f64> = (0..30).map(|i| f64::from(i) / 30.0).collect();
+        assert_eq!(paced(&times, 10), [0, 3, 6, 9, 12, 15, 18, 21, 24, 27]);
+        assert_eq!(paced(&times[..4], 50), [0, 1, 2, 3]);
+    }
+}

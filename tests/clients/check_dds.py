@@ -1,0 +1,577 @@
+"""Plays a robot on an independent DDS (Cyclone) and checks what the bridge answers.
+
+    python check_dds.py ROBOT.mcap DOMAIN HTTP_PORT BRIDGE_COMMAND ...
+
+The log is one of `tagalong simulate`. Its images, calibrations, odometry and tf_static are published in
+real time with stamps of now; one packet in a hundred is lost. tf_static is published before the bridge
+starts, the switch, the callers and a second listener come late.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+
+# Read when the first participant is created: lost packets, in thousandths.
+os.environ["CYCLONEDDS_URI"] = (
+    "<CycloneDDS><Domain><Internal><Test><XmitLossiness>10</XmitLossiness></Test></Internal>"
+    "</Domain></CycloneDDS>"
+)
+
+from dataclasses import dataclass  # noqa: E402
+
+from cyclonedds.core import Policy, Qos  # noqa: E402
+from cyclonedds.domain import DomainParticipant  # noqa: E402
+from cyclonedds.idl import IdlStruct  # noqa: E402
+from cyclonedds.idl import types as t  # noqa: E402
+from cyclonedds.pub import DataWriter  # noqa: E402
+from cyclonedds.sub import DataReader  # noqa: E402
+from cyclonedds.topic import Topic  # noqa: E402
+from cyclonedds.util import duration  # noqa: E402
+from mcap.reader import make_reader  # noqa: E402
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: t.int32
+    nanosec: t.uint32
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time
+    frame_id: str
+
+
+@dataclass
+class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
+    x: t.float64
+    y: t.float64
+    z: t.float64
+
+
+@dataclass
+class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
+    x: t.float64
+    y: t.float64
+    z: t.float64
+    w: t.float64
+
+
+@dataclass
+class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
+    position: Vector3
+    orientation: Quaternion
+
+
+@dataclass
+class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovariance_"):
+    pose: Pose
+    covariance: t.array[t.float64, 36]
+
+
+@dataclass
+class PoseStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PoseStamped_"):
+    header: Header
+    pose: Pose
+
+
+@dataclass
+class Twist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
+    linear: Vector3
+    angular: Vector3
+
+
+@dataclass
+class TwistStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TwistStamped_"):
+    header: Header
+    twist: Twist
+
+
+@dataclass
+class TwistWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::TwistWithCovariance_"):
+    twist: Twist
+    covariance: t.array[t.float64, 36]
+
+
+@dataclass
+class Odometry(IdlStruct, typename="nav_msgs::msg::dds_::Odometry_"):
+    header: Header
+    child_frame_id: str
+    pose: PoseWithCovariance
+    twist: TwistWithCovariance
+
+
+@dataclass
+class Transform(IdlStruct, typename="geometry_msgs::msg::dds_::Transform_"):
+    translation: Vector3
+    rotation: Quaternion
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TransformStamped_"):
+    header: Header
+    child_frame_id: str
+    transform: Transform
+
+
+@dataclass
+class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
+    transforms: t.sequence[TransformStamped]
+
+
+@dataclass
+class Image(IdlStruct, typename="sensor_msgs::msg::dds_::Image_"):
+    header: Header
+    height: t.uint32
+    width: t.uint32
+    encoding: str
+    is_bigendian: t.uint8
+    step: t.uint32
+    data: t.sequence[t.uint8]
+
+
+@dataclass
+class CompressedImage(IdlStruct, typename="sensor_msgs::msg::dds_::CompressedImage_"):
+    header: Header
+    format: str
+    data: t.sequence[t.uint8]
+
+
+@dataclass
+class RegionOfInterest(IdlStruct, typename="sensor_msgs::msg::dds_::RegionOfInterest_"):
+    x_offset: t.uint32
+    y_offset: t.uint32
+    height: t.uint32
+    width: t.uint32
+    do_rectify: bool
+
+
+@dataclass
+class CameraInfo(IdlStruct, typename="sensor_msgs::msg::dds_::CameraInfo_"):
+    header: Header
+    height: t.uint32
+    width: t.uint32
+    distortion_model: str
+    d: t.sequence[t.float64]
+    k: t.array[t.float64, 9]
+    r: t.array[t.float64, 9]
+    p: t.array[t.float64, 12]
+    binning_x: t.uint32
+    binning_y: t.uint32
+    roi: RegionOfInterest
+
+
+@dataclass
+class String(IdlStruct, typename="std_msgs::msg::dds_::String_"):
+    data: str
+
+
+@dataclass
+class Bool(IdlStruct, typename="std_msgs::msg::dds_::Bool_"):
+    data: bool
+
+
+@dataclass
+class Empty(IdlStruct, typename="std_msgs::msg::dds_::Empty_"):
+    structure_needs_at_least_one_member: t.uint8
+
+
+@dataclass
+class ObjectHypothesis(IdlStruct, typename="vision_msgs::msg::dds_::ObjectHypothesis_"):
+    class_id: str
+    score: t.float64
+
+
+@dataclass
+class Hypothesis(IdlStruct, typename="vision_msgs::msg::dds_::ObjectHypothesisWithPose_"):
+    hypothesis: ObjectHypothesis
+    pose: PoseWithCovariance
+
+
+@dataclass
+class BoundingBox3D(IdlStruct, typename="vision_msgs::msg::dds_::BoundingBox3D_"):
+    center: Pose
+    size: Vector3
+
+
+@dataclass
+class Detection3D(IdlStruct, typename="vision_msgs::msg::dds_::Detection3D_"):
+    header: Header
+    results: t.sequence[Hypothesis]
+    bbox: BoundingBox3D
+    id: str
+
+
+@dataclass
+class Detection3DArray(IdlStruct, typename="vision_msgs::msg::dds_::Detection3DArray_"):
+    header: Header
+    detections: t.sequence[Detection3D]
+
+
+# Services as rmw_cyclonedds carries them: the caller's number goes before the request, and comes back
+# before the answer.
+@dataclass
+class TriggerRequest(IdlStruct, typename="std_srvs::srv::dds_::Trigger_Request_"):
+    guid: t.uint64
+    number: t.int64
+    structure_needs_at_least_one_member: t.uint8
+
+
+@dataclass
+class TriggerResponse(IdlStruct, typename="std_srvs::srv::dds_::Trigger_Response_"):
+    guid: t.uint64
+    number: t.int64
+    success: bool
+    message: str
+
+
+@dataclass
+class ParameterValue(IdlStruct, typename="rcl_interfaces::msg::dds_::ParameterValue_"):
+    type: t.uint8 = 0
+    bool_value: bool = False
+    integer_value: t.int64 = 0
+    double_value: t.float64 = 0.0
+    string_value: str = ""
+    byte_array_value: t.sequence[t.uint8] = ()
+    bool_array_value: t.sequence[bool] = ()
+    integer_array_value: t.sequence[t.int64] = ()
+    double_array_value: t.sequence[t.float64] = ()
+    string_array_value: t.sequence[str] = ()
+
+
+@dataclass
+class Parameter(IdlStruct, typename="rcl_interfaces::msg::dds_::Parameter_"):
+    name: str
+    value: ParameterValue
+
+
+@dataclass
+class SetParametersResult(IdlStruct, typename="rcl_interfaces::msg::dds_::SetParametersResult_"):
+    successful: bool
+    reason: str
+
+
+@dataclass
+class SetParametersRequest(IdlStruct, typename="rcl_interfaces::srv::dds_::SetParameters_Request_"):
+    guid: t.uint64
+    number: t.int64
+    parameters: t.sequence[Parameter]
+
+
+@dataclass
+class SetParametersResponse(
+    IdlStruct, typename="rcl_interfaces::srv::dds_::SetParameters_Response_"
+):
+    guid: t.uint64
+    number: t.int64
+    results: t.sequence[SetParametersResult]
+
+
+INPUTS = {
+    "/camera/aligned_depth_to_color/camera_info": CameraInfo,
+    "/camera/aligned_depth_to_color/image_raw": Image,
+    "/camera/color/camera_info": CameraInfo,
+    "/camera/color/image_raw/compressed": CompressedImage,
+    "/odom": Odometry,
+    "/tf_static": TFMessage,
+}
+
+CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
+
+
+def sensor():
+    return Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(2), CDR)
+
+
+def reliable(depth=64):
+    wait = duration(seconds=1)
+    return Qos(Policy.Reliability.Reliable(wait), Policy.History.KeepLast(depth), CDR)
+
+
+def latched():
+    wait = duration(seconds=1)
+    return Qos(
+        Policy.Reliability.Reliable(wait),
+        Policy.Durability.TransientLocal,
+        Policy.History.KeepLast(1),
+        CDR,
+    )
+
+
+class Failed(Exception):
+    pass
+
+
+def check(is_so, text):
+    if not is_so:
+        raise Failed(text)
+    print(f"ok: {text}", flush=True)
+
+
+def wait_for(find, seconds, text):
+    """Returns the first answer of `find` that is true."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        found = find()
+        if found:
+            check(True, text)
+            return found
+        time.sleep(0.02)
+    raise Failed(f"within {seconds} s not: {text}")
+
+
+class Listener:
+    """Collects the messages of a topic with their times."""
+
+    def __init__(self, participant, topic, kind):
+        self.kind = kind
+        self.reader = DataReader(participant, Topic(participant, topic, kind), qos=reliable())
+        self.heard = []
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def listen(self):
+        while True:
+            now = time.monotonic()
+            # A writer that leaves is told by a sample without a message.
+            found = [m for m in self.reader.take(64) if isinstance(m, self.kind)]
+            self.heard += [(now, message) for message in found]
+            time.sleep(0.005)
+
+    def since(self, then):
+        return [message for at, message in list(self.heard) if at > then]
+
+
+class Caller:
+    """Calls a service as rmw_cyclonedds does."""
+
+    def __init__(self, participant, service, request, response):
+        self.request = request
+        topic = Topic(participant, f"rq/{service}Request", request)
+        self.writer = DataWriter(participant, topic, qos=reliable())
+        self.answers = Listener(participant, f"rr/{service}Reply", response)
+        self.number = 0
+
+    def call(self, *content):
+        self.number += 1
+        guid = 0x1234_5678_9ABC_DEF0
+
+        def answer():
+            for message in self.answers.since(0):
+                if (message.guid, message.number) == (guid, self.number):
+                    return message
+            return None
+
+        end = time.monotonic() + 8
+        while time.monotonic() < end:
+            # The first may come before the server knows this caller; the verbs may come twice.
+            self.writer.write(self.request(guid, self.number, *content))
+            retry = time.monotonic() + 2.5
+            while time.monotonic() < retry:
+                if answer():
+                    return answer()
+                time.sleep(0.02)
+        raise Failed(f"no answer to {self.request.__name__} {content}")
+
+
+class Robot:
+    """Publishes the log of a robot in real time."""
+
+    def __init__(self, participant, path):
+        self.participant, self.path, self.ends = participant, path, threading.Event()
+        self.writers = {}
+        for topic, kind in INPUTS.items():
+            qos = latched() if topic == "/tf_static" else sensor()
+            self.writers[topic] = DataWriter(
+                participant, Topic(participant, f"rt{topic}", kind), qos=qos
+            )
+
+    def messages(self):
+        with open(self.path, "rb") as file:
+            reader = make_reader(file)
+            for _, channel, message in reader.iter_messages(topics=list(INPUTS)):
+                kind = INPUTS[channel.topic]
+                yield channel.topic, message.log_time, kind.deserialize(message.data)
+
+    def publish_transforms(self):
+        for topic, _, message in self.messages():
+            if topic == "/tf_static":
+                self.writers[topic].write(message)
+                return
+        raise Failed("the log has no /tf_static")
+
+    def play(self):
+        """Publishes all but the transforms, whatever of it is lost."""
+        start, first = time.time(), None
+        for topic, log_time, message in self.messages():
+            if self.ends.is_set():
+                return
+            if topic == "/tf_static":
+                continue
+            first = first or log_time
+            due = start + (log_time - first) * 1e-9
+            time.sleep(max(0.0, due - time.time()))
+            shift = int(start * 1e9) - first
+            stamp = message.header.stamp
+            nanos = stamp.sec * 1_000_000_000 + stamp.nanosec + shift
+            message.header.stamp = Time(nanos // 1_000_000_000, nanos % 1_000_000_000)
+            self.writers[topic].write(message)
+
+
+class Hand:
+    """A hand at the deadman's switch, which enables ten times a second while it holds it."""
+
+    def __init__(self, participant):
+        def writer(topic, kind):
+            return DataWriter(participant, Topic(participant, topic, kind), qos=reliable())
+
+        self.enable = writer("rt/people/enable", Bool)
+        self.reset_writer = writer("rt/people/reset", Empty)
+        self.holds = False
+        threading.Thread(target=self.repeat, daemon=True).start()
+
+    def repeat(self):
+        while True:
+            if self.holds:
+                self.enable.write(Bool(True))
+            time.sleep(0.1)
+
+    def reset(self):
+        self.reset_writer.write(Empty(0))
+
+    def switch_off(self):
+        self.enable.write(Bool(False))
+
+
+class Http:
+    """The HTTP client."""
+
+    def __init__(self, port):
+        self.base = f"http://127.0.0.1:{port}"
+
+    def send(self, path, body=None, **headers):
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(f"{self.base}/{path}", data=data, headers=headers)
+        if data is not None:
+            request.add_header("Content-Type", "application/json")
+        try:
+            with urllib.request.urlopen(request, timeout=10) as answer:
+                return answer.status, json.load(answer)
+        except urllib.error.HTTPError as error:
+            text = error.read().decode()
+            return error.code, json.loads(text) if text.startswith("{") else text
+
+
+def moves(commands):
+    return any(c.twist.linear.x != 0.0 or c.twist.angular.z != 0.0 for c in commands)
+
+
+def run(path, domain, port, command):
+    robot = Robot(DomainParticipant(domain), path)
+    robot.publish_transforms()
+    bridge = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    said = []
+    threading.Thread(target=lambda: said.extend(bridge.stderr), daemon=True).start()
+    try:
+        listeners = DomainParticipant(domain)
+        commands = Listener(listeners, "rt/cmd_vel", TwistStamped)
+        states = Listener(listeners, "rt/people/state", String)
+        tracks = Listener(listeners, "rt/people/tracks", Detection3DArray)
+        threading.Thread(target=robot.play, daemon=True).start()
+        converse(domain, Http(port), commands, states, tracks)
+        bridge.send_signal(2)
+        bridge.wait(timeout=10)
+        check(bridge.returncode == 130, "the bridge ends by the signal")
+        time.sleep(0.3)
+        last = commands.since(0)[-1]
+        check(not moves([last]), "the last command is zero")
+    except Failed:
+        print("the bridge said:\n" + "".join(said), file=sys.stderr)
+        raise
+    finally:
+        robot.ends.set()
+        bridge.kill()
+
+
+def converse(domain, http, commands, states, tracks):
+    found = wait_for(
+        lambda: [m for m in tracks.since(0) if m.detections], 25, "people are tracked"
+    )
+    place = found[0].detections[0].bbox.center.position
+    check(1.5 < place.x < 4.5 and abs(place.y) < 1.0, f"where they are: {place.x:.2f} m ahead")
+    wait_for(lambda: states.since(0), 5, "states are told")
+    check(commands.since(0) == [], "no command before the switch allows it")
+
+    # The participants of the switch, of the callers and of a second listener come only now.
+    late = DomainParticipant(domain)
+    hand = Hand(late)
+    late_tracks = Listener(late, "rt/people/tracks", Detection3DArray)
+    trigger = (TriggerRequest, TriggerResponse)
+    status = Caller(late, "people/status", *trigger)
+    enroll = Caller(late, "people/enroll", SetParametersRequest, SetParametersResponse)
+    clear = Caller(late, "people/clear", *trigger)
+    wait_for(lambda: late_tracks.since(0), 5, "a listener that came late hears tracks")
+    hand.holds = True
+    time.sleep(1.0)
+    check(not moves(commands.since(0)), "an enable without a reset moves nothing")
+    hand.reset()
+    wait_for(lambda: moves(commands.since(0)), 8, "reset and enabled, the robot moves")
+
+    code, health = http.send("healthz")
+    check((code, health["ok"]) == (200, True), "GET /healthz: well")
+    code, data = http.send("status")
+    check(code == 200 and data["follows"], f"GET /status: {data['state']}, {data['reason']}")
+    people = [person["track"] for person in data["people"]]
+    check(data["track"] in people and data["distance_m"] > 1.0, "with the person and the distance")
+
+    code, answer = http.send("clear", {})
+    check((code, answer) == (200, {"ok": True}), "POST /clear")
+    wait_for(lambda: http.send("status")[1]["reason"] == "cleared", 3, "cleared")
+    time.sleep(2.0)
+    then = time.monotonic()
+    time.sleep(0.5)
+    check(commands.since(then) and not moves(commands.since(then)), "after it the robot stands")
+    code, answer = http.send("enroll", {"person": {"track": 4711}})
+    check(code == 409 and "no track 4711" in answer["reason"], f"refused: {answer['reason']}")
+    code, answer = http.send("enroll", {"person": "somebody"})
+    check(code == 400, "no request of the skill: refused")
+    code, _ = http.send("clear", {}, Host="evil.example")
+    check(code == 403, "of another host: refused")
+
+    left, top, width, height = http.send("status")[1]["people"][0]["box"]
+    point = [max(1.0, left + 0.5 * width), max(1.0, top + 0.3 * height)]
+    code, answer = http.send("enroll", {"person": {"point": point}})
+    check(code == 200, f"POST /enroll the person at a point: {answer}")
+    wait_for(lambda: moves(commands.since(then + 0.6)), 5, "the robot moves again")
+
+    answer = status.call(0)
+    check(answer.success and '"state"' in answer.message, "service people/status")
+    check(clear.call(0).success, "service people/clear")
+    wrong = Parameter("track", ParameterValue(type=2, integer_value=4711))
+    result = enroll.call([wrong]).results[0]
+    check(not result.successful and "4711" in result.reason, f"refused: {result.reason}")
+    nearest = Parameter("person", ParameterValue(type=4, string_value="nearest"))
+    check(enroll.call([nearest]).results[0].successful, "service people/enroll")
+    then = time.monotonic()
+    wait_for(lambda: moves(commands.since(then)), 5, "and the robot follows")
+
+    hand.switch_off()
+    time.sleep(0.5)
+    then = time.monotonic()
+    time.sleep(1.0)
+    check(not moves(commands.since(then)), "a false latches, though true is repeated")
+
+
+def main():
+    path, domain, port, *command = sys.argv[1:]
+    try:
+        run(path, int(domain), int(port), command)
+    except Failed as error:
+        sys.exit(f"FAILED: {error}")
+
+
+main()
