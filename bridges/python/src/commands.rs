@@ -59,6 +59,8 @@ pub fn run(
         strict,
         threads: None,
         seed,
+        serve: None,
+        realtime: false,
         format: Format::default(),
         quiet: true,
     };
