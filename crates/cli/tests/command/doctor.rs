@@ -468,6 +468,19 @@ fn of_a_laser_log_lasers_are_spoken_of() {
     assert!(laser["measured"].as_str().unwrap().contains("scans a second"), "{laser:#}");
     let read = finding(&said, "frames-read")["measured"].as_str().unwrap();
     assert!(read.contains("scans"), "{read}");
+    assert!(!said["findings"].as_array().unwrap().iter().any(|f| f["id"] == "suits"), "{said:#}");
+}
+
+#[test]
+fn a_config_for_robots_with_odometry_is_not_for_a_log_without() {
+    let home = tempfile::tempdir().unwrap();
+    let log = simulated(home.path(), SCANNER, &["/camera", "/odom", "/tf"]);
+    let (code, said) = doctor(&root().join("configs/laser-legs.toml"), &log, &[]);
+    let suits = finding(&said, "suits");
+    assert_eq!((code, suits["severity"].as_str()), (3, Some("bad")), "{said:#}");
+    assert!(suits["measured"].as_str().unwrap().contains("no odometry"), "{suits:#}");
+    let (_, said) = doctor(&root().join("configs/laser-follow.toml"), &log, &[]);
+    assert!(!said["findings"].as_array().unwrap().iter().any(|f| f["id"] == "suits"), "{said:#}");
 }
 
 /// Images that are all skipped are no good log, whatever else is fine.
