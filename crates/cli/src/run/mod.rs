@@ -48,7 +48,7 @@ use tagalong_simulate::sample;
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     // A name that is no config must not cost a simulation.
     if let Some(path) = args.config().filter(|_| !args.has_log()) {
-        ConfigFile::read(path)?;
+        ConfigFile::read(path)?.pipeline(registry, args.seed)?;
     }
     if !args.has_log() {
         sample::write(args.log()).map_err(refused)?;
