@@ -329,6 +329,7 @@ class Listener:
     """Collects the messages of a topic with their times."""
 
     def __init__(self, participant, topic, kind):
+        self.kind = kind
         self.reader = DataReader(participant, Topic(participant, topic, kind), qos=reliable())
         self.heard = []
         threading.Thread(target=self.listen, daemon=True).start()
@@ -336,7 +337,9 @@ class Listener:
     def listen(self):
         while True:
             now = time.monotonic()
-            self.heard += [(now, message) for message in self.reader.take(64)]
+            # A writer that leaves is told by a sample without a message.
+            found = [m for m in self.reader.take(64) if isinstance(m, self.kind)]
+            self.heard += [(now, message) for message in found]
             time.sleep(0.005)
 
     def since(self, then):

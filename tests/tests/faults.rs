@@ -1,6 +1,6 @@
 //! Faults of sensors and clocks, from the log or the frame to the tracks and the wheels. The names
 //! of the tests begin with the fault's: T5, time stamps that disagree; S1, a depth camera without
-//! readings.
+//! readings; S2, images with noise; S3, a room without people for long.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
 
 use std::path::{Path, PathBuf};
@@ -14,6 +14,7 @@ use tagalong_log::write::MessageLog;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_pipeline::{FrameReport, LockState, Pipeline};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
+use tagalong_stats::{RandomSource as _, SplitMix64};
 
 const SCENE: &str = include_str!("../scenes/small-room.toml");
 
@@ -214,5 +215,75 @@ fn s1_depth_that_shows_nothing_ends_tracks_and_starts_none() {
             blind.iter().filter(|report| report.lock.as_ref().unwrap().state == LockState::Lost);
         let commands: Vec<_> = lost.map(|report| report.command.unwrap().wheels).collect();
         assert!(commands.iter().all(|wheels| *wheels == WheelSpeeds::STOP), "{depth_m}");
+    }
+}
+
+/// A spoilt copy of a scene's images.
+struct Spoilt {
+    name: &'static str,
+    spoil: fn(&Images, &mut SplitMix64) -> Images,
+}
+
+const SPOILT: [Spoilt; 5] = [
+    Spoilt { name: "as they are", spoil: |images, _| images.clone() },
+    Spoilt {
+        name: "half of the depth missing",
+        spoil: |images, random| {
+            with_depth(images, |z| if random.uniform() < 0.5 { f32::NAN } else { z })
+        },
+    },
+    Spoilt {
+        name: "salt in depth",
+        spoil: |images, random| {
+            with_depth(images, |z| if random.uniform() < 0.02 { 0.4 } else { z })
+        },
+    },
+    Spoilt { name: "white images", spoil: |images, _| with_colour(images, [255; 3]) },
+    Spoilt { name: "black images", spoil: |images, _| with_colour(images, [0; 3]) },
+];
+
+fn with_depth(images: &Images, change: impl FnMut(f32) -> f32) -> Images {
+    let depth = images.depth.as_ref().unwrap().map(change);
+    Images { depth: Some(Arc::new(depth)), ..images.clone() }
+}
+
+fn with_colour(images: &Images, colour: [u8; 3]) -> Images {
+    let image = images.colour.as_ref().unwrap().map(|_| colour);
+    Images { colour: Some(Arc::new(image)), ..images.clone() }
+}
+
+/// Returns the part of the frames in which a confirmed track is within half a metre of the person.
+fn recall(config: &str, camera: &Arc<Camera>, shots: &[Shot], spoilt: &Spoilt) -> f64 {
+    let mut pipeline = pipeline(config);
+    let mut random = SplitMix64::new(7);
+    let mut found = 0;
+    for (index, shot) in shots.iter().enumerate() {
+        let images = (spoilt.spoil)(&shot.images, &mut random);
+        let report = pipeline.step(&frame(camera, index, images)).unwrap();
+        let head = shot.truth[0].head_in_robot;
+        let confirmed = report.tracks.iter().filter(|track| track.confirmed && track.seen);
+        let mut places = confirmed.map(|track| track.estimate.person.position);
+        found += usize::from(places.any(|place| (place - head).xy().norm() < 0.5));
+    }
+    found as f64 / shots.len() as f64
+}
+
+#[test]
+fn s2_noise_breaks_nothing_and_its_cost_in_recall_is_known() {
+    let (camera, shots) = shots();
+    let camera = Arc::new(camera);
+    for (config, least) in [("depth-ekf.toml", [0.7, 0.5, 0.5, 0.7, 0.7])] {
+        let recalls = SPOILT.map(|spoilt| (spoilt.name, recall(config, &camera, &shots, &spoilt)));
+        eprintln!("{config}: {recalls:?}");
+        for ((name, recall), least) in recalls.into_iter().zip(least) {
+            assert!(recall >= least, "{config}, {name}: {recall}");
+        }
+        // The detector of this config reads depth alone.
+        assert_eq!((recalls[0].1, recalls[0].1), (recalls[3].1, recalls[4].1), "{config}");
+    }
+    // Pipelines that read colour may lose the person, and nothing else.
+    for spoilt in &SPOILT {
+        recall("depth-verified.toml", &camera, &shots, spoilt);
+        recall("mono.toml", &camera, &shots, spoilt);
     }
 }

@@ -81,6 +81,11 @@ impl ConfigFile {
         }))
     }
 
+    /// Returns the config of a text, whose relative paths are resolved against `folder`.
+    pub fn of_text(text: String, folder: &Path) -> Self {
+        Self { path: folder.join("config.toml"), text }
+    }
+
     /// Returns the config that is used where neither a config nor a log is given.
     pub fn built_in() -> Self {
         Self::new("depth-ekf", include_str!("../../../configs/depth-ekf.toml"))

@@ -6,6 +6,7 @@ use std::io;
 use std::path::Path;
 
 use tagalong_log::LogError;
+use tagalong_log::write::WriteError;
 
 /// End of a command that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +64,25 @@ impl Failure {
     }
 }
 
+impl From<WriteError> for Failure {
+    /// Converts the error of writing results: a full disk is told as one, whenever it happens.
+    fn from(error: WriteError) -> Self {
+        match error {
+            full if full.is_disk_full() => Self::failed(format!(
+                "the disk is full: {full}; make room, or take another with -o"
+            )),
+            refusal if refusal.is_refusal() => Self::usage(refusal),
+            failed => Self::failed(failed),
+        }
+    }
+}
+
+/// Returns the failure of an output that cannot be made: the user may choose another (exit code 2),
+/// unless the disk is full, which is exit code 1 as it is later.
+pub fn refused(error: WriteError) -> Failure {
+    if error.is_disk_full() { error.into() } else { Failure::usage(error) }
+}
+
 impl From<LogError> for Failure {
     /// Converts the error of a log: a log that cannot be used is exit code 1, settings that cannot
     /// are 2.
@@ -84,6 +104,9 @@ pub type Outcome = Result<Ended, Failure>;
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|error| {
         let shown = folder.display();
+        if error.kind() == io::ErrorKind::StorageFull {
+            return Failure::failed(format!("the disk is full: cannot make the folder {shown}"));
+        }
         Failure::usage(format!("cannot make the folder {shown}: {error}; choose another with -o"))
     })
 }
@@ -152,6 +175,21 @@ pub fn say(text: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_full_disk_is_the_same_failure_early_and_late() {
+        let error =
+            |kind| WriteError::Io { path: "out/tracks.mcap".into(), source: io::Error::from(kind) };
+        let [early, late] =
+            [refused, Failure::from].map(|told| told(error(io::ErrorKind::StorageFull)));
+        assert_eq!((early.code, &early), (1, &late));
+        assert!(
+            early.message.contains("the disk is full") && early.message.contains("out/tracks.mcap")
+        );
+        let denied = refused(error(io::ErrorKind::PermissionDenied));
+        assert_eq!(denied.code, 2, "another folder helps");
+        assert_eq!(Failure::from(error(io::ErrorKind::BrokenPipe)).code, 1);
+    }
 
     #[test]
     fn names_cannot_steer_a_terminal() {

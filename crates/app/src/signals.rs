@@ -40,6 +40,11 @@ impl Signals {
         Ok(signals)
     }
 
+    /// Asks to stop, as SIGINT does.
+    pub fn interrupt(&self) {
+        self.received.store(SIGINT as usize, Ordering::Relaxed);
+    }
+
     /// Returns the signal that asked to stop, if there was one.
     pub fn received(&self) -> Option<u8> {
         u8::try_from(self.received.load(Ordering::Relaxed)).ok().filter(|signal| *signal != 0)

@@ -1,4 +1,12 @@
-use tagalong_matching::{Edge, Matcher};
+use std::cell::RefCell;
+
+use tagalong_matching::Matcher;
+
+thread_local! {
+    /// Kept for its memory alone: with few people more time would go into asking for that than
+    /// into the search.
+    static MATCHER: RefCell<Matcher> = RefCell::new(Matcher::new());
+}
 
 /// Assigns rows (tracks) to columns (detections) so that the sum of costs is minimal. `cost(row,
 /// column)` is `None` for a forbidden pair; a row without a column costs `miss[row]`. Returns the
@@ -16,21 +24,12 @@ pub fn assign(
     miss: &[f64],
     cost: impl Fn(usize, usize) -> Option<f64>,
 ) -> Vec<Option<usize>> {
-    let rows = 0..miss.len() as u32;
-    let edge = |row: u32, col: u32| {
-        let weight = miss[row as usize] - cost(row as usize, col as usize)?;
-        Some(Edge { row, col, weight })
-    };
-    let edge = &edge;
-    let edges: Vec<Edge> =
-        rows.flat_map(|row| (0..columns as u32).filter_map(move |col| edge(row, col))).collect();
-    let mut matched = Vec::new();
-    Matcher::new().best(miss.len(), columns, &edges, &mut matched);
-    let mut column_of = vec![None; miss.len()];
-    for edge in matched.iter().map(|index| edges[*index as usize]) {
-        column_of[edge.row as usize] = Some(edge.col as usize);
+    let mut weights = Vec::with_capacity(columns * miss.len());
+    for (row, miss) in miss.iter().enumerate() {
+        // The gain of a pair is the miss that it saves.
+        weights.extend((0..columns).map(|col| cost(row, col).map_or(0.0, |cost| miss - cost)));
     }
-    column_of
+    MATCHER.with_borrow_mut(|matcher| matcher.best_of_matrix(miss.len(), columns, &weights))
 }
 
 #[cfg(test)]

@@ -24,16 +24,28 @@ use std::process::ExitCode;
 
 use args::{Cli, Command};
 use clap::{CommandFactory as _, Parser};
+pub use commands::{EvalArgs, SimilarityChoice, eval_json};
+pub use run::{RunArgs, run_until};
 use tagalong_app::outcome::{Failure, Outcome, say};
 use tagalong_config::Registry;
 
 /// Runs the whole program: registers the plugins, parses the command line, dispatches the command.
 pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
+    ExitCode::from(main_from(std::env::args_os(), register))
+}
+
+/// Runs the whole program with these arguments, of which the first is its name, and returns the exit
+/// code; `--help` and wrong usage end the process.
+pub fn main_from(
+    arguments: impl IntoIterator<Item = OsString>,
+    register: impl FnOnce(&mut Registry),
+) -> u8 {
     tell_panics_briefly();
     let mut registry = Registry::default();
     register(&mut registry);
-    let for_programs = wants_json(std::env::args_os());
-    let cli = match Cli::try_parse() {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let for_programs = wants_json(&arguments);
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) if for_programs && error.use_stderr() => {
             let message = error.render().to_string();
@@ -43,20 +55,19 @@ pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
         Err(error) => error.exit(),
     };
     match dispatch(&cli.command, &registry) {
-        Ok(ended) => ExitCode::from(ended.code()),
+        Ok(ended) => ended.code(),
         Err(failure) => tell(&failure, for_programs),
     }
 }
 
 /// Returns true where the output is asked for as JSON, even if other arguments are wrong.
-fn wants_json(arguments: impl Iterator<Item = OsString>) -> bool {
-    let arguments: Vec<OsString> = arguments.collect();
+fn wants_json(arguments: &[OsString]) -> bool {
     arguments.iter().any(|argument| argument == "--format=json")
         || arguments.windows(2).any(|pair| pair == ["--format", "json"])
 }
 
-/// Tells a failure, for programs as the last line of stderr.
-fn tell(failure: &Failure, for_programs: bool) -> ExitCode {
+/// Tells a failure, for programs as the last line of stderr, and returns its exit code.
+fn tell(failure: &Failure, for_programs: bool) -> u8 {
     let Failure { message, code } = failure;
     // An empty message: stdout was closed, and there is no reader to inform.
     if !message.is_empty() {
@@ -65,7 +76,7 @@ fn tell(failure: &Failure, for_programs: bool) -> ExitCode {
             false => format!("error: {message}"),
         });
     }
-    ExitCode::from(*code)
+    *code
 }
 
 /// Reports a panic in a line or two, unless `RUST_BACKTRACE` is set.

@@ -219,6 +219,9 @@ fn check_rotation(r: &[f64; 9]) -> Result<(), CalibrationError> {
     Ok(())
 }
 
+/// Largest focal length, in sides of the image.
+const LONGEST_FOCAL: f64 = 1e3;
+
 fn check_lens(
     info: &CameraInfo,
     names: [&'static str; 4],
@@ -227,6 +230,14 @@ fn check_lens(
     for (field, value) in [(names[0], fx), (names[1], fy)] {
         if value <= 0.0 {
             return Err(CalibrationError::Field { field, value, why: "must be positive" });
+        }
+    }
+    // Of a telescope with a view of a twentieth of a degree; a larger number has another unit.
+    let longest = LONGEST_FOCAL * f64::from(info.width.max(info.height));
+    for (field, value) in [(names[0], fx), (names[1], fy)] {
+        if longest > 0.0 && value > longest {
+            let why = "must be at most a thousand image sides";
+            return Err(CalibrationError::Field { field, value, why });
         }
     }
     // The outer borders of the pixels: half a pixel beyond the first and the last centre.
@@ -378,6 +389,7 @@ mod tests {
         );
         assert!(broken(|i| i.distortion_model = "of my own".into()).contains("`of my own`"));
         assert!(broken(|i| i.p[3] = f64::INFINITY).starts_with("P ="));
+        assert!(broken(|i| i.k[0] = 1e30).contains("at most a thousand image sides"));
     }
 
     #[test]

@@ -86,11 +86,12 @@ fn string(text: &str) -> Vec<u8> {
 }
 
 fn schema_record(id: u16) -> Vec<u8> {
-    record(
-        3,
-        &[&id.to_le_bytes()[..], &string("std_msgs/msg/String"), &string("ros2msg"), &string("")]
-            .concat(),
-    )
+    schema_of(id, "")
+}
+
+fn schema_of(id: u16, definition: &str) -> Vec<u8> {
+    let names = [string("std_msgs/msg/String"), string("ros2msg")].concat();
+    record(3, &[&id.to_le_bytes()[..], &names, &string(definition)].concat())
 }
 
 fn channel_record(id: u16, schema: u16, topic: &[u8]) -> Vec<u8> {
@@ -374,5 +375,20 @@ fn what_is_no_file_is_refused() {
     assert!(open(&folder.path().join("absent.mcap")).contains("absent.mcap"));
     if cfg!(unix) {
         assert!(open(std::path::Path::new("/dev/zero")).contains("a pipe or a device"));
+    }
+}
+
+#[test]
+fn f13_schemas_are_not_parsed() {
+    let rule = "=".repeat(80);
+    let cyclic = format!(
+        "a/A a\n{rule}\nMSG: a/A\nstd_msgs/String a\n{rule}\nMSG: std_msgs/String\na/A a\n"
+    );
+    let part = |n: usize| format!("a/A{} a\n{rule}\nMSG: a/A{}\n", n + 1, n + 1);
+    let deep: String = (0..5000).map(part).collect();
+    for definition in [cyclic, deep, "\u{0}[[[".into()] {
+        let start = [header(), schema_of(1, &definition), channel_record(1, 1, b"/text")].concat();
+        let found = walk(&[start, message_record(1, 0), end()].concat()).unwrap();
+        assert_eq!((found.numbers, found.lost), (vec![0], false));
     }
 }

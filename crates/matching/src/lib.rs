@@ -20,6 +20,9 @@ pub struct Edge {
 
 const NONE: u32 = u32::MAX;
 
+/// Matrices up to this size are solved sooner than groups are found in them.
+const FEW_PAIRS: usize = 600;
+
 /// Finds the matching of greatest total weight; keeps its memory between calls.
 #[derive(Debug, Default)]
 pub struct Matcher {
@@ -29,6 +32,7 @@ pub struct Matcher {
     rows: Vec<u32>,
     cols: Vec<u32>,
     cost: Vec<f64>,
+    edges: Vec<Edge>,
     solver: Solver,
 }
 
@@ -59,17 +63,99 @@ impl Matcher {
         matched.sort_unstable_by_key(|&e| edges[e as usize].row);
     }
 
+    /// The same of a matrix of weights, row by row: the column of each row. Pairs at or below zero
+    /// are never matched, and the rest holds as for [`Matcher::best`].
+    ///
+    /// ```
+    /// use tagalong_matching::Matcher;
+    /// let weights = [3.0, 2.0, 2.5, 0.0];
+    /// assert_eq!(Matcher::new().best_of_matrix(2, 2, &weights), [Some(1), Some(0)]);
+    /// ```
+    pub fn best_of_matrix(
+        &mut self,
+        rows: usize,
+        cols: usize,
+        weights: &[f64],
+    ) -> Vec<Option<usize>> {
+        let useful = weights.iter().filter(|weight| **weight > 0.0).count();
+        let mut col_of = vec![None; rows];
+        if weights.len() > FEW_PAIRS && 2 * useful < weights.len() {
+            self.match_groups(rows, cols, weights, &mut col_of);
+        } else if useful > 0 {
+            self.match_all(rows, cols, weights, &mut col_of);
+        }
+        col_of
+    }
+
+    /// Solves a sparse matrix by its groups.
+    fn match_groups(
+        &mut self,
+        rows: usize,
+        cols: usize,
+        weights: &[f64],
+        col_of: &mut [Option<usize>],
+    ) {
+        let mut edges = std::mem::take(&mut self.edges);
+        edges.clear();
+        for (row, weights) in (0..).zip(weights.chunks(cols)) {
+            for (col, weight) in (0..).zip(weights).filter(|(_, weight)| **weight > 0.0) {
+                edges.push(Edge { row, col, weight: *weight });
+            }
+        }
+        let mut matched = Vec::new();
+        self.best(rows, cols, &edges, &mut matched);
+        for edge in matched.into_iter().map(|e| edges[e as usize]) {
+            col_of[edge.row as usize] = Some(edge.col as usize);
+        }
+        self.edges = edges;
+    }
+
+    /// Solves a matrix as a whole, without a search for groups.
+    fn match_all(
+        &mut self,
+        rows: usize,
+        cols: usize,
+        weights: &[f64],
+        col_of: &mut [Option<usize>],
+    ) {
+        let flipped = rows > cols;
+        self.cost.clear();
+        if flipped {
+            let column = |col: usize| weights[col..].iter().step_by(cols);
+            self.cost.extend((0..cols).flat_map(column).map(|weight| -weight.max(0.0)));
+        } else {
+            self.cost.extend(weights.iter().map(|weight| -weight.max(0.0)));
+        }
+        self.solver.solve(rows.min(cols), rows.max(cols), &self.cost);
+        for (wide, narrow) in self.solver.row_of.iter().enumerate().filter(|(_, n)| **n != NONE) {
+            let narrow = *narrow as usize;
+            let (row, col) = if flipped { (wide, narrow) } else { (narrow, wide) };
+            if weights[row * cols + col] > 0.0 {
+                col_of[row] = Some(col);
+            }
+        }
+    }
+
     /// Fills `order` with the useful edges, those of one group side by side,
     /// and `parent` with the group of each node.
     fn group(&mut self, rows: usize, cols: usize, edges: &[Edge]) {
-        self.parent.clear();
-        self.parent.extend(0..(rows + cols) as u32);
-        self.local.clear();
-        self.local.resize(rows + cols, NONE);
+        reset(&mut self.local, rows + cols, NONE);
         self.order.clear();
-        for (e, edge) in edges.iter().enumerate().filter(|(_, edge)| edge.weight > 0.0) {
-            self.order.push(e as u32);
-            let (a, b) = (self.root(edge.row), self.root(edge.col + rows as u32));
+        let useful = (0..).zip(edges).filter(|(_, edge)| edge.weight > 0.0);
+        self.order.extend(useful.map(|(e, _)| e));
+        self.parent.clear();
+        // With an edge for every pair there is one group, which need not be searched for.
+        if self.order.len() == rows * cols {
+            self.parent.resize(rows + cols, 0);
+            return;
+        }
+        self.parent.extend(0..(rows + cols) as u32);
+        for edge in edges.iter().filter(|edge| edge.weight > 0.0) {
+            let (row, col) = (edge.row, edge.col + rows as u32);
+            if self.parent[row as usize] == self.parent[col as usize] {
+                continue;
+            }
+            let (a, b) = (self.root(row), self.root(col));
             // The smaller root wins, which keeps the result independent of the order of edges.
             self.parent[a.max(b) as usize] = a.min(b);
         }
@@ -77,7 +163,10 @@ impl Matcher {
             self.parent[node as usize] = self.root(node);
         }
         let parent = &self.parent;
-        self.order.sort_by_key(|&e| parent[edges[e as usize].row as usize]);
+        let group_of = |&e: &u32| parent[edges[e as usize].row as usize];
+        if !self.order.is_sorted_by_key(group_of) {
+            self.order.sort_by_key(group_of);
+        }
     }
 
     fn root(&mut self, mut node: u32) -> u32 {
@@ -149,13 +238,15 @@ struct Solver {
     col_price: Vec<f64>,
     /// Row of each column, or `NONE`.
     row_of: Vec<u32>,
-    /// Column before each one on the path to it, or `NONE`.
-    previous: Vec<u32>,
+    /// Column before each one on the path to it, or `NONE`; as wide as the distances, because
+    /// vector instructions convert slowly between widths.
+    previous: Vec<u64>,
     /// Cost of the path to each column; NaN once it is final, which is less than nothing.
     distance: Vec<f64>,
     /// Columns whose distance is final.
     settled: Vec<(u32, f64)>,
     open: Vec<u32>,
+    left: Vec<u32>,
 }
 
 impl Solver {
@@ -164,20 +255,19 @@ impl Solver {
         reset(&mut self.row_price, rows, 0.0);
         reset(&mut self.col_price, cols, 0.0);
         reset(&mut self.row_of, cols, NONE);
-        reset(&mut self.previous, cols, NONE);
+        reset(&mut self.previous, cols, u64::from(NONE));
         self.take_cheapest(cols, cost);
         self.reduce(cols, cost);
-        for row in std::mem::take(&mut self.open) {
-            self.augment(row, &cost[..], cols);
-        }
+        let open = std::mem::take(&mut self.open);
+        open.iter().for_each(|row| self.augment(*row, cost, cols));
+        self.open = open;
     }
 
     /// Gives each row its cheapest column while that is free; the others stay open.
     fn take_cheapest(&mut self, cols: usize, cost: &[f64]) {
         self.open.clear();
         for (row, costs) in cost.chunks(cols).enumerate() {
-            let least = least(costs);
-            let col = place_of(costs, least);
+            let (col, least) = least(costs);
             self.row_price[row] = least;
             match self.row_of[col] {
                 NONE => self.row_of[col] = row as u32,
@@ -189,12 +279,13 @@ impl Solver {
     /// Lets open rows outbid the holders of their cheapest columns (augmenting row reduction of
     /// Jonker and Volgenant). A column that has a row keeps one, so that free ones cost nothing.
     fn reduce(&mut self, cols: usize, cost: &[f64]) {
-        let mut left = Vec::new();
+        self.left.clear();
+        reset(&mut self.distance, cols, 0.0);
         // A row that is outbid again and again is cheaper to place by a path.
         let mut bids = 2 * self.row_price.len();
         while let Some(row) = self.open.pop() {
             if bids == 0 {
-                left.push(row);
+                self.left.push(row);
                 continue;
             }
             bids -= 1;
@@ -202,7 +293,7 @@ impl Solver {
             let (col, first, second) = self.two_cheapest(costs);
             let holder = self.row_of[col];
             if holder != NONE && first >= second {
-                left.push(row);
+                self.left.push(row);
                 continue;
             }
             // A column without rivals needs no price.
@@ -213,22 +304,16 @@ impl Solver {
             self.row_price[row as usize] = costs[col] - self.col_price[col];
             self.row_of[col] = row;
         }
-        left.reverse();
-        self.open = left;
+        self.left.reverse();
+        std::mem::swap(&mut self.open, &mut self.left);
     }
 
     /// Returns the cheapest column at the prices, with its cost and that of the next.
-    fn two_cheapest(&self, costs: &[f64]) -> (usize, f64, f64) {
-        let mut found = (0, f64::INFINITY, f64::INFINITY);
-        for (col, (cost, price)) in costs.iter().zip(&self.col_price).enumerate() {
-            let cost = cost - price;
-            if cost < found.1 {
-                found = (col, cost, found.1);
-            } else if cost < found.2 {
-                found.2 = cost;
-            }
-        }
-        found
+    fn two_cheapest(&mut self, costs: &[f64]) -> (usize, f64, f64) {
+        reduced(costs, &self.col_price, &mut self.distance);
+        let (col, first) = least(&self.distance);
+        self.distance[col] = f64::INFINITY;
+        (col, first, least(&self.distance).1)
     }
 
     /// Gives `start` a column along the shortest path (Dijkstra on reduced costs).
@@ -237,9 +322,10 @@ impl Solver {
         self.settled.clear();
         let (mut row, mut via, mut shift) = (start, NONE, 0.0);
         let (end, reached) = loop {
-            self.relax(&cost[row as usize * cols..][..cols], shift, via);
-            let reached = least(&self.distance);
-            let col = place_of(&self.distance, reached);
+            let Self { distance, previous, col_price, .. } = self;
+            let costs = &cost[row as usize * cols..][..cols];
+            relax(costs, col_price, shift, u64::from(via), distance, previous);
+            let (col, reached) = least(distance);
             if self.row_of[col] == NONE {
                 break (col as u32, reached);
             }
@@ -250,18 +336,6 @@ impl Solver {
         };
         self.adjust(start, reached);
         self.flip(start, end);
-    }
-
-    /// Shortens the distances by the columns that are reached over the column `via`.
-    fn relax(&mut self, costs: &[f64], shift: f64, via: u32) {
-        let columns = self.distance.iter_mut().zip(&mut self.previous);
-        for ((distance, previous), (cost, price)) in columns.zip(costs.iter().zip(&self.col_price))
-        {
-            let through = cost - price + shift;
-            let is_shorter = through < *distance;
-            *distance = if is_shorter { through } else { *distance };
-            *previous = if is_shorter { via } else { *previous };
-        }
     }
 
     fn adjust(&mut self, start: u32, reached: f64) {
@@ -276,7 +350,7 @@ impl Solver {
 
     fn flip(&mut self, start: u32, end: u32) {
         let mut col = end as usize;
-        while self.previous[col] != NONE {
+        while self.previous[col] != u64::from(NONE) {
             let before = self.previous[col] as usize;
             self.row_of[col] = self.row_of[before];
             col = before;
@@ -285,24 +359,56 @@ impl Solver {
     }
 }
 
-/// Returns the least value; NaN counts as none.
-fn least(values: &[f64]) -> f64 {
-    // Several minima at once, because a single one is a chain of dependent comparisons.
-    let smaller = |a: f64, b: f64| if b < a { b } else { a };
-    let chunks = values.chunks_exact(8);
-    let rest = chunks.remainder().iter().fold(f64::INFINITY, |a, b| smaller(a, *b));
-    let mut lanes = [f64::INFINITY; 8];
-    for chunk in chunks {
-        for (lane, value) in lanes.iter_mut().zip(chunk) {
-            *lane = smaller(*lane, *value);
-        }
+/// Computes the costs of a row less the prices of the columns.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn reduced(costs: &[f64], prices: &[f64], out: &mut [f64]) {
+    for ((out, cost), price) in out.iter_mut().zip(costs).zip(prices) {
+        *out = cost - price;
     }
-    lanes.into_iter().fold(rest, smaller)
 }
 
-/// Returns the first place of a value.
-fn place_of(values: &[f64], value: f64) -> usize {
-    values.iter().position(|other| *other == value).unwrap_or_default()
+/// Shortens the distances by the columns that are reached over the column `via`.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn relax(
+    costs: &[f64],
+    prices: &[f64],
+    shift: f64,
+    via: u64,
+    distances: &mut [f64],
+    previous: &mut [u64],
+) {
+    let columns = distances.iter_mut().zip(previous);
+    for ((distance, previous), (cost, price)) in columns.zip(costs.iter().zip(prices)) {
+        let through = cost - price + shift;
+        let is_shorter = through < *distance;
+        *distance = if is_shorter { through } else { *distance };
+        *previous = if is_shorter { via } else { *previous };
+    }
+}
+
+/// Returns the least value with its first place; NaN counts as none.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn least(values: &[f64]) -> (usize, f64) {
+    // Several minima at once, because a single one is a chain of dependent comparisons.
+    const LANES: usize = 16;
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    let mut lanes = [f64::INFINITY; LANES];
+    for chunk in chunks {
+        for (lane, value) in lanes.iter_mut().zip(chunk) {
+            *lane = if *value < *lane { *value } else { *lane };
+        }
+    }
+    let all = lanes.iter().chain(rest);
+    let least = all.fold(f64::INFINITY, |least, value| if *value < least { *value } else { least });
+    let mut chunk = 0;
+    while chunk < chunks.len()
+        && chunks[chunk].iter().fold(0, |n, v| n | u8::from(*v == least)) == 0
+    {
+        chunk = chunk.wrapping_add(1);
+    }
+    let from = chunk.wrapping_mul(LANES);
+    let place = values[from..].iter().position(|value| *value == least).unwrap_or_default();
+    (from.wrapping_add(place), least)
 }
 
 fn reset<T: Clone>(list: &mut Vec<T>, len: usize, value: T) {

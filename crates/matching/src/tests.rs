@@ -54,6 +54,37 @@ proptest! {
         prop_assert!((total(&edges, &matched) - best).abs() < 1e-9, "{best}");
     }
 
+    #[test]
+    fn no_matching_of_a_matrix_weighs_more((rows, cols, edges) in problem()) {
+        let weights: Vec<f64> = edges.iter().map(|edge| edge.weight).collect();
+        let found = Matcher::new().best_of_matrix(rows as usize, cols as usize, &weights);
+        let pairs = found.iter().enumerate().filter_map(|(row, col)| Some((row, (*col)?)));
+        let matched: Vec<u32> = pairs.map(|(row, col)| (row * cols as usize + col) as u32).collect();
+        let best = best_total(0, rows, &edges, &mut Vec::new());
+        prop_assert!((total(&edges, &matched) - best).abs() < 1e-9, "{best}");
+    }
+
+    #[test]
+    fn a_matrix_is_matched_as_well_by_its_groups_as_at_once(
+        rows in 20usize..40, cols in 20usize..40, few in 1u64..40, seed in 0u64..1000,
+    ) {
+        let weight = |i: usize| {
+            let mixed = (i as u64 + seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
+            if mixed % few == 0 { (mixed % 1009) as f64 + 1.0 } else { 0.0 }
+        };
+        let weights: Vec<f64> = (0..rows * cols).map(weight).collect();
+        let (mut groups, mut whole) = (vec![None; rows], vec![None; rows]);
+        let mut matcher = Matcher::new();
+        matcher.match_groups(rows, cols, &weights, &mut groups);
+        matcher.match_all(rows, cols, &weights, &mut whole);
+        let sum = |of: &[Option<usize>]| -> f64 {
+            of.iter().enumerate().filter_map(|(row, col)| Some(weights[row * cols + (*col)?])).sum()
+        };
+        prop_assert_eq!(sum(&groups), sum(&whole));
+        let auto = matcher.best_of_matrix(rows, cols, &weights);
+        prop_assert_eq!(sum(&auto), sum(&whole));
+    }
+
     /// Prices prove it: with all reduced costs at least 0, those of the pairs 0 and free columns
     /// without a price, no other assignment costs less.
     #[test]
@@ -86,5 +117,8 @@ proptest! {
 fn the_least_of_many_is_found_beside_nan() {
     let mut values: Vec<f64> = (0..21).map(|i| f64::from((i * 7) % 21) + 3.0).collect();
     values[0] = f64::NAN;
-    assert_eq!((least(&values), place_of(&values, least(&values))), (3.0, 3));
+    assert_eq!(least(&values), (3, 3.0));
+    values[3] = f64::NAN;
+    assert_eq!(least(&values), (6, 3.0));
+    assert_eq!(least(&[5.0; 40]), (0, 5.0));
 }

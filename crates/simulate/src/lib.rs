@@ -7,7 +7,10 @@ pub mod sample;
 pub mod scenes;
 
 use std::io::ErrorKind;
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::thread;
 
 use clap::Args;
 use indicatif::ProgressBar;
@@ -147,18 +150,33 @@ pub fn record(
 ) -> Result<u64, WriteError> {
     let mut recorder = Recorder::create(path, scene, &simulation)?;
     let bar = ProgressBar::new((scene.duration_s * 10.0) as u64);
-    let mut images = 0;
-    while let Some(event) = simulation.next_event().filter(|_| goes_on()) {
-        if let Event::Shot(shot) = &event {
-            images += 1;
-            bar.set_position(shot.captured_ns / 100_000_000);
+    let (events, recorded) = mpsc::sync_channel(EVENTS_AHEAD);
+    thread::scope(|scope| {
+        // Images are encoded while the next ones are rendered.
+        let writing = scope.spawn(move || {
+            recorded.into_iter().try_for_each(|event| recorder.write(&event))?;
+            recorder.finish()
+        });
+        let mut images = 0;
+        while let Some(event) = simulation.next_event().filter(|_| goes_on()) {
+            if let Event::Shot(shot) = &event {
+                images += 1;
+                bar.set_position(shot.captured_ns / 100_000_000);
+            }
+            // The writer has gone if it failed; its error is the answer.
+            if events.send(event).is_err() {
+                break;
+            }
         }
-        recorder.write(&event)?;
-    }
-    bar.finish_and_clear();
-    recorder.finish()?;
-    Ok(images)
+        drop(events);
+        bar.finish_and_clear();
+        writing.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+        Ok(images)
+    })
 }
+
+/// Events that may wait to be written: a few images, so that neither side waits long for the other.
+const EVENTS_AHEAD: usize = 16;
 
 #[cfg(test)]
 mod tests {

@@ -131,7 +131,8 @@ fn shown(
     let in_front: Vec<&Occluder> =
         occluders.iter().filter(|c| is_nearer(c) && may_hide(&c.region, region, camera)).collect();
     let image = Rect::new(0.0, 0.0, camera.width as f64, camera.height as f64);
-    // Most people are wholly in the image with nobody before them; their samples need no look.
+    // Most people are wholly in the image without another person before them; then no sample needs
+    // a look.
     if in_front.is_empty() && is_within(region, &image) && is_plain(region) {
         return Shown { all: *ON_BODY, inside: *ON_BODY, visible: *ON_BODY };
     }

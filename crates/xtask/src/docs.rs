@@ -1,6 +1,7 @@
 //! Parts of the documents that a command prints.
 //!
-//! Between `<!-- begin: tagalong ... -->` and `<!-- end -->` stands the output of that command.
+//! Between `<!-- begin: tagalong ... -->` and `<!-- end -->` stands the output of that command, and
+//! likewise that of `cargo xtask faults`.
 //! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
 //! become stale. Slow parts, the tables of `reproduce`, `follow` and `bench`, are filled only on
 //! request.
@@ -10,6 +11,7 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
 
+use crate::faults;
 use crate::workspace::{Workspace, output};
 
 const BEGIN: &str = "<!-- begin: ";
@@ -95,8 +97,12 @@ fn filled(
     Ok(out + rest)
 }
 
-/// Returns the output of the command, with the program of this workspace.
+/// Returns the output of the command, with the program of this workspace; the table of faults is
+/// this program's own.
 fn printed(workspace: &Workspace, command: &str) -> Result<String> {
+    if let Some(rows) = command.strip_prefix(faults::COMMAND) {
+        return faults::markdown(workspace, &rows.split_whitespace().collect::<Vec<_>>());
+    }
     let mut words = command.split_whitespace();
     if words.next() != Some("tagalong") {
         bail!("`{command}` is no command of tagalong");

@@ -2,17 +2,20 @@
 
 mod ci;
 mod docs;
+mod faults;
 mod markdown;
 mod metadata;
 mod new_plugin;
 mod program;
 mod record;
 mod rehearse;
+mod sbom;
 mod tidy;
 mod try_out;
 mod walk_through;
 mod workspace;
 
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -43,6 +46,11 @@ enum Command {
         #[arg(long, value_name = "PART")]
         slow: Option<String>,
     },
+    /// Prints the table of faults with the tests that cover them
+    Faults {
+        /// Only rows whose names begin with one of these, for example `T`.
+        rows: Vec<String>,
+    },
     /// Runs the command lines of the documents that take no more than seconds
     Rehearse,
     /// Runs every config on every log and writes checksums of the results, to be compared with
@@ -53,6 +61,17 @@ enum Command {
         /// A built program to record, instead of this workspace's.
         #[arg(long)]
         program: Option<PathBuf>,
+    },
+    /// Writes the parts list (SBOM) of a program, CycloneDX in JSON
+    Sbom {
+        /// The file to write.
+        file: PathBuf,
+        /// Folder of the workspace, for example `bridges/python`.
+        #[arg(long, default_value = ".")]
+        folder: PathBuf,
+        /// The package whose parts are listed.
+        #[arg(long, default_value = "tagalong-cli")]
+        package: String,
     },
     /// Runs everything that the server runs (`.ci/run`)
     Ci,
@@ -92,9 +111,17 @@ fn run(command: Command) -> Result<()> {
         }
         Command::NewPlugin(_) => try_out::try_out(&workspace),
         Command::Docs { slow } => docs::fill(&workspace, slow.as_deref()),
+        Command::Faults { rows } => {
+            let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+            std::io::stdout().write_all(faults::markdown(&workspace, &rows)?.as_bytes())?;
+            Ok(())
+        }
         Command::Tidy => tidy::tidy(&workspace),
         Command::Record { file, program } => record::record(&workspace, &file, program),
         Command::Rehearse => rehearse::rehearse(&workspace),
+        Command::Sbom { file, folder, package } => {
+            workspace.write(file, &sbom::sbom(&workspace, &folder, &package)?)
+        }
         Command::Ci => ci::ci(&workspace),
     }
 }

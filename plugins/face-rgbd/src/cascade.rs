@@ -142,6 +142,9 @@ impl Cascade {
             return Err(format!("its feature {bad} does not lie in the window"));
         }
         let trees = self.stages.iter().flat_map(|stage| &stage.trees);
+        if trees.clone().any(Vec::is_empty) {
+            return Err("one of its trees is empty".into());
+        }
         match trees.flat_map(|tree| tree.iter().enumerate().map(move |n| (n, tree.len()))).find(
             |((at, node), nodes)| {
                 let ends = |next: &Next| match next {

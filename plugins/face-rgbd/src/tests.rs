@@ -289,6 +289,14 @@ fn broken_files_are_refused() {
     assert!(Cascade::from_xml("<a/>").is_err() && Cascade::from_xml("nonsense").is_err());
 }
 
+/// The compiled form would ask the first node of each tree.
+#[test]
+fn a_tree_without_nodes_is_refused() {
+    let mut cascade = tilted();
+    cascade.stages[0].trees.push(Vec::new());
+    assert_eq!(cascade.check().unwrap_err(), "one of its trees is empty");
+}
+
 #[test]
 fn like_windows_are_one_face_and_single_ones_none() {
     let hit = |x: f64, y: f64, side: f64| Hit { region: Rect::new(x, y, side, side), margin: 0.5 };

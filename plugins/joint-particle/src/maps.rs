@@ -38,6 +38,85 @@ pub fn parzen(
     places.iter().zip(likelihoods).map(|(place, l)| l * kernel.at(place, at)).sum()
 }
 
+/// Places side by side: two vectors of AVX-512, four of AVX2.
+const LANES: usize = 16;
+
+/// Returns [`parzen`] at many places. The exponential function is that of [`exp`], without which
+/// the compiler makes no vector instructions; the sums differ by less than 1e-14 of the sum of the
+/// kernels, and are the same on all processors.
+fn parzen_at_all(
+    places: &[PositionPair],
+    likelihoods: &[f64],
+    kernel: Kernel,
+    at: &[PositionPair],
+) -> Vec<f64> {
+    let mut sums = vec![0.0; at.len()];
+    for (at, sums) in at.chunks(LANES).zip(sums.chunks_mut(LANES)) {
+        let lanes = |axis: usize| std::array::from_fn(|i| at[i.min(at.len() - 1)][axis]);
+        let found = parzen_lanes(places, likelihoods, kernel, &[lanes(0), lanes(1)]);
+        sums.copy_from_slice(&found[..sums.len()]);
+    }
+    sums
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn parzen_lanes(
+    places: &[PositionPair],
+    likelihoods: &[f64],
+    kernel: Kernel,
+    at: &[[f64; LANES]; 2],
+) -> [f64; LANES] {
+    let per_width = [1.0 / kernel.0[0], 1.0 / kernel.0[1]];
+    let mut sums = [0.0; LANES];
+    for (place, likelihood) in places.iter().zip(likelihoods) {
+        for lane in 0..LANES {
+            let near = (place[0] - at[0][lane]) * per_width[0];
+            let far = (place[1] - at[1][lane]) * per_width[1];
+            sums[lane] += likelihood * exp(-0.5 * (near * near + far * far));
+        }
+    }
+    sums
+}
+
+/// Returns the exponential of a number that is not positive, to 1e-15 of it: 2^k times a Taylor
+/// series of the rest. Without branches and without fused arithmetic, so that loops over it become
+/// vector instructions with the same bits on every processor.
+#[inline(always)]
+fn exp(x: f64) -> f64 {
+    // Adding this number leaves no digits behind the point, and the whole number in the low bits.
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    // ln 2 in two parts, the first of few digits, so that its products are exact.
+    const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
+    // 1e-300 is nothing beside other kernels, and less has no exponent of its own.
+    let x = if x < -690.0 { -690.0 } else { x };
+    let shifted = x * std::f64::consts::LOG2_E + WHOLE;
+    let whole = shifted - WHOLE;
+    let rest = x - whole * LN_2[0] - whole * LN_2[1];
+    let mut series = 1.0;
+    // 13 terms: 0.35^14 / 14! is below the last digit.
+    for of in PER_TERM {
+        series = 1.0 + rest * of * series;
+    }
+    series * f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52)
+}
+
+/// One by the number of each term of the series, the last one first.
+const PER_TERM: [f64; 13] = [
+    1.0 / 13.0,
+    1.0 / 12.0,
+    1.0 / 11.0,
+    1.0 / 10.0,
+    1.0 / 9.0,
+    1.0 / 8.0,
+    1.0 / 7.0,
+    1.0 / 6.0,
+    1.0 / 5.0,
+    1.0 / 4.0,
+    1.0 / 3.0,
+    1.0 / 2.0,
+    1.0,
+];
+
 /// Interpolation by a Gaussian process with the same kernels. A sum of kernels is higher where more
 /// places were compared; this is not.
 #[derive(Clone, Debug)]
@@ -68,6 +147,13 @@ impl Gp {
     /// Returns the likelihood at a place; never negative.
     pub fn at(&self, at: &PositionPair) -> f64 {
         parzen(&self.places, self.coefficients.as_slice(), self.kernel, at).max(0.0)
+    }
+
+    /// Returns the likelihoods at many places; never negative.
+    fn at_all(&self, at: &[PositionPair]) -> Vec<f64> {
+        let mut all = parzen_at_all(&self.places, self.coefficients.as_slice(), self.kernel, at);
+        all.iter_mut().for_each(|likelihood| *likelihood = likelihood.max(0.0));
+        all
     }
 }
 
@@ -105,6 +191,15 @@ impl LikelihoodMap {
             Self::Table(grid, known) => grid.look_up(known, at),
             Self::Kernels(places, known, kernel) => parzen(places, known, *kernel, at),
             Self::Gp(gp) => gp.at(at),
+        }
+    }
+
+    /// Returns the likelihoods at many places, as [`LikelihoodMap::at`] does at each, but faster.
+    pub fn at_all(&self, at: &[PositionPair]) -> Vec<f64> {
+        match self {
+            Self::Table(..) => at.iter().map(|at| self.at(at)).collect(),
+            Self::Kernels(places, known, kernel) => parzen_at_all(places, known, *kernel, at),
+            Self::Gp(gp) => gp.at_all(at),
         }
     }
 }
@@ -156,6 +251,8 @@ const MAX_HALF: usize = 100;
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::random::Random;
 
@@ -170,6 +267,39 @@ mod tests {
         let mut random = Random::new(seed, 0);
         let mut draw = |centre: f64, spread: f64| centre + spread * random.normal();
         (0..count).map(|_| [draw(0.03, 0.08), draw(0.2, 0.25)]).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn many_places_are_looked_up_as_one_by_one(
+            count in 0usize..60, at in 1usize..40, seed in 0u64..1000, method in 0usize..3,
+        ) {
+            let method = [Method::Kde, Method::Gp, Method::Table][method];
+            let config = Config::default();
+            let places = sampled(count, seed);
+            let known: Vec<f64> = places.iter().map(ridge).collect();
+            let known = if method == Method::Table { vec![0.5; 1281] } else { known };
+            let map = LikelihoodMap::new(method, places, known, &config);
+            let at = sampled(at, seed + 1);
+            let weight = match &map {
+                LikelihoodMap::Gp(gp) => gp.coefficients.abs().sum(),
+                _ => count as f64,
+            };
+            for (at, fast) in at.iter().zip(map.at_all(&at)) {
+                prop_assert!((fast - map.at(at)).abs() <= 1e-14 * weight, "{} {}", fast, map.at(at));
+            }
+        }
+
+        #[test]
+        fn the_exponential_is_right_to_the_last_digits(x in -680.0..=0.0f64) {
+            prop_assert!((exp(x) / x.exp() - 1.0).abs() < 1e-15 * 2.0, "{}", x);
+        }
+    }
+
+    #[test]
+    fn the_exponential_ends_at_one_and_at_nothing() {
+        assert_eq!((exp(0.0), exp(-0.0)), (1.0, 1.0));
+        assert!(exp(-1e300) < 1e-299 && exp(f64::NEG_INFINITY) >= 0.0 && exp(f64::NAN).is_nan());
     }
 
     fn correlation(a: &[f64], b: &[f64]) -> f64 {

@@ -36,9 +36,23 @@ impl Transition {
     /// Predicts a particle; the noise becomes variance.
     pub(crate) fn apply(&self, particle: &mut Particle) {
         particle.mean = self.f * (particle.mean + self.shift);
-        particle.covariance = self.f * particle.covariance * self.f.transpose()
-            + self.noise
-            + ego_noise(&particle.mean, &self.motion);
+        let turned = self.times(&self.times(&particle.covariance).transpose()).transpose();
+        particle.covariance = turned + self.noise + ego_noise(&particle.mean, &self.motion);
+    }
+
+    /// Returns F times a matrix without the products with the zeros of F, which are half of them:
+    /// places and velocities turn, places move by velocities, and the height stays.
+    fn times(&self, matrix: &Matrix5<f64>) -> Matrix5<f64> {
+        let (f, mut product) = (&self.f, *matrix);
+        for (from, mut to) in matrix.column_iter().zip(product.column_iter_mut()) {
+            for i in 0..2 {
+                to[i] = f[(i, 0)] * from[0] + f[(i, 1)] * from[1];
+                to[i] += f[(i, 3)] * from[3];
+                to[i] += f[(i, 4)] * from[4];
+                to[i + 3] = f[(i + 3, 3)] * from[3] + f[(i + 3, 4)] * from[4];
+            }
+        }
+        product
     }
 }
 
@@ -202,6 +216,20 @@ mod tests {
             let scale = whole.covariance.trace();
             prop_assert!((mean - whole.mean).norm() < 0.1 * scale.sqrt());
             prop_assert!((spread - whole.covariance).norm() < 0.12 * scale);
+        }
+
+        #[test]
+        fn a_covariance_is_predicted_by_the_whole_product(
+            entries in prop::array::uniform25(-0.2..0.2f64), turn in -1.0..1.0f64, dt in 0.01..1.0f64,
+        ) {
+            let motion = EgoMotion { forward: 0.3, left: 0.1, turn, ..EgoMotion::at_rest(dt) };
+            let transition = Transition::new(&motion, &Config::default());
+            let mut particle = gaussian(entries);
+            let f = &transition.f;
+            let whole = f * particle.covariance * f.transpose() + transition.noise;
+            transition.apply(&mut particle);
+            let expected = whole + ego_noise(&particle.mean, &motion);
+            prop_assert_eq!(particle.covariance, expected);
         }
 
         #[test]

@@ -262,7 +262,7 @@ fn mapped(group: &mut Group, look: &mut WeighingInput<'_>) -> Result<()> {
     let lateral = Lateral::new(group, look);
     let all = lateral.places(group);
     let map = lateral.map(group, look, look.config.method, &chosen(&all, &before, look.config))?;
-    group.likelihoods = all.iter().map(|at| map.at(at)).collect();
+    group.likelihoods = map.at_all(&all);
     let weights = group.weights.iter().zip(&group.likelihoods);
     group.weights = weights.map(|(weight, likelihood)| weight * likelihood).collect();
     normalise(&mut group.weights);

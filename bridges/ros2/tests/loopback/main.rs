@@ -13,7 +13,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use peers::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,7 +21,7 @@ use tagalong_core::{Controller, Twist};
 use tagalong_log::msgs::{
     Detection3DArray, Header, Message, Odometry, PoseStamped, StringMsg, TwistStamped,
 };
-use tagalong_ros2::Options;
+use tagalong_ros2::{Options, run};
 use tagalong_sim::{Event, Simulation};
 
 #[test]
@@ -38,9 +37,7 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     let (bridge, said) = bridge(domain(0), &stop);
     let hand = Hand::new(domain(0), &stop);
     let hands = thread::spawn(move || {
-        wait_for(&said, "needs a reset");
-        hand.reset();
-        hand.hold(true);
+        hand.let_go(&said);
     });
     let last_image = robot.play(simulation);
     hands.join().unwrap();
@@ -164,9 +161,7 @@ fn odometry_that_stops_while_frames_go_on_stops_the_robot_and_another_calibratio
             !(matches!(event, Event::Odometry(_)) && is_silent.load(Ordering::Relaxed))
         })
     });
-    wait_for(&said, "needs a reset");
-    hand.reset();
-    hand.hold(true);
+    hand.let_go(&said);
     commands.wait_for_move("enabled");
     sleep(Duration::from_millis(500));
 
@@ -240,9 +235,7 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     let hand = Hand::new(domain(5), &stop);
     let junk = robot.peer.publisher_of::<u8>("/odom", Odometry::TYPE, reliable());
     let playing = thread::spawn(move || (robot.play(simulation), robot).1);
-    wait_for(&said, "needs a reset");
-    hand.reset();
-    hand.hold(true);
+    hand.let_go(&said);
     commands.wait_for_move("enabled");
 
     is_stuck.store(true, Ordering::Relaxed);

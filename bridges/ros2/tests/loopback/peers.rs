@@ -18,10 +18,10 @@ use tagalong_config::Registry;
 use tagalong_core::Stamp;
 use tagalong_geometry::{Camera, Lens, Pinhole};
 use tagalong_log::msgs::{
-    CameraInfo, Detection3DArray, Header, Image, Message, Odometry, Pose, PoseStamped, StringMsg,
-    TFMessage, TransformStamped, TwistStamped,
+    CameraInfo, Header, Image, Message, Odometry, Pose, StringMsg, TFMessage, TransformStamped,
+    TwistStamped,
 };
-use tagalong_ros2::{BridgeError, Options, Summary, run, run_with};
+use tagalong_ros2::{BridgeError, Options, Summary, run_with};
 use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Variant};
 
 /// Returns a scene of so many seconds, of a person that stands before the robot and then walks away
@@ -208,6 +208,17 @@ impl Hand {
 
     pub(crate) fn reset(&self) {
         self.reset.publish(Empty { byte: 0 }).unwrap();
+    }
+
+    /// Resets, again until the bridge has said so (the first message may come before the two know each
+    /// other), and holds the switch.
+    pub(crate) fn let_go(&self, said: &Said) {
+        wait_for(said, "needs a reset");
+        while !said.lock().unwrap().iter().any(|line| line == "reset") {
+            self.reset();
+            sleep(Duration::from_millis(200));
+        }
+        self.hold(true);
     }
 
     pub(crate) fn switch_off(&self) {

@@ -42,7 +42,7 @@ struct SpeedLimit {
 
 fn client<Q, A>(peer: &mut Peer, service: &str, package: &str, kind: &str) -> Client<Q, A>
 where
-    Q: Message + 'static,
+    Q: Message + Clone + 'static,
     A: Message + Clone + 'static,
 {
     let (kind, mapping) = (ServiceTypeName::new(package, kind), ServiceMapping::Enhanced);
@@ -139,9 +139,7 @@ fn a_person_is_enrolled_and_cleared_by_services_and_over_http() {
     let limits = "nav2_msgs/msg/SpeedLimit";
     let limit = caller.publisher_of::<SpeedLimit>("/speed_limit", limits, reliable());
     let playing = thread::spawn(move || (robot.play(simulation), robot).1);
-    wait_for(&said, "needs a reset");
-    hand.reset();
-    hand.hold(true);
+    hand.let_go(&said);
     commands.wait_for_move("the nearest person is followed by the config");
     assert_eq!(http(&address, "GET", "healthz", "").0, 200);
 

@@ -72,6 +72,40 @@ impl From<SimilarityChoice> for Similarity {
 /// # Errors
 /// Files that cannot be read or do not fit together.
 pub fn eval(args: &EvalArgs) -> Outcome {
+    let scored = scored(args)?;
+    print(&match args.format {
+        Format::Json => scored.json()?,
+        Format::Text => as_text(&scored.said())?,
+    })?;
+    Ok(Ended::Well)
+}
+
+/// Returns what `tagalong eval --format json` prints.
+///
+/// # Errors
+/// As for the command: files that cannot be read or do not fit together.
+pub fn eval_json(args: &EvalArgs) -> Result<String, Failure> {
+    scored(args)?.json()
+}
+
+/// Figures of a report, with the rules and the notes.
+struct Scored {
+    scores: Scores,
+    rules: Option<&'static str>,
+    notes: Vec<String>,
+}
+
+impl Scored {
+    fn said(&self) -> Said<'_> {
+        Said { scores: &self.scores, rules: self.rules, notes: &self.notes }
+    }
+
+    fn json(&self) -> Result<String, Failure> {
+        to_json("the scores", &self.said())
+    }
+}
+
+fn scored(args: &EvalArgs) -> Result<Scored, Failure> {
     let Judged { sequence, truth, mut notes } = judged(args)?;
     let similarity = args.similarity.into();
     let Some(sequence) = comparable(&sequence, similarity) else {
@@ -82,12 +116,7 @@ pub fn eval(args: &EvalArgs) -> Outcome {
     if scores.has_constant_scores() {
         notes.push(format!("{}: {CONSTANT_SCORES}", args.tracks.display()));
     }
-    let said = Said { scores: &scores, rules: rules(&truth), notes: &notes };
-    print(&match args.format {
-        Format::Json => to_json("the scores", &said)?,
-        Format::Text => as_text(&said)?,
-    })?;
-    Ok(Ended::Well)
+    Ok(Scored { rules: rules(&truth), scores, notes })
 }
 
 /// Note on tracks for which LAMR and AP are meaningless.

@@ -11,7 +11,7 @@ mod shell;
 
 pub use check::check;
 pub use config::{config, schema};
-pub use eval::{EvalArgs, eval};
+pub use eval::{EvalArgs, SimilarityChoice, eval, eval_json};
 pub use inspect::inspect;
 pub use list::list;
 pub use model::{ModelArgs, model};

@@ -24,7 +24,7 @@ use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, say};
 use tagalong_app::progress::Progress;
 use tagalong_app::remedies;
 use tagalong_app::serialize::to_json;
@@ -34,18 +34,31 @@ use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
 use tagalong_live::Live;
-use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog, WriteError};
+use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input};
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
 
-/// Runs a pipeline over a log.
+/// Runs a pipeline over a log, until a signal comes.
 ///
 /// # Errors
 /// A config, log or output directory that cannot be used; a plugin that fails on a frame; a disk
 /// that fails.
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
+    run_until(args, registry, Signals::listen)
+}
+
+/// Runs a pipeline over a log, for a program with signals of its own: `listen` is called once the
+/// log has been looked through, before anything is written.
+///
+/// # Errors
+/// As for [`run`].
+pub fn run_until(
+    args: &RunArgs,
+    registry: &Registry,
+    listen: impl FnOnce() -> Result<Signals, Failure>,
+) -> Outcome {
     // A name that is no config must not cost a simulation.
     if let Some(path) = args.config().filter(|_| !args.has_log()) {
         ConfigFile::read(path)?.pipeline(registry, args.seed)?;
@@ -58,7 +71,10 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
         Job::prepare(args, registry)
     })?;
     // Until here nothing is written: a signal ends the program at once, however long the log is.
-    let signals = Signals::listen()?;
+    let signals = listen()?;
+    if let Some(signal) = signals.received() {
+        return Ok(Ended::BySignal(signal));
+    }
     let mut desk = Desk::open(args, &job)?;
     // Reading ahead pays from the second core on, rendering in parallel from the third.
     let threads = threads(args.threads);
@@ -163,11 +179,6 @@ fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
     }
 }
 
-/// Returns the failure of a directory that cannot be made or filled: the user may choose another.
-fn refused(error: WriteError) -> Failure {
-    Failure::usage(error)
-}
-
 /// Begins to serve the page of what happens now, and prints its address.
 fn serve(
     at: SocketAddr,
@@ -217,6 +228,9 @@ fn work(
         desk.tally.read(item.frame.odom_stale);
         if item.frame.odom_jumped {
             pipeline.disarm("odometry jumped");
+        }
+        if item.frame.calibration_changed {
+            pipeline.disarm("the calibration changed");
         }
         let report = match pipeline.step(&item.frame.frame) {
             Ok(report) => report,
@@ -286,9 +300,9 @@ impl Desk {
             target: report.target,
             command: report.command.map(|command| command.wheels),
         };
-        self.log.write(&record).map_err(Failure::failed)?;
+        self.log.write(&record)?;
         let notes = FrameNotes::of(report, &item.frame.frame.camera, &item.frame.odom_from_robot);
-        self.log.write_json(FRAME_NOTES_TOPIC, report.stamp, &notes).map_err(Failure::failed)?;
+        self.log.write_json(FRAME_NOTES_TOPIC, report.stamp, &notes)?;
         self.timings.add("write", ms_since(writing));
         Ok(())
     }
@@ -300,7 +314,7 @@ impl Desk {
         }
         let Some(image) = background(&item.frame.frame.images()) else { return Ok(()) };
         let jpeg = images::jpeg(&image)?;
-        self.log.write_image(report.stamp, &jpeg).map_err(Failure::failed)
+        Ok(self.log.write_image(report.stamp, &jpeg)?)
     }
 
     /// Finishes the files and prints a summary.
@@ -319,14 +333,14 @@ impl Desk {
         // result.
         let is_empty = report.frames.read == 0 && signals.received().is_none();
         if report.frames.processed == 0 && (stopped.is_some() || is_empty) {
-            self.log.discard().map_err(Failure::failed)?;
+            self.log.discard()?;
             return verdict(args, &report, stopped, signals);
         }
         let times = to_json("timings.json", &self.timings.summary())?;
         let json = to_json("report.json", &report)?;
         let origin = to_json("origin.json", &Origin::of(args.log(), args.config()))?;
         let texts = RunTexts { report: &json, timings: &times, origin: &origin };
-        let folder = self.log.finish(about(&report), &texts).map_err(Failure::failed)?;
+        let folder = self.log.finish(about(&report), &texts)?;
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,

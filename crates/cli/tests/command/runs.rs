@@ -138,6 +138,46 @@ fn every_run_gives_the_same_bytes() {
     assert_eq!(picture("b"), picture("e"));
 }
 
+/// The surroundings of a process have no part in its results; without a terminal are all tests.
+#[cfg(unix)]
+#[test]
+fn p10_surroundings_change_no_byte() {
+    let home = Home::new(&Drawn::of(30), "");
+    assert_eq!(code(&home.run("plain", &[])), 0);
+    // The time that files have is the wall clock's. Pinning to one core needs `taskset`.
+    let wrappers = ["umask 077; exec nice -n 19 \"$0\" \"$@\"", "exec \"$0\" \"$@\" < /dev/null"];
+    let settings =
+        [("TZ", "Pacific/Apia"), ("TZ", "UTC"), ("LC_ALL", "de_DE.UTF-8"), ("LANG", "tr_TR")];
+    for (at, (name, value)) in settings.into_iter().enumerate() {
+        let out = format!("changed-{at}");
+        let plain = home.command(&out, &[]);
+        let mut command = Command::new("sh");
+        command.args(["-c", wrappers[at % 2]]).arg(plain.get_program()).args(plain.get_args());
+        command.current_dir(home.folder.path()).env_clear();
+        command.env("PATH", std::env::var_os("PATH").unwrap()).env(name, value);
+        let done = command.output().unwrap();
+        assert!(done.status.success(), "{}", text(&done.stderr));
+        for file in FILES {
+            let read = |out: &str| fs::read(home.path(out).join(file)).unwrap();
+            assert_eq!(read("plain"), read(&out), "{file} with {name}={value}");
+        }
+    }
+}
+
+/// The results tell nothing of the day on which they were made: the clock of a process that runs
+/// later is another one.
+#[test]
+fn p10_the_wall_clock_is_not_in_the_results() {
+    let home = Home::new(&Drawn::of(10), "");
+    assert_eq!(code(&home.run("early", &[])), 0);
+    std::thread::sleep(std::time::Duration::from_millis(1100));
+    assert_eq!(code(&home.run("late", &[])), 0);
+    for file in FILES {
+        let read = |out: &str| fs::read(home.path(out).join(file)).unwrap();
+        assert_eq!(read("early"), read("late"), "{file}");
+    }
+}
+
 #[test]
 fn overlay_draws_every_frame() {
     let home = Home::new(&Drawn::of(12), "");

@@ -382,6 +382,27 @@ fn a_jpeg_of_giant_size_is_refused() {
     assert_eq!(error, ImageError::TooLarge { width: 15_000, height: 15_000 });
 }
 
+/// Returns a progressive JPEG with its first scan repeated until there are `scans` of them.
+fn with_scans(scans: usize) -> Vec<u8> {
+    let is_marker = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0x00 | 0xd0..=0xd7 | 0xff);
+    let starts = |pair: &&[u8]| *pair == [0xff, 0xda];
+    let data = PROGRESSIVE_JPEG;
+    let has = data.windows(2).filter(starts).count();
+    let first = data.windows(2).position(|pair| starts(&pair)).unwrap();
+    let after = first + 2 + data[first + 2..].windows(2).position(is_marker).unwrap();
+    let more = data[first..after].repeat(scans - has);
+    [&data[..after], &more, &data[after..]].concat()
+}
+
+#[test]
+fn a_jpeg_of_too_many_scans_is_refused() {
+    assert!(compressed("jpeg", &with_scans(60)).is_ok());
+    // 64 is the limit; each scan costs the work of a picture.
+    for scans in [66, 10_000] {
+        assert!(compressed("jpeg", &with_scans(scans)).is_err(), "{scans}");
+    }
+}
+
 #[test]
 fn quantised_float_depth_is_inverted() {
     // a / (v - b) with a = 100, b = 2: 52 is 2 m, 102 is 1 m, 0 is none.

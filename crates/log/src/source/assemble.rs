@@ -328,6 +328,7 @@ impl Assembler {
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
             odom_jumped,
+            calibration_changed: intake.has_changed_camera(stamp),
         }
     }
 

@@ -22,6 +22,8 @@ pub(super) struct Intake {
     /// Topic that makes the frames: colour, or depth without it, or laser scans.
     primary: String,
     info: Option<CameraInfo>,
+    /// Time of the first calibration that differs from `info`.
+    changed_at: Option<Stamp>,
     pub(super) frames: Reorder,
     pub(super) depth: Waiting,
     pub(super) right: Waiting,
@@ -41,6 +43,7 @@ impl Intake {
             chosen: chosen.clone(),
             primary: primary.to_owned(),
             info: info.cloned(),
+            changed_at: None,
             frames: Reorder::new(input.reorder_frames),
             depth: Waiting::default(),
             right: Waiting::default(),
@@ -132,9 +135,18 @@ impl Intake {
             first.k != info.k || first.d != info.d || first.p != info.p || first.roi != info.roi
         });
         if changed {
-            tally.count("camera_info_changes");
-            tally.note("the calibration changes within the log; the first one is used throughout");
+            self.changed_at.get_or_insert(info.header.stamp());
+            tally.lose("camera_info_changes", || {
+                "the calibration changes within the log; the first one is used throughout, and \
+                 places after the change are off"
+                    .into()
+            });
         }
+    }
+
+    /// Returns true if the calibration has changed by this time.
+    pub(super) fn has_changed_camera(&self, stamp: Stamp) -> bool {
+        self.changed_at.is_some_and(|at| at <= stamp)
     }
 
     /// Returns the newest image with all its partners, and the number of older ones that were

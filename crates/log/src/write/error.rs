@@ -1,3 +1,4 @@
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Error of writing results.
@@ -51,6 +52,19 @@ impl WriteError {
     /// Returns true if the request is not allowed, as opposed to a disk that failed.
     pub fn is_refusal(&self) -> bool {
         matches!(self, Self::Exists { .. } | Self::NotADirectory { .. } | Self::InputInside { .. })
+    }
+
+    /// Returns true if the disk has no room.
+    pub fn is_disk_full(&self) -> bool {
+        let cause = match self {
+            Self::Io { source, .. } => source,
+            Self::Mcap { source, .. } => match &**source {
+                mcap::McapError::Io(source) => source,
+                _ => return false,
+            },
+            _ => return false,
+        };
+        matches!(cause.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
     }
 
     pub(super) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {

@@ -358,6 +358,28 @@ fn a_bad_calibration_names_topic_and_field() {
 }
 
 #[test]
+fn c1_a_calibration_that_changes_on_the_way_marks_the_frames_after_it() {
+    let mut log = started();
+    let lens = |focal| info_of("colour", &camera(16, 12, focal));
+    for i in 0..10 {
+        let stamp = at(f64::from(i) * 0.1);
+        // The same numbers again are no change.
+        let focal = if i < 6 { 14.0 } else { 20.0 };
+        let header = Header::new(stamp, "colour");
+        log.message(INFO, stamp, &CameraInfo { header, ..lens(focal) });
+        log.colour(stamp);
+    }
+    let (mut source, _saved) = open(log, Inputs::ANY);
+    let found = frames(&mut source);
+    let changed: Vec<u64> =
+        found.iter().filter(|f| f.calibration_changed).map(|f| f.frame.index).collect();
+    assert_eq!(changed, [7, 8, 9, 10]);
+    assert!(found.iter().all(|f| f.frame.camera.focal_px() == 14.0), "the first one is used");
+    assert!(source.data_lost());
+    assert_eq!(count(&source, "camera_info_changes"), 4);
+}
+
+#[test]
 fn the_pose_of_the_camera_can_be_given() {
     let mut log = LogWriter::plain();
     log.info(INFO, "colour", &camera(16, 12, 14.0));

@@ -271,6 +271,14 @@ fn settings_may_be_at_their_bounds_and_not_beyond() {
         ("command_limiter.max_accel_mps2 = 1.1", false),
         ("command_limiter.max_decel_mps2 = 100.0", false),
         ("command_limiter.max_turn_accel_radps2 = 100.0", false),
+        ("command_limiter.max_jerk_mps3 = 50.0", true),
+        ("command_limiter.max_jerk_mps3 = 0.9", false),
+        ("command_limiter.max_turn_jerk_radps3 = 501.0", false),
+        ("robot = { base = 'ackermann', min_turn_radius_m = 0.1 }", true),
+        ("robot = { base = 'ackermann', min_turn_radius_m = 0.0 }", false),
+        ("robot.base = 'tracked'", false),
+        ("target.choose = 'approach'", true),
+        ("target.choose = 'nobody'", false),
         ("command_limiter = { reaction_s = 0.25, valid_s = 0.25 }", true),
         ("command_limiter = { reaction_s = 0.24, valid_s = 0.25 }", false),
         ("command_limiter = { slow_after_s = 0.5, stop_after_s = 0.4 }", false),
@@ -280,8 +288,8 @@ fn settings_may_be_at_their_bounds_and_not_beyond() {
         ("collision_monitor.stop_m = 0.0", false),
         ("collision_monitor.memory_s = 0.0", false),
         ("collision_monitor.half_width_m = 0.16", false),
-        ("collision_monitor.range_m = 1.2", false),
-        ("collision_monitor.range_m = 1.3", true),
+        ("collision_monitor.range_m = 1.34", false),
+        ("collision_monitor.range_m = 1.35", true),
         ("collision_monitor.obstacles = 'none'", true),
         ("collision_monitor.obstacles = 'off'", false),
         ("robot.odometry = 'none'", true),
@@ -355,11 +363,11 @@ fn a_robot_that_cannot_stop_before_the_person_is_refused() {
         let config = format!("config = {{ how = 'keeps {keeps_m}' }}");
         build(&format!("{PLAIN}[controller]\nplugin = 'drive'\n{config}\n")).map(|_| ())
     };
-    // 0.45 m of reaction, 0.405 m of braking and a margin of 0.3 m.
-    assert_eq!(with(1.16), Ok(()));
-    let refused = with(1.15).unwrap_err();
+    // 0.45 m of reaction, 0.495 m of braking within the limit of the jerk and a margin of 0.3 m.
+    assert_eq!(with(1.25), Ok(()));
+    let refused = with(1.24).unwrap_err();
     for words in
-        ["0.9 m/s needs 1.16 m to stop", "follows at 1.15 m", "plugin = 'drive'", "^^^^^^^"]
+        ["0.9 m/s needs 1.25 m to stop", "follows at 1.24 m", "plugin = 'drive'", "^^^^^^^"]
     {
         assert!(refused.contains(words), "{refused}");
     }

@@ -50,7 +50,7 @@ fn ahead_m() -> f64 {
 fn a_robot_that_waits_for_an_enrollment_follows_the_person_of_it() {
     let mut ride = ride("choose = 'none'");
     let status = ride.go_on(10);
-    assert_eq!((status.state, status.follows, status.command), ("initial", false, "no target"));
+    assert_eq!((status.state, status.follows, status.command), ("initial", false, "no-target"));
     assert_eq!(status.people.len(), 2);
     assert!(status.people[0].bearing_deg > 30.0 && status.people[0].distance_m < 1.6);
     let ahead = status.people[1].clone();
@@ -88,13 +88,13 @@ fn a_refused_enrollment_gives_its_reason_and_changes_nothing() {
 fn clear_slows_the_robot_down_and_no_person_is_followed_after_it() {
     let mut ride = ride("");
     let status = ride.go_on(15);
-    assert_eq!((status.follows, status.command), (true, "follow"));
+    assert_eq!((status.follows, status.command), (true, "limited"), "it wishes for 2 and 4 m/s");
     ride.pipeline.clear();
     let status = ride.go_on(1);
     assert_eq!((status.state, status.reason), (LockState::Initial.name(), "cleared"));
     assert_eq!(status.command, Reason::Stopping.name(), "no emergency");
     let status = ride.go_on(30);
-    assert_eq!((status.command, status.track), ("no target", None));
+    assert_eq!((status.command, status.track), ("no-target", None));
     ride.enroll(Choice::Nearest).unwrap();
     assert!(ride.go_on(2).follows);
 }

@@ -23,6 +23,7 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     complaints.extend(licences::check(workspace, &metadata)?);
     complaints.extend(files::check(workspace)?);
     complaints.extend(words::check(workspace)?);
+    complaints.extend(crate::faults::check(workspace)?);
     let documents = markdown::documents(workspace)?;
     complaints.extend(paths::check(workspace, &documents));
     complaints.extend(commands::check(workspace, &metadata, &documents)?);

@@ -1,0 +1,169 @@
+"""Prints the times of our kernels beside those of other programs for the same work, one thread.
+
+Usage: python benches/peers/kernels.py   (benches/peers/run.sh installs all that it needs)
+
+Ours and theirs take turns. In each round the fastest call of each counts, because other
+programs on the machine only ever make one longer; the ratio is the median over the rounds of
+the other's time by ours, so above 1 ours is faster. The answers are compared, too: a sum of
+costs that differs from that of scipy ends the script.
+"""
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+import cv2
+import lap
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+ROUNDS = 7
+SIZES = (5, 20, 100, 500)
+PAIR_SIZE, DISPARITIES = (512, 384), 64
+
+
+def built(package, example):
+    command = ["cargo", "build", "-q", "--release", "-p", package, "--example", example]
+    subprocess.run(command, check=True)
+    folder = os.environ.get("CARGO_TARGET_DIR", "target")
+    return os.path.join(folder, "release", "examples", example)
+
+
+def lines(*command):
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return [line.split() for line in done.stdout.splitlines()]
+
+
+def fastest(call, calls):
+    def once():
+        start = time.perf_counter()
+        call()
+        return time.perf_counter() - start
+
+    return min(once() for _ in range(calls))
+
+
+def mixed(count):
+    """The numbers of `time_assignment`, to the last bit."""
+    with np.errstate(over="ignore"):
+        i = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+        i = (i ^ i >> np.uint64(29)) * np.uint64(0xBF58476D1CE4E5B9)
+    return (i >> np.uint64(11)).astype(np.float64) / 2.0**53
+
+
+class Assignment:
+    """Tracks to as many detections, every pair allowed."""
+
+    def __init__(self):
+        self.program = built("tagalong-assignment", "time_assignment")
+        self.costs = {n: mixed(n * n).reshape(n, n) for n in SIZES}
+
+    def ours(self):
+        times = {}
+        for size, us, total in lines(self.program, *map(str, SIZES)):
+            costs = self.costs[int(size)]
+            best = costs[linear_sum_assignment(costs)].sum()
+            if abs(best - float(total)) > 1e-6:
+                sys.exit(f"assignment of {size}: {total} instead of {best}")
+            times[f"assignment, n = {size}"] = float(us) * 1e-6
+        return times
+
+    def theirs(self):
+        for n, costs in self.costs.items():
+            calls = max(10, min(5000, 2_000_000 // n**2))
+            job = f"assignment, n = {n}"
+            yield job, "scipy", fastest(lambda: linear_sum_assignment(costs), calls)
+            yield job, "lap", fastest(lambda: lap.lapjv(costs), calls)
+
+
+class Images:
+    """Images as logs have them: depth in a PNG of 16 bits, colour in a JPEG."""
+
+    def __init__(self, folder):
+        self.program = built("tagalong-log", "time_images")
+        y, x = np.mgrid[:480, :640].astype(np.float64)
+        noise = np.random.default_rng(1).normal(size=(480, 640))
+        # A floor, a wall and a person, in the steps of structured light.
+        depth = np.minimum(4000.0, 90000.0 / np.maximum(y - 200.0, 1.0))
+        depth[(abs(x - 300) < 60) & (y > 120)] = 2000.0
+        steps = np.maximum(1.0, np.round(348000.0 / depth + noise / 6.0))
+        self.paths = [os.path.join(folder, name) for name in ("depth.png", "colour.jpg")]
+        cv2.imwrite(self.paths[0], (348000.0 / steps).astype(np.uint16))
+        wave = 110 + 60 * np.sin(x / 23) * np.cos(y / 17) + 4 * noise
+        colour = np.stack([wave, np.roll(wave, 40, 1), 255 - wave], 2)
+        cv2.imwrite(self.paths[1], colour.clip(0, 255).astype(np.uint8))
+        self.data = [np.fromfile(path, np.uint8) for path in self.paths]
+        self.jobs = ("PNG of 16 bits to metres, 640x480", "JPEG, 640x480")
+
+    def ours(self):
+        return {job: float(ms) * 1e-3 for job, (ms,) in zip(self.jobs, lines(self.program, *self.paths))}
+
+    def theirs(self):
+        png, jpeg = self.data
+
+        def depth():
+            return cv2.imdecode(png, cv2.IMREAD_UNCHANGED).astype(np.float32) * np.float32(1e-3)
+
+        yield self.jobs[0], "OpenCV", fastest(depth, 30)
+        yield self.jobs[1], "OpenCV", fastest(lambda: cv2.imdecode(jpeg, cv2.IMREAD_COLOR), 30)
+
+
+class Stereo:
+    """A wall and a box before it; ours does all its tests, theirs what its name says."""
+
+    JOBS = {"block": "block matching", "semi-global": "semi-global matching"}
+
+    def __init__(self, folder):
+        self.program = built("tagalong-stereo", "time_pair")
+        width, height = PAIR_SIZE
+        noise = np.random.default_rng(2).integers(0, 256, (height, width + 64)).astype(np.float32)
+        texture = cv2.GaussianBlur(noise, (3, 3), 0)
+        left, right = texture[:, :width].copy(), texture[:, 8 : 8 + width].copy()
+        right[100:, 150:300] = left[100:, 180:330]
+        self.pair = [image.astype(np.uint8) for image in (left, right)]
+        self.paths = [os.path.join(folder, name) for name in ("left.png", "right.png")]
+        for path, image in zip(self.paths, self.pair):
+            cv2.imwrite(path, image)
+
+    def ours(self):
+        time_of = lambda method: lines(self.program, method, *self.paths, str(DISPARITIES), "10")
+        return {f"{job}, 512x384, 64": float(time_of(method)[0][0]) * 1e-3 for method, job in self.JOBS.items()}
+
+    def theirs(self):
+        block, semi = (f"{job}, 512x384, 64" for job in self.JOBS.values())
+        bm = cv2.StereoBM_create(DISPARITIES, 15)
+        yield block, "OpenCV BM", fastest(lambda: bm.compute(*self.pair), 10)
+        sgbm = (0, DISPARITIES, 5, 200, 800, 1, 0, 10, 100, 2)
+        for name, mode in (("SGBM", cv2.STEREO_SGBM_MODE_SGBM), ("3WAY", cv2.STEREO_SGBM_MODE_SGBM_3WAY)):
+            matcher = cv2.StereoSGBM_create(*sgbm, mode)
+            yield semi, f"OpenCV {name}", fastest(lambda: matcher.compute(*self.pair), 3)
+
+
+def measured(seconds):
+    return f"{1e6 * seconds:.2f} us" if seconds < 1e-3 else f"{1e3 * seconds:.2f} ms"
+
+
+def main():
+    cv2.setNumThreads(1)
+    rounds = {}
+    with tempfile.TemporaryDirectory() as folder:
+        groups = (Assignment(), Images(folder), Stereo(folder))
+        for _ in range(ROUNDS):
+            for group in groups:
+                ours = group.ours()
+                for job, peer, seconds in group.theirs():
+                    rounds.setdefault((job, peer), []).append((ours[job], seconds))
+    print("| job | peer | ours | peer's | ratio |")
+    print("|---|---|---|---|---|")
+    for (job, peer), times in rounds.items():
+        ours, theirs = (statistics.median(side) for side in zip(*times))
+        ratio = statistics.median(their / our for our, their in times)
+        print(f"| {job} | {peer} | {measured(ours)} | {measured(theirs)} | {ratio:.2f} |")
+
+
+if len(sys.argv) != 1:
+    sys.exit(__doc__)
+main()

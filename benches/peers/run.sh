@@ -1,0 +1,11 @@
+#!/bin/sh
+# Prints the table of docs/performance.md: our kernels beside those of other programs, which it
+# installs into target/peers. Run it on a machine that does nothing else.
+set -eu
+cd "$(dirname "$0")/../.."
+venv=target/peers
+test -x "$venv/bin/python" || python3 -m venv "$venv"
+"$venv/bin/pip" install --quiet --disable-pip-version-check \
+    'numpy<3' 'scipy<2' 'lap<0.6' 'opencv-python-headless<5'
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+"$venv/bin/python" benches/peers/kernels.py

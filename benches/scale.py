@@ -1,0 +1,83 @@
+"""Prints how the time of a frame grows with people, image size and length of the log.
+
+Usage: python3 benches/scale.py [TAGALONG] [CONFIG...]   (from the root of the repository)
+
+TAGALONG is the program (target/release/tagalong); the configs are pipelines for colour and
+depth (configs/depth-ekf.toml and configs/joint-particle.toml). Each row is a simulated crowd
+that is recorded once and tracked on one thread. `frame` is all that the pipeline does with a
+frame, `read` the wait for the next one.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+
+SCENE = """seed = 6
+crowd = {people}
+duration_s = {length}
+[room]
+size_m = [{side}, {side}]
+[camera]
+width = {width}
+height = {height}
+[robot]
+start = [0.8, {middle}]
+"""
+
+BASE = {"people": 5, "length": 10, "width": 640, "height": 480}
+ROWS = (
+    [{"people": people} for people in (1, 5, 10, 20, 50)]
+    + [{"width": width, "height": height} for width, height in ((320, 240), (1280, 720), (1920, 1080))]
+    + [{"length": length} for length in (20, 100)]
+)
+
+
+def tracked(program, config, log, folder):
+    out = os.path.join(folder, "out")
+    command = [program, "run", config, log, "-o", out, "--overwrite", "--quiet", "--threads", "1"]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with open(os.path.join(out, "timings.json"), encoding="utf-8") as file:
+        times = json.load(file)
+    busy_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return times["whole frame"], times["read"], busy_s
+
+
+def recorded(program, settings, folder):
+    path = os.path.join(folder, "scene.toml")
+    log = os.path.join(folder, "scene.mcap")
+    # Room for all of them: 4 m² each.
+    side = max(8.0, 2.0 * (settings["people"] ** 0.5) + 4.0)
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(SCENE.format(**settings, side=side, middle=side / 2))
+    if os.path.exists(log):
+        os.remove(log)
+    subprocess.run([program, "simulate", path, "-o", log], check=True, capture_output=True)
+    return log
+
+
+def main(program="target/release/tagalong", *configs):
+    configs = configs or ("configs/depth-ekf.toml", "configs/joint-particle.toml")
+    print("| pipeline | people | image | length [s] | frames | frame p50 [ms] | p99 | worst | read p50 | processor [ms/frame] |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        for row in ROWS:
+            settings = BASE | row
+            log = recorded(program, settings, folder)
+            for config in configs:
+                frame, read, busy_s = tracked(program, config, log, folder)
+                name = os.path.basename(config).removesuffix(".toml")
+                size = f"{settings['width']}x{settings['height']}"
+                cells = (name, settings["people"], size, settings["length"], frame["frames"])
+                times = (frame["p50_ms"], frame["p99_ms"], frame["max_ms"], read["p50_ms"])
+                times = [f"{ms:.2f}" for ms in (*times, 1e3 * busy_s / frame["frames"])]
+                print("| " + " | ".join([*map(str, cells), *times]) + " |", flush=True)
+
+
+if any(argument.startswith("-") for argument in sys.argv[1:]):
+    sys.exit(__doc__)
+main(*sys.argv[1:])

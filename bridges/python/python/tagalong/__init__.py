@@ -1,0 +1,155 @@
+"""Detects and tracks people from a mobile robot.
+
+A pipeline works on numpy arrays::
+
+    import tagalong
+
+    camera = tagalong.Camera(640, 480, fx=525.0, height_m=1.2)
+    pipeline = tagalong.Pipeline.from_toml("depth-verified")
+    report = pipeline.step(colour, depth, camera, (x, y, heading), stamp_ns)
+    for track in report.tracks:
+        print(track.id, track.position)
+
+or on a log (``for frame in pipeline.frames("robot.mcap")``); ``run``, ``eval`` and ``main`` are the
+commands of the program. Lengths are metres, angles radians, the robot's frame is x forward, y left,
+z up.
+"""
+
+import json as _json
+import os as _os
+import signal as _signal
+import sys as _sys
+
+import numpy as _np
+
+from . import _tagalong
+from ._tagalong import (
+    Camera,
+    Command,
+    ConfigError,
+    Frame,
+    Frames,
+    Pipeline,
+    Report,
+    TagalongError,
+    Track,
+    __version__,
+)
+
+__all__ = [
+    "Camera",
+    "Command",
+    "ConfigError",
+    "Frame",
+    "Frames",
+    "Pipeline",
+    "Report",
+    "TagalongError",
+    "Track",
+    "__version__",
+    "eval",
+    "main",
+    "read_tracks",
+    "run",
+]
+
+# Columns that are no float; stamps would lose their nanoseconds as one.
+_TYPES = {"stamp_ns": "i8", "frame": "i8", "id": "i8", "seen": "?"}
+# Columns of the MOTChallenge, which have no names in the file.
+_BOXES = ["frame", "id", "x", "y", "width", "height", "score"]
+
+
+def main(arguments=None):
+    """Run the program `tagalong` and return its exit code.
+
+    arguments: those of the command line, without the program's name [default: sys.argv].
+    """
+    if arguments is not None:
+        return _tagalong.main(list(arguments))
+    # The program listens to Ctrl-C itself; Python would only notice it at the end.
+    _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
+    return _tagalong.main(_sys.argv[1:])
+
+
+def run(
+    config,
+    log,
+    out,
+    *,
+    overlay=False,
+    with_images=False,
+    overwrite=False,
+    strict=False,
+    seed=None,
+):
+    """Run a pipeline over a log, as `tagalong run`, and return its report.json as a dict.
+
+    config: a TOML file or the name of a built-in one; None takes the one for what the log has.
+    out: the folder of results, which must not exist without `overwrite`. With `strict` a log of
+    which something was lost raises TagalongError. Ctrl-C stops the run; the files are whole then.
+    """
+    _tagalong.run(
+        config,
+        log,
+        out,
+        overlay=overlay,
+        with_images=with_images,
+        overwrite=overwrite,
+        strict=strict,
+        seed=seed,
+    )
+    with open(_os.path.join(out, "report.json"), encoding="utf-8") as file:
+        return _json.load(file)
+
+
+def eval(truth, tracks, *, similarity="iou", log=None, rate=None, upper_body=False):
+    """Compare tracks with truth, as `tagalong eval`, and return the figures as a dict.
+
+    truth: MOTChallenge text, people.csv, KITTI labels, or a log with truth. tracks: the folder of a
+    run, tracks-metres.csv, MOTChallenge text or KITTI labels. similarity: "iou" of boxes, or
+    "metres" on the floor. log: the log of the truth, for its stamps.
+    """
+    return _json.loads(
+        _tagalong.scores(
+            truth, tracks, similarity=similarity, log=log, rate=rate, upper_body=upper_body
+        )
+    )
+
+
+def read_tracks(path):
+    """Read tracks as a dict of arrays, one per column and all of the same length.
+
+    path: the folder of a run (tracks-metres.csv, and the boxes of tracks.csv as box_x, box_y,
+    box_width, box_height, score; NaN where a track has no box), tracks-metres.csv, or MOTChallenge
+    text. `pandas.DataFrame(read_tracks(path))` is a table of it.
+    """
+    path = _os.fspath(path)
+    if not _os.path.isdir(path):
+        return _columns(path)
+    tracks = _columns(_os.path.join(path, "tracks-metres.csv"))
+    boxes = _columns(_os.path.join(path, "tracks.csv"))
+    keys = zip(boxes["frame"].tolist(), boxes["id"].tolist())
+    row_of = {key: row for row, key in enumerate(keys)}
+    keys = zip(tracks["frame"].tolist(), tracks["id"].tolist())
+    rows = _np.array([row_of.get(key, -1) for key in keys], dtype=int)
+    for name in _BOXES[2:]:
+        known = _np.append(boxes[name], _np.nan)
+        tracks[name if name == "score" else f"box_{name}"] = known[rows]
+    return tracks
+
+
+def _columns(path):
+    with open(path, encoding="utf-8") as file:
+        first = file.readline().strip()
+        file.seek(0)
+        is_named = first.startswith("stamp_ns")
+        names = first.split(",") if is_named else _BOXES
+        kinds = [(name, _TYPES.get(name, "f8")) for name in names]
+        lines = [line for line in file if line.strip()][1 if is_named else 0 :]
+    if not lines:
+        return {name: _np.empty(0, kind) for name, kind in kinds}
+    try:
+        table = _np.loadtxt(lines, kinds, delimiter=",", usecols=range(len(names)), ndmin=1)
+    except (ValueError, IndexError) as error:
+        raise TagalongError(f"{path}: {error}; tracks have the columns {', '.join(names)}") from None
+    return {name: _np.ascontiguousarray(table[name]) for name in names}

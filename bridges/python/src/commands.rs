@@ -1,0 +1,125 @@
+//! Commands of the program.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use tagalong_app::format::Format;
+use tagalong_app::outcome::{Ended, Outcome};
+use tagalong_app::signals::Signals;
+use tagalong_cli::{EvalArgs, RunArgs, SimilarityChoice, eval_json, main_from, run_until};
+
+use crate::errors::{failed, raised, wrong};
+use crate::pipeline::registry;
+
+/// Time between two looks for Ctrl-C.
+const LOOK: Duration = Duration::from_millis(10);
+/// Longest wait for a run to finish its files after Ctrl-C.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Runs the program with these arguments, without its name, and returns its exit code. `--help` and
+/// wrong usage end the process.
+#[pyfunction]
+pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    let all = [OsString::from("tagalong")].into_iter().chain(arguments);
+    let all: Vec<OsString> = all.collect();
+    py.detach(|| main_from(all, tagalong_catalog::register))
+}
+
+/// Runs a pipeline over a log and writes the files of `tagalong run`; returns true if part of the
+/// log was lost.
+#[pyfunction]
+#[pyo3(signature = (config, log, out, *, overlay, with_images, overwrite, strict, seed))]
+#[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python function")]
+pub fn run(
+    py: Python<'_>,
+    config: Option<PathBuf>,
+    log: PathBuf,
+    out: PathBuf,
+    overlay: bool,
+    with_images: bool,
+    overwrite: bool,
+    strict: bool,
+    seed: Option<u64>,
+) -> PyResult<bool> {
+    let (config, log) = match config {
+        Some(config) => (config, Some(log)),
+        None => (log, None),
+    };
+    let args = RunArgs {
+        config: Some(config),
+        log,
+        output: Some(out),
+        overlay,
+        with_images,
+        overwrite,
+        strict,
+        threads: None,
+        seed,
+        format: Format::default(),
+        quiet: true,
+    };
+    match interruptible(py, args)?.map_err(raised)? {
+        Ended::Well => Ok(false),
+        Ended::WithLoss | Ended::WithFindings => Ok(true),
+        Ended::BySignal(_) => {
+            Err(PyKeyboardInterrupt::new_err("the run was stopped; its files are whole"))
+        }
+    }
+}
+
+/// Runs in a thread, and looks for Ctrl-C meanwhile.
+fn interruptible(py: Python<'_>, args: RunArgs) -> PyResult<Outcome> {
+    let signals = Signals::default();
+    let asked = signals.clone();
+    let running = thread::spawn(move || run_until(&args, &registry(), || Ok(asked)));
+    while !running.is_finished() {
+        py.detach(|| thread::sleep(LOOK));
+        if let Err(interrupt) = py.check_signals() {
+            signals.interrupt();
+            // A run that still looks through its log has written nothing, and will not.
+            let since = Instant::now();
+            while !running.is_finished() && since.elapsed() < PATIENCE {
+                py.detach(|| thread::sleep(LOOK));
+            }
+            return Err(interrupt);
+        }
+    }
+    running.join().map_err(|_| failed("the run failed; please report this with the log"))
+}
+
+/// Compares tracks with truth; returns the figures of `tagalong eval` as JSON.
+#[pyfunction]
+#[pyo3(signature = (truth, tracks, *, similarity, log, rate, upper_body))]
+pub fn scores(
+    py: Python<'_>,
+    truth: PathBuf,
+    tracks: PathBuf,
+    similarity: &str,
+    log: Option<PathBuf>,
+    rate: Option<f64>,
+    upper_body: bool,
+) -> PyResult<String> {
+    let similarity = match similarity {
+        "iou" => SimilarityChoice::Iou,
+        "metres" => SimilarityChoice::Metres,
+        other => {
+            return Err(wrong(format!("no similarity {other:?}; there are \"iou\", \"metres\"")));
+        }
+    };
+    let args = EvalArgs {
+        truth,
+        tracks,
+        similarity,
+        log,
+        config: None,
+        rules: Default::default(),
+        upper_body,
+        rate,
+        format: Format::default(),
+    };
+    py.detach(|| eval_json(&args)).map_err(raised)
+}

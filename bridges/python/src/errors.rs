@@ -1,0 +1,42 @@
+//! Exceptions.
+
+use std::fmt::Display;
+
+use pyo3::create_exception;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use tagalong_app::outcome::Failure;
+
+create_exception!(
+    tagalong,
+    TagalongError,
+    PyRuntimeError,
+    "A log that cannot be used, a plugin that failed, or a disk that is full."
+);
+create_exception!(
+    tagalong,
+    ConfigError,
+    PyValueError,
+    "A config, or an argument, that cannot be used; shown with its line and the remedy."
+);
+
+/// Exit code of wrong usage and wrong configs.
+const USAGE: u8 = 2;
+
+/// Returns the exception of a failed command.
+pub fn raised(failure: Failure) -> PyErr {
+    match failure.code {
+        USAGE => ConfigError::new_err(failure.message),
+        _ => TagalongError::new_err(failure.message),
+    }
+}
+
+/// Returns the exception of work that failed.
+pub fn failed(why: impl Display) -> PyErr {
+    TagalongError::new_err(why.to_string())
+}
+
+/// Returns the exception of an argument with a wrong value.
+pub fn wrong(why: impl Display) -> PyErr {
+    PyValueError::new_err(why.to_string())
+}

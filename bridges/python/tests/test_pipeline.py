@@ -1,0 +1,222 @@
+"""Pipelines on arrays and on logs."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+import tagalong
+
+CAMERA = tagalong.Camera(64, 48, fx=60.0, height_m=1.2)
+DEPTH = np.full((48, 64), 3.0, np.float32)
+COLOUR = np.zeros((48, 64, 3), np.uint8)
+
+
+def lines(report, pose):
+    """The lines of tracks-metres.csv for a report, in the robot frame."""
+    for track in report.tracks:
+        numbers = [f"{value:.4f}" for value in [*track.position, *track.velocity]]
+        rows, columns = np.triu_indices(3)
+        numbers += [f"{value:.6f}" for value in track.covariance[:3, :3][rows, columns]]
+        numbers = [text.lstrip("-") if not text.strip("-0.") else text for text in numbers]
+        yield [str(report.stamp_ns), str(report.index), str(track.id), *numbers, str(int(track.seen))]
+
+
+def of_program(run):
+    """The same lines as the program wrote them: without the places in the odometry frame."""
+    rows = (run / "tracks-metres.csv").read_text().splitlines()[1:]
+    cells = (row.split(",") for row in rows)
+    return [[*row[:6], *row[9:]] for row in cells]
+
+
+def test_frames_of_a_log_give_the_tracks_of_the_program(log, run):
+    pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+    found = []
+    for frame in pipeline.frames(log):
+        found += lines(pipeline.step_frame(frame), frame.pose)
+    assert len(found) > 100
+    assert found == of_program(run)
+
+
+def test_arrays_give_the_tracks_of_the_program(log, run):
+    pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+    found, boxes = [], []
+    frames = pipeline.frames(log)
+    for frame in frames:
+        report = pipeline.step(
+            frame.colour, frame.depth, frame.camera, frame.pose, frame.stamp_ns, index=frame.index
+        )
+        found += lines(report, frame.pose)
+        boxes += [
+            f"{report.index},{t.id},{t.box[0]:.2f},{t.box[1]:.2f},{t.box[2]:.2f},{t.box[3]:.2f},"
+            f"{t.score:.6f},-1,-1,-1"
+            for t in report.tracks
+            if t.seen and t.box
+        ]
+    assert found == of_program(run)
+    assert boxes == (run / "tracks.csv").read_text().splitlines()
+    assert not frames.data_lost and frames.counters["frames"] > 20
+
+
+def test_a_config_is_a_name_a_file_or_a_text(tmp_path):
+    text = tagalong.Pipeline.from_toml("depth-ekf").resolved
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    assert tagalong.Pipeline.from_toml(path).resolved == text
+    assert tagalong.Pipeline.from_toml(str(path)).resolved == text
+    assert tagalong.Pipeline.from_toml(text).resolved == text
+
+
+def test_mistakes_in_configs_are_shown_with_their_line(tmp_path):
+    with pytest.raises(tagalong.ConfigError, match="depth-ekv"):
+        tagalong.Pipeline.from_toml("depth-ekv")
+    with pytest.raises(tagalong.ConfigError, match=r"config.toml:1:1: unknown key `sed`; did you mean `seed`"):
+        tagalong.Pipeline.from_toml("sed = 1\n")
+    with pytest.raises(ValueError):
+        tagalong.Pipeline.from_toml(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("colour", "depth", "message"),
+    [
+        (COLOUR.astype(float), DEPTH, "colour is an array of .*float64.*uint8"),
+        (COLOUR[:, :, :2], DEPTH, r"colour has shape \[48, 64, 2\]; give rows x columns x 3"),
+        (COLOUR, DEPTH.astype(np.int32), "depth is an array of .*int32.*float32"),
+        (COLOUR, DEPTH[:40], "depth has 64 x 40 pixels and the camera 64 x 48"),
+        (COLOUR, DEPTH.tolist(), "depth is a .*list.*, not a numpy array"),
+        (COLOUR, DEPTH[:0], "depth has 64 x 0 pixels"),
+        (COLOUR, DEPTH.ravel(), "depth has shape"),
+    ],
+)
+def test_images_of_wrong_types_and_shapes_are_refused(colour, depth, message):
+    pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+    with pytest.raises((TypeError, ValueError), match=message):
+        pipeline.step(colour, depth, CAMERA, None, 0)
+
+
+@pytest.mark.parametrize(
+    ("pose", "stamp", "message"),
+    [
+        ((0.0, 0.0, float("nan")), 0, "finite"),
+        ((0.0, 0.0), 0, "4 x 4"),
+        (np.eye(4) * 2.0, 0, "no rigid motion"),
+        (None, -1.0, "stamp is -1"),
+        (None, float("inf"), "stamp is inf"),
+    ],
+)
+def test_poses_and_stamps_that_are_none_are_refused(pose, stamp, message):
+    pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+    with pytest.raises(ValueError, match=message):
+        pipeline.step(COLOUR, DEPTH, CAMERA, pose, stamp)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"fx": 1e30}, "fx is 10+; it must be above 0 and at most 64000"),
+        ({"fx": float("nan")}, "fx is NaN"),
+        ({"cx": -5.0}, "cx is -5"),
+        ({"height_m": 0.0}, "height_m must be above 0"),
+        ({"height_m": None}, "pose is missing"),
+        ({"robot_from_camera": np.eye(4)}, "given twice"),
+        ({"distortion": [0.1], "model": "fov"}, "no distortion model `fov`"),
+        ({"distortion": [0.1] * 6}, "at most 5"),
+        ({"distortion": [float("inf")]}, "finite"),
+    ],
+)
+def test_cameras_that_cannot_be_are_refused(changed, message):
+    with pytest.raises(ValueError, match=message):
+        tagalong.Camera(64, 48, **{"fx": 60.0, "height_m": 1.2, **changed})
+
+
+def test_a_camera_projects_along_its_axis():
+    assert CAMERA.project([2.0, 0.0, 1.2]) == pytest.approx((31.5, 23.5))
+    assert CAMERA.project([-2.0, 0.0, 1.2]) is None
+    same = tagalong.Camera(64, 48, fx=60.0, robot_from_camera=CAMERA.robot_from_camera)
+    assert same.project([2.0, 0.3, 1.0]) == pytest.approx(CAMERA.project([2.0, 0.3, 1.0]))
+
+
+def test_depth_in_millimetres_is_depth_in_metres(log):
+    tracks = {}
+    for name, depth_of in {
+        "metres": lambda depth: depth,
+        "double": lambda depth: depth.astype(np.float64),
+        "millimetres": lambda depth: np.nan_to_num(depth * 1000.0).round().astype(np.uint16),
+        "flipped": lambda depth: np.ascontiguousarray(depth[::-1])[::-1],
+    }.items():
+        pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+        tracks[name] = [
+            list(lines(pipeline.step(None, depth_of(f.depth), f.camera, f.pose, f.stamp_ns), f.pose))
+            for f in pipeline.frames(log)
+        ]
+    assert any(tracks["metres"])
+    assert all(found == tracks["metres"] for found in tracks.values())
+
+
+def test_stamps_are_nanoseconds_or_seconds_and_repeated_ones_are_told():
+    pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+    outcomes = [
+        pipeline.step(None, DEPTH, CAMERA, None, stamp).outcome
+        for stamp in [10.0, 10_100_000_000, 10.1, 10.05, 2.0, 900.0]
+    ]
+    told = ["processed", "processed", "duplicate", "out-of-order", "reset-backward", "reset-forward"]
+    assert outcomes == told
+
+
+def test_a_controller_commands_and_needs_odometry(log):
+    pipeline = tagalong.Pipeline.from_toml("follow-depth")
+    assert pipeline.has_controller
+    with pytest.raises(ValueError, match="no odometry"):
+        pipeline.step(COLOUR, DEPTH, CAMERA, None, 0)
+    reports = [
+        pipeline.step(f.colour, f.depth, f.camera, f.pose, f.stamp_ns) for f in pipeline.frames(log)
+    ]
+    command = reports[-1].command
+    assert {report.target for report in reports} - {None}
+    assert command.valid_until_ns > command.stamp_ns == reports[-1].stamp_ns
+    assert pipeline.command_at(command.valid_until_ns + 1).reason == "expired"
+    pipeline.disarm()
+    assert pipeline.fault and pipeline.command_at(command.stamp_ns).wheels_mps == (0.0, 0.0)
+    pipeline.arm()
+    assert pipeline.fault is None
+
+
+def test_a_jump_of_the_odometry_stops_the_robot():
+    pipeline = tagalong.Pipeline.from_toml("follow-depth")
+    for at, x in enumerate([0.0, 0.05, 0.1, 5.0]):
+        pipeline.step(COLOUR, DEPTH, CAMERA, (x, 0.0, 0.0), 1.0 + 0.1 * at)
+        assert (pipeline.fault is not None) == (x == 5.0)
+
+
+def test_a_scan_alone_makes_a_frame():
+    pipeline = tagalong.Pipeline.from_toml("laser-legs")
+    angles = np.linspace(-1.0, 1.0, 181)
+    scan = np.stack([3.0 * np.cos(angles), 3.0 * np.sin(angles)], axis=1)
+    assert pipeline.step(None, None, None, None, 1.0, scan=scan).tracks == []
+    with pytest.raises(ValueError, match="not finite"):
+        pipeline.step(None, None, None, None, 2.0, scan=scan * np.nan)
+
+
+def test_the_interpreter_is_free_while_a_pipeline_works(log):
+    """Another thread counts on while frames are tracked."""
+    pipeline = tagalong.Pipeline.from_toml("depth-verified")
+    frames = list(pipeline.frames(log))
+    counted, ticks = threading.Event(), []
+
+    def count():
+        while not counted.is_set():
+            ticks.append(time.monotonic())
+            time.sleep(0.001)
+
+    other = threading.Thread(target=count)
+    other.start()
+    longest = 0.0
+    for frame in frames:
+        start, before = time.monotonic(), len(ticks)
+        pipeline.step_frame(frame)
+        took = time.monotonic() - start
+        if took > 0.02:
+            longest = max(longest, took)
+            assert len(ticks) > before, f"no tick in {took} s"
+    counted.set()
+    other.join()

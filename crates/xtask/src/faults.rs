@@ -1,0 +1,128 @@
+//! The table of faults, each with the tests that cover it.
+
+use std::collections::BTreeSet;
+
+use anyhow::{Context as _, Result};
+use serde::Deserialize;
+
+use crate::workspace::Workspace;
+
+const TABLE: &str = "crates/xtask/src/faults.toml";
+
+/// Begins the lines of documents that this table fills.
+pub const COMMAND: &str = "cargo xtask faults";
+
+#[derive(Deserialize)]
+struct Table {
+    row: Vec<Row>,
+}
+
+#[derive(Deserialize)]
+struct Row {
+    id: String,
+    fault: String,
+    result: String,
+    /// `file: name` of each test.
+    tests: Vec<String>,
+}
+
+fn table(workspace: &Workspace) -> Result<Table> {
+    toml::from_str(&workspace.read(TABLE)?).with_context(|| format!("in {TABLE}"))
+}
+
+/// Returns the table as Markdown; with `prefixes`, the rows whose names begin with one of them.
+///
+/// # Errors
+/// A table that cannot be read.
+pub fn markdown(workspace: &Workspace, prefixes: &[&str]) -> Result<String> {
+    let wanted = |row: &&Row| {
+        prefixes.is_empty() || prefixes.iter().any(|prefix| row.id.starts_with(prefix))
+    };
+    let mut out = "| | fault | result | tests |\n|---|---|---|---|\n".to_owned();
+    for Row { id, fault, result, tests } in table(workspace)?.row.iter().filter(wanted) {
+        let tests: Vec<String> = tests.iter().map(|test| shown(test)).collect();
+        out += &format!("| {id} | {fault} | {result} | {} |\n", tests.join("; "));
+    }
+    Ok(out)
+}
+
+fn shown(test: &str) -> String {
+    match test.split_once(": ") {
+        Some((file, name)) => format!("`{name}` (`{file}`)"),
+        None => test.to_owned(),
+    }
+}
+
+/// Complains about rows without a test, and about tests that do not exist.
+///
+/// # Errors
+/// A table that cannot be read.
+pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
+    let read = |file: &str| workspace.read(file).ok();
+    Ok(complaints(&table(workspace)?, read))
+}
+
+fn complaints(table: &Table, read: impl Fn(&str) -> Option<String>) -> Vec<String> {
+    let mut known = BTreeSet::new();
+    let mut complaints = Vec::new();
+    for Row { id, tests, .. } in &table.row {
+        if !known.insert(id) {
+            complaints.push(format!("{TABLE}: {id} is there twice"));
+        }
+        if tests.is_empty() {
+            complaints.push(format!("{TABLE}: {id} has no test"));
+        }
+        for test in tests.iter().filter(|test| !exists(test, &read)) {
+            complaints.push(format!("{TABLE}: {id}: there is no test `{test}`"));
+        }
+    }
+    complaints
+}
+
+/// Returns true if the file has a test of that name which is not switched off.
+fn exists(test: &str, read: impl Fn(&str) -> Option<String>) -> bool {
+    let found = || {
+        let (file, name) = test.split_once(": ")?;
+        let text = read(file)?;
+        let at = text.find(&format!("fn {name}("))?;
+        // The attributes stand between the last blank line or brace, and the name.
+        let before = text[..at].rsplit("\n\n").next()?;
+        Some(before.contains("#[test]") && !before.contains("#[ignore"))
+    };
+    found().unwrap_or(false)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table_of(tests: &[&str]) -> Table {
+        let row = |id: &str| Row {
+            id: id.into(),
+            fault: "a fault".into(),
+            result: "a result".into(),
+            tests: tests.iter().map(|test| (*test).to_owned()).collect(),
+        };
+        Table { row: vec![row("F1")] }
+    }
+
+    #[test]
+    fn a_row_needs_tests_that_are_there() {
+        let source =
+            "fn helper() {}\n\n#[test]\nfn it_works() {}\n\n#[test]\n#[ignore]\nfn off() {}\n";
+        let read = |file: &str| (file == "a.rs").then(|| source.to_owned());
+        let count = |tests: &[&str]| complaints(&table_of(tests), read).len();
+        assert_eq!(count(&["a.rs: it_works"]), 0);
+        assert_eq!(count(&[]), 1);
+        for none in ["a.rs: helper", "a.rs: off", "a.rs: gone", "b.rs: it_works", "it_works"] {
+            assert_eq!(count(&["a.rs: it_works", none]), 1, "{none}");
+        }
+        let twice = Table {
+            row: [table_of(&["a.rs: it_works"]).row, table_of(&["a.rs: it_works"]).row]
+                .into_iter()
+                .flatten()
+                .collect(),
+        };
+        assert_eq!(complaints(&twice, read).len(), 1);
+    }
+}
