@@ -57,8 +57,7 @@ const checkPause = async (page) => {
   await page.evaluate(() => document.activeElement.blur());
   await page.keyboard.press("ArrowLeft");
   assert.ok((await frameNow(page)) < stopped, "one frame back");
-  const area = await page.locator("#image-0").boundingBox();
-  await page.mouse.click(area.x + area.width / 2, area.y + area.height / 2);
+  await page.locator("#image-0").click({ position: { x: 30, y: 30 } });
   assert.match(await page.textContent("#question"), /^At column/);
   await page.click("#play");
   await waitForFrame(page, stopped + 3);

@@ -18,7 +18,7 @@ tagalong=${TAGALONG:-$root/target/release/tagalong}
 [ -x "$tagalong" ] || { echo "$tagalong is missing: cargo build --release, or name it in TAGALONG" >&2; exit 2; }
 
 if [ $# -eq 0 ]; then
-    "$tagalong" simulate "$root/configs/scenes/crossing.toml" -o "$home/a.mcap" > /dev/null
+    "$tagalong" simulate "$root/configs/scenes/crossing.toml" --set duration_s=40 -o "$home/a.mcap" > /dev/null
     set -- "$root/configs/follow-depth.toml" "$home/a.mcap"
 fi
 

@@ -47,7 +47,8 @@ pub fn html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
 /// # Errors
 /// Data that JSON cannot express.
 pub fn live_html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
-    let style = html! { link rel="stylesheet" href="page.css"; };
+    // Without an icon of its own a browser would ask for one outside of the key.
+    let style = html! { link rel="icon" href="data:,"; link rel="stylesheet" href="page.css"; };
     let names = scripts().map(|(name, _)| name);
     let scripts = html! { @for name in names { script src=(name) {} } };
     whole(heading, data, &style, &scripts)

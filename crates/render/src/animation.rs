@@ -2,9 +2,9 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-use image::codecs::gif::{GifEncoder, Repeat};
+use gif::{DisposalMethod, Encoder, Frame, Repeat};
 use image::imageops::{FilterType, resize};
-use image::{Delay, Frame, ImageReader, Rgba, RgbaImage};
+use image::{ImageReader, Rgba, RgbaImage};
 
 /// Largest difference of a channel between two pictures that counts as none: what changes by less is
 /// left as it was, which a GIF stores in almost no bytes.
@@ -31,17 +31,27 @@ impl Animation {
         let cannot =
             |error: &dyn std::fmt::Display| format!("cannot write {}: {error}", to.display());
         let file = BufWriter::new(File::create(to).map_err(|error| cannot(&error))?);
-        let mut encoder = GifEncoder::new_with_speed(file, QUANTISING_SPEED);
+        let Some(first) = pictures.first() else { return Ok(()) };
+        let mut shown = self.read(first.as_ref())?;
+        let (columns, rows) = shown.dimensions();
+        let too_large = || cannot(&"a GIF has at most 65535 columns and rows");
+        let width = u16::try_from(columns).map_err(|_| too_large())?;
+        let height = u16::try_from(rows).map_err(|_| too_large())?;
+        let mut encoder = Encoder::new(file, width, height, &[]).map_err(|error| cannot(&error))?;
         encoder.set_repeat(Repeat::Infinite).map_err(|error| cannot(&error))?;
-        let delay = Delay::from_numer_denom_ms(self.delay_ms, 1);
-        let mut shown: Option<RgbaImage> = None;
-        for path in pictures {
-            let picture = self.read(path.as_ref())?;
-            let part = changed(shown.as_mut(), &picture);
-            encoder
-                .encode_frame(Frame::from_parts(part, 0, 0, delay))
-                .map_err(|error| cannot(&error))?;
-            shown.get_or_insert(picture);
+        for (at, path) in pictures.iter().enumerate() {
+            let mut part = match at {
+                0 => shown.clone(),
+                _ => changed(&mut shown, self.read(path.as_ref())?),
+            };
+            if part.dimensions() != (columns, rows) {
+                return Err(cannot(&format!("{} has another size", path.as_ref().display())));
+            }
+            let mut frame = Frame::from_rgba_speed(width, height, &mut part, QUANTISING_SPEED);
+            frame.delay = u16::try_from(self.delay_ms / 10).unwrap_or(u16::MAX);
+            // What a later picture leaves transparent stays.
+            frame.dispose = DisposalMethod::Keep;
+            encoder.write_frame(&frame).map_err(|error| cannot(&error))?;
         }
         Ok(())
     }
@@ -62,11 +72,11 @@ impl Animation {
 
 /// Returns a picture with the pixels left transparent that are shown already, and notes what is
 /// shown then.
-fn changed(shown: Option<&mut RgbaImage>, picture: &RgbaImage) -> RgbaImage {
-    let mut part = picture.clone();
-    let Some(shown) = shown.filter(|shown| shown.dimensions() == picture.dimensions()) else {
+fn changed(shown: &mut RgbaImage, picture: RgbaImage) -> RgbaImage {
+    let mut part = picture;
+    if shown.dimensions() != part.dimensions() {
         return part;
-    };
+    }
     for (new, old) in part.pixels_mut().zip(shown.pixels_mut()) {
         let is_same = new.0.iter().zip(old.0).all(|(a, b)| a.abs_diff(b) <= SAME);
         match is_same {
@@ -91,7 +101,7 @@ mod tests {
             .map(|i| {
                 let path = home.path().join(format!("{i}.png"));
                 let square = |x, _| {
-                    if x / 20 == i { Rgba([250, 10, 10, 255]) } else { Rgba([9, 9, 9, 255]) }
+                    if x / 20 == i { Rgba([250, 10, 10, 255]) } else { Rgba([20, 20, 20, 255]) }
                 };
                 RgbaImage::from_fn(80, 40, square).save(&path).unwrap();
                 path
@@ -107,6 +117,8 @@ mod tests {
             let red: Vec<bool> =
                 (0..3).map(|part| frame.buffer().get_pixel(10 * part + 5, 10).0[0] > 200).collect();
             assert_eq!(red, [i == 0, i == 1, i == 2], "picture {i}");
+            let unchanged = frame.buffer().get_pixel(38, 10).0;
+            assert!(unchanged[0] < 30 && unchanged[3] == 255, "{unchanged:?}: it stays");
         }
     }
 

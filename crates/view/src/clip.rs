@@ -52,7 +52,9 @@ fn paced(times_s: &[f64], fps: u32) -> Vec<usize> {
         // Times are rounded to a millisecond.
         if *time_s + 1e-3 >= due_s {
             out.push(at);
-            due_s = time_s.max(due_s) + 1.0 / f64::from(fps);
+            // From the time that was due, so that rates which do not divide each other keep the pace.
+            due_s = if due_s.is_finite() { due_s } else { *time_s };
+            due_s = (due_s + 1.0 / f64::from(fps)).max(*time_s);
         }
     }
     out
@@ -67,5 +69,8 @@ mod tests {
         let times: Vec<f64> = (0..30).map(|i| f64::from(i) / 30.0).collect();
         assert_eq!(paced(&times, 10), [0, 3, 6, 9, 12, 15, 18, 21, 24, 27]);
         assert_eq!(paced(&times[..4], 50), [0, 1, 2, 3]);
+        let slow: Vec<f64> = (0..40).map(|i| f64::from(i) / 10.0).collect();
+        assert_eq!(paced(&slow, 8).len(), 32, "eight a second of ten");
+        assert_eq!(paced(&[0.0, 5.0, 5.1], 10), [0, 1, 2], "after a gap");
     }
 }

@@ -61,7 +61,7 @@ pub fn run_until(
 ) -> Outcome {
     // A name that is no config must not cost a simulation.
     if let Some(path) = args.config().filter(|_| !args.has_log()) {
-        ConfigFile::read(path)?;
+        ConfigFile::read(path)?.pipeline(registry, args.seed)?;
     }
     if !args.has_log() {
         sample::write(args.log()).map_err(refused)?;

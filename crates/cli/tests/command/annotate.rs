@@ -82,6 +82,20 @@ fn ctrl_c_and_a_kill_leave_the_file_whole_and_it_is_continued() {
 }
 
 #[test]
+#[cfg(unix)]
+fn ctrl_c_without_a_change_says_that_nothing_is_written() {
+    let home = home();
+    let (child, ..) = start(home.path(), &["walk.mcap", "--empty"]);
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-s", "INT", &pid]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let said = text(&output.stderr);
+    assert_eq!(code(&output), 130, "{said}");
+    assert!(said.contains("walk.people.csv is not written") && said.contains("Finish"), "{said}");
+    assert!(!home.path().join("walk.people.csv").exists());
+}
+
+#[test]
 fn what_cannot_be_annotated_is_refused_with_the_remedy() {
     let home = home();
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();

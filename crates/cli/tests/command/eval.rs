@@ -53,6 +53,27 @@ fn a_run_is_scored_in_the_image_and_on_the_floor() {
 }
 
 #[test]
+fn truth_that_is_named_after_another_log_is_noted() {
+    let folder = home();
+    let path = |name: &str| folder.path().join(name);
+    for name in ["other.people.csv", "truth.csv"] {
+        fs::copy(path("walk.people.csv"), path(name)).unwrap();
+    }
+    for (truth, is_noted) in
+        [("walk.people.csv", false), ("other.people.csv", true), ("truth.csv", false)]
+    {
+        let output = in_home(folder.path(), &["--truth", truth, "--tracks", "out"]);
+        let said = text(&output.stdout);
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        assert_eq!(
+            said.contains("named after other, and the run is of walk.mcap"),
+            is_noted,
+            "{said}"
+        );
+    }
+}
+
+#[test]
 fn people_annotated_in_laser_scans_are_truth_on_the_floor() {
     let folder = home();
     let header = "scan,id,x_laser_m,y_laser_m,x_robot_m,y_robot_m,ignore,source\n";

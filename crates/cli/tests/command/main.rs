@@ -14,6 +14,7 @@ mod eval;
 mod follow;
 mod import;
 mod inputs;
+mod live;
 mod missing_topics;
 mod mistakes;
 mod model;

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use crate::common::{Drawn, code, config, own_plugin, text};
+use crate::common::{Drawn, code, config, own_plugin, tagalong, text};
 
 /// Runs with these settings; returns the exit code and the message.
 fn run(home: &Path, log: &str, input: &str) -> (i32, String) {
@@ -75,4 +75,17 @@ fn a_log_of_which_no_frame_can_be_made_is_no_success() {
     assert!(told.contains("not one frame could be made of good.mcap: "), "{told}");
     assert!(told.contains("images too large 3") && told.contains("tagalong doctor"), "{told}");
     assert!(!home.path().join("runs/good-nearest").exists(), "an empty result looks like one");
+}
+
+/// The colour topic that the log has is not the right image of a pair.
+#[test]
+fn a_config_for_a_pair_on_another_log_leads_to_the_configs_that_fit() {
+    let home = tempfile::tempdir().unwrap();
+    Drawn::of(3).write(&home.path().join("rgbd.mcap"));
+    let arguments = ["run", "stereo-verified", "rgbd.mcap"];
+    let output = tagalong().args(arguments).current_dir(home.path()).output().unwrap();
+    let told = text(&output.stderr);
+    assert_eq!(code(&output), 1, "{told}");
+    assert!(told.contains("no log of a stereo pair") && told.contains("tagalong doctor"), "{told}");
+    assert!(!told.contains("as `right_topic`"), "{told}");
 }

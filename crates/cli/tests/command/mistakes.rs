@@ -133,3 +133,32 @@ fn help_is_there_for_every_command() {
         assert!(text(&output.stdout).contains("Example"), "{command}");
     }
 }
+
+#[test]
+fn a_detector_without_a_model_is_a_failure_with_the_key_to_set() {
+    let home = tempfile::tempdir().unwrap();
+    Drawn::of(3).write(&home.path().join("walk.mcap"));
+    fs::write(home.path().join("onnx.toml"), include_str!("../../../../configs/onnx.toml"))
+        .unwrap();
+    let arguments = ["run", "onnx.toml", "walk.mcap", "-o", "out"];
+    let output = tagalong().args(arguments).current_dir(home.path()).output().unwrap();
+    let told = text(&output.stderr);
+    assert_eq!(code(&output), 1, "{told}");
+    assert!(told.contains("has no model (`model`)") && told.contains("tagalong model"), "{told}");
+}
+
+#[test]
+fn a_name_that_is_no_config_costs_no_simulation() {
+    let home = tempfile::tempdir().unwrap();
+    fs::write(home.path().join("walk.people.csv"), "frame,id\n").unwrap();
+    for name in ["walk.people.csv", "none.toml"] {
+        let output = tagalong().args(["run", name]).current_dir(home.path()).output().unwrap();
+        let told = text(&output.stderr);
+        assert_eq!(code(&output), 2, "{told}");
+        assert!(
+            !told.contains("two drawn people") && !told.contains("two simulated people"),
+            "{told}"
+        );
+        assert!(!home.path().join("runs").exists(), "{name}: a log was simulated");
+    }
+}

@@ -218,6 +218,11 @@ fn a_damaged_log_is_used_as_far_as_it_goes() {
     fs::write(home.path("walk.mcap"), &whole[..whole.len() / 2]).unwrap();
     let output = home.run("out", &[]);
     assert_eq!(code(&output), 3, "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    assert!(
+        said.lines().next().unwrap().ends_with("(complete, but part of the log was lost)"),
+        "{said}"
+    );
     let report = json(&home.path("out/report.json"));
     assert_eq!(report["data_lost"], true);
     assert!(report["frames"]["processed"].as_u64().is_some_and(|n| n > 3), "{report}");
