@@ -70,7 +70,7 @@ proptest! {
     ) {
         let weight = |i: usize| {
             let mixed = (i as u64 + seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
-            if mixed % few == 0 { (mixed % 1009) as f64 + 1.0 } else { 0.0 }
+            if mixed.is_multiple_of(few) { (mixed % 1009) as f64 + 1.0 } else { 0.0 }
         };
         let weights: Vec<f64> = (0..rows * cols).map(weight).collect();
         let (mut groups, mut whole) = (vec![None; rows], vec![None; rows]);

@@ -90,7 +90,7 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
         bar.set_message(name.clone());
         let jobs = threads(args.jobs);
         let results =
-            contest::run(scenes, &contenders, registry, jobs, &advance).map_err(Failure::failed)?;
+            contest::run(scenes, &contenders, registry, jobs, advance).map_err(Failure::failed)?;
         table.add(name, &contenders, &results);
         tell(table.last_rows())?;
     }
