@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 47] = [
+const BUILT_IN: [(&str, &str); 48] = [
     ("cafeteria", include_str!("../../../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../../../configs/scenes/cafeteria-high.toml")),
     ("corridor", include_str!("../../../configs/scenes/corridor.toml")),
@@ -49,6 +49,7 @@ const BUILT_IN: [(&str, &str); 47] = [
     ("sample", include_str!("../../../configs/scenes/sample.toml")),
     ("square-walk", include_str!("../../../configs/scenes/square-walk.toml")),
     ("static-high", include_str!("../../../configs/scenes/static-high.toml")),
+    ("stereo-follow-passing", include_str!("../../../configs/scenes/stereo-follow-passing.toml")),
     ("stereo-hall", include_str!("../../../configs/scenes/stereo-hall.toml")),
     ("turntable", include_str!("../../../configs/scenes/turntable.toml")),
 ];

@@ -14,7 +14,7 @@ pub struct RunArgs {
     /// The log: .mcap, .db3, .bag, or the folder of a recording [default: a short simulated one, written to
     /// runs/sample.mcap].
     pub log: Option<PathBuf>,
-    /// Output folder [default: runs/<log>-<config>].
+    /// Output folder [default: runs/LOG-CONFIG].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Render a picture of every frame: boxes, ids, trails, and a view from above.

@@ -53,7 +53,7 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
 /// log has been looked through, before anything is written.
 ///
 /// # Errors
-/// As for [`run`].
+/// As for a run by the command.
 pub fn run_until(
     args: &RunArgs,
     registry: &Registry,
@@ -151,7 +151,7 @@ fn without_odometry(config: &ConfigFile) -> String {
     )
 }
 
-/// Returns `runs/<log>-<config>`.
+/// Returns `runs/LOG-CONFIG`.
 fn default_folder(args: &RunArgs, config: &ConfigFile) -> PathBuf {
     let log = args.log().file_stem().unwrap_or_default().to_string_lossy().into_owned();
     Path::new("runs").join(format!("{log}-{}", config.stem()))

@@ -28,6 +28,8 @@ use crate::{Base, RobotSettings};
 const LONGEST_STEP_S: f64 = 0.2;
 /// Speeds below this are standing still, m/s.
 const STILL_MPS: f64 = 1e-6;
+/// Wheel speed beyond that of any robot, m/s; differences of much larger ones overflow.
+const BEYOND_MPS: f64 = 1e6;
 
 /// Wish of a controller, with the facts that the command limiter needs about the frame.
 #[derive(Clone, Debug)]
@@ -350,7 +352,12 @@ impl CommandLimiter {
     /// Limits the wheel speeds to the drive and the turn rate, on the same arc where the base can drive
     /// it, and returns whether they are as wished.
     fn within_drive(&self, wheels: WheelSpeeds) -> (Twist, bool) {
-        let twist = self.wheels.twist(self.in_reach(self.wheels.twist(wheels)));
+        let fastest = wheels.left.abs().max(wheels.right.abs());
+        let scale = BEYOND_MPS / fastest.max(BEYOND_MPS);
+        let twist = self
+            .wheels
+            .twist(WheelSpeeds { left: wheels.left * scale, right: wheels.right * scale });
+        let twist = self.wheels.twist(self.in_reach(twist));
         let twist = match self.settings.reverse {
             false if twist.linear_mps < 0.0 => Twist { linear_mps: 0.0, ..twist },
             _ => twist,
