@@ -25,6 +25,7 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("import mot", "needs another data set"),
     ("import tpt-bench", "needs another data set"),
     ("import tum", "needs another data set"),
+    ("run configs/onnx.toml", "needs a network of the user"),
     ("yolox_s.onnx", "needs a network of the user"),
     ("people.toml", "needs a network of the user"),
     ("every-third", "needs a network that a script of Python makes"),
@@ -50,8 +51,8 @@ const LEFT_OUT: &[(&str, &str)] = &[
 /// Contents of each folder: a short log, a folder of logs, and one of images.
 const PROPS: &[&str] = &[
     "simulate configs/scenes/crossing.toml --set duration_s=3 -o LOG.mcap",
-    "simulate configs/scenes/crossing.toml --set duration_s=3 -o logs/drawn.mcap",
-    "simulate configs/scenes/crossing.toml --set duration_s=3 -o LOGS/drawn.mcap",
+    "simulate configs/scenes/crossing.toml --set duration_s=3 -o logs/short.mcap",
+    "simulate configs/scenes/crossing.toml --set duration_s=3 -o LOGS/short.mcap",
     "simulate configs/scenes/crossing.toml --gallery FOLDER",
 ];
 

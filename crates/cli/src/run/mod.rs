@@ -409,7 +409,7 @@ fn without_model(report: &RunReport) -> Option<String> {
     let remedy = remedies::of(NO_MODEL).filter(|_| lacks && report.persons.is_empty())?;
     let (name, key) = (&report.config.name, remedy.settings.join(", "));
     Some(format!(
-        "{name}: a detector has no model (`{key}`), so nobody was detected: {}",
+        "{name}: a detector has no model (`{key}`), so no person was detected: {}",
         remedy.look
     ))
 }
