@@ -11,7 +11,7 @@ use tagalong_config::Registry;
 use tagalong_core::{EgoMotion, Frame, Images, LaserScan, RightImage, Stamp, TrackId};
 use tagalong_geometry::Camera;
 use tagalong_log::odometry::{PoseBuffer, unknown_motion};
-use tagalong_pipeline::{FrameReport, Pipeline, Sources};
+use tagalong_pipeline::{Choice, Enrollment, FrameReport, Pipeline, Sources};
 
 use crate::arrays;
 use crate::camera::{PyCamera, blind};
@@ -140,10 +140,11 @@ impl PyPipeline {
         Ok(self.work()?.pipeline.command_at(now).map(PyCommand))
     }
 
-    /// Follows the person of this track from the next frame on.
+    /// Follows the person of this track; `ValueError` without a controller, or without such a track in
+    /// the last frame.
     fn choose_target(&self, track: u32) -> PyResult<()> {
-        self.work()?.pipeline.choose_target(TrackId(track));
-        Ok(())
+        let person = Enrollment::of(Choice::Track(TrackId(track)));
+        self.work()?.pipeline.enroll(&person).map_err(wrong)
     }
 
     /// Stops the robot until `arm`.

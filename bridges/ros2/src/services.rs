@@ -238,7 +238,7 @@ mod tests {
         let patience = parameter("lose_after_s", 3, |value| value.double_value = 3.5);
         let give_up = parameter("give_up_s", 2, |value| value.int_value = 30);
         let of = |parameters: &[Parameter]| enrollment(parameters).unwrap();
-        assert_eq!(of(&[nearest.clone()]), Enrollment::of(Choice::Nearest));
+        assert_eq!(of(std::slice::from_ref(&nearest)), Enrollment::of(Choice::Nearest));
         assert_eq!(of(&[point]).person, Choice::Point([320.0, 240.5]));
         assert_eq!(of(&[pixels]).person, Choice::Point([320.0, 240.0]));
         let all = of(&[search, patience, track.clone(), give_up.clone()]);
