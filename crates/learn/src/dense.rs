@@ -1,11 +1,8 @@
-//! Algebra of large matrices for trainers, by `faer` and on one thread, so that a fit has the same
-//! bytes on any number of them. Processors with other vector instructions may round otherwise,
-//! which is why pipelines do without it. Small matrices of fixed size are `nalgebra`'s.
+//! Algebra of large matrices for trainers, on one thread, so that a fit has the same bytes on any
+//! number of them. Processors with other vector instructions may round otherwise, which is why
+//! pipelines do without it.
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{Llt, Solve};
-use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector};
 
 /// Normal equations of a least-squares fit, of which only the penalties and the right side change
 /// between solutions.
@@ -21,17 +18,14 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Clone, Debug)]
 pub struct NormalEquations {
     /// Products of the columns.
-    gram: Mat<f64>,
+    gram: DMatrix<f64>,
 }
 
 impl NormalEquations {
     /// Multiplies the columns of the design matrix, which has a row for each sample.
     pub fn new(rows: &DMatrix<f64>) -> Self {
-        let (count, columns) = rows.shape();
-        let design = MatRef::from_column_major_slice(rows.as_slice(), count, columns);
-        let mut gram = Mat::zeros(columns, columns);
-        matmul(&mut gram, Accum::Replace, design.transpose(), design, 1.0, Par::Seq);
-        Self { gram }
+        // `tr_mul` would take the scalar products one by one.
+        Self { gram: rows.transpose() * rows }
     }
 
     /// Returns the weights that minimise the squared errors plus, for each weight, its penalty
@@ -42,10 +36,7 @@ impl NormalEquations {
         for (i, penalty) in penalties.iter().enumerate() {
             normal[(i, i)] += penalty;
         }
-        let factors = Llt::new(normal.as_ref(), Side::Lower).ok()?;
-        let solved =
-            factors.solve(MatRef::from_column_major_slice(right.as_slice(), right.len(), 1));
-        let weights = DVector::from_iterator(right.len(), solved.col(0).iter().copied());
+        let weights = Cholesky::new(normal)?.solve(right);
         weights.iter().all(|weight| weight.is_finite()).then_some(weights)
     }
 }
@@ -53,13 +44,10 @@ impl NormalEquations {
 /// Returns the scalar products of all pairs of vectors, a row for each of `a` and a column for each
 /// of `b`. Both hold one vector of `length` numbers after the other.
 pub fn scalar_products(a: &[f32], b: &[f32], length: usize) -> Vec<f32> {
-    let (rows, columns) = (a.len() / length, b.len() / length);
-    let left = MatRef::from_row_major_slice(&a[..rows * length], rows, length);
-    let right = MatRef::from_row_major_slice(&b[..columns * length], columns, length);
-    let mut products = vec![0.0; rows * columns];
-    let out = MatMut::from_row_major_slice_mut(&mut products, rows, columns);
-    matmul(out, Accum::Replace, left, right.transpose(), 1.0, Par::Seq);
-    products
+    let vectors = |of| DMatrixView::from_slice(of, length, of.len() / length);
+    // A matrix lies column after column, so this one holds the products with each of `a` in turn.
+    let products: DMatrix<f32> = vectors(b).transpose() * vectors(a);
+    products.data.into()
 }
 
 #[cfg(test)]
@@ -71,7 +59,7 @@ mod tests {
         crate::mix(seed as u64) as f64 / u64::MAX as f64 * 2.0 - 1.0
     }
 
-    /// The slow reference: the equations written out, and solved by `nalgebra`.
+    /// The slow reference: the equations written out, and solved by another factorisation.
     #[test]
     fn weights_are_those_of_the_normal_equations() {
         let rows = DMatrix::from_fn(50, 7, |row, column| number(row * 7 + column));

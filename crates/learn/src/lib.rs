@@ -13,7 +13,6 @@ mod adam;
 pub mod boost;
 mod calibrate;
 pub mod conv;
-#[cfg(feature = "dense")]
 pub mod dense;
 mod folds;
 mod held_out;

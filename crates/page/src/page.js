@@ -483,7 +483,7 @@
 
   const events = data.runs.flatMap((run, number) => run.events.map((event) => ({ ...event, run: number })))
     .sort((a, b) => a.i - b.i || a.run - b.run);
-  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", target: "◎", lock: "⚿", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
+  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", target: "◎", lock: "◆", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
   const BAD = ["missed", "switched", "wrong person", "false track"];
   const hiddenKinds = new Set();
   const knownKinds = new Set();
