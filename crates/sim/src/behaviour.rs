@@ -3,7 +3,7 @@
 
 use nalgebra::{Point2, Rotation2, Vector2};
 
-use crate::body::Stance;
+use crate::body::{Stance, feet_ahead_m};
 use crate::gait::Gait;
 use crate::person::Person;
 use crate::scene::{AtEnd, PersonSettings, Posture, Trick};
@@ -35,6 +35,9 @@ const ROUND_RAD: f64 = 1.4;
 const BEND_EVERY_S: f64 = 6.0;
 const BEND_RAD: f64 = 1.1;
 const BEND_TAKES_S: f64 = 0.4;
+/// Time in which a seated person gets up, s, and the bend of their trunk on the way, rad.
+const GETS_UP_S: f64 = 1.8;
+const GETS_UP_BEND_RAD: f64 = 0.7;
 /// Speed below which a walker counts as standing and leaves the avoiding to the others, m/s.
 const STANDS_MPS: f64 = 0.1;
 /// Companions come no nearer to each other than about this, m.
@@ -100,8 +103,11 @@ impl Walker {
         let points: Vec<Point2<f64>> = settings.path.iter().map(|p| Point2::from(*p)).collect();
         let way = points.get(1).map_or(Vector2::x(), |next| next - points[0]);
         let heading_rad = settings.heading_deg.map_or(way.y.atan2(way.x), f64::to_radians);
-        let stance =
-            Stance { posture: settings.posture, ..Stance::standing(points[0], heading_rad) };
+        let stance = Stance {
+            posture: settings.posture,
+            seated: if settings.posture == Posture::Seated { 1.0 } else { 0.0 },
+            ..Stance::standing(points[0], heading_rad)
+        };
         let waits_until_s = settings.start_s.max(settings.enters_s);
         Self {
             person,
@@ -180,6 +186,7 @@ impl Walker {
         if wanted != Vector2::zeros() || self.stance.speed_mps > STANDS_MPS {
             self.stay_outside(obstacles);
         }
+        self.get_up(now_s);
         self.turn(dt, lead);
         self.stride(dt);
         self.bend(now_s, dt);
@@ -230,11 +237,25 @@ impl Walker {
         (lead.velocity + gap / CATCH_UP_S).cap_magnitude(1.3 * self.settings.speed_mps)
     }
 
+    /// Rises from the seat in time for the way; the feet stay where they are.
+    fn get_up(&mut self, now_s: f64) {
+        if self.settings.path.len() < 2 || self.stance.seated == 0.0 {
+            return;
+        }
+        let left = ((self.waits_until_s - now_s) / GETS_UP_S).clamp(0.0, 1.0);
+        let seated = left.min(self.stance.seated);
+        let ahead_m = |seated| feet_ahead_m(&self.person.build, seated);
+        let heading = Rotation2::new(self.stance.heading_rad) * Vector2::x();
+        self.stance.place += heading * (ahead_m(self.stance.seated) - ahead_m(seated));
+        self.stance.seated = seated;
+    }
+
     fn bend(&mut self, now_s: f64, dt: f64) {
         let down = self.settings.posture == Posture::Bending
             && self.stance.speed_mps < 0.1
             && now_s.rem_euclid(BEND_EVERY_S) > 0.5 * BEND_EVERY_S;
-        let goal = if down { BEND_RAD } else { 0.0 };
+        let rising = 4.0 * self.stance.seated * (1.0 - self.stance.seated);
+        let goal = if down { BEND_RAD } else { GETS_UP_BEND_RAD * rising };
         self.stance.bend_rad += (goal - self.stance.bend_rad) * (dt / BEND_TAKES_S).min(1.0);
     }
 
@@ -302,14 +323,14 @@ impl Walker {
     }
 
     fn turn(&mut self, dt: f64, lead: Option<&Lead>) {
-        let v = self.velocity;
+        let (v, seated) = (self.velocity, self.stance.seated > 0.0);
         if let Some(lead) = lead.filter(|_| self.stance.speed_mps < 0.4) {
             self.turn_to(lead.heading_rad, dt);
         } else if self.stance.speed_mps > 0.08 {
             self.turn_to(v.y.atan2(v.x), dt);
         } else if self.settings.spin_deg_per_s != 0.0 {
             self.stance.heading_rad += self.settings.spin_deg_per_s.to_radians() * dt;
-        } else if let Some(goal) = self.settings.path.get(self.ahead) {
+        } else if let Some(goal) = self.settings.path.get(self.ahead).filter(|_| !seated) {
             let way = Point2::from(*goal) - self.stance.place;
             self.turn_to(way.y.atan2(way.x), dt);
         }
@@ -428,6 +449,29 @@ mod tests {
         walk(&mut walkers, 12.0, |w| fastest = fastest.max(w[0].stance.speed_mps));
         assert!((walkers[0].stance.place - Point2::new(4.0, 3.0)).norm() < 0.3);
         assert!(walkers[0].stance.speed_mps < 0.02 && (fastest - 1.1).abs() < 0.1, "{fastest}");
+    }
+
+    #[test]
+    fn a_seated_person_gets_up_and_walks() {
+        let settings = PersonSettings {
+            path: vec![[1.0, 1.0], [4.0, 1.0]],
+            posture: Posture::Seated,
+            start_s: 4.0,
+            ..PersonSettings::default()
+        };
+        let mut walkers = [Walker::new(Person::subject(1), settings)];
+        let feet_m = |w: &Walker| w.stance.place.x + feet_ahead_m(&w.person.build, w.stance.seated);
+        let on_chair_m = feet_m(&walkers[0]);
+        walk(&mut walkers, 2.0, |w| assert_eq!(w[0].stance.seated, 1.0));
+        let mut lean_rad = 0f64;
+        walk(&mut walkers, 4.0, |w| {
+            assert!((feet_m(&w[0]) - on_chair_m).abs() < 1e-9);
+            lean_rad = lean_rad.max(w[0].stance.bend_rad);
+        });
+        assert!(walkers[0].stance.seated < 0.02 && lean_rad > 0.4, "{lean_rad}");
+        walk(&mut walkers, 8.0, |_| {});
+        assert_eq!(walkers[0].stance.seated, 0.0);
+        assert!((walkers[0].stance.place.x - 4.0).abs() < 0.3);
     }
 
     #[test]

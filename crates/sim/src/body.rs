@@ -66,6 +66,8 @@ pub struct Stance {
     pub phase: f64,
     /// Posture of the body.
     pub posture: Posture,
+    /// Part of the way down to a seat: 0 stands, 1 sits.
+    pub seated: f64,
     /// Forward bend of the trunk in addition to that of walking, rad.
     pub bend_rad: f64,
 }
@@ -74,7 +76,7 @@ impl Stance {
     /// Creates an upright person.
     pub fn standing(place: Point2<f64>, heading_rad: f64) -> Self {
         let posture = Posture::Upright;
-        Self { place, heading_rad, speed_mps: 0.0, phase: 0.0, posture, bend_rad: 0.0 }
+        Self { place, heading_rad, speed_mps: 0.0, phase: 0.0, posture, seated: 0.0, bend_rad: 0.0 }
     }
 }
 
@@ -83,6 +85,8 @@ impl Stance {
 pub struct Skeleton {
     /// Posture of the body.
     pub posture: Posture,
+    /// Part of the way down to a seat.
+    pub seated: f64,
     /// Middle between the hip joints.
     pub pelvis: Point3<f64>,
     /// Middle between the shoulder joints.
@@ -129,13 +133,14 @@ impl Skeleton {
         let ground = Point3::new(stance.place.x, stance.place.y, 0.0);
         // A bending person pushes the hips back to keep the balance.
         let back = 0.12 * h * bend.sin();
-        let height = hip_height(stance.posture) * h + motion.up_m;
+        let height = hip_height(stance.seated) * h + motion.up_m;
         let pelvis = ground + yaw * Vector3::new(motion.forward_m - back, motion.left_m, height);
         let chest = pelvis + thorax_turn * Vector3::new(0.0, 0.0, TORSO * h);
         let neck = yaw * about_y(0.8 * bend + 0.3 * nod_rad(stance));
         let head = chest + neck * Vector3::new(0.01 * h, 0.0, (NECK + 0.5 * HEAD) * h);
         let mut skeleton = Self {
             posture: stance.posture,
+            seated: stance.seated,
             pelvis,
             chest,
             head,
@@ -205,12 +210,14 @@ impl Skeleton {
     }
 }
 
-/// Height of the hips as a fraction of the body height.
-fn hip_height(posture: Posture) -> f64 {
-    match posture {
-        Posture::Seated => ANKLE + SHANK + THIGH * SEATED.hip.cos(),
-        _ => ANKLE + SHANK + THIGH,
-    }
+/// Height of the hips as a fraction of the body height; the shanks stay upright.
+fn hip_height(seated: f64) -> f64 {
+    ANKLE + SHANK + THIGH * (seated * SEATED.hip).cos()
+}
+
+/// Returns how far the feet are ahead of the hips, m.
+pub fn feet_ahead_m(build: &Build, seated: f64) -> f64 {
+    THIGH * build.height_m * (seated * SEATED.hip).sin()
 }
 
 /// Returns the angle by which the face looks down.
@@ -223,13 +230,13 @@ fn nod_rad(stance: &Stance) -> f64 {
 fn held(walking: LimbAngles, side: usize, stance: &Stance) -> LimbAngles {
     // Arms hang down from a trunk that is bent.
     let hanging = LimbAngles { shoulder: walking.shoulder + 1.2 * stance.bend_rad, ..walking };
-    match stance.posture {
-        Posture::Seated => SEATED,
+    let upright = match stance.posture {
         Posture::Phone if side == 1 => {
             LimbAngles { shoulder: PHONE_ARM.0, elbow: PHONE_ARM.1, ..hanging }
         }
         _ => hanging,
-    }
+    };
+    upright.mix(&SEATED, stance.seated)
 }
 
 /// Knee and ankle (ahead of the hip, below it) of a leg whose ankle shall be
@@ -319,7 +326,7 @@ mod tests {
     #[test]
     fn who_sits_or_bends_has_a_low_head() {
         let build = Build { height_m: 1.70, breadth: 1.0 };
-        let sits = Stance { posture: Posture::Seated, ..stance(0.0, 0.0) };
+        let sits = Stance { seated: 1.0, ..stance(0.0, 0.0) };
         let s = Skeleton::new(&build, &sits);
         assert!((1.05..1.30).contains(&s.head.z), "{}", s.head.z);
         assert!((0.40..0.55).contains(&s.knees[0].z) && s.ankles[0].z > 0.05);

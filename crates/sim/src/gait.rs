@@ -49,6 +49,21 @@ pub struct LimbAngles {
     pub elbow: f64,
 }
 
+impl LimbAngles {
+    /// Returns angles a part of the way from these to others.
+    pub fn mix(&self, others: &Self, part: f64) -> Self {
+        // Exact at both ends.
+        let mix = |from: f64, to: f64| from * (1.0 - part) + to * part;
+        Self {
+            hip: mix(self.hip, others.hip),
+            knee: mix(self.knee, others.knee),
+            ankle: mix(self.ankle, others.ankle),
+            shoulder: mix(self.shoulder, others.shoulder),
+            elbow: mix(self.elbow, others.elbow),
+        }
+    }
+}
+
 impl Gait {
     /// The gait of a body `height_m` tall at `speed_mps`, at rest if zero. The
     /// model ends at 2.3 leg lengths per second; faster bodies move like that.

@@ -248,7 +248,7 @@ impl Drawing<'_> {
         let upper = self.s.pelvis + Vector3::new(0.0, 0.0, 0.06 * h);
         let hem = self.s.pelvis - Vector3::new(0.0, 0.0, 0.13 * h);
         self.ellipsoid(upper, turn, Vector3::new(0.078 * h, 0.108 * w, 0.16 * h), self.look.top);
-        if self.s.posture == Posture::Seated {
+        if self.s.seated > 0.5 {
             return;
         }
         for sign in [1.0, -1.0] {

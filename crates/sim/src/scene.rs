@@ -545,7 +545,7 @@ pub enum Posture {
     Upright,
     /// Looks down at a phone while standing and walking.
     Phone,
-    /// Sits on a chair all the time, at the first point of the path.
+    /// Sits on a chair at the first point of the path; with more points, gets up by `start_s`.
     Seated,
     /// Bends down now and then while standing.
     Bending,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 48] = [
+const BUILT_IN: [(&str, &str); 49] = [
     ("cafeteria", include_str!("../../../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../../../configs/scenes/cafeteria-high.toml")),
     ("corridor", include_str!("../../../configs/scenes/corridor.toml")),
@@ -28,6 +28,7 @@ const BUILT_IN: [(&str, &str); 48] = [
     ("follow-doors", include_str!("../../../configs/scenes/follow-doors.toml")),
     ("follow-dropped", include_str!("../../../configs/scenes/follow-dropped.toml")),
     ("follow-fast", include_str!("../../../configs/scenes/follow-fast.toml")),
+    ("follow-gets-up", include_str!("../../../configs/scenes/follow-gets-up.toml")),
     ("follow-latency", include_str!("../../../configs/scenes/follow-latency.toml")),
     ("follow-passing", include_str!("../../../configs/scenes/follow-passing.toml")),
     ("follow-return-15", include_str!("../../../configs/scenes/follow-return-15.toml")),
