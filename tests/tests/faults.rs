@@ -50,6 +50,8 @@ struct Fault {
     skew_s: f64,
     /// True if every second depth image is missing.
     half_depth: bool,
+    /// Image from which on the camera has another calibration.
+    zoomed_from: Option<usize>,
     /// Largest delay of recording after the stamp, which changes the order of messages, s.
     delay_s: f64,
 }
@@ -84,6 +86,9 @@ fn record(camera: &Camera, shots: &[Shot], fault: Fault) -> Recorded {
     // A log holds its messages in the order of recording.
     images.sort_by_key(|(recorded, ..)| *recorded);
     for (recorded, stamp, shot, is_depth) in images {
+        if fault.zoomed_from.is_some_and(|from| stamp == at(from)) {
+            log.send("/camera/camera_info", recorded, &zoomed(camera, stamp)).unwrap();
+        }
         send(&mut log, recorded, stamp, &shot.images, is_depth);
     }
     log.finish().unwrap();
@@ -108,6 +113,13 @@ fn info(camera: &Camera) -> CameraInfo {
     let Lens::Pinhole(lens) = camera.lens else { panic!("a pinhole camera") };
     let size = (camera.width, camera.height);
     CameraInfo::of_lens(&Header::new(at(0), "camera"), &lens, size, 0.0)
+}
+
+/// Returns the calibration of a lens of another focal length.
+fn zoomed(camera: &Camera, stamp: Stamp) -> CameraInfo {
+    let mut info = CameraInfo { header: Header::new(stamp, "camera"), ..info(camera) };
+    info.k[0] *= 1.2;
+    info
 }
 
 /// Result of a run over a log: stamps with tracks, and the number of colour and depth images
@@ -168,6 +180,22 @@ fn t5_depth_at_half_rate_halves_the_frames_and_nothing_else() {
     assert_eq!((run.colour_alone, run.depth_alone), (shots.len() as u64 / 2, 0));
     let confirmed = |tracks: &[Track]| tracks.iter().filter(|t| t.confirmed && t.seen).count();
     assert_eq!(confirmed(&run.tracks.last().unwrap().1), 1);
+}
+
+#[test]
+fn c1_another_calibration_in_a_log_freezes_the_tracks() {
+    let (camera, shots) = shots();
+    let from = shots.len() / 2;
+    let run = run(&record(&camera, &shots, Fault { zoomed_from: Some(from), ..Fault::default() }));
+    let places = |tracks: &[Track]| -> Vec<_> {
+        tracks.iter().map(|track| (track.id, track.estimate.person.position)).collect()
+    };
+    let (before, after) = run.tracks.split_at(from);
+    let last = places(&before.last().unwrap().1);
+    assert!(!last.is_empty() && after.len() == shots.len() - from);
+    for (_, tracks) in after {
+        assert!(places(tracks) == last && tracks.iter().all(|track| !track.seen), "{tracks:?}");
+    }
 }
 
 fn frame(camera: &Arc<Camera>, index: usize, images: Images) -> Frame {
@@ -272,8 +300,7 @@ fn s2_noise_breaks_nothing_and_its_cost_in_recall_is_known() {
     let recalls = SPOILT.map(|spoilt| recall("depth-ekf.toml", &camera, &shots, &spoilt));
     let [clean, holes, salt, white, black] = recalls;
     assert!(clean > 0.9, "{recalls:?}");
-    // A weakness, not a wish: its silhouettes need runs of valid pixels.
-    assert_eq!((holes, salt), (0.0, 0.0), "better than the table of faults says");
+    assert!(holes > 0.9 && salt > 0.9, "{recalls:?}");
     // The detector of this config reads depth alone.
     assert_eq!((clean, clean), (white, black));
     // Pipelines that read colour may lose the person, and nothing else.

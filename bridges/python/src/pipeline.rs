@@ -118,9 +118,6 @@ impl PyPipeline {
             if frame.odom_jumped {
                 work.pipeline.disarm("odometry jumped");
             }
-            if frame.calibration_changed {
-                work.pipeline.disarm("the calibration changed");
-            }
             work.pipeline.step(&frame.frame).map_err(failed)
         })?;
         PyReport::new(py, report, &frame.frame.camera)

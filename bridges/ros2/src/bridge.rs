@@ -116,7 +116,6 @@ pub fn run_with(
     let clock = Arc::new(StampClock::new(options.clock));
     let started = start(options, &setup, &mut network, &inbox, &clock, stop, tell)?;
     let Some((source, ears)) = started else { return Ok(Summary::default()) };
-    source.notes().iter().for_each(|note| tell(note));
     let callers = Callers { desk, requests };
     let mut bridge = Bridge::new(options, setup, source, network, inbox, clock, callers)?;
     bridge.live = live;
@@ -234,6 +233,8 @@ struct Bridge {
     max_speed_mps: f64,
     /// Last permission that was told.
     told: Option<Permission>,
+    /// Number of notes of the source that were told.
+    noted: usize,
     /// Number of other publishers of commands that was told.
     rivals: usize,
     looked: Instant,
@@ -299,6 +300,7 @@ impl Bridge {
             callers,
             out,
             told: None,
+            noted: 0,
             rivals: 0,
             looked: Instant::now(),
             beat: None,
@@ -408,13 +410,15 @@ impl Bridge {
         Err(BridgeError::Calibration(topic))
     }
 
-    /// Tells changes of the permission to move and other publishers of commands, and publishes the
-    /// heartbeat.
+    /// Tells notes of the source, changes of the permission to move and other publishers of
+    /// commands, and publishes the heartbeat.
     fn report_state(&mut self, tell: &dyn Fn(&str)) {
         if self.beat.is_some_and(|beat| beat.elapsed() < BEAT) {
             return;
         }
         self.beat = Some(Instant::now());
+        self.source.notes().iter().skip(self.noted).for_each(|note| tell(note));
+        self.noted = self.source.notes().len();
         let permission = self.wheels.as_ref().map(|wheels| wheels.switch().permission());
         if let Some(permission) = permission.filter(|now| Some(*now) != self.told) {
             tell(&format!("{}{}", permission.cause(), self.remedy(permission)));

@@ -10,12 +10,13 @@ use tagalong_log::msgs::Header;
 use tagalong_pipeline::Permission;
 
 use crate::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::skill::STUCK;
 use crate::stamps::StampClock;
 
 /// Time between two messages.
 const EACH: Duration = Duration::from_secs(1);
-/// Time in one frame, or without one, from which on it is an error.
-const STUCK: Duration = Duration::from_secs(1);
+/// Time without a frame from which on the state is stale.
+const STALE_AFTER: Duration = Duration::from_secs(1);
 
 const OK: u8 = 0;
 const WARN: u8 = 1;
@@ -113,7 +114,7 @@ impl Status {
         if let Some(fault) = self.fault {
             return (ERROR, format!("fault: {fault}"));
         }
-        if now.saturating_duration_since(self.heard) > STUCK {
+        if now.saturating_duration_since(self.heard) > STALE_AFTER {
             return (STALE, "no frames".into());
         }
         match self.permission {
@@ -153,6 +154,7 @@ mod tests {
         let fault = Status { fault: Some("odometry jumped"), permission: latched, ..well };
         assert_eq!(worst(fault), (ERROR, "fault: odometry jumped".into()));
         let stuck = Status { frame_since: Some(now), ..well };
+        assert_eq!(stuck.worst(now + Duration::from_millis(501)).0, ERROR);
         assert_eq!(
             stuck.worst(now + Duration::from_secs(3)),
             (ERROR, "one frame takes 3.0 s".into())

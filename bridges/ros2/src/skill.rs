@@ -18,6 +18,8 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const WAITING: usize = 16;
 /// Time without a frame from which on the bridge is not well.
 const SILENCE: Duration = Duration::from_secs(2);
+/// Time in one frame from which on the pipeline is stuck.
+pub(crate) const STUCK: Duration = Duration::from_millis(500);
 
 /// Change that a caller asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,6 +105,8 @@ struct Shared {
     permission: Option<Permission>,
     frames: u64,
     frame: Option<Instant>,
+    /// End of the last turn of the loop, which takes one frame.
+    turn: Option<Instant>,
     /// True once the pipeline takes requests.
     is_open: bool,
 }
@@ -128,7 +132,7 @@ impl Desk {
     /// Sets the state after a turn of the loop, and after a request.
     pub(crate) fn turn(&self, permission: Option<Permission>, fault: Option<&'static str>) {
         let mut shared = self.lock();
-        shared.permission = permission;
+        (shared.permission, shared.turn) = (permission, Some(Instant::now()));
         if let Some(follow) = &mut shared.follow {
             follow.fault = fault;
         }
@@ -165,12 +169,14 @@ impl Desk {
     pub(crate) fn health(&self) -> Health {
         let shared = self.lock();
         let fault = shared.follow.as_ref().and_then(|follow| follow.fault);
-        let reason = match (shared.frame, fault) {
-            (None, _) => Some("no frame yet".to_owned()),
-            (Some(at), _) if at.elapsed() > SILENCE => {
+        let stuck = shared.turn.map(|at| at.elapsed()).filter(|since| *since > STUCK);
+        let reason = match (stuck, shared.frame, fault) {
+            (Some(since), ..) => Some(format!("one frame takes {:.1} s", since.as_secs_f64())),
+            (_, None, _) => Some("no frame yet".to_owned()),
+            (_, Some(at), _) if at.elapsed() > SILENCE => {
                 Some(format!("no frame for {:.1} s", at.elapsed().as_secs_f64()))
             }
-            (_, Some(fault)) => Some(format!("fault: {fault}")),
+            (.., Some(fault)) => Some(format!("fault: {fault}")),
             _ => None,
         };
         Health { ok: reason.is_none(), reason }
@@ -222,7 +228,10 @@ mod tests {
         desk.turn(Some(Permission::NotEnabled), None);
         assert_eq!(desk.health(), Health { ok: true, reason: None });
         assert_eq!(desk.status().permission, Some("not enabled"));
-        thread::sleep(SILENCE + Duration::from_millis(50));
+        thread::sleep(STUCK + Duration::from_millis(50));
+        assert!(desk.health().reason.unwrap().starts_with("one frame takes 0."), "stuck");
+        thread::sleep(SILENCE - STUCK);
+        desk.turn(Some(Permission::NotEnabled), None);
         assert!(desk.health().reason.unwrap().starts_with("no frame for 2."));
     }
 }

@@ -68,13 +68,21 @@ impl From<WriteError> for Failure {
     /// Converts the error of writing results: a full disk is told as one, whenever it happens.
     fn from(error: WriteError) -> Self {
         match error {
-            full if full.is_disk_full() => Self::failed(format!(
-                "the disk is full: {full}; make room, or take another with -o"
-            )),
+            full if full.is_disk_full() => disk_full(full),
             refusal if refusal.is_refusal() => Self::usage(refusal),
             failed => Self::failed(failed),
         }
     }
+}
+
+/// Returns the failure of a full disk: the same words and code wherever it fills.
+fn disk_full(what: impl Display) -> Failure {
+    Failure::failed(format!("the disk is full: {what}; make room, or choose another"))
+}
+
+/// Returns true for an error of a disk without room.
+fn is_full(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded)
 }
 
 /// Returns the failure of an output that cannot be made: the user may choose another (exit code 2),
@@ -103,12 +111,22 @@ pub type Outcome = Result<Ended, Failure>;
 /// A folder that cannot be made there is the user's to change: exit code 2.
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|error| {
-        let shown = folder.display();
-        if error.kind() == io::ErrorKind::StorageFull {
-            return Failure::failed(format!("the disk is full: cannot make the folder {shown}"));
+        let why = format!("cannot make the folder {}: {error}", folder.display());
+        match is_full(&error) {
+            true => disk_full(why),
+            false => Failure::usage(format!("{why}; choose another with -o")),
         }
-        Failure::usage(format!("cannot make the folder {shown}: {error}; choose another with -o"))
     })
+}
+
+/// Writes a whole file, and makes its folder.
+///
+/// # Errors
+/// As for [`make_folder`]; a file that cannot be written: exit code 1.
+pub fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+    make_room_for(path)?;
+    let failed = |source| WriteError::Io { path: path.to_owned(), source };
+    std::fs::write(path, content).map_err(|source| failed(source).into())
 }
 
 /// Makes the parent folder of a file.
@@ -160,6 +178,7 @@ pub fn print(text: &str) -> Result<(), Failure> {
         .and_then(|()| io::Write::flush(&mut out));
     written.map_err(|error| match error.kind() {
         io::ErrorKind::BrokenPipe => Failure::nobody_listens(),
+        _ if is_full(&error) => disk_full(format!("cannot write to stdout: {error}")),
         _ => Failure::failed(format!("cannot write to stdout: {error}")),
     })
 }
@@ -186,6 +205,8 @@ mod tests {
         assert!(
             early.message.contains("the disk is full") && early.message.contains("out/tracks.mcap")
         );
+        let printed = disk_full("cannot write out/tracks.mcap: no storage space");
+        assert_eq!(early, printed, "a folder, a file and stdout have the same words");
         let denied = refused(error(io::ErrorKind::PermissionDenied));
         assert_eq!(denied.code, 2, "another folder helps");
         assert_eq!(Failure::from(error(io::ErrorKind::BrokenPipe)).code, 1);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use tagalong_app::outcome::{Failure, make_room_for};
+use tagalong_app::outcome::{Failure, write_file};
 use tagalong_config::{FileLimit, read_bytes, read_text};
 use tagalong_eval::Sequence;
 use tagalong_report::{TaskResult, TaskTiming};
@@ -145,9 +145,8 @@ fn timing_name(hash: &str) -> String {
 /// A disk that fails.
 pub fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let failed = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
-    make_room_for(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(format!("{name}.{}.partial", std::process::id()));
-    fs::write(&partial, bytes).map_err(failed)?;
+    write_file(&partial, bytes)?;
     fs::rename(&partial, path).map_err(failed)
 }

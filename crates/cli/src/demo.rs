@@ -1,11 +1,10 @@
 //! `tagalong demo`: every step from a scene to a report, without an input file.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tagalong_app::format::Format;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
 use tagalong_benchmark::{BenchArgs, bench};
@@ -75,14 +74,12 @@ fn draw(folder: &Path, seed: Option<u64>) -> Result<PathBuf, Failure> {
     let log = folder.join("demo.mcap");
     make_folder(folder)?;
     put(&folder.join("demo-scene.toml"), SCENE)?;
-    record(Simulation::new(&scene, threads(None)), &scene, &log, &|| true)
-        .map_err(Failure::failed)?;
+    record(Simulation::new(&scene, threads(None)), &scene, &log, &|| true)?;
     Ok(log)
 }
 
 fn put(path: &Path, text: &str) -> Result<PathBuf, Failure> {
-    fs::write(path, text)
-        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))?;
+    write_file(path, text)?;
     Ok(path.to_owned())
 }
 

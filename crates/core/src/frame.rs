@@ -99,6 +99,9 @@ pub struct Frame {
     pub camera: Arc<Camera>,
     /// The robot's motion since the previous frame.
     pub motion: EgoMotion,
+    /// True if the camera was calibrated anew since the first frame, while `camera` stayed as it was:
+    /// positions from the images are wrong.
+    pub calibration_changed: bool,
     sensors: Sensors,
     grey: OnceLock<Arc<GreyImage>>,
     derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
@@ -126,7 +129,13 @@ impl Frame {
         sensors: Sensors,
     ) -> Self {
         let (grey, derived) = (OnceLock::new(), Mutex::default());
-        Self { index, stamp, camera, motion, sensors, grey, derived }
+        let calibration_changed = false;
+        Self { index, stamp, camera, motion, calibration_changed, sensors, grey, derived }
+    }
+
+    /// Returns the frame with [`Frame::calibration_changed`] as given.
+    pub fn with_changed_calibration(self, calibration_changed: bool) -> Self {
+        Self { calibration_changed, ..self }
     }
 
     /// Returns the frame with the data of one more sensor, in place of data of the same type.
@@ -269,6 +278,7 @@ impl Frame {
     fn of_same_moment(&self, sensors: Sensors) -> Self {
         let camera = Arc::clone(&self.camera);
         Self::of_sensors(self.index, self.stamp, camera, self.motion, sensors)
+            .with_changed_calibration(self.calibration_changed)
     }
 
     /// Returns the image of a kind, if the frame carries one.
@@ -328,7 +338,9 @@ mod tests {
     fn depth_that_is_added_leaves_the_rest() {
         let laser = LaserScan::of_points([Point3::new(1.0, 0.5, 0.2)]);
         let frame = frame(Images::default()).with_laser(Some(laser)).with_recorded(Some(vec![]));
+        let frame = frame.with_changed_calibration(true);
         let with_depth = frame.with_depth(Arc::new(DepthImage::filled(4, 4, 2.0)));
+        assert!(with_depth.calibration_changed);
         assert!(with_depth.depth().is_ok());
         assert_eq!(with_depth.laser().unwrap().points[..], [Point3::new(1.0, 0.5, 0.2)]);
         assert_eq!(with_depth.recorded().map(<[_]>::len), Some(0));

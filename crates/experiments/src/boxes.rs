@@ -4,13 +4,12 @@
 //! association is tried on thousands of frames in less than a second.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
 use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
@@ -238,9 +237,7 @@ impl Bench<'_> {
         make_folder(&folder)?;
         for (sequence, tracked) in self.sequences.iter().zip(tracked) {
             let path = folder.join(format!("{}.txt", sequence.info.name));
-            fs::write(&path, tracked.tracks.text()).map_err(|error| {
-                Failure::failed(format!("cannot write {}: {error}", path.display()))
-            })?;
+            write_file(&path, tracked.tracks.text())?;
         }
         Ok(())
     }

@@ -1,12 +1,11 @@
 //! `tagalong reproduce`: the tables of a published system beside ours.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::format::TableFormat;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
 use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
@@ -143,11 +142,7 @@ fn json(all: &[ExperimentFindings]) -> Result<String, Failure> {
 }
 
 fn write(folder: &Path, all: &[ExperimentFindings]) -> Result<(), Failure> {
-    let save = |name: &str, text: &str| {
-        let path = folder.join(name);
-        fs::write(&path, text)
-            .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
-    };
+    let save = |name: &str, text: &str| write_file(&folder.join(name), text);
     let tables = all.iter().flat_map(|found| &found.findings.tables);
     let pages: Vec<String> = tables.map(Table::markdown).collect();
     save("tables.json", &json(all)?)?;
@@ -221,7 +216,7 @@ mod tests {
         let findings = Findings { tables: vec![table], pictures: vec![picture] };
         let found = ExperimentFindings { experiment: "one", simulated: Vec::new(), findings };
         write(folder.path(), &[found]).unwrap();
-        let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+        let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         assert!(read("tables.md").contains("**A table**"));
         assert!(read("tables.json").contains("\"experiment\": \"one\""));
         assert_eq!(read("plot.svg"), "<svg/>");

@@ -26,6 +26,10 @@ pub struct Target {
 const MCAP: &[u8] = include_bytes!("../seeds/tiny.mcap");
 const BAG: &[u8] = include_bytes!("../seeds/tiny.bag");
 const DATABASE: &[u8] = include_bytes!("../seeds/tiny.db3");
+const CASCADE: &str = include_str!("../seeds/tiny-cascade.xml");
+const COLOR_TEXTURE: &str = include_str!("../../../configs/models/color-texture.toml");
+const OMNI_DISTANCE: &str = include_str!("../../../configs/models/omni-distance.toml");
+const SVM_PATCH: &str = include_str!("../../../configs/models/svm-patch.toml");
 
 /// Returns all parsers.
 pub fn targets() -> Vec<Target> {
@@ -92,7 +96,7 @@ pub fn targets() -> Vec<Target> {
             seeds: vec![include_bytes!("../../../configs/scenes/follow-passing.toml").to_vec()],
             parse: |bytes, _| as_text(bytes, |text| drop(Scene::parse(text))),
         },
-        model("cascade", include_str!("../../../configs/models/cascade.xml"), |bytes, _| {
+        model("cascade", CASCADE, |bytes, _| {
             as_text(bytes, |text| drop(tagalong_face_rgbd::Cascade::from_xml(text)));
         }),
         model("body-net", include_str!("../../../configs/models/body-net.toml"), |bytes, _| {
@@ -101,10 +105,24 @@ pub fn targets() -> Vec<Target> {
         model("depth-net", include_str!("../../../configs/models/depth-net.toml"), |bytes, _| {
             as_text(bytes, |text| drop(tagalong_depth_net::Model::from_text(text)));
         }),
-        model("hog", include_str!("../../../configs/models/hog-upper-body.toml"), |bytes, _| {
-            as_text(bytes, |text| drop(tagalong_hog_upper_body::Model::from_text(text)));
+        Target {
+            name: "hog",
+            about: "a model file",
+            seeds: vec![
+                include_bytes!("../../../configs/models/hog-upper-body.toml").to_vec(),
+                include_bytes!("../../../configs/models/hog-upper-body-linear.toml").to_vec(),
+            ],
+            parse: |bytes, _| {
+                as_text(bytes, |text| drop(tagalong_hog_upper_body::Model::from_text(text)));
+            },
+        },
+        model("color-texture", &first_trees(COLOR_TEXTURE), |bytes, _| {
+            as_text(bytes, |text| drop(tagalong_color_texture::Model::from_text(text)));
         }),
-        model("svm-patch", include_str!("../../../configs/models/svm-patch.toml"), |bytes, _| {
+        model("omni-distance", OMNI_DISTANCE, |bytes, _| {
+            as_text(bytes, |text| drop(tagalong_omni_appearance::Model::from_text(text)));
+        }),
+        model("svm-patch", &first_vectors(SVM_PATCH), |bytes, _| {
             as_text(bytes, |text| drop(tagalong_svm_patch::Model::from_text(text)));
         }),
         model("laser-legs", include_str!("../../../configs/models/laser-legs.toml"), |bytes, _| {
@@ -129,6 +147,18 @@ pub fn targets() -> Vec<Target> {
             });
         }),
     ]
+}
+
+/// Returns a model of the first trees of one, which has a tree in each line.
+fn first_trees(text: &str) -> String {
+    let lines: Vec<&str> = text.lines().take(8).collect();
+    format!("{}]\n", lines.join("\n").trim_end_matches(','))
+}
+
+/// Returns a model of the first two support vectors of one.
+fn first_vectors(text: &str) -> String {
+    let third = text.match_indices("[[vectors]]").nth(2);
+    text[..third.map_or(text.len(), |(at, _)| at)].to_owned()
 }
 
 /// Limits at which a parser that obeys them cannot take much memory or time.
@@ -206,4 +236,17 @@ fn config(bytes: &[u8], _: &Path) {
     as_text(bytes, |text| {
         REGISTRY.with(|registry| drop(Pipeline::from_toml(text, Path::new("."), registry)));
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn first_parts_of_models_are_models() {
+        assert!(tagalong_color_texture::Model::from_text(&first_trees(COLOR_TEXTURE)).is_ok());
+        assert!(tagalong_svm_patch::Model::from_text(&first_vectors(SVM_PATCH)).is_ok());
+        let cascade = tagalong_face_rgbd::Cascade::from_xml(CASCADE);
+        assert!(cascade.is_ok_and(|cascade| cascade.stages.len() == 2 && cascade.check().is_ok()));
+    }
 }

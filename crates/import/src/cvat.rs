@@ -1,12 +1,11 @@
 //! Annotations of CVAT, as its formats "CVAT for video 1.1" and "CVAT for images 1.1" export them:
 //! <https://docs.cvat.ai/docs/manual/advanced/xml_format/>.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Node, TextPos};
 use tagalong_app::format::Format;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, say, spare};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, spare, write_file};
 use tagalong_config::{FileLimit, read_text};
 use tagalong_eval::Region;
 use tagalong_eval::formats::people::Row;
@@ -31,10 +30,8 @@ pub fn import(args: &ImportArgs) -> Outcome {
     let Read { rows, note } = read(&args.path)?;
     note.iter().for_each(|note| say(note));
     let text = if args.whole_bodies { mot(&rows) } else { people_csv(&rows)? };
-    make_room_for(&output)?;
+    write_file(&output, text)?;
     let shown = output.display();
-    fs::write(&output, text)
-        .map_err(|error| Failure::failed(format!("cannot write {shown}: {error}")))?;
     let count = rows.len();
     print(&match args.format {
         Format::Json => format!("{:#}\n", serde_json::json!({ "truth": output, "boxes": count })),

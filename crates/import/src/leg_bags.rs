@@ -8,12 +8,11 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use serde::Deserialize;
 use tagalong_app::format::Format;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{LaserScan, Pose, decode};
 use tagalong_log::{Limits, LogWalker, Message};
@@ -65,10 +64,8 @@ pub fn import(args: &ImportArgs) -> Outcome {
     spare(&output, args.overwrite)?;
     let bag = read(&args.path)?;
     let (text, count) = table(&bag, args)?;
-    make_room_for(&output)?;
+    write_file(&output, text)?;
     let shown = output.display();
-    fs::write(&output, text)
-        .map_err(|error| Failure::failed(format!("cannot write {shown}: {error}")))?;
     print(&match args.format {
         Format::Json => format!("{:#}\n", serde_json::json!({ "truth": output, "people": count })),
         Format::Text => format!("{count} annotated people are in {shown}\n"),

@@ -21,7 +21,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use tagalong_app::format::Format;
-use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
+use tagalong_app::outcome::{
+    CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare, write_file,
+};
 use tagalong_app::signals::Signals;
 
 use self::sequence::Sequence;
@@ -203,9 +205,7 @@ fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
 fn beside(sequence: &Sequence, log: &Path) -> Result<(), Failure> {
     let write = |ending: &str, text: &str| {
         let path = log.with_extension(ending);
-        std::fs::write(&path, text).map_err(|error| {
-            Failure::failed(format!("cannot write {}: {error}", path.display()))
-        })?;
+        write_file(&path, text)?;
         Ok::<_, Failure>(path)
     };
     for (ending, text) in &sequence.beside {

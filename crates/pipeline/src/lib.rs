@@ -15,6 +15,7 @@
 //! | entry | dropped |
 //! |---|---|
 //! | `frame: duplicate`, `frame: out of order` | a frame, by its stamp |
+//! | `frame: calibration changed` | a frame of another calibration, and each after it; tracks stay where they were |
 //! | `odometry: ...` | a frame that shows too little to correct the wheels by |
 //! | `stereo: ...`, `stereo pixels: ...` | a stereo pair, or pixels of it, without depth |
 //! | `motion not finite` | a frame's odometry; the robot counts as standing |

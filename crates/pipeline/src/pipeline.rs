@@ -31,7 +31,8 @@ const STAGES: [&str; 9] = {
 
 impl Pipeline {
     /// Takes one frame through the pipeline. Data of the frame beyond [`Pipeline::inputs`] is
-    /// ignored.
+    /// ignored. From a frame with [`Frame::calibration_changed`] on, the tracks stay where they were
+    /// and the robot stands, also after [`Pipeline::arm`].
     ///
     /// # Errors
     /// [`StepError`] if a plugin fails or panics. The pipeline is stopped then: each further call
@@ -189,6 +190,9 @@ impl Pipeline {
     fn process(&mut self, frame: &Frame) -> Result<FrameReport, StepError> {
         let Tracked { report, completed } = self.tracker.step(frame)?;
         let mut report = FrameReport::from(report);
+        if self.tracker.is_frozen() {
+            self.disarm("the calibration changed");
+        }
         if report.outcome.is_processed() {
             let start = Instant::now();
             // Depth from a stereo pair shows obstacles, too.

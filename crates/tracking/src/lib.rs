@@ -5,6 +5,7 @@
 //! | stage | module | decided by |
 //! |---|---|---|
 //! | stamps that jump | `clock` | [`ClockSettings`] |
+//! | tracks held, once the calibration changed | `frozen` | |
 //! | depth and motion completed | `preprocess` | each [`Preprocessor`] |
 //! | tracks predicted | | the filter |
 //! | tracks searched for, image searched for new people | `search` | detectors, verifiers |
@@ -33,6 +34,7 @@
 mod clock;
 mod detections;
 mod duplicates;
+mod frozen;
 mod guarded;
 mod half_hidden;
 mod memo;

@@ -12,6 +12,7 @@ use tagalong_vision::Describer;
 use crate::clock::{Clock, Tick};
 use crate::detections::{DetectionSet, PendingDetection};
 use crate::duplicates::DuplicateFinder;
+use crate::frozen::held;
 use crate::half_hidden::inflate_half_hidden;
 use crate::memo::Identities;
 use crate::occlusion::{
@@ -63,6 +64,10 @@ pub struct Tracker {
     reidentifier: Reidentifier,
     /// The tracks after the last processed frame, in the robot frame of that time.
     last: Vec<Track>,
+    /// The same as they were reported: under the numbers of the people.
+    reported: Vec<Track>,
+    /// True since a frame whose calibration changed: the tracks stay where they were.
+    frozen: bool,
     /// Processed frames.
     frames: u64,
     visualises: bool,
@@ -100,12 +105,15 @@ impl Tracker {
             table: TrackTable::default(),
             duplicates: DuplicateFinder::default(),
             last: Vec::new(),
+            reported: Vec::new(),
+            frozen: false,
             frames: 0,
             visualises: false,
         }
     }
 
-    /// Takes one frame through all stages.
+    /// Takes one frame through all stages. From a frame with another calibration on, no plugin gets
+    /// any: the tracks stay where they were on the floor, unseen, until the clock jumps.
     ///
     /// # Errors
     /// [`StepError`] if a plugin fails or panics. The tracker cannot be used afterwards.
@@ -119,6 +127,10 @@ impl Tracker {
             }
             Tick::Go(outcome, motion) => (outcome, motion),
         };
+        self.frozen |= frame.calibration_changed;
+        if self.frozen {
+            return Ok(self.hold(frame, motion, TrackingReport { outcome, ..report }, log));
+        }
         let (completed, motion) = self.preprocess(frame, motion, &mut log)?;
         let frame = log.timed(STAGES[0], completed.as_ref().unwrap_or(frame));
         self.reset_after(outcome, frame, &mut log)?;
@@ -147,7 +159,38 @@ impl Tracker {
         report.outcome = outcome;
         let mut report = self.finish(report, detections, log);
         people.renumber(&mut report);
+        self.reported.clone_from(&report.tracks);
         Ok(Tracked { report, completed })
+    }
+
+    /// Returns true once a frame had another calibration.
+    pub fn is_frozen(&self) -> bool {
+        self.frozen
+    }
+
+    /// Reports the tracks where they were; without a known motion they end.
+    fn hold(
+        &mut self,
+        frame: &Frame,
+        motion: Option<EgoMotion>,
+        report: TrackingReport,
+        mut log: StageLog,
+    ) -> Tracked {
+        log.funnel.drop_many("frame: calibration changed", 1);
+        let before = std::mem::take(&mut self.reported);
+        match motion {
+            Some(motion) => {
+                let held = before.iter().map(|track| held(track, &motion, &frame.camera));
+                self.reported = held.collect();
+            }
+            None => log.ended = before.iter().map(|track| track.id).collect(),
+        }
+        let (tracks, StageLog { funnel, ended, .. }) = (self.reported.clone(), log);
+        let motion = motion.unwrap_or(report.motion);
+        Tracked {
+            report: TrackingReport { motion, tracks, funnel, ended, ..report },
+            completed: None,
+        }
     }
 
     /// Switches [`TrackingReport::visualisation`] on or off. Its time counts as that of the stage

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point2, Point3};
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, write_file};
 use tagalong_app::serialize::to_toml;
 use tagalong_app::threads::threads;
 use tagalong_config::{AnnotatedPerson, FileLimit, Trainer, read_text};
@@ -18,7 +18,7 @@ use tagalong_trials::Draw;
 
 use super::args::TrainArgs;
 use super::rooms::ImageTiming;
-use super::session::{Session, write};
+use super::session::Session;
 use super::wide_rooms::wide_scene;
 
 /// Name of the detector that is trained on frames.
@@ -59,10 +59,10 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
     let fitted = trainer.fit(tell).map_err(Failure::failed)?;
     session.bar.finish_and_clear();
-    write(&session.model, &fitted.model)?;
+    write_file(&session.model, &fitted.model)?;
     let path = session.model.with_extension("card.toml");
     let card = card(args, scenes, &fitted.figures)?;
-    write(&path, &card)?;
+    write_file(&path, &card)?;
     write_left_out(&session.model, &fitted.without)?;
     print(&card)?;
     say(&format!("{} and {}", session.model.display(), path.display()));
@@ -106,7 +106,7 @@ pub(super) fn room_logs() -> impl Iterator<Item = String> {
 /// # Errors
 /// A file that cannot be written: exit code 1.
 pub(super) fn write_left_out(model: &Path, left_out: &[(String, String)]) -> Result<(), Failure> {
-    left_out.iter().try_for_each(|(room, text)| write(&without(model, room), text))
+    left_out.iter().try_for_each(|(room, text)| write_file(&without(model, room), text))
 }
 
 /// Returns the path of the model that has not seen a room.

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Point3};
 use serde::Serialize;
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, write_file};
 use tagalong_config::{Example, Trainer};
 use tagalong_core::Detection;
 use tagalong_log::{LegScan, Limits, read_leg_scans};
 
 use super::leg_scenes::{self, frame};
 use super::photos::fingerprint;
-use crate::session::{Session, write};
+use crate::session::Session;
 
 /// Name of the plugin.
 pub(super) const NAME: &str = "laser-legs";
@@ -57,7 +57,7 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
     let fitted = trainer.fit(tell).map_err(Failure::failed)?;
     session.bar.finish_and_clear();
-    write(&session.model, &fitted.model)?;
+    write_file(&session.model, &fitted.model)?;
     let name = |bag: &PathBuf| {
         let name = bag.file_name().map(|name| name.to_string_lossy().into_owned());
         format!("{FOLDER}/{}", name.unwrap_or_default())
@@ -77,7 +77,7 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
          # fitted and held-out scans. Shares are of segments, at even odds.\n{text}"
     );
     let path = session.model.with_extension("card.toml");
-    write(&path, &text)?;
+    write_file(&path, &text)?;
     print(&text)?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)

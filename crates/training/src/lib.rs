@@ -25,12 +25,12 @@ mod wide_rooms;
 mod windows;
 
 pub use args::TrainArgs;
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, write_file};
 use tagalong_config::{Kind, Registry};
 use tagalong_core::Verifier;
 
 use self::card::Card;
-use self::session::{Session, write};
+use self::session::Session;
 
 /// Runs `tagalong train`.
 ///
@@ -64,7 +64,7 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
             .fit(&mut |part| session.bar.set_position((1000.0 * part) as u64))
             .map_err(Failure::failed)?;
         // Written first: the verifier loads the model from its file.
-        write(&session.model, &fitted.model)?;
+        write_file(&session.model, &fitted.model)?;
         doubter = Some(session.verifier()?);
         card.rounds.push(counts);
         card.fit = fitted.figures;
@@ -73,7 +73,7 @@ pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     card.held_out_logs = session.try_logs()?;
     session.bar.finish_and_clear();
     let path = session.model.with_extension("card.toml");
-    write(&path, &card.to_text()?)?;
+    write_file(&path, &card.to_text()?)?;
     print(&card.summary())?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)

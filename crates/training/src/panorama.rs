@@ -2,7 +2,7 @@
 //! simulated rooms with known positions.
 
 use nalgebra::Matrix3;
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, write_file};
 use tagalong_app::threads::threads;
 use tagalong_config::{Example, Trainer};
 use tagalong_core::{Detection, Frame};
@@ -10,7 +10,7 @@ use tagalong_sim::{Scene, Split, Truth, Variant};
 use tagalong_trials::Draw;
 
 use super::args::TrainArgs;
-use super::session::{Session, write};
+use super::session::Session;
 
 /// Name of the model on the command line.
 pub const NAME: &str = "omni-distance";
@@ -68,9 +68,9 @@ pub fn train(session: &Session<'_>, args: &TrainArgs) -> Outcome {
     session.tell(rooms.len() - 1, "fitting");
     let fitted = trainer.fit(&mut |_| ()).map_err(Failure::failed)?;
     session.bar.finish_and_clear();
-    write(&session.model, &fitted.model)?;
+    write_file(&session.model, &fitted.model)?;
     let card = card(args, &rooms, &fitted.figures);
-    write(&session.model.with_extension("card.toml"), &card)?;
+    write_file(&session.model.with_extension("card.toml"), &card)?;
     print(&card)?;
     say(&format!("{}", session.model.display()));
     Ok(Ended::Well)

@@ -1,4 +1,3 @@
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -296,16 +295,4 @@ fn with_value<T>(
     let span = table.span();
     let value = Spanned::new(span, toml::de::DeValue::Table(table.into_inner()));
     build(Some(value)).map_err(|error| Failure::usage(error.message))
-}
-
-/// Writes a file, and makes its folder.
-///
-/// # Errors
-/// A file that cannot be written: exit code 1.
-pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    let failed = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(failed)?;
-    }
-    fs::write(path, text).map_err(failed)
 }

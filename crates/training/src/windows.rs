@@ -5,9 +5,9 @@ use std::path::Path;
 
 use super::card::WindowCard;
 use super::photos::{Take, photos};
-use super::session::{Session, write};
+use super::session::Session;
 use super::{faces, frames};
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, write_file};
 use tagalong_config::{Example, Trainer};
 use tagalong_core::{Detection, Frame};
 
@@ -47,12 +47,12 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
     let fitted = trainer.fit(tell).map_err(Failure::failed)?;
     session.bar.finish_and_clear();
-    write(&session.model, &fitted.model)?;
+    write_file(&session.model, &fitted.model)?;
     frames::write_left_out(&session.model, &fitted.without)?;
     let path = session.model.with_extension("card.toml");
     let card = WindowCard::new(session.args, sources, shown, fitted.figures);
     let text = card.to_text()?;
-    write(&path, &text)?;
+    write_file(&path, &text)?;
     print(&text)?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)

@@ -12,11 +12,10 @@ mod pictures;
 mod recording;
 mod truth;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
 use tagalong_page::data::{PageData, RunData};
 use tagalong_page::html::{Heading, html};
 use tagalong_scoring::TruthFile;
@@ -98,10 +97,8 @@ pub fn view(args: &ViewArgs) -> Outcome {
     check_same_log(&runs)?;
     spare(&output, args.overwrite)?;
     let page = Page::of(&runs, args)?;
-    make_room_for(&output)?;
+    write_file(&output, &page.text)?;
     let shown = output.display();
-    fs::write(&output, &page.text)
-        .map_err(|error| Failure::failed(format!("cannot write {shown}: {error}")))?;
     let megabytes = page.text.len() as f64 / 1e6;
     let mut said = format!("{shown}: {} frames, {megabytes:.1} MB\n", page.frames);
     page.notes.iter().for_each(|note| said += &format!("  {note}\n"));

@@ -230,7 +230,9 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     let base = folder.join("depth-ekf.toml").canonicalize().unwrap();
     let text = format!("extends = '{}'\n[controller]\nplugin = 'stuck'\n", base.display());
     std::fs::write(&config, text).unwrap();
-    let options = Options { config: config.clone(), ..options(domain(5), "20") };
+    let address = format!("127.0.0.1:{}", 40_000 + std::process::id() % 20_000);
+    let http = Some(address.parse().unwrap());
+    let options = Options { config: config.clone(), http, ..options(domain(5), "20") };
     let (bridge, said) = bridge_with(options, registry, &stop);
     let hand = Hand::new(domain(5), &stop);
     let junk = robot.peer.publisher_of::<u8>("/odom", Odometry::TYPE, reliable());
@@ -238,11 +240,16 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     hand.let_go(&said);
     commands.wait_for_move("enabled");
 
+    assert_eq!(skill::http(&address, "GET", "healthz", "").0, 200);
+
     is_stuck.store(true, Ordering::Relaxed);
     // The command of the last frame expires a quarter of a second after its stamp.
     sleep(Duration::from_millis(250 + 100 + 300));
     let expired = Instant::now();
-    sleep(Duration::from_millis(1900));
+    sleep(Duration::from_millis(400));
+    let (code, health) = skill::http(&address, "GET", "healthz", "");
+    assert!(code == 503 && health.contains("one frame takes "), "{code} {health}");
+    sleep(Duration::from_millis(1500));
     assert!(!commands.moves_since(expired), "stuck");
     let stuck = |message: &DiagnosticStatus| {
         message.level == 2 && message.message.contains("one frame takes")

@@ -1,8 +1,7 @@
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
-use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, write_file};
 use tagalong_config::{Context, NamedTensor, Registry};
 use tagalong_core::DiffDrive;
 use toml::Spanned;
@@ -35,11 +34,11 @@ impl Export<'_> {
         let network = registry.export(self.plugin, Some(value), &context);
         let network = network.map_err(|error| Failure::usage(error.message))?;
         let card = card_of(self.file);
-        write(self.file, &network.onnx)?;
-        write(&card, network.card.as_bytes())?;
+        write_file(self.file, &network.onnx)?;
+        write_file(&card, &network.card)?;
         let mut written = vec![self.file.display().to_string(), card.display().to_string()];
         if let Some(sample) = self.sample {
-            write(sample, as_json(&network.sample).to_string().as_bytes())?;
+            write_file(sample, as_json(&network.sample).to_string())?;
             written.push(sample.display().to_string());
         }
         print(&format!("written: {}\n", written.join(", ")))?;
@@ -59,11 +58,6 @@ fn card_of(file: &Path) -> PathBuf {
     let mut name = file.file_name().unwrap_or_default().to_owned();
     name.push(".card.toml");
     file.with_file_name(name)
-}
-
-fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
-    fs::write(path, content)
-        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
 }
 
 fn as_json(sample: &[NamedTensor]) -> Value {

@@ -229,9 +229,6 @@ fn work(
         if item.frame.odom_jumped {
             pipeline.disarm("odometry jumped");
         }
-        if item.frame.calibration_changed {
-            pipeline.disarm("the calibration changed");
-        }
         let report = match pipeline.step(&item.frame.frame) {
             Ok(report) => report,
             Err(error) => return Ok(Some(error)),

@@ -1,8 +1,9 @@
 //! Ctrl-C and SIGTERM leave valid files.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -133,6 +134,53 @@ fn a_full_disk_is_told_with_the_name_of_the_file() {
     assert_eq!(code(&output), 1, "{told}");
     assert!(told.contains("cannot write") && told.contains("out/tracks"), "{told}");
     assert!(!home.path().join("out/tracks.mcap").exists(), "half a file has no final name");
+}
+
+/// Runs the program in a shell with a small disk at `small`; `None` where this machine lets no one
+/// mount it.
+fn on_small_disk(home: &Path, disk: &str, program: &Command) -> Option<Output> {
+    fs::create_dir_all(home.join("small")).unwrap();
+    let mount = format!("mount -t tmpfs -o {disk} none small || exit 99");
+    let words = program.get_args().map(|word| word.to_string_lossy().into_owned());
+    let words = words.collect::<Vec<_>>().join(" ");
+    let output = Command::new("unshare")
+        .args(["--user", "--map-root-user", "--mount", "sh", "-c"])
+        .arg(format!("{mount}; exec \"$0\" {words}"))
+        .arg(program.get_program())
+        .current_dir(home)
+        .output()
+        .ok()?;
+    let refused = output.status.code() == Some(99) || text(&output.stderr).contains("unshare: ");
+    (!refused).then_some(output)
+}
+
+/// Disks on which the folder, the first file, the log, the tables and the report are too much.
+#[test]
+fn a_full_disk_is_the_same_failure_early_and_late() {
+    let home = tempfile::tempdir().unwrap();
+    Drawn::of(200).write(&home.path().join("walk.mcap"));
+    config(home.path(), "");
+    let mut program = own_plugin();
+    program.args(["run", "nearest.toml", "walk.mcap", "-o", "small/out"]);
+    let kilobytes = (1..).map(|pages| format!("size={}k", 4 * pages));
+    let disks = ["nr_inodes=1", "nr_inodes=2", "nr_inodes=3"].map(String::from);
+    let mut places = BTreeSet::new();
+    for disk in disks.into_iter().chain(kilobytes) {
+        let Some(output) = on_small_disk(home.path(), &disk, &program) else {
+            eprintln!("skipped: this machine mounts no small disk");
+            return;
+        };
+        let told = text(&output.stderr);
+        if code(&output) == 0 {
+            break;
+        }
+        assert_eq!(code(&output), 1, "{disk}: {told}");
+        let words = told.lines().rfind(|line| line.contains("the disk is full: cannot "));
+        let words = words.unwrap_or_else(|| panic!("{disk}: {told}"));
+        assert!(words.ends_with("make room, or choose another"), "{words}");
+        places.insert(words.split("small/").nth(1).unwrap().split(':').next().unwrap().to_owned());
+    }
+    assert!(places.len() >= 4, "{places:?}");
 }
 
 #[test]

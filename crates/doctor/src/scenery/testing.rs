@@ -88,7 +88,6 @@ impl Room {
             odom_from_robot: Isometry2::new(Vector2::new(told, 0.0), 0.0),
             odom_stale: false,
             odom_jumped: false,
-            calibration_changed: false,
         }
     }
 

@@ -14,7 +14,7 @@ use log::RideLog;
 use serde::Serialize;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
 use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
@@ -295,9 +295,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     for (name, text) in
         [("follow.json", &json), ("follow.md", &markdown), ("likeness.csv", &likeness)]
     {
-        let path = folder.join(name);
-        let why = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
-        fs::write(&path, text).map_err(why)?;
+        write_file(&folder.join(name), text)?;
     }
     say(&format!("the logs and tables are in {}", folder.display()));
     Ok(())

@@ -324,11 +324,11 @@ impl Assembler {
         self.previous = Some((stamp, here));
         tally.count("frames");
         LogFrame {
-            frame: Frame::of_sensors(self.index, stamp, camera, motion, sensors),
+            frame: Frame::of_sensors(self.index, stamp, camera, motion, sensors)
+                .with_changed_calibration(intake.has_changed_camera(stamp)),
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
             odom_jumped,
-            calibration_changed: intake.has_changed_camera(stamp),
         }
     }
 

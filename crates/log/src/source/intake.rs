@@ -137,8 +137,8 @@ impl Intake {
         if changed {
             self.changed_at.get_or_insert(info.header.stamp());
             tally.lose("camera_info_changes", || {
-                "the calibration changes within the log; the first one is used throughout, and \
-                 places after the change are off"
+                "the calibration changes on the way; the first one is used throughout, and from \
+                 the change on tracks stay where they were"
                     .into()
             });
         }

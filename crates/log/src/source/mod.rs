@@ -34,9 +34,6 @@ pub struct LogFrame {
     pub odom_stale: bool,
     /// True if odometry has jumped since the previous frame.
     pub odom_jumped: bool,
-    /// True if the camera has another calibration since an earlier message: the first one is used,
-    /// and places are off.
-    pub calibration_changed: bool,
 }
 
 /// Facts about a log.

@@ -372,7 +372,7 @@ fn c1_a_calibration_that_changes_on_the_way_marks_the_frames_after_it() {
     let (mut source, _saved) = open(log, Inputs::ANY);
     let found = frames(&mut source);
     let changed: Vec<u64> =
-        found.iter().filter(|f| f.calibration_changed).map(|f| f.frame.index).collect();
+        found.iter().filter(|f| f.frame.calibration_changed).map(|f| f.frame.index).collect();
     assert_eq!(changed, [7, 8, 9, 10]);
     assert!(found.iter().all(|f| f.frame.camera.focal_px() == 14.0), "the first one is used");
     assert!(source.data_lost());

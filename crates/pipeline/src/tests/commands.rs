@@ -2,7 +2,7 @@
 //! without a frame, within the validity of a command.
 
 use nalgebra::Point3;
-use tagalong_core::{Command, EgoMotion, Frame, Images, Reason, Stamp, WheelSpeeds};
+use tagalong_core::{Command, EgoMotion, Frame, Images, Reason, Stamp, Track, WheelSpeeds};
 
 use super::doubles::{PLAIN, World, camera, frame, person, scored, with_eyes};
 use crate::{LockState, Pipeline};
@@ -47,6 +47,37 @@ fn t7_a_gap_of_the_odometry_stops_and_a_jump_is_a_fault_at_once() {
     pipeline.arm();
     assert!(is_moving(&pipeline.step(&frame(23, 2.3)).unwrap().command.unwrap()));
     assert!(!is_moving(&paused(1.0).1));
+}
+
+#[test]
+fn c1_another_calibration_freezes_the_tracks_and_holds_the_robot() {
+    let (world, mut pipeline) = driving("");
+    let before = pipeline.step(&frame(21, 2.1)).unwrap().tracks;
+    let asked = world.asked.lock().unwrap().len();
+    // The robot was moving: 0.2 m ahead, and a quarter of a turn to the left.
+    let turn = std::f64::consts::FRAC_PI_2;
+    let motion = EgoMotion { forward: 0.2, turn, ..EgoMotion::at_rest(0.1) };
+    let report = pipeline.step(&after(22, 2.2, motion).with_changed_calibration(true)).unwrap();
+    let place = |track: &Track| track.estimate.person.position;
+    let (held, was) = (&report.tracks[0], &before[0]);
+    assert_eq!((held.id, held.seen, held.confirmed), (was.id, false, true));
+    // Where it was on the floor: now 2.8 m to the right.
+    assert!((place(held) - Point3::new(0.0, -2.8, 1.6)).norm() < 1e-9, "{held:?}");
+    assert_eq!(report.funnel.count("frame: calibration changed"), 1);
+    let command = report.command.unwrap();
+    assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
+    assert_eq!(pipeline.fault(), Some("the calibration changed"));
+    // Neither arming nor frames that say nothing of it let go.
+    pipeline.arm();
+    for index in 23..40 {
+        let report = pipeline.step(&frame(index, index as f64 * 0.1)).unwrap();
+        assert!((place(&report.tracks[0]) - place(held)).norm() < 1e-9);
+        assert_eq!(report.command.unwrap().reason, Reason::Fault, "{index}");
+        assert_eq!(report.funnel.count("frame: calibration changed"), 1);
+    }
+    assert_eq!(world.asked.lock().unwrap().len(), asked, "no plugin gets such a frame");
+    let reset = pipeline.step(&frame(40, 99.0)).unwrap();
+    assert_eq!((reset.tracks.len(), reset.ended), (0, vec![held.id]), "nothing lasts over a jump");
 }
 
 /// A person steps in from beside the camera, and is in no image.
