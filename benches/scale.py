@@ -35,11 +35,17 @@ ROWS = (
 )
 
 
+def quietly(command):
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(command)}: {done.stderr}")
+
+
 def tracked(program, config, log, folder):
     out = os.path.join(folder, "out")
-    command = [program, "run", config, log, "-o", out, "--overwrite", "--quiet", "--threads", "1"]
+    command = [program, "run", config, log, "-o", out, "--overwrite", "--threads", "1"]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(command, check=True)
+    quietly(command)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     with open(os.path.join(out, "timings.json"), encoding="utf-8") as file:
         times = json.load(file)
@@ -56,7 +62,7 @@ def recorded(program, settings, folder):
         file.write(SCENE.format(**settings, side=side, middle=side / 2))
     if os.path.exists(log):
         os.remove(log)
-    subprocess.run([program, "simulate", path, "-o", log], check=True, capture_output=True)
+    quietly([program, "simulate", path, "-o", log])
     return log
 
 

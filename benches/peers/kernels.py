@@ -82,33 +82,44 @@ class Assignment:
 class Images:
     """Images as logs have them: depth in a PNG of 16 bits, colour in a JPEG."""
 
+    JOBS = {
+        "depth.png": "depth in a PNG as OpenCV writes it",
+        "smallest.png": "depth in a smallest PNG (`compressedDepth`)",
+        "colour.jpg": "JPEG",
+    }
+
     def __init__(self, folder):
         self.program = built("tagalong-log", "time_images")
         y, x = np.mgrid[:480, :640].astype(np.float64)
-        noise = np.random.default_rng(1).normal(size=(480, 640))
-        # A floor, a wall and a person, in the steps of structured light.
+        random = np.random.default_rng(1)
+        noise = random.normal(size=(480, 640))
+        # A floor, a wall and a person, in the steps of structured light, with noise of half a step
+        # and with holes.
         depth = np.minimum(4000.0, 90000.0 / np.maximum(y - 200.0, 1.0))
         depth[(abs(x - 300) < 60) & (y > 120)] = 2000.0
-        steps = np.maximum(1.0, np.round(348000.0 / depth + noise / 6.0))
-        self.paths = [os.path.join(folder, name) for name in ("depth.png", "colour.jpg")]
-        cv2.imwrite(self.paths[0], (348000.0 / steps).astype(np.uint16))
+        depth = 348000.0 / np.maximum(1.0, np.round(348000.0 / depth + noise / 2.0))
+        depth[cv2.GaussianBlur(random.normal(size=depth.shape), (0, 0), 6) > 0.07] = 0
         wave = 110 + 60 * np.sin(x / 23) * np.cos(y / 17) + 4 * noise
         colour = np.stack([wave, np.roll(wave, 40, 1), 255 - wave], 2)
-        cv2.imwrite(self.paths[1], colour.clip(0, 255).astype(np.uint8))
+        self.paths = [os.path.join(folder, name) for name in self.JOBS]
+        cv2.imwrite(self.paths[0], depth.astype(np.uint16))
+        cv2.imwrite(self.paths[1], depth.astype(np.uint16), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+        cv2.imwrite(self.paths[2], colour.clip(0, 255).astype(np.uint8))
         self.data = [np.fromfile(path, np.uint8) for path in self.paths]
-        self.jobs = ("PNG of 16 bits to metres, 640x480", "JPEG, 640x480")
+        self.jobs = [f"{job}, 640x480" for job in self.JOBS.values()]
 
     def ours(self):
         return {job: float(ms) * 1e-3 for job, (ms,) in zip(self.jobs, lines(self.program, *self.paths))}
 
     def theirs(self):
-        png, jpeg = self.data
+        *depths, colour = zip(self.jobs, self.data)
 
-        def depth():
-            return cv2.imdecode(png, cv2.IMREAD_UNCHANGED).astype(np.float32) * np.float32(1e-3)
+        def metres(data):
+            return cv2.imdecode(data, cv2.IMREAD_UNCHANGED).astype(np.float32) * np.float32(1e-3)
 
-        yield self.jobs[0], "OpenCV", fastest(depth, 30)
-        yield self.jobs[1], "OpenCV", fastest(lambda: cv2.imdecode(jpeg, cv2.IMREAD_COLOR), 30)
+        for job, data in depths:
+            yield job, "OpenCV", fastest(lambda: metres(data), 30)
+        yield colour[0], "OpenCV", fastest(lambda: cv2.imdecode(colour[1], cv2.IMREAD_COLOR), 30)
 
 
 class Stereo:

@@ -1,6 +1,6 @@
-"""Runs all tasks of a benchmark's plan with HyperQueue on this machine.
+"""Runs a planned benchmark in shards with HyperQueue on this machine.
 
-Usage: hyperqueue_bench.py TAGALONG BENCHMARK_DIRECTORY CORES
+Usage: hyperqueue_bench.py TAGALONG BENCHMARK_DIRECTORY CORES SHARDS
 """
 
 import os
@@ -10,17 +10,17 @@ from hyperqueue import Job, LocalCluster
 from hyperqueue.cluster import WorkerConfig
 
 
-def main(tagalong, folder, cores):
-    with open(os.path.join(folder, "plan.jsonl"), encoding="utf-8") as plan:
-        count = sum(1 for _ in plan)
+def main(tagalong, folder, cores, shards):
     with LocalCluster() as cluster:
         cluster.start_worker(WorkerConfig(cores=int(cores)))
         client = cluster.client()
         job = Job(default_workdir=os.getcwd())
-        for task in range(1, count + 1):
-            job.program([tagalong, "bench", "run", "-o", folder, "--task", str(task)],
-                        cwd=os.getcwd(), stdout=None, stderr=None)
+        for part in range(1, int(shards) + 1):
+            command = [tagalong, "bench", "run", "-o", folder, "--shard", f"{part}/{shards}"]
+            job.program(command, cwd=os.getcwd(), stdout=None, stderr=None)
         client.wait_for_jobs([client.submit(job)])
 
 
+if len(sys.argv) != 5:
+    sys.exit(__doc__)
 main(*sys.argv[1:])

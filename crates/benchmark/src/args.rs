@@ -1,4 +1,5 @@
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, Subcommand};
 use tagalong_app::format::Format;
@@ -36,7 +37,8 @@ pub enum Step {
     },
     /// Runs the planned tasks that have no result yet
     #[command(after_help = "Examples:\n  tagalong bench run -o bench --jobs 4\n  \
-                            tagalong bench run -o bench --task 17")]
+                            tagalong bench run -o bench --task 17\n  \
+                            tagalong bench run -o bench --shard 3/64")]
     Run {
         #[command(flatten)]
         run: RunArgs,
@@ -95,12 +97,42 @@ pub struct RunArgs {
     /// Only this task: its number in the plan, or its hash.
     #[arg(long, value_name = "K|HASH")]
     pub task: Option<String>,
+    /// Only part K of N, by logs: K, K + N, and so on of the plan's logs with all of their tasks.
+    #[arg(long, value_name = "K/N", conflicts_with = "task")]
+    pub shard: Option<Shard>,
     /// Run tasks again that failed before.
     #[arg(long)]
     pub retry_failed: bool,
     /// Measure times, one task at a time, on an otherwise idle machine.
     #[arg(long)]
     pub timing: bool,
+}
+
+/// Part of a plan for one of several processes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    part: usize,
+    parts: usize,
+}
+
+impl Shard {
+    /// Returns true if the log at this place of the plan, from 0, is of this part.
+    pub fn has(self, log: usize) -> bool {
+        log % self.parts == self.part - 1
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').and_then(|(part, parts)| {
+            Some(Self { part: part.parse().ok()?, parts: parts.parse().ok()? })
+        });
+        numbers
+            .filter(|shard| (1..=shard.parts).contains(&shard.part))
+            .ok_or_else(|| "expected K/N with K from 1 to N, for example 3/64".into())
+    }
 }
 
 /// Content of the report.
@@ -131,7 +163,7 @@ impl BenchArgs {
         Self {
             step: None,
             plan: PlanArgs { configs, logs, logs_dir: None, seeds: 1 },
-            run: RunArgs { jobs: 1, task: None, retry_failed: false, timing: false },
+            run: RunArgs { jobs: 1, task: None, shard: None, retry_failed: false, timing: false },
             report: ReportArgs {
                 gate: GateArgs { baseline: None, fail_if: Vec::new() },
                 format: Format::Text,

@@ -76,8 +76,8 @@ fn everything(args: &BenchArgs, registry: &Registry) -> Outcome {
     if let Some(signal) = tally.signal {
         return Ok(Ended::BySignal(signal));
     }
-    // A single task has no complete set of results to report.
-    if args.run.task.is_none() {
+    // A single task or shard has no complete set of results to report.
+    if args.run.task.is_none() && args.run.shard.is_none() {
         make_report(&args.folder, args.report.format, gate.as_ref())?;
     }
     verdict(tally)
@@ -148,5 +148,22 @@ mod tests {
     fn all_arguments_have_their_step() {
         let args = parse("bench --jobs 3").unwrap_or_else(|error| panic!("{error}"));
         assert_eq!((args.plan.seeds, args.run.jobs, args.report.gate.baseline), (1, 3, None));
+    }
+
+    #[test]
+    fn the_shards_of_a_plan_have_each_log_once() {
+        for log in 0..7 {
+            let has = |k: &usize| {
+                let args = parse(&format!("bench run --shard {k}/3")).ok();
+                let Some(Step::Run { run, .. }) = args.and_then(|args| args.step) else {
+                    return false;
+                };
+                run.shard.is_some_and(|shard| shard.has(log))
+            };
+            assert_eq!((1..=3).filter(has).collect::<Vec<_>>(), [log % 3 + 1]);
+        }
+        for wrong in ["0/3", "4/3", "1/0", "3", "a/b", "1/3 --task 1"] {
+            assert!(parse(&format!("bench run --shard {wrong}")).is_err(), "{wrong}");
+        }
     }
 }

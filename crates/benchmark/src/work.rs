@@ -15,7 +15,7 @@ use tagalong_pipeline::Pipeline;
 use tagalong_report::{Outcome, TaskResult};
 use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
 
-use super::args::RunArgs;
+use super::args::{RunArgs, Shard};
 use super::pictures::Wanted;
 use super::plan::{PlannedConfig, Task, reread, version};
 use super::store::{Store, Stored, StoredTiming};
@@ -101,8 +101,20 @@ fn asked(args: &RunArgs, store: &Store) -> Result<Vec<Task>, Failure> {
             )));
         }
     }
+    if let Some(shard) = args.shard {
+        keep_shard(&mut tasks, shard);
+    }
     tasks.retain(|task| task.skip.is_none());
     Ok(tasks)
+}
+
+/// Keeps the tasks of a shard. Those of one log stay together, because they share its images.
+fn keep_shard(tasks: &mut Vec<Task>, shard: Shard) {
+    let mut numbers = BTreeMap::new();
+    tasks.retain(|task| {
+        let next = numbers.len();
+        shard.has(*numbers.entry(task.log.clone()).or_insert(next))
+    });
 }
 
 fn is_due(args: &RunArgs, store: &Store, task: &Task) -> bool {

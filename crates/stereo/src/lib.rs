@@ -30,6 +30,7 @@ mod reduce;
 mod refine;
 mod rows;
 mod settings;
+mod share;
 mod speckle;
 mod strip;
 mod texture;

@@ -3,13 +3,14 @@ use tagalong_core::{Error, GreyImage, Result};
 use crate::paths::Penalties;
 use crate::refine::Refiner;
 use crate::settings::MAX_DISPARITIES;
+use crate::share::{band_rows, share};
 use crate::speckle::SpeckleFilter;
 use crate::strip::{Output, Pair, Strip};
 use crate::texture::TextureTest;
-use crate::{Dropped, StereoSettings, fill};
+use crate::{Dropped, Method, StereoSettings, fill};
 
-/// Rows of a strip. Strips do not depend on the number of threads, so that the disparities do not,
-/// either.
+/// Rows of a strip of semi-global matching, where paths start above each strip. It does not depend
+/// on the number of threads, so that the disparities do not, either.
 const STRIP_ROWS: usize = 192;
 
 /// Matcher of rectified pairs; keeps its buffers between them.
@@ -80,15 +81,17 @@ impl Matcher {
         if width * height > 0 {
             self.fill(left, right, max_disparity)?;
         }
-        let (holes, settings) = (self.holes(), &self.settings);
+        let (holes, threads, settings) = (self.holes(), self.threads(), &self.settings);
         let (pixels, step) = (settings.speckle_pixels, settings.speckle_step as f32);
         let mut dropped = Dropped::default();
         self.strips.iter().for_each(|strip| dropped.add(&strip.dropped));
         // Refined before the filters, which compare disparities to fractions of a pixel.
-        if settings.refine_px > 0 {
-            self.refiner.apply([left, right], settings.refine_px, &mut self.disparities);
+        if settings.refine_px > 0 && width * height > 0 {
+            let radius = settings.refine_px;
+            self.refiner.apply([left, right], radius, threads, &mut self.disparities);
         }
-        dropped.unsupported = self.texture.apply(left, settings.texture, &mut self.disparities);
+        dropped.unsupported =
+            self.texture.apply(left, settings.texture, threads, &mut self.disparities);
         dropped.speckle = self.speckles.apply(&mut self.disparities, width, pixels, step);
         dropped.filled = fill::holes(&mut self.disparities, width, &holes);
         for (d, confidence) in self.disparities.iter().zip(&mut self.confidences) {
@@ -96,6 +99,13 @@ impl Matcher {
         }
         let (values, confidences) = (self.disparities.as_slice(), self.confidences.as_slice());
         Ok(Disparities { width, values, confidences, dropped })
+    }
+
+    fn threads(&self) -> usize {
+        match self.settings.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            n => n,
+        }
     }
 
     fn holes(&self) -> fill::Most {
@@ -125,7 +135,12 @@ impl Matcher {
     }
 
     fn run<const D: usize>(&mut self, left: &GreyImage, right: &GreyImage) {
-        let cells = STRIP_ROWS * left.width();
+        let threads = self.threads();
+        let rows = match self.settings.method {
+            Method::Block => band_rows(left.height(), threads),
+            Method::SemiGlobal => STRIP_ROWS,
+        };
+        let cells = rows * left.width();
         let count = left.pixels().len().div_ceil(cells);
         self.strips.resize_with(count, Strip::default);
         let pair = Pair { left, right, settings: &self.settings, penalties: &self.penalties };
@@ -135,21 +150,12 @@ impl Matcher {
             .iter_mut()
             .zip(outputs.enumerate())
             .map(|(strip, (i, (disparities, confidences)))| {
-                (strip, Output { first_row: i * STRIP_ROWS, disparities, confidences })
+                (strip, Output { first_row: i * rows, disparities, confidences })
             })
             .collect();
-        let each = count.div_ceil(threads(self.settings.threads).min(count));
-        let work = |jobs: &mut [(&mut Strip, Output<'_>)]| {
+        let each = count.div_ceil(threads.min(count));
+        share(jobs.chunks_mut(each), |jobs| {
             jobs.iter_mut().for_each(|(strip, output)| strip.fill::<D>(&pair, output));
-        };
-        std::thread::scope(|scope| {
-            let mut shares = jobs.chunks_mut(each);
-            // This thread takes the first share itself.
-            let own = shares.next();
-            for share in shares {
-                scope.spawn(|| work(share));
-            }
-            own.map(work);
         });
     }
 }
@@ -164,13 +170,6 @@ pub(crate) fn size_error(left: &GreyImage, right: &GreyImage) -> Option<Error> {
         );
         Error::Other(message)
     })
-}
-
-fn threads(wanted: usize) -> usize {
-    match wanted {
-        0 => std::thread::available_parallelism().map_or(1, usize::from),
-        n => n,
-    }
 }
 
 /// Computes the penalties. The large one falls with the difference in brightness: a jump of the

@@ -15,6 +15,8 @@
 
 use tagalong_core::GreyImage;
 
+use crate::share::{band_rows, share};
+
 /// Maximum difference between neighbouring disparities of one surface, px.
 const SAME_PX: f32 = 1.0;
 /// Weight of the previous disparity: the variance of the noise of a pixel, in grey levels, over
@@ -39,18 +41,25 @@ const UNKNOWN: f32 = 1e6;
 /// Refines disparities; keeps its buffers.
 #[derive(Debug, Default)]
 pub struct Refiner {
+    /// One for each thread.
+    loaders: Vec<Loader>,
+    sums: Sums,
+}
+
+/// Buffers for the equations of a row.
+#[derive(Debug, Default)]
+struct Loader {
     left: Vec<[f32; 2]>,
     right: Vec<[f32; 2]>,
     padded: Vec<u8>,
     row: Equations,
-    /// Sums of the window's row around each pixel; with padding behind the last.
-    sums: Sums,
-    was: Vec<f32>,
 }
 
-/// Squared slopes of each pixel, and their product with the disparity.
+/// Previous disparity of each pixel and sums of the window's row around it: squared slopes, and
+/// their products with the disparity. Rows are padded to a multiple of [`LANES`].
 #[derive(Debug, Default)]
 struct Sums {
+    was: Vec<f32>,
     squares: Vec<f32>,
     products: Vec<f32>,
 }
@@ -73,25 +82,45 @@ impl Refiner {
     /// columns and rows; `radius` is at most [`MAX_RADIUS`].
     pub fn apply(
         &mut self,
-        [left, right]: [&GreyImage; 2],
+        images: [&GreyImage; 2],
         radius: usize,
+        threads: usize,
         disparities: &mut [f32],
     ) {
-        let (width, height) = (left.width(), left.height());
-        for row in [&mut self.sums.squares, &mut self.sums.products, &mut self.was] {
-            row.resize(disparities.len() + LANES, 0.0);
+        let (width, height) = (images[0].width(), images[0].height());
+        let (padded, rows) = (width.next_multiple_of(LANES), band_rows(height, threads));
+        let Sums { was, squares, products } = &mut self.sums;
+        for row in [&mut *was, &mut *squares, &mut *products] {
+            row.resize(height * padded, 0.0);
         }
-        for (y, row) in disparities.chunks_exact(width).enumerate() {
-            levels(left.row(y), &mut self.padded, &mut self.left);
-            levels(right.row(y), &mut self.padded, &mut self.right);
-            self.row.load(&self.left, &self.right, row);
-            across(&self.row, radius, y * width..(y + 1) * width, &mut self.sums);
-        }
-        self.was[..disparities.len()].copy_from_slice(disparities);
-        for (y, row) in disparities.chunks_exact_mut(width).enumerate() {
-            let rows = y.saturating_sub(radius)..(y + radius + 1).min(height);
-            down(&self.was, &self.sums, (y, rows), row);
-        }
+        self.loaders.resize_with(height.div_ceil(rows), Loader::default);
+        let bands = squares.chunks_mut(rows * padded).zip(products.chunks_mut(rows * padded));
+        let bands = was.chunks_mut(rows * padded).zip(bands).zip(disparities.chunks(rows * width));
+        share(self.loaders.iter_mut().zip(bands).enumerate(), |(band, (loader, place))| {
+            let ((was, (squares, products)), disparities) = place;
+            let sums = squares.chunks_exact_mut(padded).zip(products.chunks_exact_mut(padded));
+            let rows_of = was.chunks_exact_mut(padded).zip(disparities.chunks_exact(width));
+            for (y, ((was, row), (squares, products))) in (band * rows..).zip(rows_of.zip(sums)) {
+                was[..width].copy_from_slice(row);
+                loader.load(images.map(|image| image.row(y)), row);
+                across(&loader.row, radius, squares, products);
+            }
+        });
+        let sums = &self.sums;
+        share(disparities.chunks_mut(rows * width).enumerate(), |(band, disparities)| {
+            for (y, row) in (band * rows..).zip(disparities.chunks_exact_mut(width)) {
+                let window = y.saturating_sub(radius)..(y + radius + 1).min(height);
+                down(sums, (y, window), row);
+            }
+        });
+    }
+}
+
+impl Loader {
+    fn load(&mut self, [left, right]: [&[u8]; 2], disparities: &[f32]) {
+        levels(left, &mut self.padded, &mut self.left);
+        levels(right, &mut self.padded, &mut self.right);
+        self.row.load(&self.left, &self.right, disparities);
     }
 }
 
@@ -205,8 +234,9 @@ fn gain(left: &[[f32; 2]], disparities: &[f32], right: &[f32]) -> f32 {
 
 /// Sums up over the part of a window's row that is of one surface, around the means.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &mut Sums) {
-    for (i, at) in place.step_by(LANES).enumerate() {
+fn across(row: &Equations, radius: usize, squares: &mut [f32], products: &mut [f32]) {
+    let (squares, products) = (squares.as_chunks_mut().0, products.as_chunks_mut().0);
+    for (i, (squares, products)) in squares.iter_mut().zip(products).enumerate() {
         let from = MAX_RADIUS + i * LANES;
         let own = lanes(&row.d, from);
         let [mut n, mut g, mut q, mut gg, mut gq] = [[0.0_f32; LANES]; 5];
@@ -222,8 +252,7 @@ fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &m
                 gq[lane] += slope * qs[lane];
             }
         }
-        let squares = &mut out.squares[at..].as_chunks_mut::<LANES>().0[0];
-        let products = &mut out.products[at..].as_chunks_mut::<LANES>().0[0];
+        let (squares, products): (&mut [f32; LANES], &mut [f32; LANES]) = (squares, products);
         for lane in 0..LANES {
             let mean = g[lane] / n[lane];
             // Rounding can make the variance of equal slopes negative.
@@ -235,8 +264,8 @@ fn across(row: &Equations, radius: usize, place: std::ops::Range<usize>, out: &m
 
 /// Solves for the disparities of row `y` with the sums of some rows.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn down(was: &[f32], sums: &Sums, (y, rows): (usize, std::ops::Range<usize>), row: &mut [f32]) {
-    let width = row.len();
+fn down(sums: &Sums, (y, rows): (usize, std::ops::Range<usize>), row: &mut [f32]) {
+    let (was, width) = (sums.was.as_slice(), row.len().next_multiple_of(LANES));
     for (i, new) in row.chunks_mut(LANES).enumerate() {
         let own = lanes(was, y * width + i * LANES);
         let (mut squares, mut products) = ([PRIOR; LANES], [0.0_f32; LANES]);

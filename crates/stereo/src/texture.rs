@@ -9,6 +9,8 @@
 
 use tagalong_core::GreyImage;
 
+use crate::share::{band_rows, share};
+
 /// Difference between disparities of one surface, px, or as a fraction: people are not flat.
 const SAME_PX: f32 = 0.75;
 const SAME_PART: f32 = 0.1;
@@ -16,6 +18,14 @@ const SAME_PART: f32 = 0.1;
 /// Filter of pixels by row; keeps its buffers.
 #[derive(Debug, Default)]
 pub struct TextureTest {
+    /// One for each thread.
+    bands: Vec<Band>,
+}
+
+/// Buffers for a row, and the number of dropped pixels of a band.
+#[derive(Debug, Default)]
+struct Band {
+    dropped: u64,
     /// Mask of each pixel: all bits set if it is textured and has a disparity.
     textured: Vec<u32>,
     /// Disparity of the last textured pixel up to each one, and of the next.
@@ -26,19 +36,33 @@ pub struct TextureTest {
 impl TextureTest {
     /// Sets the unsupported disparities of an image to NaN, and returns their number. `least` is
     /// the minimum slope of a textured pixel; 0 leaves them all.
-    pub fn apply(&mut self, image: &GreyImage, least: u8, disparities: &mut [f32]) -> u64 {
-        if least == 0 {
+    pub fn apply(
+        &mut self,
+        image: &GreyImage,
+        least: u8,
+        threads: usize,
+        disparities: &mut [f32],
+    ) -> u64 {
+        let (width, height) = (image.width(), image.height());
+        if least == 0 || disparities.is_empty() {
             return 0;
         }
-        let last = image.height().saturating_sub(1);
-        let rows = disparities.chunks_exact_mut(image.width().max(1)).enumerate();
-        rows.map(|(y, row)| {
-            let near = [y.saturating_sub(1), y, (y + 1).min(last)];
-            self.judge(row, near.map(|y| image.row(y)), least)
-        })
-        .sum()
+        let rows = band_rows(height, threads);
+        self.bands.resize_with(height.div_ceil(rows), Band::default);
+        let jobs = self.bands.iter_mut().zip(disparities.chunks_mut(rows * width)).enumerate();
+        share(jobs, |(i, (band, disparities))| {
+            let all = (i * rows..).zip(disparities.chunks_exact_mut(width));
+            let judged = all.map(|(y, row)| {
+                let near = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
+                band.judge(row, near.map(|y| image.row(y)), least)
+            });
+            band.dropped = judged.sum();
+        });
+        self.bands.iter().map(|band| band.dropped).sum()
     }
+}
 
+impl Band {
     /// Filters one row of the image, given its neighbours.
     fn judge(&mut self, row: &mut [f32], rows: [&[u8]; 3], least: u8) -> u64 {
         for buffer in [&mut self.before, &mut self.behind] {

@@ -139,7 +139,7 @@ fn the_scores_equal_those_of_eval() {
 }
 
 #[test]
-fn jobs_and_single_tasks_give_the_same_bytes() {
+fn jobs_shards_and_single_tasks_give_the_same_bytes() {
     let home = Home::new();
     home.config("panics", "config = { panic_after_frames = 4 }");
     let arguments = |out: &'static str| ["--logs-dir", "logs", "--seeds", "2", "-o", out];
@@ -152,9 +152,15 @@ fn jobs_and_single_tasks_give_the_same_bytes() {
         home.bench(&["run", "-o", "three", "--task", wanted]);
     }
     home.bench(&["report", "-o", "three"]);
+    home.bench(&[&["plan"][..], &arguments("four")].concat());
+    home.bench(&["run", "-o", "four", "--shard", "2/2"]);
+    let half = files(&home.path("four"));
+    assert_eq!(half.keys().filter(|name| name.starts_with("results/")).count(), 6);
+    home.bench(&["run", "-o", "four", "--shard", "1/2"]);
+    home.bench(&["report", "-o", "four"]);
     let one = files(&home.path("one"));
     assert_eq!(one.keys().filter(|name| name.starts_with("results/")).count(), 12);
-    for other in ["two", "three"] {
+    for other in ["two", "three", "four"] {
         let other = files(&home.path(other));
         assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
         for (name, bytes) in &one {

@@ -9,7 +9,7 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::raw::exact;
-use super::{ImageError, Pixels, check_size, metres, metres_of_float, rvl};
+use super::{ImageError, Pixels, check_size, deep_png, metres, metres_of_float, rvl};
 use crate::Limits;
 use crate::msgs::CompressedImage;
 
@@ -124,7 +124,15 @@ fn jpeg(data: &[u8], limits: &Limits) -> Result<Pixels, ImageError> {
 }
 
 fn png(data: &[u8], depth_unit_m: Option<f64>, limits: &Limits) -> Result<Pixels, ImageError> {
+    // As for `16UC1`: millimetres.
+    let unit = depth_unit_m.unwrap_or(0.001) as f32;
+    if let Some(depth) = deep_png::decode(data, limits, |v| metres(v, unit)) {
+        return Ok(Pixels::Depth(depth));
+    }
     let png = PngPixels::read(data, limits)?;
+    if let Some(depth) = png.scaled(|v| metres(v, unit)) {
+        return Ok(Pixels::Depth(depth));
+    }
     let (w, h, bytes) = (png.width, png.height, png.bytes);
     let pixels = match (png.colour, png.depth) {
         (png::ColorType::Grayscale, png::BitDepth::Eight) => Pixels::Grey(exact(w, h, bytes)),
@@ -134,13 +142,6 @@ fn png(data: &[u8], depth_unit_m: Option<f64>, limits: &Limits) -> Result<Pixels
         (png::ColorType::Rgba, png::BitDepth::Eight) => {
             let (pixels, _) = bytes.as_chunks::<4>();
             Pixels::Colour(exact(w, h, pixels.iter().map(|p| [p[0], p[1], p[2]]).collect()))
-        }
-        (png::ColorType::Grayscale, png::BitDepth::Sixteen) => {
-            // As for `16UC1`: millimetres.
-            let unit = depth_unit_m.unwrap_or(0.001) as f32;
-            let values = bytes.as_chunks::<2>().0.iter();
-            let depth = values.map(|p| metres(u16::from_be_bytes(*p), unit)).collect();
-            Pixels::Depth(exact(w, h, depth))
         }
         (colour, depth) => {
             return Err(ImageError::Codec(format!("a PNG of {colour:?} with {depth:?} bits")));
@@ -180,6 +181,14 @@ impl PngPixels {
             bytes,
         })
     }
+
+    /// Returns what `pixel` makes of the values; `None` if they are not 16 bits of grey.
+    fn scaled(&self, pixel: impl Fn(u16) -> f32) -> Option<DepthImage> {
+        let is_deep =
+            (self.colour, self.depth) == (png::ColorType::Grayscale, png::BitDepth::Sixteen);
+        let values = self.bytes.as_chunks::<2>().0.iter().map(|p| pixel(u16::from_be_bytes(*p)));
+        is_deep.then(|| exact(self.width, self.height, values.collect()))
+    }
 }
 
 /// Decodes depth as `compressed_depth_image_transport` writes it: a header of 12 bytes, then 16-bit
@@ -192,48 +201,48 @@ fn compressed_depth(
     let Some((header, body)) = image.data.split_at_checked(DEPTH_HEADER) else {
         return Err(ImageError::Codec("shorter than its 12-byte header".into()));
     };
-    let (width, height, values) = if body.starts_with(&[0x89, b'P', b'N', b'G']) {
-        depth_png(body, limits)?
-    } else if image.format.to_ascii_lowercase().contains("rvl") {
-        depth_rvl(body, limits)?
-    } else {
-        return Err(ImageError::Codec("compressedDepth that is neither PNG nor RVL".into()));
-    };
+    let is_rvl = image.format.to_ascii_lowercase().contains("rvl");
     let float = |at: usize| {
         f32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
     };
-    let pixels = if image.format.starts_with("32FC1") {
+    if image.format.starts_with("32FC1") {
         let (a, b, unit) = (float(4), float(8), depth_unit_m.unwrap_or(1.0) as f32);
         let inverse = |v: u16| if v == 0 { f32::NAN } else { a / (f32::from(v) - b) };
-        values.into_iter().map(|v| metres_of_float(inverse(v), unit)).collect()
+        depth_of(body, is_rvl, limits, |v| metres_of_float(inverse(v), unit))
     } else {
         let unit = depth_unit_m.unwrap_or(0.001) as f32;
-        values.into_iter().map(|v| metres(v, unit)).collect()
-    };
-    Ok(exact(width, height, pixels))
-}
-
-fn depth_png(body: &[u8], limits: &Limits) -> Result<(usize, usize, Vec<u16>), ImageError> {
-    let png = PngPixels::read(body, limits)?;
-    if (png.colour, png.depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
-        return Err(ImageError::Codec("compressedDepth whose PNG has not 16 bits of grey".into()));
+        depth_of(body, is_rvl, limits, |v| metres(v, unit))
     }
-    let values = png.bytes.as_chunks::<2>().0.iter().map(|p| u16::from_be_bytes(*p)).collect();
-    Ok((png.width, png.height, values))
 }
 
-/// Reads columns and rows as 32-bit numbers, then the stream.
-fn depth_rvl(body: &[u8], limits: &Limits) -> Result<(usize, usize, Vec<u16>), ImageError> {
-    let (size, stream) =
-        body.split_at_checked(8).ok_or_else(|| ImageError::Codec("RVL without a size".into()))?;
+/// Returns what `pixel` makes of the values in the body of a `compressedDepth` message.
+fn depth_of(
+    body: &[u8],
+    is_rvl: bool,
+    limits: &Limits,
+    pixel: impl Fn(u16) -> f32,
+) -> Result<DepthImage, ImageError> {
+    let lost = |why: &str| ImageError::Codec(why.into());
+    if body.starts_with(&[0x89, b'P', b'N', b'G']) {
+        if let Some(depth) = deep_png::decode(body, limits, &pixel) {
+            return Ok(depth);
+        }
+        let depth = PngPixels::read(body, limits)?.scaled(pixel);
+        return depth.ok_or_else(|| lost("compressedDepth whose PNG has not 16 bits of grey"));
+    }
+    if !is_rvl {
+        return Err(lost("compressedDepth that is neither PNG nor RVL"));
+    }
+    // Columns and rows as 32-bit numbers, then the stream.
+    let (size, stream) = body.split_first_chunk::<8>().ok_or_else(|| lost("RVL without a size"))?;
     let number =
         |at: usize| u32::from_le_bytes([size[at], size[at + 1], size[at + 2], size[at + 3]]);
     let (width, height) = (number(0), number(4));
     check_size(width.into(), height.into(), 4, limits)?;
     let (width, height) = (width as usize, height as usize);
-    let values = rvl::decode(stream, width * height)
-        .ok_or_else(|| ImageError::Codec("the RVL stream does not fit the size".into()))?;
-    Ok((width, height, values))
+    rvl::decode(stream, width * height, pixel)
+        .map(|values| exact(width, height, values))
+        .ok_or_else(|| lost("the RVL stream does not fit the size"))
 }
 
 /// Returns the data of a `16UC1; compressedDepth rvl` message: header, size, stream. `values` are

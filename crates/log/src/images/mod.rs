@@ -6,6 +6,7 @@
 
 mod bayer;
 mod compressed;
+mod deep_png;
 mod disparity;
 mod raw;
 mod rvl;

@@ -5,26 +5,63 @@
 //! sequence of nibbles with three bits each, the low ones first, and the fourth bit is set if more
 //! follow. Eight nibbles make a 32-bit word, first nibble highest, words little endian.
 
+/// Bits that say that another nibble follows.
+const MORE: u64 = 0x8888_8888_8888_8888;
+/// Nibbles of numbers that are read at once.
+const SHORT: u32 = 5;
+
 /// Reader of numbers from a stream of nibbles.
 struct Nibbles<'a> {
-    bytes: &'a [u8],
-    at: usize,
+    words: std::slice::Iter<'a, [u8; 4]>,
+    /// Nibbles that are read next, the first highest; zeros behind the last of them.
+    next: u64,
+    /// Number of these.
+    count: u32,
 }
 
-impl Nibbles<'_> {
-    fn next(&mut self) -> Option<u32> {
-        // Nibble i of a word lies in byte 3 - i/2, the even ones in its high half.
-        let (word, i) = (self.at / 8, self.at % 8);
-        let byte = self.bytes.get(4 * word + 3 - i / 2)?;
-        self.at += 1;
-        Some(u32::from(if i % 2 == 0 { byte >> 4 } else { byte & 15 }))
+impl<'a> Nibbles<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        Self { words: bytes.as_chunks().0.iter(), next: 0, count: 0 }
     }
 
+    fn refill(&mut self) {
+        if self.count <= 8
+            && let Some(word) = self.words.next()
+        {
+            self.next |= u64::from(u32::from_le_bytes(*word)) << (32 - 4 * self.count);
+            self.count += 8;
+        }
+    }
+
+    fn drop_first(&mut self, count: u32) {
+        self.next <<= 4 * count;
+        self.count -= count;
+    }
+
+    #[inline]
     fn number(&mut self) -> Option<u32> {
+        self.refill();
+        let length = (!self.next & MORE).leading_zeros() / 4 + 1;
+        if length > SHORT.min(self.count) {
+            return self.long_number();
+        }
+        // Without branches on the length, which is as good as random.
+        let digit = |i: u32| (self.next >> (60 - 4 * i)) as u32 & 7;
+        let digits = (0..SHORT).fold(0, |value, i| value | digit(i) << (3 * i));
+        self.drop_first(length);
+        Some(digits & ((1 << (3 * length)) - 1))
+    }
+
+    fn long_number(&mut self) -> Option<u32> {
         let mut value = 0;
         // Eleven nibbles hold 32 bits; a longer number is damage.
         for shift in (0..32).step_by(3) {
-            let nibble = self.next()?;
+            self.refill();
+            if self.count == 0 {
+                return None;
+            }
+            let nibble = (self.next >> 60) as u32;
+            self.drop_first(1);
             value |= (nibble & 7) << shift;
             if nibble & 8 == 0 {
                 return Some(value);
@@ -34,29 +71,28 @@ impl Nibbles<'_> {
     }
 }
 
-/// Decodes the `count` values of a stream; `None` if it ends early or holds more.
-pub(super) fn decode(bytes: &[u8], count: usize) -> Option<Vec<u16>> {
-    let mut nibbles = Nibbles { bytes, at: 0 };
-    let mut out: Vec<u16> = Vec::with_capacity(count);
-    let mut last = 0_u16;
-    while out.len() < count {
-        let zeros = nibbles.number()? as usize;
-        // Tested before the memory is taken: a damaged run may claim any length.
-        if zeros > count - out.len() {
-            return None;
-        }
-        out.resize(out.len() + zeros, 0);
+/// Decodes the `count` values of a stream to what `pixel` makes of them; `None` if it ends early or
+/// holds more.
+pub(super) fn decode<P: Copy>(
+    bytes: &[u8],
+    count: usize,
+    pixel: impl Fn(u16) -> P,
+) -> Option<Vec<P>> {
+    let mut nibbles = Nibbles::new(bytes);
+    let mut out = vec![pixel(0); count];
+    let (mut at, mut last) = (0_usize, 0_u16);
+    while at < count {
+        // A damaged run may claim any length: the bounds of `out` tell.
+        at = at.saturating_add(nibbles.number()? as usize);
         let readings = nibbles.number()? as usize;
-        if readings > count - out.len() {
-            return None;
-        }
-        for _ in 0..readings {
+        for value in out.get_mut(at..)?.get_mut(..readings)? {
             let coded = nibbles.number()?;
             // Zigzag: the lowest bit is the sign.
             let step = (coded >> 1) as i32 ^ -((coded & 1) as i32);
             last = last.wrapping_add(step as u16);
-            out.push(last);
+            *value = pixel(last);
         }
+        at += readings;
     }
     Some(out)
 }

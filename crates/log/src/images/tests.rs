@@ -3,6 +3,8 @@ use proptest::prelude::*;
 use super::*;
 use crate::msgs::{CompressedImage, DisparityImage, Header, Image, RegionOfInterest};
 
+mod coded_depth;
+
 const JPEG: &[u8] = include_bytes!("../../tests/data/gradient.jpg");
 const GREY_JPEG: &[u8] = include_bytes!("../../tests/data/gradient-grey.jpg");
 const PROGRESSIVE_JPEG: &[u8] = include_bytes!("../../tests/data/gradient-progressive.jpg");
@@ -434,7 +436,7 @@ fn rvl_is_as_published() {
     let nibbles = [2_u32, 3, 8 | 2, 1, 0, 1];
     let word = nibbles.iter().fold(0, |word, nibble| word << 4 | nibble) << 8;
     assert_eq!(rvl::encode(&[0, 0, 5, 5, 4]), word.to_le_bytes());
-    assert_eq!(rvl::decode(&word.to_le_bytes(), 5).unwrap(), [0, 0, 5, 5, 4]);
+    assert_eq!(rvl::decode(&word.to_le_bytes(), 5, |v| v).unwrap(), [0, 0, 5, 5, 4]);
 }
 
 #[test]
@@ -556,9 +558,9 @@ proptest! {
             .flat_map(|(value, count, zero)| (0..*count).map(|i| if *zero { 0 } else { value.wrapping_add(i as u16) }))
             .collect();
         let coded = rvl::encode(&values);
-        prop_assert_eq!(rvl::decode(&coded, values.len()).unwrap(), values.clone());
+        prop_assert_eq!(rvl::decode(&coded, values.len(), |v| v).unwrap(), values.clone());
         for length in 0..coded.len().saturating_sub(4) {
-            prop_assert!(rvl::decode(&coded[..length], values.len()).is_none_or(|v| v.len() == values.len()));
+            prop_assert!(rvl::decode(&coded[..length], values.len(), |v| v).is_none_or(|v| v.len() == values.len()));
         }
         if !values.is_empty() {
             let data = encode_rvl(values.len() as u32, 1, &values);

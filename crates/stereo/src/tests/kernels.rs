@@ -102,6 +102,7 @@ proptest! {
         image in images(1),
         values in prop::collection::vec(prop_oneof![Just(f32::NAN), 0.0..20.0_f32], 40 * 12),
         least in 1..60u8,
+        threads in 1..5usize,
     ) {
         let (image, width) = (&image[0], image[0].width());
         let values = &values[..image.pixels().len()];
@@ -109,7 +110,7 @@ proptest! {
         let slow: Vec<f32> =
             rows.flat_map(|(y, row)| reference::supported(row, image, y, least.into())).collect();
         let mut fast = values.to_vec();
-        let dropped = TextureTest::default().apply(image, least, &mut fast);
+        let dropped = TextureTest::default().apply(image, least, threads, &mut fast);
         let bits = |row: &[f32]| row.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
         prop_assert_eq!(bits(&fast), bits(&slow));
         let holes = |row: &[f32]| row.iter().filter(|v| v.is_nan()).count();
@@ -121,10 +122,11 @@ proptest! {
         pair in images(2),
         values in prop::collection::vec(prop_oneof![Just(f32::NAN), 3.0..6.0_f32], 40 * 12),
         radius in 1..5usize,
+        threads in 1..5usize,
     ) {
         let mut fast = values[..pair[0].pixels().len()].to_vec();
         let slow = reference::refined(&pair, &fast, radius);
-        Refiner::default().apply([&pair[0], &pair[1]], radius, &mut fast);
+        Refiner::default().apply([&pair[0], &pair[1]], radius, threads, &mut fast);
         for (fast, slow) in fast.iter().zip(&slow) {
             let close = (f64::from(*fast) - slow).abs() < 1e-2 || (fast.is_nan() && slow.is_nan());
             prop_assert!(close, "{} {}", fast, slow);

@@ -107,10 +107,11 @@ fn misunderstood(program: &Program, words: &[&str]) -> Result<Option<String>> {
     Ok((!said.status.success()).then(|| format!("`tagalong {}`: {first}", words.join(" "))))
 }
 
-/// A word as the shell hands it on; any number for a variable.
+/// A word as the shell hands it on; any number for each variable.
 fn plain(word: &&str) -> String {
     let word = word.trim_matches(['\'', '"']);
-    if word.starts_with('$') { "1".to_owned() } else { word.to_owned() }
+    let part = |part: &str| if part.starts_with('$') { "1".to_owned() } else { part.to_owned() };
+    word.split('/').map(part).collect::<Vec<_>>().join("/")
 }
 
 #[cfg(test)]
@@ -133,5 +134,6 @@ mod tests {
         assert_eq!(calls("tagalong simulate --set a.b=1 > x"), [set]);
         assert_eq!(plain(&"'HOTA<-0.01'"), "HOTA<-0.01");
         assert_eq!(plain(&"\"$TASK\""), "1");
+        assert_eq!(plain(&"\"$TASK/$TASKS\""), "1/1");
     }
 }
