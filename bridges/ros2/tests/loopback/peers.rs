@@ -19,7 +19,7 @@ use tagalong_core::Stamp;
 use tagalong_geometry::{Camera, Lens, Pinhole};
 use tagalong_log::msgs::{
     CameraInfo, Header, Image, Message, Odometry, Pose, StringMsg, TFMessage, TransformStamped,
-    TwistStamped,
+    Twist, TwistStamped,
 };
 use tagalong_ros2::{BridgeError, Options, Summary, run_with};
 use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Variant};
@@ -244,7 +244,24 @@ impl<M: Clone> Collected<M> {
     }
 }
 
-impl Collected<TwistStamped> {
+/// A command, with or without a header.
+pub(crate) trait Command: Clone {
+    fn twist(&self) -> &Twist;
+}
+
+impl Command for Twist {
+    fn twist(&self) -> &Twist {
+        self
+    }
+}
+
+impl Command for TwistStamped {
+    fn twist(&self) -> &Twist {
+        &self.twist
+    }
+}
+
+impl<C: Command> Collected<C> {
     /// Returns true if a command since then moves the robot.
     pub(crate) fn moves_since(&self, then: Instant) -> bool {
         self.so_far().iter().any(|(at, command)| *at > then && speeds(command) != [0.0, 0.0])
@@ -443,6 +460,6 @@ pub(crate) fn bridge_with(
 }
 
 /// Returns metres per second and radians per second.
-pub(crate) fn speeds(command: &TwistStamped) -> [f64; 2] {
-    [command.twist.linear.x, command.twist.angular.z]
+pub(crate) fn speeds(command: &impl Command) -> [f64; 2] {
+    [command.twist().linear.x, command.twist().angular.z]
 }

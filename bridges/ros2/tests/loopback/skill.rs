@@ -12,7 +12,7 @@ use ros2_client::rcl_interfaces::{SetParametersRequest, SetParametersResponse};
 use ros2_client::{Client, Message, ServiceMapping, ServiceTypeName};
 use serde::{Deserialize, Serialize};
 use tagalong_config::Registry;
-use tagalong_log::msgs::{Header, TwistStamped};
+use tagalong_log::msgs::{Header, Twist};
 use tagalong_ros2::{CommandType, Options};
 use tagalong_sim::Simulation;
 
@@ -108,11 +108,12 @@ fn a_person_is_enrolled_and_cleared_by_services_and_over_http() {
     let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
     let simulation = Simulation::new(&scene(60.0), 1);
     let mut robot = Robot::new(domain(7), simulation.camera());
-    let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
+    let plain = "geometry_msgs/msg/Twist";
+    let commands = robot.peer.collect_of::<Twist>("/cmd_vel", plain, &heard_all);
     let address = format!("127.0.0.1:{}", 20_000 + std::process::id() % 20_000);
     let options = Options {
         http: Some(address.parse().unwrap()),
-        command_type: CommandType::TwistStamped,
+        command_type: CommandType::Twist,
         ..options(domain(7), "20")
     };
     let mut registry = Registry::default();
@@ -172,7 +173,7 @@ fn a_person_is_enrolled_and_cleared_by_services_and_over_http() {
     let limited = Instant::now();
     sleep(Duration::from_millis(700));
     let fastest = commands.so_far().into_iter().filter(|(at, _)| *at > limited);
-    let fastest = fastest.map(|(_, command)| command.twist.linear.x).fold(0.0, f64::max);
+    let fastest = fastest.map(|(_, command)| command.linear.x).fold(0.0, f64::max);
     assert!(fastest <= 0.05 + 1e-9, "{fastest}");
 
     stop.store(true, Ordering::Relaxed);
