@@ -10,35 +10,79 @@ use sha2::{Digest, Sha256};
 use tagalong_config::{ConfigError, FileLimit, Registry, Settings, parse_settings, read_text};
 use tagalong_log::write::OutputSettings;
 use tagalong_log::{InputSettings, Limits, LogError};
-use tagalong_pipeline::{Document, Options, Pipeline, RunSettings, check_tuning, flattened};
+use tagalong_pipeline::{
+    Document, Options, Pipeline, RunSettings, check_tuning, flattened, flattened_with,
+};
 
 use crate::outcome::Failure;
 use crate::serialize::to_toml;
 use crate::suggest::config_hint;
 
-/// Configs that need no file. None of them extends another one, which would be a file.
-const BUILT_IN: [(&str, &str); 15] = [
-    ("depth-alone", include_str!("../../../configs/depth-alone.toml")),
-    ("depth-verified", include_str!("../../../configs/depth-verified.toml")),
-    ("depth-ekf-as-printed", include_str!("../../../configs/depth-ekf-as-printed.toml")),
-    ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
-    ("depth-laser", include_str!("../../../configs/depth-laser.toml")),
-    ("depth-net-ekf", include_str!("../../../configs/depth-net-ekf.toml")),
-    ("stereo-verified", include_str!("../../../configs/stereo-verified.toml")),
-    ("stereo-street", include_str!("../../../configs/stereo-street.toml")),
-    ("omni-rich", include_str!("../../../configs/omni-rich.toml")),
-    ("mono", include_str!("../../../configs/mono.toml")),
-    ("laser-legs", include_str!("../../../configs/laser-legs.toml")),
-    ("laser-follow", include_str!("../../../configs/laser-follow.toml")),
-    ("follow-depth", include_str!("../../../configs/follow-depth.toml")),
-    ("naive", include_str!("../../../configs/naive.toml")),
-    ("recorded", include_str!("../../../configs/recorded.toml")),
-];
+/// Names and texts of configs.
+macro_rules! configs {
+    ($($name:literal)*) => {
+        &[$(($name, include_str!(concat!("../../../configs/", $name, ".toml")))),*]
+    };
+}
+
+/// Configs that need no file: all of the folder but those with a model in a file of its own.
+const BUILT_IN: &[(&str, &str)] = configs! {
+    "depth-alone"
+    "depth-color-ekf"
+    "depth-ekf"
+    "depth-ekf-as-printed"
+    "depth-ekf-follow"
+    "depth-jpda"
+    "depth-laser"
+    "depth-net-ekf"
+    "depth-sprt"
+    "depth-svm-ekf"
+    "depth-two-stage"
+    "depth-verified"
+    "follow-as-printed"
+    "follow-clear"
+    "follow-depth"
+    "follow-low"
+    "joint-particle"
+    "joint-particle-all"
+    "joint-particle-as-printed"
+    "joint-particle-kde30"
+    "joint-particle-kde50"
+    "joint-particle-table"
+    "laser-follow"
+    "laser-legs"
+    "mono"
+    "naive"
+    "omni-appearance"
+    "omni-ekf"
+    "omni-rich"
+    "particle-verified"
+    "recorded"
+    "recorded-observation-centric"
+    "rgbd-compressive"
+    "rgbd-compressive-as-printed"
+    "rgbd-detector"
+    "rgbd-ekf"
+    "rgbd-faces"
+    "rgbd-follow"
+    "rgbd-kalman"
+    "rgbd-upper-bodies"
+    "stereo-ekf"
+    "stereo-ekf-as-printed"
+    "stereo-follow"
+    "stereo-street"
+    "stereo-svm-ekf"
+    "stereo-verified"
+};
 
 /// Text of a config file, with its path.
 pub struct ConfigFile {
     path: PathBuf,
     text: String,
+}
+
+fn built_in_text(name: &str) -> Option<&'static str> {
+    BUILT_IN.iter().find(|(built_in, _)| *built_in == name).map(|(_, text)| *text)
 }
 
 /// Tables of a config that are not the pipeline's.
@@ -101,8 +145,14 @@ impl ConfigFile {
     pub fn named(name: &str) -> Option<Self> {
         let file = name.strip_prefix("configs/");
         let name = file.map_or(Some(name), |file| file.strip_suffix(".toml"))?;
-        let (name, text) = BUILT_IN.iter().find(|(built_in, _)| *built_in == name)?;
-        Some(Self::new(name, text))
+        let text = built_in_text(name)?;
+        // Those that it extends are built in, too.
+        let read_base = |path: &Path| {
+            let base = path.file_stem().and_then(|stem| built_in_text(&stem.to_string_lossy()));
+            base.map(str::to_owned).ok_or(ErrorKind::NotFound.into())
+        };
+        let whole = flattened_with(text, Path::new("configs"), &read_base);
+        Some(Self::new(name, whole.as_deref().unwrap_or(text)))
     }
 
     fn new(name: &str, text: &str) -> Self {
@@ -281,5 +331,24 @@ impl OuterSettings {
     /// As for [`to_toml`].
     pub fn resolved(&self) -> Result<String, Failure> {
         to_toml("the tables [input], [limits] and [output]", self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_configs_of_the_folder_are_built_in_but_those_with_a_model_of_their_own() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+        let files = crate::suggest::toml_files(&folder);
+        let stems = files.iter().map(|file| file.file_stem().unwrap().to_str().unwrap());
+        let left_out: Vec<&str> = stems.filter(|stem| ConfigFile::named(stem).is_none()).collect();
+        assert_eq!(left_out, ["omni-appearance-as-printed", "onnx", "stereo-svm-ekf-as-printed"]);
+        for name in ConfigFile::built_in_names() {
+            let built_in = ConfigFile::named(name).unwrap();
+            let table: toml::Table = built_in.text.parse().unwrap();
+            assert!(!table.contains_key("extends"), "{name}");
+        }
     }
 }

@@ -7,19 +7,28 @@ use std::path::{Path, PathBuf};
 use tagalong_config::nearest;
 use tagalong_log::LogFiles;
 
+use crate::config_file::ConfigFile;
 use crate::outcome::Failure;
 
-/// Returns "; did you mean `configs/depth-ekf.toml`?", if there is such a file.
+/// Returns "; did you mean `configs/depth-ekf.toml`?", or the names of the configs that there are.
 pub fn config_hint(wanted: &Path) -> String {
     let folders = [wanted.parent().unwrap_or(Path::new("")).to_owned(), PathBuf::from("configs")];
     let files: Vec<PathBuf> = folders.iter().flat_map(|folder| toml_files(folder)).collect();
     let names: Vec<&str> = files.iter().filter_map(|f| f.file_stem()?.to_str()).collect();
     let stem = wanted.file_stem().and_then(|s| s.to_str()).unwrap_or_default();
-    let best = nearest(stem, names.iter().copied());
-    match best.and_then(|name| files.iter().find(|f| f.file_stem().is_some_and(|s| s == name))) {
+    let built_in: Vec<&str> = ConfigFile::built_in_names().collect();
+    let best = nearest(stem, names.iter().chain(&built_in).copied());
+    let Some(best) = best else {
+        // Of a folder that was named all files may be meant; TOML files lie about in many others.
+        let named = if folders[0].as_os_str().is_empty() { &[][..] } else { &names };
+        let mut known: Vec<&str> = named.iter().chain(&built_in).copied().collect();
+        known.sort_unstable();
+        known.dedup();
+        return format!("; there are: {}", known.join(", "));
+    };
+    match files.iter().find(|f| f.file_stem().is_some_and(|s| s == best)) {
         Some(file) => format!("; did you mean `{}`?", file.display()),
-        None if names.is_empty() => String::new(),
-        None => format!("; there are: {}", names.join(", ")),
+        None => format!("; did you mean `{best}`, which is built in?"),
     }
 }
 
@@ -96,7 +105,9 @@ mod tests {
         let hint = config_hint(&home.path().join("dept-ekf.toml"));
         assert!(hint.contains("did you mean") && hint.contains("depth-ekf.toml"), "{hint}");
         let hint = config_hint(&home.path().join("zzzzzzzz.toml"));
-        assert!(hint.contains("there are: depth-ekf, other"), "{hint}");
+        assert!(hint.contains(", depth-ekf, ") && hint.contains(", other, "), "{hint}");
+        let hint = config_hint(&home.path().join("follow-lov.toml"));
+        assert!(hint.contains("did you mean `follow-low`"), "{hint}");
     }
 
     #[test]

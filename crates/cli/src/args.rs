@@ -138,7 +138,7 @@ pub enum Command {
     /// Lists the contents of a log, and the inputs that a pipeline could use
     #[command(after_help = INSPECT_HELP)]
     Inspect {
-        /// The log, an MCAP file with ROS 2 messages.
+        /// The log: MCAP, `.db3`, `.bag`, or the folder of a bag.
         log: PathBuf,
         /// Take the `[input]` and `[limits]` sections of this config.
         #[arg(long)]
@@ -250,10 +250,9 @@ Examples:
   tagalong run --overlay --overwrite       (built-in config, simulated log)
   tagalong run robot.mcap                  (the pipeline for what the log has)
   tagalong run depth-verified robot.mcap   (a built-in pipeline, from any folder)
-  tagalong run configs/depth-ekf.toml robot.mcap
-  tagalong run configs/depth-ekf.toml robot.mcap -o out --overlay --overwrite
+  tagalong run my-pipeline.toml robot.mcap -o out --overlay --overwrite
   tagalong run robot.mcap --with-images    (tracks.mcap with the images, for Foxglove)
-  tagalong run configs/depth-ekf.toml robot.mcap --format json | jq .funnel";
+  tagalong run robot.mcap --format json | jq .funnel";
 
 const CONFIG_HELP: &str = "\
 Examples:

@@ -42,10 +42,10 @@ use self::visit::{Scope, Visit};
 #[derive(Args, Debug)]
 #[command(allow_missing_positional = true)]
 pub struct DoctorArgs {
-    /// The pipeline, a TOML file or the name of a built-in one [default: all that fit the log, one
-    /// after the other].
+    /// The pipeline, a TOML file or the name of a built-in one [default: the recommended ones that
+    /// fit the log, one after the other].
     pub config: Option<PathBuf>,
-    /// The log, an MCAP file with ROS 2 messages.
+    /// The log: MCAP, `.db3`, `.bag`, or the folder of a bag.
     #[arg(required = true)]
     pub log: PathBuf,
     /// Write pictures into this folder: frames with their tracks, and the candidates that each test

@@ -30,7 +30,7 @@ mod tests;
 mod tune;
 
 use checks::check;
-pub use document::{Document, flattened};
+pub use document::{Document, ReadBase, flattened, flattened_with};
 use inputs::{Declared, declared_inputs};
 use resolve::resolve;
 pub use suits::Suits;

@@ -46,8 +46,8 @@ mod tests;
 
 pub use appearance::AppearanceSettings;
 pub use config::{
-    DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, RunSettings, Suits, Tunable,
-    check_tuning, flattened, with_values,
+    DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, ReadBase, RunSettings, Suits, Tunable,
+    check_tuning, flattened, flattened_with, with_values,
 };
 pub use pipeline::Pipeline;
 pub use report::FrameReport;

@@ -14,7 +14,7 @@ use log::RideLog;
 use serde::Serialize;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, spare, write_file};
 use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
@@ -73,6 +73,9 @@ pub struct FollowArgs {
     /// tables, to this folder.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+    /// Replace the files of earlier rides in that folder.
+    #[arg(long, requires = "output")]
+    pub overwrite: bool,
     /// Write a picture of every frame of every ride beside its log, too: boxes, ids, target, plan.
     #[arg(long, requires = "output")]
     pub overlay: bool,
@@ -134,6 +137,9 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
     let seeds = args.split.seeds(args.first_seed, args.seeds).map_err(Failure::usage)?;
     let jobs = jobs(args, seeds, registry)?;
     if let Some(folder) = &args.output {
+        for job in &jobs {
+            spare(&log_file(folder, job), args.overwrite)?;
+        }
         make_folder(folder)?;
     }
     let bar = bar(jobs.len());
@@ -232,7 +238,9 @@ fn ride(
     signals: &Signals,
 ) -> Result<Followed, TrialError> {
     let Job { suite, scene, contender } = job;
-    let file = args.output.as_deref().map(|folder| log_file(folder, job));
+    // A ride that a signal came before leaves no log.
+    let folder = args.output.as_deref().filter(|_| signals.received().is_none());
+    let file = folder.map(|folder| log_file(folder, job));
     let mut log = RideLog::new(file.as_deref(), scene, signals.clone());
     if let Some(file) = file.filter(|_| args.overlay) {
         log = log.with_overlay(&overlay_folder(&file))?;

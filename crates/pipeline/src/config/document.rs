@@ -2,6 +2,7 @@
 //!
 //! The texts are read as one, end to end: a byte range says in which file it lies.
 
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -19,6 +20,9 @@ const MAX_DEPTH: usize = 32;
 const MAX_BASES: usize = 8;
 /// The key that names the config to extend.
 pub(super) const EXTENDS: &str = "extends";
+
+/// Returns the text of the config at a path.
+pub type ReadBase<'a> = dyn Fn(&Path) -> io::Result<String> + 'a;
 
 /// A config, and those that it extends.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,11 +56,16 @@ impl Document {
     /// # Errors A text that is no TOML, too long or nested too deep, and a base that cannot be
     /// read, extends itself, or has such a fault.
     pub fn read(text: &str, folder: &Path) -> Result<Self, ConfigError> {
+        Self::read_with(text, folder, &|path| read_text(path, FileLimit::Config))
+    }
+
+    /// Reads a config; `read_base` returns the texts of the configs that are extended.
+    fn read_with(text: &str, folder: &Path, read_base: &ReadBase<'_>) -> Result<Self, ConfigError> {
         let mut document = Self { text: text.to_owned(), bases: Vec::new() };
         let (mut folder, mut end) = (folder.to_owned(), text.len());
         let mut extends = parse(text, 0)?.remove(EXTENDS).map(name_of);
         while let Some((name, span)) = &extends {
-            let base = base_at(&folder, name.as_deref(), end, &document.bases)
+            let base = base_at(&folder, name.as_deref(), end, &document.bases, read_base)
                 .map_err(|message| ConfigError { message, span: Some(span.clone()) });
             let base = base.map_err(|error| document.locate(error))?;
             end = base.padded.len();
@@ -125,7 +134,19 @@ impl Document {
 /// # Errors
 /// As [`Document::read`].
 pub fn flattened(text: &str, folder: &Path) -> Result<String, ConfigError> {
-    let document = Document::read(text, folder)?;
+    flattened_with(text, folder, &|path| read_text(path, FileLimit::Config))
+}
+
+/// As [`flattened`]; `read_base` returns the texts of the configs that are extended.
+///
+/// # Errors
+/// As [`Document::read`].
+pub fn flattened_with(
+    text: &str,
+    folder: &Path,
+    read_base: &ReadBase<'_>,
+) -> Result<String, ConfigError> {
+    let document = Document::read_with(text, folder, read_base)?;
     if document.bases.is_empty() {
         return Ok(text.to_owned());
     }
@@ -168,6 +189,7 @@ fn base_at(
     name: Option<&str>,
     start: usize,
     before: &[Base],
+    read_base: &ReadBase<'_>,
 ) -> Result<Base, String> {
     let Some(name) = name else { return Err(format!("`{EXTENDS}` must be the path of a config")) };
     let path = folder.join(name);
@@ -176,8 +198,8 @@ fn base_at(
             "`{EXTENDS}` goes on in a circle, or through more than {MAX_BASES} configs"
         ));
     }
-    let text = read_text(&path, FileLimit::Config)
-        .map_err(|error| format!("cannot extend {}: {error}", path.display()))?;
+    let text =
+        read_base(&path).map_err(|error| format!("cannot extend {}: {error}", path.display()))?;
     Ok(Base { path, padded: "\n".repeat(start) + &text, start })
 }
 
