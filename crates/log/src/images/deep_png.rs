@@ -63,7 +63,7 @@ fn parts(data: &[u8]) -> Option<(u32, u32, Vec<u8>)> {
             (b"IHDR", header) if size.is_none() => size = Some(size_of(header)?),
             (b"IDAT", part) => stream.extend_from_slice(part),
             (b"IEND", _) => break,
-            // What need not be understood leaves the values alone, but for transparency.
+            // Chunks that a decoder may skip leave the values alone, except transparency.
             (kind, _) if kind[0].is_ascii_lowercase() && kind != b"tRNS" => {}
             _ => return None,
         }

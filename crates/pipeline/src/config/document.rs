@@ -56,7 +56,7 @@ impl Document {
     /// # Errors A text that is no TOML, too long or nested too deep, and a base that cannot be
     /// read, extends itself, or has such a fault.
     pub fn read(text: &str, folder: &Path) -> Result<Self, ConfigError> {
-        Self::read_with(text, folder, &|path| read_text(path, FileLimit::Config))
+        Self::read_with(text, folder, &read_config)
     }
 
     /// Reads a config; `read_base` returns the texts of the configs that are extended.
@@ -134,7 +134,7 @@ impl Document {
 /// # Errors
 /// As [`Document::read`].
 pub fn flattened(text: &str, folder: &Path) -> Result<String, ConfigError> {
-    flattened_with(text, folder, &|path| read_text(path, FileLimit::Config))
+    flattened_with(text, folder, &read_config)
 }
 
 /// As [`flattened`]; `read_base` returns the texts of the configs that are extended.
@@ -151,6 +151,10 @@ pub fn flattened_with(
         return Ok(text.to_owned());
     }
     toml::to_string(&document.table()?).map_err(|error| ConfigError::new(error.to_string()))
+}
+
+fn read_config(path: &Path) -> io::Result<String> {
+    read_text(path, FileLimit::Config)
 }
 
 /// Parses a text that begins at byte `start` of the given one.
