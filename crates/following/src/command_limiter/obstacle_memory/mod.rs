@@ -20,6 +20,10 @@ const STANDS_S: f64 = 1.0;
 /// below is believed to be there for `STEPPED_IN_S`, s, however short it was seen.
 const CLOSE_M: f64 = 0.6;
 const STEPPED_IN_S: f64 = 5.0;
+/// Height below which a thing is part of what stands so far beside it, m: the seat of a chair, which is
+/// below the image before it was seen for a second. Nobody is so low.
+const LOW_M: f64 = 0.6;
+const BESIDE_M: f64 = 0.2;
 /// Offset from the torso of a person to the head, m.
 const TORSO: Vector3<f64> = Vector3::new(0.0, 0.0, 0.35);
 /// Distance from a person within which a point may be an object that the person carries, pulls or
@@ -92,9 +96,14 @@ struct Obstacle {
     at: Point2<f64>,
     /// Heights at which it was seen above that.
     heights: Heights,
-    /// Time for which it has been seen, s, without the time in which the followed person stood
-    /// beside it and may have carried it.
+    /// Time for which it has been seen, s, without `beside_s`.
     seen_s: f64,
+    /// Time for which it has been seen while the followed person was there and may have carried it,
+    /// or been it, s. It counts as soon as the person has gone and it still stands there: a chair
+    /// after its sitter got up.
+    beside_s: f64,
+    /// True for what was seen only where the followed person was.
+    of_target: bool,
     /// Time for which it has not been seen, s.
     unseen_s: f64,
     /// Track of the person that it was, if it is one.
@@ -105,7 +114,7 @@ struct Obstacle {
 
 impl ObstacleMemory {
     /// Takes in an image; the robot moved by `motion` since the last one. Points near the followed
-    /// person are not remembered, nor are moving ones.
+    /// person are remembered only if they stay when the person goes, and moving ones are not.
     pub(crate) fn update(
         &mut self,
         settings: &CollisionMonitorSettings,
@@ -165,14 +174,8 @@ impl ObstacleMemory {
                 let who = Some(track.id);
                 // `STANDS_S` at once: the tracker vouches for a person, so no second of standing is
                 // needed.
-                self.things.push(Obstacle {
-                    at,
-                    heights,
-                    seen_s: STANDS_S,
-                    unseen_s: 0.0,
-                    who,
-                    is_drop: false,
-                });
+                let seen_s = STANDS_S;
+                self.things.push(Obstacle { seen_s, who, ..Obstacle::new(at, heights) });
             }
         }
     }
@@ -225,31 +228,23 @@ impl ObstacleMemory {
         target: Option<&Person>,
     ) {
         let grid = &self.grid;
-        self.things.retain_mut(|Obstacle { at, heights, seen_s, unseen_s, is_drop, .. }| {
-            *at = motion.apply_to_point(*at);
+        self.things.retain_mut(|thing| {
+            thing.at = motion.apply_to_point(thing.at);
+            let at = &thing.at;
             if !is_near(settings, at) {
                 return false;
             }
             if grid.is_something(at) {
-                let carried = target.is_some_and(|person| may_carry(person, at));
-                *seen_s += if carried { 0.0 } else { motion.dt };
-                *unseen_s = 0.0;
-                heights.0 |= grid.heights_around(at).0;
+                thing.heights.0 |= grid.heights_around(at).0;
+                thing.see(settings, motion.dt, target);
                 return true;
             }
-            *unseen_s += motion.dt;
-            let is_gone = depth.is_some_and(|depth| match is_drop {
+            thing.unseen_s += motion.dt;
+            let is_gone = depth.is_some_and(|depth| match thing.is_drop {
                 true => shows_floor(settings, camera, depth, at),
-                false => shows_past(camera, depth, at, *heights),
+                false => shows_past(camera, depth, at, thing.heights),
             });
-            // An obstacle that stood for a second is kept for `memory_s`, a brief one only if it
-            // was close.
-            let kept_s = match () {
-                () if *seen_s >= STANDS_S => settings.memory_s,
-                () if is_close(settings, at) => STEPPED_IN_S,
-                () => 0.0,
-            };
-            !is_gone && *unseen_s <= kept_s
+            !is_gone && thing.unseen_s <= thing.kept_s(settings)
         });
     }
 
@@ -305,22 +300,73 @@ impl ObstacleMemory {
         }
         for point in &self.seen {
             let at = point.xy();
-            let is_of = |person: &Person| far_m(person, &at) < settings.target_radius_m;
-            if self.grid.is_full(&at) && !target.is_some_and(is_of) {
+            if self.grid.is_full(&at) {
                 self.grid.clear_around(&at);
                 let heights = self.grid.heights_around(&at);
                 let is_drop = point.z <= 0.0;
                 // A floor does not walk away, so no second of standing is needed.
                 let seen_s = if is_drop { STANDS_S } else { 0.0 };
-                self.things.push(Obstacle {
-                    at,
-                    heights,
-                    seen_s,
-                    unseen_s: 0.0,
-                    who: None,
-                    is_drop,
-                });
+                let of_target =
+                    !is_drop && target.is_some_and(|person| is_of(settings, person, &at));
+                let first = Obstacle { seen_s, of_target, is_drop, ..Obstacle::new(at, heights) };
+                self.things.push(first);
             }
+        }
+        self.join_low_parts();
+    }
+
+    /// Lets low things that are seen beside standing ones stand, too.
+    fn join_low_parts(&mut self) {
+        let stand = |thing: &&Obstacle| thing.seen_s >= STANDS_S && thing.who.is_none();
+        let standing: Vec<_> = self.things.iter().filter(stand).map(|thing| thing.at).collect();
+        let is_part = |thing: &&mut Obstacle| {
+            thing.unseen_s == 0.0 && !thing.of_target && thing.heights.are_low()
+        };
+        for thing in self.things.iter_mut().filter(is_part) {
+            if standing.iter().any(|at| nalgebra::distance(at, &thing.at) < BESIDE_M) {
+                thing.seen_s = thing.seen_s.max(STANDS_S);
+            }
+        }
+    }
+}
+
+impl Obstacle {
+    fn new(at: Point2<f64>, heights: Heights) -> Self {
+        let (seen_s, beside_s, unseen_s) = (0.0, 0.0, 0.0);
+        Self {
+            at,
+            heights,
+            seen_s,
+            beside_s,
+            unseen_s,
+            of_target: false,
+            who: None,
+            is_drop: false,
+        }
+    }
+
+    /// Takes in that it is seen, `dt_s` after the image before.
+    fn see(&mut self, settings: &CollisionMonitorSettings, dt_s: f64, target: Option<&Person>) {
+        self.unseen_s = 0.0;
+        let of_target = target.is_some_and(|person| is_of(settings, person, &self.at));
+        if of_target || target.is_some_and(|person| may_carry(person, &self.at)) {
+            self.beside_s += dt_s;
+            return;
+        }
+        self.seen_s += dt_s;
+        self.of_target = false;
+        if target.is_some_and(|person| far_m(person, &self.at) > CARRIED_M) {
+            self.seen_s += std::mem::take(&mut self.beside_s);
+        }
+    }
+
+    /// Returns the time for which it is remembered out of view, s: for long if it stood for a
+    /// second, and briefly if it was close.
+    fn kept_s(&self, settings: &CollisionMonitorSettings) -> f64 {
+        match () {
+            () if self.seen_s >= STANDS_S => settings.memory_s,
+            () if !self.of_target && is_close(settings, &self.at) => STEPPED_IN_S,
+            () => 0.0,
         }
     }
 }
@@ -329,6 +375,10 @@ impl Heights {
     /// Returns the set of the one height nearest to `height_m`.
     fn of(height_m: f64) -> Self {
         Self(1 << (height_m / BAND_M).clamp(0.0, 15.0) as u16)
+    }
+
+    fn are_low(self) -> bool {
+        self.metres().all(|height_m| height_m < LOW_M)
     }
 
     /// Returns the middle of each height, m.
@@ -467,6 +517,11 @@ fn is_close(settings: &CollisionMonitorSettings, at: &Point2<f64>) -> bool {
 
 fn far_m(person: &Person, at: &Point2<f64>) -> f64 {
     nalgebra::distance(&person.position.xy(), at)
+}
+
+/// Returns true for a place that belongs to the person.
+fn is_of(settings: &CollisionMonitorSettings, person: &Person, at: &Point2<f64>) -> bool {
+    far_m(person, at) < settings.target_radius_m
 }
 
 fn may_carry(person: &Person, at: &Point2<f64>) -> bool {

@@ -87,6 +87,53 @@ fn people_are_not_remembered_and_what_is_gone_is_forgotten() {
     assert_eq!(look(9.0), Some(Ahead::Free));
 }
 
+/// A person gets up from a box and walks away, and the robot drives after them.
+#[test]
+fn what_the_person_sat_on_is_remembered_when_they_have_gone() {
+    let settings = CollisionMonitorSettings::default();
+    let mut surroundings = ObstacleMemory::default();
+    let mut look = |x: f64, forward: f64, person: &Person| {
+        let (depth, still) = (with_box(x, 0.0), EgoMotion::at_rest(0.1));
+        let motion = EgoMotion { forward, ..still };
+        surroundings.update(&settings, &camera(), Some(&depth), &motion, Some(person));
+        surroundings.ahead(&settings, 0.0, Some(person.position.xy()))
+    };
+    for _ in 0..WAIT {
+        assert_eq!(look(1.5, 0.0, &person(1.5, 0.0, 0.0)), Some(Ahead::Free), "it is theirs");
+    }
+    let gone = person(2.9, 0.0, 0.7);
+    assert!(is_at(look(1.5, 0.0, &gone), 1.3));
+    for step in 1..=7 {
+        look(1.5 - 0.15 * f64::from(step), 0.15, &gone);
+    }
+    let then = (0..60).map(|_| look(9.0, 0.0, &gone)).last();
+    assert!(is_at(then.flatten(), 0.25), "{then:?}");
+}
+
+/// The seat of a chair, whose back stands beside the path, is in view for two frames.
+#[test]
+fn a_low_part_of_what_stands_is_remembered_though_it_was_seen_briefly() {
+    let settings = CollisionMonitorSettings::default();
+    let is_there = |with_back: bool| {
+        let mut surroundings = ObstacleMemory::default();
+        let mut look = |depth: &DepthImage, forward: f64| {
+            let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
+            surroundings.update(&settings, &camera(), Some(depth), &motion, None);
+            surroundings.ahead(&settings, 0.0, None) != Some(Ahead::Free)
+        };
+        let back = with_box(if with_back { 1.4 } else { 9.0 }, 0.6);
+        let seat = with_box(1.5, 0.3);
+        let both = DepthImage::from_fn(80, 60, |u, v| back.row(v)[u].min(seat.row(v)[u]));
+        let images = [vec![&back; WAIT], vec![&both; 2]].concat();
+        for image in images {
+            look(image, 0.0);
+        }
+        look(&with_box(9.0, 0.0), 0.9);
+        (0..60).map(|_| look(&with_box(9.0, 0.0), 0.0)).last()
+    };
+    assert_eq!((is_there(true), is_there(false)), (Some(true), Some(false)));
+}
+
 /// A person with the head above the image crosses the path a metre before the robot: only the
 /// legs were seen, and they are not remembered.
 #[test]
