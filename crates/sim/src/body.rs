@@ -118,6 +118,23 @@ pub struct Skeleton {
 }
 
 impl Skeleton {
+    /// Returns the same body on a floor that is higher by so much, m.
+    pub fn raised(mut self, by_m: f64) -> Self {
+        let pairs = [
+            &mut self.shoulders,
+            &mut self.elbows,
+            &mut self.wrists,
+            &mut self.hips,
+            &mut self.knees,
+            &mut self.ankles,
+            &mut self.heels,
+            &mut self.toes,
+        ];
+        let trunk = [&mut self.pelvis, &mut self.chest, &mut self.head];
+        pairs.into_iter().flatten().chain(trunk).for_each(|joint| joint.z += by_m);
+        self
+    }
+
     /// The joints of a body in a stance.
     pub fn new(build: &Build, stance: &Stance) -> Self {
         let h = build.height_m;

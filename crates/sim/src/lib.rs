@@ -71,7 +71,7 @@ pub use person::Extra;
 pub use robot::Encoder;
 pub use scene::{
     AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
-    LightSettings, PersonSettings, Posture, RobotSettings, RoomSettings, Scene, Trick,
+    LightSettings, PersonSettings, Posture, Ramp, RobotSettings, RoomSettings, Scene, Trick,
 };
 pub use simulation::{Clearance, Event, OdometryReading, Shot, Simulation, Truth, WebcamShot};
 pub use split::{Seeds, Split};

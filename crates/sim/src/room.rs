@@ -5,7 +5,7 @@ use nalgebra::{Point2, Point3, Rotation2, Rotation3, Vector2, Vector3};
 use crate::behaviour::Obstacle;
 use crate::material::{Colour, Material, Pattern, scaled};
 use crate::random::Random;
-use crate::scene::{Floor, Furniture, FurnitureKind, LightSettings, RoomSettings, Scene};
+use crate::scene::{Floor, Furniture, FurnitureKind, LightSettings, Ramp, RoomSettings, Scene};
 use crate::shape::{Form, Shape};
 use crate::world::{Lamp, Object};
 
@@ -48,13 +48,16 @@ pub fn room(settings: &RoomSettings) -> Object {
     };
     let (cx, cy, cz) = (0.5 * x, 0.5 * y, 0.5 * z);
     let door_y = 0.3 * y;
-    let mut shapes = vec![
-        slab([cx, cy, -half], [x, y, 0.0], floor(settings.floor)),
+    let mut shapes = match &settings.ramp {
+        None => vec![slab([cx, cy, -half], [x, y, 0.0], floor(settings.floor))],
+        Some(ramp) => sloped_floor(ramp, [x, y], floor(settings.floor)).into(),
+    };
+    shapes.extend([
         slab([cx, cy, z + half], [x, y, 0.0], Material::plain([0.75; 3])),
         slab([-half, cy, cz], [0.0, y, z], wall),
         slab([cx, -half, cz], [x, 0.0, z], wall),
         slab([cx, y + half, cz], [x, 0.0, z], wall),
-    ];
+    ]);
     if settings.open_door {
         let [side, top] = DOOR_M;
         let (low, high) = (door_y - side, door_y + side);
@@ -82,6 +85,24 @@ pub fn room(settings: &RoomSettings) -> Object {
         shapes.extend(door(x, door_y));
     }
     Object::new(shapes, None, false)
+}
+
+/// Returns the level floor before a ramp, the ramp, and the level floor after it, in a room of this
+/// length and width, m.
+fn sloped_floor(ramp: &Ramp, [x, y]: [f64; 2], of: Material) -> [Shape; 3] {
+    let Ramp { from_m, length_m, rise_m } = ramp;
+    let (half, end_m) = (0.5 * WALL_M, from_m + length_m);
+    let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), -rise_m.atan2(*length_m));
+    let plate = |middle: [f64; 2], long: f64, turn: Rotation3<f64>| {
+        let surface = Point3::new(middle[0], 0.5 * y, middle[1]);
+        let sides = Vector3::new(0.5 * long, 0.5 * y + half, half);
+        Shape::new(Form::Block(sides), surface - turn * Vector3::new(0.0, 0.0, half), turn, of)
+    };
+    [
+        plate([0.5 * from_m, 0.0], *from_m, Rotation3::identity()),
+        plate([from_m + 0.5 * length_m, 0.5 * rise_m], length_m.hypot(*rise_m), turn),
+        plate([0.5 * (end_m + x), *rise_m], (x - end_m).max(0.0), Rotation3::identity()),
+    ]
 }
 
 fn floor(kind: Floor) -> Material {

@@ -1,5 +1,6 @@
 //! Scenes as TOML: everything that a simulated log depends on, the seed included.
 
+use nalgebra::Point2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::ConfigError;
@@ -208,7 +209,9 @@ impl Scene {
         ];
         let webcams = self.webcams.iter().flat_map(WebcamSettings::rules);
         let laser = self.laser.iter().flat_map(LaserSettings::rules);
-        let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(webcams).chain(laser);
+        let ramp = self.room.ramp.iter().flat_map(Ramp::rules);
+        let devices = webcams.chain(laser);
+        let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(devices).chain(ramp);
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
             None => Ok(()),
@@ -250,6 +253,43 @@ pub struct RoomSettings {
     pub clutter: usize,
     /// The door at the far end stands open to a dark room.
     pub open_door: bool,
+    /// A ramp across the room; without it the floor is level.
+    pub ramp: Option<Ramp>,
+}
+
+impl RoomSettings {
+    /// Returns the height of the floor at a place, m.
+    pub fn floor_m(&self, at: &Point2<f64>) -> f64 {
+        self.ramp.as_ref().map_or(0.0, |ramp| ramp.height_m(at.x))
+    }
+}
+
+/// Floor that rises along the length of the room, and is level before and after that.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Ramp {
+    /// Where it begins, m from the near end of the room.
+    pub from_m: f64,
+    /// Length along the room, m.
+    pub length_m: f64,
+    /// Height at its end, m.
+    pub rise_m: f64,
+}
+
+impl Ramp {
+    fn height_m(&self, x: f64) -> f64 {
+        self.rise_m * ((x - self.from_m) / self.length_m).clamp(0.0, 1.0)
+    }
+
+    fn rules(&self) -> [(bool, &'static str); 2] {
+        [
+            (self.from_m >= 0.0 && self.length_m > 0.0, "room.ramp must have a place and a length"),
+            (
+                (0.0..=0.2).contains(&(self.rise_m / self.length_m)),
+                "room.ramp.rise_m must be in 0 to a fifth of length_m",
+            ),
+        ]
+    }
 }
 
 impl Default for RoomSettings {
@@ -261,6 +301,7 @@ impl Default for RoomSettings {
             floor: Floor::Planks,
             clutter: 0,
             open_door: false,
+            ramp: None,
         }
     }
 }

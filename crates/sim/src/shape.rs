@@ -54,6 +54,12 @@ impl Shape {
         shape
     }
 
+    /// Returns the solid higher by so much, m.
+    pub fn raised(&self, by_m: f64) -> Self {
+        let origin = self.origin + Vector3::new(0.0, 0.0, by_m);
+        Self::new(self.form, origin, self.world_from_own, self.material)
+    }
+
     /// A capsule between two points; `forward` fixes how a texture lies on it.
     pub fn limb(
         ends: (Point3<f64>, Point3<f64>),

@@ -40,6 +40,9 @@ const GOES_M: f64 = 0.6;
 /// the robot.
 const FEELERS: u32 = 48;
 const FEELERS_M: [f64; 4] = [0.15, 0.45, 0.8, 1.2];
+/// Half the distance of the places on which the robot stands, m: it tilts little by little at the
+/// ends of a ramp.
+const STANDS_ON_M: f64 = 0.15;
 /// Half the width of a person, m.
 const BODY_M: f64 = 0.2;
 /// Visible fraction below which no detector can be expected to find a person.
@@ -173,7 +176,10 @@ impl Simulation {
         let obstacles: Vec<Obstacle> = pieces.iter().flat_map(room::obstacles).collect();
         let mut fixed = vec![room::room(&scene.room)];
         let (ceiling_m, mut chance) = (scene.room.height_m, stream(8));
-        fixed.extend(pieces.iter().map(|piece| room::furniture(piece, ceiling_m, &mut chance)));
+        fixed.extend(pieces.iter().map(|piece| {
+            let floor_m = scene.room.floor_m(&piece.at.into());
+            room::furniture(piece, ceiling_m - floor_m, &mut chance).raised(floor_m)
+        }));
         let mirror = (scene.camera.kind == CameraKind::Panorama)
             .then(|| MirrorCamera::new(&scene.camera, &mut stream(6)));
         let camera = mirror
@@ -251,9 +257,11 @@ impl Simulation {
         let rays = FEELERS_M.into_iter().flat_map(|height_m| {
             (0..FEELERS).map(move |i| (height_m, TAU * f64::from(i) / f64::from(FEELERS)))
         });
+        let floor_m = self.scene.room.floor_m(&robot);
         let things = rays.map(|(height_m, angle)| {
             let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            world::distance(&self.stage.objects, &Point3::new(robot.x, robot.y, height_m), &ray)
+            let from = Point3::new(robot.x, robot.y, floor_m + height_m);
+            world::distance(&self.stage.objects, &from, &ray)
         });
         Clearance { people_m: least(&mut { people }), things_m: least(&mut { things }) }
     }
@@ -393,12 +401,18 @@ impl Simulation {
         let mut people = Vec::new();
         let mut uppers = Vec::new();
         for (walker, id) in self.present() {
-            let skeleton = Skeleton::new(&walker.person.build, &walker.stance);
+            let skeleton = self.skeleton(walker);
             let (shapes, upper) = walker.person.shapes(&skeleton);
             people.push(Object::new(shapes, Some(id), true));
             uppers.push(upper);
         }
         (World::new(&self.stage, people), uppers)
+    }
+
+    /// Returns a person on the floor.
+    fn skeleton(&self, walker: &Walker) -> Skeleton {
+        let floor_m = self.scene.room.floor_m(&walker.stance.place);
+        Skeleton::new(&walker.person.build, &walker.stance).raised(floor_m)
     }
 
     /// The robot's body in the world while a part of the image is taken, from the
@@ -409,8 +423,13 @@ impl Simulation {
         let planar = self.robot.pose_after(since_middle);
         let nod = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.robot.nod_rad());
         let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
-        let at = planar.translation.vector;
-        Isometry3::from_parts(Translation3::new(at.x, at.y, 0.0), yaw * nod)
+        let at = Point2::from(planar.translation.vector);
+        let at_m = |dx: f64| self.scene.room.floor_m(&(at + Vector2::new(dx, 0.0)));
+        let rise = at_m(STANDS_ON_M) - at_m(-STANDS_ON_M);
+        // A rising floor lifts the nose of a robot that looks along the room.
+        let slope =
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -rise.atan2(2.0 * STANDS_ON_M));
+        Isometry3::from_parts(Translation3::new(at.x, at.y, at_m(0.0)), slope * yaw * nod)
     }
 
     fn moment(&self, eye: u64, gain: f64) -> Moment {
@@ -525,7 +544,7 @@ impl Simulation {
         let people = world.people.iter().filter_map(|o| Some((o.person?, o)));
         let walkers = self.present().map(|(walker, _)| walker).zip(uppers);
         let truth = people.zip(walkers).map(|((id, object), (walker, upper))| {
-            let skeleton = Skeleton::new(&walker.person.build, &walker.stance);
+            let skeleton = self.skeleton(walker);
             let torso = nalgebra::center(&skeleton.pelvis, &skeleton.chest);
             let (upper_body, seen) = sight((id, &object.shapes[..*upper]), &skeleton);
             Truth {

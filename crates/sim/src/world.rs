@@ -26,6 +26,12 @@ impl Object {
         Self { shapes, person, casts_shadow }
     }
 
+    /// Lifts the solids by so much, m.
+    pub fn raised(mut self, by_m: f64) -> Self {
+        self.shapes.iter_mut().for_each(|shape| *shape = shape.raised(by_m));
+        self
+    }
+
     /// The solids with the person to whom they belong.
     fn solids(&self) -> impl Iterator<Item = (Option<u16>, &Shape)> + Clone {
         self.shapes.iter().map(|shape| (self.person, shape))

@@ -1,4 +1,5 @@
 use super::*;
+use crate::scene::{Ramp, RoomSettings};
 
 const SMALL: &str = "seed = 4\nduration_s = 1.0\n[camera]\nwidth = 96\nheight = 72\n\
     [room]\nclutter = 3\n[[people]]\npath = [[4.0, 3.0]]\nheight_m = 1.7\n\
@@ -37,6 +38,45 @@ fn depth_is_the_same_without_colour() {
         };
         assert!(b.images.colour.is_none() && bits(a) == bits(b));
         assert_eq!(a.truth, b.truth);
+    }
+}
+
+/// One person 3 m before the robot, at this place along the room.
+fn on_ramp(ramp: &str, robot_x: f64) -> Shot {
+    let text = format!(
+        "seed = 4\nduration_s = 0.2\n[camera]\nwidth = 96\nheight = 72\n[room]\n{ramp}\n\
+         [robot]\nstart = [{robot_x:?}, 3.0]\n[[people]]\npath = [[{:?}, 3.0]]\nheight_m = 1.7\n",
+        robot_x + 3.0
+    );
+    shots(&text, 1).swap_remove(0)
+}
+
+#[test]
+fn a_ramp_lifts_people_and_tilts_the_robot() {
+    let ramp = "ramp = { from_m = 3.0, length_m = 2.0, rise_m = 0.2 }";
+    let (level, below) = (on_ramp("", 2.0), on_ramp(ramp, 2.0));
+    let up = below.truth[0].head_in_robot - level.truth[0].head_in_robot;
+    assert!((up - Vector3::new(0.0, 0.0, 0.2)).norm() < 1e-9, "{up:?}");
+    let head = on_ramp("", 4.0).truth[0].head_in_robot;
+    let slope = Rotation3::from_axis_angle(&Vector3::y_axis(), -0.1_f64.atan());
+    let expected = slope.inverse() * (head + Vector3::new(0.0, 0.0, 0.1));
+    let seen = on_ramp(ramp, 4.0).truth[0].head_in_robot;
+    assert!((seen - expected).norm() < 1e-9, "{seen} {expected}");
+    let above = on_ramp(ramp, 6.0).truth[0].head_in_robot;
+    assert!((above - head).norm() < 1e-9, "the level floor above it: {above} {head}");
+}
+
+#[test]
+fn the_floor_of_a_ramp_is_where_people_stand_on_it() {
+    let settings = RoomSettings {
+        ramp: Some(Ramp { from_m: 3.0, length_m: 2.0, rise_m: 0.2 }),
+        ..RoomSettings::default()
+    };
+    let room = [room::room(&settings)];
+    for x in [0.5, 2.9, 3.5, 4.5, 5.1, 8.0] {
+        let down = world::distance(&room, &Point3::new(x, 2.0, 1.0), &-Vector3::z());
+        let floor_m = settings.floor_m(&Point2::new(x, 2.0));
+        assert!((1.0 - down - floor_m).abs() < 1e-3, "{x}: {down} above {floor_m}");
     }
 }
 
