@@ -260,7 +260,10 @@ const SPOILT: [Spoilt; 5] = [
     },
     Spoilt {
         spoil: |images, random| {
-            with_depth(images, |z| if random.uniform() < 0.02 { 0.4 } else { z })
+            with_depth(images, |z| match random.uniform() {
+                salt if salt < 0.02 => (0.3 + 400.0 * salt) as f32,
+                _ => z,
+            })
         },
     },
     Spoilt { spoil: |images, _| with_colour(images, [255; 3]) },
@@ -300,8 +303,7 @@ fn s2_noise_breaks_nothing_and_its_cost_in_recall_is_known() {
     let recalls = SPOILT.map(|spoilt| recall("depth-ekf.toml", &camera, &shots, &spoilt));
     let [clean, holes, salt, white, black] = recalls;
     assert!(clean > 0.9, "{recalls:?}");
-    // A weakness, not a wish: its silhouettes need runs of valid pixels.
-    assert_eq!((holes, salt), (0.0, 0.0), "better than the table of faults says");
+    assert!(holes > 0.8 && salt > 0.8, "{recalls:?}");
     // The detector of this config reads depth alone.
     assert_eq!((clean, clean), (white, black));
     // Pipelines that read colour may lose the person, and nothing else.

@@ -14,6 +14,7 @@ pub mod quality;
 pub mod registration;
 mod row_sums;
 mod sketch;
+mod speckle;
 mod upright;
 
 pub use appearance::{Appearance, AppearanceDifference};

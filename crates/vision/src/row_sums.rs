@@ -1,5 +1,7 @@
 use tagalong_core::DepthImage;
 
+use crate::speckle::despeckle;
+
 /// Running sums of a row up to, and without, one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
@@ -51,18 +53,25 @@ impl RowSums {
     /// Reduces `depth` by `scale` (at least 1) and sums it up. Each reduced pixel is the first
     /// valid one of its block, so that small holes close.
     pub fn new(depth: &DepthImage, scale: usize) -> Self {
-        let scale = scale.max(1);
-        let (width, height) = (depth.width() / scale, depth.height() / scale);
-        let mut values = vec![0u16; width * height];
+        Self::of(reduced(depth, scale.max(1)), depth.width() / scale.max(1), scale.max(1))
+    }
+
+    /// As [`RowSums::new`], without noise in single pixels: readings that are near none of their
+    /// neighbours are dropped, and holes of one pixel within a surface are closed.
+    pub fn despeckled(depth: &DepthImage, scale: usize) -> Self {
+        let (scale, mut values) = (scale.max(1), reduced(depth, scale.max(1)));
+        let width = depth.width() / scale;
+        despeckle(&mut values, width);
+        Self::of(values, width, scale)
+    }
+
+    fn of(values: Vec<u16>, width: usize, scale: usize) -> Self {
+        let height = values.len().checked_div(width).unwrap_or(0);
         let mut sums = Vec::with_capacity((width + 1) * height);
         for y in 0..height {
-            let row = &mut values[y * width..(y + 1) * width];
-            for dy in 0..scale {
-                fill_row(row, depth.row(y * scale + dy), scale);
-            }
             let mut running = Sums::default();
             sums.push(running);
-            sums.extend(row.iter().map(|value| {
+            sums.extend(values[y * width..(y + 1) * width].iter().map(|value| {
                 let value = u32::from(*value);
                 // Rows are too short for an overflow, and checking for one takes time.
                 running.count = running.count.wrapping_add(u32::from(value != 0));
@@ -123,6 +132,19 @@ impl RowSums {
         let (a, b) = (row[from], row[to]);
         Sums { count: b.count - a.count, sum: b.sum - a.sum, squares: b.squares - a.squares }
     }
+}
+
+/// Returns the inverse depths of an image, reduced by `scale`.
+fn reduced(depth: &DepthImage, scale: usize) -> Vec<u16> {
+    let (width, height) = (depth.width() / scale, depth.height() / scale);
+    let mut values = vec![0u16; width * height];
+    for y in 0..height {
+        let row = &mut values[y * width..(y + 1) * width];
+        for dy in 0..scale {
+            fill_row(row, depth.row(y * scale + dy), scale);
+        }
+    }
+    values
 }
 
 /// Fills the empty pixels of a reduced row from one row of its blocks.

@@ -22,7 +22,7 @@ impl Working {
 impl Derived for Working {
     fn derive(frame: &Frame) -> Result<Self> {
         let scale = (frame.camera.focal_px() / WORKING_FOCAL_PX).round().max(1.0);
-        Ok(Self(RowSums::new(frame.depth()?, scale as usize)))
+        Ok(Self(RowSums::despeckled(frame.depth()?, scale as usize)))
     }
 }
 

@@ -1,0 +1,274 @@
+//! Noise in single pixels of an image of inverse depth.
+
+/// Difference of two readings of one surface, as a part of their mean, at most: 1 / 8 ...
+const SURFACE_BITS: u32 = 3;
+/// ... or this, in the unit of the values: 0.03 1/m, because the noise of a sensor is as large far
+/// away, where the inverse depth is small, as near by.
+const NOISE: u16 = (0.03 * crate::RowSums::UNITS) as u16;
+/// An image is speckled from one odd reading in so many pixels on, ...
+const FEW_ODD: usize = 100;
+/// ... or from one hole of a single pixel in so many on. Sensors have fewer of both, at the edges of
+/// what they see and at the end of their reach, and silhouettes allow for these.
+const FEW_HOLES: usize = 20;
+/// Neighbours of a hole that have a reading where it is closed, at least: at a straight edge there
+/// are three.
+const LEAST_READ: usize = 4;
+/// Times that holes are closed, because their neighbours may be holes, too: of pixels half of which
+/// are missing at random, one in a hundred is left.
+const CLOSINGS: usize = 4;
+
+/// Drops readings that are near none of their eight neighbours, and closes holes with readings
+/// around them, in an image with many of either. Where no pixel stands alone, nothing changes:
+/// neither at the straight edge of a surface or a hole, nor in a line one pixel wide. 0 is no
+/// reading.
+pub(crate) fn despeckle(values: &mut [u16], width: usize) {
+    let Speckles { odd, holes } = Speckles::count(values, width);
+    if odd > values.len() / FEW_ODD || holes > values.len() / FEW_HOLES {
+        clean(values, width);
+    }
+}
+
+/// Numbers of pixels that differ from both neighbours in their row, which agree.
+#[derive(Debug, PartialEq)]
+struct Speckles {
+    /// Readings of another depth.
+    odd: usize,
+    /// Pixels without a reading.
+    holes: usize,
+}
+
+impl Speckles {
+    fn count(values: &[u16], width: usize) -> Self {
+        let mut found = Self { odd: 0, holes: 0 };
+        if width < 3 {
+            return found;
+        }
+        for row in values.chunks_exact(width) {
+            for ((left, middle), right) in row.iter().zip(&row[1..]).zip(&row[2..]) {
+                let agree = (*left != 0) & is_near(*left, *right);
+                found.holes += usize::from(agree & (*middle == 0));
+                found.odd += usize::from(agree & (*middle != 0) & !is_near(*left, *middle));
+            }
+        }
+        found
+    }
+}
+
+fn clean(values: &mut [u16], width: usize) {
+    let stride = width + 2;
+    let mut from = with_margin(values, width);
+    let mut to = vec![0; from.len()];
+    pass(&from, &mut to, stride, kept);
+    for _ in 0..CLOSINGS {
+        std::mem::swap(&mut from, &mut to);
+        pass(&from, &mut to, stride, closed);
+    }
+    for (row, clean) in values.chunks_exact_mut(width).zip(to.chunks_exact(stride).skip(1)) {
+        row.copy_from_slice(&clean[1..=width]);
+    }
+}
+
+/// Returns the image with a margin of one pixel without readings.
+fn with_margin(values: &[u16], width: usize) -> Vec<u16> {
+    let stride = width + 2;
+    let mut framed = vec![0; stride * (values.len() / width + 2)];
+    for (row, out) in values.chunks_exact(width).zip(framed.chunks_exact_mut(stride).skip(1)) {
+        out[1..=width].copy_from_slice(row);
+    }
+    framed
+}
+
+/// Three by three pixels.
+type Patch = [[u16; 3]; 3];
+
+/// Replaces each pixel inside of the margin by a function of the patch around it.
+fn pass(from: &[u16], to: &mut [u16], stride: usize, change: impl Fn(Patch) -> u16) {
+    let width = stride - 2;
+    let lines = from.len() / stride;
+    for y in 1..lines.saturating_sub(1) {
+        // Nine rows of one length each: the loop becomes vector instructions.
+        let rows = [y - 1, y, y + 1].map(|y| {
+            let row = &from[y * stride..(y + 1) * stride];
+            [&row[..width], &row[1..=width], &row[2..]]
+        });
+        let out = &mut to[y * stride + 1..][..width];
+        for (x, out) in out.iter_mut().enumerate() {
+            *out = change(rows.map(|row| row.map(|shifted| shifted[x])));
+        }
+    }
+}
+
+/// Returns true if two readings may be of one surface.
+fn is_near(a: u16, b: u16) -> bool {
+    a.abs_diff(b) <= (a.midpoint(b) >> SURFACE_BITS).max(NOISE)
+}
+
+/// Returns the pixel in the middle, or none if it is near no neighbour.
+fn kept(patch: Patch) -> u16 {
+    let middle = patch[1][1];
+    let is_near = |other: u16| (other != 0) & is_near(middle, other);
+    let near = beside(patch).into_iter().fold(false, |near, other| near | is_near(other));
+    if near { middle } else { 0 }
+}
+
+/// Returns the pixel in the middle; for a hole the median of its neighbours, if enough have a
+/// reading.
+fn closed(patch: Patch) -> u16 {
+    if patch[1][1] != 0 {
+        return patch[1][1];
+    }
+    let mut around = beside(patch);
+    around.sort_unstable();
+    let holes = around.iter().take_while(|value| **value == 0).count();
+    if around.len() - holes < LEAST_READ { 0 } else { around[usize::midpoint(holes, around.len())] }
+}
+
+/// Returns the neighbours of the pixel in the middle.
+fn beside([above, row, below]: Patch) -> [u16; 8] {
+    [above[0], above[1], above[2], row[0], row[2], below[0], below[1], below[2]]
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A pixel of the image; 0 outside.
+    fn at(values: &[u16], width: usize, x: i64, y: i64) -> u16 {
+        let inside = (0..width as i64).contains(&x) && y >= 0;
+        let index = y * width as i64 + x;
+        if inside { values.get(index as usize).copied().unwrap_or(0) } else { 0 }
+    }
+
+    /// One step of the definition, pixel by pixel.
+    fn slow(
+        values: &[u16],
+        width: usize,
+        change: impl Fn(u16, &dyn Fn(i64, i64) -> u16) -> u16,
+    ) -> Vec<u16> {
+        let places = (0..values.len()).map(|i| ((i % width) as i64, (i / width) as i64));
+        let pixel = |(x, y)| {
+            let beside = |dx: i64, dy: i64| at(values, width, x + dx, y + dy);
+            change(beside(0, 0), &beside)
+        };
+        places.map(pixel).collect()
+    }
+
+    fn one_surface(a: u16, b: u16) -> bool {
+        let (a, b) = (f64::from(a), f64::from(b));
+        let most = ((0.5 * (a + b)).floor() / 8.0).floor().max(60.0);
+        a > 0.0 && b > 0.0 && (a - b).abs() <= most
+    }
+
+    const HALF: [(i64, i64); 4] = [(-1, -1), (0, -1), (1, -1), (-1, 0)];
+
+    fn slowly(values: &[u16], width: usize) -> Vec<u16> {
+        let is_alone = |middle: u16, beside: &dyn Fn(i64, i64) -> u16| {
+            HALF.iter().all(|(dx, dy)| {
+                !one_surface(middle, beside(*dx, *dy)) && !one_surface(middle, beside(-dx, -dy))
+            })
+        };
+        let close = |middle: u16, beside: &dyn Fn(i64, i64) -> u16| {
+            let around = HALF.iter().flat_map(|(dx, dy)| [beside(*dx, *dy), beside(-dx, -dy)]);
+            let mut read: Vec<u16> = around.filter(|value| *value > 0).collect();
+            read.sort_unstable();
+            match (middle, read.len()) {
+                (0, 4..) => read[read.len() / 2],
+                _ => middle,
+            }
+        };
+        let kept =
+            slow(values, width, |middle, beside| if is_alone(middle, beside) { 0 } else { middle });
+        (0..CLOSINGS).fold(kept, |values, _| slow(&values, width, close))
+    }
+
+    fn cleaned(mut values: Vec<u16>, width: usize) -> Vec<u16> {
+        clean(&mut values, width);
+        values
+    }
+
+    proptest! {
+        #[test]
+        fn speckles_are_counted_in_rows(
+            width in 1usize..9,
+            values in prop::collection::vec(prop_oneof![Just(0u16), 480u16..620, 950u16..1100], 0..72),
+        ) {
+            let values = &values[..values.len() / width * width];
+            let is_hole = |row: &&[u16]| one_surface(row[0], row[2]) && row[1] == 0;
+            let is_odd = |row: &&[u16]| {
+                one_surface(row[0], row[2]) && row[1] > 0 && !one_surface(row[0], row[1])
+            };
+            let triples = || values.chunks(width).flat_map(|row| row.windows(3));
+            let (odd, holes) = (triples().filter(is_odd).count(), triples().filter(is_hole).count());
+            prop_assert_eq!(Speckles::count(values, width), Speckles { odd, holes });
+        }
+
+        #[test]
+        fn the_passes_equal_their_definition(
+            width in 1usize..9,
+            values in prop::collection::vec(
+                prop_oneof![Just(0u16), 480u16..560, 950u16..1100, 100u16..8000], 0..72
+            ),
+        ) {
+            let values = values[..values.len() / width * width].to_vec();
+            prop_assert_eq!(cleaned(values.clone(), width), slowly(&values, width));
+            let mut left = values.clone();
+            despeckle(&mut left, width);
+            let Speckles { odd, holes } = Speckles::count(&values, width);
+            let is_speckled = odd > values.len() / 100 || holes > values.len() / 20;
+            prop_assert_eq!(left, if is_speckled { slowly(&values, width) } else { values });
+        }
+    }
+
+    /// A wall at 4 m with a post of two pixels at 2 m, and a shadow of three pixels beside it.
+    fn scene() -> Vec<u16> {
+        let row = |x: usize| match x {
+            5 | 6 => 1000,
+            7..=9 => 0,
+            _ => 500,
+        };
+        (0..12 * 16).map(|i| row(i % 16)).collect()
+    }
+
+    #[test]
+    fn a_scene_without_single_pixels_stays_as_it_is() {
+        assert_eq!(cleaned(scene(), 16), scene());
+        let line: Vec<u16> =
+            (0..12 * 16).map(|i| if i % 16 == i / 16 { 900 } else { 400 }).collect();
+        assert_eq!(cleaned(line.clone(), 16), line, "a line of one pixel, aslant");
+    }
+
+    #[test]
+    fn a_single_reading_and_a_single_hole_become_what_is_around_them() {
+        for (at, odd) in [(3 * 16 + 2, 5000), (3 * 16 + 2, 0), (0, 5000), (8 * 16 + 12, 90)] {
+            let mut values = scene();
+            values[at] = odd;
+            let expected = if at == 0 { 0 } else { 500 };
+            assert_eq!(cleaned(values, 16)[at], expected, "{at}: {odd}");
+        }
+        let mut values = scene();
+        values[5 * 16 + 8] = 500;
+        assert_eq!(cleaned(values, 16)[5 * 16 + 8], 0, "a single reading in a shadow");
+    }
+
+    #[test]
+    fn pixels_missing_at_random_come_back() {
+        let mut random = 1u32;
+        let mut missing = || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            random >> 31 == 0
+        };
+        let values: Vec<u16> = (0..100 * 100).map(|_| if missing() { 0 } else { 500 }).collect();
+        let holes = |values: &[u16]| values.iter().filter(|value| **value == 0).count();
+        assert!((4_500..5_500).contains(&holes(&values)), "{}", holes(&values));
+        let clean = cleaned(values, 100);
+        assert!(holes(&clean) < 100, "{}", holes(&clean));
+    }
+
+    #[test]
+    fn an_image_without_pixels_is_left_alone() {
+        despeckle(&mut [], 0);
+        despeckle(&mut [], 4);
+    }
+}
