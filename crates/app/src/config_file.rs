@@ -40,7 +40,7 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "depth-two-stage"
     "depth-verified"
     "follow-as-printed"
-    "follow-clear"
+    "follow-arc"
     "follow-depth"
     "follow-low"
     "joint-particle"
