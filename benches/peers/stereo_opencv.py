@@ -44,8 +44,8 @@ def opencv_ms(matcher, left, right):
 
 
 def ours_ms(program, method, paths):
-    command = [program, method, *paths, str(DISPARITIES), str(RUNS)]
-    return float(subprocess.run(command, check=True, capture_output=True).stdout)
+    command = [program, method, *paths, str(DISPARITIES), str(RUNS), "1"]
+    return float(subprocess.run(command, check=True, capture_output=True).stdout.split()[0])
 
 
 def read(path):

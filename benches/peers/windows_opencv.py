@@ -8,7 +8,8 @@ blocks, in sizes 15 % apart, and the linear machine has weights by chance in Ope
 what is found differs, the work does not. With a log of colour and depth images the
 detectors look at its frames, too, where depth allows a person; OpenCV, which cannot
 do that, looks at all windows of these frames. Times are of the processor, not of the
-clock on the wall, for one picture, and each is the least of several rounds.
+clock on the wall, for one picture, and each is the least of several rounds. Prints
+rows of the table of `run.sh`.
 """
 
 import glob
@@ -33,6 +34,7 @@ DETECTORS = {
     "linear": [*BODIES, 'machine="linear"', "min_score=2"],
     "trees": BODIES,
 }
+JOBS = {"cascade": "cascade", "linear": "HOG, linear", "trees": "HOG, trees"}
 PEERS = {"cascade": "cascade", "linear": "linear", "trees": "linear"}
 
 
@@ -84,12 +86,10 @@ def compare(title, peers, ours, rounds):
         times = {"OpenCV " + name: ms() for name, ms in peers.items()}
         times |= {"our " + name: ms() for name, ms in ours.items()}
         best = {name: min(ms, best.get(name, ms)) for name, ms in times.items()}
-    print(title)
-    for name, ms in best.items():
-        print(f"  {name:16} {ms:7.2f} ms")
     for name in ours:
-        ratio = best["OpenCV " + PEERS[name]] / best["our " + name]
-        print(f"  OpenCV {PEERS[name]} / our {name}: {ratio:.2f}")
+        own, peer = best["our " + name], best["OpenCV " + PEERS[name]]
+        job = f"{JOBS[name]}, {title}"
+        print(f"| {job} | OpenCV, all windows | {own:.2f} ms | {peer:.2f} ms | {peer / own:.2f} |")
 
 
 def all_windows(picture, folder):
@@ -106,7 +106,7 @@ def all_windows(picture, folder):
     peers = {name: lambda scan=scan: opencv_ms(scan, [image], RUNS)
              for name, scan in scans().items()}
     ours = {name: lambda c=command: ours_ms(c, 1, RUNS) for name, command in commands.items()}
-    compare("all windows", peers, ours, ROUNDS)
+    compare("all windows, 640x480", peers, ours, ROUNDS)
 
 
 def where_depth_allows(log, folder):

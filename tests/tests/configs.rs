@@ -22,7 +22,7 @@ fn configs() -> Vec<(String, String)> {
 
 fn resolved(registry: &Registry, text: &str) -> Option<String> {
     let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();
-    let options = Options { foreign, seed: None };
+    let options = Options { foreign, seed: None, threads: None };
     let built = Pipeline::from_toml_with(text, &folder(), registry, &options);
     built.ok().map(|(pipeline, _)| pipeline.resolved())
 }

@@ -153,7 +153,7 @@ impl Options {
             .map_err(|error| BridgeError::Config(format!("cannot read config {shown}: {error}")))?;
         let folder = self.config.parent().unwrap_or("".as_ref());
         let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();
-        let pipelines = tagalong_pipeline::Options { foreign, seed: None };
+        let pipelines = tagalong_pipeline::Options { foreign, ..Default::default() };
         let mistake =
             |error: tagalong_config::ConfigError| BridgeError::Config(error.render(&shown, &text));
         let (pipeline, run) =

@@ -180,7 +180,7 @@ impl ConfigFile {
     /// A value that its setting does not allow, shown with its line: exit code 2.
     pub fn check_tuning(&self, registry: &Registry) -> Result<(), Failure> {
         let (pipeline, settings) = self.pipeline(registry, None)?;
-        check_tuning(&settings.tune, &pipeline, self.folder(), registry, &options(None))
+        check_tuning(&settings.tune, &pipeline, self.folder(), registry, &options(None, None))
             .map_err(|error| self.mistake(&error))
     }
 
@@ -217,7 +217,7 @@ impl ConfigFile {
     /// # Errors
     /// A mistake in the text.
     pub fn variant(&self, text: &str, registry: &Registry) -> Result<Pipeline, ConfigError> {
-        let built = Pipeline::from_toml_with(text, self.folder(), registry, &options(None));
+        let built = Pipeline::from_toml_with(text, self.folder(), registry, &options(None, None));
         built.map(|(pipeline, _)| pipeline)
     }
 
@@ -230,7 +230,20 @@ impl ConfigFile {
         registry: &Registry,
         seed: Option<u64>,
     ) -> Result<(Pipeline, RunSettings), Failure> {
-        Pipeline::from_toml_with(&self.text, self.folder(), registry, &options(seed))
+        self.pipeline_on(registry, seed, None)
+    }
+
+    /// Builds the pipeline as [`ConfigFile::pipeline`] does, for at most so many threads.
+    ///
+    /// # Errors
+    /// As for [`ConfigFile::pipeline`].
+    pub fn pipeline_on(
+        &self,
+        registry: &Registry,
+        seed: Option<u64>,
+        threads: Option<usize>,
+    ) -> Result<(Pipeline, RunSettings), Failure> {
+        Pipeline::from_toml_with(&self.text, self.folder(), registry, &options(seed, threads))
             .map_err(|error| self.mistake(&error))
     }
 
@@ -307,8 +320,8 @@ impl Place {
     }
 }
 
-fn options(seed: Option<u64>) -> Options {
-    Options { foreign: OuterSettings::TABLES.map(str::to_owned).to_vec(), seed }
+fn options(seed: Option<u64>, threads: Option<usize>) -> Options {
+    Options { foreign: OuterSettings::TABLES.map(str::to_owned).to_vec(), seed, threads }
 }
 
 /// Collects all texts in a value.

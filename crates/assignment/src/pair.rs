@@ -88,15 +88,19 @@ impl PairCost {
         }
     }
 
+    /// Returns the largest distance on the floor of a pair within the gate, m.
+    fn reach_m(&self, dt_s: f64) -> f64 {
+        match self.cost {
+            Cost::Mahalanobis => self.gate_m + self.gate_speed_mps * dt_s,
+            Cost::Overlap => f64::INFINITY,
+        }
+    }
+
     /// Computes d² = ν' S⁻¹ ν with S = P + R.
     fn mahalanobis(&self, track: &Track, detection: &Detection, dt_s: f64) -> Option<Fit> {
         let innovation = detection.position - track.estimate.person.position;
-        // A track with a large covariance admits detections at any distance by d² alone. Most pairs
-        // are too far apart along one axis, which needs no root.
-        let most_m = self.gate_m + self.gate_speed_mps * dt_s;
-        if innovation.x.abs().max(innovation.y.abs()) > 1.01 * most_m
-            || innovation.xy().norm() > most_m
-        {
+        // A track with a large covariance admits detections at any distance by d² alone.
+        if innovation.xy().norm() > self.reach_m(dt_s) {
             return None;
         }
         let position = track.estimate.covariance.fixed_view::<3, 3>(0, 0);
@@ -132,8 +136,8 @@ impl Pairs<'_> {
     }
 
     /// Returns the fits of these tracks and detections, by their numbers, with a row for each
-    /// track: `None` for a pair that the tracker's gate does not admit, or that `fit` gives none.
-    /// The appearance of a pair takes part as `pair_cost` weighs it.
+    /// track: `None` for a pair that the tracker's gate does not admit, or that `fit`, which stays
+    /// within the gate of `pair_cost`, gives none. The appearance of a pair takes part as `pair_cost` weighs it.
     pub fn fits(
         &self,
         rows: &[usize],
@@ -147,7 +151,18 @@ impl Pairs<'_> {
             let look = self.gate.appearance_of(row, column);
             fit.map(|fit| pair_cost.with_appearance(fit, look))
         };
-        rows.iter().map(|row| columns.iter().map(|column| pair(*row, *column)).collect()).collect()
+        // Most pairs are too far apart along one axis, which is seen soonest in a list of places.
+        let reach = 1.01 * pair_cost.reach_m(self.gate.dt_s);
+        let places: Vec<_> = columns.iter().map(|i| self.detections[*i].position.xy()).collect();
+        let fits_of = |row: &usize| {
+            let own = self.tracks[*row].estimate.person.position.xy();
+            let each = columns.iter().zip(&places).map(|(column, place)| {
+                let is_far = (place - own).amax() > reach;
+                if is_far { None } else { pair(*row, *column) }
+            });
+            each.collect()
+        };
+        rows.iter().map(fits_of).collect()
     }
 }
 

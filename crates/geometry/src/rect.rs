@@ -70,6 +70,10 @@ impl Rect {
     /// ```
     pub fn iou(&self, other: &Self) -> f64 {
         let common = self.intersection(other).area();
+        // As of most pairs, and sooner than the sum.
+        if common == 0.0 {
+            return 0.0;
+        }
         let union = self.area() + other.area() - common;
         if union > 0.0 { common / union } else { 0.0 }
     }

@@ -2,7 +2,7 @@
 //! number of them. Processors with other vector instructions may round otherwise, which is why
 //! pipelines do without it.
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Normal equations of a least-squares fit, of which only the penalties and the right side change
 /// between solutions.
@@ -41,15 +41,6 @@ impl NormalEquations {
     }
 }
 
-/// Returns the scalar products of all pairs of vectors, a row for each of `a` and a column for each
-/// of `b`. Both hold one vector of `length` numbers after the other.
-pub fn scalar_products(a: &[f32], b: &[f32], length: usize) -> Vec<f32> {
-    let vectors = |of| DMatrixView::from_slice(of, length, of.len() / length);
-    // A matrix lies column after column, so this one holds the products with each of `a` in turn.
-    let products: DMatrix<f32> = vectors(b).transpose() * vectors(a);
-    products.data.into()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -78,21 +69,5 @@ mod tests {
         assert_eq!(normal.solve(&[-1.0, -1.0], &right), None);
         assert!(normal.solve(&[1.0, 1.0], &right).is_some());
         assert_eq!(normal.solve(&[f64::NAN, 1.0], &right), None);
-    }
-
-    #[test]
-    fn products_are_those_of_the_definition() {
-        let vectors = |count: usize, seed: usize| -> Vec<f32> {
-            (0..count * 33).map(|k| number(seed + k) as f32).collect()
-        };
-        let (a, b) = (vectors(5, 1), vectors(4, 9000));
-        let products = scalar_products(&a, &b, 33);
-        assert_eq!(products.len(), 20);
-        for (k, product) in products.iter().enumerate() {
-            let (row, column) = (&a[33 * (k / 4)..][..33], &b[33 * (k % 4)..][..33]);
-            let expected: f32 = row.iter().zip(column).map(|(a, b)| a * b).sum();
-            assert!((product - expected).abs() < 1e-5, "{k}");
-        }
-        assert!(scalar_products(&[], &b, 33).is_empty());
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tagalong_config::{ConfigError, Context, Registry, Settings, Value, nearest, parse_settings};
 use tagalong_core::{Associator, Filter, TrackManager, Verifier};
-use tagalong_stereo::StereoDepth;
+use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_tracking::Guarded;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -77,11 +77,13 @@ pub struct Options {
     pub foreign: Vec<String>,
     /// Seed that replaces the config's.
     pub seed: Option<u64>,
+    /// Most threads of stereo matching; the results do not depend on it.
+    pub threads: Option<usize>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { foreign: vec!["input".into(), "limits".into()], seed: None }
+        Self { foreign: vec!["input".into(), "limits".into()], seed: None, threads: None }
     }
 }
 
@@ -174,7 +176,11 @@ impl Pipeline {
         let suits = suits::read(root.remove(suits::TABLE))?;
         let resolved =
             toml::to_string(&resolved).map_err(|error| ConfigError::new(error.to_string()))?;
-        let stereo = settings.stereo.clone().map(StereoDepth::new).transpose();
+        let on_threads = |stereo: &StereoSettings| match options.threads {
+            Some(most) => StereoDepth::new(stereo.on_threads(most)),
+            None => StereoDepth::new(stereo.clone()),
+        };
+        let stereo = settings.stereo.as_ref().map(on_threads).transpose();
         let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
         let (seed, robot) = (settings.seed, settings.robot.clone());
         let run = RunSettings { seed, robot, tune, suits, document: document.clone() };

@@ -7,15 +7,18 @@
 //! * [`mean`], [`mean_and_deviation`], [`median`], [`percentile`]: summaries of values.
 //! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`]: how far a figure can
 //!   be trusted; [`paired_gain`], [`sign_flip`], [`holm`]: how far a difference can.
+//! * [`exp2_of_negative`]: an exponential function for loops over many numbers.
 //!
 //! There is no clock and no global generator: the same seed gives the same bytes.
 
 mod intervals;
+mod power;
 mod random;
 mod significance;
 mod summary;
 
 pub use intervals::{CONFIDENCE, Interval, clustered_share, draws_interval, mean_interval, wilson};
+pub use power::exp2_of_negative;
 pub use random::{ChaCha, RandomSource, SplitMix64, XorShift64, fingerprint, mix, number_at};
 pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};
 pub use summary::{mean, mean_and_deviation, median, percentile};

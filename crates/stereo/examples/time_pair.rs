@@ -1,13 +1,15 @@
-//! Matches a pair of image files several times on one thread and prints the time of the fastest
-//! run, ms. Used by `benches/peers/stereo_opencv.py`.
+//! Matches a pair of image files several times and prints the time of the fastest run, ms, and
+//! the least processor time of the thread that asks, which does its share of the work and all that is
+//! not shared. Used by `benches/peers/stereo_opencv.py` and `benches/peers/kernels.py`.
 //!
-//! `cargo run --release -p tagalong-stereo --example time_pair METHOD LEFT RIGHT DISPARITIES RUNS`
+//! `cargo run --release -p tagalong-stereo --example time_pair METHOD LEFT RIGHT DISPARITIES RUNS THREADS`
 
 #![allow(clippy::print_stdout, reason = "its output is what it is for")]
 
 use std::error::Error;
 use std::time::{Duration, Instant};
 
+use cpu_time::ThreadTime;
 use tagalong_core::GreyImage;
 use tagalong_stereo::{Matcher, Method, StereoSettings};
 
@@ -19,8 +21,8 @@ fn grey(path: &str) -> Result<GreyImage, Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [method, left, right, disparities, runs] = arguments.as_slice() else {
-        return Err("expected: METHOD LEFT RIGHT DISPARITIES RUNS".into());
+    let [method, left, right, disparities, runs, threads] = arguments.as_slice() else {
+        return Err("expected: METHOD LEFT RIGHT DISPARITIES RUNS THREADS".into());
     };
     let method = match method.as_str() {
         "block" => Method::Block,
@@ -29,14 +31,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let (left, right) = (grey(left)?, grey(right)?);
     let (disparities, runs): (usize, usize) = (disparities.parse()?, runs.parse()?);
-    let settings = StereoSettings { method, threads: 1, ..StereoSettings::default() };
+    let threads = threads.parse()?;
+    let settings = StereoSettings { method, threads, ..StereoSettings::default() };
     let mut matcher = Matcher::new(settings)?;
-    let mut best = Duration::MAX;
+    let (mut best, mut own) = (Duration::MAX, Duration::MAX);
     for _ in 0..runs {
-        let start = Instant::now();
+        let (start, own_start) = (Instant::now(), ThreadTime::now());
         matcher.disparities(&left, &right, disparities.saturating_sub(1))?;
         best = best.min(start.elapsed());
+        own = own.min(own_start.elapsed());
     }
-    println!("{:.3}", best.as_secs_f64() * 1e3);
+    println!("{:.3} {:.3}", best.as_secs_f64() * 1e3, own.as_secs_f64() * 1e3);
     Ok(())
 }

@@ -7,6 +7,7 @@ use tagalong_geometry::Lens;
 use crate::matcher::size_error;
 use crate::rectification::Rectification;
 use crate::reduce::Reducer;
+use crate::settings::MAX_DISPARITIES;
 use crate::{Disparities, Dropped, Matcher, StereoSettings};
 
 /// Number of frames between two checks of the rectification.
@@ -54,7 +55,8 @@ impl StereoDepth {
 
     /// Returns the depth of a frame's left image, of the same size: metres along the optical axis,
     /// NaN = unknown. The reasons for unknown pixels, or for an image without any depth, are
-    /// counted in the funnel.
+    /// counted in the funnel, and so are frames in which the least depth has a larger disparity than
+    /// is searched, 255 px: nearer points are then unknown.
     ///
     /// # Errors
     /// [`Error::MissingImage`] without a right or a left image; [`Error::Other`] if they differ in
@@ -78,10 +80,11 @@ impl StereoDepth {
             at_size(&mut self.right, &right.image, size),
         );
         let focal_baseline = fx * scale * right.baseline_m;
-        let max_disparity = max_disparity(&self.settings, focal_baseline);
+        let wanted = max_disparity(&self.settings, focal_baseline);
+        let max_disparity = wanted.min(MAX_DISPARITIES - 1);
         // Not for each frame, because the search in all directions is slow.
         if self.frames.is_multiple_of(CHECK_EVERY) {
-            self.rectification = Rectification::measure(left, right_image, max_disparity.min(255));
+            self.rectification = Rectification::measure(left, right_image, max_disparity);
         }
         self.frames += 1;
         let depth = unshared(&mut self.depth, fine.width(), fine.height());
@@ -90,6 +93,8 @@ impl StereoDepth {
             funnel.drop_many(reason, 1);
             return Ok(Arc::clone(&self.depth));
         }
+        let too_near = wanted > max_disparity;
+        funnel.drop_many("stereo: least depth beyond 255 px of disparity", u64::from(too_near));
         let off = self.rectification.vertical_px.abs() > self.settings.max_vertical_px;
         funnel.drop_many("stereo: images vertically off", u64::from(off));
         let unequal = are_unequal(left, right_image);

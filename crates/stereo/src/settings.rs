@@ -107,6 +107,13 @@ impl Default for StereoSettings {
 pub const MAX_DISPARITIES: usize = 256;
 
 impl StereoSettings {
+    /// Returns the settings for at most so many threads, 1 at least.
+    #[must_use]
+    pub fn on_threads(&self, most: usize) -> Self {
+        let own = if self.threads == 0 { most } else { self.threads };
+        Self { threads: own.min(most).max(1), ..self.clone() }
+    }
+
     /// Refuses settings that cannot work.
     ///
     /// # Errors

@@ -1,6 +1,8 @@
 //! Detections of one frame, with the decisions of the tracker about them.
 
+use nalgebra::Point2;
 use tagalong_core::{Associations, Detection, Funnel, Matched, Track, TrackId};
+use tagalong_geometry::Rect;
 
 use crate::{Candidate, Fate, MergeSettings};
 
@@ -108,17 +110,21 @@ impl DetectionSet {
     pub(crate) fn merge(&mut self, settings: &MergeSettings) {
         let mut order = self.undecided();
         order.sort_by(|a, b| self.score(*b).total_cmp(&self.score(*a)));
-        let mut kept: Vec<usize> = Vec::new();
+        let mut kept: Vec<(usize, Outline)> = Vec::new();
         for index in order {
-            let is_same = |other: &&usize| {
-                is_same_person(&self.all[index].detection, &self.all[**other].detection, settings)
+            let own = Outline::of(&self.all[index].detection);
+            let detection = |index: usize| &self.all[index].detection;
+            let is_same = |(other, outline): &&(usize, Outline)| {
+                own.is_at(outline, settings)
+                    || own.overlaps(outline, settings)
+                        && may_be_at_one_place(detection(index), detection(*other))
             };
-            match kept.iter().find(is_same).copied() {
+            match kept.iter().find(is_same).map(|(better, _)| *better) {
                 Some(better) => {
                     self.all[better].discovered |= self.all[index].discovered;
                     self.settle(index, Fate::Dropped("same person"));
                 }
-                None => kept.push(index),
+                None => kept.push((index, own)),
             }
         }
     }
@@ -179,23 +185,34 @@ impl DetectionSet {
     }
 }
 
-/// Returns true if two detections belong to one person.
-fn is_same_person(a: &Detection, b: &Detection, settings: &MergeSettings) -> bool {
+/// Parts of a detection that decide about most pairs.
+#[derive(Clone, Copy)]
+struct Outline {
+    floor: Point2<f64>,
+    rect: Option<Rect>,
+}
+
+impl Outline {
+    fn of(detection: &Detection) -> Self {
+        Self { floor: detection.position.xy(), rect: detection.rect() }
+    }
+
+    fn is_at(&self, other: &Self, settings: &MergeSettings) -> bool {
+        (self.floor - other.floor).norm() < settings.same_person_m
+    }
+
+    fn overlaps(&self, other: &Self, settings: &MergeSettings) -> bool {
+        self.rect.zip(other.rect).is_some_and(|(a, b)| a.iou(&b) > settings.same_person_iou)
+    }
+}
+
+/// Returns true if the positions differ by no more than their covariances allow: two people in one
+/// line of sight overlap in the image as well.
+fn may_be_at_one_place(a: &Detection, b: &Detection) -> bool {
     let apart = (a.position - b.position).xy();
-    if apart.norm() < settings.same_person_m {
-        return true;
-    }
-    // Most pairs overlap nowhere, which is quicker to see than a contradiction.
-    let overlap = a.rect().zip(b.rect()).map_or(0.0, |(a, b)| a.iou(&b));
-    if overlap.is_nan() || overlap <= settings.same_person_iou {
-        return false;
-    }
-    // Two people in one line of sight overlap as well; they are kept apart if their positions
-    // differ by more than their covariances allow.
     let spread = (a.covariance + b.covariance).fixed_view::<2, 2>(0, 0).into_owned();
-    let contradicts =
-        spread.cholesky().is_none_or(|s| apart.dot(&s.solve(&apart)) > CHI_SQUARED_2_99);
-    !contradicts
+    let distance = spread.cholesky().map(|s| apart.dot(&s.solve(&apart)));
+    distance.is_some_and(|d| d.is_nan() || d <= CHI_SQUARED_2_99)
 }
 
 /// 99 % point of chi-squared with two degrees of freedom.
@@ -205,9 +222,17 @@ const CHI_SQUARED_2_99: f64 = 9.21;
 mod tests {
     use nalgebra::{Matrix3, Point3};
     use tagalong_core::Association;
-    use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
+    use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
     use super::*;
+
+    fn is_same_person(a: &Detection, b: &Detection, settings: &MergeSettings) -> bool {
+        let both = [a, b].map(|detection| PendingDetection::new(detection.clone(), 0, true));
+        let mut set = DetectionSet::default();
+        set.add(both);
+        set.merge(settings);
+        set.undecided().len() == 1
+    }
 
     fn person(x: f64, y: f64) -> Detection {
         let lens =

@@ -31,7 +31,8 @@ impl Contender {
     /// [`TrialError::Config`] with the place of the mistake.
     pub fn pipeline(&self, registry: &Registry, seed: u64) -> Result<Pipeline, TrialError> {
         // The seed of the scene: each draw gives the plugins other random numbers, too.
-        let options = Options { foreign: FOREIGN.map(str::to_owned).to_vec(), seed: Some(seed) };
+        let foreign = FOREIGN.map(str::to_owned).to_vec();
+        let options = Options { foreign, seed: Some(seed), threads: None };
         Pipeline::from_toml_with(&self.config, &self.folder, registry, &options)
             .map(|(pipeline, _)| pipeline)
             .map_err(|error| TrialError::Config(error.render(&self.name, &self.config)))

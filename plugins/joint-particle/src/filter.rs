@@ -119,7 +119,7 @@ impl JointParticle {
         let mut headings = self.headings.clone();
         for group in &self.groups {
             for (person, id) in group.ids.iter().enumerate() {
-                let mean = group.moments(person).mean;
+                let mean = group.mean(person);
                 let velocity = Vector2::new(mean[3], mean[4]);
                 let walks = velocity.norm() > WALKING_MPS;
                 let stands_alone = group.people() == 1 && !walks;
@@ -150,7 +150,7 @@ impl JointParticle {
         let single = self.groups.iter().filter(|g| g.people() == 1 && seen.contains_key(&g.ids[0]));
         single
             .map(|group| {
-                let m = group.moments(0).mean;
+                let m = group.mean(0);
                 (group.ids[0], Point3::new(m[0], m[1], m[2]))
             })
             .collect()

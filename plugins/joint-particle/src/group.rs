@@ -146,11 +146,22 @@ impl Group {
         (1..self.rows()).fold(0, heavier)
     }
 
+    /// Returns the weights of the particles of one person, and the particles.
+    fn weighted(&self, person: usize) -> impl Iterator<Item = (f64, &Particle)> {
+        let column = self.parts.iter().skip(person).step_by(self.people());
+        self.weights.iter().copied().zip(column)
+    }
+
+    /// Returns the mean of one person.
+    pub(crate) fn mean(&self, person: usize) -> Vector5<f64> {
+        self.weighted(person).map(|(w, p)| p.mean * w).sum()
+    }
+
     /// Returns mean and covariance of one person.
     pub(crate) fn moments(&self, person: usize) -> Moments {
-        let column = || (0..self.rows()).map(|row| (self.weights[row], &self.row(row)[person]));
-        let mean: Vector5<f64> = column().map(|(w, p)| p.mean * w).sum();
-        let covariance: Matrix5<f64> = column()
+        let mean = self.mean(person);
+        let covariance: Matrix5<f64> = self
+            .weighted(person)
             .map(|(w, p)| {
                 let off = p.mean - mean;
                 (p.covariance + off * off.transpose()) * w

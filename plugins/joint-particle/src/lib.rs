@@ -26,6 +26,7 @@ mod weighing;
 
 pub use config::{Chosen, Config, Method};
 pub use filter::JointParticle;
+pub use maps::{LikelihoodMap, PositionPair};
 use tagalong_config::Registry;
 
 /// Registers the filter `joint-particle`.

@@ -1,4 +1,4 @@
-use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, Point3, Vector2, Vector5};
+use nalgebra::{Matrix2, Matrix3, Matrix5, Point2, Point3, Vector2, Vector3, Vector5};
 use tagalong_core::{Detection, EgoMotion, Person};
 
 use crate::config::Config;
@@ -114,11 +114,10 @@ impl Particle {
     /// the Gaussian on it (Rao and Blackwell).
     pub(crate) fn draw_across(&mut self, eye: &Point2<f64>, random: &mut Random) {
         let across = across(&(self.floor() - eye));
-        let h = Vector5::new(across.x, across.y, 0.0, 0.0, 0.0);
-        let variance = (self.covariance * h).dot(&h).max(0.0);
-        let drawn = h.dot(&self.mean) + variance.sqrt() * random.normal();
+        let h = Vector3::new(across.x, across.y, 0.0);
+        let deviation = self.variance(&h).max(0.0).sqrt();
         // A measurement without noise is the same as conditioning on the sample.
-        self.correct(&h, drawn, 0.0);
+        self.correct(&h, deviation * random.normal(), 0.0);
     }
 
     /// Takes back the changes of the last `dt_s` seconds, and their variance, along a direction on
@@ -138,14 +137,21 @@ impl Particle {
         self.covariance = free * self.covariance * free;
     }
 
-    /// Updates by a measurement of `h . x` with the given variance (Kalman).
-    pub(crate) fn correct(&mut self, h: &Vector5<f64>, measured: f64, variance: f64) {
-        let ph = self.covariance * h;
-        let total = h.dot(&ph) + variance;
+    /// Returns the variance of the position along a direction.
+    pub(crate) fn variance(&self, h: &Vector3<f64>) -> f64 {
+        let position = self.covariance.fixed_view::<3, 3>(0, 0);
+        (position * h).dot(h)
+    }
+
+    /// Updates by a measurement of the position along the direction `h` with the given variance
+    /// (Kalman); `off` is its difference from the position of the mean.
+    pub(crate) fn correct(&mut self, h: &Vector3<f64>, off: f64, variance: f64) {
+        let ph = self.covariance.fixed_columns::<3>(0) * h;
+        let total = h.dot(&ph.fixed_rows::<3>(0)) + variance;
         // Along a direction without variance the gain is undefined, and there is nothing to update.
         if total > 1e-12 {
             let gain = ph / total;
-            self.mean += gain * (measured - h.dot(&self.mean));
+            self.mean += gain * off;
             self.covariance -= gain * ph.transpose();
             self.covariance = 0.5 * (self.covariance + self.covariance.transpose());
         }
@@ -258,7 +264,7 @@ mod tests {
 
     #[test]
     fn what_is_not_known_of_the_robots_motion_spreads_the_place() {
-        let sigmas = nalgebra::Vector3::new(0.03, 0.02, 0.01);
+        let sigmas = Vector3::new(0.03, 0.02, 0.01);
         let covariance = Matrix3::from_diagonal(&sigmas.map(|s| s * s));
         let motion = EgoMotion { forward: 0.3, left: 0.1, turn: 0.4, covariance, dt: 0.1 };
         let standing =

@@ -94,7 +94,7 @@ impl<'a> WeighingInput<'a> {
     /// Returns the people of a group from near to far.
     fn order(&self, group: &Group) -> Vec<usize> {
         let depth = |person: usize| {
-            let m = group.moments(person).mean;
+            let m = group.mean(person);
             self.frame.camera.depth_of(&nalgebra::Point3::new(m[0], m[1], m[2]))
         };
         let mut order: Vec<(f64, usize)> = (0..group.people()).map(|p| (depth(p), p)).collect();
@@ -201,7 +201,7 @@ impl Lateral {
     fn new(group: &Group, look: &WeighingInput<'_>) -> Self {
         let order = look.order(group);
         let (near, far) = (order[0], order[1]);
-        let means = [near, far].map(|person| group.moments(person).mean);
+        let means = [near, far].map(|person| group.mean(person));
         let origin = Point2::new(means[0][0], means[0][1]);
         let across = match look.config.compat_printed_axes {
             true => Vector2::y(),
@@ -292,14 +292,14 @@ fn refine(group: &mut Group, look: &mut WeighingInput<'_>, person: usize) -> Res
         let row = group.best();
         let best = group.row(row)[person].clone();
         let h = line.direction(&best, &look.eye);
-        let variance = (best.covariance * h).dot(&h);
+        let variance = best.variance(&h);
         if variance.is_nan() || variance <= 1e-8 {
             continue;
         }
         let (sigma, id) = (variance.sqrt(), group.ids[person]);
         let moved = |i: usize| {
             let mut moved = best.clone();
-            moved.mean += h * offset(i, sigma);
+            moved.mean.fixed_rows_mut::<3>(0).axpy(offset(i, sigma), &h, 1.0);
             look.person(id, &moved)
         };
         let variants: Vec<Person> = (0..SAMPLES).map(moved).collect();
@@ -312,8 +312,8 @@ fn refine(group: &mut Group, look: &mut WeighingInput<'_>, person: usize) -> Res
         // comparisons as there are particles.
         for particle in group.column_mut(person) {
             let h = line.direction(particle, &look.eye);
-            let now = line.value(particle, &look.eye);
-            particle.correct(&h, h.dot(&particle.mean) + measured - now, spread);
+            let off = measured - line.value(particle, &look.eye);
+            particle.correct(&h, off, spread);
         }
     }
     Ok(())
@@ -329,12 +329,12 @@ enum Line {
 }
 
 impl Line {
-    fn direction(self, particle: &Particle, eye: &Point2<f64>) -> Vector5<f64> {
+    fn direction(self, particle: &Particle, eye: &Point2<f64>) -> Vector3<f64> {
         match self {
-            Self::Height => Vector5::new(0.0, 0.0, 1.0, 0.0, 0.0),
+            Self::Height => Vector3::z(),
             Self::Range => {
                 let left = across(&(particle.floor() - eye));
-                Vector5::new(left.y, -left.x, 0.0, 0.0, 0.0)
+                Vector3::new(left.y, -left.x, 0.0)
             }
         }
     }

@@ -29,8 +29,8 @@ pub struct RunArgs {
     /// Fail (exit code 1) if anything of the log was lost or damaged.
     #[arg(long)]
     pub strict: bool,
-    /// Threads: 1 does everything in turn, 2 reads ahead, 3 also renders in parallel. The results
-    /// are the same.
+    /// Threads: 1 does everything in turn, 2 reads ahead, 3 also renders in parallel; stereo matching
+    /// takes as many at most. The results are the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub threads: Option<u8>,
     /// Use this seed instead of the config's.

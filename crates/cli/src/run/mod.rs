@@ -117,7 +117,8 @@ impl Job {
             None if !args.has_log() => ConfigFile::built_in(),
             None => choice::choose(args.log(), registry)?,
         };
-        let (pipeline, settings) = config.pipeline(registry, args.seed)?;
+        let threads = args.threads.map(usize::from);
+        let (pipeline, settings) = config.pipeline_on(registry, args.seed, threads)?;
         let outer = config.outer()?;
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;

@@ -56,6 +56,27 @@ fn a_reduced_pair_keeps_its_depth() {
     assert!(close > 170 * 160, "{close}");
 }
 
+/// A plane at 0.2 m has 100 px, within the range of bytes; 0.01 m would have 2000.
+#[test]
+fn a_least_depth_that_is_too_near_is_told_and_the_rest_is_matched() {
+    let (left, right) = noise_pair(320, 120, 100);
+    for (min_depth_m, told) in [(0.01, 1), (0.1, 0)] {
+        let settings = StereoSettings { min_depth_m, ..StereoSettings::default() };
+        let (depth, funnel) = depth(settings, &frame(left.clone(), right.clone()));
+        let close = depth.pixels().iter().filter(|d| (**d - 0.2).abs() < 0.01).count();
+        assert!(close > 200 * 120, "{min_depth_m}: {close}");
+        assert_eq!(funnel.count("stereo: least depth beyond 255 px of disparity"), told);
+    }
+}
+
+#[test]
+fn threads_are_bound_and_never_none() {
+    let of = |threads: usize, most: usize| {
+        StereoSettings { threads, ..StereoSettings::default() }.on_threads(most).threads
+    };
+    assert_eq!([of(0, 3), of(8, 3), of(1, 3), of(0, 0)], [3, 3, 1, 1]);
+}
+
 #[test]
 fn depth_out_of_range_is_none_and_counted() {
     let (left, right) = noise_pair(160, 120, 10);

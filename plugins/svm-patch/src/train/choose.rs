@@ -4,7 +4,7 @@ use tagalong_core::Result;
 use tagalong_learn::{accepted, area, mix, parts, side_by_side};
 
 use super::{Sample, solver};
-use crate::{Patch, Sampler, Training};
+use crate::{Sampler, Training};
 
 /// One combination that was tried, and its result on held-out samples.
 #[derive(Clone, Debug)]
@@ -64,10 +64,7 @@ fn hold_out(
         let is_out = |s: &&&Sample| parts.get(&s.example.group) == Some(&fold);
         let (out, rest): (Vec<&Sample>, Vec<&Sample>) = samples.iter().partition(|s| is_out(s));
         let model = fit(&rest)?;
-        let patches: Vec<&Patch> = out.iter().map(|s| &*s.patch).collect();
-        let decisions = model.decisions(&patches);
-        values
-            .extend(decisions.into_iter().zip(&out).map(|(value, s)| (value, s.example.is_person)));
+        values.extend(out.iter().map(|s| (model.decision(&s.patch), s.example.is_person)));
     }
     Ok(values)
 }

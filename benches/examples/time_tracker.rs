@@ -1,0 +1,101 @@
+//! Prints the time of a frame of the whole tracker with given detections, for each number of people
+//! that is named: the median, in microseconds. Everyone stands 1.1 m from the next, before a camera.
+//!
+//! ```sh
+//! cargo run --release -p tagalong-benches --example time_tracker -- 5 20 100
+//! ```
+#![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use nalgebra::{Matrix3, Point3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_config::Registry;
+use tagalong_core::{
+    Capabilities, Detection, Detector, EgoMotion, Frame, Funnel, Images, Inputs, Query, Result,
+    Stamp,
+};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
+use tagalong_pipeline::Pipeline;
+use tagalong_stats::{RandomSource, SplitMix64, median};
+
+/// Frames until all tracks are confirmed, and those that are timed.
+const FIRST: u64 = 30;
+const TIMED: u64 = 300;
+const FRAME_NS: u64 = 100_000_000;
+
+fn main() {
+    for people in std::env::args().skip(1).filter_map(|text| text.parse().ok()) {
+        println!("{people} {:.2}", median_us(people));
+    }
+}
+
+/// Settings of `grid`.
+#[derive(Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+struct GridSettings {
+    people: usize,
+}
+
+/// Detects people at the crossings of a grid, a few centimetres off.
+struct Grid {
+    people: usize,
+    random: SplitMix64,
+}
+
+impl Detector for Grid {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { inputs: Inputs::NONE, discovers: true, tracks: false, weighs: false }
+    }
+
+    fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
+        let side = (self.people as f64).sqrt().ceil() as usize;
+        let mut off = || self.random.between(-0.05, 0.05);
+        let found = (0..self.people).map(|i| {
+            let (row, column) = ((i / side) as f64, (i % side) as f64 - 0.5 * (side - 1) as f64);
+            let position = Point3::new(2.0 + 1.1 * row + off(), 1.1 * column + off(), 1.6 + off());
+            Detection {
+                image: Some(ImageBox::upper_body(frame.camera.upper_body(&position))),
+                position,
+                covariance: Matrix3::identity() * 0.0025,
+                score: 4.0,
+                source: "grid",
+            }
+        });
+        Ok(found.collect())
+    }
+}
+
+fn median_us(people: usize) -> f64 {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    registry.detector("grid", "people on a grid", |settings: GridSettings, _| {
+        Ok(Grid { people: settings.people, random: SplitMix64::new(1) })
+    });
+    let config = format!(
+        "[[detectors]]\nplugin = 'grid'\nroles = ['discover']\nconfig = {{ people = {people} }}\n\
+         [filter]\nplugin = 'ekf'\n[associator]\nplugin = 'associate-hungarian'\n\
+         [manager]\nplugin = 'manage-sprt'\n"
+    );
+    let (mut pipeline, _) =
+        Pipeline::from_toml(&config, Path::new("."), &registry).expect("the config is right");
+    let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+    let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.5, 0.0, 0.0));
+    let mut times = Vec::new();
+    for index in 0..FIRST + TIMED {
+        let stamp = Stamp::from_nanos(index * FRAME_NS);
+        let (motion, images) = (EgoMotion::at_rest(0.1), Images::default());
+        let frame = Frame::new(index, stamp, Arc::clone(&camera), motion, images);
+        let start = Instant::now();
+        let report = pipeline.step(&frame).expect("nothing fails");
+        let us = 1e6 * start.elapsed().as_secs_f64();
+        if index >= FIRST {
+            assert_eq!(report.tracks.len(), people, "everyone is tracked");
+            times.push(us);
+        }
+    }
+    median(times).expect("some were timed")
+}

@@ -1,0 +1,96 @@
+//! Prints, in microseconds, the time of a frame of one person with 625 particles and a likelihood
+//! that takes none, and that of looking up 625 places in a map of two people that is a sum of 50
+//! kernels, with the sum of what is found. Places are numbers that look random.
+//! `benches/peers/kernels.py` compares both with numpy and scipy.
+//!
+//! ```sh
+//! cargo run --release -p tagalong-joint-particle --example time_particles
+//! ```
+#![allow(clippy::print_stdout, reason = "an example answers on the terminal")]
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use nalgebra::{Matrix3, Point3};
+use tagalong_core::{
+    Detection, EgoMotion, Evidence, Filter, Frame, Images, Likelihood, Person, Result, Stamp,
+    TrackId,
+};
+use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_joint_particle::{Config, JointParticle, LikelihoodMap, Method, PositionPair};
+use tagalong_stats::number_at;
+
+const CALLS: usize = 300;
+
+fn main() -> Result<()> {
+    println!("step {:.3}", step()?);
+    let (us, sum) = look_up();
+    println!("map {us:.3} {sum:.9}");
+    Ok(())
+}
+
+/// The likelihood of a person one metre wide about 3 m ahead.
+struct Wide;
+
+impl Likelihood for Wide {
+    fn log_likelihood(&self, _: &Frame, scene: &[Person]) -> Result<f64> {
+        let middle = Point3::new(3.0, 0.0, 1.6);
+        Ok(scene.iter().map(|person| -0.5 * (person.position - middle).norm_squared()).sum())
+    }
+}
+
+/// Returns the time of the fastest frame: prediction, weighing, resampling where it is due, and the
+/// estimate.
+fn step() -> Result<f64> {
+    let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+    let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
+    let motion = EgoMotion::at_rest(0.1);
+    let frame = Frame::new(1, Stamp::default(), Arc::clone(&camera), motion, Images::default());
+    let config = Config { particles: 625, ..Config::default() };
+    let mut filter = JointParticle::new(config, 1)?;
+    let first = Detection {
+        image: None,
+        position: Point3::new(3.0, 0.0, 1.6),
+        covariance: Matrix3::identity() * 0.01,
+        score: 1.0,
+        source: "example",
+    };
+    filter.start(TrackId(1), &first, &camera);
+    let likelihood: Option<&dyn Likelihood> = Some(&Wide);
+    let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
+    let mut best = f64::INFINITY;
+    for _ in 0..CALLS {
+        let start = Instant::now();
+        filter.predict(&motion, &camera);
+        black_box(filter.update(&evidence)?);
+        black_box(filter.estimates(&camera));
+        best = best.min(1e6 * start.elapsed().as_secs_f64());
+    }
+    Ok(best)
+}
+
+/// Returns the time of the fastest call, and the sum of what was found.
+fn look_up() -> (f64, f64) {
+    let known = (0..50).map(|k| 0.5 + uniform(2000 + k)).collect();
+    let map = LikelihoodMap::new(Method::Kde, places(0, 50), known, &Config::default());
+    let at = places(50, 625);
+    let (mut best, mut found) = (f64::INFINITY, Vec::new());
+    for _ in 0..CALLS {
+        let start = Instant::now();
+        found = black_box(map.at_all(&at));
+        best = best.min(1e6 * start.elapsed().as_secs_f64());
+    }
+    (best, found.iter().sum())
+}
+
+/// Returns places of two people within the reach of the filter's table.
+fn places(first: u64, count: u64) -> Vec<PositionPair> {
+    let place = |k: u64| [0.6 * uniform(2 * k), 1.8 * uniform(2 * k + 1)];
+    (first..first + count).map(place).collect()
+}
+
+/// Returns a number between -1/2 and 1/2.
+fn uniform(at: u64) -> f64 {
+    (number_at(1, at) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+}
