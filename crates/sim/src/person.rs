@@ -44,6 +44,10 @@ pub enum Extra {
     Bag,
     /// A suitcase on wheels, drawn along by the right hand.
     Trolley,
+    /// A poncho from the shoulders down to the thighs, of the top's cloth.
+    Poncho,
+    /// An open laptop before the chest.
+    Laptop,
 }
 
 /// Random numbers that only subjects are drawn from.
@@ -235,6 +239,8 @@ impl Drawing<'_> {
                 Extra::Hat => self.hat(scaled(self.look.trousers.colour, 1.3)),
                 Extra::GreenHat => self.hat([0.02, 0.45, 0.05]),
                 Extra::Bag => self.bag(),
+                Extra::Poncho => self.poncho(),
+                Extra::Laptop => self.laptop(),
                 Extra::Trolley => {}
             }
         }
@@ -255,6 +261,26 @@ impl Drawing<'_> {
             let out = turn * Vector3::new(0.0, sign * 0.035 * w, 0.0);
             self.limb(upper + out, hem + out, 0.07 * h, 0.078 * h, self.look.top);
         }
+    }
+
+    fn poncho(&mut self) {
+        let (h, w) = (self.h, self.w);
+        let hem = self.s.pelvis - Vector3::new(0.0, 0.0, 0.04 * h);
+        let collar = self.s.chest - Vector3::new(0.0, 0.0, 0.03 * h);
+        self.limb(collar, hem, 0.085 * w, 0.17 * w, self.look.top);
+    }
+
+    /// The keyboard lies before the chest, the screen stands at its far edge.
+    fn laptop(&mut self) {
+        let turn = self.s.world_from_thorax;
+        let before = |x: f64, z: f64| self.s.chest + turn * (Vector3::new(x, 0.0, z) * self.h);
+        let (shell, glass) = (Material::plain([0.35; 3]), Material::plain([0.05; 3]));
+        let keys = Form::Block(Vector3::new(0.12, 0.17, 0.01));
+        let screen = Form::Block(Vector3::new(0.008, 0.17, 0.11));
+        let (low, high) = (before(0.15, -0.14), before(0.225, -0.075));
+        self.shapes.push(Shape::new(keys, low, turn, shell));
+        // Glass returns hardly any projected dots.
+        self.shapes.push(Shape::new(screen, high, turn, glass.with_infrared(0.03)));
     }
 
     fn backpack(&mut self) {
@@ -335,6 +361,29 @@ mod tests {
             .map(|p| [p.build.height_m.to_bits(), p.build.breadth.to_bits()])
             .collect();
         assert_eq!(sizes.len() as u64, 3 * SUBJECTS);
+    }
+
+    /// Returns the first surface on a ray towards a person, at a height and beside the middle.
+    fn met(extras: &[Extra], [aside, height]: [f64; 2]) -> Option<(f64, Shape)> {
+        let mut person = Person::subject(3);
+        person.look.extras = extras.to_vec();
+        let stance = Stance::standing(Point2::origin(), 0.0);
+        let (shapes, _) = person.shapes(&Skeleton::new(&person.build, &stance));
+        let eye = Point3::new(2.0, aside, height * person.build.height_m);
+        let met = shapes.iter().filter_map(|s| Some((s.meet(&eye, &-Vector3::x())?, *s)));
+        met.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    #[test]
+    fn a_poncho_fills_the_sides_and_a_laptop_is_before_the_chest() {
+        let top = Person::subject(3).look.top;
+        let hip = |extras: &[Extra]| met(extras, [0.2, 0.5]).map(|(_, shape)| shape.material);
+        assert_ne!(hip(&[]), Some(top), "hands and trousers");
+        assert_eq!(hip(&[Extra::Poncho]), Some(top));
+        let chest = |extras: &[Extra]| met(extras, [0.0, 0.76]).unwrap();
+        let ((bare, _), (held, screen)) = (chest(&[]), chest(&[Extra::Laptop]));
+        assert!(bare - held > 0.15, "{bare} {held}");
+        assert!(screen.material.infrared < 0.05, "glass");
     }
 
     #[test]

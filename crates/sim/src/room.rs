@@ -229,6 +229,7 @@ pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
             .flat_map(|(y, r)| [round(*y, *r), round(-y, *r)])
             .collect(),
         FurnitureKind::Partition => [-0.65, 0.0, 0.65].map(|y| round(y, 0.35)).into(),
+        FurnitureKind::GlassDoor => [-0.3, 0.3].map(|y| round(y, 0.25)).into(),
         _ => vec![round(0.0, 0.3)],
     }
 }
@@ -256,6 +257,9 @@ pub fn furniture(piece: &Furniture, ceiling_m: f64, random: &mut Random) -> Obje
         FurnitureKind::BinOnTable => maker.bin_on_table(),
         FurnitureKind::Doorway => maker.doorway(ceiling_m),
         FurnitureKind::Partition => maker.partition(),
+        FurnitureKind::Blanket => maker.blanket(),
+        FurnitureKind::Flag => maker.flag(),
+        FurnitureKind::GlassDoor => maker.glass_door(),
     }
     Object::new(maker.shapes, None, true)
 }
@@ -414,6 +418,34 @@ impl Maker {
             self.limb([0.0, y, 0.0], [0.0, y, 1.7], [0.025, 0.025], Material::plain(METAL));
             self.block([0.0, y, 0.015], [0.22, 0.03, 0.015], Material::plain(METAL));
         }
+    }
+
+    /// A hump with the breadth of shoulders.
+    fn blanket(&mut self) {
+        let wool = Material::patterned(self.cloth, scaled(self.cloth, 1.4), Pattern::Checks(0.11));
+        self.chair();
+        let (top, broad) = (self.between(0.9, 1.25), self.between(0.16, 0.26));
+        let (slip, fold) = (self.between(-0.08, 0.08), self.between(0.05, 0.1));
+        self.limb([-0.2, slip - broad, top], [-0.2, slip + broad, top], [fold, fold], wool);
+        self.limb([-0.15, slip, top - broad], [0.0, slip, 0.1], [broad, 1.3 * broad], wool);
+    }
+
+    /// Cloth beside a pole, which reaches as high as a tall person or beyond.
+    fn flag(&mut self) {
+        let (top, long) = (self.between(1.8, 2.3), self.between(0.7, 1.1));
+        let (wide, metal) = (self.between(0.12, 0.25), Material::plain(METAL));
+        let stripes =
+            Material::patterned(self.cloth, [0.6, 0.58, 0.5], Pattern::Stripes(0.35 * long));
+        self.limb([0.0, 0.0, 0.0], [0.0, 0.0, top], [0.015, 0.015], metal);
+        self.ellipsoid([0.0, 0.0, 0.02], [0.16, 0.16, 0.03], metal);
+        self.ellipsoid([0.02, 0.8 * wide, top - 0.5 * long], [0.06, wide, 0.55 * long], stripes);
+    }
+
+    fn glass_door(&mut self) {
+        let [side, top] = DOOR_M;
+        let pane = Material::plain([0.45, 0.50, 0.50]).with_infrared(0.0);
+        self.block([0.0, 0.0, 0.5 * top], [0.01, side, 0.5 * top], pane);
+        self.shapes.extend(door_frame(self.at, &self.turn));
     }
 
     /// A shade or a globe, above the foot or on an arm beside it.
@@ -577,6 +609,8 @@ mod tests {
             K::Poster,
             K::CardboardFigure,
             K::BinOnTable,
+            K::Blanket,
+            K::Flag,
         ];
         for kind in kinds {
             assert_eq!(forms(kind, 1), forms(kind, 1), "the seed decides");
@@ -614,6 +648,21 @@ mod tests {
         let reach = arm.extent(&along);
         assert!((reach - 0.27).abs() < 1e-9, "{reach}");
         assert!((arm.origin - nalgebra::center(&from, &to)).norm() < 1e-12);
+    }
+
+    /// A ray through the middle of the pane meets glass, and one beside it the frame.
+    #[test]
+    fn frosted_glass_returns_no_dots_and_its_frame_does() {
+        let piece =
+            Furniture { kind: FurnitureKind::GlassDoor, at: [3.0, 2.0], heading_deg: 180.0 };
+        let made = furniture(&piece, 2.8, &mut Random::new(1, 8));
+        let infrared = |y: f64| {
+            let eye = Point3::new(1.0, y, 1.0);
+            let met = made.shapes.iter().filter_map(|s| Some((s.meet(&eye, &Vector3::x())?, s)));
+            met.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, shape)| shape.material.infrared)
+        };
+        assert_eq!(infrared(2.0), Some(0.0));
+        assert!(infrared(2.48).is_some_and(|infrared| infrared > 0.3));
     }
 
     #[test]

@@ -526,6 +526,12 @@ pub enum FurnitureKind {
     Doorway,
     /// A screen of 1.6 m x 1.7 m across its heading.
     Partition,
+    /// A blanket over the back of a chair, down to the floor.
+    Blanket,
+    /// A flag that hangs from a pole.
+    Flag,
+    /// A door of frosted glass, from which no projected dots return.
+    GlassDoor,
 }
 
 impl FurnitureKind {
@@ -545,6 +551,9 @@ impl FurnitureKind {
             Self::BinOnTable => "bin on a table",
             Self::Doorway => "doorway",
             Self::Partition => "partition",
+            Self::Blanket => "blanket",
+            Self::Flag => "flag",
+            Self::GlassDoor => "glass door",
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 49] = [
+const BUILT_IN: [(&str, &str); 50] = [
     ("cafeteria", include_str!("../../../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../../../configs/scenes/cafeteria-high.toml")),
     ("corridor", include_str!("../../../configs/scenes/corridor.toml")),
@@ -17,6 +17,7 @@ const BUILT_IN: [(&str, &str); 49] = [
     ("crowd", include_str!("../../../configs/scenes/crowd.toml")),
     ("demo", include_str!("../../../configs/scenes/demo.toml")),
     ("empty-clutter", include_str!("../../../configs/scenes/empty-clutter.toml")),
+    ("empty-real", include_str!("../../../configs/scenes/empty-real.toml")),
     ("follow-alike", include_str!("../../../configs/scenes/follow-alike.toml")),
     ("follow-around", include_str!("../../../configs/scenes/follow-around.toml")),
     ("follow-between", include_str!("../../../configs/scenes/follow-between.toml")),

@@ -37,6 +37,10 @@ pub struct TrainArgs {
     /// those of `depth-ekf` and `stereo-verified` with low thresholds.
     #[arg(long, value_name = "CONFIG")]
     pub proposes: Option<PathBuf>,
+    /// A scene that is simulated for a verifier in place of random rooms, at its own rate and for
+    /// its own time, as a draw of the training split each time; may be given several times.
+    #[arg(long, value_name = "SCENE", requires = "proposes")]
+    pub world: Vec<PathBuf>,
     /// Leaves out an annotated log of a verifier's training data, for a model that has not seen its
     /// room; may be given several times.
     #[arg(long, value_name = "LOG", value_parser = clap::builder::PossibleValuesParser::new(TRAIN_LOGS))]

@@ -77,7 +77,8 @@ pub fn label(candidate: &Detection, people: &[Known]) -> Label {
 /// Callback for each frame.
 pub type See<'a> = &'a mut dyn FnMut(&AnnotatedFrame) -> Result<(), Failure>;
 
-/// Goes through a simulated scene. A stereo pair is matched, as a pipeline would.
+/// Goes through a simulated scene. A stereo pair is matched, as a pipeline would; a panorama has
+/// no depth.
 ///
 /// # Errors
 /// Invalid settings, and those of `see`.
@@ -91,9 +92,9 @@ pub fn in_scene(
     let mut stereo = StereoDepth::new(stereo).map_err(Failure::failed)?;
     while let Some(simulated) = draw.next_frame() {
         let people = simulated.truth.iter().map(known).collect();
-        let frame = match simulated.frame.depth() {
-            Ok(_) => simulated.frame,
-            Err(_) => with_depth(simulated.frame, &mut stereo)?,
+        let frame = match (simulated.frame.depth(), simulated.frame.right()) {
+            (Ok(_), _) | (_, Err(_)) => simulated.frame,
+            (Err(_), Ok(_)) => with_depth(simulated.frame, &mut stereo)?,
         };
         see(&AnnotatedFrame { frame, people })?;
     }

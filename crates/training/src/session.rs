@@ -6,7 +6,7 @@ use tagalong_app::threads::threads;
 use tagalong_config::{ConfigError, Context, Example, FileLimit, Registry, Trainer, read_text};
 use tagalong_core::{Detection, DiffDrive, Frame, Verifier};
 use tagalong_pipeline::Pipeline;
-use tagalong_sim::{CameraKind, Split};
+use tagalong_sim::{CameraKind, Scene, Split, Variant};
 use toml::Spanned;
 use toml::de::DeTable;
 
@@ -16,6 +16,7 @@ use super::held_out::{Comparison, Effect, Tally};
 use super::in_use::{InUse, pipeline};
 use super::photos::{self, fingerprint, photos};
 use super::plan::Plan;
+use super::rooms::ImageTiming;
 use super::seen::{AnnotatedFrame, Label, in_log, in_scene, label};
 use super::{faces, rooms, seen};
 
@@ -35,6 +36,8 @@ pub struct Session<'a> {
     pub registry: &'a Registry,
     /// Amount of simulated data.
     pub plan: Plan,
+    /// Texts of the scenes that are simulated in place of random rooms.
+    worlds: Vec<String>,
     /// Settings of the plugin.
     pub settings: toml::Table,
     /// Path of the model.
@@ -59,7 +62,8 @@ impl<'a> Session<'a> {
             bar.set_style(style);
         }
         let settings = settings(args.settings.as_deref())?;
-        Ok(Self { args, registry, plan: Plan::new(args), settings, model, bar })
+        let worlds = args.world.iter().map(|path| scene_text(path)).collect::<Result<_, _>>()?;
+        Ok(Self { args, registry, plan: Plan::new(args), worlds, settings, model, bar })
     }
 
     /// Shows the start of a step of a round.
@@ -70,7 +74,12 @@ impl<'a> Session<'a> {
 
     /// Returns the names of the training data.
     pub fn sources(&self) -> Vec<String> {
-        let mut names = vec!["simulated rooms".to_owned()];
+        let worlds = self.args.world.iter().filter_map(|path| path.file_stem());
+        let mut names: Vec<String> =
+            worlds.map(|name| format!("simulated {}", name.to_string_lossy())).collect();
+        if names.is_empty() {
+            names.push("simulated rooms".to_owned());
+        }
         if self.args.data.is_some() {
             names.extend(self.train_logs().map(|log| format!("logs/{log}.mcap")));
             names.extend(
@@ -153,8 +162,7 @@ impl<'a> Session<'a> {
         self.tell(round, "drawing scenes");
         self.bar.set_length(numbers.end - numbers.start);
         for number in numbers {
-            let scene =
-                rooms::scene(Split::Train, number, self.plan.look).map_err(Failure::failed)?;
+            let scene = self.scene(Split::Train, number, self.plan.look)?;
             let in_use = self.in_use(scene.camera.kind)?;
             let mut pipeline = pipeline(&in_use.proposing()?, self.registry)?;
             in_scene(&scene, threads(None), in_use.stereo()?, &mut |seen| {
@@ -182,6 +190,17 @@ impl<'a> Session<'a> {
             self.bar.inc(1);
         }
         Ok(counts)
+    }
+
+    /// Returns a scene of a split: the next of the given ones in turn, or a random room.
+    fn scene(&self, split: Split, number: u64, look: ImageTiming) -> Result<Scene, Failure> {
+        if self.worlds.is_empty() {
+            return rooms::scene(split, number, look).map_err(Failure::failed);
+        }
+        let text = &self.worlds[(number % self.worlds.len() as u64) as usize];
+        let scene = Scene::parse_with(text, &Variant::of_split(split, number));
+        // Webcams would cost time, and no pipeline looks at them.
+        Ok(Scene { webcams: Vec::new(), ..scene.map_err(Failure::usage)? })
     }
 
     /// Returns the pipeline that a verifier is trained for.
@@ -214,8 +233,7 @@ impl<'a> Session<'a> {
         self.bar.set_length(self.plan.test_scenes);
         let mut tally = Tally::default();
         for number in 0..self.plan.test_scenes {
-            let scene =
-                rooms::scene(Split::Test, number, self.plan.test_look).map_err(Failure::failed)?;
+            let scene = self.scene(Split::Test, number, self.plan.test_look)?;
             let in_use = self.in_use(scene.camera.kind)?;
             let mut comparison = self.comparison(&in_use)?;
             tally.next_scene();
@@ -275,6 +293,12 @@ fn quick_settings(plugin: &str) -> toml::Table {
         _ => "",
     };
     text.parse().unwrap_or_default()
+}
+
+/// Reads a scene.
+fn scene_text(path: &Path) -> Result<String, Failure> {
+    read_text(path, FileLimit::Config)
+        .map_err(|error| Failure::usage(format!("{}: {error}", path.display())))
 }
 
 /// Reads the settings of a plugin, if there are any.

@@ -11,6 +11,8 @@ use tagalong_geometry::Camera;
 pub struct Upright {
     /// Left and right end of each row.
     rows: [[End; 2]; Self::ROWS],
+    /// True in a panorama, where columns are counted modulo the width.
+    is_around: bool,
 }
 
 /// End of a row: its pixel and its depth along the optical axis, m.
@@ -57,9 +59,12 @@ impl Upright {
         let nowhere = End { pixel: Point2::origin(), ahead_m: 0.0 };
         let mut rows = [[nowhere; 2]; Self::ROWS];
         for (row, ends) in rows.iter_mut().enumerate() {
-            *ends = [end(row, -1.0)?, end(row, 1.0)?];
+            let [left, mut right] = [end(row, -1.0)?, end(row, 1.0)?];
+            // In a panorama the seam may lie between the two ends.
+            right.pixel.x = camera.column_near(right.pixel.x, left.pixel.x);
+            *ends = [left, right];
         }
-        Some(Self { rows })
+        Some(Self { rows, is_around: camera.panorama().is_some() })
     }
 
     /// Samples the intensities; `None` in an image without pixels.
@@ -72,7 +77,7 @@ impl Upright {
         for (row, line) in self.lines().enumerate() {
             for column in 0..Self::COLUMNS {
                 let pixel = line.at(column).pixel;
-                let (x, has_column) = nearest(pixel.x, width);
+                let (x, has_column) = self.column(pixel.x, width);
                 let (y, has_row) = nearest(pixel.y, height);
                 let cell = row * Self::COLUMNS + column;
                 out.grey[cell] = f32::from(image.row(y)[x]);
@@ -91,7 +96,7 @@ impl Upright {
     ) -> impl Iterator<Item = Option<f32>> + 'a {
         let (width, height) = (depth.width(), depth.height());
         let reading = move |End { pixel, ahead_m }: End| {
-            let (x, has_column) = nearest(pixel.x, width);
+            let (x, has_column) = self.column(pixel.x, width);
             let (y, has_row) = nearest(pixel.y, height);
             let reading = if has_column && has_row { depth.row(y)[x] } else { f32::NAN };
             (reading.is_finite() && reading > 0.0).then_some(reading - ahead_m as f32)
@@ -100,6 +105,15 @@ impl Upright {
         self.lines()
             .step_by(every)
             .flat_map(move |line| columns.clone().map(move |column| reading(line.at(column))))
+    }
+
+    /// Returns the column of a place, and true if it lies inside the image.
+    fn column(&self, place: f64, width: usize) -> (usize, bool) {
+        if self.is_around {
+            nearest(place.rem_euclid(width as f64), width)
+        } else {
+            nearest(place, width)
+        }
     }
 
     fn lines(&self) -> impl Iterator<Item = Line> {
@@ -141,7 +155,7 @@ fn nearest(place: f64, size: usize) -> (usize, bool) {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::{ConicalMirror, Distortion, Lens, Panorama, Pinhole};
 
     use super::*;
 
@@ -169,6 +183,39 @@ mod tests {
                 assert!(shown.is_seen[cell]);
             }
         }
+    }
+
+    /// In a panorama the columns go on beyond the seam, on both sides of a person there.
+    #[test]
+    fn a_plane_across_the_seam_of_a_panorama_is_whole() {
+        let d = [67.5_f64.to_radians(), 0.05, 8.0, 230.0];
+        let mirror = ConicalMirror::new(175.0, [240.0; 2], d).unwrap();
+        let camera = Camera {
+            lens: Lens::Panorama(Panorama { mirror, columns: 480, rows: 120 }),
+            width: 480,
+            height: 120,
+            robot_from_camera: ConicalMirror::upright(1.5),
+        };
+        let image = GreyImage::from_fn(480, 120, |x, _| (x as i64 - 240).unsigned_abs() as u8);
+        let mut across = 0;
+        for bearing in (0..36).map(|step| f64::from(10 * step).to_radians()) {
+            let head = Point3::new(2.0 * bearing.cos(), 2.0 * bearing.sin(), 1.6);
+            let shown = Upright::new(&camera, &head).unwrap().grey(&image).unwrap();
+            let aside = Vector2::new(bearing.sin(), -bearing.cos());
+            let column = |cell: usize| {
+                let m = (cell as f64 - 17.5) * Upright::STEP_M;
+                let place = Point3::new(head.x + m * aside.x, head.y + m * aside.y, 1.0);
+                camera.project(&place).unwrap().x.rem_euclid(480.0)
+            };
+            across += usize::from((column(0) - column(35)).abs() > 240.0);
+            for cell in (0..36).step_by(5) {
+                let wanted = (column(cell) - 240.0).abs();
+                let off = f64::from(shown.grey[40 * Upright::COLUMNS + cell]) - wanted;
+                assert!(off.abs() <= 1.5, "{bearing} {cell}: {off}");
+                assert!(shown.is_seen[40 * Upright::COLUMNS + cell]);
+            }
+        }
+        assert!(across > 0, "none of the planes lies across the seam");
     }
 
     #[test]

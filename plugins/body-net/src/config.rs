@@ -14,6 +14,9 @@ pub struct Config {
     pub limit: f64,
     /// Added to the evidence of each frame, log-odds. Below zero the verifier is stricter.
     pub bias: f64,
+    /// True to look at depth and say nothing without it; false for cameras that have none, with a
+    /// model that was trained so.
+    pub depth: bool,
     /// Fit of a model; only `tagalong train` reads it.
     pub training: Training,
 }
@@ -25,6 +28,7 @@ impl Default for Config {
             weight: 1.0,
             limit: 6.0,
             bias: 0.0,
+            depth: true,
             training: Training::default(),
         }
     }

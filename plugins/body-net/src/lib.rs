@@ -2,8 +2,8 @@
 //!
 //! An upright plane through the candidate, from the floor to 2 m, is sampled in intensity and depth
 //! ([`NetworkInput`]), always at one scale. A network of four layers ([`Net`]) turns it into
-//! log-odds ([`Model`]). Without depth it gives no evidence, because the place of the candidate
-//! would be a guess.
+//! log-odds ([`Model`]). Without depth it gives no evidence, unless it is set and trained to go
+//! without.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).
 
@@ -31,7 +31,5 @@ pub const NAME: &str = "body-net";
 pub fn register(registry: &mut Registry) {
     registry.verifier(NAME, "a small network looks at all of a candidate", BodyNet::new);
     #[cfg(feature = "train")]
-    registry.trainer(NAME, |config: Config, context| {
-        train::NetTrainer::new(config.training, context.seed)
-    });
+    registry.trainer(NAME, |config: Config, context| train::NetTrainer::new(config, context.seed));
 }

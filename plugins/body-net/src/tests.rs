@@ -115,7 +115,7 @@ mod network {
     }
 
     fn view(seed: u32) -> NetworkInput {
-        NetworkInput::new(&seen(seed.is_multiple_of(2), seed), &candidate()).unwrap().unwrap()
+        NetworkInput::new(&seen(seed.is_multiple_of(2), seed), &candidate(), true).unwrap().unwrap()
     }
 
     fn net() -> Net {
@@ -172,8 +172,12 @@ mod training {
         Training { epochs: 6, rate: 0.005, batch: 8, ..Training::default() }
     }
 
+    fn with(training: Training) -> Config {
+        Config { training, ..Config::default() }
+    }
+
     fn trainer(training: Training, count: u32) -> NetTrainer {
-        let mut trainer = NetTrainer::new(training, 5).unwrap();
+        let mut trainer = NetTrainer::new(with(training), 5).unwrap();
         for seed in 0..count {
             let is_person = seed % 2 == 0;
             let example = Example { is_person, group: u64::from(seed / 3) };
@@ -193,7 +197,7 @@ mod training {
         let (model, mut pass) = (Model::from_text(&fitted.model).unwrap(), Pass::default());
         for seed in 500..520 {
             let view =
-                NetworkInput::new(&seen(seed % 2 == 0, seed), &candidate()).unwrap().unwrap();
+                NetworkInput::new(&seen(seed % 2 == 0, seed), &candidate(), true).unwrap().unwrap();
             let log_odds = model.log_odds(&view, &mut pass);
             assert!((log_odds > 0.0) == (seed % 2 == 0), "{seed}: {log_odds}");
         }
@@ -217,7 +221,7 @@ mod training {
 
     #[test]
     fn one_class_is_no_training_set() {
-        let mut trainer = NetTrainer::new(small(), 1).unwrap();
+        let mut trainer = NetTrainer::new(with(small()), 1).unwrap();
         for group in 0..8 {
             let example = Example { is_person: true, group };
             trainer.add(&seen(true, group as u32), &candidate(), example).unwrap();
@@ -233,7 +237,7 @@ mod training {
             Training { batch: 0, ..small() },
             Training { folds: 1, ..small() },
         ] {
-            assert!(NetTrainer::new(training, 1).is_err());
+            assert!(NetTrainer::new(with(training), 1).is_err());
         }
     }
 }

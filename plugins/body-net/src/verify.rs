@@ -11,6 +11,7 @@ const BUILT_IN: &str = include_str!("../../../configs/models/body-net.toml");
 pub struct BodyNet {
     model: Model,
     pass: Pass,
+    depth: bool,
     calibration: ScoreCalibration,
 }
 
@@ -23,7 +24,7 @@ impl BodyNet {
     pub fn new(config: Config, context: &Context) -> Result<Self> {
         let calibration = ScoreCalibration::new(config.weight, config.limit, config.bias)?;
         let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
-        Ok(Self { model, pass: Pass::default(), calibration })
+        Ok(Self { model, pass: Pass::default(), depth: config.depth, calibration })
     }
 }
 
@@ -33,7 +34,7 @@ impl Verifier for BodyNet {
     }
 
     fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
-        let Some(view) = NetworkInput::new(frame, candidate)? else { return Ok(0.0) };
+        let Some(view) = NetworkInput::new(frame, candidate, self.depth)? else { return Ok(0.0) };
         Ok(self.calibration.calibrate(self.model.log_odds(&view, &mut self.pass)))
     }
 }

@@ -24,24 +24,30 @@ impl NetworkInput {
     /// ... and of the depth.
     pub const DEPTH: [usize; 2] = [Upright::ROWS / EVERY, Upright::COLUMNS / EVERY];
 
-    /// Looks at a candidate; `None` without depth, or if it is too near to be seen whole.
+    /// Looks at a candidate; `None` if it is too near to be seen whole, and without the depth that
+    /// is wanted. If it is not, all of it counts as not known.
     ///
     /// # Errors
     /// [`tagalong_core::Error::MissingImage`] for a frame without intensity.
-    pub fn new(frame: &Frame, candidate: &Detection) -> Result<Option<Self>> {
-        let (grey, depth) = (frame.grey()?, frame.depth().ok());
-        let Some((plane, depth)) = Upright::new(&frame.camera, &candidate.position).zip(depth)
-        else {
+    pub fn new(frame: &Frame, candidate: &Detection, with_depth: bool) -> Result<Option<Self>> {
+        let (grey, depth) = (frame.grey()?, frame.depth().ok().filter(|_| with_depth));
+        let Some(plane) = Upright::new(&frame.camera, &candidate.position) else {
             return Ok(None);
         };
+        if with_depth && depth.is_none() {
+            return Ok(None);
+        }
         let steps = |behind_m: Option<f32>| {
             // A surface farther from the plane than this is not part of the person anyway.
             behind_m.map_or(UNKNOWN, |m| (m.clamp(-REACH_M, REACH_M) / STEP_M).round() as i8)
         };
-        Ok(plane.grey(grey).map(|seen| Self {
-            grey: seen.grey.iter().map(|value| *value as u8).collect(),
-            behind: plane.behind_m(depth, EVERY).map(steps).collect(),
-        }))
+        let behind = match depth {
+            Some(depth) => plane.behind_m(depth, EVERY).map(steps).collect(),
+            None => vec![UNKNOWN; Self::DEPTH[0] * Self::DEPTH[1]],
+        };
+        let intensity = |value: &f32| *value as u8;
+        let seen = plane.grey(grey);
+        Ok(seen.map(|seen| Self { grey: seen.grey.iter().map(intensity).collect(), behind }))
     }
 
     /// Depth in units of the network, and 1 where it is known.
@@ -64,7 +70,18 @@ mod tests {
 
     #[test]
     fn without_depth_there_is_no_view() {
-        assert_eq!(NetworkInput::new(&frame(picture(true, 1)), &candidate()).unwrap(), None);
+        let bare = frame(picture(true, 1));
+        assert_eq!(NetworkInput::new(&bare, &candidate(), true).unwrap(), None);
+    }
+
+    #[test]
+    fn where_depth_is_not_wanted_none_is_known() {
+        let depth = DepthImage::from_fn(64, 64, |_, _| 2.0);
+        let frame = frame(picture(true, 1)).with_depth(Arc::new(depth));
+        let [with, without] = [true, false]
+            .map(|wanted| NetworkInput::new(&frame, &candidate(), wanted).unwrap().unwrap());
+        assert_eq!(with.grey, without.grey);
+        assert!(without.behind.iter().all(|steps| *steps == UNKNOWN) && with != without);
     }
 
     #[test]
@@ -76,7 +93,7 @@ mod tests {
         };
         let depth = DepthImage::from_fn(64, 64, |x, _| at(x));
         let frame = frame(picture(true, 1)).with_depth(Arc::new(depth));
-        let view = NetworkInput::new(&frame, &candidate()).unwrap().unwrap();
+        let view = NetworkInput::new(&frame, &candidate(), true).unwrap().unwrap();
         // A row at the height of the camera; the plane is 27 pixels wide.
         let row = 20 * NetworkInput::DEPTH[1];
         assert_eq!([0, 8, 10, 17].map(|column| view.behind[row + column]), [-100, -100, 25, -128]);

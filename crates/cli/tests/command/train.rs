@@ -52,3 +52,32 @@ fn wrong_settings_are_named() {
     #[cfg(feature = "train")]
     assert!(text(&output.stderr).contains("did you mean `folds`?"), "{}", text(&output.stderr));
 }
+
+/// Scenes of a file take the place of random rooms, as other draws.
+#[test]
+#[cfg(feature = "train")]
+fn a_verifier_is_trained_in_the_given_world() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = "duration_s = 2.0\n[camera]\nrate_hz = 3.0\n[robot]\nstart = [1.0, 3.0]\n\
+                 [[people]]\npath = [[4.0, 2.0], [3.6, 4.0]]\n\
+                 [[furniture]]\nkind = \"cardboard-figure\"\nat = [4.5, 4.3]\nheading_deg = 190.0\n\
+                 [[furniture]]\nkind = \"coat-stand\"\nat = [4.0, 1.2]\n";
+    let proposes = "[[detectors]]\nplugin = \"depth-template\"\n\
+                    config = { discover_cost = 0.3, boundary_margin_m = 0.2 }\n\
+                    [filter]\nplugin = \"ekf\"\n";
+    fs::write(folder.path().join("hall.toml"), world).unwrap();
+    fs::write(folder.path().join("low.toml"), proposes).unwrap();
+    let given = ["svm-patch", "--quick", "--scenes", "5", "-o", "a.toml", "--world", "hall.toml"];
+    let output = train(folder.path(), &given);
+    assert_eq!(code(&output), 2, "a world without a detector that proposes");
+    assert!(text(&output.stderr).contains("--proposes"), "{}", text(&output.stderr));
+    let output = train(folder.path(), &[&given[..], &["--proposes", "low.toml"]].concat());
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let card = fs::read_to_string(folder.path().join("a.card.toml")).unwrap();
+    let card: toml::Table = card.parse().unwrap();
+    assert_eq!(card["trained_on"].as_array().unwrap()[0].as_str(), Some("simulated hall"));
+    let missing = [&given[..7], &["--world", "none.toml", "--proposes", "low.toml"]].concat();
+    let output = train(folder.path(), &missing);
+    assert_eq!(code(&output), 2);
+    assert!(text(&output.stderr).contains("none.toml"), "{}", text(&output.stderr));
+}

@@ -8,7 +8,7 @@ use tagalong_core::{Detection, Error, Frame, Result};
 use tagalong_learn::{Adam, Line, accepted, area, mix, pace, parts, platt, side_by_side};
 
 use self::changes::{Draws, changed};
-use crate::{Model, Net, NetworkInput, Pass, Training};
+use crate::{Config, Model, Net, NetworkInput, Pass, Training};
 
 /// A batch is always summed in so many parts, however many cores there are: the same
 /// bytes on all machines.
@@ -21,6 +21,7 @@ const STEPS: f32 = 1e4;
 /// Collects views of candidates and fits models to them.
 pub struct NetTrainer {
     training: Training,
+    depth: bool,
     seed: u64,
     views: Vec<NetworkInput>,
     examples: Vec<Example>,
@@ -33,9 +34,10 @@ impl NetTrainer {
     ///
     /// # Errors
     /// [`Error::Settings`] for numbers that cannot work.
-    pub fn new(training: Training, seed: u64) -> Result<Self> {
+    pub fn new(config: Config, seed: u64) -> Result<Self> {
+        let Config { training, depth, .. } = config;
         check(&training)?;
-        Ok(Self { training, seed, views: Vec::new(), examples: Vec::new(), unseen: 0 })
+        Ok(Self { training, depth, seed, views: Vec::new(), examples: Vec::new(), unseen: 0 })
     }
 
     /// A network that has seen these examples.
@@ -134,7 +136,7 @@ impl NetTrainer {
 
 impl Trainer for NetTrainer {
     fn add(&mut self, frame: &Frame, candidate: &Detection, example: Example) -> Result<()> {
-        match NetworkInput::new(frame, candidate)? {
+        match NetworkInput::new(frame, candidate, self.depth)? {
             Some(view) => {
                 self.views.push(view);
                 self.examples.push(example);
@@ -198,7 +200,7 @@ mod tests {
     /// Returns a trainer with so many people and then others, each in a group of its own.
     fn trainer(people: usize, others: usize) -> NetTrainer {
         let training = Training { epochs: 1, batch: 4, folds: 3, ..Training::default() };
-        let mut trainer = NetTrainer::new(training, 1).unwrap();
+        let mut trainer = NetTrainer::new(Config { training, ..Config::default() }, 1).unwrap();
         for k in 0..people + others {
             let grey = (0..80 * 36).map(|cell| (cell * (k + 7) % 251) as u8).collect();
             trainer.views.push(NetworkInput { grey, behind: vec![0; 40 * 18] });
