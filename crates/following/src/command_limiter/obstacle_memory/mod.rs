@@ -1,5 +1,5 @@
 use nalgebra::{Point2, Point3, Vector3};
-use tagalong_core::{DepthImage, EgoMotion, Person, Track, TrackId};
+use tagalong_core::{DepthImage, EgoMotion, GreyImage, Person, Track, TrackId};
 use tagalong_geometry::Camera;
 
 use super::collision_monitor::{Ahead, Sign, ahead, fall, is_thing};
@@ -16,6 +16,9 @@ const ENOUGH: u16 = 3;
 const FARTHEST_M: f64 = 50.0;
 /// Time after which a static point is an obstacle to remember, s; a person walking by is not.
 const STANDS_S: f64 = 1.0;
+/// Time after which a fall is one to remember, s: a floor does not walk away, but a wrong match of a
+/// stereo pair on a floor without texture lies below it for an image or two.
+const FALLS_S: f64 = 0.3;
 /// Distance ahead of the robot, m, within which an obstacle that left the image at its edge or
 /// below is believed to be there for `STEPPED_IN_S`, s, however short it was seen.
 const CLOSE_M: f64 = 0.6;
@@ -33,6 +36,10 @@ const BEFORE_M: f64 = 0.2;
 const BAND_M: f64 = 0.1;
 /// Part of valid readings below which an image column is dark.
 const DARK: f64 = 0.05;
+/// Slope of the brightness across a pixel from which on it has texture, grey levels: noise is less.
+const TEXTURED: i32 = 6;
+/// Part of textured pixels below which a column has too little texture for a stereo pair.
+const SMOOTH: f64 = 0.1;
 /// Depth that is assumed for an object that hides a column, m.
 const HIDES_M: f64 = 0.4;
 
@@ -121,6 +128,17 @@ impl ObstacleMemory {
         self.grid.count(settings, &self.seen);
         self.propagate(settings, camera, depth, motion, target);
         self.remember(settings, target);
+    }
+
+    /// Takes in the left image of a stereo pair, whose depth this is. A column without texture is
+    /// dark for want of it, and no object hides it.
+    pub(crate) fn excuse_smooth(&mut self, left: &GreyImage) {
+        let step = left.width().div_ceil(COLUMNS).max(1);
+        for (at, column) in self.columns.iter_mut().enumerate() {
+            if column.dark_s > 0.0 && is_smooth(left, at * step, step) {
+                column.dark_s = f64::INFINITY;
+            }
+        }
     }
 
     /// Takes in a laser scan. It needs no memory, because a scanner also sees to the sides and close
@@ -225,31 +243,32 @@ impl ObstacleMemory {
         target: Option<&Person>,
     ) {
         let grid = &self.grid;
-        self.things.retain_mut(|Obstacle { at, heights, seen_s, unseen_s, is_drop, .. }| {
-            *at = motion.apply_to_point(*at);
-            if !is_near(settings, at) {
+        self.things.retain_mut(|thing| {
+            thing.at = motion.apply_to_point(thing.at);
+            let at = thing.at;
+            if !is_near(settings, &at) {
                 return false;
             }
-            if grid.is_something(at) {
-                let carried = target.is_some_and(|person| may_carry(person, at));
-                *seen_s += if carried { 0.0 } else { motion.dt };
-                *unseen_s = 0.0;
-                heights.0 |= grid.heights_around(at).0;
+            if grid.is_something(&at) {
+                let carries = |person: &Person| !thing.is_drop && may_carry(person, &at);
+                thing.seen_s += if target.is_some_and(carries) { 0.0 } else { motion.dt };
+                thing.unseen_s = 0.0;
+                thing.heights.0 |= grid.heights_around(&at).0;
                 return true;
             }
-            *unseen_s += motion.dt;
-            let is_gone = depth.is_some_and(|depth| match is_drop {
-                true => shows_floor(settings, camera, depth, at),
-                false => shows_past(camera, depth, at, *heights),
+            thing.unseen_s += motion.dt;
+            let is_gone = depth.is_some_and(|depth| match thing.is_drop {
+                true => shows_floor(settings, camera, depth, &at),
+                false => shows_past(camera, depth, &at, thing.heights),
             });
             // An obstacle that stood for a second is kept for `memory_s`, a brief one only if it
             // was close.
             let kept_s = match () {
-                () if *seen_s >= STANDS_S => settings.memory_s,
-                () if is_close(settings, at) => STEPPED_IN_S,
+                () if thing.is_static() => settings.memory_s,
+                () if is_close(settings, &at) => STEPPED_IN_S,
                 () => 0.0,
             };
-            !is_gone && *unseen_s <= kept_s
+            !is_gone && thing.unseen_s <= kept_s
         });
     }
 
@@ -299,7 +318,7 @@ impl ObstacleMemory {
         for thing in &self.things {
             // Points of a known obstacle must not become a second one below.
             self.grid.clear_around(&thing.at);
-            if thing.seen_s >= STANDS_S {
+            if thing.is_static() {
                 self.grid.mark_standing(&thing.at);
             }
         }
@@ -309,19 +328,23 @@ impl ObstacleMemory {
             if self.grid.is_full(&at) && !target.is_some_and(is_of) {
                 self.grid.clear_around(&at);
                 let heights = self.grid.heights_around(&at);
-                let is_drop = point.z <= 0.0;
-                // A floor does not walk away, so no second of standing is needed.
-                let seen_s = if is_drop { STANDS_S } else { 0.0 };
                 self.things.push(Obstacle {
                     at,
                     heights,
-                    seen_s,
+                    seen_s: 0.0,
                     unseen_s: 0.0,
                     who: None,
-                    is_drop,
+                    is_drop: point.z <= 0.0,
                 });
             }
         }
+    }
+}
+
+impl Obstacle {
+    /// Returns true if it was seen for long enough to be remembered.
+    fn is_static(&self) -> bool {
+        self.seen_s >= if self.is_drop { FALLS_S } else { STANDS_S }
     }
 }
 
@@ -423,6 +446,22 @@ impl Grid {
     fn clear_around(&mut self, at: &Point2<f64>) {
         self.around(at).iter().for_each(|cell| self.points[*cell] = 0);
     }
+}
+
+/// Returns true if a column of an image has nearly no texture, by the pixels of every so many rows.
+fn is_smooth(image: &GreyImage, x: usize, step: usize) -> bool {
+    let at = |dx: i64, y: i64| image.get(x as i64 + dx, y).map_or(0, i32::from);
+    let slope = |y: i64| {
+        let across = |y: i64| at(1, y) - at(-1, y);
+        ((across(y - 1) + 2 * across(y) + across(y + 1)) / 4).abs()
+    };
+    // The border has no slope: it has no neighbours.
+    if x == 0 || x + 1 >= image.width() || image.height() < 3 {
+        return true;
+    }
+    let rows = (1..image.height() - 1).step_by(step);
+    let textured = rows.clone().filter(|y| slope(*y as i64) >= TEXTURED).count();
+    (textured as f64) < SMOOTH * rows.len() as f64
 }
 
 /// Returns true for a depth that was measured, m.
