@@ -173,6 +173,9 @@ impl Steering {
         let (monitor, camera) = (self.limiter.monitor(), &frame.camera);
         // Obstacles are updated after the lock, because points of the target are no obstacles.
         self.obstacles.update(monitor, camera, frame.depth().ok(), motion, person);
+        if let (Ok(left), true) = (frame.grey(), frame.right().is_ok()) {
+            self.obstacles.excuse_smooth(left);
+        }
         self.obstacles.add_scan(monitor, frame.laser().map(|scan| &scan.points[..]), motion);
         self.obstacles.add_tracks(tracks, followed);
         let sighted = self.obstacles.is_sighted(monitor, self.limiter.patience_s());

@@ -1,5 +1,5 @@
 use nalgebra::{Point2, Point3, Vector3};
-use tagalong_core::{DepthImage, EgoMotion, Person, Track, TrackId};
+use tagalong_core::{DepthImage, EgoMotion, GreyImage, Person, Track, TrackId};
 use tagalong_geometry::Camera;
 
 use super::collision_monitor::{Ahead, Sign, ahead, fall, is_thing};
@@ -16,6 +16,9 @@ const ENOUGH: u16 = 3;
 const FARTHEST_M: f64 = 50.0;
 /// Time after which a static point is an obstacle to remember, s; a person walking by is not.
 const STANDS_S: f64 = 1.0;
+/// Time after which a fall is one to remember, s: a floor does not walk away, but a wrong match of a
+/// stereo pair on a floor without texture lies below it for an image or two.
+const FALLS_S: f64 = 0.3;
 /// Distance ahead of the robot, m, within which an obstacle that left the image at its edge or
 /// below is believed to be there for `STEPPED_IN_S`, s, however short it was seen.
 const CLOSE_M: f64 = 0.6;
@@ -37,6 +40,10 @@ const BEFORE_M: f64 = 0.2;
 const BAND_M: f64 = 0.1;
 /// Part of valid readings below which an image column is dark.
 const DARK: f64 = 0.05;
+/// Slope of the brightness across a pixel from which on it has texture, grey levels: noise is less.
+const TEXTURED: i32 = 6;
+/// Part of textured pixels below which a column has too little texture for a stereo pair.
+const SMOOTH: f64 = 0.1;
 /// Depth that is assumed for an object that hides a column, m.
 const HIDES_M: f64 = 0.4;
 
@@ -130,6 +137,17 @@ impl ObstacleMemory {
         self.grid.count(settings, &self.seen);
         self.propagate(settings, camera, depth, motion, target);
         self.remember(settings, target);
+    }
+
+    /// Takes in the left image of a stereo pair, whose depth this is. A column without texture is
+    /// dark for want of it, and no object hides it.
+    pub(crate) fn excuse_smooth(&mut self, left: &GreyImage) {
+        let step = left.width().div_ceil(COLUMNS).max(1);
+        for (at, column) in self.columns.iter_mut().enumerate() {
+            if column.dark_s > 0.0 && is_smooth(left, at * step, step) {
+                column.dark_s = f64::INFINITY;
+            }
+        }
     }
 
     /// Takes in a laser scan. It needs no memory, because a scanner also sees to the sides and close
@@ -294,7 +312,7 @@ impl ObstacleMemory {
         for thing in &self.things {
             // Points of a known obstacle must not become a second one below.
             self.grid.clear_around(&thing.at);
-            if thing.seen_s >= STANDS_S {
+            if thing.is_static() {
                 self.grid.mark_standing(&thing.at);
             }
         }
@@ -304,11 +322,9 @@ impl ObstacleMemory {
                 self.grid.clear_around(&at);
                 let heights = self.grid.heights_around(&at);
                 let is_drop = point.z <= 0.0;
-                // A floor does not walk away, so no second of standing is needed.
-                let seen_s = if is_drop { STANDS_S } else { 0.0 };
                 let of_target =
                     !is_drop && target.is_some_and(|person| is_of(settings, person, &at));
-                let first = Obstacle { seen_s, of_target, is_drop, ..Obstacle::new(at, heights) };
+                let first = Obstacle { of_target, is_drop, ..Obstacle::new(at, heights) };
                 self.things.push(first);
             }
         }
@@ -317,10 +333,10 @@ impl ObstacleMemory {
 
     /// Lets low things that are seen beside standing ones stand, too.
     fn join_low_parts(&mut self) {
-        let stand = |thing: &&Obstacle| thing.seen_s >= STANDS_S && thing.who.is_none();
+        let stand = |thing: &&Obstacle| thing.is_static() && !thing.is_drop && thing.who.is_none();
         let standing: Vec<_> = self.things.iter().filter(stand).map(|thing| thing.at).collect();
         let is_part = |thing: &&mut Obstacle| {
-            thing.unseen_s == 0.0 && !thing.of_target && thing.heights.are_low()
+            thing.unseen_s == 0.0 && !thing.of_target && !thing.is_drop && thing.heights.are_low()
         };
         for thing in self.things.iter_mut().filter(is_part) {
             if standing.iter().any(|at| nalgebra::distance(at, &thing.at) < BESIDE_M) {
@@ -348,6 +364,7 @@ impl Obstacle {
     /// Takes in that it is seen, `dt_s` after the image before.
     fn see(&mut self, settings: &CollisionMonitorSettings, dt_s: f64, target: Option<&Person>) {
         self.unseen_s = 0.0;
+        let target = target.filter(|_| !self.is_drop);
         let of_target = target.is_some_and(|person| is_of(settings, person, &self.at));
         if of_target || target.is_some_and(|person| may_carry(person, &self.at)) {
             self.beside_s += dt_s;
@@ -360,11 +377,16 @@ impl Obstacle {
         }
     }
 
+    /// Returns true if it was seen for long enough to be remembered.
+    fn is_static(&self) -> bool {
+        self.seen_s >= if self.is_drop { FALLS_S } else { STANDS_S }
+    }
+
     /// Returns the time for which it is remembered out of view, s: for long if it stood for a
     /// second, and briefly if it was close.
     fn kept_s(&self, settings: &CollisionMonitorSettings) -> f64 {
         match () {
-            () if self.seen_s >= STANDS_S => settings.memory_s,
+            () if self.is_static() => settings.memory_s,
             () if !self.of_target && is_close(settings, &self.at) => STEPPED_IN_S,
             () => 0.0,
         }
@@ -473,6 +495,22 @@ impl Grid {
     fn clear_around(&mut self, at: &Point2<f64>) {
         self.around(at).iter().for_each(|cell| self.points[*cell] = 0);
     }
+}
+
+/// Returns true if a column of an image has nearly no texture, by the pixels of every so many rows.
+fn is_smooth(image: &GreyImage, x: usize, step: usize) -> bool {
+    let at = |dx: i64, y: i64| image.get(x as i64 + dx, y).map_or(0, i32::from);
+    let slope = |y: i64| {
+        let across = |y: i64| at(1, y) - at(-1, y);
+        ((across(y - 1) + 2 * across(y) + across(y + 1)) / 4).abs()
+    };
+    // The border has no slope: it has no neighbours.
+    if x == 0 || x + 1 >= image.width() || image.height() < 3 {
+        return true;
+    }
+    let rows = (1..image.height() - 1).step_by(step);
+    let textured = rows.clone().filter(|y| slope(*y as i64) >= TEXTURED).count();
+    (textured as f64) < SMOOTH * rows.len() as f64
 }
 
 /// Returns true for a depth that was measured, m.

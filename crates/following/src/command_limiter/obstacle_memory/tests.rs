@@ -282,6 +282,37 @@ fn where_the_image_went_dark_from_top_to_bottom_somebody_stands() {
     assert_eq!(look(0..23), Some(Ahead::Free), "too narrow");
 }
 
+/// The columns in the middle lose their depth: of a stereo pair that is an object where the image has
+/// texture, and nothing where it is smooth but for the noise of the camera.
+#[test]
+fn what_a_stereo_pair_cannot_match_for_want_of_texture_is_no_object() {
+    let settings = CollisionMonitorSettings::default();
+    let seen = with_box(9.0, 0.0);
+    let dark =
+        DepthImage::from_fn(
+            80,
+            60,
+            |u, v| {
+                if (30..50).contains(&u) { f32::NAN } else { seen.row(v)[u] }
+            },
+        );
+    let noisy = |u: usize, v: usize| 100 + ((7 * u + 3 * v) % 5) as u8;
+    for (stripes, expected) in [(40, Some(HIDES_M - settings.front_m)), (0, None)] {
+        let mut surroundings = ObstacleMemory::default();
+        let image =
+            GreyImage::from_fn(80, 60, |u, v| noisy(u, v) + if u % 4 < 2 { stripes } else { 0 });
+        for depth in [&seen, &dark, &dark] {
+            surroundings.update(&settings, &camera(), Some(depth), &EgoMotion::at_rest(0.1), None);
+            surroundings.excuse_smooth(&image);
+        }
+        let found = surroundings.ahead(&settings, 0.0, None);
+        match expected {
+            Some(metres) => assert!(is_at(found, metres), "{found:?}"),
+            None => assert_eq!(found, Some(Ahead::Free)),
+        }
+    }
+}
+
 /// A laser scanner hits a person beside the robot, with and without a depth image: an obstacle
 /// in a bend as long as the hits last. Hits high above are no obstacle, nor is the followed
 /// person; one ray may be dust.
@@ -376,6 +407,29 @@ fn a_fall_below_the_image_is_remembered() {
     }
     let found = surroundings.ahead(&settings, 0.0, None);
     assert!(is_at(found, 1.8 - 0.95 - 0.2), "{found:?}");
+}
+
+/// A wrong match of a stereo pair lies below the floor in two images, and then there is no depth.
+#[test]
+fn a_fall_that_was_seen_too_briefly_is_not_remembered() {
+    let settings = CollisionMonitorSettings::default();
+    let (fall, floor) = (with_edge(1.6, 0.17), with_edge(9.0, 0.0));
+    let nothing = DepthImage::from_fn(160, 120, |u, v| match floor.row(v)[u] {
+        z if z == fall.row(v)[u] => z,
+        _ => f32::NAN,
+    });
+    for (images, is_remembered) in [(2, false), (6, true)] {
+        let mut surroundings = ObstacleMemory::default();
+        let mut look = |depth: &DepthImage| {
+            let still = EgoMotion::at_rest(0.1);
+            surroundings.update(&settings, &fine_camera(), Some(depth), &still, None);
+            surroundings.ahead(&settings, 0.0, None)
+        };
+        for _ in 0..images {
+            assert!(is_at(look(&fall), 1.4), "it counts at once");
+        }
+        assert_eq!(look(&nothing) != Some(Ahead::Free), is_remembered, "{images}");
+    }
 }
 
 #[test]
