@@ -76,7 +76,7 @@ fn a_verifier_is_trained_in_the_given_world() {
     let card = fs::read_to_string(folder.path().join("a.card.toml")).unwrap();
     let card: toml::Table = card.parse().unwrap();
     assert_eq!(card["trained_on"].as_array().unwrap()[0].as_str(), Some("simulated hall"));
-    let missing = [&given[..7], &["--world", "none.toml", "--proposes", "low.toml"]].concat();
+    let missing = ["svm-patch", "-o", "b.toml", "--world", "none.toml", "--proposes", "low.toml"];
     let output = train(folder.path(), &missing);
     assert_eq!(code(&output), 2);
     assert!(text(&output.stderr).contains("none.toml"), "{}", text(&output.stderr));
