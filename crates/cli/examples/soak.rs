@@ -21,7 +21,7 @@ use tagalong_trials::Draw;
 const SCENES: [&str; 3] = ["follow-passing", "follow-crowd", "follow-turns"];
 /// Size of the images, pixels: the ride is about time and memory, and small images are simulated fast.
 const SIZE: [usize; 2] = [100, 75];
-/// Whom to follow.
+/// The person ahead of the robot.
 const NEAREST: Enrollment =
     Enrollment { person: Choice::Nearest, lose_after_s: None, search: None, give_up_s: None };
 /// Pause between two scenes, s: the clock jumps ahead, and all tracks end.

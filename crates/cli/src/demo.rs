@@ -45,7 +45,7 @@ pub fn demo(args: &DemoArgs, registry: &Registry) -> Outcome {
     let folder = &args.output;
     RunDir::check(folder, args.overwrite, Path::new("")).map_err(Failure::usage)?;
     let signals = Signals::listen()?;
-    say("1/4 drawing four people around a moving robot");
+    say("1/4 simulating four people around a moving robot");
     let log = draw(folder, args.seed)?;
     for ((name, config), step) in PIPELINES.iter().zip(2..) {
         say(&format!("{step}/4 tracking them with {name}"));

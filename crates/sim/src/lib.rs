@@ -49,6 +49,7 @@ mod material;
 mod mirror;
 mod parallel;
 mod person;
+mod ramp;
 mod random;
 mod render;
 mod robot;
@@ -68,10 +69,11 @@ mod world;
 pub use laser::LaserSettings;
 pub use mirror::MirrorSettings;
 pub use person::Extra;
+pub use ramp::Ramp;
 pub use robot::Encoder;
 pub use scene::{
     AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
-    LightSettings, PersonSettings, Posture, Ramp, RobotSettings, RoomSettings, Scene, Trick,
+    LightSettings, PersonSettings, Posture, RobotSettings, RoomSettings, Scene, Trick,
 };
 pub use simulation::{Clearance, Event, OdometryReading, Shot, Simulation, Truth, WebcamShot};
 pub use split::{Seeds, Split};

@@ -4,8 +4,9 @@ use nalgebra::{Point2, Point3, Rotation2, Rotation3, Vector2, Vector3};
 
 use crate::behaviour::Obstacle;
 use crate::material::{Colour, Material, Pattern, scaled};
+use crate::ramp::Ramp;
 use crate::random::Random;
-use crate::scene::{Floor, Furniture, FurnitureKind, LightSettings, Ramp, RoomSettings, Scene};
+use crate::scene::{Floor, Furniture, FurnitureKind, LightSettings, RoomSettings, Scene};
 use crate::shape::{Form, Shape};
 use crate::world::{Lamp, Object};
 

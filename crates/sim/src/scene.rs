@@ -10,6 +10,7 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorSettings;
 use crate::person::Extra;
+use crate::ramp::Ramp;
 use crate::split::{SUBJECTS, Split};
 use crate::variation::{Variant, one_scene};
 use crate::webcam::WebcamSettings;
@@ -261,34 +262,6 @@ impl RoomSettings {
     /// Returns the height of the floor at a place, m.
     pub fn floor_m(&self, at: &Point2<f64>) -> f64 {
         self.ramp.as_ref().map_or(0.0, |ramp| ramp.height_m(at.x))
-    }
-}
-
-/// Floor that rises along the length of the room, and is level before and after that.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Ramp {
-    /// Where it begins, m from the near end of the room.
-    pub from_m: f64,
-    /// Length along the room, m.
-    pub length_m: f64,
-    /// Height at its end, m.
-    pub rise_m: f64,
-}
-
-impl Ramp {
-    fn height_m(&self, x: f64) -> f64 {
-        self.rise_m * ((x - self.from_m) / self.length_m).clamp(0.0, 1.0)
-    }
-
-    fn rules(&self) -> [(bool, &'static str); 2] {
-        [
-            (self.from_m >= 0.0 && self.length_m > 0.0, "room.ramp must have a place and a length"),
-            (
-                (0.0..=0.2).contains(&(self.rise_m / self.length_m)),
-                "room.ramp.rise_m must be in 0 to a fifth of length_m",
-            ),
-        ]
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 50] = [
+const BUILT_IN: [(&str, &str); 51] = [
     ("cafeteria", include_str!("../../../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../../../configs/scenes/cafeteria-high.toml")),
     ("corridor", include_str!("../../../configs/scenes/corridor.toml")),
@@ -32,6 +32,7 @@ const BUILT_IN: [(&str, &str); 50] = [
     ("follow-gets-up", include_str!("../../../configs/scenes/follow-gets-up.toml")),
     ("follow-latency", include_str!("../../../configs/scenes/follow-latency.toml")),
     ("follow-passing", include_str!("../../../configs/scenes/follow-passing.toml")),
+    ("follow-ramp", include_str!("../../../configs/scenes/follow-ramp.toml")),
     ("follow-return-15", include_str!("../../../configs/scenes/follow-return-15.toml")),
     ("follow-return-30", include_str!("../../../configs/scenes/follow-return-30.toml")),
     ("follow-return-5", include_str!("../../../configs/scenes/follow-return-5.toml")),

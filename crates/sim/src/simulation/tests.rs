@@ -1,5 +1,6 @@
 use super::*;
-use crate::scene::{Ramp, RoomSettings};
+use crate::ramp::Ramp;
+use crate::scene::RoomSettings;
 
 const SMALL: &str = "seed = 4\nduration_s = 1.0\n[camera]\nwidth = 96\nheight = 72\n\
     [room]\nclutter = 3\n[[people]]\npath = [[4.0, 3.0]]\nheight_m = 1.7\n\
