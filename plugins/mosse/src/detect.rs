@@ -1,7 +1,8 @@
 use std::collections::BTreeMap;
 
 use tagalong_core::{
-    Capabilities, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result, Track, TrackId,
+    Capabilities, Detection, Detector, Frame, Funnel, GreyImage, Input, Inputs, Query, Result,
+    Track, TrackId,
 };
 use tagalong_geometry::{HEAD_RADIUS_M, Rect};
 use tagalong_vision::{BoxSettings, BoxedBody};
@@ -15,6 +16,11 @@ const SIDES_PX: std::ops::RangeInclusive<f64> = 12.0..=1000.0;
 /// A detection that overlaps the track's box by less was not the one that the track was given
 /// (IoU).
 const SAME_PLACE: f64 = 0.7;
+
+/// Something, or the test that failed.
+type TestResult<T> = std::result::Result<T, &'static str>;
+/// The test of a box that cannot be sampled.
+const UNUSABLE: &str = "mosse: box outside, too small or too large";
 
 /// Follows people by correlation filters.
 pub struct Mosse {
@@ -44,28 +50,21 @@ impl Mosse {
     }
 
     /// Returns the place of a known person, or the test that failed.
-    fn near(
-        &mut self,
-        frame: &Frame,
-        track: &Track,
-    ) -> Result<std::result::Result<Detection, &'static str>> {
-        let grey = frame.grey()?;
+    fn near(&mut self, frame: &Frame, grey: &GreyImage, track: &Track) -> TestResult<Detection> {
         let expected = track.estimate.region;
-        let Some(target) = self.targets.get_mut(&track.id) else {
-            return Ok(Err("mosse: not learnt yet"));
-        };
+        let target = self.targets.get_mut(&track.id).ok_or("mosse: not learnt yet")?;
         if !is_usable(grey, &expected) {
-            return Ok(Err("mosse: box outside, too small or too large"));
+            return Err(UNUSABLE);
         }
         let window = self.fourier.spectrum(&Patch::new(grey, &expected).0);
         let part = self.config.regularisation as f32;
         let peak = Peak::of(&target.filter.correlation(&self.fourier, &window, part));
         if peak.ratio < self.config.min_ratio {
-            return Ok(Err("mosse: peak"));
+            return Err("mosse: peak");
         }
         let region = moved(&expected, &peak);
         if !shows(&self.config, frame, track, &region) {
-            return Ok(Err("mosse: depth"));
+            return Err("mosse: depth");
         }
         target.found = Some((region, peak.ratio));
         let settings = BoxSettings {
@@ -74,8 +73,7 @@ impl Mosse {
             sigma_depth_m: self.config.sigma_depth_m,
             ..BoxSettings::default()
         };
-        let found = settings.detection(frame, &region, self.config.score, NAME);
-        Ok(found.ok_or("mosse: box outside, too small or too large"))
+        settings.detection(frame, &region, self.config.score, NAME).ok_or(UNUSABLE)
     }
 
     /// Adapts the filter of one person to this frame.
@@ -125,7 +123,7 @@ fn memory(config: &Config, found: Option<(Rect, f64)>, region: &Rect) -> Option<
 }
 
 /// Returns true if the middle of a square is in the image and its size can be sampled.
-fn is_usable(grey: &tagalong_core::GreyImage, square: &Rect) -> bool {
+fn is_usable(grey: &GreyImage, square: &Rect) -> bool {
     let image = Rect::new(0.0, 0.0, grey.width() as f64, grey.height() as f64);
     SIDES_PX.contains(&square.width)
         && SIDES_PX.contains(&square.height)
@@ -166,7 +164,7 @@ impl Detector for Mosse {
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let Query::Track(track) = search else { return Ok(Vec::new()) };
-        match self.near(frame, track)? {
+        match self.near(frame, frame.grey()?, track) {
             Ok(found) => Ok(vec![found]),
             Err(test) => {
                 funnel.drop_at(test, track.estimate.region);
