@@ -18,6 +18,9 @@ import time
 import cv2
 import lap
 import numpy as np
+import supervision
+import trackers
+from filterpy.kalman import KalmanFilter
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import gaussian_kde
 
@@ -169,6 +172,81 @@ class Patches:
         yield self.MANY, "OpenCV", fastest(lambda: self.machine.predict(self.patches, None, raw), 5)
 
 
+class Filters:
+    """A prediction and an update of a state of 5 by a measurement of 3."""
+
+    JOB = "Kalman filter of a person"
+
+    def __init__(self):
+        self.program = built("tagalong-ekf", "time_filter")
+        moves, sees = np.eye(5), np.eye(3, 5)
+        moves[0, 3] = moves[1, 4] = 0.1
+        self.seen = np.array([[3.0], [0.0], [1.6]])
+        self.opencv = cv2.KalmanFilter(5, 3, 0, cv2.CV_64F)
+        self.opencv.transitionMatrix, self.opencv.measurementMatrix = moves, sees
+        self.opencv.processNoiseCov = 0.01 * np.eye(5)
+        self.opencv.measurementNoiseCov = 0.01 * np.eye(3)
+        self.opencv.errorCovPost = np.eye(5)
+        self.filterpy = KalmanFilter(5, 3)
+        self.filterpy.F, self.filterpy.H = moves, sees
+        self.filterpy.Q, self.filterpy.R = 0.01 * np.eye(5), 0.01 * np.eye(3)
+
+    def ours(self):
+        ((us,),) = lines(self.program)
+        return {self.JOB: float(us) * 1e-6}
+
+    def theirs(self):
+        yield self.JOB, "OpenCV, called from Python", fastest(self.step_opencv, 3000)
+        yield self.JOB, "filterpy", fastest(self.step_filterpy, 1000)
+
+    def step_opencv(self):
+        self.opencv.predict()
+        self.opencv.correct(self.seen)
+
+    def step_filterpy(self):
+        self.filterpy.predict()
+        self.filterpy.update(self.seen)
+
+
+class Trackers:
+    """A frame of people who are all seen: ours in space, with outlines and probabilities; theirs by
+    the overlap of boxes."""
+
+    PEERS = {"SORT": trackers.SORTTracker, "ByteTrack": trackers.ByteTrackTracker}
+    SIZES = (5, 20, 100)
+
+    def __init__(self):
+        self.program = built("tagalong-benches", "time_tracker")
+
+    def ours(self):
+        rows = lines(self.program, *map(str, self.SIZES))
+        return {self.job(people): float(us) * 1e-6 for people, us in rows}
+
+    def theirs(self):
+        for people in self.SIZES:
+            side = int(np.ceil(people**0.5))
+            corner = np.array([[60.0 * (i % side), 60.0 * (i // side)] for i in range(people)])
+            boxes = np.hstack([corner, corner + 40.0])
+            for name, kind in self.PEERS.items():
+                yield self.job(people), name, self.median_update(kind(), boxes)
+
+    def median_update(self, tracker, boxes, frames=40):
+        """The first frames confirm the tracks."""
+        random, times = np.random.default_rng(1), []
+        for _ in range(frames):
+            found = supervision.Detections(xyxy=boxes + random.normal(0, 1, boxes.shape),
+                                           confidence=np.full(len(boxes), 0.9),
+                                           class_id=np.zeros(len(boxes), int))
+            start = time.perf_counter()
+            tracker.update(found)
+            times.append(time.perf_counter() - start)
+        return statistics.median(times[frames // 2 :])
+
+    @staticmethod
+    def job(people):
+        return f"tracker, {people} people"
+
+
 class Images:
     """Images as logs have them: depth in a PNG of 16 bits, colour in a JPEG."""
 
@@ -264,7 +342,8 @@ def main():
     cv2.setNumThreads(1)
     rounds = {}
     with tempfile.TemporaryDirectory() as folder:
-        groups = (Assignment(), Particles(), Patches(), Images(folder), Stereo(folder))
+        groups = (Assignment(), Particles(), Patches(), Filters(), Trackers(), Images(folder),
+                  Stereo(folder))
         for _ in range(ROUNDS):
             for group in groups:
                 ours = group.ours()

@@ -148,6 +148,7 @@ impl Options {
     /// # Errors
     /// [`BridgeError::Config`], with file, line and remedy.
     pub(crate) fn setup(&self, registry: &Registry) -> Result<Setup, BridgeError> {
+        check_security(|name| std::env::var(name).ok())?;
         let shown = self.config.display().to_string();
         let text = read_text(&self.config, FileLimit::Config)
             .map_err(|error| BridgeError::Config(format!("cannot read config {shown}: {error}")))?;
@@ -171,5 +172,34 @@ impl Options {
             odometry_topic: self.odometry.clone().or(input.odometry_topic),
             ..input
         }
+    }
+}
+
+/// Refuses to talk openly where the environment enforces the security of ROS 2: this node has none.
+fn check_security(variable: impl Fn(&str) -> Option<String>) -> Result<(), BridgeError> {
+    let is = |name, wanted| variable(name).is_some_and(|value| value == wanted);
+    if is("ROS_SECURITY_ENABLE", "true") && is("ROS_SECURITY_STRATEGY", "Enforce") {
+        let words = "ROS_SECURITY_STRATEGY is Enforce, and this program has no DDS security; its README \
+                     says why, under Security";
+        return Err(BridgeError::Config(words.to_owned()));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_node_without_security_starts_where_security_is_enforced() {
+        let enforced = |name: &str| {
+            let value = if name == "ROS_SECURITY_ENABLE" { "true" } else { "Enforce" };
+            Some(value.to_owned())
+        };
+        assert_eq!(check_security(enforced).unwrap_err().exit_code(), 2);
+        // The default strategy of ROS 2 is Permissive: nodes without keys may talk.
+        let enabled = |name: &str| (name == "ROS_SECURITY_ENABLE").then(|| "true".to_owned());
+        assert!(check_security(enabled).is_ok());
+        assert!(check_security(|_| None).is_ok());
     }
 }

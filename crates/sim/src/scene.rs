@@ -135,7 +135,10 @@ impl Scene {
         let rules = [
             (self.seed < Split::SEEDS_END, "seed must be below 3000000000"),
             (self.room.clutter <= 500, "room.clutter must be at most 500"),
-            (self.duration_s > 0.0 && self.duration_s <= 3600.0, "duration_s must be in 0 to 3600"),
+            (
+                self.duration_s > 0.0 && self.duration_s <= 86_400.0,
+                "duration_s must be in 0 to 86400",
+            ),
             (
                 self.room.size_m.iter().all(|m| (1.0..=200.0).contains(m)),
                 "room.size_m must be in 1 to 200",
