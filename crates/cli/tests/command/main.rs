@@ -8,6 +8,8 @@ mod annotate;
 mod answers;
 mod bad_input;
 mod bench;
+#[cfg(unix)]
+mod damaged;
 mod demo;
 mod doctor;
 mod eval;
