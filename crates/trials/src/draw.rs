@@ -13,7 +13,8 @@ pub const ODOMETRY_SIGMA: f64 = 0.02;
 /// Images that come up to this many frames late are put in order, as the log
 /// reader does.
 const REORDERED: usize = 3;
-/// Odometry is kept for this long, ns: longer than any image is late.
+/// Odometry is kept for this long before the oldest image that waits, ns: longer than any image is
+/// late.
 const KEPT_NS: u64 = 1_000_000_000;
 
 /// Input of a pipeline at one moment of a scene, and the truth at that moment.
@@ -101,8 +102,7 @@ impl Draw {
             match event {
                 Some(Event::Odometry(reading)) => {
                     self.odometry.insert(reading.at_ns, reading.odom_from_robot);
-                    // Odometry older than any waiting image is not needed again.
-                    self.odometry = self.odometry.split_off(&reading.at_ns.saturating_sub(KEPT_NS));
+                    self.forget_odometry(reading.at_ns);
                 }
                 Some(Event::Shot(shot)) => drop(self.waiting.insert(shot.captured_ns, *shot)),
                 Some(Event::Webcam(_)) => {}
@@ -111,6 +111,13 @@ impl Draw {
         }
         let (_, shot) = self.waiting.pop_first()?;
         Some(self.simulated(shot))
+    }
+
+    /// Drops odometry that is older than any image to come: at few images a second those that wait
+    /// to be put in order are old themselves.
+    fn forget_odometry(&mut self, now_ns: u64) {
+        let oldest_ns = self.waiting.keys().next().map_or(now_ns, |waits| now_ns.min(*waits));
+        self.odometry = self.odometry.split_off(&oldest_ns.saturating_sub(KEPT_NS));
     }
 
     fn simulated(&mut self, shot: Shot) -> SimulatedFrame {
@@ -202,6 +209,16 @@ mod tests {
         assert!(sorted(&log), "{:?}", stamps(&log));
         assert!(!sorted(&live), "{:?}", stamps(&live));
         assert!(log.len() == live.len() && log.len() < 80);
+    }
+
+    #[test]
+    fn images_that_wait_for_longer_than_odometry_is_kept_have_their_motion() {
+        let slow = Scene::parse(&SCENE.replace("rate_hz = 20.0", "rate_hz = 2.0")).unwrap();
+        let (driven, jumped) = simulated(Draw::new(&slow, 1)).iter().fold((0.0, 0.0), |sums, d| {
+            let step: f64 = d.frame.motion.forward.hypot(d.frame.motion.left);
+            (sums.0 + step, step.max(sums.1))
+        });
+        assert!(driven > 0.3 && jumped < 0.6, "{driven} {jumped}");
     }
 
     #[test]

@@ -3,6 +3,8 @@ use crate::warp::{Sweep, Warp};
 
 /// Number of parts in which the background is renewed while the robot stands.
 pub(crate) const TURNS: usize = 4;
+/// Mark of a taken pixel at which the background stays as it is, however long.
+pub(crate) const HELD: u8 = 2;
 /// Weight of a new image in the mean while the robot moves.
 const MOVING_PART: f32 = 0.5;
 
@@ -112,8 +114,9 @@ impl Background {
         }
     }
 
-    /// Follows an image: by a part where `taken` is 0; completely where it has not been 0 for
-    /// longer than [`Pace::absorb_s`]. One row in [`Pace::turns`] is renewed.
+    /// Follows an image: by a part where `taken` is 0; not at all where it is [`HELD`]; elsewhere
+    /// completely once it has not been 0 for longer than [`Pace::absorb_s`]. One row in
+    /// [`Pace::turns`] is renewed.
     pub(crate) fn follow(&mut self, colours: &[u8], taken: &[u8], pace: &Pace, phase: usize) {
         let turns = pace.turns.max(1);
         // One row's turn makes up for the images in which other rows had theirs.
@@ -131,7 +134,8 @@ impl Background {
         {
             let pixels = mean.chunks_exact_mut(3).zip(level.chunks_exact_mut(3));
             let seen = colours.chunks_exact(3).zip(taken.iter().zip(taken_s));
-            for ((mean, level), (colour, (taken, taken_s))) in pixels.zip(seen) {
+            let changing = pixels.zip(seen).filter(|(_, (_, (taken, _)))| **taken != HELD);
+            for ((mean, level), (colour, (taken, taken_s))) in changing {
                 *taken_s = if *taken == 0 { 0.0 } else { *taken_s + passed_s };
                 let part =
                     if *taken == 0 { part } else { f32::from(u8::from(*taken_s > pace.absorb_s)) };
@@ -187,6 +191,10 @@ mod tests {
             background.follow(&[120; 6], &[0, 1], &pace, phase);
         }
         assert_eq!(background.level, [120; 6], "what stands there for half a minute is furniture");
+        for phase in 320..720 {
+            background.follow(&[90; 6], &[0, HELD], &pace, phase);
+        }
+        assert_eq!(background.level, [90, 90, 90, 120, 120, 120], "it is held under a person");
     }
 
     #[test]

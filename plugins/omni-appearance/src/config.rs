@@ -90,6 +90,10 @@ pub struct Config {
     /// Uncertainty of the background after the robot has moved, columns and rows.
     #[schemars(inner(range(max = 20)))]
     pub slack_px: [usize; 2],
+    /// Once the robot has moved, at least this part of a person's pixels differs from the previous
+    /// image, which is moved like the background and at least 0.2 s old; 0 asks for none.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub changed_part: f64,
     /// As printed: columns are averaged as if the panorama ended at its seam.
     pub compat_printed_seam: bool,
 }
@@ -119,6 +123,7 @@ impl Default for Config {
             sigma_height_m: 0.12,
             walls_m: vec![1.2, 2.0, 3.5, 6.0],
             slack_px: [3, 2],
+            changed_part: 0.3,
             compat_printed_seam: false,
         }
     }
@@ -160,6 +165,7 @@ mod tests {
             "sigma_height_m = 10.0",
             "walls_m = [0.5, 1000.0]",
             "slack_px = [20, 0]",
+            "changed_part = 1.0",
         ];
         for line in good {
             assert!(checked(line).is_ok(), "{line}");
@@ -187,6 +193,7 @@ mod tests {
             "walls_m = []",
             "walls_m = [0.4, 2.0]",
             "slack_px = [0, 21]",
+            "changed_part = 1.1",
         ];
         for line in wrong {
             let key = line.split(' ').next().unwrap();

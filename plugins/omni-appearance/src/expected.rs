@@ -71,6 +71,11 @@ impl Expected {
         Self { column, half: half * width, range_m }
     }
 
+    /// Returns true if a column is within so many half widths of the middle.
+    pub(crate) fn is_near(&self, column: usize, width: usize, halves: f64) -> bool {
+        self.off(column, width).abs() <= halves
+    }
+
     /// Returns the offset of a column from the middle, in half widths; right is positive.
     fn off(&self, column: usize, width: usize) -> f64 {
         let width = width as f64;
@@ -113,7 +118,7 @@ fn visible(run: Run, width: usize, expected: &[Expected]) -> Vec<Expected> {
     inside.sort_by(|a, b| a.range_m.total_cmp(&b.range_m));
     let mut seen: Vec<Expected> = Vec::new();
     for person in inside {
-        let is_on = |who: &Expected, column: usize| who.off(column, width).abs() <= 1.0;
+        let is_on = |who: &Expected, column: usize| who.is_near(column, width, 1.0);
         let shown = |column: &usize| {
             is_on(&person, *column) && !seen.iter().any(|nearer| is_on(nearer, *column))
         };
@@ -135,7 +140,7 @@ fn shares(expected: &Expected, run: Run, width: usize) -> bool {
 /// one with the nearest edge. `inside` goes from near to far.
 fn owner(column: usize, width: usize, inside: &[Expected]) -> usize {
     let off = |who: usize| inside[who].off(column, width).abs();
-    let covering = (0..inside.len()).find(|who| off(*who) <= 1.0);
+    let covering = (0..inside.len()).find(|who| inside[*who].is_near(column, width, 1.0));
     let nearest = || (0..inside.len()).min_by(|a, b| off(*a).total_cmp(&off(*b)));
     covering.or_else(nearest).unwrap_or(0)
 }

@@ -1,6 +1,7 @@
 use tagalong_core::{Frame, Funnel, Result, Stamp, Track};
 
-use crate::background::{Pace, TURNS};
+use crate::background::{HELD, Pace, TURNS};
+use crate::changes::Changes;
 use crate::expected::{Expected, Known, divided};
 use crate::warp::{Bounds, Sweep, Warp, is_moving};
 use crate::{Background, Blob, Config, PanoramaGeometry, Segmenter};
@@ -18,6 +19,9 @@ struct ImageState {
     segmenter: Segmenter,
     bounds: Bounds,
     sweep: Sweep,
+    changes: Changes,
+    /// Background pixels that must not follow the image at once, and those that must not at all.
+    taken: Vec<u8>,
     /// Frame number and time of the image in `blobs`.
     seen: Option<(u64, Stamp)>,
     blobs: Vec<Blob>,
@@ -105,6 +109,8 @@ impl ImageState {
             segmenter: Segmenter::new(size.0, config),
             bounds: Bounds::default(),
             sweep: Sweep::default(),
+            changes: Changes::default(),
+            taken: Vec::new(),
             seen: None,
             blobs: Vec::new(),
             known: Vec::new(),
@@ -156,20 +162,40 @@ impl ImageState {
         }
         let expected = expected(&self.known, frame);
         self.blobs = people(segmenter, colours, &expected, config, funnel);
+        self.changes.keep(colours);
+        self.drop_static(config, funnel);
         Ok(())
     }
 
-    /// Moves the background with the robot.
+    /// Drops blobs that show what the previous image showed: edges of furniture that the moved
+    /// background has in another place.
+    fn drop_static(&mut self, config: &Config, funnel: &mut Funnel) {
+        let (solid, width) = (&self.segmenter.counts().solid, self.size.0);
+        let before = self.blobs.len();
+        let changes = &self.changes;
+        self.blobs.retain(|blob| changes.part(blob.run, width, solid) >= config.changed_part);
+        funnel.drop_many("no change since the last image", (before - self.blobs.len()) as u64);
+    }
+
+    /// Moves the background and the previous image with the robot.
     fn follow_robot(&mut self, frame: &Frame, grey: bool, config: &Config) -> Result<()> {
+        self.changes.clear();
         let Some(panorama) = frame.camera.panorama() else { return Ok(()) };
-        if self.background.frames() == 0 || !is_moving(&frame.motion) {
+        if self.background.frames() == 0 {
             return Ok(());
         }
-        self.uncertain = true;
-        let warp = |wall_m: &f64| Warp::new(&frame.camera, panorama, &frame.motion, *wall_m);
-        let warps: Vec<Warp> = config.walls_m.iter().map(warp).collect();
         let colours = if grey { &self.grey[..] } else { frame.colour()?.pixels().as_flattened() };
-        self.background.move_by(&mut self.sweep, &warps, colours);
+        let mut warps = Vec::new();
+        if is_moving(&frame.motion) {
+            self.uncertain = true;
+            let warp = |wall_m: &f64| Warp::new(&frame.camera, panorama, &frame.motion, *wall_m);
+            warps.extend(config.walls_m.iter().map(warp));
+            self.background.move_by(&mut self.sweep, &warps, colours);
+        }
+        let compared = self.uncertain && frame.motion.dt >= STEP_S;
+        if compared && config.changed_part > 0.0 {
+            self.changes.compare(&mut self.sweep, &warps, colours);
+        }
         Ok(())
     }
 
@@ -187,20 +213,39 @@ impl ImageState {
             false => (adapt_s, absorb_s, TURNS),
         };
         let pace = Pace { part: dt_s / adapt_s, absorb_s, dt_s, turns };
+        self.taken.clone_from(&self.segmenter.counts().taken);
+        if self.uncertain {
+            self.hold_people(frame);
+        }
         let colour = frame.colour().ok();
         let colours = colour.map_or(&self.grey[..], |c| c.pixels().as_flattened());
-        let taken = &self.segmenter.counts().taken;
-        self.background.follow(colours, taken, &pace, self.phase);
+        self.background.follow(colours, &self.taken, &pace, self.phase);
         self.phase = self.phase.wrapping_add(1);
         Ok(())
     }
+
+    /// Holds the background where people are known: it is renewed so fast while the robot moves that
+    /// it would take in who stays at one bearing.
+    fn hold_people(&mut self, frame: &Frame) {
+        let Some(view) = PanoramaGeometry::of(&frame.camera) else { return };
+        let width = self.size.0;
+        for person in self.known.iter().map(|known| Expected::of(known, frame, &view)) {
+            for column in (0..width).filter(|c| person.is_near(*c, width, HELD_HALVES)) {
+                self.taken.iter_mut().skip(column).step_by(width).for_each(|taken| *taken = HELD);
+            }
+        }
+    }
 }
 
+/// Least time between two images in which a person moves visibly, s.
+const STEP_S: f64 = 0.2;
+/// Half widths of a known person to each side of it within which the background is held.
+const HELD_HALVES: f64 = 1.3;
 /// Time constant of the background while the robot moves, s.
 const MOVING_ADAPT_S: f32 = 0.5;
 /// Time after which a differing pixel becomes background while the robot moves, s: a difference
-/// that stays in its place is not a walking person.
-const MOVING_ABSORB_S: f32 = 2.0;
+/// that stays in its place is not a walking person, unless a person is known there.
+const MOVING_ABSORB_S: f32 = 4.0;
 
 /// Returns the expected columns of the tracks that were known after the previous image.
 fn expected(known: &[Known], frame: &Frame) -> Vec<Expected> {

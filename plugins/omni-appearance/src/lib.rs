@@ -15,6 +15,7 @@
 
 mod background;
 mod blob;
+mod changes;
 pub mod circular;
 mod config;
 mod detector;

@@ -1,12 +1,13 @@
 use std::sync::Arc;
 
-use nalgebra::{Point2, Point3};
+use nalgebra::{Point2, Point3, SMatrix, Vector2};
 use tagalong_config::Registry;
 use tagalong_conformance::context;
 use tagalong_core::{
-    Detection, Detector, EgoMotion, Frame, Funnel, Images, Query, RgbImage, Stamp,
+    Detection, Detector, EgoMotion, Estimate, Frame, Funnel, Images, Person, Query, RgbImage,
+    Stamp, Track, TrackId,
 };
-use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama};
+use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
 
 use crate::{Config, Distance, Model, OmniAppearance};
 
@@ -123,6 +124,67 @@ fn three_people_are_three() {
     for place in places {
         let near = |d: &&Detection| (d.position.xy() - place).norm() < 0.35;
         assert_eq!(found.iter().filter(near).count(), 1, "{place}");
+    }
+}
+
+/// The frame of [`frame`], on a robot that turns by a tenth of a column, which counts as motion.
+fn turning(index: u64, camera: &Arc<Camera>, people: &[Point2<f64>]) -> Frame {
+    let still = frame(index, camera, people);
+    let motion = EgoMotion { turn: 0.0013, ..EgoMotion::at_rest(0.333) };
+    Frame::new(index, still.stamp, Arc::clone(camera), motion, still.images())
+}
+
+#[test]
+fn once_the_robot_has_moved_who_shows_no_change_is_furniture() {
+    let camera = camera(1.55);
+    for (changed_part, when_it_stays) in [(0.3, 0), (0.0, 1)] {
+        let mut detector = ready(Config { changed_part, ..analytic() }, &camera);
+        assert!(see(&mut detector, &turning(20, &camera, &[])).is_empty());
+        let mut at =
+            |index, range| see(&mut detector, &turning(index, &camera, &[around(range, 60.0)]));
+        assert_eq!(at(21, 3.0).len(), 1, "who was not there before");
+        assert_eq!(at(22, 3.0).len(), when_it_stays);
+        assert_eq!(at(23, 2.0).len(), 1, "who comes nearer");
+    }
+}
+
+/// Returns a confirmed track at a place in the robot frame.
+fn track(place: Point2<f64>) -> Track {
+    let position = Point3::new(place.x, place.y, 1.63);
+    let estimate = Estimate {
+        person: Person { position, velocity: Vector2::zeros() },
+        covariance: SMatrix::identity(),
+        region: Rect::default(),
+    };
+    let id = TrackId(1);
+    Track {
+        id,
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 9,
+        unseen_s: 0.0,
+        score: 1.0,
+    }
+}
+
+#[test]
+fn the_background_of_a_moving_robot_does_not_take_in_who_is_known() {
+    let camera = camera(1.55);
+    let place = around(3.0, 60.0);
+    for (tracks, found) in [(vec![track(place)], 1), (vec![], 0)] {
+        let mut detector = ready(Config { changed_part: 0.0, ..analytic() }, &camera);
+        see(&mut detector, &turning(20, &camera, &[]));
+        let everywhere = Query::Discover { occupied: &[] };
+        let mut last = 0;
+        // Ten seconds, which is twice as long as what stays there is not taken for furniture.
+        for index in 21..51 {
+            let frame = turning(index, &camera, &[place]);
+            last = detector.detect(&frame, &everywhere, &mut Funnel::default()).unwrap().len();
+            detector.learn(&frame, &tracks).unwrap();
+        }
+        assert_eq!(last, found);
     }
 }
 

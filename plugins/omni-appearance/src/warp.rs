@@ -135,8 +135,8 @@ pub(crate) struct Sweep {
 }
 
 impl Sweep {
-    /// Moves colours, and a number for each pixel, by `warps`, one for each distance; `colours` is
-    /// the new image.
+    /// Moves colours, and a number for each pixel or none, by `warps`, one for each distance;
+    /// `colours` is the new image.
     pub(crate) fn apply(
         &mut self,
         warps: &[Warp],
@@ -165,7 +165,7 @@ impl Sweep {
                 mean[pixels.clone()].copy_from_slice(&self.images[best][pixels]);
                 // Times are not averages: they are taken from the nearest pixel instead of
                 // interpolated.
-                for x in across.clone() {
+                for x in across.clone().filter(|_| !self.times.is_empty()) {
                     times[y * columns + x] = self.times[warps[best].nearest(x, y)];
                 }
             }
