@@ -10,13 +10,14 @@ use toml::Value;
 
 use crate::scatter::Scatter;
 use crate::variant::{parsed, with_values};
-use crate::{Cell, Experiment, Findings, Lab, Picture, ReproduceError, Row, System, Table};
+use crate::{Cell, Experiment, Findings, Lab, Picture, ReproduceError, Row, System, Table, forms};
 
 /// The system of P3.
 pub const SYSTEM: System = System {
     name: "joint-particle",
     about: "P3: joint particles, overlapping silhouettes, likelihood maps",
     experiments: &[
+        forms::experiment(forms::of_p3),
         Experiment {
             name: "table-1",
             about: "Table I: two people cross parallel to the image; cost, error, success",
@@ -103,6 +104,24 @@ fn parallel(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     let picture = Picture { name: "cost-and-error".into(), svg: trials.chart() };
     let title = "Two people cross parallel to the image (P3, Table I)";
     Ok(Findings { tables: vec![trials.table(title, true)], pictures: vec![picture] })
+}
+
+/// Number of crossings of the first table.
+const FEW: u64 = 8;
+
+/// Returns crossings parallel to the image, before a stereo pair.
+pub(crate) fn crossings(lab: &Lab) -> std::result::Result<Vec<Scene>, ReproduceError> {
+    lab.scenes("crossing-parallel", &SEEN_BY, lab.seeds(FEW))
+}
+
+/// Returns for each run whether all people keep their tracks across the line of sight, 100 or 0;
+/// nothing if the crossing is no trial.
+pub(crate) fn successes(trial: Trial) -> std::result::Result<Vec<Vec<f64>>, TrialError> {
+    let success = |result: Result| {
+        let success = if result.in_image { 100.0 } else { 0.0 };
+        result.is_trial.then_some(success).into_iter().collect()
+    };
+    Ok(results(trial)?.into_iter().map(success).collect())
 }
 
 fn hidden(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
@@ -212,6 +231,26 @@ fn fit(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
         .notes
         .push("Simulated with seeds of the split validation: the settings are chosen here.".into());
     Ok(trials.table("Free parameters of the printed form", false).into())
+}
+
+/// Returns shipped configs with the `[stereo]` stage of `stereo-ekf` and its settings of a detector,
+/// unless they have a stage of their own.
+pub(crate) fn on_a_pair(
+    lab: &Lab,
+    names: &[&str],
+) -> std::result::Result<Vec<Contender>, ReproduceError> {
+    let stage = parsed(&lab.contender(STEREO)?)?.remove("stereo");
+    let contender = |name: &&str| {
+        let contender = lab.contender(name)?;
+        if parsed(&contender)?.contains_key("stereo") {
+            return Ok(contender);
+        }
+        let contender = in_stereo(lab, &[contender])?.1.remove(0);
+        let mut config = parsed(&contender)?;
+        config.extend(stage.clone().map(|stage| ("stereo".to_owned(), stage)));
+        Ok(Contender { config: config.to_string(), ..contender })
+    };
+    names.iter().map(contender).collect()
 }
 
 /// Returns the settings of the `[stereo]` stage, and the contenders with those of a detector in its

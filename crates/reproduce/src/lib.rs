@@ -11,12 +11,15 @@
 //! To add a table, write a function `fn(&Lab) -> Result<Findings, ReproduceError>` in the file of
 //! its system and name it in the system's list.
 
+mod draws;
 mod findings;
+mod forms;
 mod given;
 mod joint_particle;
 mod lab;
 mod laser;
 mod omni_appearance;
+mod real;
 mod recorded;
 mod rgbd_compressive;
 mod scatter;

@@ -9,13 +9,14 @@ use tagalong_trials::{Contender, Judge, Run, Trial, TrialError};
 
 use crate::given::given;
 use crate::recorded::{Recorded, recorded};
-use crate::{Cell, Experiment, Findings, Lab, ReproduceError, Row, System, Table};
+use crate::{Cell, Experiment, Findings, Lab, ReproduceError, Row, System, Table, forms};
 
 /// The system of P2.
 pub const SYSTEM: System = System {
     name: "rgbd-compressive",
     about: "P2: upper bodies in RGB-D images, compressive tracking, a Kalman filter",
     experiments: &[
+        forms::experiment(forms::of_p2),
         Experiment {
             name: "static",
             about: "Fig. 6: log-average miss rate before a fixed camera, part by part",
@@ -174,9 +175,14 @@ impl Work {
 }
 
 fn fixed(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
-    let scenes = lab.scenes("static-high", &SIMULATED, lab.seeds(STATIC_LOGS))?;
+    let scenes = static_scenes(lab)?;
     let title = "Log-average miss rate before a fixed camera (P2, Fig. 6)";
     table(lab, title, &scenes, 23.8)
+}
+
+/// Returns the simulated logs before a fixed camera.
+pub(crate) fn static_scenes(lab: &Lab<'_>) -> Result<Vec<Scene>, ReproduceError> {
+    lab.scenes("static-high", &SIMULATED, lab.seeds(STATIC_LOGS))
 }
 
 fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
@@ -228,7 +234,8 @@ fn table(
 const WORK: [&str; 5] =
     ["frames/s", "windows a frame", "windows with depth", "boxes a frame", "boxes with depth"];
 /// Judge of real and of simulated people.
-const JUDGE: Judge = Judge { similarity: Similarity::Iou, max_range_m: 6.0, coasting: true };
+pub(crate) const JUDGE: Judge =
+    Judge { similarity: Similarity::Iou, max_range_m: 6.0, coasting: true };
 const TIMES: &str =
     "Frames a second are of the time that one core worked; a busy machine makes it work slower.";
 

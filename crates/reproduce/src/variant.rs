@@ -15,6 +15,16 @@ pub(crate) fn parsed(contender: &Contender) -> Result<Table, ReproduceError> {
     contender.config.parse().map_err(unreadable)
 }
 
+/// Returns the contender without a table of its config.
+///
+/// # Errors
+/// As [`parsed`].
+pub(crate) fn without_table(contender: &Contender, key: &str) -> Result<Contender, ReproduceError> {
+    let mut config = parsed(contender)?;
+    config.remove(key);
+    Ok(Contender { config: config.to_string(), ..contender.clone() })
+}
+
 /// Returns the contender under another name, with other values, TOML, at dotted keys; a number is
 /// an index into an array. Missing tables are created.
 ///

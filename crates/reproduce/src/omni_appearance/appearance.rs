@@ -8,7 +8,8 @@ use tagalong_sim::{Scene, Truth};
 use tagalong_trials::Draw;
 
 use super::splits::Split;
-use super::{FRESH, difference, in_turn, mean, means, over_draws};
+use super::{FRESH, in_turn};
+use crate::draws::{difference, mean, means, over_draws};
 use crate::lab::read;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 

@@ -7,7 +7,7 @@ use tagalong_geometry::{Camera, Lens};
 use tagalong_sim::{Event, Scene, Simulation};
 use tagalong_triangulate::{Cameras, HatColour, Known, Sight, Station, calibrate, find_hat};
 
-use super::over_draws;
+use crate::draws::over_draws;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Number of rooms, each with its own webcams.

@@ -1,8 +1,10 @@
 //! Section 6.2: the filter against the appearance model alone, and the printed method step by step.
 
-use tagalong_trials::{Contender, Run, Trial, TrialError};
+use tagalong_sim::{Scene, Truth};
+use tagalong_trials::{Contender, Moment, Run, Trial, TrialError};
 
-use super::{FRESH, difference, in_turn, means, over_draws};
+use super::{FRESH, in_turn};
+use crate::draws::{difference, means, over_draws};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Number of rooms, with two people each.
@@ -71,7 +73,7 @@ struct Walk {
 }
 
 pub(super) fn kalman(lab: &Lab) -> Result<Findings, ReproduceError> {
-    let scenes = in_turn(lab, ROOMS, EACH_S)?;
+    let scenes = rooms(lab)?;
     let contender = |name: &str, text: String| Contender {
         folder: lab.configs.clone(),
         ..Contender::new(name, text)
@@ -94,6 +96,34 @@ pub(super) fn kalman(lab: &Lab) -> Result<Findings, ReproduceError> {
     Ok(Findings { tables, pictures: Vec::new() })
 }
 
+/// Returns the scenes of section 6.2: rooms with two people, one after the other.
+pub(crate) fn rooms(lab: &Lab) -> Result<Vec<Scene>, ReproduceError> {
+    in_turn(lab, ROOMS, EACH_S)
+}
+
+/// Returns the errors of the answers of each run, m.
+pub(crate) fn answers_m(trial: Trial) -> Result<Vec<Vec<f64>>, TrialError> {
+    let of_run = |run: &Run| {
+        let truths = trial.moments.iter().map(the_person).enumerate();
+        truths.filter_map(|(at, truth)| error_m(run, at, truth?)).collect()
+    };
+    Ok(trial.runs.iter().map(of_run).collect())
+}
+
+/// Returns the person in view: the people are in the room one after the other.
+fn the_person(moment: &Moment) -> Option<&Truth> {
+    moment.truth.first().filter(|truth| !truth.ignore)
+}
+
+/// Returns the least error of the tracks that are seen in a frame, m.
+fn error_m(run: &Run, frame: usize, truth: &Truth) -> Option<f64> {
+    let seen = run.reports[frame].tracks.iter().filter(|track| track.seen);
+    let off = |track: &tagalong_core::Track| {
+        (track.estimate.person.position - truth.head_in_robot).xy().norm()
+    };
+    seen.map(off).min_by(f64::total_cmp)
+}
+
 fn config(detector: &str, filter: &str) -> String {
     format!(
         "extends = \"omni-appearance.toml\"\n[[detectors]]\nplugin = \"omni-appearance\"\n\
@@ -109,15 +139,8 @@ fn walk(trial: Trial) -> Result<Walk, TrialError> {
         images: 0,
     };
     for (at, moment) in trial.moments.iter().enumerate() {
-        // The people are in the room one after the other, so there is one at a time.
-        let Some(truth) = moment.truth.first().filter(|truth| !truth.ignore) else { continue };
-        let error = |run: &Run| {
-            let seen = run.reports[at].tracks.iter().filter(|track| track.seen);
-            let off = |track: &tagalong_core::Track| {
-                (track.estimate.person.position - truth.head_in_robot).xy().norm()
-            };
-            seen.map(off).min_by(f64::total_cmp)
-        };
+        let Some(truth) = the_person(moment) else { continue };
+        let error = |run: &Run| error_m(run, at, truth);
         let (of_filters, of_steps) = trial.runs.split_at(filters);
         // Filters are compared on the images in which all of them have an estimate.
         let all: Option<Vec<f64>> = of_filters.iter().map(error).collect();

@@ -1,10 +1,11 @@
 //! Beyond the paper: several people, and a robot that drives.
 
-use tagalong_eval::{Scores, Tally, draws_interval};
+use tagalong_eval::Tally;
 use tagalong_sim::Scene;
 use tagalong_trials::{Judge, Trial, TrialError};
 
-use super::{FRESH, over_draws};
+use super::FRESH;
+use crate::draws::{over_draws, pooled};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// The printed method, the corrected one, its detector with the filter of P1, and the best.
@@ -60,18 +61,9 @@ fn judged(trial: Trial) -> Result<Vec<PipelineResult>, TrialError> {
 
 fn table(title: &str, trials: &[Vec<PipelineResult>]) -> Table {
     let row = |(at, name): (usize, &&str)| {
-        let scores = |drawn: &[usize]| {
-            Tally::combine(drawn.iter().map(|draw| &trials[*draw][at].tally)).scores()
-        };
-        let everything: Vec<usize> = (0..trials.len()).collect();
-        let share = |of: fn(&Scores) -> Option<f64>| {
-            let figure = |drawn: &[usize]| of(&scores(drawn)).unwrap_or(f64::NAN);
-            match draws_interval(trials.len(), figure) {
-                Some(interval) => Cell::estimate(Some(interval), 3).percent(),
-                None => Cell::number(figure(&everything), 3).percent(),
-            }
-        };
-        let swaps = Cell::number(scores(&everything).idsw as f64, 0);
+        let tallies: Vec<&Tally> = trials.iter().map(|done| &done[at].tally).collect();
+        let share = |of| pooled(&tallies, 3, of).percent();
+        let swaps = Cell::number(Tally::combine(tallies.iter().copied()).scores().idsw as f64, 0);
         let errors: Vec<Vec<f64>> = trials.iter().map(|done| done[at].errors_m.clone()).collect();
         let cells = vec![share(|s| s.idf1), share(|s| s.mota), swaps, over_draws(&errors, 3)];
         Row::ours(*name, cells)

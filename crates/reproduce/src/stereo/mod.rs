@@ -4,20 +4,22 @@ mod fit;
 mod ladder;
 mod left_out;
 mod occlusion;
-mod real;
 mod times;
 mod turntable;
 mod variants;
 mod verifier;
 mod walk;
 
-use crate::{Experiment, System};
+pub(crate) use walk::{walker_errors_m, walks};
+
+use crate::{Experiment, System, forms};
 
 /// The system of P1.
 pub const STEREO_EKF: System = System {
     name: "stereo-ekf",
     about: "P1: templates in stereo depth and an extended Kalman filter",
     experiments: &[
+        forms::experiment(forms::of_p1),
         Experiment {
             name: "times",
             about: "Section 4: 70 ms a frame at 512x384",
@@ -51,6 +53,7 @@ pub const STEREO_SVM_EKF: System = System {
     name: "stereo-svm-ekf",
     about: "P4: templates in stereo depth, an SVM that verifies, an extended Kalman filter",
     experiments: &[
+        forms::experiment(forms::of_p4),
         Experiment {
             name: "times",
             about: "Table II: 40 + 20 + 10 + 20 = 90 ms at 512x384, two people",
@@ -70,6 +73,11 @@ pub const STEREO_SVM_EKF: System = System {
             name: "walk",
             about: "Fig. 11: error along two edges of a square, 125 mm on average",
             run: walk::of_p4,
+        },
+        Experiment {
+            name: "wheels",
+            about: "not in the paper: Fig. 11 by how wrong the robot's wheels are",
+            run: walk::by_wheels,
         },
         Experiment {
             name: "occlusion",

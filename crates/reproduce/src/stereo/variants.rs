@@ -32,11 +32,13 @@ use Setting::{Is, Number};
 const NO_VELOCITY: (&str, Setting) = ("filter.config.compat_printed_velocity", Is(false));
 const NO_NOISE: (&str, Setting) = ("filter.config.compat_printed_noise", Is(false));
 const NO_UPDATE: (&str, Setting) = ("filter.config.compat_printed_update", Is(false));
+/// The table `[odometry]`, with a default in it.
+const ODOMETRY: (&str, Setting) = ("odometry.wheel_error", Number(0.01));
 const NO_MEASUREMENT: (&str, Setting) = ("filter.config.compat_printed_measurement", Is(false));
 
 /// P1, from the printed form to the best. Free parameters are fitted in each printed form
 /// (`tagalong reproduce stereo-ekf --only fit-printed`).
-pub const OF_P1: [Variant; 4] = [
+pub const OF_P1: [Variant; 5] = [
     Variant { name: "stereo-ekf-as-printed", of: "stereo-ekf-as-printed", set: &[] },
     Variant {
         name: "printed, velocity corrected",
@@ -48,12 +50,13 @@ pub const OF_P1: [Variant; 4] = [
         ],
     },
     Variant { name: "stereo-ekf", of: "stereo-ekf", set: &[] },
+    Variant { name: "stereo-ekf with `[odometry]`", of: "stereo-ekf", set: &[ODOMETRY] },
     Variant { name: "stereo-verified", of: "stereo-verified", set: &[] },
 ];
 
 /// P4, likewise. With the whole filter corrected, the remaining difference to `stereo-svm-ekf` is
 /// the cost of the printed dissimilarity and of the verifier's pixels.
-pub const OF_P4: [Variant; 5] = [
+pub const OF_P4: [Variant; 6] = [
     Variant { name: "stereo-svm-ekf-as-printed", of: "stereo-svm-ekf-as-printed", set: &[] },
     Variant {
         name: "printed, velocity corrected",
@@ -70,6 +73,7 @@ pub const OF_P4: [Variant; 5] = [
         set: &[NO_VELOCITY, NO_NOISE, NO_UPDATE, NO_MEASUREMENT],
     },
     Variant { name: "stereo-svm-ekf", of: "stereo-svm-ekf", set: &[] },
+    Variant { name: "stereo-svm-ekf with `[odometry]`", of: "stereo-svm-ekf", set: &[ODOMETRY] },
     Variant { name: "stereo-verified", of: "stereo-verified", set: &[] },
 ];
 

@@ -9,7 +9,8 @@ use tagalong_pipeline::{Fate, FrameReport};
 use tagalong_sim::{Furniture, FurnitureKind, Truth};
 use tagalong_trials::{Moment, Trial, TrialError};
 
-use super::{STEREO, real};
+use super::STEREO;
+use crate::real::{self, NOT_TRAINED_ON, TRAINED_ON};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// A title, a scene, and its settings.
@@ -25,10 +26,8 @@ const SEQUENCES: [Sequence; 3] = [
 const PIPELINES: [&str; 3] = ["stereo-ekf", "stereo-svm-ekf", "stereo-verified"];
 
 /// Logs of real rooms, first those in which no shipped verifier was trained.
-const REAL: [(&str, &[&str]); 2] = [
-    ("real rooms not trained on", &["corredor1-camera1", "lab2-camera1", "lab2-camera2"]),
-    ("real rooms trained on", &["filinha", "um"]),
-];
+const REAL: [(&str, &[&str]); 2] =
+    [("real rooms not trained on", &NOT_TRAINED_ON), ("real rooms trained on", &TRAINED_ON)];
 /// The detector of `depth-ekf`, with verifiers by the config that has them.
 const REAL_VERIFIERS: [(&str, Option<&str>); 5] = [
     ("depth-ekf", None),

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point2, Vector2};
 use tagalong_eval::{PositionError, draws_interval, percentile};
+use tagalong_sim::Scene;
 use tagalong_trials::{Judge, Moment, Trial, TrialError};
 
 use super::STEREO;
@@ -63,12 +64,72 @@ pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
     walk(lab, &OF_P4)
 }
 
+/// Errors of the wheels that are tried: the standard deviation of the radius of each wheel and of
+/// their distance, as a fraction.
+const WHEEL_ERRORS: [&str; 4] = ["0", "0.001", "0.002", "0.005"];
+
+/// Measures the error of the walker's position by how wrong the wheels are.
+///
+/// # Errors
+/// As [`Lab::trials`].
+pub fn by_wheels(lab: &Lab) -> Result<Findings, ReproduceError> {
+    let contenders = lab.contenders(&["stereo-svm-ekf", "stereo-verified"])?;
+    let walks = |error: &&str| {
+        let set = [&FOLLOWED[..], &[("robot.wheel_bias", *error)]].concat();
+        let scenes = lab.scenes("square-walk", &set, lab.seeds(20))?;
+        lab.trials(&format!("walks with wheels off by {error}"), &scenes, &contenders, errors)
+    };
+    let columns: Vec<Vec<Walk>> = WHEEL_ERRORS.iter().map(walks).collect::<Result<_, _>>()?;
+    Ok(wheels_table(&columns).into())
+}
+
+fn wheels_table(columns: &[Vec<Walk>]) -> Table {
+    let row = |name: &str, of: fn(&Walk) -> &[f64]| {
+        let cell = |walks: &Vec<Walk>| mean_mm(&walks.iter().map(of).collect());
+        Row::ours(name, columns.iter().map(cell).collect())
+    };
+    let draws = columns.first().map_or(0, Vec::len);
+    Table {
+        title: "Mean error of the place of the person who is followed, mm, by the error of the \
+                wheels"
+            .into(),
+        columns: WHEEL_ERRORS.map(|error| format!("wheels off by {error}")).to_vec(),
+        rows: vec![
+            row("stereo-svm-ekf, frame of the start", |walk| &walk.errors[0].in_start),
+            row("stereo-svm-ekf, frame of the robot", |walk| &walk.errors[0].in_robot),
+            row("stereo-verified, frame of the start", |walk| &walk.errors[1].in_start),
+            row("stereo-verified, frame of the robot", |walk| &walk.errors[1].in_robot),
+            row("no tracker: the drift of the wheels, frame of the start", |walk| &walk.drift),
+        ],
+        notes: vec![
+            format!("{draws} simulated walks for each column; intervals: 95 %, over walks"),
+            "Off by: the standard deviation of the radius of each wheel and of their distance, as \
+             a fraction (`wheel_bias` of the scene's robot); the other tables have 0.005. The paper \
+             prints 125 mm for one walk, and nothing on its wheels."
+                .into(),
+        ],
+    }
+}
+
 fn walk(lab: &Lab, variants: &[Variant]) -> Result<Findings, ReproduceError> {
     let scenes = lab.scenes("square-walk", &FOLLOWED, lab.seeds(50))?;
     let contenders =
         variants.iter().map(|variant| variant.contender(lab)).collect::<Result<Vec<_>, _>>()?;
     let walks = lab.trials("walks along two edges", &scenes, &contenders, errors)?;
     Ok(table(&walks, variants).into())
+}
+
+/// Number of walks of the first table.
+const FEW: u64 = 8;
+
+/// Returns walks along two edges, before a robot that follows.
+pub(crate) fn walks(lab: &Lab) -> Result<Vec<Scene>, ReproduceError> {
+    lab.scenes("square-walk", &FOLLOWED, lab.seeds(FEW))
+}
+
+/// Returns the errors of the walker of each run in the frame of the start, m.
+pub(crate) fn walker_errors_m(trial: Trial) -> Result<Vec<Vec<f64>>, TrialError> {
+    Ok(errors(trial)?.errors.into_iter().map(|of| of.in_start).collect())
 }
 
 /// Returns the id of the walker, the first person of the scene.
@@ -210,23 +271,27 @@ fn table(walks: &[Walk], variants: &[Variant]) -> Table {
 
 fn cells(walks: &Walks<'_>) -> Vec<Cell> {
     let all: Vec<f64> = walks.concat();
-    let mean = |drawn: &[usize]| {
-        let errors = || drawn.iter().flat_map(|&walk| walks[walk]);
-        errors().sum::<f64>() / errors().count() as f64
-    };
     let worst: Vec<f64> =
         walks.iter().filter_map(|walk| walk.iter().copied().reduce(f64::max)).collect();
     let error = PositionError::of(&all).unwrap_or_default();
     let millimetres = |metres: Option<f64>| Cell::number(1e3 * metres.unwrap_or(f64::NAN), 0);
-    let mean = draws_interval(walks.len(), |drawn| 1e3 * mean(drawn));
-    // A mean of distances is not negative, but the interval may reach below zero.
-    let mean = mean.map(|mean| mean.within(0.0, f64::INFINITY));
     vec![
-        Cell::estimate(mean, 0),
+        mean_mm(walks),
         millimetres(Some(error.p95_m)),
         millimetres(percentile(&worst, 0.5)),
         millimetres(Some(error.max_m)),
     ]
+}
+
+/// Returns the mean error over all frames, mm, with its interval over walks.
+fn mean_mm(walks: &Walks<'_>) -> Cell {
+    let mean = |drawn: &[usize]| {
+        let errors = || drawn.iter().flat_map(|&walk| walks[walk]);
+        1e3 * errors().sum::<f64>() / errors().count() as f64
+    };
+    // A mean of distances is not negative, but the interval may reach below zero.
+    let interval = draws_interval(walks.len(), mean);
+    Cell::estimate(interval.map(|mean| mean.within(0.0, f64::INFINITY)), 0)
 }
 
 #[cfg(test)]

@@ -12,10 +12,14 @@ use tagalong_pipeline::Pipeline;
 use tagalong_sim::Truth;
 use tagalong_trials::{Contender, Moment, Run, Trial};
 
-use super::variants::table;
 use crate::lab::read;
+use crate::variant::parsed;
 use crate::{Lab, ReproduceError};
 
+/// Logs in which no shipped verifier was trained, ...
+pub(crate) const NOT_TRAINED_ON: [&str; 3] = ["corredor1-camera1", "lab2-camera1", "lab2-camera2"];
+/// ... and those in which some were.
+pub(crate) const TRAINED_ON: [&str; 2] = ["filinha", "um"];
 /// Config of the detector for depth images of real rooms.
 const DETECTS: &str = "depth-ekf";
 /// Keys of a config for the verifiers and the track manager, which depends on them.
@@ -25,14 +29,14 @@ const OF_VERIFIERS: [&str; 2] = ["verifiers", "manager"];
 ///
 /// # Errors
 /// A config that cannot be read.
-pub fn contender(
+pub(crate) fn contender(
     lab: &Lab,
     name: &str,
     verifiers: Option<&str>,
 ) -> Result<Contender, ReproduceError> {
     let plain = lab.contender(DETECTS)?;
     let Some(of) = verifiers else { return Ok(Contender { name: name.into(), ..plain }) };
-    let (mut config, mut with) = (table(&plain)?, table(&lab.contender(of)?)?);
+    let (mut config, mut with) = (parsed(&plain)?, parsed(&lab.contender(of)?)?);
     config.extend(OF_VERIFIERS.iter().filter_map(|key| with.remove_entry(*key)));
     Ok(Contender { name: name.into(), config: config.to_string(), ..plain })
 }
@@ -41,7 +45,7 @@ pub fn contender(
 ///
 /// # Errors
 /// A log or annotations that cannot be used, and a plugin that fails.
-pub fn trial(
+pub(crate) fn trial(
     lab: &Lab,
     log: &str,
     contenders: &[Contender],
