@@ -1,4 +1,4 @@
-//! What has changed since the previous image, with a robot that moved between the two.
+//! Changes since the previous image, with a robot that moved between the two.
 
 use crate::circular::Run;
 use crate::warp::{Sweep, Warp};
