@@ -111,7 +111,7 @@ def all_windows(picture, folder):
 
 def where_depth_allows(log, folder):
     detector = built("tagalong-benches", "time_detector")
-    subprocess.run([detector, log, "face-rgbd", "0", folder], check=True)
+    subprocess.run([detector, log, "face-rgbd", "0", folder], check=True, capture_output=True)
     paths = sorted(glob.glob(os.path.join(folder, "[0-9]*.png")))
     images = [cv2.imread(path, 0) for path in paths]
     commands = {name: [detector, log, plugin, "RUNS", *settings]
