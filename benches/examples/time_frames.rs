@@ -6,7 +6,7 @@
 //! ```sh
 //! cargo run --release -p tagalong-benches --example time_frames -- LOG configs/depth-ekf.toml
 //! ```
-#![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
+#![allow(clippy::print_stdout, reason = "a program for developers")]
 
 use std::error::Error;
 use std::path::Path;
