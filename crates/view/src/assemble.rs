@@ -9,24 +9,10 @@ use tagalong_page::moment::Moment;
 
 use crate::recording::Recording;
 
-/// Part of a log, s since its first frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Span {
-    /// First time; none for the beginning.
-    pub from_s: Option<f64>,
-    /// Last time; none for the end.
-    pub to_s: Option<f64>,
-}
-
-/// Returns the stamps of all frames of all runs, in their order, within a span.
-pub fn stamps(runs: &[Recording], span: Span) -> Vec<u64> {
+/// Returns the stamps of all frames of all runs, in their order.
+pub fn stamps(runs: &[Recording]) -> Vec<u64> {
     let all: BTreeSet<u64> = runs.iter().flat_map(|run| &run.moments).map(stamp_of).collect();
-    let first = all.first().copied().unwrap_or(0);
-    let is_within = |stamp: &u64| {
-        let t_s = (stamp - first) as f64 * 1e-9;
-        span.from_s.is_none_or(|from| t_s >= from) && span.to_s.is_none_or(|to| t_s <= to)
-    };
-    all.into_iter().filter(is_within).collect()
+    all.into_iter().collect()
 }
 
 fn stamp_of(moment: &Moment) -> u64 {
@@ -70,12 +56,10 @@ mod tests_of_times {
     #[test]
     fn runs_with_different_frames_share_one_list_of_times() {
         let runs = [recording(&[1_000_000_000, 3_000_000_000]), recording(&[2_000_000_000])];
-        let all = stamps(&runs, Span::default());
+        let all = stamps(&runs);
         assert_eq!(times(&all), [0.0, 1.0, 2.0]);
         let frames = run_data(&runs[0], &all).frames;
         let is_there: Vec<bool> = frames.iter().map(Option::is_some).collect();
         assert_eq!(is_there, [true, false, true]);
-        let part = stamps(&runs, Span { from_s: Some(0.5), to_s: Some(1.5) });
-        assert_eq!(part, [2_000_000_000]);
     }
 }

@@ -8,7 +8,7 @@ use tagalong_app::progress::Progress;
 use tagalong_render::Animation;
 
 use crate::ViewArgs;
-use crate::assemble::{Span, stamps, times};
+use crate::assemble::{stamps, times};
 use crate::recording::Recording;
 
 /// Writes the animation of a run.
@@ -16,10 +16,9 @@ use crate::recording::Recording;
 /// # Errors
 /// A run without pictures, a span without frames, a file that exists.
 pub fn write(args: &ViewArgs, file: &Path) -> Outcome {
-    let run = [Recording::read(&args.run)?];
+    let run = [Recording::read(&args.run, &args.window()?)?];
     spare(file, args.overwrite)?;
-    let span = Span { from_s: args.from, to_s: args.to };
-    let shown = stamps(&run, span);
+    let shown = stamps(&run);
     if shown.is_empty() {
         return Err(Failure::usage("no frame lies between --from and --to"));
     }

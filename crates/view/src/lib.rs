@@ -20,9 +20,9 @@ use tagalong_page::data::{PageData, RunData};
 use tagalong_page::html::{Heading, html};
 use tagalong_scoring::TruthFile;
 
-use crate::assemble::{Span, run_data, stamps, times};
+use crate::assemble::{run_data, stamps, times};
 use crate::film::Film;
-use crate::recording::Recording;
+use crate::recording::{Recording, Span, Window};
 use crate::truth::PageTruth;
 
 /// Arguments of `tagalong view`.
@@ -65,6 +65,21 @@ pub struct ViewArgs {
     pub fps: u32,
 }
 
+/// Frames that are read for each megabyte of the page: more than it has room for, as a frame with one
+/// track takes half a kilobyte.
+const FRAMES_PER_MB: usize = 2000;
+
+impl ViewArgs {
+    fn folders(&self) -> impl Iterator<Item = &PathBuf> {
+        [Some(&self.run), self.other.as_ref()].into_iter().flatten()
+    }
+
+    fn window(&self) -> Result<Window, Failure> {
+        let span = Span { from_s: self.from, to_s: self.to };
+        Window::of(self.folders(), span, self.max_mb as usize * FRAMES_PER_MB)
+    }
+}
+
 /// Examples for `tagalong view --help`.
 pub const HELP: &str = "\
 The page has a time line, the images with boxes, numbers and trails, a plan from above, the funnel of
@@ -88,12 +103,9 @@ pub fn view(args: &ViewArgs) -> Outcome {
         return clip::write(args, file);
     }
     let output = args.output.clone().unwrap_or_else(|| args.run.join("view.html"));
-    let folders = [Some(&args.run), args.other.as_ref()];
-    let runs: Vec<Recording> = folders
-        .into_iter()
-        .flatten()
-        .map(|folder| Recording::read(folder))
-        .collect::<Result<_, _>>()?;
+    let window = args.window()?;
+    let runs: Vec<Recording> =
+        args.folders().map(|folder| Recording::read(folder, &window)).collect::<Result<_, _>>()?;
     check_same_log(&runs)?;
     spare(&output, args.overwrite)?;
     let page = Page::of(&runs, args)?;
@@ -128,8 +140,7 @@ struct Page {
 impl Page {
     fn of(runs: &[Recording], args: &ViewArgs) -> Result<Self, Failure> {
         let mut notes = Vec::new();
-        let span = Span { from_s: args.from, to_s: args.to };
-        let all = stamps(runs, span);
+        let all = stamps(runs);
         if all.is_empty() {
             return Err(Failure::usage("no frame lies between --from and --to"));
         }
@@ -170,15 +181,18 @@ fn thinned(
 ) -> (Vec<u64>, Vec<RunData>) {
     let whole: Vec<RunData> = runs.iter().map(|run| run_data(run, &all)).collect();
     let length: usize = whole.iter().map(length_of).sum();
-    let every = length.div_ceil(bytes.max(1)).max(1);
-    if every == 1 {
+    let step = length.div_ceil(bytes.max(1)).max(1);
+    let every = step as u64 * runs.iter().map(|run| run.every).max().unwrap_or(1);
+    if every > 1 {
+        notes.push(format!(
+            "one frame in {every} is shown, so that the page stays small; --from and --to show all \
+             of a part"
+        ));
+    }
+    if step == 1 {
         return (all, whole);
     }
-    let kept: Vec<u64> = all.iter().copied().step_by(every).collect();
-    notes.push(format!(
-        "one frame in {every} is shown, so that the page stays small; --from and --to show all of \
-         a part"
-    ));
+    let kept: Vec<u64> = all.iter().copied().step_by(step).collect();
     let data = runs.iter().map(|run| run_data(run, &kept)).collect();
     (kept, data)
 }

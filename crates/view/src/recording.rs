@@ -1,6 +1,5 @@
 //! Run as it was recorded: frames with tracks, candidates and funnel, and its config.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -9,7 +8,7 @@ use tagalong_app::origin::Origin;
 use tagalong_app::outcome::Failure;
 use tagalong_config::{FileLimit, read_text};
 use tagalong_log::msgs::{StringMsg, decode};
-use tagalong_log::{Limits, LogWalker, read_attachment};
+use tagalong_log::{Limits, LogFile, LogWalker, read_attachment};
 use tagalong_page::moment::{Moment, TrackState};
 use toml::Table;
 
@@ -27,8 +26,55 @@ pub struct Recording {
     pub origin: Origin,
     /// Resolved config; empty if it cannot be read.
     pub config: Table,
-    /// Frames in the order of their stamps.
+    /// Frames in the order of their stamps, as far as the window lets them in.
     pub moments: Vec<Moment>,
+    /// One frame in so many is there.
+    pub every: u64,
+}
+
+/// Part of a log, s since its first frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Span {
+    /// First time; none for the beginning.
+    pub from_s: Option<f64>,
+    /// Last time; none for the end.
+    pub to_s: Option<f64>,
+}
+
+/// Frames that are read: a run of a day must not fill the memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Window {
+    /// Part of the log.
+    span: Span,
+    /// First frame of all runs, ns.
+    first_ns: u64,
+    /// At most so many; of more, every second, fourth or eighth is kept.
+    most: usize,
+}
+
+impl Window {
+    /// Opens a window on the runs of some folders.
+    ///
+    /// # Errors
+    /// A folder that is no run, or one without notes on its frames.
+    pub fn of<'a>(
+        folders: impl IntoIterator<Item = &'a PathBuf>,
+        span: Span,
+        most: usize,
+    ) -> Result<Self, Failure> {
+        let mut first_ns = u64::MAX;
+        for folder in folders {
+            let mut frames = Frames::open(&tracks_of(folder)?)?;
+            let first = frames.next_moment()?.ok_or_else(|| frames.without_notes())?;
+            first_ns = first_ns.min(first.notes.stamp_ns);
+        }
+        Ok(Self { span, first_ns, most })
+    }
+
+    fn contains(&self, stamp_ns: u64) -> bool {
+        let t_s = stamp_ns.saturating_sub(self.first_ns) as f64 * 1e-9;
+        self.span.from_s.is_none_or(|from| t_s >= from) && self.span.to_s.is_none_or(|to| t_s <= to)
+    }
 }
 
 /// Part of a run's `report.json` that is used.
@@ -64,25 +110,28 @@ impl Recording {
     ///
     /// # Errors
     /// A folder that is no run, or one without notes on its frames; names the remedy.
-    pub fn read(folder: &Path) -> Result<Self, Failure> {
-        let tracks = folder.join("tracks.mcap");
-        if !tracks.is_file() {
-            return Err(no_run(folder));
-        }
+    pub fn read(folder: &Path, window: &Window) -> Result<Self, Failure> {
+        let tracks = tracks_of(folder)?;
         let report = read_json(&folder.join("report.json"))?;
         // Only the images need it, and they may be found without it.
         let origin = read_json(&folder.join("origin.json")).unwrap_or_default();
-        let moments = read_moments(&tracks)?;
+        let mut frames = Frames::open(&tracks)?;
+        let (moments, every) = gather(|| frames.next_moment(), window)?;
         let config = read_attachment(&tracks, "config.toml", &Limits::default())?;
         let text = config.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
         let config = toml::from_str(&text).unwrap_or_default();
-        Ok(Self { folder: folder.to_owned(), report, origin, config, moments })
+        Ok(Self { folder: folder.to_owned(), report, origin, config, moments, every })
     }
 
     /// Returns the name of its config without the ending.
     pub fn config_name(&self) -> String {
         self.report.config.name.trim_end_matches(".toml").to_owned()
     }
+}
+
+fn tracks_of(folder: &Path) -> Result<PathBuf, Failure> {
+    let tracks = folder.join("tracks.mcap");
+    if tracks.is_file() { Ok(tracks) } else { Err(no_run(folder)) }
 }
 
 /// Returns the failure of a path that is not the folder of a run.
@@ -107,37 +156,100 @@ fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, Failure> {
     serde_json::from_str(&text).map_err(|error| Failure::failed(format!("{shown}: {error}")))
 }
 
-fn read_moments(path: &Path) -> Result<Vec<Moment>, Failure> {
-    let shown = path.display();
-    let broken = |why: &dyn std::fmt::Display| Failure::failed(format!("{shown}: {why}"));
-    // Its message names the file.
-    let mut walker = LogWalker::open(path, &Limits::default()).map_err(Failure::failed)?;
-    let mut by_stamp: BTreeMap<u64, Moment> = BTreeMap::new();
-    let mut has_notes = false;
-    while let Some(message) = walker.next() {
-        let topic = message.channel.topic.as_str();
-        if !matches!(topic, TRACKS_TOPIC | FRAME_NOTES_TOPIC) {
+/// Frames of a file of tracks, one after the other.
+struct Frames {
+    shown: String,
+    walker: LogWalker<LogFile>,
+    /// Tracks of the frame whose notes come next.
+    tracks: Option<TracksMessage>,
+}
+
+impl Frames {
+    fn open(path: &Path) -> Result<Self, Failure> {
+        // Its message names the file.
+        let walker = LogWalker::open(path, &Limits::default()).map_err(Failure::failed)?;
+        Ok(Self { shown: path.display().to_string(), walker, tracks: None })
+    }
+
+    /// Returns the next frame; none at the end. A frame that was cut in two is left out.
+    fn next_moment(&mut self) -> Result<Option<Moment>, Failure> {
+        let shown = &self.shown;
+        let broken = |why: &dyn std::fmt::Display| Failure::failed(format!("{shown}: {why}"));
+        while let Some(message) = self.walker.next() {
+            let topic = message.channel.topic.as_str();
+            if !matches!(topic, TRACKS_TOPIC | FRAME_NOTES_TOPIC) {
+                continue;
+            }
+            let text: StringMsg = decode(message.data).map_err(|error| broken(&error))?;
+            let unread = |error: serde_json::Error| broken(&format!("{topic}: {error}"));
+            if topic == TRACKS_TOPIC {
+                self.tracks = Some(serde_json::from_str(&text.data).map_err(unread)?);
+                continue;
+            }
+            let notes: FrameNotes = serde_json::from_str(&text.data).map_err(unread)?;
+            let found = self.tracks.take().filter(|found| found.stamp_ns == notes.stamp_ns);
+            let (tracks, target) =
+                found.map(|found| (found.tracks, found.target)).unwrap_or_default();
+            return Ok(Some(Moment { notes, tracks, target }));
+        }
+        Ok(None)
+    }
+
+    fn without_notes(&self) -> Failure {
+        Failure::failed(format!(
+            "{} has no {FRAME_NOTES_TOPIC}: no frame was processed, or an earlier version made the \
+             run; repeat it with `tagalong run ... --overwrite`",
+            self.shown
+        ))
+    }
+}
+
+/// Gathers the frames of a window, and returns one in how many that is.
+fn gather(
+    mut next: impl FnMut() -> Result<Option<Moment>, Failure>,
+    window: &Window,
+) -> Result<(Vec<Moment>, u64), Failure> {
+    let (mut kept, mut every) = (Vec::new(), 1);
+    while let Some(moment) = next()? {
+        if !window.contains(moment.notes.stamp_ns) || !is_kept(&moment, every) {
             continue;
         }
-        let text: StringMsg = decode(message.data).map_err(|error| broken(&error))?;
-        let unread = |error: serde_json::Error| broken(&format!("{topic}: {error}"));
-        if topic == FRAME_NOTES_TOPIC {
-            let notes: FrameNotes = serde_json::from_str(&text.data).map_err(unread)?;
-            has_notes = true;
-            let stamp = notes.stamp_ns;
-            by_stamp.entry(stamp).or_default().notes = notes;
-        } else {
-            let read: TracksMessage = serde_json::from_str(&text.data).map_err(unread)?;
-            let moment = by_stamp.entry(read.stamp_ns).or_default();
-            (moment.tracks, moment.target) = (read.tracks, read.target);
+        kept.push(moment);
+        if kept.len() > window.most {
+            every *= 2;
+            kept.retain(|moment| is_kept(moment, every));
         }
     }
-    if !has_notes {
-        return Err(Failure::failed(format!(
-            "{shown} has no {FRAME_NOTES_TOPIC}: no frame was processed, or an earlier version \
-             made the run; repeat it with `tagalong run ... --overwrite`"
-        )));
+    kept.sort_by_key(|moment| moment.notes.stamp_ns);
+    Ok((kept, every))
+}
+
+/// Tells by the number of a frame, so that two runs of one log keep the same frames.
+fn is_kept(moment: &Moment, every: u64) -> bool {
+    moment.notes.frame.saturating_sub(1).is_multiple_of(every)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers of the frames that a window keeps of nine a second apart.
+    fn kept(span: Span, most: usize) -> (Vec<u64>, u64) {
+        let mut frames = (1..=9).map(|frame| Moment {
+            notes: FrameNotes { frame, stamp_ns: frame * 1_000_000_000, ..FrameNotes::default() },
+            ..Moment::default()
+        });
+        let window = Window { span, first_ns: 1_000_000_000, most };
+        let (moments, every) = gather(|| Ok(frames.next()), &window).unwrap();
+        (moments.iter().map(|moment| moment.notes.frame).collect(), every)
     }
-    // A file that was cut may end between the two messages of a frame.
-    Ok(by_stamp.into_values().filter(|moment| moment.notes.frame > 0).collect())
+
+    #[test]
+    fn a_window_keeps_its_span_and_of_too_many_frames_every_second() {
+        assert_eq!(kept(Span::default(), 9), ((1..=9).collect(), 1));
+        assert_eq!(kept(Span::default(), 8), (vec![1, 3, 5, 7, 9], 2));
+        assert_eq!(kept(Span::default(), 3), (vec![1, 5, 9], 4));
+        let span = Span { from_s: Some(2.0), to_s: Some(4.0) };
+        assert_eq!(kept(span, 3), (vec![3, 4, 5], 1), "all of a part");
+    }
 }
