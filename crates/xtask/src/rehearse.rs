@@ -43,6 +43,7 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("trials", "takes long"),
     ("--seeds", "takes long"),
     ("--fit", "takes long"),
+    ("LONG.mcap", "takes a quarter of an hour"),
     ("crowd=5", "takes half a minute, as the tests build it"),
     ("hide_s=3", "takes a quarter of a minute, as the tests build it"),
     ("--gallery pictures", "takes half a minute, as the tests build it"),
