@@ -96,7 +96,7 @@ mod tests {
     fn followed(likeness: Vec<(Likeness, bool)>) -> Followed {
         let ridden = Ridden { likeness, ..Ridden::default() };
         let (suite, pipeline) = ("scene".into(), "config".into());
-        Followed { suite, pipeline, ridden, took_ms: Vec::new(), story: Vec::new() }
+        Followed { suite, pipeline, ridden, ..Followed::default() }
     }
 
     /// The odds that a track is the person depend on the upper body alone, and in every fourth

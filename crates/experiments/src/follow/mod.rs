@@ -95,15 +95,19 @@ fn fraction(text: &str) -> Result<f64, String> {
 /// One pipeline on one random variant of a scene.
 struct Job {
     suite: String,
+    swept: Option<String>,
     scene: Scene,
     contender: Contender,
 }
 
 /// Result of a job.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Followed {
-    /// Name of the scene.
+    /// Name of the scene, with the value of the sweep.
     pub suite: String,
+    /// Value of the sweep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub swept: Option<String>,
     /// Name of the pipeline.
     pub pipeline: String,
     /// Scores of the ride.
@@ -169,14 +173,16 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
     for path in scenes(args)? {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for value in swept(args) {
-            let suite = [&name].into_iter().chain(value.as_ref().map(|(_, value)| value));
+            let swept = value.as_ref().map(|(_, value)| value.clone());
+            let suite = std::iter::once(&name).chain(&swept);
             let suite = suite.map(String::as_str).collect::<Vec<_>>().join(" ");
             for contender in &contenders {
                 for seed in seeds.numbers() {
                     let mut variant = variant(args, seed);
                     variant.set.extend(value.clone());
                     let scene = tagalong_simulate::read(&path, &variant)?;
-                    jobs.push(Job { suite: suite.clone(), scene, contender: contender.clone() });
+                    let (suite, swept) = (suite.clone(), swept.clone());
+                    jobs.push(Job { suite, swept, scene, contender: contender.clone() });
                 }
             }
         }
@@ -237,7 +243,7 @@ fn ride(
     registry: &Registry,
     signals: &Signals,
 ) -> Result<Followed, TrialError> {
-    let Job { suite, scene, contender } = job;
+    let Job { suite, swept, scene, contender } = job;
     // A ride that a signal came before leaves no log.
     let folder = args.output.as_deref().filter(|_| signals.received().is_none());
     let file = folder.map(|folder| log_file(folder, job));
@@ -249,6 +255,7 @@ fn ride(
     log.finish()?;
     Ok(Followed {
         suite: suite.clone(),
+        swept: swept.clone(),
         pipeline: contender.name.clone(),
         ridden: RideJudge::default().judge(&ride),
         story: story::story(&ride),

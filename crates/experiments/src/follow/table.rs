@@ -28,18 +28,11 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
         "ms/frame",
     ];
     let pipelines = unique(results.iter().map(|result| result.pipeline.as_str()));
-    let mut suites = unique(results.iter().map(|result| result.suite.as_str()));
     let mut rows: Vec<Row> = Vec::new();
-    // The empty name stands for all scenes together.
-    if suites.len() > 1 {
-        suites.push("");
-    }
-    for suite in suites {
+    for (name, group) in groups(results) {
         for pipeline in &pipelines {
-            let of =
-                |r: &&Followed| (suite.is_empty() || r.suite == suite) && r.pipeline == *pipeline;
-            let chosen: Vec<&Followed> = results.iter().filter(of).collect();
-            let name = if suite.is_empty() { "all scenes" } else { suite };
+            let chosen: Vec<&Followed> =
+                group.iter().copied().filter(|result| result.pipeline == *pipeline).collect();
             rows.push(Row::ours(format!("{name}: {pipeline}"), cells(&chosen, &judge)));
         }
     }
@@ -52,6 +45,25 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
     std::iter::once(following)
         .chain(pipelines.iter().filter_map(|pipeline| reliability(results, pipeline, seeds)))
         .collect()
+}
+
+/// Returns the rides of each scene, then all of each value of a sweep over scenes, then all.
+fn groups(results: &[Followed]) -> Vec<(String, Vec<&Followed>)> {
+    let of = |is_of: &dyn Fn(&Followed) -> bool| results.iter().filter(|r| is_of(r)).collect();
+    let suites = unique(results.iter().map(|result| result.suite.as_str()));
+    let values = unique(results.iter().filter_map(|result| result.swept.as_deref()));
+    let each = suites.iter().map(|suite| (suite.to_string(), of(&|r| r.suite == *suite)));
+    let mut groups: Vec<(String, Vec<&Followed>)> = each.collect();
+    if suites.len() > values.len() {
+        for value in &values {
+            let rides = of(&|r| r.swept.as_deref() == Some(value));
+            groups.push((format!("all scenes {value}"), rides));
+        }
+    }
+    if suites.len() > 1 {
+        groups.push(("all scenes".into(), of(&|_| true)));
+    }
+    groups
 }
 
 fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
@@ -195,4 +207,40 @@ pub fn likeness_csv(results: &[Followed]) -> String {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rides(of: &[(&str, Option<&str>)]) -> Vec<Followed> {
+        let ride = |(suite, swept): &(&str, Option<&str>)| Followed {
+            suite: (*suite).into(),
+            swept: swept.map(str::to_owned),
+            ..Followed::default()
+        };
+        of.iter().map(ride).collect()
+    }
+
+    /// Names of the groups, with the number of rides of each.
+    fn named(of: &[(&str, Option<&str>)]) -> Vec<(String, usize)> {
+        groups(&rides(of)).into_iter().map(|(name, group)| (name, group.len())).collect()
+    }
+
+    #[test]
+    fn each_value_of_a_sweep_over_scenes_has_a_row_for_all_of_them() {
+        let group = |name: &str, rides| (name.to_owned(), rides);
+        assert_eq!(named(&[("a", None), ("a", None)]), [group("a", 2)]);
+        let two = [("a", None), ("b", None)];
+        assert_eq!(named(&two), [group("a", 1), group("b", 1), group("all scenes", 2)]);
+        let one_scene = [("a 1", Some("1")), ("a 2", Some("2"))];
+        assert_eq!(
+            named(&one_scene),
+            [group("a 1", 1), group("a 2", 1), group("all scenes", 2)],
+            "a value's only scene is its total"
+        );
+        let both = [one_scene[0], one_scene[1], ("b 1", Some("1")), ("b 2", Some("2"))];
+        let totals = [group("all scenes 1", 2), group("all scenes 2", 2), group("all scenes", 4)];
+        assert_eq!(named(&both)[4..], totals);
+    }
 }
