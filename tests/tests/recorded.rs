@@ -31,7 +31,7 @@ fn table(of: [&str; 2], data: Option<PathBuf>, seeds: Option<u64>) -> Table {
         seeds,
         first_seed: 0,
         simulated: SimulatedScenes::default(),
-        jobs: 1,
+        jobs: 2,
         progress: &Silent,
     };
     let experiments = system(of[0]).unwrap().experiments;
