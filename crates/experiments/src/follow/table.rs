@@ -18,6 +18,7 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
         "wrong %",
         "longest wrong s",
         "refound %",
+        "after s",
         "in view %",
         "distance %",
         "farther m",
@@ -83,6 +84,7 @@ fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
              view (up to {} m away)",
             judge.refind_s, judge.max_range_m
         ),
+        "after: from their coming back into view to their being followed, of those who were found".into(),
         format!(
             "distance: within {} m of the stand-off while the person walked below {} m/s, and how \
              much farther away on the mean",
@@ -104,8 +106,12 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
             let sum = |f: fn(&Ridden) -> f64| drawn.iter().map(|&i| f(of[i])).sum::<f64>();
             sum(a) / sum(b)
         };
-        draws_interval(of.len(), ratio).map(|share| share.within(0.0, 1.0))
+        draws_interval(of.len(), ratio)
     };
+    let part = |a, b, digits| {
+        Cell::estimate(times(a, b).map(|share| share.within(0.0, 1.0)), digits).percent()
+    };
+    let after = times(|r| found_after(r).sum(), |r| found_after(r).count() as f64);
     let refound: Vec<[u64; 2]> = rides
         .iter()
         // Resampling whole rides respects that the seconds of one ride are not independent.
@@ -128,11 +134,12 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     vec![
         Cell::number(count as f64, 0),
         Cell::share(kept, count, 1),
-        Cell::estimate(times(|r| r.wrong_s, |r| r.right_s + r.wrong_s), 4).percent(),
+        part(|r| r.wrong_s, |r| r.right_s + r.wrong_s, 4),
         Cell::number(rides.iter().map(|ride| ride.longest_wrong_s).fold(0.0, f64::max), 1),
         Cell::clustered(&refound, 1),
-        Cell::estimate(times(|r| r.in_view_s, |r| r.time_s), 3).percent(),
-        Cell::estimate(times(|r| r.distance_kept_s, |r| r.slow_s), 3).percent(),
+        Cell::estimate(after.map(|time| time.within(0.0, f64::INFINITY)), 1),
+        part(|r| r.in_view_s, |r| r.time_s, 3),
+        part(|r| r.distance_kept_s, |r| r.slow_s, 3),
         Cell::mean(&farther, 2),
         Cell::number(rides.iter().filter(touches).count() as f64, 0),
         least(|ride| ride.clearance_people_m),
@@ -140,6 +147,11 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
         Cell::mean(&jerks, 1),
         percentile(&took, 0.95).map_or_else(Cell::default, |ms| Cell::number(ms, 1)),
     ]
+}
+
+/// Returns the times from coming back into view to being followed, s.
+fn found_after(ride: &Ridden) -> impl Iterator<Item = f64> {
+    ride.episodes.iter().filter_map(|episode| Some(episode.found_s? - episode.in_view_s?))
 }
 
 /// Returns the share of true matches among the tracks to which the lock gave some probability.
@@ -211,7 +223,26 @@ pub fn likeness_csv(results: &[Followed]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_sim::Split;
+    use tagalong_trials::Episode;
+
     use super::*;
+
+    #[test]
+    fn people_who_come_back_are_found_after_the_mean_time() {
+        let episode = |in_view_s, found_s| Episode { lost_s: 1.0, in_view_s, found_s };
+        let episodes = vec![
+            episode(Some(2.0), Some(3.0)),
+            episode(Some(5.0), Some(7.0)),
+            episode(Some(8.0), None),
+            episode(None, None),
+        ];
+        let ridden = Ridden { episodes, ..Ridden::default() };
+        let ride = Followed { ridden, ..Followed::default() };
+        let table = &tables(&[ride], Split::Test.seeds(0, 1).unwrap())[0];
+        let at = table.columns.iter().position(|column| column == "after s").unwrap();
+        assert_eq!(table.rows[0].cells[at].value, Some(1.5));
+    }
 
     fn rides(of: &[(&str, Option<&str>)]) -> Vec<Followed> {
         let ride = |(suite, swept): &(&str, Option<&str>)| Followed {
