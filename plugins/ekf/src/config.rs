@@ -25,6 +25,10 @@ pub struct Config {
     /// noise is normal, and every detection counts in full.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub student_dof: f64,
+    /// Time constant with which the velocity decays, s; 0: it does not. A person who is hidden for
+    /// long walks on for less long than that.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub velocity_decay_s: f64,
     /// As printed: subtract the robot's speed from the person's velocity in
     /// every frame. Biased while the robot moves.
     pub compat_printed_velocity: bool,
@@ -51,6 +55,7 @@ impl Default for Config {
             initial_velocity_variance: 2.0,
             extra_sigma_m: 0.02,
             student_dof: 0.0,
+            velocity_decay_s: 0.0,
             compat_printed_velocity: false,
             compat_printed_noise: false,
             compat_printed_update: false,

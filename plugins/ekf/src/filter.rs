@@ -78,9 +78,10 @@ impl Ekf {
     pub(crate) fn transition(&self, mean: &Vector5<f64>, motion: &EgoMotion) -> Vector5<f64> {
         let back = turn_back(motion);
         let velocity = Vector2::new(mean[3], mean[4]);
-        let moved = Vector2::new(mean[0], mean[1]) + velocity * motion.dt;
+        let (passed, kept) = decayed(self.config.velocity_decay_s, motion.dt);
+        let moved = Vector2::new(mean[0], mean[1]) + velocity * passed;
         let position = back * (moved - Vector2::new(motion.forward, motion.left));
-        let mut velocity = back * velocity;
+        let mut velocity = back * velocity * kept;
         if self.config.compat_printed_velocity && motion.dt > 0.0 {
             velocity.x -= motion.forward.hypot(motion.left).copysign(motion.forward) / motion.dt;
         }
@@ -101,7 +102,7 @@ impl PersonFilter for Ekf {
     }
 
     fn predict(&self, state: &mut State, motion: &EgoMotion) {
-        let f = state_jacobian(motion);
+        let f = state_jacobian(motion, self.config.velocity_decay_s);
         state.mean = self.transition(&state.mean, motion);
         let covariance = f * state.covariance * f.transpose()
             + self.process_noise(motion.dt)
@@ -183,6 +184,15 @@ impl Ekf {
     }
 }
 
+/// Returns the time for which a velocity that decays counts, s, and the part of it that is left.
+fn decayed(time_constant_s: f64, dt: f64) -> (f64, f64) {
+    if time_constant_s == 0.0 {
+        return (dt, 1.0);
+    }
+    let kept = (-dt / time_constant_s).exp();
+    (time_constant_s * (1.0 - kept), kept)
+}
+
 /// From the axes before the robot's turn to those after it.
 fn turn_back(motion: &EgoMotion) -> Matrix2<f64> {
     let (sin, cos) = motion.turn.sin_cos();
@@ -190,12 +200,13 @@ fn turn_back(motion: &EgoMotion) -> Matrix2<f64> {
 }
 
 /// Derivative of the transition by the state.
-pub(crate) fn state_jacobian(motion: &EgoMotion) -> Matrix5 {
+pub(crate) fn state_jacobian(motion: &EgoMotion, decay_s: f64) -> Matrix5 {
     let back = turn_back(motion);
+    let (passed, kept) = decayed(decay_s, motion.dt);
     let mut f = Matrix5::identity();
     f.fixed_view_mut::<2, 2>(0, 0).copy_from(&back);
-    f.fixed_view_mut::<2, 2>(0, 3).copy_from(&(back * motion.dt));
-    f.fixed_view_mut::<2, 2>(3, 3).copy_from(&back);
+    f.fixed_view_mut::<2, 2>(0, 3).copy_from(&(back * passed));
+    f.fixed_view_mut::<2, 2>(3, 3).copy_from(&(back * kept));
     f
 }
 

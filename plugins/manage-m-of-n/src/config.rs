@@ -26,6 +26,10 @@ pub struct Config {
     /// ... in so many frames in which it could have been seen (at most 32), ...
     #[schemars(range(min = 1, max = 32))]
     pub confirm_within: u32,
+    /// ... or in two frames in a row that are at least so far apart, s (0: never): errors of
+    /// images that are far apart in time are less alike, ...
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub confirm_apart_s: f64,
     /// ... or at once by a detection with at least this score.
     pub confirm_score: f64,
     /// A track that is not confirmed ends after this many misses in a row.
@@ -65,6 +69,7 @@ impl Default for Config {
             doubt_limit: 6.0,
             confirm_hits: 2,
             confirm_within: 3,
+            confirm_apart_s: 0.0,
             confirm_score: 2.0,
             tentative_misses: 2,
             drop_after_s: 1.0,

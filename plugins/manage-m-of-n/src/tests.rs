@@ -125,6 +125,21 @@ fn hits_confirm_only_if_they_are_close_to_each_other() {
 }
 
 #[test]
+fn two_hits_in_a_row_confirm_where_images_are_far_apart() {
+    use Observation::{Missed, Occluded};
+    // The frames of the rig are an eighth of a second apart.
+    let hits = |confirm_apart_s: f64, observations: &[Observation]| {
+        let config = Config { confirm_hits: 4, confirm_within: 5, ..Config::default() };
+        confirmed(Config { confirm_apart_s, ..config }, 1.0, observations)
+    };
+    assert!(hits(0.125, &[DETECTED]) && hits(0.125, &[Occluded, DETECTED]));
+    assert!(!hits(0.125, &[Missed, DETECTED]), "not in a row");
+    assert!(!hits(0.126, &[DETECTED; 2]) && !hits(0.0, &[DETECTED; 2]));
+    let doubtful = Observation::Detected { log_odds: -5.0 };
+    assert!(!hits(0.125, &[doubtful]), "hits that are likely people");
+}
+
+#[test]
 fn hits_that_are_probably_no_person_confirm_no_track() {
     let doubtful = Observation::Detected { log_odds: -0.5 };
     let config = || Config { drop_score: -9.0, ..Config::default() };
@@ -243,6 +258,7 @@ fn settings_that_cannot_work_are_refused() {
         (Config { confirm_hits: 9, ..default() }, "`confirm_within` must be at least 9"),
         (Config { confirm_within: 40, ..default() }, "`confirm_within`"),
         (Config { confirm_hits: 0, ..default() }, "`confirm_hits`"),
+        (Config { confirm_apart_s: -0.1, ..default() }, "`confirm_apart_s`"),
         (Config { miss_score: f64::NEG_INFINITY, ..default() }, "`miss_score`"),
         (Config { drop_score: 0.1, ..default() }, "`drop_score` must be at most 0"),
         (Config { drop_score: f64::NAN, ..default() }, "`drop_score`"),

@@ -36,8 +36,8 @@ impl TrackCount {
     pub(crate) fn observe(&mut self, observation: Observation, dt_s: f64, settings: &Config) {
         self.observation = observation;
         match observation {
-            Observation::Detected { log_odds } => self.hit(Some(log_odds), settings),
-            Observation::Updated => self.hit(None, settings),
+            Observation::Detected { log_odds } => self.hit(Some(log_odds), dt_s, settings),
+            Observation::Updated => self.hit(None, dt_s, settings),
             Observation::Missed => self.miss(dt_s, settings),
             Observation::NotSearched => self.missed_s += dt_s,
             Observation::Occluded => self.clear_misses(),
@@ -45,7 +45,7 @@ impl TrackCount {
         }
     }
 
-    fn hit(&mut self, log_odds: Option<f64>, settings: &Config) {
+    fn hit(&mut self, log_odds: Option<f64>, dt_s: f64, settings: &Config) {
         self.clear_misses();
         self.remember(true, settings);
         if let Some(log_odds) = log_odds {
@@ -53,7 +53,13 @@ impl TrackCount {
             self.confirmed |= log_odds >= settings.confirm_score;
         }
         let is_likely = self.score >= settings.start_score;
-        self.confirmed |= is_likely && self.recent.count_ones() >= settings.confirm_hits;
+        self.confirmed |= is_likely && self.has_enough_hits(dt_s, settings);
+    }
+
+    fn has_enough_hits(&self, dt_s: f64, settings: &Config) -> bool {
+        let far_apart = settings.confirm_apart_s > 0.0 && dt_s >= settings.confirm_apart_s;
+        let twice_in_a_row = self.recent & 0b11 == 0b11;
+        self.recent.count_ones() >= settings.confirm_hits || far_apart && twice_in_a_row
     }
 
     fn miss(&mut self, dt_s: f64, settings: &Config) {

@@ -23,7 +23,8 @@ pub struct RoomsArgs {
     /// The rooms and their logs, a TOML file.
     #[arg(value_name = "ROOMS")]
     pub rooms: PathBuf,
-    /// The pipelines [default: every config in configs with a table `[tune]`].
+    /// The pipelines, the last of which is the baseline of the others [default: every config in
+    /// configs with a table `[tune]`, without a baseline].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
     /// Folder of the logs [default: the `folder` that the rooms name].

@@ -3,6 +3,7 @@
 
 mod args;
 mod contest;
+mod pairs;
 mod report;
 mod work;
 

@@ -10,6 +10,7 @@ use tagalong_tuning::{Choice, Figures, Objective, leave_one_out, mean};
 
 use super::RoomsArgs;
 use super::contest::{Contestant, Location};
+use super::pairs::{Pair, by_log, differences, pairs};
 use super::work::{Desk, Run};
 use crate::plan::Annotated;
 
@@ -21,6 +22,8 @@ pub struct Report {
     seed: u64,
     rooms: Vec<About>,
     pipelines: Vec<Fitted>,
+    /// The named pipelines beside the last of them.
+    pairs: Vec<Pair>,
 }
 
 /// Room with its logs.
@@ -33,8 +36,8 @@ struct About {
 
 /// Results of a pipeline.
 #[derive(Serialize)]
-struct Fitted {
-    name: String,
+pub struct Fitted {
+    pub name: String,
     /// Number of tried settings, those of the config among them.
     settings: usize,
     /// Number of settings that contradict themselves, which were not tried.
@@ -43,7 +46,7 @@ struct Fitted {
     skipped: Vec<Skipped>,
     shipped: Values,
     chosen_with_all: Values,
-    rooms: Vec<InRoom>,
+    pub rooms: Vec<InRoom>,
     /// Reason for an empty result.
     #[serde(skip_serializing_if = "Option::is_none")]
     too_few: Option<String>,
@@ -60,16 +63,28 @@ struct Skipped {
 
 /// Results of a pipeline in a room.
 #[derive(Serialize)]
-struct InRoom {
-    room: String,
+pub struct InRoom {
+    pub room: String,
     /// Settings that the other rooms chose.
     chosen_without: Values,
     /// Their score here.
-    without: Figures,
+    pub without: Figures,
     /// Score of the choice of all rooms here.
     with_all: Figures,
     /// Score of the config's settings here.
     shipped: Figures,
+    /// The same log by log.
+    pub logs: Vec<InLog>,
+}
+
+/// Results of a pipeline on a log.
+#[derive(Serialize)]
+pub struct InLog {
+    pub log: String,
+    /// With the settings that the other rooms chose.
+    pub without: Figures,
+    /// With those of the config.
+    pub shipped: Figures,
 }
 
 impl Report {
@@ -93,12 +108,15 @@ impl Report {
             .iter()
             .enumerate()
             .map(|(at, contestant)| Scorer { locations, desk, at, contestant }.fitted(objective));
+        let pipelines: Vec<Fitted> = fitted.collect::<Result<_, _>>()?;
         Ok(Self {
             objective,
             budget: args.budget,
             seed: args.seed,
             rooms: locations.iter().map(about).collect(),
-            pipelines: fitted.collect::<Result<_, _>>()?,
+            // Only the user knows which of them is the baseline.
+            pairs: if args.configs.is_empty() { Vec::new() } else { pairs(&pipelines) },
+            pipelines,
         })
     }
 
@@ -124,7 +142,9 @@ impl Report {
 
     fn tables(&self) -> Vec<Table> {
         let each = self.pipelines.iter().map(Fitted::table);
-        std::iter::once(self.summary()).chain(each).collect()
+        let beside = differences(&self.pairs).map(|table| [table, by_log(&self.pipelines)]);
+        let beside = beside.into_iter().flatten();
+        std::iter::once(self.summary()).chain(beside).chain(each).collect()
     }
 
     /// Returns the means over the rooms.
@@ -231,12 +251,15 @@ impl Scorer<'_> {
         let (unseen, seen) = (table(true)?, table(false)?);
         // A model that has seen a room would make any setting look good there.
         let Choice { without, with_all } = leave_one_out(&unseen, objective);
-        let in_room = |(at, (location, _)): (usize, &(&Location, Vec<usize>))| InRoom {
-            room: location.name.clone(),
-            chosen_without: self.values(without[at]),
-            without: unseen[without[at]][at],
-            with_all: seen[with_all][at],
-            shipped: seen[0][at],
+        let in_room = |(at, (location, logs)): (usize, &(&Location, Vec<usize>))| {
+            Ok::<_, Failure>(InRoom {
+                room: location.name.clone(),
+                chosen_without: self.values(without[at]),
+                without: unseen[without[at]][at],
+                with_all: seen[with_all][at],
+                shipped: seen[0][at],
+                logs: self.by_log(without[at], logs)?,
+            })
         };
         Ok(Fitted {
             name: self.contestant.name(),
@@ -245,19 +268,34 @@ impl Scorer<'_> {
             skipped,
             shipped: self.values(0),
             chosen_with_all: self.values(with_all),
-            rooms: rooms.iter().enumerate().map(in_room).collect(),
+            rooms: rooms.iter().enumerate().map(in_room).collect::<Result<_, _>>()?,
             too_few,
         })
     }
 
     fn room(&self, setting: usize, unseen: bool, logs: &[usize]) -> Result<Figures, Failure> {
-        let of = |log: &usize| {
-            let run = Run { contestant: self.at, setting, log: *log, unseen };
-            let missing = || Failure::failed("a result went missing; run the command again");
-            self.desk.result(run).map(|result| result.figures).ok_or_else(missing)
-        };
+        let of = |log: &usize| self.log(setting, unseen, *log);
         let figures: Vec<Figures> = logs.iter().map(of).collect::<Result<_, _>>()?;
         Ok(mean(&figures))
+    }
+
+    fn by_log(&self, chosen: usize, logs: &[usize]) -> Result<Vec<InLog>, Failure> {
+        let names: Vec<&str> = self
+            .locations
+            .iter()
+            .flat_map(|location| location.logs.iter().map(|log| log.name.as_str()))
+            .collect();
+        let of = |log: &usize| {
+            let (without, shipped) = (self.log(chosen, true, *log)?, self.log(0, false, *log)?);
+            Ok(InLog { log: names[*log].to_owned(), without, shipped })
+        };
+        logs.iter().map(of).collect()
+    }
+
+    fn log(&self, setting: usize, unseen: bool, log: usize) -> Result<Figures, Failure> {
+        let run = Run { contestant: self.at, setting, log, unseen };
+        let missing = || Failure::failed("a result went missing; run the command again");
+        self.desk.result(run).map(|result| result.figures).ok_or_else(missing)
     }
 
     fn values(&self, setting: usize) -> Values {
@@ -276,6 +314,7 @@ impl Fitted {
             without: of(|room| &room.without),
             with_all: of(|room| &room.with_all),
             shipped: of(|room| &room.shipped),
+            logs: Vec::new(),
         }
     }
 

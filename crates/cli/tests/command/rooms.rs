@@ -142,6 +142,30 @@ fn tables_name_figures_and_choices() {
 }
 
 #[test]
+fn named_pipelines_are_compared_with_the_last_one_room_by_room_and_log_by_log() {
+    let home = Home::new();
+    home.config("far", "config = { max_depth_m = 4.0 }", "manager.config.confirm_hits = [2]");
+    home.config("blind", TUNE, "manager.config.confirm_hits = [2]");
+    let named = ["--configs", "configs/far.toml", "configs/blind.toml"];
+    let report = home.rooms(&[&named[..], &["--format", "json"]].concat());
+    let report: Value = serde_json::from_slice(&report.stdout).unwrap();
+    let figure = |pipeline: usize, room: usize| {
+        report["pipelines"][pipeline]["rooms"][room]["without"]["IDF1"].as_f64().unwrap()
+    };
+    let gained = (figure(0, 0) + figure(0, 1) - figure(1, 0) - figure(1, 1)) / 2.0;
+    let pair = &report["pairs"][0];
+    assert_eq!((&pair["pipeline"], &pair["baseline"]), (&"far".into(), &"blind".into()));
+    assert_eq!(pair["rooms"], 2);
+    let told = pair["gains"][1]["difference"]["estimate"].as_f64().unwrap();
+    assert!(gained > 0.5 && (told - gained).abs() < 1e-9, "{told} instead of {gained}");
+    let page = text(&home.rooms(&[&named[..], &["--format", "markdown"]].concat()).stdout);
+    for words in ["**Difference to blind, each", "| far | 2 | ", "| a: far | ", "| b: blind | "] {
+        assert!(page.contains(words), "{words} in {page}");
+    }
+    assert!(!text(&home.rooms(&[]).stdout).contains("Difference to"), "nobody named a baseline");
+}
+
+#[test]
 fn logs_that_cannot_be_read_are_listed_with_the_reason() {
     let home = Home::new();
     Drawn { depth: false, ..Drawn::of(5) }.write(&home.path("logs/mono.mcap"));

@@ -41,10 +41,11 @@ fn with(motion: &EgoMotion, index: usize, by: f64) -> EgoMotion {
 proptest! {
     #[test]
     fn the_state_jacobian_is_that_of_the_transition(
-        state in states(), motion in motions(), printed in any::<bool>(),
+        state in states(), motion in motions(), printed in any::<bool>(), decay_s in 0.0..3.0f64,
     ) {
-        let filter = filter(Config { compat_printed_velocity: printed, ..Config::default() });
-        let f = state_jacobian(&motion);
+        let config = Config { velocity_decay_s: decay_s, ..Config::default() };
+        let filter = filter(Config { compat_printed_velocity: printed, ..config });
+        let f = state_jacobian(&motion, decay_s);
         for i in 0..5 {
             let mut step = Vector5::zeros();
             step[i] = 1e-3;
@@ -155,6 +156,28 @@ fn the_process_noise_does_not_depend_on_the_frame_rate_as_the_printed_one_does()
     let printed = Config { compat_printed_noise: true, ..config };
     let ratio = velocity_variance_after_1s(&printed, 5) / velocity_variance_after_1s(&printed, 50);
     assert!((ratio - 10.0).abs() < 1e-6);
+}
+
+/// Returns x and the velocity along it, predicted from 3 m and 1 m/s over two seconds.
+fn predicted_over_2s(velocity_decay_s: f64, frames: u32) -> [f64; 2] {
+    let filter = filter(Config { velocity_decay_s, ..Config::default() });
+    let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
+    state.mean[3] = 1.0;
+    for _ in 0..frames {
+        filter.predict(&mut state, &EgoMotion::at_rest(2.0 / f64::from(frames)));
+    }
+    [state.mean[0], state.mean[3]]
+}
+
+#[test]
+fn a_velocity_decays_by_time_and_not_by_frames() {
+    for frames in [1, 6, 22] {
+        let [[x, speed], [constant, same]] =
+            [1.0, 0.0].map(|decay_s| predicted_over_2s(decay_s, frames));
+        let kept = (-2.0f64).exp();
+        assert!((speed - kept).abs() < 1e-9 && (x - 3.0 - (1.0 - kept)).abs() < 1e-9, "{frames}");
+        assert!((same - 1.0).abs() < 1e-9 && (constant - 5.0).abs() < 1e-9, "{frames}");
+    }
 }
 
 /// Returns the estimated height of a person that stands for 20 s and has sat for 1 s.

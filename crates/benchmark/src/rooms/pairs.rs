@@ -1,0 +1,103 @@
+//! Pipelines beside the last one that was named, in rooms that had no say in their settings.
+
+use serde::Serialize;
+use tagalong_reproduce::{Cell, Row, Table};
+use tagalong_stats::{Gain, paired_gain};
+use tagalong_tuning::Figures;
+
+use super::report::Fitted;
+
+/// Reads one figure.
+type Read = fn(&Figures) -> f64;
+
+/// Figures that are compared, with the titles of their columns.
+const COMPARED: [(&str, Read); 5] = [
+    ("HOTA", |figures| figures.hota),
+    ("IDF1", |figures| figures.idf1),
+    ("MOTA", |figures| figures.mota),
+    ("false", |figures| figures.false_a_frame),
+    ("recall", |figures| figures.recall),
+];
+
+/// Differences of a pipeline to the baseline over the rooms that both can read.
+#[derive(Serialize)]
+pub struct Pair {
+    pipeline: String,
+    baseline: String,
+    rooms: usize,
+    /// In the order of [`COMPARED`]; none if there is no such room.
+    gains: Vec<Option<Gain>>,
+}
+
+/// Compares all pipelines with the last one.
+pub fn pairs(pipelines: &[Fitted]) -> Vec<Pair> {
+    let Some((baseline, others)) = pipelines.split_last() else { return Vec::new() };
+    others.iter().map(|other| Pair::new(other, baseline)).collect()
+}
+
+impl Pair {
+    fn new(pipeline: &Fitted, baseline: &Fitted) -> Self {
+        let same = |name: &str| baseline.rooms.iter().find(|room| room.room == name);
+        let both: Vec<[Figures; 2]> = pipeline
+            .rooms
+            .iter()
+            .filter_map(|room| same(&room.room).map(|other| [other.without, room.without]))
+            .collect();
+        let gain = |figure: Read| {
+            let [a, b] = [0, 1].map(|at| both.iter().map(|pair| figure(&pair[at])).collect());
+            let [a, b]: [Vec<f64>; 2] = [a, b];
+            paired_gain(&a, &b)
+        };
+        Self {
+            pipeline: pipeline.name.clone(),
+            baseline: baseline.name.clone(),
+            rooms: both.len(),
+            gains: COMPARED.iter().map(|(_, figure)| gain(*figure)).collect(),
+        }
+    }
+}
+
+/// Returns the table of the differences, if there are any.
+pub fn differences(pairs: &[Pair]) -> Option<Table> {
+    let baseline = &pairs.first()?.baseline;
+    let row = |pair: &Pair| {
+        let rooms = Cell::number(pair.rooms as f64, 0);
+        let gains = pair.gains.iter().map(|gain| Cell::estimate(gain.map(|of| of.difference), 3));
+        Row::ours(&pair.pipeline, std::iter::once(rooms).chain(gains).collect())
+    };
+    let titles = COMPARED.iter().map(|(title, _)| *title);
+    Some(Table {
+        title: format!("Difference to {baseline}, each without the room that is scored"),
+        columns: std::iter::once("rooms").chain(titles).map(String::from).collect(),
+        rows: pairs.iter().map(row).collect(),
+        notes: vec![
+            "Means of the differences w/o, paired by room, with Student's intervals of 95 % over \
+             rooms; fewer than six rooms are never called clear."
+                .to_owned(),
+        ],
+    })
+}
+
+/// Returns the table of each log, in which the pipelines stand beside each other.
+pub fn by_log(pipelines: &[Fitted]) -> Table {
+    let rows = pipelines.iter().flat_map(|pipeline| {
+        let logs = pipeline.rooms.iter().flat_map(|room| &room.logs);
+        logs.map(|log| (log.log.as_str(), row(&format!("{}: {}", log.log, pipeline.name), log)))
+    });
+    let mut rows: Vec<(&str, Row)> = rows.collect();
+    rows.sort_by_key(|(log, _)| *log);
+    let two = COMPARED.iter().flat_map(|(title, _)| [format!("{title} w/o"), "as is".into()]);
+    Table {
+        title: "Log by log".into(),
+        columns: two.chain(["off m w/o".into()]).collect(),
+        rows: rows.into_iter().map(|(_, row)| row).collect(),
+        notes: vec!["w/o: without the room of the log, its other logs included.".to_owned()],
+    }
+}
+
+fn row(name: &str, log: &super::report::InLog) -> Row {
+    let each = COMPARED.iter().flat_map(|(_, figure)| [&log.without, &log.shipped].map(figure));
+    let cells = each.map(|figure| Cell::number(figure, 3));
+    let off = log.without.position_error_m.map_or_else(Cell::default, |off| Cell::number(off, 3));
+    Row::ours(name, cells.chain([off]).collect())
+}
