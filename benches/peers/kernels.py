@@ -8,6 +8,8 @@ the other's time by ours, so above 1 ours is faster. The answers are compared, t
 costs that differs from that of scipy ends the script.
 """
 
+import contextlib
+import io
 import os
 import statistics
 import subprocess
@@ -21,6 +23,7 @@ import numpy as np
 import supervision
 import trackers
 from filterpy.kalman import KalmanFilter
+from mot17_trackeval import once, tree
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import gaussian_kde
 
@@ -290,6 +293,67 @@ class Images:
         yield colour[0], "OpenCV", fastest(lambda: cv2.imdecode(colour[1], cv2.IMREAD_COLOR), 30)
 
 
+class Logs:
+    """The messages of an MCAP file; the `mcap` crate has the whole file in memory already."""
+
+    def __init__(self):
+        self.program = built("tagalong-log", "time_mcap")
+
+    def ours(self):
+        rows = lines(self.program)
+        self.crate = {self.job(form): float(ms) * 1e-3 for form, _, ms in rows}
+        return {self.job(form): float(ms) * 1e-3 for form, ms, _ in rows}
+
+    def theirs(self):
+        for job, seconds in self.crate.items():
+            yield job, "`mcap` crate", seconds
+
+    @staticmethod
+    def job(form):
+        return f"MCAP, 61 MB, compression: {form}"
+
+
+class Metrics:
+    """Reading and scoring a sequence by CLEAR, Identity and HOTA."""
+
+    JOB = "metrics, 1000 frames of 20 people"
+    FRAMES, PEOPLE, NAME = 1000, 20, "MOT17-02-FRCNN"
+
+    def __init__(self, folder):
+        self.program = built("tagalong-eval", "time_metrics")
+        mot, self.root = os.path.join(folder, "mot"), os.path.join(folder, "trackeval")
+        sequence = os.path.join(mot, "gt", "MOT17-train", self.NAME)
+        tracker = os.path.join(mot, "tracker-output", "MOT17-train")
+        os.makedirs(os.path.join(sequence, "gt"))
+        os.makedirs(tracker)
+        self.truth = os.path.join(sequence, "gt", "gt.txt")
+        self.tracks = os.path.join(tracker, self.NAME + ".txt")
+        random = np.random.default_rng(1)
+        corners = random.uniform(0, 1800, (self.PEOPLE, 2))
+        steps = random.normal(0, 1, (self.FRAMES, self.PEOPLE, 2)).cumsum(0)
+        with open(self.truth, "w") as truth, open(self.tracks, "w") as tracks:
+            for frame, places in enumerate(corners + steps, 1):
+                for person, (x, y) in enumerate(places, 1):
+                    truth.write(f"{frame},{person},{x:.1f},{y:.1f},60,120,1,1,1\n")
+                    # A tracker that is a few pixels off, misses some, and changes numbers at times.
+                    if random.random() < 0.9:
+                        x, y = random.normal((x, y), 5)
+                        number = person + 100 * ((frame + 37 * person) // 400)
+                        tracks.write(f"{frame},{number},{x:.1f},{y:.1f},60,120,1,-1,-1,-1\n")
+        with open(os.path.join(sequence, "seqinfo.ini"), "w") as info:
+            info.write(f"[Sequence]\nname={self.NAME}\nseqLength={self.FRAMES}\n")
+        tree(mot, self.root)
+
+    def ours(self):
+        ((ms,),) = lines(self.program, self.truth, self.tracks, str(self.FRAMES))
+        return {self.JOB: float(ms) * 1e-3}
+
+    def theirs(self):
+        with contextlib.redirect_stdout(io.StringIO()):
+            seconds = min(once(self.root) for _ in range(2))
+        yield self.JOB, "TrackEval", seconds
+
+
 class Stereo:
     """A wall and a box before it; ours does all its tests, theirs what its name says. Two threads
     are compared with one of ours."""
@@ -342,8 +406,8 @@ def main():
     cv2.setNumThreads(1)
     rounds = {}
     with tempfile.TemporaryDirectory() as folder:
-        groups = (Assignment(), Particles(), Patches(), Filters(), Trackers(), Images(folder),
-                  Stereo(folder))
+        groups = (Assignment(), Particles(), Patches(), Filters(), Trackers(), Metrics(folder),
+                  Logs(), Images(folder), Stereo(folder))
         for _ in range(ROUNDS):
             for group in groups:
                 ours = group.ours()

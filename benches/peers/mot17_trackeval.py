@@ -18,7 +18,9 @@ import numpy
 # TrackEval was written for numpy 1, which had these names for Python's types.
 numpy.float, numpy.int = float, int
 
-import trackeval  # noqa: E402
+# It prints the optional parts that it has nothing for.
+with contextlib.redirect_stdout(io.StringIO()):
+    import trackeval  # noqa: E402
 
 
 def tree(mot, root):

@@ -90,9 +90,13 @@ impl<F: PersonFilter> Filter for PerPerson<F> {
     fn update(&mut self, evidence: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         let camera = &evidence.frame.camera;
         let mut supported = BTreeMap::new();
-        for (id, matches) in by_track(evidence.matched) {
+        // A stable sort, so that the matches of a track stay in the order of the detections.
+        let mut matched = evidence.matched.to_vec();
+        matched.sort_by_key(|matched| matched.id);
+        for matches in matched.chunk_by(|a, b| a.id == b.id) {
+            let id = matches[0].id;
             let Some(state) = self.states.get_mut(&id) else { continue };
-            let support = match &matches[..] {
+            let support = match matches {
                 // A single certain match skips the mixture, so that one-to-one associations stay
                 // exact.
                 [only] if only.weight > 1.0 - CERTAINTY => {
@@ -112,15 +116,6 @@ impl<F: PersonFilter> Filter for PerPerson<F> {
     fn stop(&mut self, id: TrackId) {
         self.states.remove(&id);
     }
-}
-
-/// Groups the matches by track.
-fn by_track<'a>(matched: &[Matched<'a>]) -> BTreeMap<TrackId, Vec<Matched<'a>>> {
-    let mut groups: BTreeMap<TrackId, Vec<Matched<'a>>> = BTreeMap::new();
-    for matched in matched {
-        groups.entry(matched.id).or_default().push(*matched);
-    }
-    groups
 }
 
 #[cfg(test)]

@@ -43,6 +43,8 @@ pub(crate) struct DetectionSet {
     all: Vec<PendingDetection>,
     /// Track, index of the detection, weight.
     pairs: Vec<(TrackId, usize, f64)>,
+    /// The places in `pairs` of each track, in the order of the tracks.
+    places: Vec<(TrackId, usize)>,
 }
 
 impl DetectionSet {
@@ -67,12 +69,27 @@ impl DetectionSet {
 
     /// Returns the probability that a track was detected at all.
     pub(crate) fn weight_of_track(&self, id: TrackId) -> f64 {
-        self.pairs.iter().filter(|(track, ..)| *track == id).map(|(.., weight)| weight).sum()
+        self.pairs_of(id).map(|(.., weight)| weight).sum()
     }
 
     fn heaviest(&self, id: TrackId) -> Option<usize> {
-        let of_track = self.pairs.iter().filter(|(track, ..)| *track == id);
-        of_track.max_by(|a, b| a.2.total_cmp(&b.2)).map(|(_, index, _)| *index)
+        let heaviest = self.pairs_of(id).max_by(|a, b| a.2.total_cmp(&b.2));
+        heaviest.map(|(_, index, _)| *index)
+    }
+
+    /// Returns the pairs of a track. Each track asks for its own several times a frame, which was
+    /// a look at all pairs of all tracks.
+    fn pairs_of(&self, id: TrackId) -> impl Iterator<Item = &(TrackId, usize, f64)> {
+        let from = self.places.partition_point(|(track, _)| *track < id);
+        let own = self.places[from..].iter().take_while(move |(track, _)| *track == id);
+        own.map(|(_, place)| &self.pairs[*place])
+    }
+
+    fn sort_places(&mut self) {
+        let places = self.pairs.iter().enumerate().map(|(place, (id, ..))| (*id, place));
+        self.places.clear();
+        self.places.extend(places);
+        self.places.sort_unstable();
     }
 
     /// Changes the detections of a track, and returns the most probable one afterwards.
@@ -81,9 +98,8 @@ impl DetectionSet {
         id: TrackId,
         mut change: impl FnMut(&mut Detection),
     ) -> Option<&Detection> {
-        for (_, index, _) in self.pairs.iter().filter(|(track, ..)| *track == id) {
-            change(&mut self.all[*index].detection);
-        }
+        let own: Vec<usize> = self.pairs_of(id).map(|(_, index, _)| *index).collect();
+        own.into_iter().for_each(|index| change(&mut self.all[index].detection));
         self.heaviest(id).map(|index| &self.all[index].detection)
     }
 
@@ -141,16 +157,17 @@ impl DetectionSet {
 
     /// Applies the decisions of the associator about the detections at the indices `open`.
     pub(crate) fn take_over(&mut self, answer: &Associations, tracks: &[Track], open: &[usize]) {
-        for pair in &answer.pairs {
-            self.pairs.push((tracks[pair.track].id, open[pair.detection], pair.weight));
-        }
         // A detection that several tracks share is reported with the most probable one.
-        for &index in open {
-            let of_detection = self.pairs.iter().filter(|(_, detection, _)| *detection == index);
-            if let Some((id, ..)) = of_detection.max_by(|a, b| a.2.total_cmp(&b.2)) {
-                self.all[index].fate = Some(Fate::Matched(*id));
+        let mut most = vec![f64::NEG_INFINITY; open.len()];
+        for pair in &answer.pairs {
+            let (id, index) = (tracks[pair.track].id, open[pair.detection]);
+            self.pairs.push((id, index, pair.weight));
+            if pair.weight >= most[pair.detection] {
+                most[pair.detection] = pair.weight;
+                self.all[index].fate = Some(Fate::Matched(id));
             }
         }
+        self.sort_places();
         for spent in answer.spent.iter().filter_map(|at| open.get(*at)) {
             self.all[*spent].fate.get_or_insert(Fate::Dropped("associator"));
         }
@@ -159,6 +176,7 @@ impl DetectionSet {
     /// Drops the detections of tracks that the filter does not support.
     pub(crate) fn reject(&mut self, is_supported: impl Fn(TrackId) -> bool, test: &'static str) {
         self.pairs.retain(|(id, ..)| is_supported(*id));
+        self.sort_places();
         for pending in &mut self.all {
             if let Some(Fate::Matched(id)) = pending.fate
                 && !is_supported(id)

@@ -103,6 +103,17 @@ impl Pose {
     fn px_per_m(self) -> f64 {
         (f64::from(self.scale_step) * SCALE_STEP).exp()
     }
+
+    /// Returns how far the window reaches left and right of the head centre, pixels.
+    pub(crate) fn half_width(self) -> i64 {
+        (HALF_WIDTH_M * self.px_per_m()).round() as i64
+    }
+
+    /// Returns how far left and right of the head centre the person can show or hide anything,
+    /// pixels.
+    pub(crate) fn reach(self) -> i64 {
+        ((HALF_WIDTH_M + GUARD_M) * self.px_per_m()).ceil() as i64 + 1
+    }
 }
 
 /// Silhouettes in all body directions, viewing angles and scales. They are
@@ -150,24 +161,24 @@ impl Bank {
     /// The template of a pose.
     pub fn template(&mut self, pose: Pose) -> &Template {
         let Self { reliefs, templates, max_rows } = self;
-        templates.entry(pose).or_insert_with(|| cut(reliefs, pose, *max_rows))
+        templates.entry(pose).or_insert_with(|| {
+            let cutter = Cutter::new(reliefs, pose);
+            Template::new(cutter.with_reliefs(cutter.outline(*max_rows).iter()), pose.half_width())
+        })
     }
 
-    /// Cuts the template of a pose without keeping it.
-    pub(crate) fn cut(&self, pose: Pose) -> Template {
-        cut(self.reliefs, pose, self.max_rows)
+    /// Cuts the rows of a pose without their reliefs, which take most of the time, and keeps none.
+    pub(crate) fn outline(&self, pose: Pose) -> Vec<TemplateRow> {
+        Cutter::new(self.reliefs, pose).outline(self.max_rows)
     }
 }
 
-/// Cuts the relief of a pose into runs at its scale and roll.
-fn cut(reliefs: &Reliefs, pose: Pose, max_rows: usize) -> Template {
-    let relief = &reliefs[pose.direction as usize][(pose.pitch - FIRST_PITCH) as usize];
-    let scale = pose.px_per_m();
-    let (first, last) = ((-ABOVE_M * scale).round() as i64, (BELOW_M * scale).round() as i64);
-    let half_width = (HALF_WIDTH_M * scale).round() as i64;
-    let step = ((last - first + 1) as usize).div_ceil(max_rows).max(1);
-    let cutter = Cutter::new(relief, pose, half_width);
-    Template::new((first..=last).step_by(step).map(|dy| cutter.row(dy)).collect(), half_width)
+/// Returns rows of an outline with their reliefs.
+pub(crate) fn with_reliefs<'a>(
+    pose: Pose,
+    rows: impl Iterator<Item = &'a TemplateRow>,
+) -> Vec<TemplateRow> {
+    Cutter::new(&RELIEFS, pose).with_reliefs(rows)
 }
 
 /// A relief under the pixels of a template. A turned person shifts along a row by the same steps
@@ -177,45 +188,53 @@ struct Cutter<'a> {
     scale: f64,
     /// Sine and cosine of the roll.
     turn: (f64, f64),
-    half_width: i64,
-    /// Steps right and up on the relief of each column of the window, m.
-    columns: Vec<(f64, f64)>,
+    columns: Vec<Column>,
     /// Depth of the face, m.
     face: f64,
 }
 
+/// A column of the window, and its steps right and up on the relief, m.
+struct Column {
+    dx: i64,
+    right_m: f64,
+    up_m: f64,
+}
+
 impl<'a> Cutter<'a> {
-    fn new(relief: &'a Relief, pose: Pose, half_width: i64) -> Self {
-        let scale = pose.px_per_m();
+    /// A cutter at the scale and roll of a pose.
+    fn new(reliefs: &'a Reliefs, pose: Pose) -> Self {
+        let relief = &reliefs[pose.direction as usize][(pose.pitch - FIRST_PITCH) as usize];
+        let (scale, half_width) = (pose.px_per_m(), pose.half_width());
         let (sin, cos) = (f64::from(pose.roll) * ROLL_STEP_DEG).to_radians().sin_cos();
         let column = |dx: i64| {
             let x = dx as f64 / scale;
-            (x * cos, x * sin)
+            Column { dx, right_m: x * cos, up_m: x * sin }
         };
         let columns = (-half_width..=half_width).map(column).collect();
-        Self { relief, scale, turn: (sin, cos), half_width, columns, face: relief.at(0.0, 0.0) }
+        Self { relief, scale, turn: (sin, cos), columns, face: relief.at(0.0, 0.0) }
     }
 
-    /// Returns the row of the template `dy` pixels below the head centre.
+    /// Returns at most `max_rows` rows, without their reliefs.
+    fn outline(&self, max_rows: usize) -> Vec<TemplateRow> {
+        let [first, last] = [-ABOVE_M, BELOW_M].map(|m| (m * self.scale).round() as i64);
+        let step = ((last - first + 1) as usize).div_ceil(max_rows).max(1);
+        (first..=last).step_by(step).map(|dy| self.row(dy)).collect()
+    }
+
+    fn with_reliefs<'r>(&self, rows: impl Iterator<Item = &'r TemplateRow>) -> Vec<TemplateRow> {
+        rows.map(|row| TemplateRow { relief_m: self.mean_relief(row), ..*row }).collect()
+    }
+
+    /// Returns the row of the template `dy` pixels below the head centre, without its relief.
     fn row(&self, dy: i64) -> TemplateRow {
-        let y = dy as f64 / self.scale;
-        let (right, down) = (y * self.turn.0, y * self.turn.1);
-        let (mut from, mut to, mut sum, mut count) = (0, 0, 0.0, 0.0);
-        for (dx, column) in (-self.half_width..).zip(&self.columns) {
-            let behind = self.relief.at(column.0 + right, down - column.1);
-            if behind.is_nan() {
-                continue;
-            }
-            if count == 0.0 {
-                from = dx;
-            }
-            to = dx + 1;
-            sum += behind - self.face;
-            count += 1.0;
-        }
-        if count == 0.0 {
+        let start = self.start_of(dy);
+        let columns = self.columns_of_body(start);
+        let is_body = |column: &&Column| !self.behind(start, column).is_nan();
+        let ends = (columns.iter().find(is_body), columns.iter().rfind(is_body));
+        let (Some(first), Some(last)) = ends else {
             return TemplateRow { dy, from: 0, to: 0, guard_from: 0, guard_to: 0, relief_m: 0.0 };
-        }
+        };
+        let (from, to) = (first.dx, last.dx + 1);
         let guard = ((GUARD_M * self.scale).round() as i64).max(1).min((to - from) / 4);
         TemplateRow {
             dy,
@@ -223,8 +242,45 @@ impl<'a> Cutter<'a> {
             to: to - guard,
             guard_from: from - guard,
             guard_to: to + guard,
-            relief_m: sum / count,
+            relief_m: 0.0,
         }
+    }
+
+    /// Returns the mean depth of the person behind the face in a row, edges included, m.
+    fn mean_relief(&self, row: &TemplateRow) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        let start = self.start_of(row.dy);
+        for column in self.columns_of_body(start) {
+            let behind = self.behind(start, column);
+            if !behind.is_nan() {
+                sum += behind - self.face;
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { sum / count } else { 0.0 }
+    }
+
+    /// Returns the place on the relief of a row's middle, m right and down.
+    fn start_of(&self, dy: i64) -> (f64, f64) {
+        let y = dy as f64 / self.scale;
+        (y * self.turn.0, y * self.turn.1)
+    }
+
+    /// Returns the depth behind the head in a column of the row that starts there, m.
+    fn behind(&self, (right_m, down_m): (f64, f64), column: &Column) -> f64 {
+        self.relief.at(column.right_m + right_m, down_m - column.up_m)
+    }
+
+    /// Returns the columns of a row between which the body lies: most of a window is beside it.
+    fn columns_of_body(&self, (right_m, down_m): (f64, f64)) -> &[Column] {
+        let [Some(left), Some(right)] = [self.columns.first(), self.columns.last()] else {
+            return &[];
+        };
+        let (up_m, least_up_m) = (left.up_m.max(right.up_m), left.up_m.min(right.up_m));
+        let (from_m, to_m) = self.relief.extent(down_m - up_m, down_m - least_up_m);
+        let from = self.columns.partition_point(|column| column.right_m + right_m < from_m);
+        let to = self.columns.partition_point(|column| column.right_m + right_m <= to_m);
+        &self.columns[from..to.max(from)]
     }
 }
 
@@ -268,7 +324,10 @@ mod tests {
             which in 0usize..3, pitch in -1.0..1.5f64, roll in -2.0..2.0f64, scale in 5.0..300.0f64,
         ) {
             let pose = Pose::nearest(Direction::ALL[which], pitch, roll, scale);
-            let template = Bank::new(usize::MAX).cut(pose);
+            let mut bank = Bank::new(usize::MAX);
+            let outline = bank.outline(pose);
+            let template = bank.template(pose);
+            prop_assert_eq!(&with_reliefs(pose, outline.iter()), &template.rows);
             let relief = render(pose.direction.yaw_rad(), (f64::from(pose.pitch) * PITCH_STEP_DEG).to_radians());
             for row in &template.rows {
                 let slow = slow_row(&relief, pose, row.dy, template.half_width);

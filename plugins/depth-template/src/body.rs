@@ -39,6 +39,8 @@ pub fn body_parts() -> [Part; 9] {
 #[derive(Clone, Debug)]
 pub struct Relief {
     cells: Vec<f64>,
+    /// Cells of each line between which the body lies.
+    extents: Vec<Range<usize>>,
 }
 
 impl Relief {
@@ -46,6 +48,30 @@ impl Relief {
     pub const SIZE: usize = 200;
     /// Width and height, m.
     pub const SIDE_M: f64 = 1.0;
+    const CELL_M: f64 = Self::SIDE_M / Self::SIZE as f64;
+
+    fn new(cells: Vec<f64>) -> Self {
+        let extent = |line: &[f64]| {
+            let is_body = |cell: &f64| !cell.is_nan();
+            let first = line.iter().position(is_body).unwrap_or(Self::SIZE);
+            first..line.iter().rposition(is_body).map_or(0, |last| last + 1)
+        };
+        let extents = cells.chunks(Self::SIZE).map(extent).collect();
+        Self { cells, extents }
+    }
+
+    /// Returns a range right of the head centre, m, outside of which there is no body between two
+    /// lines, m below it; it ends before it starts where there is none at all.
+    pub fn extent(&self, from_m: f64, to_m: f64) -> (f64, f64) {
+        let line = |m: f64| ((m / Self::SIDE_M + 0.5) * Self::SIZE as f64).max(0.0) as usize;
+        // A cell more on each side, so that rounding cannot cut the border off.
+        let from = line(from_m).saturating_sub(1).min(Self::SIZE);
+        let lines = &self.extents[from..(line(to_m) + 2).clamp(from, Self::SIZE)];
+        let (first, last) = lines
+            .iter()
+            .fold((Self::SIZE, 0), |(first, last), e| (first.min(e.start), last.max(e.end)));
+        (middle_m(first) - Self::CELL_M, middle_m(last) + Self::CELL_M)
+    }
 
     /// The relief at `right`, `down` of the head centre, m; NaN beside the body.
     pub fn at(&self, right_m: f64, down_m: f64) -> f64 {
@@ -84,7 +110,7 @@ pub fn render(yaw_rad: f64, pitch_rad: f64) -> Relief {
             }
         }
     }
-    Relief { cells }
+    Relief::new(cells)
 }
 
 /// Returns the middle of a cell along one side of the relief, m.

@@ -15,6 +15,8 @@ const LEVEL_STEP: f64 = 0.03;
 const PER_STEP: f64 = 1.0 / LEVEL_STEP;
 const LEVELS: usize = 160;
 const NEAREST_M: f64 = 0.2;
+/// Levels of a row for which there is room from the start.
+const USUAL_LEVELS: usize = 8;
 const NONE: u32 = u32::MAX;
 
 /// A depth at which a person may be, as a step of a logarithmic scale.
@@ -100,6 +102,8 @@ impl Scores {
         };
         self.image = Arc::clone(image);
         self.sums.clear();
+        // Memory that grew within a frame was copied, and new to the processor, each time.
+        self.sums.reserve(image.0.height() * (self.columns.len() + 1) * USUAL_LEVELS);
         self.places.clear();
         self.places.resize(image.0.height() * LEVELS, NONE);
     }

@@ -108,6 +108,11 @@ impl MetricImage {
         self.scale == rows.scale() as f64 && *self.camera == *camera
     }
 
+    /// Columns of the reduced image, or one more.
+    pub fn width(&self) -> i64 {
+        self.columns as i64 * Self::GRID
+    }
+
     /// The upward direction in the image is that in which a point moves when
     /// it is raised; it does not depend on the depth.
     fn geometry_of(&self, x: f64, y: f64, up_in_camera: &Vector3<f64>) -> Geometry {

@@ -1,12 +1,12 @@
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use tagalong_core::{Frame, Likelihood, Person, Result, Visualisation};
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 use tagalong_vision::ComparedPixels;
 
-use crate::bank::{Bank, Direction, Pose, Template, TemplateRow};
-use crate::config::DepthTemplateConfig;
+use crate::bank::{Bank, Direction, Pose, TemplateRow, with_reliefs};
+use crate::config::{DepthTemplateConfig, Weighing};
 use crate::printed::{Canvas, Printed};
 use crate::scores::{Levels, ONE, Scores};
 use crate::view::{MetricImage, Working};
@@ -27,6 +27,8 @@ pub struct Weigher {
 struct Tools {
     tolerance_m: f64,
     one_sided: f64,
+    /// Windows beside the image count: the printed form looks at all between the windows.
+    all_windows: bool,
     silhouettes: Silhouettes,
     view: Option<Arc<MetricImage>>,
     canvas: Option<Arc<Canvas>>,
@@ -59,12 +61,14 @@ struct Silhouettes {
 struct Silhouette {
     /// Which one it is.
     number: usize,
+    pose: Pose,
+    /// All rows without their reliefs.
     rows: Vec<TemplateRow>,
     half_width: i64,
     /// Distance of the rows that are looked at.
     step: i64,
-    /// Every `step`-th row, from each of the first ones on.
-    thinned: Vec<Vec<TemplateRow>>,
+    /// Every `step`-th row with its relief, from each of the first ones on, once asked for.
+    thinned: Vec<OnceLock<Vec<TemplateRow>>>,
     /// Pixels of the person in the rows that are looked at.
     area: f64,
 }
@@ -87,6 +91,7 @@ impl Weigher {
         let tools = Tools {
             tolerance_m: config.likelihood_tolerance_m,
             one_sided: config.likelihood_one_sided,
+            all_windows: config.weighing != Weighing::Ratio,
             silhouettes: Silhouettes { bank: Bank::new(usize::MAX), kept: Vec::new() },
             view: None,
             canvas: None,
@@ -223,7 +228,7 @@ impl Tools {
     }
 
     /// Returns the place of a person's silhouette in the image; `None` behind the camera, or so far
-    /// aside that nothing can be seen.
+    /// aside that nothing can be seen or hidden.
     fn place(
         &mut self,
         person: &Person,
@@ -243,6 +248,10 @@ impl Tools {
         let (inside_x, inside_y) = view.nearest_inside(x, y);
         let local = view.local(inside_x, inside_y, depth_m);
         let pose = Pose::nearest(direction, local.pitch_rad, local.roll_rad, local.px_per_m);
+        let reach = pose.reach();
+        if !self.all_windows && !(-reach..view.width() + reach).contains(&x) {
+            return None;
+        }
         let silhouette = self.silhouettes.of(pose);
         let reach_m = depth_m + self.tolerance_m;
         Some(Placed { silhouette, x, y, depth_m, reach_m, levels: Levels::of_face(depth_m) })
@@ -384,11 +393,12 @@ fn rivals(scene: &[Placed], k: usize) -> impl Iterator<Item = &Placed> {
 impl Placed {
     /// The rows of the silhouette that are looked at, with their lines.
     fn rows(&self, height: i64) -> impl Iterator<Item = (i64, &TemplateRow)> {
-        let Silhouette { rows, thinned, step, .. } = &*self.silhouette;
+        let Silhouette { rows, step, .. } = &*self.silhouette;
         let first = self.y + rows.first().map_or(0, |row| row.dy);
         let phase = (-first).rem_euclid(*step);
         let above = (-first - phase).max(0) / step;
-        let rows = thinned[phase as usize].get(above as usize..).unwrap_or_default();
+        let rows =
+            self.silhouette.thinned(phase as usize).get(above as usize..).unwrap_or_default();
         let lines = (first + phase + above * step..height).step_by(*step as usize);
         lines.zip(rows)
     }
@@ -443,7 +453,7 @@ impl Silhouettes {
         let found = self.kept.binary_search_by(|(kept, _)| kept.cmp(&pose));
         let at = found.unwrap_or_else(|at| {
             let number = self.kept.len();
-            let silhouette = Arc::new(Silhouette::new(self.bank.cut(pose), number));
+            let silhouette = Arc::new(Silhouette::new(self.bank.outline(pose), pose, number));
             self.kept.insert(at, (pose, silhouette));
             at
         });
@@ -452,14 +462,18 @@ impl Silhouettes {
 }
 
 impl Silhouette {
-    fn new(template: Template, number: usize) -> Self {
-        let Template { rows, half_width, .. } = template;
+    fn new(rows: Vec<TemplateRow>, pose: Pose, number: usize) -> Self {
         let pixels: i64 = rows.iter().map(|row| (row.to - row.from).max(0)).sum();
         let step = ROW_STEPS[usize::from(rows.len() >= MANY_ROWS)];
-        let every = |from| rows.iter().skip(from).step_by(step as usize).copied().collect();
-        let thinned = (0..step as usize).map(every).collect();
+        let thinned = vec![OnceLock::new(); step as usize];
         let area = (pixels as f64 / step as f64).max(1.0);
-        Self { number, half_width, step, thinned, area, rows }
+        Self { number, pose, half_width: pose.half_width(), step, thinned, area, rows }
+    }
+
+    /// Returns every `step`-th row from the one number `phase` on.
+    fn thinned(&self, phase: usize) -> &[TemplateRow] {
+        let every = || self.rows.iter().skip(phase).step_by(self.step as usize);
+        self.thinned[phase].get_or_init(|| with_reliefs(self.pose, every()))
     }
 }
 

@@ -102,12 +102,14 @@ impl PersonFilter for Ekf {
     }
 
     fn predict(&self, state: &mut State, motion: &EgoMotion) {
-        let f = state_jacobian(motion, self.config.velocity_decay_s);
         state.mean = self.transition(&state.mean, motion);
-        let covariance = f * state.covariance * f.transpose()
-            + self.process_noise(motion.dt)
-            + self.ego_noise(&state.mean, motion);
-        state.covariance = symmetric(covariance);
+        let moved = moved(&state.covariance, motion, self.config.velocity_decay_s);
+        let covariance = moved + self.process_noise(motion.dt);
+        // A robot at rest, or one whose motion is certain, adds none.
+        state.covariance = symmetric(match motion.covariance == Matrix3::zeros() {
+            true => covariance,
+            false => covariance + self.ego_noise(&state.mean, motion),
+        });
     }
 
     /// The update in Joseph form. S = P + R is positive definite as long as P
@@ -119,13 +121,19 @@ impl PersonFilter for Ekf {
         let variances = detection.covariance.diagonal();
         let measured = variances.iter().filter(|v| **v < UNMEASURED_M2).count() as u32;
         let normal = self.measurement(detection);
-        let Some(s) = symmetric3(prior + normal).cholesky() else {
+        let Some(mut inverted) = inverse(&symmetric3(prior + normal)) else {
             return Update::default();
         };
-        let nis = innovation.dot(&s.solve(&innovation));
-        let r = normal / self.weight(&prior, &normal, &innovation, measured);
-        let Some(s) = symmetric3(prior + r).cholesky() else { return Update::default() };
-        let gain: Matrix5x3 = s.solve(&p.fixed_rows::<3>(0).into_owned()).transpose();
+        let nis = innovation.dot(&(inverted * innovation));
+        let mut r = normal;
+        if self.config.student_dof != 0.0 {
+            r /= self.weight(&prior, &normal, &innovation, measured);
+            let Some(weighted) = inverse(&symmetric3(prior + r)) else {
+                return Update::default();
+            };
+            inverted = weighted;
+        }
+        let gain: Matrix5x3 = p.fixed_columns::<3>(0) * inverted;
         state.mean += gain * innovation;
         state.covariance = self.corrected(&p, &gain, &r);
         Update { nis: Some((nis, measured)) }
@@ -163,24 +171,20 @@ impl Ekf {
         measured: u32,
     ) -> f64 {
         let dof = self.config.student_dof;
-        if dof == 0.0 {
-            return 1.0;
-        }
         (0..STUDENT_ROUNDS).fold(1.0, |weight, _| {
-            let s = symmetric3(prior + normal / weight).cholesky();
-            let squared = s.map_or(0.0, |s| innovation.dot(&s.solve(innovation)));
+            let inverted = inverse(&symmetric3(prior + normal / weight));
+            let squared = inverted.map_or(0.0, |inverted| innovation.dot(&(inverted * innovation)));
             ((dof + f64::from(measured)) / (dof + squared)).min(1.0)
         })
     }
 
     fn corrected(&self, p: &Matrix5, gain: &Matrix5x3, r: &Matrix3<f64>) -> Matrix5 {
-        let mut kept = Matrix5::identity();
-        let mut seen = kept.fixed_columns_mut::<3>(0);
-        seen -= gain;
+        let less = less_seen(gain, p);
         if self.config.compat_printed_update {
-            return kept * p;
+            return less;
         }
-        symmetric(kept * p * kept.transpose() + gain * r * gain.transpose())
+        let both = less_seen(gain, &less.transpose()).transpose();
+        symmetric(both + gain * r * gain.transpose())
     }
 }
 
@@ -193,6 +197,40 @@ fn decayed(time_constant_s: f64, dt: f64) -> (f64, f64) {
     (time_constant_s * (1.0 - kept), kept)
 }
 
+/// Returns F M F' with the Jacobian F of the transition, without its zeros: the sums of the others
+/// are in the same order.
+pub(crate) fn moved(m: &Matrix5, motion: &EgoMotion, decay_s: f64) -> Matrix5 {
+    let back = turn_back(motion);
+    let (passed, kept) = decayed(decay_s, motion.dt);
+    let (ahead, onwards) = (back * passed, back * kept);
+    let rows = |m: &Matrix5| {
+        let mut out = *m;
+        for (mut out, m) in out.column_iter_mut().zip(m.column_iter()) {
+            for i in 0..2 {
+                let now = back[(i, 0)] * m[0] + back[(i, 1)] * m[1];
+                out[i] = now + ahead[(i, 0)] * m[3] + ahead[(i, 1)] * m[4];
+                out[i + 3] = onwards[(i, 0)] * m[3] + onwards[(i, 1)] * m[4];
+            }
+        }
+        out
+    };
+    rows(&rows(m).transpose()).transpose()
+}
+
+/// Returns (I - K H) M, without the zeros and ones of the velocities, which are not measured.
+pub(crate) fn less_seen(gain: &Matrix5x3, m: &Matrix5) -> Matrix5 {
+    let mut kept = -gain;
+    (0..3).for_each(|i| kept[(i, i)] += 1.0);
+    let mut out = Matrix5::zeros();
+    for (mut out, m) in out.column_iter_mut().zip(m.column_iter()) {
+        for i in 0..5 {
+            let seen = kept[(i, 0)] * m[0] + kept[(i, 1)] * m[1] + kept[(i, 2)] * m[2];
+            out[i] = if i < 3 { seen } else { seen + m[i] };
+        }
+    }
+    out
+}
+
 /// From the axes before the robot's turn to those after it.
 fn turn_back(motion: &EgoMotion) -> Matrix2<f64> {
     let (sin, cos) = motion.turn.sin_cos();
@@ -200,6 +238,7 @@ fn turn_back(motion: &EgoMotion) -> Matrix2<f64> {
 }
 
 /// Derivative of the transition by the state.
+#[cfg(test)]
 pub(crate) fn state_jacobian(motion: &EgoMotion, decay_s: f64) -> Matrix5 {
     let back = turn_back(motion);
     let (passed, kept) = decayed(decay_s, motion.dt);
@@ -219,6 +258,18 @@ pub(crate) fn motion_jacobian(predicted: &Vector5<f64>, motion: &EgoMotion) -> M
     let [x, y, _, vx, vy] = [0, 1, 2, 3, 4].map(|i| predicted[i]);
     j.set_column(2, &Vector5::new(y, -x, 0.0, vy, -vx));
     j
+}
+
+/// Returns the inverse of a symmetric matrix by its minors, with one division, where factors take
+/// dozens; `None` for a matrix that is not positive definite (Sylvester's criterion).
+pub(crate) fn inverse(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let [a, b, c, d, e, f] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|place| m[place]);
+    let (first, second, third) = (d * f - e * e, c * e - b * f, b * e - c * d);
+    let (middle, last, beside) = (a * f - c * c, a * d - b * b, b * c - a * e);
+    let determinant = a * first + b * second + c * third;
+    let is_positive = a > 0.0 && last > 0.0 && determinant > 0.0;
+    let adjugate = Matrix3::new(first, second, third, second, middle, beside, third, beside, last);
+    is_positive.then(|| adjugate * (1.0 / determinant))
 }
 
 fn symmetric(m: Matrix5) -> Matrix5 {

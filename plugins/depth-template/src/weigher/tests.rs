@@ -28,8 +28,10 @@ fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
     let mut weight = 0.0;
     for (k, person) in cast.iter().enumerate() {
         let (mut sum, mut beside) = (0, [0, 0]);
-        for (index, row) in person.silhouette.rows.iter().enumerate() {
-            let line = person.y + person.silhouette.rows[0].dy + index as i64;
+        let mut bank = Bank::new(usize::MAX);
+        let rows = &bank.template(person.silhouette.pose).rows;
+        for (index, row) in rows.iter().enumerate() {
+            let line = person.y + rows[0].dy + index as i64;
             if line % person.silhouette.step != 0 || !(0..60).contains(&line) {
                 continue;
             }
@@ -91,6 +93,31 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn people_beside_the_image_are_left_out_and_change_nothing(
+        pixels in prop::collection::vec(prop_oneof![Just(f32::NAN), 1.0f32..4.0], 80 * 60),
+        scene in prop::collection::vec((person(), 1.0..4.0f64), 1..4),
+    ) {
+        let scene: Vec<Person> = scene
+            .into_iter()
+            .map(|(mut person, aside)| {
+                person.position.y *= aside;
+                person
+            })
+            .collect();
+        let frame = frame(pixels);
+        let [some, all] = [false, true].map(|all_windows| {
+            let weigher = Weigher::new(&DepthTemplateConfig::default());
+            weigher.tools().all_windows = all_windows;
+            weigher.log_likelihood(&frame, &scene).unwrap()
+        });
+        prop_assert_eq!(some, all);
+    }
+}
+
 /// A wall at 5 m and people painted as their silhouettes.
 fn painted(people: &[Person]) -> Frame {
     let weigher = Weigher::new(&DepthTemplateConfig::default());
@@ -107,7 +134,7 @@ fn painted(people: &[Person]) -> Frame {
         let here = |p: &&Placed| p.body(y).is_some_and(|(a, b)| a <= x && x < b);
         let relief = |p: &Placed| {
             let row = p.silhouette.rows.iter().find(|row| p.y + row.dy == y);
-            row.map_or(0.0, |row| row.relief_m)
+            row.map_or(0.0, |row| with_reliefs(p.silhouette.pose, std::iter::once(row))[0].relief_m)
         };
         let nearest = cast.iter().filter(here).map(|p| (p.depth_m + relief(p)) as f32);
         nearest.fold(5.0, f32::min)

@@ -7,7 +7,7 @@ use tagalong_core::{DiffDrive, EgoMotion};
 use tagalong_filtering::PersonFilter;
 
 use super::world::{DT_S, World, camera, detection, normal3};
-use crate::filter::{motion_jacobian, state_jacobian};
+use crate::filter::{inverse, less_seen, motion_jacobian, moved, state_jacobian};
 use crate::{Config, Ekf, State};
 
 fn filter(config: Config) -> Ekf {
@@ -63,6 +63,42 @@ proptest! {
             let ahead = filter.transition(&state, &with(&motion, i, 1e-4));
             let behind = filter.transition(&state, &with(&motion, i, -1e-4));
             prop_assert!(((ahead - behind) / 2e-4 - j.column(i)).norm() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn products_without_zeros_are_the_whole_ones_to_the_last_bit(
+        motion in motions(), m in prop::array::uniform25(-5.0..5.0f64),
+        gain in prop::array::uniform15(-1.0..1.0f64), decay_s in 0.0..3.0f64,
+    ) {
+        let m = SMatrix::<f64, 5, 5>::from_iterator(m);
+        let f = state_jacobian(&motion, decay_s);
+        prop_assert_eq!(moved(&m, &motion, decay_s), f * m * f.transpose());
+        let gain = SMatrix::<f64, 5, 3>::from_iterator(gain);
+        let mut kept = SMatrix::<f64, 5, 5>::identity();
+        let mut seen = kept.fixed_columns_mut::<3>(0);
+        seen -= gain;
+        prop_assert_eq!(less_seen(&gain, &m), kept * m);
+        let both = less_seen(&gain, &less_seen(&gain, &m).transpose()).transpose();
+        prop_assert_eq!(both, kept * m * kept.transpose());
+    }
+
+    #[test]
+    fn an_inverse_by_minors_is_that_of_the_factors(
+        root in prop::array::uniform9(-1.0..1.0f64), scale in prop::array::uniform3(-3.0..3.0f64),
+        off in -0.5..2.0f64,
+    ) {
+        // Standard deviations from a millimetre to a kilometre, as of what was not measured.
+        let scale = Matrix3::from_diagonal(&Vector3::from(scale.map(|s| 10f64.powf(s))));
+        let root = Matrix3::from_iterator(root);
+        let core = root * root.transpose() + Matrix3::identity() * 0.05;
+        let m = scale * core * scale;
+        let (ours, slow) = (inverse(&m).unwrap(), m.cholesky().unwrap().inverse());
+        let unit = scale * (ours - slow) * scale;
+        prop_assert!(unit.amax() < 1e-10, "{}", unit);
+        let shifted = core - Matrix3::identity() * off;
+        if shifted.symmetric_eigenvalues().min().abs() > 1e-9 {
+            prop_assert_eq!(inverse(&shifted).is_some(), shifted.cholesky().is_some());
         }
     }
 
