@@ -1,4 +1,8 @@
-//! Changes since the previous image, with a robot that moved between the two.
+//! Changes since a previous image, with a robot that moved between the two.
+
+use std::collections::VecDeque;
+
+use tagalong_core::EgoMotion;
 
 use crate::circular::Run;
 use crate::warp::{Sweep, Warp};
@@ -7,36 +11,69 @@ use crate::warp::{Sweep, Warp};
 /// noise and interpolation leave.
 const SAME: f32 = 12.0;
 
-/// Comparator of an image with the previous one. Unlike the background, the previous image has no
-/// errors of many motions, and no people of long ago.
+/// Most images that are remembered.
+const MOST_IMAGES: usize = 16;
+/// Least time between two images in which a person moves visibly, s.
+const STEP_S: f64 = 0.2;
+
+/// Comparator of an image with the last one that is old enough for a person to have moved since. Unlike
+/// the background, that image has no errors of many motions, and no people of long ago.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Changes {
-    /// Colours of the previous image, three per pixel.
-    previous: Vec<f32>,
+    /// Images that are too young, and before them one that is not; oldest first.
+    past: VecDeque<Past>,
+    /// The image that is compared, as it looks from the robot's new place.
+    moved: Vec<f32>,
     /// 1 where the last image differs from it, else 0; empty if they were not compared.
     changed: Vec<u8>,
 }
 
+/// An image with the motion of the robot since then.
+#[derive(Clone, Debug)]
+struct Past {
+    colours: Vec<u8>,
+    since: Option<EgoMotion>,
+}
+
 impl Changes {
-    /// Compares an image with the previous one, which is moved with the robot as `sweep` estimates
-    /// it. Nothing is compared with the first image.
+    /// Adds a motion of the robot, and forgets images that are older than needed.
+    pub(crate) fn move_by(&mut self, motion: &EgoMotion) {
+        for past in &mut self.past {
+            past.since = Some(past.since.map_or(*motion, |since| joined(&since, motion)));
+        }
+        let is_old = |past: &Past| past.since.is_some_and(|since| since.dt >= STEP_S);
+        while self.past.get(1).is_some_and(is_old) {
+            self.past.pop_front();
+        }
+    }
+
+    /// Returns the motion since the image that is compared; `None` if all are too young.
+    pub(crate) fn motion(&self) -> Option<EgoMotion> {
+        self.past.front()?.since.filter(|since| since.dt >= STEP_S)
+    }
+
+    /// Compares an image with that of [`Changes::motion`], which is moved with the robot as `sweep`
+    /// estimates it. Without such an image nothing is compared.
     pub(crate) fn compare(&mut self, sweep: &mut Sweep, warps: &[Warp], colours: &[u8]) {
         self.changed.clear();
-        if self.previous.is_empty() {
-            return;
-        }
-        sweep.apply(warps, colours, &mut self.previous, &mut []);
-        let pixels = colours.chunks_exact(3).zip(self.previous.chunks_exact(3));
+        let Some(past) = self.motion().and(self.past.front()) else { return };
+        self.moved.clear();
+        self.moved.extend(past.colours.iter().map(|colour| f32::from(*colour)));
+        sweep.apply(warps, colours, &mut self.moved, &mut []);
+        let pixels = colours.chunks_exact(3).zip(self.moved.chunks_exact(3));
         let differs = |(now, before): (&[u8], &[f32])| {
             now.iter().zip(before).any(|(now, before)| (f32::from(*now) - before).abs() > SAME)
         };
         self.changed.extend(pixels.map(|pixel| u8::from(differs(pixel))));
     }
 
-    /// Ends an image: the next one is compared with it.
+    /// Ends an image: later ones are compared with it.
     pub(crate) fn keep(&mut self, colours: &[u8]) {
-        self.previous.clear();
-        self.previous.extend(colours.iter().map(|colour| f32::from(*colour)));
+        self.past.push_back(Past { colours: colours.to_vec(), since: None });
+        // Those of a camera that is faster than 75 images a second are not compared.
+        while self.past.len() > MOST_IMAGES {
+            self.past.pop_front();
+        }
     }
 
     /// Forgets the last comparison.
@@ -56,6 +93,18 @@ impl Changes {
             }
         }
         if all == 0 { 1.0 } else { f64::from(changed) / f64::from(all) }
+    }
+}
+
+/// Returns two motions after each other as one.
+fn joined(first: &EgoMotion, second: &EgoMotion) -> EgoMotion {
+    let moved = first.isometry() * second.isometry();
+    EgoMotion {
+        forward: moved.translation.x,
+        left: moved.translation.y,
+        turn: moved.rotation.angle(),
+        dt: first.dt + second.dt,
+        ..*second
     }
 }
 
@@ -79,6 +128,7 @@ mod tests {
         changes.compare(&mut sweep, &[], &image(&[], 0));
         assert_eq!(changes.part(run, WIDTH, &solid), 1.0, "there is no previous image");
         changes.keep(&image(&[], 0));
+        changes.move_by(&EgoMotion::at_rest(STEP_S));
         // Columns 5, 0 and 1 have four solid pixels, of which column 5 has one.
         changes.compare(&mut sweep, &[], &image(&[5, 3], 113));
         assert_eq!(changes.part(run, WIDTH, &solid), 0.25);
@@ -86,5 +136,34 @@ mod tests {
         assert_eq!(changes.part(run, WIDTH, &solid), 0.0, "this is noise");
         changes.clear();
         assert_eq!(changes.part(run, WIDTH, &solid), 1.0);
+    }
+
+    #[test]
+    fn images_of_a_fast_camera_are_compared_with_one_that_is_old_enough() {
+        let (mut changes, mut sweep) = (Changes::default(), Sweep::default());
+        let (run, solid) = (Run { first: 0, length: WIDTH }, [1; 2 * WIDTH]);
+        let step = EgoMotion { forward: 0.05, turn: 0.1, ..EgoMotion::at_rest(0.08) };
+        let mut part = |column: usize| {
+            changes.move_by(&step);
+            changes.compare(&mut sweep, &[], &image(&[column], 200));
+            changes.keep(&image(&[column], 200));
+            changes.part(run, WIDTH, &solid) * WIDTH as f64
+        };
+        // Each image shows another column. That of three steps ago is the first to be old enough.
+        let parts = [0, 1, 2, 0, 1, 3].map(&mut part);
+        let expected = [6.0, 6.0, 6.0, 0.0, 0.0, 2.0];
+        assert!(parts.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{parts:?}");
+    }
+
+    #[test]
+    fn motions_after_each_other_add_up_in_the_frame_of_the_first() {
+        let quarter = EgoMotion {
+            forward: 1.0,
+            turn: std::f64::consts::FRAC_PI_2,
+            ..EgoMotion::at_rest(0.1)
+        };
+        let both = joined(&quarter, &quarter);
+        assert!((both.forward - 1.0).abs() < 1e-9 && (both.left - 1.0).abs() < 1e-9, "{both:?}");
+        assert!((both.turn - std::f64::consts::PI).abs() < 1e-9 && (both.dt - 0.2).abs() < 1e-9);
     }
 }

@@ -1,4 +1,5 @@
-use tagalong_core::{Frame, Funnel, Result, Stamp, Track};
+use tagalong_core::{EgoMotion, Frame, Funnel, Result, Stamp, Track};
+use tagalong_geometry::Panorama;
 
 use crate::background::{HELD, Pace, TURNS};
 use crate::changes::Changes;
@@ -185,15 +186,16 @@ impl ImageState {
             return Ok(());
         }
         let colours = if grey { &self.grey[..] } else { frame.colour()?.pixels().as_flattened() };
-        let mut warps = Vec::new();
         if is_moving(&frame.motion) {
             self.uncertain = true;
-            let warp = |wall_m: &f64| Warp::new(&frame.camera, panorama, &frame.motion, *wall_m);
-            warps.extend(config.walls_m.iter().map(warp));
+            let warps = warps_of(&frame.motion, frame, panorama, config);
             self.background.move_by(&mut self.sweep, &warps, colours);
         }
-        let compared = self.uncertain && frame.motion.dt >= STEP_S;
-        if compared && config.changed_part > 0.0 {
+        self.changes.move_by(&frame.motion);
+        let compared =
+            self.changes.motion().filter(|_| self.uncertain && config.changed_part > 0.0);
+        if let Some(since) = compared {
+            let warps = warps_of(&since, frame, panorama, config);
             self.changes.compare(&mut self.sweep, &warps, colours);
         }
         Ok(())
@@ -237,8 +239,6 @@ impl ImageState {
     }
 }
 
-/// Least time between two images in which a person moves visibly, s.
-const STEP_S: f64 = 0.2;
 /// Half widths of a known person to each side of it within which the background is held.
 const HELD_HALVES: f64 = 1.3;
 /// Time constant of the background while the robot moves, s.
@@ -246,6 +246,12 @@ const MOVING_ADAPT_S: f32 = 0.5;
 /// Time after which a differing pixel becomes background while the robot moves, s: a difference
 /// that stays in its place is not a walking person, unless a person is known there.
 const MOVING_ABSORB_S: f32 = 4.0;
+
+/// Returns where pixels come from by a motion, for each distance of a wall; none for a robot at rest.
+fn warps_of(motion: &EgoMotion, frame: &Frame, panorama: &Panorama, config: &Config) -> Vec<Warp> {
+    let walls = config.walls_m.iter().filter(|_| is_moving(motion));
+    walls.map(|wall_m| Warp::new(&frame.camera, panorama, motion, *wall_m)).collect()
+}
 
 /// Returns the expected columns of the tracks that were known after the previous image.
 fn expected(known: &[Known], frame: &Frame) -> Vec<Expected> {
