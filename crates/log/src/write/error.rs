@@ -1,6 +1,8 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use mcap::McapError;
+
 /// Error of writing results.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -44,7 +46,7 @@ pub enum WriteError {
         /// Path of the file.
         path: PathBuf,
         /// Cause.
-        source: Box<mcap::McapError>,
+        source: Box<McapError>,
     },
 }
 
@@ -56,22 +58,21 @@ impl WriteError {
 
     /// Returns true if the disk has no room.
     pub fn is_disk_full(&self) -> bool {
-        let cause = match self {
-            Self::Io { source, .. } => source,
-            Self::Mcap { source, .. } => match &**source {
-                mcap::McapError::Io(source) => source,
-                _ => return false,
-            },
-            _ => return false,
-        };
-        matches!(cause.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
+        let Self::Io { source, .. } = self else { return false };
+        matches!(source.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
     }
 
     pub(super) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.to_owned(), source }
     }
 
-    pub(super) fn mcap(path: &Path) -> impl FnOnce(mcap::McapError) -> Self + '_ {
-        move |source| Self::Mcap { path: path.to_owned(), source: Box::new(source) }
+    pub(super) fn mcap(path: &Path) -> impl FnOnce(McapError) -> Self + '_ {
+        move |source| match source {
+            // The header of a record is written by `binrw`, whose error is called one of parsing.
+            McapError::Io(source) | McapError::Parse(binrw::Error::Io(source)) => {
+                Self::io(path)(source)
+            }
+            other => Self::Mcap { path: path.to_owned(), source: Box::new(other) },
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
-use mcap::{Compression, McapError, WriteOptions, Writer};
+use mcap::{Compression, WriteOptions, Writer};
 use serde::Serialize;
 use tagalong_core::Stamp;
 
@@ -39,7 +39,7 @@ impl MessageLog {
             // As for `tracks.mcap`: one thread gives the same bytes on every machine.
             .compression_threads(1)
             .create(BufWriter::new(file))
-            .map_err(failed(&partial))?;
+            .map_err(WriteError::mcap(&partial))?;
         Ok(Self { writer, channels: BTreeMap::new(), partial, path: path.to_owned() })
     }
 
@@ -89,14 +89,14 @@ impl MessageLog {
         let at = at.nanos();
         let header = MessageHeader { channel_id, sequence: 0, log_time: at, publish_time: at };
         let written = self.writer.write_to_known_channel(&header, data);
-        written.map_err(failed(&self.partial))
+        written.map_err(WriteError::mcap(&self.partial))
     }
 
     fn open<M: Message>(&mut self, topic: &str) -> Result<u16, WriteError> {
         let schema = self.writer.add_schema(M::TYPE, "ros2msg", M::DEFINITION.as_bytes());
-        let schema = schema.map_err(failed(&self.partial))?;
+        let schema = schema.map_err(WriteError::mcap(&self.partial))?;
         let channel = self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
-        let id = channel.map_err(failed(&self.partial))?;
+        let id = channel.map_err(WriteError::mcap(&self.partial))?;
         self.channels.insert(topic.to_owned(), id);
         Ok(id)
     }
@@ -106,11 +106,7 @@ impl MessageLog {
     /// # Errors
     /// [`WriteError::Io`], [`WriteError::Mcap`].
     pub fn finish(mut self) -> Result<(), WriteError> {
-        self.writer.finish().map_err(failed(&self.partial))?;
+        self.writer.finish().map_err(WriteError::mcap(&self.partial))?;
         fs::rename(&self.partial, &self.path).map_err(WriteError::io(&self.path))
     }
-}
-
-fn failed(path: &Path) -> impl FnOnce(McapError) -> WriteError + '_ {
-    move |source| WriteError::Mcap { path: path.to_owned(), source: Box::new(source) }
 }
