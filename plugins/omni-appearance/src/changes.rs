@@ -22,6 +22,8 @@ const STEP_S: f64 = 0.2;
 pub(crate) struct Changes {
     /// Images that are too young, and before them one that is not; oldest first.
     past: VecDeque<Past>,
+    /// Room of the image that was forgotten last, for the next one.
+    room: Vec<u8>,
     /// The image that is compared, as it looks from the robot's new place.
     moved: Vec<f32>,
     /// 1 where the last image differs from it, else 0; empty if they were not compared.
@@ -39,11 +41,11 @@ impl Changes {
     /// Adds a motion of the robot, and forgets images that are older than needed.
     pub(crate) fn move_by(&mut self, motion: &EgoMotion) {
         for past in &mut self.past {
-            past.since = Some(past.since.map_or(*motion, |since| joined(&since, motion)));
+            past.since = Some(past.since.map_or(*motion, |since| since.then(motion)));
         }
         let is_old = |past: &Past| past.since.is_some_and(|since| since.dt >= STEP_S);
         while self.past.get(1).is_some_and(is_old) {
-            self.past.pop_front();
+            self.forget_oldest();
         }
     }
 
@@ -69,10 +71,19 @@ impl Changes {
 
     /// Ends an image: later ones are compared with it.
     pub(crate) fn keep(&mut self, colours: &[u8]) {
-        self.past.push_back(Past { colours: colours.to_vec(), since: None });
         // Those of a camera that is faster than 75 images a second are not compared.
-        while self.past.len() > MOST_IMAGES {
-            self.past.pop_front();
+        while self.past.len() >= MOST_IMAGES {
+            self.forget_oldest();
+        }
+        let mut kept = std::mem::take(&mut self.room);
+        kept.clear();
+        kept.extend_from_slice(colours);
+        self.past.push_back(Past { colours: kept, since: None });
+    }
+
+    fn forget_oldest(&mut self) {
+        if let Some(oldest) = self.past.pop_front() {
+            self.room = oldest.colours;
         }
     }
 
@@ -93,18 +104,6 @@ impl Changes {
             }
         }
         if all == 0 { 1.0 } else { f64::from(changed) / f64::from(all) }
-    }
-}
-
-/// Returns two motions after each other as one.
-fn joined(first: &EgoMotion, second: &EgoMotion) -> EgoMotion {
-    let moved = first.isometry() * second.isometry();
-    EgoMotion {
-        forward: moved.translation.x,
-        left: moved.translation.y,
-        turn: moved.rotation.angle(),
-        dt: first.dt + second.dt,
-        ..*second
     }
 }
 
@@ -162,7 +161,7 @@ mod tests {
             turn: std::f64::consts::FRAC_PI_2,
             ..EgoMotion::at_rest(0.1)
         };
-        let both = joined(&quarter, &quarter);
+        let both = quarter.then(&quarter);
         assert!((both.forward - 1.0).abs() < 1e-9 && (both.left - 1.0).abs() < 1e-9, "{both:?}");
         assert!((both.turn - std::f64::consts::PI).abs() < 1e-9 && (both.dt - 0.2).abs() < 1e-9);
     }

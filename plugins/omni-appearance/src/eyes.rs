@@ -163,7 +163,9 @@ impl ImageState {
         }
         let expected = expected(&self.known, frame);
         self.blobs = people(segmenter, colours, &expected, config, funnel);
-        self.changes.keep(colours);
+        if config.changed_part > 0.0 {
+            self.changes.keep(colours);
+        }
         self.drop_static(config, funnel);
         Ok(())
     }
@@ -186,16 +188,18 @@ impl ImageState {
             return Ok(());
         }
         let colours = if grey { &self.grey[..] } else { frame.colour()?.pixels().as_flattened() };
+        let mut warps = warps_of(&frame.motion, frame, panorama, config);
         if is_moving(&frame.motion) {
             self.uncertain = true;
-            let warps = warps_of(&frame.motion, frame, panorama, config);
             self.background.move_by(&mut self.sweep, &warps, colours);
         }
         self.changes.move_by(&frame.motion);
         let compared =
             self.changes.motion().filter(|_| self.uncertain && config.changed_part > 0.0);
         if let Some(since) = compared {
-            let warps = warps_of(&since, frame, panorama, config);
+            if since != frame.motion {
+                warps = warps_of(&since, frame, panorama, config);
+            }
             self.changes.compare(&mut self.sweep, &warps, colours);
         }
         Ok(())
