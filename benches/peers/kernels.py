@@ -294,19 +294,23 @@ class Images:
 
 
 class Logs:
-    """The messages of an MCAP file; the `mcap` crate has the whole file in memory already."""
+    """The messages of an MCAP file. The `mcap` crate needs the whole file in memory: it reads it, or has
+    it already."""
+
+    PEERS = ("`mcap` crate", "`mcap` crate, file in memory")
 
     def __init__(self):
         self.program = built("tagalong-log", "time_mcap")
 
     def ours(self):
         rows = lines(self.program)
-        self.crate = {self.job(form): float(ms) * 1e-3 for form, _, ms in rows}
-        return {self.job(form): float(ms) * 1e-3 for form, ms, _ in rows}
+        self.crate = {self.job(form): theirs for form, _, *theirs in rows}
+        return {self.job(form): float(ms) * 1e-3 for form, ms, *_ in rows}
 
     def theirs(self):
-        for job, seconds in self.crate.items():
-            yield job, "`mcap` crate", seconds
+        for job, times in self.crate.items():
+            for peer, ms in zip(self.PEERS, times):
+                yield job, peer, float(ms) * 1e-3
 
     @staticmethod
     def job(form):
@@ -398,6 +402,137 @@ class Stereo:
             yield job, "ours, one thread", seconds
 
 
+class Scenes:
+    """Scenes of two people weighed in a depth image: each person a template that is brought to size and
+    moved to its depth, the nearer before the farther, and the capped differences summed."""
+
+    NAMES = {"templates": "625 joint templates", "held": "50 joint templates, depth held"}
+    COUNTS = {"templates": (625, 0.1), "held": (50, 0.0)}
+    FOCAL, HEADS, CAP = 183.0, ((2.5, 0.1, 1.6), (3.4, -0.15, 1.65)), 0.3
+
+    def __init__(self):
+        random = np.random.default_rng(1)
+        y, x = np.mgrid[-1:1:60j, -1:1:60j]
+        self.template = np.where(x**2 + y**2 < 1, 0.1 * (x**2 + y**2), 9.0).astype(np.float32)
+        self.depth = np.full((192, 256), 5.5, np.float32)
+        self.scenes = {}
+        for name, (count, deep) in self.COUNTS.items():
+            off = random.uniform(-1, 1, (count, 2, 3)) * [deep, 0.2, 0.4 * deep]
+            self.scenes[name] = np.array(self.HEADS) + off
+
+    def times(self):
+        for name, job in self.NAMES.items():
+            scenes = self.scenes[name]
+            calls = 3000 // len(scenes)
+            yield job, "numpy and OpenCV", fastest(lambda: [self.weigh(scene) for scene in scenes], calls)
+
+    def weigh(self, scene):
+        boxes = []
+        for far, aside, high in scene:
+            side = int(0.6 * self.FOCAL / far)
+            left = int(128 - self.FOCAL * aside / far) - side // 2
+            boxes.append((left, int(96 + self.FOCAL * (1.2 - high) / far), side, far))
+        left, top = (min(box[k] for box in boxes) for k in (0, 1))
+        right, bottom = (max(box[k] + box[2] for box in boxes) for k in (0, 1))
+        drawn = np.full((bottom - top, right - left), 9.0, np.float32)
+        for x, y, side, far in boxes:
+            person = cv2.resize(self.template, (side, side), interpolation=cv2.INTER_NEAREST)
+            part = drawn[y - top : y - top + side, x - left : x - left + side]
+            np.minimum(part, person + np.float32(far), out=part)
+        off = cv2.absdiff(drawn, self.depth[top:bottom, left:right])
+        return np.minimum(off, self.CAP, out=off).sum()
+
+
+class Appearance:
+    """One person found again in a grey image, and learnt."""
+
+    NAMES = {"compressive": "compressive tracking, a person and frame"}
+    PEERS = {"KCF": lambda: cv2.TrackerKCF_create(), "MOSSE": lambda: cv2.legacy.TrackerMOSSE_create()}
+
+    def __init__(self):
+        y, x = np.mgrid[:480, :640]
+        self.images = []
+        for step in range(20):
+            left = 270 + 2 * step
+            inside = (abs(x - left - 50) < 50) & (abs(y - 220) < 50)
+            grey = np.where(inside, ((2 * x - 2 * left) ** 2 // 64 + 7 * y) % 120 + 90, (x**2 // 64 + 21 * y) % 120 + 20)
+            self.images.append(cv2.cvtColor(grey.astype(np.uint8), cv2.COLOR_GRAY2BGR))
+
+    def times(self):
+        (job,) = self.NAMES.values()
+        for name, create in self.PEERS.items():
+            tracker, times = create(), []
+            tracker.init(self.images[0], (270, 170, 100, 100))
+            for image in self.images[1:]:
+                start = time.perf_counter()
+                tracker.update(image)
+                times.append(time.perf_counter() - start)
+            yield job, name, statistics.median(times)
+
+
+class Wheels:
+    """From a pair to speeds of the wheels: ours on simulated people with all its tests, theirs the same
+    parts of OpenCV: matching, one template in 32 sizes, and a Kalman filter."""
+
+    JOBS = {"block": "a pair to speeds of wheels, block", "semi-global": "a pair to speeds of wheels, semi-global"}
+    SCENE, CONFIG = "configs/scenes/stereo-follow-passing.toml", "configs/stereo-ekf.toml"
+
+    def __init__(self, folder, stereo):
+        self.program, self.pair = built("tagalong-benches", "time_frames"), stereo.pair
+        self.log = os.path.join(folder, "pairs.mcap")
+        simulate = ["simulate", self.SCENE, "-o", self.log, "--set", "duration_s=4"]
+        subprocess.run(["cargo", "run", "-q", "--release", "--", *simulate], check=True, capture_output=True)
+        self.configs = {}
+        for method in self.JOBS:
+            with open(self.CONFIG) as config:
+                text = config.read().replace("[stereo]", f'[stereo]\nmethod = "{method}"')
+            self.configs[method] = os.path.join(folder, f"{method}.toml")
+            with open(self.configs[method], "w") as config:
+                config.write(text)
+        self.filter = Filters()
+        y, x = np.mgrid[-1:1:60j, -1:1:60j]
+        self.template = (0.1 * (x**2 + y**2)).astype(np.float32)
+
+    def ours(self):
+        def median_ms(config):
+            return float(lines(self.program, self.log, config)[-1][5])
+
+        return {job: 1e-3 * median_ms(self.configs[method]) for method, job in self.JOBS.items()}
+
+    def theirs(self):
+        block = cv2.StereoBM_create(DISPARITIES, 15)
+        semi = cv2.StereoSGBM_create(0, DISPARITIES, 5, 200, 800, 1, 0, 10, 100, 2, cv2.STEREO_SGBM_MODE_SGBM_3WAY)
+        for job, matcher in zip(self.JOBS.values(), (block, semi)):
+            yield job, "the same parts of OpenCV", fastest(lambda: self.steer(matcher), 3)
+
+    def steer(self, matcher):
+        disparity = matcher.compute(*self.pair)[::2, ::2].astype(np.float32) / 16
+        depth = 30.0 / np.maximum(disparity, 1.0)
+        best = []
+        for far in np.geomspace(0.8, 5.5, 32):
+            side = max(8, int(0.6 * 107 / far))
+            template = cv2.resize(self.template, (side, side)) + np.float32(far)
+            best.append(cv2.minMaxLoc(cv2.matchTemplate(depth, template, cv2.TM_SQDIFF))[0] / side**2)
+        self.filter.step_opencv()
+        return best
+
+
+class Stages:
+    """What one call of `time_stages` times."""
+
+    def __init__(self):
+        self.program = built("tagalong-benches", "time_stages")
+        self.peers = (Scenes(), Appearance())
+
+    def ours(self):
+        us = {name: float(time) for name, time in lines(self.program)}
+        return {job: 1e-6 * us[name] for peer in self.peers for name, job in peer.NAMES.items()}
+
+    def theirs(self):
+        for peer in self.peers:
+            yield from peer.times()
+
+
 def measured(seconds):
     return f"{1e6 * seconds:.2f} us" if seconds < 1e-3 else f"{1e3 * seconds:.2f} ms"
 
@@ -406,8 +541,9 @@ def main():
     cv2.setNumThreads(1)
     rounds = {}
     with tempfile.TemporaryDirectory() as folder:
-        groups = (Assignment(), Particles(), Patches(), Filters(), Trackers(), Metrics(folder),
-                  Logs(), Images(folder), Stereo(folder))
+        stereo = Stereo(folder)
+        groups = (Assignment(), Particles(), Stages(), Patches(), Filters(), Trackers(),
+                  Metrics(folder), Logs(), Images(folder), stereo, Wheels(folder, stereo))
         for _ in range(ROUNDS):
             for group in groups:
                 ours = group.ours()

@@ -8,7 +8,7 @@ cd "$(dirname "$0")/../.."
 venv=target/peers
 test -x "$venv/bin/python" || python3 -m venv "$venv"
 "$venv/bin/pip" install --quiet --disable-pip-version-check \
-    'numpy<3' 'scipy<2' 'lap<0.6' 'opencv-python-headless<5' filterpy 'supervision<1' rich
+    'numpy<3' 'scipy<2' 'lap<0.6' 'opencv-contrib-python-headless<5' filterpy 'supervision<1' rich
 # Without what they depend on: they ask for other builds of OpenCV, which is the one above.
 "$venv/bin/pip" install --quiet --disable-pip-version-check --no-deps 'trackers<3' trackeval
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1

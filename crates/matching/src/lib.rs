@@ -280,7 +280,6 @@ impl Solver {
     /// Jonker and Volgenant). A column that has a row keeps one, so that free ones cost nothing.
     fn reduce(&mut self, cols: usize, cost: &[f64]) {
         self.left.clear();
-        reset(&mut self.distance, cols, 0.0);
         // A row that is outbid again and again is cheaper to place by a path.
         let mut bids = 2 * self.row_price.len();
         while let Some(row) = self.open.pop() {
@@ -290,7 +289,7 @@ impl Solver {
             }
             bids -= 1;
             let costs = &cost[row as usize * cols..][..cols];
-            let (col, first, second) = self.two_cheapest(costs);
+            let (col, first, second) = two_cheapest(costs, &self.col_price);
             let holder = self.row_of[col];
             if holder != NONE && first >= second {
                 self.left.push(row);
@@ -306,14 +305,6 @@ impl Solver {
         }
         self.left.reverse();
         std::mem::swap(&mut self.open, &mut self.left);
-    }
-
-    /// Returns the cheapest column at the prices, with its cost and that of the next.
-    fn two_cheapest(&mut self, costs: &[f64]) -> (usize, f64, f64) {
-        reduced(costs, &self.col_price, &mut self.distance);
-        let (col, first) = least(&self.distance);
-        self.distance[col] = f64::INFINITY;
-        (col, first, least(&self.distance).1)
     }
 
     /// Gives `start` a column along the shortest path (Dijkstra on reduced costs).
@@ -359,12 +350,63 @@ impl Solver {
     }
 }
 
-/// Computes the costs of a row less the prices of the columns.
+/// Number of minima at once: a single one is a chain of dependent comparisons.
+const LANES: usize = 8;
+
+/// Returns the cheapest column at the prices, the first of several, with its cost and that of the
+/// next.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn reduced(costs: &[f64], prices: &[f64], out: &mut [f64]) {
-    for ((out, cost), price) in out.iter_mut().zip(costs).zip(prices) {
-        *out = cost - price;
+fn two_cheapest(costs: &[f64], prices: &[f64]) -> (usize, f64, f64) {
+    let (chunks, rest) = costs.as_chunks::<LANES>();
+    let (prices_of, prices_of_rest) = prices.as_chunks::<LANES>();
+    let (mut firsts, mut seconds) = ([f64::INFINITY; LANES], [f64::INFINITY; LANES]);
+    for (costs, prices) in chunks.iter().zip(prices_of) {
+        for lane in 0..LANES {
+            add_cost(costs[lane] - prices[lane], &mut firsts[lane], &mut seconds[lane]);
+        }
     }
+    // Halved again and again, the lanes are compared side by side until one is left.
+    let mut half = if chunks.is_empty() { 0 } else { LANES / 2 };
+    while half > 0 {
+        for lane in 0..half {
+            let (first, second) = (firsts[lane + half], seconds[lane + half]);
+            let less = if second < seconds[lane] { second } else { seconds[lane] };
+            seconds[lane] = less;
+            add_cost(first, &mut firsts[lane], &mut seconds[lane]);
+        }
+        half /= 2;
+    }
+    let ([mut first, ..], [mut second, ..]) = (firsts, seconds);
+    for (cost, price) in rest.iter().zip(prices_of_rest) {
+        add_cost(cost - price, &mut first, &mut second);
+    }
+    let is_first = |cost: &f64, price: &f64| cost - price == first;
+    let mut chunk = 0;
+    while chunk < chunks.len() && !any(&chunks[chunk], &prices_of[chunk], is_first) {
+        chunk = chunk.wrapping_add(1);
+    }
+    let from = chunk.wrapping_mul(LANES);
+    let mut columns = costs[from..].iter().zip(&prices[from..]);
+    let place = columns.position(|(cost, price)| is_first(cost, price)).unwrap_or_default();
+    (from.wrapping_add(place), first, second)
+}
+
+/// Keeps the least cost so far and the next.
+#[inline(always)]
+fn add_cost(cost: f64, first: &mut f64, second: &mut f64) {
+    let more = if cost < *first { *first } else { cost };
+    *second = if more < *second { more } else { *second };
+    *first = if cost < *first { cost } else { *first };
+}
+
+/// Returns true if a test holds in any lane; written without an early end, for vector instructions.
+#[inline(always)]
+fn any(a: &[f64; LANES], b: &[f64; LANES], test: impl Fn(&f64, &f64) -> bool) -> bool {
+    let mut found = 0;
+    for lane in 0..LANES {
+        found |= u8::from(test(&a[lane], &b[lane]));
+    }
+    found != 0
 }
 
 /// Shortens the distances by the columns that are reached over the column `via`.
@@ -389,8 +431,6 @@ fn relax(
 /// Returns the least value with its first place; NaN counts as none.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn least(values: &[f64]) -> (usize, f64) {
-    // Several minima at once, because a single one is a chain of dependent comparisons.
-    const LANES: usize = 16;
     let (chunks, rest) = values.as_chunks::<LANES>();
     let mut lanes = [f64::INFINITY; LANES];
     for chunk in chunks {

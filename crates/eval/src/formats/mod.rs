@@ -154,7 +154,7 @@ impl<'a> Line<'a> {
 
     fn number(&self, index: usize, name: &str) -> Result<f64, FormatError> {
         let text = self.text(index, name)?;
-        match text.parse::<f64>() {
+        match plain(text).map_or_else(|| text.parse::<f64>(), Ok) {
             Ok(value) if value.is_finite() => Ok(value),
             _ => Err(self.error(format!("`{name}` is `{text}`, expected a finite number"))),
         }
@@ -177,16 +177,40 @@ impl<'a> Line<'a> {
     }
 }
 
+/// Returns the value of a few digits with a point among them, as `parse` does, which takes longer:
+/// both numbers are exact, so that their quotient is rounded once.
+fn plain(text: &str) -> Option<f64> {
+    const TENS: [f64; 8] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7];
+    let (digits, negative) = match text.as_bytes() {
+        [b'-', digits @ ..] => (digits, true),
+        digits => (digits, false),
+    };
+    if digits.is_empty() || digits.len() > TENS.len() {
+        return None;
+    }
+    let (mut whole, mut behind) = (0_u32, None);
+    for (at, byte) in digits.iter().enumerate() {
+        match byte {
+            b'0'..=b'9' => whole = 10 * whole + u32::from(byte - b'0'),
+            b'.' if behind.is_none() && digits.len() > 1 => behind = Some(digits.len() - 1 - at),
+            _ => return None,
+        }
+    }
+    let value = f64::from(whole) / TENS[behind.unwrap_or(0)];
+    Some(if negative { -value } else { value })
+}
+
 /// The lines that are not empty, cut at commas if there are any, else at blanks.
 fn lines<'a>(text: &'a str, file: &'a str) -> impl Iterator<Item = Line<'a>> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(
         move |(index, line)| {
-            let fields = if line.contains(',') {
-                line.split(',').map(str::trim).collect()
-            } else {
-                line.split_whitespace().collect()
-            };
+            // Room for the fields of most formats, which are not known before the end of the line.
+            let mut fields = Vec::with_capacity(10);
+            match line.contains(',') {
+                true => fields.extend(line.split(',').map(str::trim)),
+                false => fields.extend(line.split_whitespace()),
+            }
             Line { file, number: index + 1, fields }
         },
     )
@@ -218,5 +242,28 @@ impl<'a> Table<'a> {
             let there = self.header.fields.join(", ");
             self.header.error(format!("no column `{name}`; there are: {there}"))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::plain;
+
+    proptest! {
+        #[test]
+        fn plain_numbers_are_those_of_parse(text in "-?[0-9.]{0,9}|[+-]?[0-9]{1,3}(e[0-9])?|nan|inf") {
+            if let Some(value) = plain(&text) {
+                prop_assert_eq!(text.parse::<f64>().map(f64::to_bits), Ok(value.to_bits()));
+            }
+        }
+
+        #[test]
+        fn numbers_of_few_digits_are_plain(whole in -9999..9999_i32, part in 0..999_u32) {
+            for text in [whole.to_string(), format!("{whole}.{part}")] {
+                prop_assert!(plain(&text).is_some());
+            }
+        }
     }
 }

@@ -8,6 +8,10 @@ use super::settings::TargetSettings;
 
 /// Speed below which a person stands before the robot, m/s.
 const STANDS_MPS: f64 = 0.3;
+/// Distance by which a person who is taken instead of the chosen one is nearer, m.
+const NEARER_M: f64 = 0.3;
+/// Speed across the line of sight of a person who walks past, m/s.
+const CROSSES_MPS: f64 = 0.4;
 
 /// Rule by which a target is chosen while there is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -27,6 +31,8 @@ pub enum ChoiceRule {
 pub(super) struct Chooser {
     /// Time for which there has been a track to choose, s.
     waited_s: f64,
+    /// Time since one was chosen, s.
+    chosen_s: f64,
     /// Confirmed tracks that may be walking up to the robot.
     approaches: BTreeMap<TrackId, Approach>,
 }
@@ -49,6 +55,12 @@ pub(crate) fn distance_m(track: &Track) -> f64 {
 pub(crate) fn bearing_deg(track: &Track) -> f64 {
     let place = track.estimate.person.position.xy();
     place.y.atan2(place.x).to_degrees()
+}
+
+/// Returns the speed of a track across the line of sight, m/s.
+fn across_mps(track: &Track) -> f64 {
+    let person = &track.estimate.person;
+    person.velocity.perp(&person.position.xy().coords.normalize()).abs()
 }
 
 /// Returns the nearest confirmed track in front, within the bearing and the distance of the settings.
@@ -97,6 +109,26 @@ impl Chooser {
         let is_due = self.waited_s >= settings.choose_after_s;
         self.waited_s = if track.is_some() { self.waited_s + dt_s } else { 0.0 };
         track.filter(|_| is_due)
+    }
+
+    /// Returns the track to follow instead of the one that was just chosen, if there is one: where only
+    /// the legs of a near person are in the image, somebody farther away may have been seen first.
+    pub(super) fn reconsider<'a>(
+        &mut self,
+        settings: &TargetSettings,
+        chosen: &Track,
+        tracks: &'a [Track],
+        dt_s: f64,
+    ) -> Option<&'a Track> {
+        self.chosen_s += dt_s;
+        let by_rule = settings.track.is_none() && settings.choose == ChoiceRule::Nearest;
+        if !by_rule || self.chosen_s > settings.reconsider_s {
+            return None;
+        }
+        let is_nearer = |track: &&Track| distance_m(track) < distance_m(chosen) - NEARER_M;
+        let nearer = nearest_in_front(settings, tracks).filter(is_nearer)?;
+        // Who walks past between the robot and the person is nearer, too.
+        (nearer.seen && across_mps(nearer) < CROSSES_MPS).then_some(nearer)
     }
 
     /// Returns the nearest track that came nearer by `approach_by_m` and has stood within

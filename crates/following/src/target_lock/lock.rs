@@ -229,7 +229,7 @@ impl TargetLock {
             LockState::Initial if may_choose => self.start(tracks, motion.dt),
             LockState::Initial => {}
             LockState::Lost => self.look_for(tracks, &log_odds),
-            _ => self.hold(tracks, &log_odds),
+            _ => self.hold(tracks, &log_odds, motion.dt),
         }
         // Others are noted before the appearance is learned, with the state of this frame.
         self.tell_apart(tracks);
@@ -278,22 +278,33 @@ impl TargetLock {
 
     /// Follows the track that the chooser picks, if it picks one.
     fn start(&mut self, tracks: &[Track], dt_s: f64) {
-        let Some(track) = self.chooser.choose(&self.settings, tracks, dt_s) else { return };
+        if let Some(track) = self.chooser.choose(&self.settings, tracks, dt_s) {
+            self.begin(track, "chosen");
+        }
+    }
+
+    /// Follows this track from now on.
+    fn begin(&mut self, track: &Track, why: &'static str) {
         self.track = Some(track.id);
         // The chosen track is the person by definition.
         self.belief = CERTAIN;
         self.see(track);
         match self.settings.remember {
-            true => self.go(LockState::Training, "chosen"),
-            false => self.go(LockState::Locked, "chosen"),
+            true => self.go(LockState::Training, why),
+            false => self.go(LockState::Locked, why),
         }
     }
 
     /// Stays with the track, or has doubts.
-    fn hold(&mut self, tracks: &[Track], log_odds: &BTreeMap<TrackId, f64>) {
+    fn hold(&mut self, tracks: &[Track], log_odds: &BTreeMap<TrackId, f64>, dt_s: f64) {
         let Some(track) = tracks.iter().find(|track| Some(track.id) == self.track) else {
             return self.lose("the track ended");
         };
+        if let Some(nearer) = self.chooser.reconsider(&self.settings, track, tracks, dt_s) {
+            let chooser = std::mem::take(&mut self.chooser);
+            *self = Self { chooser, ..Self::new(self.settings.clone(), self.describer.clone()) };
+            return self.begin(nearer, "nearer than the one chosen before");
+        }
         if !track.seen {
             return self.miss();
         }

@@ -23,6 +23,10 @@ pub struct TargetSettings {
     /// not always seen first.
     #[schemars(range(min = 0.0))]
     pub choose_after_s: f64,
+    /// Time after that choice in which somebody nearer, within the same bearing, is taken instead, s.
+    /// A person who was enrolled is kept in any case.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub reconsider_s: f64,
     /// Distance within which a person that walked up to the robot stands before it, m.
     #[schemars(range(min = 0.5, max = 5.0))]
     pub approach_within_m: f64,
@@ -79,6 +83,7 @@ impl Default for TargetSettings {
             choose_within_deg: 45.0,
             choose_within_m: 5.0,
             choose_after_s: 0.0,
+            reconsider_s: 0.0,
             approach_within_m: 2.0,
             approach_by_m: 0.5,
             approach_stands_s: 1.0,

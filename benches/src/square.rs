@@ -1,0 +1,47 @@
+//! A patterned square before a patterned wall, and the track of somebody who stands there.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, SMatrix, Vector2};
+use tagalong_core::{
+    DepthImage, EgoMotion, Estimate, Frame, GreyImage, Images, Person, Stamp, Track, TrackId,
+};
+use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+
+/// Returns the camera, 640x480.
+pub fn camera() -> Arc<Camera> {
+    let lens = Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+    Arc::new(Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0))
+}
+
+/// Returns a patterned square before a patterned wall at 6 m, and its depth, m.
+pub fn frame(camera: &Arc<Camera>, of: Rect, index: u64, face_m: f32) -> Frame {
+    let inside = |x: usize, y: usize| of.contains(nalgebra::Point2::new(x as f64, y as f64));
+    let grey = GreyImage::from_fn(640, 480, |x, y| {
+        let (x, y, kind) = if inside(x, y) { (2 * x, y, 90) } else { (x, 3 * y, 20) };
+        ((x * x / 64 + y * 7) % 120 + kind) as u8
+    });
+    let depth = DepthImage::from_fn(640, 480, |x, y| if inside(x, y) { face_m } else { 6.0 });
+    let images =
+        Images { grey: Some(Arc::new(grey)), depth: Some(Arc::new(depth)), ..Images::default() };
+    let stamp = Stamp::default().plus_seconds(index as f64 * 0.04);
+    Frame::new(index, stamp, Arc::clone(camera), EgoMotion::at_rest(0.04), images)
+}
+
+/// Returns a track at 3 m with this standard deviation, m.
+pub fn track(camera: &Camera, sigma_m: f64) -> Track {
+    let head = Point3::new(3.0, 0.0, 1.35);
+    let region = camera.upper_body(&head);
+    let person = Person { position: head, velocity: Vector2::zeros() };
+    let estimate = Estimate { person, covariance: SMatrix::identity() * sigma_m.powi(2), region };
+    Track {
+        id: TrackId(1),
+        estimate,
+        seen: true,
+        occluded: false,
+        confirmed: true,
+        age: 9,
+        unseen_s: 0.0,
+        score: 2.0,
+    }
+}
