@@ -1,4 +1,4 @@
-//! A patterned square before a patterned wall, and the track of somebody who stands there.
+//! A patterned square before a patterned wall, and the track of a person there.
 
 use std::sync::Arc;
 

@@ -193,7 +193,7 @@ impl Person {
         other.frames().any(|frame| frames.contains(&frame))
     }
 
-    /// Adds the boxes of another person, who is in none of the same frames; no box moves.
+    /// Adds the boxes of another person, in none of the same frames; no box moves.
     pub fn join(&mut self, mut other: Self) {
         self.pin_edges();
         other.pin_edges();

@@ -8,9 +8,9 @@ use super::settings::TargetSettings;
 
 /// Speed below which a person stands before the robot, m/s.
 const STANDS_MPS: f64 = 0.3;
-/// Distance by which a person who is taken instead of the chosen one is nearer, m.
+/// Distance by which a person taken instead of the chosen one is nearer, m.
 const NEARER_M: f64 = 0.3;
-/// Speed across the line of sight of a person who walks past, m/s.
+/// Speed across the line of sight from which a person walks past, m/s.
 const CROSSES_MPS: f64 = 0.4;
 
 /// Rule by which a target is chosen while there is none.
@@ -127,7 +127,7 @@ impl Chooser {
         }
         let is_nearer = |track: &&Track| distance_m(track) < distance_m(chosen) - NEARER_M;
         let nearer = nearest_in_front(settings, tracks).filter(is_nearer)?;
-        // Who walks past between the robot and the person is nearer, too.
+        // Somebody walking past between the robot and the person is nearer, too.
         (nearer.seen && across_mps(nearer) < CROSSES_MPS).then_some(nearer)
     }
 

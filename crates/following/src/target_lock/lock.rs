@@ -226,8 +226,8 @@ impl TargetLock {
         let likeness = self.likeness(&looks);
         let log_odds = likeness.iter().map(|(like, odds)| (like.track, *odds)).collect();
         match self.state {
-            LockState::Initial if may_choose => self.start(tracks, motion.dt),
-            LockState::Initial => {}
+            LockState::Initial if !may_choose => {}
+            LockState::Initial => self.start(tracks, motion.dt),
             LockState::Lost => self.look_for(tracks, &log_odds),
             _ => self.hold(tracks, &log_odds, motion.dt),
         }
@@ -289,10 +289,8 @@ impl TargetLock {
         // The chosen track is the person by definition.
         self.belief = CERTAIN;
         self.see(track);
-        match self.settings.remember {
-            true => self.go(LockState::Training, why),
-            false => self.go(LockState::Locked, why),
-        }
+        let remembers = self.settings.remember;
+        self.go(if remembers { LockState::Training } else { LockState::Locked }, why);
     }
 
     /// Stays with the track, or has doubts.
@@ -394,9 +392,7 @@ impl TargetLock {
         }
         self.candidates = seen;
         let best = self.candidates.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
-        let Some((id, (belief, times))) = best.map(|(id, candidate)| (*id, *candidate)) else {
-            return;
-        };
+        let Some((&id, &(belief, times))) = best else { return };
         let Some(track) = tracks.iter().find(|track| track.id == id) else { return };
         if times >= self.settings.again_sightings {
             self.track = Some(id);

@@ -141,7 +141,7 @@ impl Reidentifier {
         self.absent.iter_mut().for_each(|person| person.lose_place(pause_s));
     }
 
-    /// Moves all memories into the robot's new frame, and forgets people who are long gone.
+    /// Moves all memories into the robot's new frame, and forgets people long gone.
     fn predict(&mut self, motion: &EgoMotion) {
         for identity in self.tracks.values_mut() {
             identity.person.predict(motion);
@@ -292,7 +292,7 @@ impl Reidentifier {
         self.tracks.insert(id, identity);
     }
 
-    /// Recognises people who came back, and returns the numbers that were given up for that.
+    /// Recognises people that came back, and returns the numbers that were given up for that.
     fn recognise(&mut self, tracks: &[Track]) -> Vec<TrackId> {
         let mut given_up = Vec::new();
         for track in tracks.iter().filter(|track| track.confirmed) {
