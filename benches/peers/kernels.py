@@ -447,7 +447,7 @@ class Appearance:
     """One person found again in a grey image, and learnt."""
 
     NAMES = {"compressive": "compressive tracking, a person and frame"}
-    PEERS = {"KCF": lambda: cv2.TrackerKCF_create(), "MOSSE": lambda: cv2.legacy.TrackerMOSSE_create()}
+    PEERS = {"KCF": cv2.TrackerKCF_create, "MOSSE": cv2.legacy.TrackerMOSSE_create}
 
     def __init__(self):
         y, x = np.mgrid[:480, :640]
@@ -455,7 +455,8 @@ class Appearance:
         for step in range(20):
             left = 270 + 2 * step
             inside = (abs(x - left - 50) < 50) & (abs(y - 220) < 50)
-            grey = np.where(inside, ((2 * x - 2 * left) ** 2 // 64 + 7 * y) % 120 + 90, (x**2 // 64 + 21 * y) % 120 + 20)
+            person = ((2 * x - 2 * left) ** 2 // 64 + 7 * y) % 120 + 90
+            grey = np.where(inside, person, (x**2 // 64 + 21 * y) % 120 + 20)
             self.images.append(cv2.cvtColor(grey.astype(np.uint8), cv2.COLOR_GRAY2BGR))
 
     def times(self):

@@ -1,7 +1,7 @@
 //! Prints the time of reading all messages of an MCAP file, without compression and with each: ours,
 //! that of the `mcap` crate, which reads the whole file into memory first, and that of the crate with
-//! the file in memory already: the fastest of calls that take turns, in milliseconds. The file has a hundred depth images of
-//! 640x480. `benches/peers/kernels.py` shows the ratios.
+//! the file in memory already: the fastest of calls that take turns, in milliseconds. The file has a
+//! hundred depth images of 640x480. `benches/peers/kernels.py` shows the ratios.
 //!
 //! ```sh
 //! cargo run --release -p tagalong-log --example time_mcap

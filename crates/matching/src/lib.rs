@@ -380,14 +380,14 @@ fn two_cheapest(costs: &[f64], prices: &[f64]) -> (usize, f64, f64) {
     for (cost, price) in rest.iter().zip(prices_of_rest) {
         add_cost(cost - price, &mut first, &mut second);
     }
-    let is_first = |cost: &f64, price: &f64| cost - price == first;
     let mut chunk = 0;
-    while chunk < chunks.len() && !any(&chunks[chunk], &prices_of[chunk], is_first) {
+    while chunk < chunks.len() && !any(|lane| chunks[chunk][lane] - prices_of[chunk][lane] == first)
+    {
         chunk = chunk.wrapping_add(1);
     }
     let from = chunk.wrapping_mul(LANES);
     let mut columns = costs[from..].iter().zip(&prices[from..]);
-    let place = columns.position(|(cost, price)| is_first(cost, price)).unwrap_or_default();
+    let place = columns.position(|(cost, price)| cost - price == first).unwrap_or_default();
     (from.wrapping_add(place), first, second)
 }
 
@@ -401,10 +401,10 @@ fn add_cost(cost: f64, first: &mut f64, second: &mut f64) {
 
 /// Returns true if a test holds in any lane; written without an early end, for vector instructions.
 #[inline(always)]
-fn any(a: &[f64; LANES], b: &[f64; LANES], test: impl Fn(&f64, &f64) -> bool) -> bool {
+fn any(test: impl Fn(usize) -> bool) -> bool {
     let mut found = 0;
     for lane in 0..LANES {
-        found |= u8::from(test(&a[lane], &b[lane]));
+        found |= u8::from(test(lane));
     }
     found != 0
 }
@@ -441,9 +441,7 @@ fn least(values: &[f64]) -> (usize, f64) {
     let all = lanes.iter().chain(rest);
     let least = all.fold(f64::INFINITY, |least, value| if *value < least { *value } else { least });
     let mut chunk = 0;
-    while chunk < chunks.len()
-        && chunks[chunk].iter().fold(0, |n, v| n | u8::from(*v == least)) == 0
-    {
+    while chunk < chunks.len() && !any(|lane| chunks[chunk][lane] == least) {
         chunk = chunk.wrapping_add(1);
     }
     let from = chunk.wrapping_mul(LANES);

@@ -188,18 +188,18 @@ impl ImageState {
             return Ok(());
         }
         let colours = if grey { &self.grey[..] } else { frame.colour()?.pixels().as_flattened() };
-        let mut warps = warps_of(&frame.motion, frame, panorama, config);
+        let mut last_warps = None;
         if is_moving(&frame.motion) {
             self.uncertain = true;
-            self.background.move_by(&mut self.sweep, &warps, colours);
+            let warps = last_warps.insert(warps_of(&frame.motion, frame, panorama, config));
+            self.background.move_by(&mut self.sweep, warps, colours);
         }
         self.changes.move_by(&frame.motion);
         let compared =
             self.changes.motion().filter(|_| self.uncertain && config.changed_part > 0.0);
         if let Some(since) = compared {
-            if since != frame.motion {
-                warps = warps_of(&since, frame, panorama, config);
-            }
+            let warps = last_warps.filter(|_| since == frame.motion);
+            let warps = warps.unwrap_or_else(|| warps_of(&since, frame, panorama, config));
             self.changes.compare(&mut self.sweep, &warps, colours);
         }
         Ok(())

@@ -127,7 +127,7 @@ impl Chooser {
         }
         let is_nearer = |track: &&Track| distance_m(track) < distance_m(chosen) - NEARER_M;
         let nearer = nearest_in_front(settings, tracks).filter(is_nearer)?;
-        // Somebody walking past between the robot and the person is nearer, too.
+        // A person walking past between the robot and the chosen one is nearer, too.
         (nearer.seen && across_mps(nearer) < CROSSES_MPS).then_some(nearer)
     }
 
