@@ -492,11 +492,15 @@ impl Tape {
                 self.accels = None;
                 linear_mps.abs() < 1e-9 && gentle_turn
             }
-            // No slower than the obstacle demands.
-            (Reason::Obstacle, Some(Ahead::Something(at_m))) if !gentle => {
-                let stop_m = CollisionMonitorSettings::default().stop_m;
-                self.accels = None;
-                accel < 0.0 && (linear_mps - settings.speed_within(at_m - stop_m)).abs() < 1e-6
+            (Reason::Obstacle, Some(Ahead::Something(at_m))) => {
+                let most = settings.speed_within(at_m - CollisionMonitorSettings::default().stop_m);
+                // No slower than the obstacle demands; an emergency also where it is gentle by chance.
+                let is_emergency = accel < 0.0 && (linear_mps - most).abs() < 1e-6;
+                if is_emergency {
+                    self.accels = None;
+                }
+                let may_turn = gentle_turn || -accel > settings.max_decel_mps2;
+                is_emergency && may_turn || gentle && gentle_turn
             }
             _ => gentle && gentle_turn,
         }
