@@ -473,7 +473,8 @@ class Appearance:
 
 class Wheels:
     """From a pair to speeds of the wheels: ours on simulated people with all its tests, theirs the same
-    parts of OpenCV: matching, one template in 32 sizes, and a Kalman filter."""
+    parts of OpenCV: matching, one template in 32 sizes, in depth of half the size as ours and of the full one, and
+    a Kalman filter."""
 
     JOBS = {"block": "a pair to speeds of wheels, block", "semi-global": "a pair to speeds of wheels, semi-global"}
     SCENE, CONFIG = "configs/scenes/stereo-follow-passing.toml", "configs/stereo-ekf.toml"
@@ -504,14 +505,16 @@ class Wheels:
         block = cv2.StereoBM_create(DISPARITIES, 15)
         semi = cv2.StereoSGBM_create(0, DISPARITIES, 5, 200, 800, 1, 0, 10, 100, 2, cv2.STEREO_SGBM_MODE_SGBM_3WAY)
         for job, matcher in zip(self.JOBS.values(), (block, semi)):
-            yield job, "the same parts of OpenCV", fastest(lambda: self.steer(matcher), 3)
+            for part, size in ((2, "half"), (1, "full")):
+                name = f"the same parts of OpenCV, templates of {size} size"
+                yield job, name, fastest(lambda: self.steer(matcher, part), 3)
 
-    def steer(self, matcher):
-        disparity = matcher.compute(*self.pair)[::2, ::2].astype(np.float32) / 16
+    def steer(self, matcher, part):
+        disparity = matcher.compute(*self.pair)[::part, ::part].astype(np.float32) / 16
         depth = 30.0 / np.maximum(disparity, 1.0)
         best = []
         for far in np.geomspace(0.8, 5.5, 32):
-            side = max(8, int(0.6 * 107 / far))
+            side = max(8, int(0.6 * 214 / part / far))
             template = cv2.resize(self.template, (side, side)) + np.float32(far)
             best.append(cv2.minMaxLoc(cv2.matchTemplate(depth, template, cv2.TM_SQDIFF))[0] / side**2)
         self.filter.step_opencv()
