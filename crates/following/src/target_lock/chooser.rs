@@ -10,6 +10,9 @@ use super::settings::TargetSettings;
 const STANDS_MPS: f64 = 0.3;
 /// Distance by which a person taken instead of the chosen one is nearer, m.
 const NEARER_M: f64 = 0.3;
+/// Distance beyond which a person's head is in the image of a camera as low as 0.3 m, so that nobody
+/// there was overlooked, m.
+const OVERLOOKED_M: f64 = 3.0;
 /// Speed across the line of sight from which a person walks past, m/s.
 const CROSSES_MPS: f64 = 0.4;
 
@@ -128,7 +131,8 @@ impl Chooser {
         let is_nearer = |track: &&Track| distance_m(track) < distance_m(chosen) - NEARER_M;
         let nearer = nearest_in_front(settings, tracks).filter(is_nearer)?;
         // A person walking past between the robot and the chosen one is nearer, too.
-        (nearer.seen && across_mps(nearer) < CROSSES_MPS).then_some(nearer)
+        let stands = nearer.seen && across_mps(nearer) < CROSSES_MPS;
+        (stands && distance_m(nearer) <= OVERLOOKED_M).then_some(nearer)
     }
 
     /// Returns the nearest track that came nearer by `approach_by_m` and has stood within

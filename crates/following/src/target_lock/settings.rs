@@ -23,8 +23,8 @@ pub struct TargetSettings {
     /// not always seen first.
     #[schemars(range(min = 0.0))]
     pub choose_after_s: f64,
-    /// Time after that choice in which somebody nearer, within the same bearing, is taken instead, s.
-    /// An enrolled person is kept in any case.
+    /// Time after that choice in which somebody nearer, at most 3 m away and within the same bearing,
+    /// is taken instead, s. An enrolled person is kept in any case.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub reconsider_s: f64,
     /// Distance within which a person that walked up to the robot stands before it, m.
