@@ -58,8 +58,9 @@ impl Speckles {
 /// Pixels whose numbers are counted in 16 bits.
 const BLOCK: usize = 1 << 14;
 
-/// Returns how many pixels in the middle are odd, and how many are holes. Counts as wide as the pixels, and
-/// without a check for an overflow that no block can have, let the loop become vector instructions.
+/// Returns how many pixels in the middle are odd, and how many are holes. Counts as wide as the
+/// pixels, and without a check for an overflow that no block can have, let the loop become vector
+/// instructions.
 fn count(left: &[u16], middle: &[u16], right: &[u16]) -> [u16; 2] {
     let [mut odd, mut holes] = [0u16; 2];
     for ((left, middle), right) in left.iter().zip(middle).zip(right) {

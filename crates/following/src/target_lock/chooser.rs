@@ -131,8 +131,9 @@ impl Chooser {
         let is_nearer = |track: &&Track| distance_m(track) < distance_m(chosen) - NEARER_M;
         let nearer = nearest_in_front(settings, tracks).filter(is_nearer)?;
         // A person walking past between the robot and the chosen one is nearer, too.
-        let stands = nearer.seen && across_mps(nearer) < CROSSES_MPS;
-        (stands && distance_m(nearer) <= OVERLOOKED_M).then_some(nearer)
+        let walks_past = across_mps(nearer) >= CROSSES_MPS;
+        let was_overlooked = nearer.seen && distance_m(nearer) <= OVERLOOKED_M;
+        (was_overlooked && !walks_past).then_some(nearer)
     }
 
     /// Returns the nearest track that came nearer by `approach_by_m` and has stood within
