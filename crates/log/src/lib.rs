@@ -54,6 +54,8 @@ pub use packed::LogFile;
 pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
 pub use tagalong_core::{Input, Inputs, Usage};
 pub use timing::{Skew, Timing};
-pub use truth::{TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
+pub use truth::{
+    TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthJoint, TruthPerson, read_truth, read_truth_lines,
+};
 pub use walk::{Channel, Counters, LOSSES, Message};
 pub use walker::LogWalker;

@@ -7,6 +7,7 @@
 //! be read, too (message encoding `json`, schema encoding `jsonschema`, schema name
 //! [`TRUTH_SCHEMA`]).
 
+use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::Path;
 
@@ -61,6 +62,23 @@ pub struct TruthPerson {
     /// True if the person counts neither as a miss nor as a false alarm.
     #[serde(default)]
     pub ignore: bool,
+    /// Joints by their names in the keypoints of COCO (`left_shoulder`), as far as they are known.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub joints: BTreeMap<String, TruthJoint>,
+}
+
+/// One joint of a person.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TruthJoint {
+    /// In the robot frame (X forward, Y left, Z up), m.
+    pub in_robot_m: [f64; 3],
+    /// Column and row in the image, pixels; nothing outside of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub px: Option<[f64; 2]>,
+    /// True if nothing stands before it.
+    #[serde(default)]
+    pub in_sight: bool,
 }
 
 fn whole() -> f64 {
@@ -156,5 +174,18 @@ mod tests {
         let text = serde_json::to_string(&frame).unwrap();
         assert_eq!(serde_json::from_str::<TruthFrame>(&text).unwrap(), frame);
         assert!(TruthFrame::schema().contains("head_in_robot_m"));
+    }
+
+    #[test]
+    fn joints_are_read_by_their_names() {
+        let text = r#"{"stamp_ns":5,"people":[{"id":3,"head_in_robot_m":null,"upper_body_px":null,
+            "joints":{"left_knee":{"in_robot_m":[2,0.1,0.5],"px":[320,400.5],"in_sight":true},
+                      "left_hip":{"in_robot_m":[2,0.1,0.9]}}}]}"#;
+        let frame: TruthFrame = serde_json::from_str(text).unwrap();
+        let joints = &frame.people[0].joints;
+        assert_eq!(joints["left_knee"].px, Some([320.0, 400.5]));
+        assert_eq!((joints["left_hip"].px, joints["left_hip"].in_sight), (None, false));
+        let text = serde_json::to_string(&frame).unwrap();
+        assert_eq!(serde_json::from_str::<TruthFrame>(&text).unwrap(), frame);
     }
 }

@@ -109,6 +109,7 @@ fn annotated(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Option<Trut
         visible_fraction: row.visible,
         occluder: None,
         ignore: row.ignore,
+        joints: Vec::new(),
     })
 }
 

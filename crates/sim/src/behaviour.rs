@@ -307,7 +307,7 @@ impl Walker {
     }
 
     /// Returns the push away from a place, stronger from ahead than from behind, with a part to the
-    /// right so that people who meet head-on pass each other.
+    /// right so that people pass each other when they meet head-on.
     fn push(&self, from: &Point2<f64>, radius_m: f64, reach_m: f64) -> Vector2<f64> {
         let away = self.stance.place - from;
         let distance = away.norm();

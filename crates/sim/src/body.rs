@@ -118,6 +118,24 @@ pub struct Skeleton {
 }
 
 impl Skeleton {
+    /// Returns the joints that pose networks know, by their names in the keypoints of COCO.
+    pub fn joints(&self) -> [(&'static str, Point3<f64>); 12] {
+        [
+            ("left_shoulder", self.shoulders[0]),
+            ("right_shoulder", self.shoulders[1]),
+            ("left_elbow", self.elbows[0]),
+            ("right_elbow", self.elbows[1]),
+            ("left_wrist", self.wrists[0]),
+            ("right_wrist", self.wrists[1]),
+            ("left_hip", self.hips[0]),
+            ("right_hip", self.hips[1]),
+            ("left_knee", self.knees[0]),
+            ("right_knee", self.knees[1]),
+            ("left_ankle", self.ankles[0]),
+            ("right_ankle", self.ankles[1]),
+        ]
+    }
+
     /// Returns the same body on a floor that is higher by so much, m.
     pub fn raised(mut self, by_m: f64) -> Self {
         let pairs = [

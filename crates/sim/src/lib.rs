@@ -42,6 +42,8 @@
 
 mod behaviour;
 mod body;
+mod daylight;
+mod furniture;
 mod gait;
 mod lanes;
 mod laser;
@@ -66,16 +68,20 @@ mod variation;
 mod webcam;
 mod world;
 
+pub use daylight::Daylight;
+pub use furniture::{Furniture, FurnitureKind};
 pub use laser::LaserSettings;
 pub use mirror::MirrorSettings;
 pub use person::Extra;
 pub use ramp::Ramp;
 pub use robot::Encoder;
 pub use scene::{
-    AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
-    LightSettings, PersonSettings, Posture, RobotSettings, RoomSettings, Scene, Trick,
+    AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, LightSettings, PersonSettings,
+    Posture, RobotSettings, RoomSettings, Scene, Trick,
 };
-pub use simulation::{Clearance, Event, OdometryReading, Shot, Simulation, Truth, WebcamShot};
+pub use simulation::{
+    Clearance, Event, Joint, OdometryReading, Shot, Simulation, Truth, WebcamShot,
+};
 pub use split::{Seeds, Split};
 pub use variation::Variant;
 pub use webcam::WebcamSettings;

@@ -21,6 +21,12 @@ pub struct Material {
     /// Reflectance in the near infrared of a structured-light camera. Cloth that
     /// is black to the eye often is not black there.
     pub infrared: f64,
+    /// Share of the light that is mirrored.
+    pub reflects: f64,
+    /// Share of the light that comes through from behind; the rest is the surface's own.
+    pub passes: f64,
+    /// Light of its own: it is as bright as if this much more light fell on it, lx.
+    pub glow_lux: f64,
 }
 
 /// Layout of the two colours of a surface. Lengths in metres.
@@ -52,7 +58,36 @@ impl Material {
     /// One colour.
     pub fn plain(colour: Colour) -> Self {
         // Bright cloth usually reflects more infrared, too.
-        Self { colour, second: colour, pattern: Pattern::Plain, infrared: 0.3 + 0.6 * luma(colour) }
+        Self {
+            colour,
+            second: colour,
+            pattern: Pattern::Plain,
+            infrared: 0.3 + 0.6 * luma(colour),
+            reflects: 0.0,
+            passes: 0.0,
+            glow_lux: 0.0,
+        }
+    }
+
+    /// A silvered mirror, a little dusty.
+    pub fn mirror() -> Self {
+        Self { reflects: 0.9, infrared: 0.0, ..Self::plain([0.5; 3]) }
+    }
+
+    /// Clear glass: both of its faces together mirror some 8 % of the light that falls straight on
+    /// them (Fresnel, index 1.5).
+    pub fn glass() -> Self {
+        Self { reflects: 0.08, passes: 0.88, infrared: 0.0, ..Self::plain([0.4, 0.5, 0.45]) }
+    }
+
+    /// False for mirrors and glass, which show other things.
+    pub fn shows_itself(&self) -> bool {
+        self.reflects == 0.0 && self.passes == 0.0
+    }
+
+    /// The same with light of its own.
+    pub fn glowing(self, glow_lux: f64) -> Self {
+        Self { glow_lux, ..self }
     }
 
     /// Two colours in a pattern.

@@ -12,7 +12,7 @@ use crate::parallel::in_pieces;
 use crate::seen::{Met, SolidView};
 use crate::shape::Shape;
 use crate::sight::{SightedSolid, before, between};
-use crate::world::{Hit, World};
+use crate::world::{Hit, Shine, World};
 
 /// Side of a tile, pixels.
 const TILE: usize = LANES;
@@ -133,7 +133,7 @@ impl WorldCamera<'_> {
         while let Some(lane) = left.iter().position(|left| *left) {
             let number = met.number[lane];
             let wanted = std::array::from_fn(|lane| left[lane] && met.number[lane] == number);
-            self.shade(tile[number as usize], (&points, rays, &met.t), &wanted, pixels);
+            self.shade(tile[number as usize], eye, (&points, rays, &met.t), &wanted, pixels);
             left.iter_mut().zip(wanted).for_each(|(left, done)| *left &= !done);
         }
     }
@@ -142,23 +142,27 @@ impl WorldCamera<'_> {
     fn shade(
         &self,
         SightedSolid { shape, person, .. }: &SightedSolid<'_>,
+        eye: &Point3<f64>,
         (points, rays, t): (&Vectors, &Vectors, &Lanes),
         wanted: &[bool; LANES],
         pixels: &mut [Hit],
     ) {
         let surface = shape.surface(points, rays);
-        let light = if self.lit {
-            self.world.light(&shape.material, points, &surface, wanted)
-        } else {
-            [[0.0; LANES]; 3]
-        };
+        let Shine { light, infrared } =
+            self.world.shine(&shape.material, points, &surface, wanted, self.lit);
         for (lane, pixel) in pixels.iter_mut().enumerate().filter(|(lane, _)| wanted[*lane]) {
-            *pixel = Hit {
+            let own = Hit {
                 t: t[lane],
                 light: [light[0][lane], light[1][lane], light[2][lane]],
-                infrared: shape.material.infrared,
+                infrared: infrared[lane],
                 facing: surface.facing[lane],
                 person: *person,
+            };
+            *pixel = if shape.material.shows_itself() {
+                own
+            } else {
+                let (normal, ray) = (surface.normal.at(lane), rays.at(lane));
+                self.world.beyond(own, shape, &normal, (eye, &ray))
             };
         }
     }
@@ -263,7 +267,9 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::daylight::Daylight;
     use crate::material::{Material, Pattern};
+    use crate::scene::RoomSettings;
     use crate::shape::Form;
     use crate::world::{Lamp, Object, Stage};
 
@@ -309,18 +315,26 @@ mod tests {
         #[test]
         fn tiles_lose_nothing_that_a_ray_meets(
             solids in prop::collection::vec(
-                (0..3usize, prop::array::uniform3(-3.0..3.0f64), -3.0..3.0f64), 0..20),
+                (0..9usize, prop::array::uniform3(-3.0..3.0f64), -3.0..3.0f64), 0..20),
             pitch in -0.5..0.5f64, yaw in -3.0..3.0f64,
         ) {
             let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 23.5, cy: 17.0, distortion: Distortion::None };
             let camera = Camera::mounted(lens, 50, 37, 0.2, pitch, 0.1);
             let objects = solids.into_iter().enumerate().map(|(i, (form, at, turn))| {
-                Object::new(vec![shape(form, at, turn)], Some(i as u16), true)
+                let mut solid = shape(form % 3, at, turn);
+                // One in nine is a mirror, one is glass.
+                solid.material = match form {
+                    4 => Material::mirror(),
+                    7 => Material::glass(),
+                    _ => solid.material,
+                };
+                Object::new(vec![solid], Some(i as u16), true)
             });
-            let lamp = Lamp { at: Point3::new(0.0, 1.0, 2.5), lux_at_1m: 500.0 };
+            let lamp = Lamp::hanging(Point3::new(0.0, 1.0, 2.5), 500.0);
+            let sun = Daylight::default().sun(&RoomSettings::default()).unwrap();
             let mut objects: Vec<Object> = objects.collect();
             let people = objects.split_off(objects.len() / 2);
-            let world = World::new(&Arc::new(Stage::new(objects, vec![lamp], 100.0)), people);
+            let world = World::new(&Arc::new(Stage::new(objects, vec![lamp, sun], 100.0)), people);
             let pose = Isometry3::rotation(Vector3::z() * yaw);
             let image = draw(&world, &camera, &pose, 2);
             let eye = Eye::new(&camera, &pose);

@@ -3,12 +3,15 @@
 use nalgebra::{Point2, Point3, Rotation2, Rotation3, Vector2, Vector3};
 
 use crate::behaviour::Obstacle;
+use crate::furniture::{Furniture, FurnitureKind};
 use crate::material::{Colour, Material, Pattern, scaled};
 use crate::ramp::Ramp;
 use crate::random::Random;
-use crate::scene::{Floor, Furniture, FurnitureKind, LightSettings, RoomSettings, Scene};
+use crate::scene::{Floor, LightSettings, RoomSettings, Scene};
 use crate::shape::{Form, Shape};
 use crate::world::{Lamp, Object};
+
+mod glass;
 
 const WOOD: Colour = [0.30, 0.17, 0.08];
 const METAL: Colour = [0.10, 0.10, 0.11];
@@ -152,7 +155,7 @@ pub fn lamps(room: &RoomSettings, light: &LightSettings) -> Vec<Lamp> {
     let direct = light.lux * (1.0 - light.ambient);
     let place = |i: usize| (i as f64 + 0.5) / light.lamps as f64;
     let hang = |i: usize| Point3::new(x * place(i), y * (0.35 + 0.3 * (i % 2) as f64), z);
-    (0..light.lamps).map(|i| Lamp { at: hang(i), lux_at_1m: direct * z * z }).collect()
+    (0..light.lamps).map(|i| Lamp::hanging(hang(i), direct * z * z)).collect()
 }
 
 /// Random pieces along the walls, off the ways of robot and people and off each
@@ -230,7 +233,10 @@ pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
             .flat_map(|(y, r)| [round(*y, *r), round(-y, *r)])
             .collect(),
         FurnitureKind::Partition => [-0.65, 0.0, 0.65].map(|y| round(y, 0.35)).into(),
-        FurnitureKind::GlassDoor => [-0.3, 0.3].map(|y| round(y, 0.25)).into(),
+        FurnitureKind::GlassDoor | FurnitureKind::Mirror => {
+            [-0.3, 0.3].map(|y| round(y, 0.25)).into()
+        }
+        FurnitureKind::GlassWall => [-0.9, -0.3, 0.3, 0.9].map(|y| round(y, 0.3)).into(),
         _ => vec![round(0.0, 0.3)],
     }
 }
@@ -261,6 +267,8 @@ pub fn furniture(piece: &Furniture, ceiling_m: f64, random: &mut Random) -> Obje
         FurnitureKind::Blanket => maker.blanket(),
         FurnitureKind::Flag => maker.flag(),
         FurnitureKind::GlassDoor => maker.glass_door(),
+        FurnitureKind::Mirror => maker.mirror(),
+        FurnitureKind::GlassWall => maker.glass_wall(),
     }
     Object::new(maker.shapes, None, true)
 }
@@ -440,13 +448,6 @@ impl Maker {
         self.limb([0.0, 0.0, 0.0], [0.0, 0.0, top], [0.015, 0.015], metal);
         self.ellipsoid([0.0, 0.0, 0.02], [0.16, 0.16, 0.03], metal);
         self.ellipsoid([0.02, 0.8 * wide, top - 0.5 * long], [0.06, wide, 0.55 * long], stripes);
-    }
-
-    fn glass_door(&mut self) {
-        let [side, top] = DOOR_M;
-        let pane = Material::plain([0.45, 0.50, 0.50]).with_infrared(0.0);
-        self.block([0.0, 0.0, 0.5 * top], [0.01, side, 0.5 * top], pane);
-        self.shapes.extend(door_frame(self.at, &self.turn));
     }
 
     /// A shade or a globe, above the foot or on an arm beside it.
@@ -649,21 +650,6 @@ mod tests {
         let reach = arm.extent(&along);
         assert!((reach - 0.27).abs() < 1e-9, "{reach}");
         assert!((arm.origin - nalgebra::center(&from, &to)).norm() < 1e-12);
-    }
-
-    /// A ray through the middle of the pane meets glass, and one beside it the frame.
-    #[test]
-    fn frosted_glass_returns_no_dots_and_its_frame_does() {
-        let piece =
-            Furniture { kind: FurnitureKind::GlassDoor, at: [3.0, 2.0], heading_deg: 180.0 };
-        let made = furniture(&piece, 2.8, &mut Random::new(1, 8));
-        let infrared = |y: f64| {
-            let eye = Point3::new(1.0, y, 1.0);
-            let met = made.shapes.iter().filter_map(|s| Some((s.meet(&eye, &Vector3::x())?, s)));
-            met.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, shape)| shape.material.infrared)
-        };
-        assert_eq!(infrared(2.0), Some(0.0));
-        assert!(infrared(2.48).is_some_and(|infrared| infrared > 0.3));
     }
 
     #[test]

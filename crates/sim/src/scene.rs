@@ -7,6 +7,8 @@ use tagalong_config::ConfigError;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
+use crate::daylight::Daylight;
+use crate::furniture::Furniture;
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorSettings;
 use crate::person::Extra;
@@ -214,8 +216,9 @@ impl Scene {
         let webcams = self.webcams.iter().flat_map(WebcamSettings::rules);
         let laser = self.laser.iter().flat_map(LaserSettings::rules);
         let ramp = self.room.ramp.iter().flat_map(Ramp::rules);
-        let devices = webcams.chain(laser);
-        let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(devices).chain(ramp);
+        let day = self.light.day.iter().flat_map(|day| day.rules(&self.room));
+        let parts = webcams.chain(laser).chain(ramp).chain(day);
+        let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
             None => Ok(()),
@@ -304,11 +307,13 @@ pub struct LightSettings {
     pub lamps: usize,
     /// Light from everywhere as a fraction of `lux`.
     pub ambient: f64,
+    /// Windows and the sun; without it the room has no windows.
+    pub day: Option<Daylight>,
 }
 
 impl Default for LightSettings {
     fn default() -> Self {
-        Self { lux: 350.0, lamps: 2, ambient: 0.35 }
+        Self { lux: 350.0, lamps: 2, ambient: 0.35, day: None }
     }
 }
 
@@ -456,81 +461,6 @@ pub struct FaultSettings {
 impl Default for FaultSettings {
     fn default() -> Self {
         Self { dropped: 0.01, late: 0.02 }
-    }
-}
-
-/// A piece of furniture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Furniture {
-    /// Kind of furniture.
-    pub kind: FurnitureKind,
-    /// Where it stands, m.
-    pub at: [f64; 2],
-    /// Where its front looks, degrees.
-    #[serde(default)]
-    pub heading_deg: f64,
-}
-
-/// Furniture, most of it with the silhouette of a person.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum FurnitureKind {
-    /// A stand with a coat and a hat.
-    CoatStand,
-    /// A chair with a jacket over its back.
-    DrapedChair,
-    /// A lamp with a shade at head height.
-    FloorLamp,
-    /// A tall plant in a pot.
-    Plant,
-    /// A round pillar up to the ceiling.
-    Pillar,
-    /// A sheet on a panel that shows a person.
-    Poster,
-    /// A person cut out of cardboard.
-    CardboardFigure,
-    /// A desk with a monitor.
-    Desk,
-    /// A shelf with books.
-    Shelf,
-    /// A chair.
-    Chair,
-    /// A round bin on a small table.
-    BinOnTable,
-    /// A wall of 2.4 m across its heading with an open doorway in its middle.
-    Doorway,
-    /// A screen of 1.6 m x 1.7 m across its heading.
-    Partition,
-    /// A blanket over the back of a chair, down to the floor.
-    Blanket,
-    /// A flag that hangs from a pole.
-    Flag,
-    /// A door of frosted glass, from which no projected dots return.
-    GlassDoor,
-}
-
-impl FurnitureKind {
-    /// Its name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::CoatStand => "coat stand",
-            Self::DrapedChair => "draped chair",
-            Self::FloorLamp => "floor lamp",
-            Self::Plant => "plant",
-            Self::Pillar => "pillar",
-            Self::Poster => "poster",
-            Self::CardboardFigure => "cardboard figure",
-            Self::Desk => "desk",
-            Self::Shelf => "shelf",
-            Self::Chair => "chair",
-            Self::BinOnTable => "bin on a table",
-            Self::Doorway => "doorway",
-            Self::Partition => "partition",
-            Self::Blanket => "blanket",
-            Self::Flag => "flag",
-            Self::GlassDoor => "glass door",
-        }
     }
 }
 

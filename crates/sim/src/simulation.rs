@@ -12,6 +12,7 @@ use tagalong_geometry::{Camera, Distortion, Panorama, Pinhole, Rect};
 
 use crate::behaviour::{Obstacle, Walker, hidden_by, lead_of, others, play_tricks};
 use crate::body::Skeleton;
+use crate::furniture::{Furniture, FurnitureKind};
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorCamera;
 use crate::person::Person;
@@ -19,15 +20,18 @@ use crate::random::Random;
 use crate::render::{Visibility, WorldCamera};
 use crate::robot::{Encoder, Robot};
 use crate::room;
-use crate::scene::{AtEnd, CameraKind, Furniture, FurnitureKind, PersonSettings, Posture, Scene};
+use crate::scene::{AtEnd, CameraKind, PersonSettings, Posture, Scene};
 use crate::sensor::{DepthSensor, Exposure, Moment};
 use crate::shape::Shape;
 use crate::split::{SUBJECTS, Split};
 use crate::webcam::Webcam;
 use crate::world::{self, Hit, Object, Stage, World};
 
+mod joints;
 mod walkers;
 
+pub use joints::Joint;
+use joints::{Spot, joints};
 use walkers::walkers;
 
 /// People, robot and odometry move in steps of this many nanoseconds.
@@ -131,6 +135,8 @@ pub struct Truth {
     pub occluder: Option<u16>,
     /// Hardly seen: neither a miss nor a false alarm.
     pub ignore: bool,
+    /// Shoulders, elbows, wrists, hips, knees and ankles; none where they are unknown.
+    pub joints: Vec<Joint>,
 }
 
 /// Free distance around a robot, m; negative is contact.
@@ -175,6 +181,11 @@ impl Simulation {
         pieces.extend(chairs(scene));
         let obstacles: Vec<Obstacle> = pieces.iter().flat_map(room::obstacles).collect();
         let mut fixed = vec![room::room(&scene.room)];
+        let mut lamps = room::lamps(&scene.room, &scene.light);
+        if let Some(day) = &scene.light.day {
+            fixed.push(day.windows(&scene.room));
+            lamps.extend(day.sun(&scene.room));
+        }
         let (ceiling_m, mut chance) = (scene.room.height_m, stream(8));
         fixed.extend(pieces.iter().map(|piece| {
             let floor_m = scene.room.floor_m(&piece.at.into());
@@ -191,11 +202,7 @@ impl Simulation {
             camera,
             mirror,
             webcams: scene.webcams.iter().map(|webcam| Webcam::new(webcam, threads)).collect(),
-            stage: Arc::new(Stage::new(
-                fixed,
-                room::lamps(&scene.room, &scene.light),
-                scene.light.lux * scene.light.ambient,
-            )),
+            stage: Arc::new(Stage::new(fixed, lamps, scene.light.lux * scene.light.ambient)),
             walkers: walkers(scene, &obstacles, &mut stream(3)),
             pieces,
             obstacles,
@@ -512,8 +519,11 @@ impl Simulation {
         let (camera, lit) = (&self.true_camera, self.scene.camera.colour);
         let view = WorldCamera { world, camera, pose: &|part| self.world_from_robot(part), lit };
         let seen = view.draw(self.threads);
-        let truth =
-            self.truth(world, uppers, pose, |of, skeleton| sight(&view, &seen, of, skeleton));
+        let truth = self.truth(
+            (world, uppers, pose),
+            |of, skeleton| sight(&view, &seen, of, skeleton),
+            |id, joint| joints::in_lens(&view, &seen, id, joint),
+        );
         (seen, truth)
     }
 
@@ -526,20 +536,21 @@ impl Simulation {
     ) -> (Image<Hit>, Vec<Truth>) {
         let world_from_camera = pose * self.true_camera.robot_from_camera;
         let seen = mirror.draw(world, &world_from_camera, self.threads);
-        let truth = self.truth(world, uppers, pose, |of, skeleton| {
-            mirror.sight(&seen, &world_from_camera, of, &skeleton.head)
-        });
+        let truth = self.truth(
+            (world, uppers, pose),
+            |of, skeleton| mirror.sight(&seen, &world_from_camera, of, &skeleton.head),
+            |id, joint| joints::in_mirror(mirror, &seen, &world_from_camera, id, joint),
+        );
         (seen, truth)
     }
 
     /// `sight` returns how the upper body of a person appears: the region where it must be, and the
-    /// visible part of it.
+    /// visible part of it; `spot` how a joint does.
     fn truth(
         &self,
-        world: &World,
-        uppers: &[usize],
-        pose: &Isometry3<f64>,
+        (world, uppers, pose): (&World, &[usize], &Isometry3<f64>),
         sight: impl Fn((u16, &[Shape]), &Skeleton) -> (Option<Rect>, Visibility),
+        spot: impl Fn(u16, &Point3<f64>) -> Spot,
     ) -> Vec<Truth> {
         let people = world.people.iter().filter_map(|o| Some((o.person?, o)));
         let walkers = self.present().map(|(walker, _)| walker).zip(uppers);
@@ -556,6 +567,7 @@ impl Simulation {
                 visible_fraction: seen.fraction,
                 occluder: seen.occluder,
                 ignore: seen.fraction < LEAST_VISIBLE,
+                joints: joints(&skeleton, pose, |joint| spot(id, joint)),
             }
         });
         truth.collect()
@@ -616,7 +628,7 @@ fn shaken(camera: &Camera, degrees: f64, random: &mut Random) -> Camera {
     Camera { robot_from_camera: camera.robot_from_camera * off, ..camera.clone() }
 }
 
-/// Returns a chair for each person who sits.
+/// Returns a chair for each seated person.
 fn chairs(scene: &Scene) -> impl Iterator<Item = Furniture> {
     let seated = scene.people.iter().filter(|p| p.posture == Posture::Seated);
     seated.map(|person| Furniture {

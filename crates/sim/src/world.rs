@@ -1,9 +1,11 @@
 //! The visible world at one moment, and the casting of single rays into it.
 
+use std::ptr;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Point3, Vector3};
 
+use crate::daylight::Windows;
 use crate::lanes::{LANES, Lanes, Vectors, dot};
 use crate::material::{Colour, Material};
 use crate::shadow::{self, Shadows};
@@ -38,6 +40,11 @@ impl Object {
     }
 }
 
+/// Sunlight in which half of the contrast of projected dots is left, lx: a light wall in 20 000 lx
+/// has depth up to 1.3 m. A choice, not a measurement: no table of depth by illuminance was found,
+/// only that such cameras hardly measure anything out of doors.
+const WASHED_OUT_LUX: f64 = 200.0;
+
 /// A lamp: a point that shines on all sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
@@ -45,6 +52,9 @@ pub struct Lamp {
     pub at: Point3<f64>,
     /// Illuminance of a facing surface at one metre, lx.
     pub lux_at_1m: f64,
+    /// Openings through which the sun shines. Its light has infrared, which the light of lamps
+    /// has not.
+    pub windows: Option<Windows>,
 }
 
 /// Everything that never moves, in the coordinates of the world.
@@ -90,7 +100,7 @@ pub struct Hit {
     pub t: f64,
     /// Light towards the eye in each colour, lx times reflectance.
     pub light: Colour,
-    /// Reflectance in the near infrared.
+    /// Reflectance in the near infrared, less what sunlight washes out.
     pub infrared: f64,
     /// Cosine between the surface's normal and the way back.
     pub facing: f64,
@@ -109,74 +119,132 @@ impl World {
         self.stage.objects.iter().chain(&self.people).flat_map(Object::solids)
     }
 
-    /// Returns the distance to the first solid in a direction of length one, m; infinite where
-    /// there is none.
+    /// Returns the range of a laser in a direction of length one, m; infinite where it meets
+    /// nothing. It goes through glass, and mirrors send it on.
     pub(crate) fn distance(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
-        distance(self.stage.objects.iter().chain(&self.people), eye, ray)
+        let solids = || self.solids().filter(|(_, solid)| solid.material.passes == 0.0);
+        let Some((t, _, solid)) = meet(solids(), eye, ray) else { return f64::INFINITY };
+        if solid.material.reflects == 0.0 {
+            return t;
+        }
+        let at = eye + ray * t;
+        let on = mirrored(ray, &solid.normal(&solid.own(&at)));
+        let others = solids().filter(|(_, other)| !ptr::eq(*other, solid));
+        meet(others, &at, &on).map_or(f64::INFINITY, |(further, ..)| t + further)
     }
 
-    /// The first of some solids that a ray meets: for rays that have no eye in
-    /// common, and the reference for those that have.
+    /// The first of some solids that a ray meets, through glass and by way of mirrors: for rays
+    /// that have no eye in common, and the reference for those that have.
     pub(crate) fn first<'a>(
         &'a self,
         solids: impl Iterator<Item = (Option<u16>, &'a Shape)>,
         eye: &Point3<f64>,
         ray: &Vector3<f64>,
     ) -> Hit {
-        let per_length = 1.0 / ray.norm_squared();
-        let meet = |(person, shape): (Option<u16>, &'a Shape)| {
-            // The bounding ball is cheap, and most solids miss most rays.
-            let near = shape.near(eye, ray, per_length);
-            Some((near.then(|| shape.meet(eye, ray)).flatten()?, person, shape))
-        };
-        let first = solids.filter_map(meet).min_by(|a, b| a.0.total_cmp(&b.0));
-        first.map_or(Hit::NOTHING, |(t, person, shape)| self.hit(t, person, shape, (eye, ray)))
+        meet(solids, eye, ray).map_or(Hit::NOTHING, |(t, person, shape)| {
+            let (hit, normal) = self.hit(t, person, shape, (eye, ray));
+            if shape.material.shows_itself() {
+                return hit;
+            }
+            self.beyond(hit, shape, &normal, (eye, ray))
+        })
     }
 
-    /// Returns the surface of a solid that a ray from an eye meets after `t` lengths of it.
+    /// Returns the view in a mirror or through glass with this normal, where a ray from an eye
+    /// meets it; glass mirrors a little, too. Mirrors that are seen in mirrors or through glass
+    /// show their own surface only.
+    pub(crate) fn beyond(
+        &self,
+        seen: Hit,
+        of: &Shape,
+        normal: &Vector3<f64>,
+        (eye, ray): (&Point3<f64>, &Vector3<f64>),
+    ) -> Hit {
+        let Material { reflects, passes, .. } = of.material;
+        let at = eye + ray * seen.t;
+        let look = |ray: &Vector3<f64>| {
+            let others = self.solids().filter(|(_, other)| !ptr::eq(*other, of));
+            meet(others, &at, ray)
+                .map_or(Hit::NOTHING, |(t, person, shape)| self.hit(t, person, shape, (&at, ray)).0)
+        };
+        let image = Hit { person: None, ..look(&mirrored(ray, normal)) };
+        let behind = if passes > 0.0 { look(ray) } else { Hit::NOTHING };
+        let own = 1.0 - reflects - passes;
+        let light = std::array::from_fn(|c| {
+            own * seen.light[c] + reflects * image.light[c] + passes * behind.light[c]
+        });
+        // Projected dots go the way of most of the light, there and back.
+        let (share, main) = if passes > reflects { (passes, behind) } else { (reflects, image) };
+        Hit { t: seen.t + main.t, light, infrared: share * share * main.infrared, ..main }
+    }
+
+    /// Returns the surface of a solid that a ray from an eye meets after `t` lengths of it, and its
+    /// normal.
     fn hit(
         &self,
         t: f64,
         person: Option<u16>,
         of: &Shape,
         (eye, ray): (&Point3<f64>, &Vector3<f64>),
-    ) -> Hit {
+    ) -> (Hit, Vector3<f64>) {
         let at = eye + ray * t;
         let own = of.own(&at);
         let normal = of.normal(&own);
-        let light = scaled_light(of.material.at(&own), self.lux(&at, &normal));
+        let [lux, sun] = self.lux(&at, &normal);
+        let light = of.material.at(&own).map(|colour| colour * (lux + of.material.glow_lux));
         let facing = -normal.dot(ray) / ray.norm();
-        Hit { t, light, infrared: of.material.infrared, facing, person }
+        (Hit { t, light, infrared: left_over(of.material.infrared, sun), facing, person }, normal)
     }
 
-    /// Illuminance of a point with this normal.
-    fn lux(&self, at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+    /// Illuminance of a point with this normal, and the part of it that the sun has, lx.
+    fn lux(&self, at: &Point3<f64>, normal: &Vector3<f64>) -> [f64; 2] {
         // Floors are lit by the ceiling, undersides by the floor, which is darker.
-        let ambient = self.stage.ambient_lux * (0.75 + 0.25 * normal.z);
-        let lamps = self.stage.lamps.iter().zip(self.shadows());
-        lamps.fold(ambient, |sum, (lamp, shadows)| sum + lamp.on(shadows, at, normal))
+        let mut lux = [self.stage.ambient_lux * (0.75 + 0.25 * normal.z), 0.0];
+        for (lamp, shadows) in self.stage.lamps.iter().zip(self.shadows()) {
+            let on = lamp.on(shadows, at, normal);
+            lux[0] += on;
+            lux[1] += if lamp.windows.is_some() { on } else { 0.0 };
+        }
+        lux
     }
 
-    /// Returns the light towards the eye in each colour from points of the surface of a solid, of
-    /// which only the `wanted` ones count.
-    pub(crate) fn light(
+    /// Returns how points of the surface of a solid appear, of which only the `wanted` ones count;
+    /// without colours if it is not `lit`.
+    pub(crate) fn shine(
         &self,
         of: &Material,
         points: &Vectors,
         surface: &Surface,
         wanted: &[bool; LANES],
-    ) -> [Lanes; 3] {
+        lit: bool,
+    ) -> Shine {
+        let is_sunny = self.stage.lamps.iter().any(|lamp| lamp.windows.is_some());
+        let mut shine = Shine { light: [[0.0; LANES]; 3], infrared: [of.infrared; LANES] };
+        if !lit && !is_sunny {
+            return shine;
+        }
         let mut lux = ambient(self.stage.ambient_lux, &surface.normal);
-        for (lamp, shadows) in self.stage.lamps.iter().zip(self.shadows()) {
-            let beams = shine(lamp, points, &surface.normal);
+        let mut sun = [0.0; LANES];
+        let lamps = self.stage.lamps.iter().zip(self.shadows());
+        for (lamp, shadows) in lamps.filter(|(lamp, _)| lit || lamp.windows.is_some()) {
+            let beams = beams(lamp, points, &surface.normal);
             let lit = |lane: usize| wanted[lane] && beams.lux[lane] != 0.0;
             let mut open = std::array::from_fn(lit);
             shadows.iter().for_each(|shadows| shadows.darken(&beams.ways, &mut open));
             for lane in 0..LANES {
-                lux[lane] += if open[lane] { beams.lux[lane] } else { 0.0 };
+                let on = if open[lane] { beams.lux[lane] } else { 0.0 };
+                lux[lane] += on;
+                sun[lane] += if lamp.windows.is_some() { on } else { 0.0 };
             }
         }
-        of.colours(&surface.own, wanted).map(|colour| std::array::from_fn(|i| colour[i] * lux[i]))
+        if is_sunny {
+            shine.infrared = sun.map(|sun| left_over(of.infrared, sun));
+        }
+        if lit {
+            let colours = of.colours(&surface.own, wanted);
+            shine.light = colours.map(|c| std::array::from_fn(|i| c[i] * (lux[i] + of.glow_lux)));
+        }
+        shine
     }
 
     /// Returns the shadows around each lamp: those of the stage, and those of people.
@@ -187,9 +255,43 @@ impl World {
     }
 }
 
-/// Returns the shadows that objects throw, for each lamp.
+/// Appearance of points of a surface.
+pub(crate) struct Shine {
+    /// Light towards the eye in each colour, lx times reflectance.
+    pub light: [Lanes; 3],
+    /// See [`Hit::infrared`].
+    pub infrared: Lanes,
+}
+
+/// Returns the first of some solids that a ray meets, and its distance in lengths of the ray.
+fn meet<'a>(
+    solids: impl Iterator<Item = (Option<u16>, &'a Shape)>,
+    eye: &Point3<f64>,
+    ray: &Vector3<f64>,
+) -> Option<(f64, Option<u16>, &'a Shape)> {
+    let per_length = 1.0 / ray.norm_squared();
+    let meet = |(person, shape): (Option<u16>, &'a Shape)| {
+        // The bounding ball is cheap, and most solids miss most rays.
+        let near = shape.near(eye, ray, per_length);
+        Some((near.then(|| shape.meet(eye, ray)).flatten()?, person, shape))
+    };
+    solids.filter_map(meet).min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Returns the direction of a ray after a mirror with this normal.
+fn mirrored(ray: &Vector3<f64>, normal: &Vector3<f64>) -> Vector3<f64> {
+    ray - normal * (2.0 * normal.dot(ray))
+}
+
+/// Returns the part of a reflectance that projected dots stand out with in so much sunlight, lx.
+fn left_over(infrared: f64, sun_lux: f64) -> f64 {
+    infrared / (1.0 + sun_lux / WASHED_OUT_LUX)
+}
+
+/// Returns the shadows that objects throw, for each lamp; glass throws none.
 fn shadows(side: usize, lamps: &[Lamp], objects: &[Object]) -> Vec<Shadows> {
     let casters = objects.iter().filter(|object| object.casts_shadow).flat_map(Object::solids);
+    let casters = casters.filter(|(_, solid)| solid.material.passes == 0.0);
     lamps.iter().map(|lamp| Shadows::new(side, lamp.at, casters.clone())).collect()
 }
 
@@ -206,21 +308,35 @@ struct Beams {
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn shine(lamp: &Lamp, points: &Vectors, normals: &Vectors) -> Beams {
+fn beams(lamp: &Lamp, points: &Vectors, normals: &Vectors) -> Beams {
     let mut beams = Beams { ways: Vectors::ZERO, lux: [0.0; LANES] };
     for lane in 0..LANES {
         let (way, lux) = lamp.beam(&points.at(lane), &normals.at(lane));
         beams.ways.set(lane, &way);
         beams.lux[lane] = lux;
     }
+    if let Some(windows) = &lamp.windows {
+        for lane in 0..LANES {
+            let open = windows.are_open(&lamp.at, &beams.ways.at(lane));
+            beams.lux[lane] = if open { beams.lux[lane] } else { 0.0 };
+        }
+    }
     beams
 }
 
 impl Lamp {
+    /// Creates a lamp in the room.
+    pub fn hanging(at: Point3<f64>, lux_at_1m: f64) -> Self {
+        Self { at, lux_at_1m, windows: None }
+    }
+
     /// Illuminance of a point with this normal, lx.
     fn on(&self, shadows: [&Shadows; 2], at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
         let (way, lux) = self.beam(&at.coords, normal);
-        let dark = lux == 0.0 || shadows.iter().any(|shadows| shadows.on(&way));
+        let is_shut = |windows: &Windows| !windows.are_open(&self.at, &way);
+        let dark = lux == 0.0
+            || self.windows.as_ref().is_some_and(is_shut)
+            || shadows.iter().any(|shadows| shadows.on(&way));
         if dark { 0.0 } else { lux }
     }
 
@@ -256,8 +372,4 @@ pub(crate) fn distance<'a>(
     let solids = objects.into_iter().flat_map(|object| &object.shapes);
     let met = solids.filter(|shape| shape.near(eye, ray, 1.0)).filter_map(|s| s.meet(eye, ray));
     met.fold(f64::INFINITY, f64::min)
-}
-
-fn scaled_light(colour: Colour, lux: f64) -> Colour {
-    colour.map(|c| c * lux)
 }

@@ -7,13 +7,28 @@ use tagalong_core::{DepthImage, Images, RgbImage};
 use tagalong_geometry::Rect;
 use tagalong_render::canvas::{Canvas, Ink, LINE_PX};
 use tagalong_render::write_png;
-use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
+use tagalong_sim::{Event, Joint, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapper;
 
 /// Pictures of one scene.
 const PICTURES: u64 = 6;
 /// Depth that is rendered black, m.
 const FAR_M: f32 = 8.0;
+/// Joints that a bone connects.
+const BONES: [[&str; 2]; 12] = [
+    ["left_shoulder", "right_shoulder"],
+    ["left_shoulder", "left_elbow"],
+    ["left_elbow", "left_wrist"],
+    ["right_shoulder", "right_elbow"],
+    ["right_elbow", "right_wrist"],
+    ["left_shoulder", "left_hip"],
+    ["right_shoulder", "right_hip"],
+    ["left_hip", "right_hip"],
+    ["left_hip", "left_knee"],
+    ["left_knee", "left_ankle"],
+    ["right_hip", "right_knee"],
+    ["right_knee", "right_ankle"],
+];
 
 /// Renders some moments of a scene, evenly spread, with the truth on them: the image on the left,
 /// depth or the right image beside it; of a mirror the unwrapped image and the raw one. Images of
@@ -107,8 +122,24 @@ fn annotated(image: &RgbImage, truth: &[Truth]) -> RgbImage {
         if let Some(visible) = &person.visible {
             outline(&mut canvas, visible, width, Ink::solid([0, 200, 255]).faint(0.7));
         }
+        skeleton(&mut canvas, &person.joints);
     }
     canvas.into_image()
+}
+
+/// Draws the bones between joints in the image: those in sight bright, the others faint.
+fn skeleton(canvas: &mut Canvas, joints: &[Joint]) {
+    let find = |name: &str| joints.iter().find(|joint| joint.name == name);
+    for [from, to] in BONES {
+        let Some((from, to)) = find(from).zip(find(to)) else { continue };
+        let Some((a, b)) = from.pixel.zip(to.pixel) else { continue };
+        // Across the seam of a panorama a bone would cross the whole image.
+        if (a.x - b.x).abs() > 0.5 * canvas.width() as f64 {
+            continue;
+        }
+        let ink = Ink::solid([90, 255, 120]);
+        canvas.line(a, b, if from.in_sight && to.in_sight { ink } else { ink.faint(0.3) });
+    }
 }
 
 /// Outlines a rectangle. Beyond the right edge of a panorama it goes on at the left.

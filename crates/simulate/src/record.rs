@@ -13,9 +13,9 @@ use tagalong_log::msgs::{
     StringMsg, TFMessage, TransformStamped, TwistStamped,
 };
 use tagalong_log::write::{MessageLog, WriteError};
-use tagalong_log::{TruthFrame, TruthPerson};
+use tagalong_log::{TruthFrame, TruthJoint, TruthPerson};
 use tagalong_sim::{
-    Event, LaserSettings, OdometryReading, Scene, Shot, Simulation, Truth, WebcamShot,
+    Event, Joint, LaserSettings, OdometryReading, Scene, Shot, Simulation, Truth, WebcamShot,
 };
 
 /// Start time of every simulated log.
@@ -325,6 +325,15 @@ fn truth(captured: Stamp, people: &[Truth]) -> TruthFrame {
         visible: truth.visible_fraction,
         occluder: truth.occluder.map(i64::from),
         ignore: truth.ignore,
+        joints: truth.joints.iter().map(joint).collect(),
     };
     TruthFrame { stamp_ns: captured.nanos(), people: people.iter().map(person).collect() }
+}
+
+fn joint(joint: &Joint) -> (String, TruthJoint) {
+    // A tenth of a millimetre and of a pixel: all digits would be most of a log without colour.
+    let rounded = |value: f64, parts: f64| (value * parts).round() / parts;
+    let in_robot_m = <[f64; 3]>::from(joint.in_robot.coords).map(|m| rounded(m, 1e4));
+    let px = joint.pixel.map(|pixel| [pixel.x, pixel.y].map(|px| rounded(px, 10.0)));
+    (joint.name.into(), TruthJoint { in_robot_m, px, in_sight: joint.in_sight })
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 51] = [
+const BUILT_IN: [(&str, &str); 53] = [
     ("cafeteria", include_str!("../../../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../../../configs/scenes/cafeteria-high.toml")),
     ("corridor", include_str!("../../../configs/scenes/corridor.toml")),
@@ -15,6 +15,7 @@ const BUILT_IN: [(&str, &str); 51] = [
     ("crossing-parallel", include_str!("../../../configs/scenes/crossing-parallel.toml")),
     ("crossing-three", include_str!("../../../configs/scenes/crossing-three.toml")),
     ("crowd", include_str!("../../../configs/scenes/crowd.toml")),
+    ("daylight", include_str!("../../../configs/scenes/daylight.toml")),
     ("demo", include_str!("../../../configs/scenes/demo.toml")),
     ("empty-clutter", include_str!("../../../configs/scenes/empty-clutter.toml")),
     ("empty-real", include_str!("../../../configs/scenes/empty-real.toml")),
@@ -43,6 +44,7 @@ const BUILT_IN: [(&str, &str); 51] = [
     ("follow-turns", include_str!("../../../configs/scenes/follow-turns.toml")),
     ("following", include_str!("../../../configs/scenes/following.toml")),
     ("full-occlusion", include_str!("../../../configs/scenes/full-occlusion.toml")),
+    ("mirrors", include_str!("../../../configs/scenes/mirrors.toml")),
     ("office", include_str!("../../../configs/scenes/office.toml")),
     ("office-high", include_str!("../../../configs/scenes/office-high.toml")),
     ("omni-hat", include_str!("../../../configs/scenes/omni-hat.toml")),

@@ -82,6 +82,7 @@ fn room(seed: u64, people: usize) -> Scene {
             lux: chance.between(80.0, 700.0),
             lamps: chance.between(1.0, 4.0) as usize,
             ambient: chance.between(0.2, 0.5),
+            day: None,
         },
         camera: CameraSettings {
             width: 512,

@@ -52,6 +52,7 @@ fn moment(at: usize, people: &[&[HeadSample]], camera: &Camera) -> Moment {
             visible_fraction,
             occluder: (visible_fraction < 1.0).then_some(if id == 1 { 2 } else { 1 }),
             ignore: visible_fraction < 0.2,
+            joints: Vec::new(),
         }
     });
     Moment {

@@ -32,7 +32,13 @@ fn the_same_scene_and_seed_are_the_same_bytes_on_any_number_of_threads() {
     assert_eq!(first, log("b.mcap", &["--threads", "3"]));
     assert_ne!(first, log("c.mcap", &["--seed", "9"]));
     let truth = read_truth(&folder.path().join("a.mcap"), &Limits::default()).unwrap().unwrap();
-    assert_eq!((truth.len(), truth[0].people.len(), truth[0].people[0].id), (6, 1, 1));
+    let person = &truth[0].people[0];
+    assert_eq!((truth.len(), truth[0].people.len(), person.id), (6, 1, 1));
+    let (joints, head) = (&person.joints, person.head_in_robot_m.unwrap());
+    assert_eq!(joints.len(), 12);
+    let up = |name: &str| joints[name].in_robot_m[2];
+    assert!(up("left_ankle") < up("left_knee") && up("left_hip") < up("left_shoulder"));
+    assert!(up("right_shoulder") < head[2] && joints["right_shoulder"].px.is_some());
     let inspected = tagalong().arg("inspect").arg(folder.path().join("a.mcap")).output().unwrap();
     let told = text(&inspected.stdout);
     assert!(told.contains("a pipeline can use: colour, depth, odometry"), "{told}");
@@ -140,6 +146,9 @@ fn a_mirror_and_webcams_are_in_the_log_as_they_are_described() {
 
     let truth = read_truth(&path, &Limits::default()).unwrap().unwrap();
     let [x, _, width, _] = truth[0].people[0].upper_body_px.unwrap();
+    let shoulder = &truth[0].people[0].joints["left_shoulder"];
+    let column = shoulder.px.unwrap()[0];
+    assert!(shoulder.in_sight && (x..x + width).contains(&column), "{column} {x} {width}");
     assert!(x < 480.0 && x + width > 475.0, "behind the robot: {x} {width}");
 }
 

@@ -312,6 +312,7 @@ mod tests {
             visible_fraction: 1.0,
             occluder: None,
             ignore: false,
+            joints: Vec::new(),
         }
     }
 

@@ -302,3 +302,73 @@ fn who_wanders_goes_elsewhere_with_every_seed_and_keeps_off_things() {
     let near = first.iter().flatten().filter(|at| (*at - Point2::new(4.5, 3.0)).norm() < 1.6);
     assert!((3..30).contains(&near.count()));
 }
+
+#[test]
+fn joints_are_where_the_body_is_and_know_what_hides_them() {
+    let text = SMALL.replace("width = 96\nheight = 72", "width = 320\nheight = 240");
+    let shot = shots(&text, 2).swap_remove(0);
+    let joint = |person: usize, name: &str| {
+        *shot.truth[person].joints.iter().find(|joint| joint.name == name).unwrap()
+    };
+    // Both look away from the robot, and the second stands right behind the first.
+    let pixel = |name: &str| joint(0, name).pixel.unwrap();
+    let (left, right) = (pixel("left_shoulder"), pixel("right_shoulder"));
+    assert!(left.x < right.x - 10.0 && (left.y - right.y).abs() < 6.0, "{left} {right}");
+    assert!(pixel("left_hip").y > left.y && pixel("left_knee").y > pixel("left_hip").y);
+    assert!(joint(0, "left_shoulder").in_sight && joint(0, "right_knee").in_sight);
+    let hidden = joint(1, "left_shoulder");
+    assert!(hidden.pixel.is_some() && !hidden.in_sight, "{hidden:?}");
+    let [first, second] = [0, 1].map(|person| joint(person, "right_hip").in_robot.x);
+    assert!((first - 3.0).abs() < 0.1 && (second - 5.0).abs() < 0.1, "{first} {second}");
+}
+
+/// From behind, a body hides the wrist that is held before it.
+#[test]
+fn the_own_body_hides_a_joint_too() {
+    let text = "seed = 4\nduration_s = 0.2\n[camera]\nwidth = 320\nheight = 240\n\
+        [[people]]\npath = [[4.0, 3.0]]\nposture = \"phone\"\nextras = []\nheading_deg = ";
+    let in_sight = |degrees: u32| {
+        let shot = shots(&format!("{text}{degrees}.0\n"), 1).swap_remove(0);
+        let joints = &shot.truth[0].joints;
+        joints.iter().find(|joint| joint.name == "right_wrist").unwrap().in_sight
+    };
+    assert!(in_sight(180) && !in_sight(20));
+}
+
+/// In a room whose floor the sun reaches, before and after it comes through the windows.
+#[test]
+fn sunlight_makes_images_bright_and_takes_away_depth() {
+    let shot = |sun_lux: f64| {
+        let text = format!(
+            "seed = 4\nduration_s = 0.2\n[camera]\nwidth = 160\nheight = 120\npitch_down_deg = 15.0\n\
+             [light.day]\nsun_lux = {sun_lux:?}\nsky_lux = 0.0\nelevation_deg = 35.0\n"
+        );
+        shots(&text, 2).swap_remove(0)
+    };
+    let (overcast, sunny) = (shot(0.0), shot(30_000.0));
+    let [dark, bright] = [&overcast, &sunny].map(|shot| shot.images.colour.clone().unwrap());
+    let [all, left] = [&overcast, &sunny].map(|shot| shot.images.depth.clone().unwrap());
+    let at = |x: usize, y: usize| y * 160 + x;
+    let lit = (0..160 * 120).filter(|i| bright.pixels()[*i][1] > 250 && dark.pixels()[*i][1] < 200);
+    let lit: Vec<usize> = lit.collect();
+    assert!(lit.len() > 300, "{} white pixels", lit.len());
+    let measured = |depth: &tagalong_core::DepthImage| {
+        lit.iter().filter(|i| !depth.pixels()[**i].is_nan()).count()
+    };
+    let (before, after) = (measured(&all), measured(&left));
+    assert!(before > 9 * lit.len() / 10 && after < lit.len() / 10, "{before} {after}");
+    // The sky in a window is as bright as it is said to be, and a hole in the depth.
+    let day = "seed = 4\nduration_s = 0.2\n[camera]\nwidth = 160\nheight = 120\n\
+        [robot]\nstart = [4.5, 2.0]\nheading_deg = 90.0\n[light.day]\nsun_lux = 0.0\nsky_lux = ";
+    let middle = |sky_lux: u32| {
+        let images = shots(&format!("{day}{sky_lux}.0\n"), 1).swap_remove(0).images;
+        // Beside the bar in the middle of the window.
+        let (colour, depth) = (images.colour.unwrap(), images.depth.unwrap());
+        (colour.pixels()[at(90, 50)][1], depth.pixels()[at(90, 50)])
+    };
+    let [(dark, _), (bright, hole)] = [0, 5000].map(middle);
+    assert!(dark < 200 && bright > 250 && hole.is_nan(), "{dark} {bright} {hole}");
+    // In the shade it measures as before.
+    let shade = at(40, 110);
+    assert!((all.pixels()[shade] - left.pixels()[shade]).abs() < 0.01);
+}

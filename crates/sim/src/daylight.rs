@@ -1,0 +1,167 @@
+//! Windows, the sky in them, and the sun.
+
+use nalgebra::{Point3, Rotation3, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::material::Material;
+use crate::scene::RoomSettings;
+use crate::shape::{Form, Shape};
+use crate::world::{Lamp, Object};
+
+/// Half the width of a window, and the heights of its sill and its top, m.
+const HALF_M: f64 = 0.65;
+const SILL_M: f64 = 0.85;
+const TOP_M: f64 = 2.15;
+/// Width of a window with its frame and some wall, m.
+const LEAST_PITCH_M: f64 = 1.6;
+/// Distance of the sun, m: far enough for parallel beams.
+const SUN_M: f64 = 1000.0;
+
+/// Windows along the left wall of a room (at the far end of Y), evenly spread, and the light of
+/// the day in them. They shine in a camera's face, and where the sun falls images are white and
+/// structured light measures nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Daylight {
+    /// Number of windows.
+    pub windows: usize,
+    /// Brightness of the sky in them, as the illuminance of a white surface, lx.
+    pub sky_lux: f64,
+    /// Illuminance of a surface that faces the sun, lx; 0 is an overcast day.
+    pub sun_lux: f64,
+    /// Direction of the sun from straight out of the windows towards the far end of the room,
+    /// degrees.
+    pub azimuth_deg: f64,
+    /// Height of the sun above the horizon, degrees.
+    pub elevation_deg: f64,
+}
+
+impl Default for Daylight {
+    fn default() -> Self {
+        Self {
+            windows: 3,
+            sky_lux: 3000.0,
+            sun_lux: 20_000.0,
+            azimuth_deg: 20.0,
+            elevation_deg: 30.0,
+        }
+    }
+}
+
+impl Daylight {
+    /// Returns the conditions on the settings, each with the message for a violation.
+    pub(crate) fn rules(&self, room: &RoomSettings) -> [(bool, &'static str); 5] {
+        [
+            (
+                self.windows > 0 && self.windows as f64 * LEAST_PITCH_M <= room.size_m[0],
+                "light.day.windows must be at least 1, and 1.6 m of wall long each",
+            ),
+            ((0.0..=50_000.0).contains(&self.sky_lux), "light.day.sky_lux must be in 0 to 50000"),
+            ((0.0..=130_000.0).contains(&self.sun_lux), "light.day.sun_lux must be in 0 to 130000"),
+            (self.azimuth_deg.abs() <= 80.0, "light.day.azimuth_deg must be in -80 to 80"),
+            (
+                (2.0..=80.0).contains(&self.elevation_deg),
+                "light.day.elevation_deg must be in 2 to 80",
+            ),
+        ]
+    }
+
+    /// Returns the panes, bright as the sky, with their frames before the wall of a room.
+    pub(crate) fn windows(&self, room: &RoomSettings) -> Object {
+        let openings = Windows::of(self.windows, room);
+        let pane = Material::plain([0.85, 0.93, 1.0]).with_infrared(0.0).glowing(self.sky_lux);
+        let frame = Material::plain([0.7; 3]);
+        let (middle, half) = (0.5 * (SILL_M + openings.top_m), 0.5 * (openings.top_m - SILL_M));
+        let mut shapes = Vec::new();
+        for number in 0..self.windows {
+            let x = openings.middle(number);
+            let mut block = |[along, up]: [f64; 2], sides: [f64; 3], of| {
+                let at = Point3::new(x + along, openings.wall_m, middle + up);
+                shapes.push(Shape::new(Form::Block(sides.into()), at, Rotation3::identity(), of));
+            };
+            block([0.0, 0.0], [HALF_M, 0.01, half], pane);
+            for along in [-HALF_M, 0.0, HALF_M] {
+                block([along, 0.0], [0.025, 0.03, half], frame);
+            }
+            for up in [-half, half] {
+                block([0.0, up], [HALF_M, 0.03, 0.025], frame);
+            }
+        }
+        Object::new(shapes, None, false)
+    }
+
+    /// Returns the sun as a lamp; `None` on an overcast day.
+    pub(crate) fn sun(&self, room: &RoomSettings) -> Option<Lamp> {
+        let (aside, up) = (self.azimuth_deg.to_radians(), self.elevation_deg.to_radians());
+        let towards =
+            Vector3::new(up.cos() * aside.sin(), up.cos() * aside.cos(), up.sin()) * SUN_M;
+        let at = Point3::new(0.5 * room.size_m[0], room.size_m[1], 1.0) + towards;
+        let windows = Some(Windows::of(self.windows, room));
+        let lux_at_1m = self.sun_lux * SUN_M * SUN_M;
+        (self.sun_lux > 0.0).then_some(Lamp { at, lux_at_1m, windows })
+    }
+}
+
+/// Openings in a wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Windows {
+    count: usize,
+    /// From the middle of a window to that of the next, m.
+    pitch_m: f64,
+    /// Place of the wall along Y, m.
+    wall_m: f64,
+    top_m: f64,
+}
+
+impl Windows {
+    fn of(count: usize, room: &RoomSettings) -> Self {
+        let [long, wide] = room.size_m;
+        let top_m = TOP_M.min(room.height_m - 0.2);
+        Self { count, pitch_m: long / count as f64, wall_m: wide, top_m }
+    }
+
+    /// Returns the place of a window along the wall, m.
+    fn middle(&self, number: usize) -> f64 {
+        (number as f64 + 0.5) * self.pitch_m
+    }
+
+    /// Returns true if a way from the sun comes through a window.
+    #[inline(always)]
+    pub fn are_open(&self, sun: &Point3<f64>, way: &Vector3<f64>) -> bool {
+        let at = sun + way * ((self.wall_m - sun.y) / way.y);
+        let from_middle = (at.x / self.pitch_m).fract() - 0.5;
+        let is_along = at.x > 0.0 && at.x < self.count as f64 * self.pitch_m;
+        let is_beside = (from_middle * self.pitch_m).abs() < HALF_M;
+        is_along && is_beside && at.z > SILL_M && at.z < self.top_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn the_sun_comes_through_the_windows_only() {
+        let room = RoomSettings { size_m: [9.0, 6.0], ..RoomSettings::default() };
+        let day = Daylight { azimuth_deg: 0.0, elevation_deg: 45.0, ..Daylight::default() };
+        let sun = day.sun(&room).unwrap();
+        let windows = sun.windows.unwrap();
+        // At 45 degrees a sill of 0.85 m is 0.85 m from the wall on the floor.
+        let open = |x: f64, from_wall: f64| {
+            windows.are_open(&sun.at, &(Point3::new(x, 6.0 - from_wall, 0.0) - sun.at))
+        };
+        assert!(open(1.5, 0.9) && open(4.5, 2.0) && open(2.1, 1.5));
+        assert!(!open(1.5, 0.8) && !open(1.5, 2.2) && !open(3.0, 1.5), "wall");
+        assert!(Daylight { sun_lux: 0.0, ..day }.sun(&room).is_none());
+    }
+
+    #[test]
+    fn windows_that_do_not_fit_are_refused() {
+        let text = "[room]\nsize_m = [9.0, 6.0]\n[light.day]\nwindows = ";
+        assert!(Scene::parse(&format!("{text}5\n")).is_ok());
+        let error = Scene::parse(&format!("{text}6\n")).unwrap_err();
+        assert!(error.message.contains("light.day.windows"), "{error:?}");
+    }
+}

@@ -1,0 +1,82 @@
+//! Joints of people in the truth.
+
+use nalgebra::{Isometry3, Point2, Point3};
+use tagalong_core::Image;
+
+use crate::body::Skeleton;
+use crate::mirror::MirrorCamera;
+use crate::render::WorldCamera;
+use crate::world::Hit;
+
+/// The surface of a body lies at most this far before its joints, m; what is farther before them
+/// is another part of it.
+const FLESH_M: f64 = 0.2;
+
+/// A joint of a person.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    /// Name as in the keypoints of COCO, like `left_shoulder`.
+    pub name: &'static str,
+    /// In the robot frame, m.
+    pub in_robot: Point3<f64>,
+    /// Place in the image, pixels, of a panorama camera in the unwrapped one; `None` outside.
+    pub pixel: Option<Point2<f64>>,
+    /// True if neither a thing nor another person nor another part of the same body stands before
+    /// it; with a panorama camera the own body never hides it.
+    pub in_sight: bool,
+}
+
+/// Appearance of a point: its pixel, and whether it is in sight.
+pub(super) type Spot = (Option<Point2<f64>>, bool);
+
+/// Returns the joints of a person, with the `spot` of each point of the world.
+pub(super) fn joints(
+    skeleton: &Skeleton,
+    world_from_robot: &Isometry3<f64>,
+    spot: impl Fn(&Point3<f64>) -> Spot,
+) -> Vec<Joint> {
+    let joint = |(name, at): (&'static str, Point3<f64>)| {
+        let (pixel, in_sight) = spot(&at);
+        Joint { name, in_robot: world_from_robot.inverse_transform_point(&at), pixel, in_sight }
+    };
+    skeleton.joints().into_iter().map(joint).collect()
+}
+
+/// Returns how a joint of a person appears in an image through a lens.
+pub(super) fn in_lens(
+    view: &WorldCamera<'_>,
+    seen: &Image<Hit>,
+    person: u16,
+    joint: &Point3<f64>,
+) -> Spot {
+    let camera = view.camera;
+    let in_robot = |part| (view.pose)(part).inverse_transform_point(joint);
+    let Some(first) = camera.project(&in_robot(0.5)) else { return (None, false) };
+    // Its row is taken a little before or after the middle one, as that of the head.
+    let then = in_robot((first.y / camera.height as f64).clamp(0.0, 1.0));
+    let Some(pixel) = camera.project(&then) else { return (None, false) };
+    let Some(hit) = seen.get(pixel.x.round() as i64, pixel.y.round() as i64) else {
+        return (None, false);
+    };
+    let own = hit.person == Some(person) && camera.depth_of(&then) - hit.t < FLESH_M;
+    (Some(pixel), own)
+}
+
+/// Returns how a joint of a person appears in the unwrapped image of a mirror.
+pub(super) fn in_mirror(
+    mirror: &MirrorCamera,
+    raw: &Image<Hit>,
+    world_from_camera: &Isometry3<f64>,
+    person: u16,
+    joint: &Point3<f64>,
+) -> Spot {
+    let panorama = &mirror.panorama;
+    let pixel = panorama.pixel(&world_from_camera.inverse_transform_point(joint));
+    let at = panorama.raw_pixel(pixel.x, pixel.y).map(f64::round);
+    match raw.get(at.x as i64, at.y as i64) {
+        Some(hit) if (0.0..panorama.rows as f64).contains(&pixel.y) => {
+            (Some(pixel), hit.person == Some(person))
+        }
+        _ => (None, false),
+    }
+}
