@@ -80,11 +80,6 @@ impl Material {
         Self { reflects: 0.08, passes: 0.88, infrared: 0.0, ..Self::plain([0.4, 0.5, 0.45]) }
     }
 
-    /// False for mirrors and glass, which show other things.
-    pub fn shows_itself(&self) -> bool {
-        self.reflects == 0.0 && self.passes == 0.0
-    }
-
     /// The same with light of its own.
     pub fn glowing(self, glow_lux: f64) -> Self {
         Self { glow_lux, ..self }

@@ -71,6 +71,12 @@ impl WorldCamera<'_> {
         }
     }
 
+    /// Returns the robot in the world while a row is taken: where a point appears depends on when
+    /// its row is taken, and the other way round, so that callers look for it at 0.5 first.
+    pub fn pose_at(&self, row: f64) -> Isometry3<f64> {
+        (self.pose)((row / self.camera.height as f64).clamp(0.0, 1.0))
+    }
+
     /// The eye while the strip with a row is taken.
     fn eye(&self, row: usize) -> Eye<'_> {
         let (top, height) = (row - row % TILE, self.camera.height);
@@ -158,12 +164,8 @@ impl WorldCamera<'_> {
                 facing: surface.facing[lane],
                 person: *person,
             };
-            *pixel = if shape.material.shows_itself() {
-                own
-            } else {
-                let (normal, ray) = (surface.normal.at(lane), rays.at(lane));
-                self.world.beyond(own, shape, &normal, (eye, &ray))
-            };
+            let (normal, ray) = (surface.normal.at(lane), rays.at(lane));
+            *pixel = self.world.shown(own, shape, &normal, (eye, &ray));
         }
     }
 }

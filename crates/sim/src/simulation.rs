@@ -583,10 +583,9 @@ fn sight(
     skeleton: &Skeleton,
 ) -> (Option<Rect>, Visibility) {
     let camera = view.camera;
-    let from = |part| (view.pose)(part).inverse_transform_point(&skeleton.head);
-    // Where the head is depends on when its row is taken, and the other way round.
-    let row = camera.upper_body(&from(0.5)).centre().y;
-    let whole = camera.upper_body(&from((row / camera.height as f64).clamp(0.0, 1.0)));
+    let square =
+        |pose: Isometry3<f64>| camera.upper_body(&pose.inverse_transform_point(&skeleton.head));
+    let whole = square(view.pose_at(square((view.pose)(0.5)).centre().y));
     let clipped = whole.clipped(camera.width, camera.height);
     if clipped.width < 2.0 || clipped.height < 2.0 {
         return (None, Visibility::default());

@@ -52,8 +52,7 @@ pub struct Lamp {
     pub at: Point3<f64>,
     /// Illuminance of a facing surface at one metre, lx.
     pub lux_at_1m: f64,
-    /// Openings through which the sun shines. Its light has infrared, which the light of lamps
-    /// has not.
+    /// Openings through which the sun shines; none for a lamp in the room.
     pub windows: Option<Windows>,
 }
 
@@ -143,17 +142,28 @@ impl World {
     ) -> Hit {
         meet(solids, eye, ray).map_or(Hit::NOTHING, |(t, person, shape)| {
             let (hit, normal) = self.hit(t, person, shape, (eye, ray));
-            if shape.material.shows_itself() {
-                return hit;
-            }
-            self.beyond(hit, shape, &normal, (eye, ray))
+            self.shown(hit, shape, &normal, (eye, ray))
         })
     }
 
-    /// Returns the view in a mirror or through glass with this normal, where a ray from an eye
-    /// meets it; glass mirrors a little, too. Mirrors that are seen in mirrors or through glass
-    /// show their own surface only.
-    pub(crate) fn beyond(
+    /// Returns what a surface with this normal shows where a ray from an eye meets it: itself, or
+    /// the view in a mirror or through glass.
+    #[inline(always)]
+    pub(crate) fn shown(
+        &self,
+        own: Hit,
+        of: &Shape,
+        normal: &Vector3<f64>,
+        way: (&Point3<f64>, &Vector3<f64>),
+    ) -> Hit {
+        let Material { reflects, passes, .. } = of.material;
+        let shows_itself = reflects == 0.0 && passes == 0.0;
+        if shows_itself { own } else { self.beyond(own, of, normal, way) }
+    }
+
+    /// Returns the view in a mirror or through glass; glass mirrors a little, too. Mirrors that
+    /// are seen in mirrors or through glass show their own surface only.
+    fn beyond(
         &self,
         seen: Hit,
         of: &Shape,
@@ -203,7 +213,7 @@ impl World {
         for (lamp, shadows) in self.stage.lamps.iter().zip(self.shadows()) {
             let on = lamp.on(shadows, at, normal);
             lux[0] += on;
-            lux[1] += if lamp.windows.is_some() { on } else { 0.0 };
+            lux[1] += if lamp.is_sun() { on } else { 0.0 };
         }
         lux
     }
@@ -218,7 +228,7 @@ impl World {
         wanted: &[bool; LANES],
         lit: bool,
     ) -> Shine {
-        let is_sunny = self.stage.lamps.iter().any(|lamp| lamp.windows.is_some());
+        let is_sunny = self.stage.lamps.iter().any(Lamp::is_sun);
         let mut shine = Shine { light: [[0.0; LANES]; 3], infrared: [of.infrared; LANES] };
         if !lit && !is_sunny {
             return shine;
@@ -226,15 +236,14 @@ impl World {
         let mut lux = ambient(self.stage.ambient_lux, &surface.normal);
         let mut sun = [0.0; LANES];
         let lamps = self.stage.lamps.iter().zip(self.shadows());
-        for (lamp, shadows) in lamps.filter(|(lamp, _)| lit || lamp.windows.is_some()) {
+        for (lamp, shadows) in lamps.filter(|(lamp, _)| lit || lamp.is_sun()) {
             let beams = beams(lamp, points, &surface.normal);
-            let lit = |lane: usize| wanted[lane] && beams.lux[lane] != 0.0;
-            let mut open = std::array::from_fn(lit);
+            let mut open = std::array::from_fn(|lane| wanted[lane] && beams.lux[lane] != 0.0);
             shadows.iter().for_each(|shadows| shadows.darken(&beams.ways, &mut open));
             for lane in 0..LANES {
                 let on = if open[lane] { beams.lux[lane] } else { 0.0 };
                 lux[lane] += on;
-                sun[lane] += if lamp.windows.is_some() { on } else { 0.0 };
+                sun[lane] += if lamp.is_sun() { on } else { 0.0 };
             }
         }
         if is_sunny {
@@ -328,6 +337,11 @@ impl Lamp {
     /// Creates a lamp in the room.
     pub fn hanging(at: Point3<f64>, lux_at_1m: f64) -> Self {
         Self { at, lux_at_1m, windows: None }
+    }
+
+    /// True for the sun, whose light has infrared, which that of lamps has not.
+    fn is_sun(&self) -> bool {
+        self.windows.is_some()
     }
 
     /// Illuminance of a point with this normal, lx.

@@ -26,8 +26,8 @@ pub struct Joint {
     pub in_sight: bool,
 }
 
-/// Appearance of a point: its pixel, and whether it is in sight.
-pub(super) type Spot = (Option<Point2<f64>>, bool);
+/// Pixel of a point in the image, and whether it is in sight; `None` outside.
+pub(super) type Spot = Option<(Point2<f64>, bool)>;
 
 /// Returns the joints of a person, with the `spot` of each point of the world.
 pub(super) fn joints(
@@ -36,8 +36,9 @@ pub(super) fn joints(
     spot: impl Fn(&Point3<f64>) -> Spot,
 ) -> Vec<Joint> {
     let joint = |(name, at): (&'static str, Point3<f64>)| {
-        let (pixel, in_sight) = spot(&at);
-        Joint { name, in_robot: world_from_robot.inverse_transform_point(&at), pixel, in_sight }
+        let (pixel, in_sight) = spot(&at).unzip();
+        let in_robot = world_from_robot.inverse_transform_point(&at);
+        Joint { name, in_robot, pixel, in_sight: in_sight.unwrap_or(false) }
     };
     skeleton.joints().into_iter().map(joint).collect()
 }
@@ -50,16 +51,12 @@ pub(super) fn in_lens(
     joint: &Point3<f64>,
 ) -> Spot {
     let camera = view.camera;
-    let in_robot = |part| (view.pose)(part).inverse_transform_point(joint);
-    let Some(first) = camera.project(&in_robot(0.5)) else { return (None, false) };
-    // Its row is taken a little before or after the middle one, as that of the head.
-    let then = in_robot((first.y / camera.height as f64).clamp(0.0, 1.0));
-    let Some(pixel) = camera.project(&then) else { return (None, false) };
-    let Some(hit) = seen.get(pixel.x.round() as i64, pixel.y.round() as i64) else {
-        return (None, false);
-    };
-    let own = hit.person == Some(person) && camera.depth_of(&then) - hit.t < FLESH_M;
-    (Some(pixel), own)
+    let row = camera.project(&(view.pose)(0.5).inverse_transform_point(joint))?.y;
+    let in_robot = view.pose_at(row).inverse_transform_point(joint);
+    let pixel = camera.project(&in_robot)?;
+    let hit = seen.get(pixel.x.round() as i64, pixel.y.round() as i64)?;
+    let is_own = hit.person == Some(person) && camera.depth_of(&in_robot) - hit.t < FLESH_M;
+    Some((pixel, is_own))
 }
 
 /// Returns how a joint of a person appears in the unwrapped image of a mirror.
@@ -73,10 +70,7 @@ pub(super) fn in_mirror(
     let panorama = &mirror.panorama;
     let pixel = panorama.pixel(&world_from_camera.inverse_transform_point(joint));
     let at = panorama.raw_pixel(pixel.x, pixel.y).map(f64::round);
-    match raw.get(at.x as i64, at.y as i64) {
-        Some(hit) if (0.0..panorama.rows as f64).contains(&pixel.y) => {
-            (Some(pixel), hit.person == Some(person))
-        }
-        _ => (None, false),
-    }
+    let hit = raw.get(at.x as i64, at.y as i64)?;
+    let is_inside = (0.0..panorama.rows as f64).contains(&pixel.y);
+    is_inside.then_some((pixel, hit.person == Some(person)))
 }
