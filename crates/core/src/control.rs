@@ -78,12 +78,28 @@ pub enum Reason {
     Obstacle,
     /// Slower because frames arrive late.
     Slow,
+    /// Slower because a person, or something that moves, is near.
+    Near,
+    /// Slower because a sensor sees too little of the region that the robot would sweep.
+    Unclear,
     /// Slower and slower until the robot stands, because there is no target.
     Stopping,
     /// Stop: an obstacle ahead is too near.
     Blocked,
+    /// Stop: a person, or something that moves, is nearer than the protective distance.
+    TooClose,
+    /// Stop: the sensors see too little of the region that the robot would sweep.
+    Unknown,
     /// Stop: the depth image has no readings at all, or a sensor of obstacles is missing.
     Blind,
+    /// Stop: a sensor repeats itself, or does not change as the odometry says.
+    Frozen,
+    /// Stop: the odometry is missing, too old, or no number.
+    Odometry,
+    /// Stop: images or wheels respond later than the reaction time allows.
+    Late,
+    /// Stop: a bumper is pressed.
+    Contact,
     /// Stop: there is no target.
     NoTarget,
     /// Stop: too few frames since the start or a jump of the clock.
@@ -108,9 +124,17 @@ impl Reason {
             Self::Search => "search",
             Self::Obstacle => "obstacle",
             Self::Slow => "slow",
+            Self::Near => "near",
+            Self::Unclear => "unclear",
             Self::Stopping => "stopping",
             Self::Blocked => "blocked",
+            Self::TooClose => "too-close",
+            Self::Unknown => "unknown",
             Self::Blind => "blind",
+            Self::Frozen => "frozen",
+            Self::Odometry => "odometry",
+            Self::Late => "late",
+            Self::Contact => "contact",
             Self::NoTarget => "no-target",
             Self::Settling => "settling",
             Self::Stalled => "stalled",
@@ -131,8 +155,18 @@ impl Reason {
             Self::Search => "searches for the lost person, at most half as fast",
             Self::Obstacle => "slower: an obstacle is ahead",
             Self::Slow => "slower: frames arrive late",
+            Self::Near => "slower: a person, or something that moves, is near",
+            Self::Unclear => "slower: the sensors see little of the way ahead",
             Self::Stopping => "brakes: there is no target",
             Self::Blocked => "stands: an obstacle ahead is too near",
+            Self::TooClose => "stands: a person, or something that moves, is too close",
+            Self::Unknown => "stands: the sensors see too little of the way ahead",
+            Self::Frozen => {
+                "stands: a sensor repeats itself, or does not change as the odometry says"
+            }
+            Self::Odometry => "stands: the odometry is missing, too old, or no number",
+            Self::Late => "stands: images or wheels respond too late",
+            Self::Contact => "stands: a bumper is pressed",
             Self::Blind => "stands: depth has no readings, or a sensor of obstacles is missing",
             Self::NoTarget => "stands: there is no target",
             Self::Settling => "stands: too few frames since the start or a jump of the clock",
@@ -153,6 +187,8 @@ impl Reason {
                 | Self::Search
                 | Self::Obstacle
                 | Self::Slow
+                | Self::Near
+                | Self::Unclear
                 | Self::Stopping
         )
     }
@@ -233,16 +269,24 @@ pub trait Controller: Send {
 mod tests {
     use super::*;
 
-    const ALL: [Reason; 15] = [
+    const ALL: [Reason; 23] = [
         Reason::Follow,
         Reason::Limited,
         Reason::Unsure,
         Reason::Search,
         Reason::Obstacle,
         Reason::Slow,
+        Reason::Near,
+        Reason::Unclear,
         Reason::Stopping,
         Reason::Blocked,
+        Reason::TooClose,
+        Reason::Unknown,
         Reason::Blind,
+        Reason::Frozen,
+        Reason::Odometry,
+        Reason::Late,
+        Reason::Contact,
         Reason::NoTarget,
         Reason::Settling,
         Reason::Stalled,
@@ -252,8 +296,8 @@ mod tests {
     ];
 
     #[test]
-    fn the_robot_moves_for_seven_reasons_and_stands_for_the_others() {
-        let (moves, stands) = ALL.split_at(7);
+    fn the_robot_moves_for_nine_reasons_and_stands_for_the_others() {
+        let (moves, stands) = ALL.split_at(9);
         assert!(moves.iter().all(|reason| reason.moves()));
         assert!(stands.iter().all(|reason| !reason.moves()));
     }

@@ -102,6 +102,12 @@ pub struct Frame {
     /// True if the camera was calibrated anew since the first frame, while `camera` stayed as it was:
     /// positions from the images are wrong.
     pub calibration_changed: bool,
+    /// Age of the newest odometry at the time of the frame, s; infinite if there never was any. A
+    /// robot is not steered by old odometry.
+    pub odometry_age_s: f64,
+    /// Time from the capture of the frame until it was handed over, s, by the clock of the stamps;
+    /// `None` where there is no such clock, as for a log.
+    pub latency_s: Option<f64>,
     sensors: Sensors,
     grey: OnceLock<Arc<GreyImage>>,
     derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
@@ -128,14 +134,33 @@ impl Frame {
         motion: EgoMotion,
         sensors: Sensors,
     ) -> Self {
-        let (grey, derived) = (OnceLock::new(), Mutex::default());
-        let calibration_changed = false;
-        Self { index, stamp, camera, motion, calibration_changed, sensors, grey, derived }
+        Self {
+            index,
+            stamp,
+            camera,
+            motion,
+            calibration_changed: false,
+            odometry_age_s: 0.0,
+            latency_s: None,
+            sensors,
+            grey: OnceLock::new(),
+            derived: Mutex::default(),
+        }
     }
 
     /// Returns the frame with [`Frame::calibration_changed`] as given.
     pub fn with_changed_calibration(self, calibration_changed: bool) -> Self {
         Self { calibration_changed, ..self }
+    }
+
+    /// Returns the frame with [`Frame::odometry_age_s`] as given.
+    pub fn with_odometry_age(self, odometry_age_s: f64) -> Self {
+        Self { odometry_age_s, ..self }
+    }
+
+    /// Returns the frame with [`Frame::latency_s`] as given.
+    pub fn with_latency(self, latency_s: Option<f64>) -> Self {
+        Self { latency_s, ..self }
     }
 
     /// Returns the frame with the data of one more sensor, in place of data of the same type.
@@ -279,6 +304,8 @@ impl Frame {
         let camera = Arc::clone(&self.camera);
         Self::of_sensors(self.index, self.stamp, camera, self.motion, sensors)
             .with_changed_calibration(self.calibration_changed)
+            .with_odometry_age(self.odometry_age_s)
+            .with_latency(self.latency_s)
     }
 
     /// Returns the image of a kind, if the frame carries one.

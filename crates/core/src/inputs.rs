@@ -32,6 +32,8 @@ impl Input {
     /// The kinds that every build knows.
     pub const ALL: [Self; 5] =
         [Self::Colour, Self::Depth, Self::Right, Self::Laser, Self::Detections];
+    /// Readings of the further sources of the collision monitor, [`crate::ObstacleReadings`].
+    pub const OBSTACLES: Self = Self::Named("obstacle-sources");
 
     /// Returns the name in configs and in JSON.
     pub fn name(self) -> &'static str {

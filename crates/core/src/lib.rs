@@ -37,6 +37,7 @@ mod image;
 mod inputs;
 mod manager;
 mod motion;
+mod obstacles;
 mod scan;
 mod sensors;
 mod time;
@@ -58,7 +59,8 @@ pub use manager::{
     Initiation, Observation, ObservedTrack, TrackChanges, TrackHealth, TrackManager, Unassociated,
 };
 pub use motion::{DiffDrive, EgoMotion, planar_pose};
-pub use scan::LaserScan;
+pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReading};
+pub use scan::{LaserScan, RayReading, UnreadRay};
 pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};
 pub use time::Stamp;
 pub use track::{Track, TrackId};

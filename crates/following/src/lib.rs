@@ -29,7 +29,8 @@ mod steering;
 mod target_lock;
 
 pub use command_limiter::{
-    CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource, Orders,
+    CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource, Orders, SourceKind,
+    SourceSettings,
 };
 pub use enable::{Enable, EnableSwitch, Permission};
 pub use settings::{Base, FollowSettings, OdometrySource, RobotSettings};

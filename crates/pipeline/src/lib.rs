@@ -57,7 +57,7 @@ pub use tagalong_following::{
     Base, Choice, ChoiceRule, CollisionMonitorSettings, CommandLimiterSettings, Differences,
     Enable, EnableSwitch, Enrollment, EnrollmentError, FollowStatus, Likeness, LockReport,
     LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission, RobotSettings,
-    SearchSettings, TargetSettings,
+    SearchSettings, SourceKind, SourceSettings, TargetSettings,
 };
 pub use tagalong_odometry::{MotionSource, OdometrySettings};
 pub use tagalong_stereo::StereoSettings;

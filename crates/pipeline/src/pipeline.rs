@@ -6,7 +6,7 @@ use tagalong_tracking::StepError;
 use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 
 use crate::{Enrollment, EnrollmentError, FollowStatus, FrameReport, Orders, PipelineSettings};
-use tagalong_following::{EnableSwitch, Steered, Steering};
+use tagalong_following::{EnableSwitch, SourceSettings, Steered, Steering};
 use tagalong_vision::Describer;
 
 /// Tracker, with the controller that drives the robot after one of its tracks.
@@ -61,8 +61,26 @@ impl Pipeline {
     /// Returns the command in force at a time, by the clock of the frames' stamps: the last command
     /// until it expires, zero after that, after a fault and before the first frame. A control loop
     /// asks at its own rate. `None` without a controller.
+    ///
+    /// A command also ends by the age of its frame on the monotonic clock of this machine, whatever
+    /// `now` says; see [`Orders::at`].
     pub fn command_at(&self, now: Stamp) -> Option<Command> {
         Some(self.orders()?.at(now))
+    }
+
+    /// Returns the command in force as [`Pipeline::command_at`], in simulated time: `since_frame` is
+    /// the time since the last frame that led to a command.
+    pub fn command_after(&self, now: Stamp, since_frame: Duration) -> Option<Command> {
+        Some(self.orders()?.after(now, since_frame))
+    }
+
+    /// Returns the further sources of obstacles of `[[collision_monitor.sources]]`; none without a
+    /// controller.
+    pub fn obstacle_sources(&self) -> &[SourceSettings] {
+        match &self.steering {
+            Some(_) => &self.settings.collision_monitor.sources,
+            None => &[],
+        }
     }
 
     /// Returns a copy of the state behind [`Pipeline::command_at`], for use in another thread.

@@ -106,22 +106,10 @@ impl LaserSettings {
 
     /// Returns the scan that some ranges stand for; the scanner sits above the robot's origin.
     pub fn scan(&self, ranges: &[f32]) -> LaserScan {
-        let rays = (0..).zip(self.directions()).zip(ranges);
-        let met = rays.filter(|(_, range)| range.is_finite());
-        let point = |((ray, direction), range): ((u32, f64), &f32)| {
-            let range = f64::from(*range);
-            let (x, y) = (range * direction.cos(), range * direction.sin());
-            (ray, Point3::new(x, y, self.height_m))
-        };
-        let (rays, points): (Vec<u32>, Vec<Point3<f64>>) = met.map(point).unzip();
-        let mut directions = self.directions();
-        let increment_rad = directions.next().zip(directions.next()).map_or(0.0, |(a, b)| b - a);
-        LaserScan {
-            robot_from_scanner: Isometry3::translation(0.0, 0.0, self.height_m),
-            increment_rad,
-            points: points.into(),
-            rays: rays.into(),
-        }
+        let mount = Isometry3::translation(0.0, 0.0, self.height_m);
+        let limits_m = [self.min_range_m, self.max_range_m];
+        let ranges = ranges.iter().copied().map(f64::from);
+        LaserScan::of_ranges(mount, self.first_rad(), self.step_rad(), limits_m, ranges)
     }
 }
 

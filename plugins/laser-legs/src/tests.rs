@@ -37,9 +37,11 @@ fn scan(rays: u32, rounds: &Rounds, pose: Isometry3<f64>) -> LaserScan {
     }
     LaserScan {
         robot_from_scanner: pose,
+        first_rad: -0.5 * TAU,
         increment_rad: step,
         points: points.into(),
         rays: numbers.into(),
+        unread: Default::default(),
     }
 }
 

@@ -13,10 +13,14 @@ mod collision_monitor;
 mod obstacle_memory;
 mod ramp;
 mod settings;
+mod sources;
 
 pub(crate) use collision_monitor::Ahead;
 pub(crate) use obstacle_memory::ObstacleMemory;
 pub use settings::{CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource};
+pub use sources::{SourceKind, SourceSettings};
+
+use std::time::{Duration, Instant};
 
 use ramp::{Axis, AxisLimits};
 use tagalong_core::{Command, DiffDrive, EgoMotion, Reason, Stamp, Twist, WheelSpeeds};
@@ -83,13 +87,26 @@ pub struct Orders {
     last: Option<Command>,
     fault: Option<&'static str>,
     valid_s: f64,
+    /// Time at which the frame of the last command was processed. Stamps tell nothing of a sensor
+    /// that repeats itself, and a clock may be set back; this one never goes back.
+    made: Instant,
 }
 
 impl Orders {
     /// Returns the command in force at a time, by the clock of the frames' stamps. A command with a
     /// stamp further ahead than the validity of a command is ignored: clocks that disagree must not
     /// make it last longer.
+    ///
+    /// Whatever the stamps say, a command ends when its validity has passed on the monotonic clock
+    /// since its frame was processed: images that are heard again, or a clock that stands still, do
+    /// not make it last.
     pub fn at(&self, now: Stamp) -> Command {
+        self.after(now, self.made.elapsed())
+    }
+
+    /// Returns the command in force as [`Orders::at`], in simulated time: `since_frame` is the time
+    /// since the last frame that led to a command.
+    pub fn after(&self, now: Stamp, since_frame: Duration) -> Command {
         let stop = |reason| Command {
             twist: Twist::STOP,
             wheels: WheelSpeeds::STOP,
@@ -97,10 +114,13 @@ impl Orders {
             valid_until: now.plus_seconds(self.valid_s),
             reason,
         };
+        let is_young = since_frame.as_secs_f64() <= self.valid_s;
         match self.last {
             _ if self.fault.is_some() => stop(Reason::Fault),
             None => stop(Reason::Settling),
-            Some(last) if self.is_near(last.stamp, now) && now <= last.valid_until => last,
+            Some(last) if is_young && self.is_near(last.stamp, now) && now <= last.valid_until => {
+                last
+            }
             Some(_) => stop(Reason::Expired),
         }
     }
@@ -123,6 +143,8 @@ pub(crate) struct CommandLimiter {
     /// Motion of the last command.
     motion: Motion,
     fault: Option<&'static str>,
+    /// Time of the last command.
+    made: Instant,
 }
 
 /// Motion of a command, with the accelerations that led to it.
@@ -159,6 +181,7 @@ impl CommandLimiter {
             last: None,
             motion: Motion::default(),
             fault: None,
+            made: Instant::now(),
         }
     }
 
@@ -181,12 +204,18 @@ impl CommandLimiter {
         let command = Command { twist, wheels, stamp: wish.stamp, valid_until, reason };
         // Stops are remembered, too: the ramp of the next command starts from this one.
         self.last = Some(command);
+        self.made = Instant::now();
         command
     }
 
     /// Returns the command state that holds until the next frame.
     pub(crate) fn orders(&self) -> Orders {
-        Orders { last: self.last, fault: self.fault, valid_s: self.settings.valid_s }
+        Orders {
+            last: self.last,
+            fault: self.fault,
+            valid_s: self.settings.valid_s,
+            made: self.made,
+        }
     }
 
     /// Latches a fault if the odometry moved faster than the robot can.

@@ -2,6 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{Error, Result};
 
+use super::SourceSettings;
 use crate::RobotSettings;
 
 /// Limits on the robot's motion, for any wish of the controller. The figures are those that makers
@@ -178,6 +179,8 @@ pub struct CollisionMonitorSettings {
     /// image, s.
     #[schemars(range(min = 1.0, max = 600.0))]
     pub memory_s: f64,
+    /// Further sources of obstacles: laser scanners, depth cameras, range sensors and bumpers.
+    pub sources: Vec<SourceSettings>,
 }
 
 /// Sensors of obstacles that a controller has.
@@ -207,6 +210,7 @@ impl Default for CollisionMonitorSettings {
             min_points: 6,
             min_seen: 0.02,
             memory_s: 20.0,
+            sources: Vec::new(),
         }
     }
 }
@@ -217,6 +221,7 @@ impl CollisionMonitorSettings {
     /// # Errors
     /// [`Error::Settings`] names the key and the remedy.
     pub fn check(&self, robot: &RobotSettings, limiter: &CommandLimiterSettings) -> Result<()> {
+        SourceSettings::check_all(&self.sources)?;
         let wheels = ("wheel_half_separation_m", robot.wheel_half_separation_m);
         at_least("half_width_m", self.half_width_m, wheels.0, wheels.1)?;
         at_least("top_m", self.top_m, "floor_m", self.floor_m)?;

@@ -281,6 +281,9 @@ fn commands_expire() {
     assert_eq!(later(0.2), command);
     assert_eq!((later(0.3).wheels, later(0.3).reason), (WheelSpeeds::STOP, Reason::Expired));
     assert_eq!((later(-0.2), later(-0.3).reason), (command, Reason::Expired));
+    let aged = |ms| moving.orders().after(command.stamp, Duration::from_millis(ms));
+    assert_eq!(aged(249), command);
+    assert_eq!((aged(251).wheels, aged(251).reason), (WheelSpeeds::STOP, Reason::Expired));
     let nothing_yet = limiter().orders().at(Stamp::from_nanos(5));
     assert_eq!(nothing_yet.wheels, WheelSpeeds::STOP);
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
 use nalgebra::{Isometry2, Isometry3, Point3, UnitQuaternion, Vector3};
-use tagalong_core::{Input, LaserScan as Scan, Sensors, Stamp};
+use tagalong_core::{Input, LaserScan as Scan, RayReading, Sensors, Stamp, UnreadRay};
 
 use super::{Moment, SensorReader, SensorType};
 use crate::msgs::{CdrError, LaserScan, decode};
@@ -109,9 +109,11 @@ pub(crate) fn seen_from(
         points(scan).map(|(ray, point)| (ray, moved_point(point))).unzip();
     Scan {
         robot_from_scanner: moved * robot_from_laser,
+        first_rad: f64::from(scan.angle_min),
         increment_rad: f64::from(scan.angle_increment),
         points: points.into(),
         rays: rays.into(),
+        unread: unread(scan).collect(),
     }
 }
 
@@ -139,6 +141,18 @@ fn points(scan: &LaserScan) -> impl Iterator<Item = (u32, Point3<f64>)> {
         (ray as u32, Point3::new(range * angle.cos(), range * angle.sin(), 0.0))
     };
     met.map(point).filter(|(_, point)| point.coords.norm().is_finite())
+}
+
+/// Yields the rays without a reflection, with what the scanner said instead.
+fn unread(scan: &LaserScan) -> impl Iterator<Item = UnreadRay> {
+    let limits = limits(scan);
+    let (min_m, max_m) = (f64::from(*limits.start()), f64::from(*limits.end()));
+    (0..).zip(&scan.ranges).filter_map(move |(ray, range)| {
+        match RayReading::of(f64::from(*range), min_m, max_m) {
+            RayReading::Reflection(_) => None,
+            reading => Some(UnreadRay { ray, reading }),
+        }
+    })
 }
 
 #[cfg(test)]

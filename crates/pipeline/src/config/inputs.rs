@@ -10,8 +10,11 @@ use tagalong_odometry::MotionSource;
 use super::PipelineSettings;
 
 /// Inputs of the target lock and the collision monitor, which every controller has.
-const STEERING: Inputs =
-    Inputs::NONE.accept(Input::Colour).accept(Input::Depth).accept(Input::Laser);
+const STEERING: Inputs = Inputs::NONE
+    .accept(Input::Colour)
+    .accept(Input::Depth)
+    .accept(Input::Laser)
+    .accept(Input::OBSTACLES);
 /// Inputs of `[odometry]`, by depth and by the image alone.
 const ODOMETRY: Inputs = CAMERA_MOTION.require(Input::Depth);
 const CAMERA_MOTION: Inputs = Inputs::NONE.require(Input::Colour);

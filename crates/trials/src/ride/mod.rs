@@ -2,6 +2,8 @@
 
 mod judge;
 
+use std::time::Duration;
+
 use cpu_time::ThreadTime;
 
 pub use judge::{Episode, Ridden, RideJudge};
@@ -91,7 +93,9 @@ impl Ride {
         };
         let failed =
             |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
-        while let Some(simulated) = ride.next_frame(&mut draw, &pipeline, witness) {
+        // Time at which the last frame that led to a command was handed over.
+        let mut framed = Stamp::default();
+        while let Some(simulated) = ride.next_frame(&mut draw, &pipeline, framed, witness) {
             if ride.reports.is_empty() {
                 let missing = pipeline.check_sources(sources(&simulated.frame));
                 missing.map_err(|why| TrialError::Config(format!("{}: {why}", contender.name)))?;
@@ -102,6 +106,7 @@ impl Ride {
             ride.took_ms.push(before.elapsed().as_secs_f64() * 1e3);
             // Between frames `command_at` steers; this is the fresh command.
             if let Some(command) = report.command {
+                framed = ride.now();
                 draw.steer(command.wheels);
             }
             witness.frame(&simulated, &report);
@@ -111,10 +116,17 @@ impl Ride {
         Ok(ride)
     }
 
+    /// Returns the time of the last step of the simulation.
+    fn now(&self) -> Stamp {
+        let at_s = self.ticks.last().map_or(0.0, |tick| tick.at_s);
+        Stamp::default().plus_seconds(at_s)
+    }
+
     fn next_frame(
         &mut self,
         draw: &mut Draw,
         pipeline: &Pipeline,
+        framed: Stamp,
         witness: &mut dyn Witness,
     ) -> Option<SimulatedFrame> {
         if !witness.goes_on() {
@@ -125,7 +137,7 @@ impl Ride {
             // Only the odometry ticks: it is the fastest message of the robot.
             let Event::Odometry(reading) = event else { return None };
             self.ticks.push(tick(simulation, reading.at_ns));
-            command(pipeline, Stamp::from_nanos(reading.at_ns))
+            command(pipeline, Stamp::from_nanos(reading.at_ns), framed)
         })
     }
 }
@@ -144,6 +156,7 @@ fn tick(simulation: &Simulation, at_ns: u64) -> Tick {
     }
 }
 
-fn command(pipeline: &Pipeline, now: Stamp) -> Option<WheelSpeeds> {
-    pipeline.command_at(now).map(|command| command.wheels)
+fn command(pipeline: &Pipeline, now: Stamp, framed: Stamp) -> Option<WheelSpeeds> {
+    let since_frame = Duration::from_secs_f64(now.seconds_since(framed).max(0.0));
+    pipeline.command_after(now, since_frame).map(|command| command.wheels)
 }
