@@ -122,7 +122,8 @@ fn printed(workspace: &Workspace, command: &str) -> Result<String> {
         return faults::markdown(workspace, &rows.split_whitespace().collect::<Vec<_>>());
     }
     if let Some(source) = command.strip_prefix(EXCERPT) {
-        let (page, title) = source.split_once(' ').context("an excerpt names a page and a title")?;
+        let (page, title) =
+            source.split_once(' ').context("an excerpt names a page and a title")?;
         return excerpt(&workspace.read(page)?, title)
             .with_context(|| format!("{page} has no table `{title}`"));
     }
@@ -159,7 +160,8 @@ mod tests {
 
     #[test]
     fn an_excerpt_is_one_table_with_its_notes() {
-        let page = "# a\n\n**first**\n\n| 1 |\n\n**second**\n\n| 2 |\n\n* note\n\n<!-- end -->\n| 3 |\n";
+        let page =
+            "# a\n\n**first**\n\n| 1 |\n\n**second**\n\n| 2 |\n\n* note\n\n<!-- end -->\n| 3 |\n";
         let second = excerpt(page, "second").unwrap();
         assert_eq!(second.trim(), "**second**\n\n| 2 |\n\n* note");
         assert_eq!(excerpt(page, "first").unwrap().trim(), "**first**\n\n| 1 |");
