@@ -43,6 +43,7 @@
 mod behaviour;
 mod body;
 mod daylight;
+mod faults;
 mod furniture;
 mod gait;
 mod lanes;
@@ -69,6 +70,7 @@ mod webcam;
 mod world;
 
 pub use daylight::Daylight;
+pub use faults::{FaultKind, InjectedFault, ScheduledFault};
 pub use furniture::{Furniture, FurnitureKind};
 pub use laser::LaserSettings;
 pub use mirror::MirrorSettings;

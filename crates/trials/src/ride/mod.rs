@@ -10,7 +10,7 @@ pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_config::Registry;
 use tagalong_core::{Frame, Stamp, WheelSpeeds};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources};
-use tagalong_sim::{Clearance, Event, Scene, Simulation};
+use tagalong_sim::{Clearance, Event, Scene, ScheduledFault, Simulation};
 
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
 
@@ -61,6 +61,8 @@ pub struct Ride {
     pub took_ms: Vec<f64>,
     /// The robot, step by step.
     pub ticks: Vec<Tick>,
+    /// Faults that were injected.
+    pub faults: Vec<ScheduledFault>,
 }
 
 impl Ride {
@@ -92,6 +94,7 @@ impl Ride {
             reports: Vec::new(),
             took_ms: Vec::new(),
             ticks: Vec::new(),
+            faults: draw.simulation().faults().to_vec(),
         };
         let failed =
             |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
@@ -136,10 +139,12 @@ impl Ride {
         }
         draw.next_frame_while(|simulation, event| {
             witness.event(event);
-            // Only the odometry ticks: it is the fastest message of the robot.
-            let Event::Odometry(reading) = event else { return None };
-            self.ticks.push(tick(simulation, reading.at_ns));
-            command(pipeline, Stamp::from_nanos(reading.at_ns), framed)
+            // Wheels ask for commands at each step, whether the odometry speaks or not.
+            let at_ns = event.step_ns()?;
+            self.ticks.push(tick(simulation, at_ns));
+            let since_frame = Stamp::from_nanos(at_ns).seconds_since(framed);
+            let now = Stamp::from_nanos(simulation.robot_clock_ns(at_ns));
+            command(pipeline, now, since_frame)
         })
     }
 }
@@ -158,7 +163,7 @@ fn tick(simulation: &Simulation, at_ns: u64) -> Tick {
     }
 }
 
-fn command(pipeline: &Pipeline, now: Stamp, framed: Stamp) -> Option<WheelSpeeds> {
-    let since_frame = Duration::from_secs_f64(now.seconds_since(framed).max(0.0));
+fn command(pipeline: &Pipeline, now: Stamp, since_frame_s: f64) -> Option<WheelSpeeds> {
+    let since_frame = Duration::from_secs_f64(since_frame_s.max(0.0));
     pipeline.command_after(now, since_frame).map(|command| command.wheels)
 }
