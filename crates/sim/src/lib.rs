@@ -44,6 +44,7 @@ mod approach;
 mod behaviour;
 mod body;
 mod daylight;
+mod faults;
 mod furniture;
 mod gait;
 mod lanes;
@@ -71,6 +72,7 @@ mod world;
 
 pub use approach::{ApproachBy, ApproachInView, ApproachSettings, ApproachState};
 pub use daylight::Daylight;
+pub use faults::{FaultKind, InjectedFault, ScheduledFault};
 pub use furniture::{Furniture, FurnitureKind};
 pub use laser::LaserSettings;
 pub use mirror::MirrorSettings;

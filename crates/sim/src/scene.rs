@@ -9,6 +9,7 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use crate::approach::{ApproachBy, ApproachSettings};
 use crate::daylight::Daylight;
+use crate::faults::InjectedFault;
 use crate::furniture::Furniture;
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorSettings;
@@ -227,7 +228,7 @@ impl Scene {
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
-            None => Ok(()),
+            None => self.check_faults().map_err(ConfigError::new),
         }
     }
 }
@@ -462,11 +463,14 @@ pub struct FaultSettings {
     pub dropped: f64,
     /// Fraction of images that are recorded late, up to 0.15 s.
     pub late: f64,
+    /// Faults that begin at a time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub inject: Vec<InjectedFault>,
 }
 
 impl Default for FaultSettings {
     fn default() -> Self {
-        Self { dropped: 0.01, late: 0.02 }
+        Self { dropped: 0.01, late: 0.02, inject: Vec::new() }
     }
 }
 
