@@ -326,9 +326,7 @@ impl InjectedFault {
                 return Some(format!("faults.inject: {kind} has no size: leave it out"));
             }
             (Some(_), Some([least, most])) if !is_within(self.size, least, most) => {
-                return Some(format!(
-                    "faults.inject: size of {kind} must be in {least} to {most}"
-                ));
+                return Some(format!("faults.inject: size of {kind} must be in {least} to {most}"));
             }
             _ => {}
         }

@@ -17,7 +17,8 @@ pub fn story(ride: &Ride) -> Vec<String> {
     lines
 }
 
-fn words(report: &FrameReport) -> String {
+/// Returns the target and the reason for the motion in words.
+pub(super) fn words(report: &FrameReport) -> String {
     let whom = report.target.map_or("nobody".into(), |id| format!("track {id}"));
     let lock = report
         .lock
