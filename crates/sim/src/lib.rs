@@ -40,6 +40,7 @@
 // iterators zipped over all of them would hide the arithmetic.
 #![allow(clippy::needless_range_loop)]
 
+mod approach;
 mod behaviour;
 mod body;
 mod daylight;
@@ -69,6 +70,7 @@ mod variation;
 mod webcam;
 mod world;
 
+pub use approach::{ApproachBy, ApproachInView, ApproachSettings, ApproachState};
 pub use daylight::Daylight;
 pub use faults::{FaultKind, InjectedFault, ScheduledFault};
 pub use furniture::{Furniture, FurnitureKind};

@@ -31,7 +31,8 @@ fn fault_events(ride: &Ride) -> Vec<(f64, String)> {
     events
 }
 
-fn words(report: &FrameReport) -> String {
+/// Returns the target and the reason for the motion in words.
+pub(super) fn words(report: &FrameReport) -> String {
     let whom = report.target.map_or("nobody".into(), |id| format!("track {id}"));
     let lock = report
         .lock
