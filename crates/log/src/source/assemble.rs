@@ -19,7 +19,7 @@ use crate::images::{
     decode_disparity, decode_plain_disparity, decode_raw, size_of_compressed, size_of_raw,
 };
 use crate::msgs::{CompressedImage, DisparityImage, Image, LaserScan, decode};
-use crate::odometry::{PoseAt, unknown_motion};
+use crate::odometry::{MAX_GAP_S, PoseAt, unknown_motion};
 use crate::pairing::Payload;
 use crate::register::Registration;
 use crate::scan::Type;
@@ -319,13 +319,15 @@ impl Assembler {
         // Before `previous` is this frame: without odometry it gives the pose.
         let sensors = self.sense(plan, stamp, &camera, sensors, intake, tally);
         let here = self.pose_at(plan, stamp, intake);
+        note_odometry_ahead(plan, stamp, intake, tally);
         let odom_jumped = self.has_jumped(plan, stamp, intake, tally);
         let (motion, known) = self.motion(plan, stamp, here, odom_jumped, tally);
         self.previous = Some((stamp, here));
         tally.count("frames");
         LogFrame {
             frame: Frame::of_sensors(self.index, stamp, camera, motion, sensors)
-                .with_changed_calibration(intake.has_changed_camera(stamp)),
+                .with_changed_calibration(intake.has_changed_camera(stamp))
+                .with_odometry_age(odometry_age_s(plan, stamp, intake)),
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
             odom_jumped,
@@ -336,10 +338,12 @@ impl Assembler {
         let found = match &plan.odom_frames {
             None => return PoseAt { pose: Isometry2::identity(), stale: false },
             Some(None) => intake.poses.at(stamp),
-            Some(Some((odom, robot))) => intake
-                .tf
-                .lookup(odom, robot, stamp)
-                .map(|pose| PoseAt { pose: planar_pose(&pose), stale: false }),
+            Some(Some((odom, robot))) => intake.tf.lookup(odom, robot, stamp).map(|pose| {
+                let age_s = intake.tf.age_s(odom, robot, stamp);
+                // Static transforms alone have no age.
+                let stale = age_s.is_finite() && age_s > MAX_GAP_S;
+                PoseAt { pose: planar_pose(&pose), stale }
+            }),
         };
         // Without odometry the robot stays at its last pose, which is marked as stale.
         let last = self.previous.map_or_else(Isometry2::identity, |(_, last)| last.pose);
@@ -380,6 +384,32 @@ impl Assembler {
             return (unknown_motion(dt), false);
         }
         (EgoMotion::between(&before.pose, &here.pose, dt, plan.input.odometry_sigma), true)
+    }
+}
+
+/// Returns the age of odometry at a frame, s; infinite without any.
+fn odometry_age_s(plan: &Plan, stamp: Stamp, intake: &Intake) -> f64 {
+    match &plan.odom_frames {
+        None => f64::INFINITY,
+        Some(None) => intake.poses.age_s(stamp),
+        Some(Some((odom, robot))) => intake.tf.age_s(odom, robot, stamp),
+    }
+}
+
+/// Counts a frame whose next reading of odometry lies far in its future, and tells how far.
+fn note_odometry_ahead(plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut Tally) {
+    let ahead_s = match &plan.odom_frames {
+        None => None,
+        Some(None) => intake.poses.ahead_s(stamp),
+        Some(Some((odom, robot))) => intake.tf.ahead_s(odom, robot, stamp),
+    };
+    if let Some(ahead_s) = ahead_s {
+        tally.remark("odometry_ahead_frames", || {
+            format!(
+                "odometry is stamped {ahead_s:.1} s after the frame at {stamp} and is not used for \
+                 it: compare the clocks of the odometry and of the sensor that makes the frames"
+            )
+        });
     }
 }
 

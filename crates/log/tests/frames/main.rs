@@ -3,6 +3,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod odometry_age;
 mod topics;
 
 use common::{LogWriter, SavedLog, at, camera, info_of, level_pose};
