@@ -69,6 +69,7 @@ impl Assembler {
         self.index += 1;
         let tolerance_s = plan.input.pair_tolerance_s;
         intake.pair_sensors(image.stamp, next, tolerance_s);
+        watch_frame(plan, Some(plan.primary()), image, image.stamp, intake, tally);
         if plan.is_of_scans() {
             return self.assemble_scan(plan, image, intake, tally);
         }
@@ -79,6 +80,11 @@ impl Assembler {
         }
         if plan.chosen.right.is_some() && right.is_none() {
             tally.count("left_without_right");
+        }
+        for (topic, partner) in [(&plan.chosen.depth, &depth), (&plan.chosen.right, &right)] {
+            if let Some(partner) = partner {
+                watch_frame(plan, topic.as_deref(), partner, image.stamp, intake, tally);
+            }
         }
         let requires = |input| plan.inputs.requires(input);
         // Tested before decoding, which is the costly part.
@@ -326,7 +332,7 @@ impl Assembler {
         tally.count("frames");
         LogFrame {
             frame: Frame::of_sensors(self.index, stamp, camera, motion, sensors)
-                .with_changed_calibration(intake.has_changed_camera(stamp))
+                .with_changed_calibration(intake.watch.has_changed(stamp))
                 .with_odometry_age(odometry_age_s(plan, stamp, intake)),
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
@@ -384,6 +390,21 @@ impl Assembler {
             return (unknown_motion(dt), false);
         }
         (EgoMotion::between(&before.pose, &here.pose, dt, plan.input.odometry_sigma), true)
+    }
+}
+
+/// Compares the frame of an image that a frame is made of with that of the first image of its topic.
+fn watch_frame(
+    plan: &Plan,
+    topic: Option<&str>,
+    image: &Payload,
+    frame_stamp: Stamp,
+    intake: &mut Intake,
+    tally: &mut Tally,
+) {
+    if let Some(topic) = topic {
+        let first = plan.scan.frame_of(topic);
+        intake.watch.watch_frame(topic, first, image, frame_stamp, tally);
     }
 }
 

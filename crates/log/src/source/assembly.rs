@@ -30,8 +30,7 @@ pub(super) struct Assembly {
 
 impl Assembly {
     pub(super) fn new(plan: Plan, tally: Tally) -> Self {
-        let intake = Intake::new(&plan.scan, &plan.chosen, plan.primary(), &plan.input);
-        Self { intake, assembler: Assembler::new(), plan, tally, ended: false }
+        Self { intake: Intake::new(&plan), assembler: Assembler::new(), plan, tally, ended: false }
     }
 
     /// Returns true for topics with messages that are used.

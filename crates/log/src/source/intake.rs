@@ -2,11 +2,9 @@
 
 use tagalong_core::{Stamp, planar_pose};
 
+use super::changes::CameraWatch;
 use super::plan::Plan;
-use crate::InputSettings;
-use crate::msgs::{
-    CameraInfo, CdrError, CompressedImage, DisparityImage, Image, Odometry, TFMessage, decode,
-};
+use crate::msgs::{CdrError, CompressedImage, DisparityImage, Image, Odometry, TFMessage, decode};
 use crate::odometry::PoseBuffer;
 use crate::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
 use crate::scan::{Scan, Type, is_static};
@@ -21,9 +19,9 @@ pub(super) struct Intake {
     chosen: Chosen,
     /// Topic that makes the frames: colour, or depth without it, or laser scans.
     primary: String,
-    info: Option<CameraInfo>,
-    /// Time of the first calibration that differs from `info`.
-    changed_at: Option<Stamp>,
+    pub(super) watch: CameraWatch,
+    /// Newest stamp of the messages that make the frames.
+    newest: Option<Stamp>,
     pub(super) frames: Reorder,
     pub(super) depth: Waiting,
     pub(super) right: Waiting,
@@ -34,16 +32,17 @@ pub(super) struct Intake {
 }
 
 impl Intake {
-    pub(super) fn new(scan: &Scan, chosen: &Chosen, primary: &str, input: &InputSettings) -> Self {
+    pub(super) fn new(plan: &Plan) -> Self {
+        let Plan { scan, chosen, input, .. } = plan;
+        let primary = plan.primary();
         let mut tf = scan.tf.clone();
         // The first pass left one sample of each moving transform, to know the links only.
         tf.clear_moving();
-        let info = chosen.colour_info.as_ref().and_then(|topic| scan.infos.get(topic));
         Self {
             chosen: chosen.clone(),
             primary: primary.to_owned(),
-            info: info.cloned(),
-            changed_at: None,
+            watch: CameraWatch::new(plan),
+            newest: None,
             frames: Reorder::new(input.reorder_frames),
             depth: Waiting::default(),
             right: Waiting::default(),
@@ -67,7 +66,7 @@ impl Intake {
         } else if topic == self.chosen.odometry.as_ref() {
             decode(message.data).map(|odometry| self.take_odometry(&odometry, tally))
         } else if topic == self.chosen.colour_info.as_ref() {
-            decode(message.data).map(|info| self.watch_info(&info, tally))
+            decode(message.data).map(|info| self.watch.watch_info(&info, tally))
         } else if Type::of(&message.channel.schema_name) == Type::Tf {
             decode(message.data).map(|tf| self.take_tf(&tf, &message.channel.topic, tally))
         } else {
@@ -80,12 +79,15 @@ impl Intake {
 
     fn take_frame(&mut self, image: Payload, tally: &mut Tally) {
         let newest = self.frames.last();
+        self.newest = self.newest.max(Some(image.stamp));
         match self.frames.push(image) {
             Arrival::Queued | Arrival::Suspect => {}
             Arrival::Duplicate => tally.count("duplicate_frames"),
             Arrival::LateBefore => tally.count("late_frames"),
             Arrival::Jumped => {
                 tally.count("time_jumps_back");
+                self.newest = self.frames.newest();
+                self.watch.clock_jumps();
                 // Partners with older stamps than the newest image belong to the new time already.
                 if let Some(newest) = newest {
                     self.depth.set_aside(newest);
@@ -117,6 +119,26 @@ impl Intake {
     }
 
     fn take_tf(&mut self, tf: &TFMessage, topic: &str, tally: &mut Tally) {
+        match self.newest {
+            Some(now) if is_static(topic) => self.take_static(tf, topic, now, tally),
+            // Before the first frame, a later mount replaces an earlier one.
+            _ => self.insert_all(tf, topic, tally),
+        }
+    }
+
+    /// Takes in static transforms during the run; those that move a camera are not used.
+    fn take_static(&mut self, tf: &TFMessage, topic: &str, now: Stamp, tally: &mut Tally) {
+        let before = self.watch.mounts(&self.tf);
+        let children = tf.transforms.iter().map(|transform| &transform.child_frame_id);
+        let saved: Vec<_> = children.map(|child| self.tf.saved(child)).collect();
+        self.insert_all(tf, topic, tally);
+        if self.watch.watch_mounts(&before, &self.tf, now, tally) {
+            // In reverse order, because a frame may be there twice.
+            saved.into_iter().rev().for_each(|link| self.tf.restore(link));
+        }
+    }
+
+    fn insert_all(&mut self, tf: &TFMessage, topic: &str, tally: &mut Tally) {
         for transform in &tf.transforms {
             if !self.tf.insert(transform, is_static(topic)) {
                 tally.lose("transforms_invalid", || {
@@ -127,26 +149,6 @@ impl Intake {
                 });
             }
         }
-    }
-
-    fn watch_info(&mut self, info: &CameraInfo, tally: &mut Tally) {
-        // Field by field, because the header differs in each message.
-        let changed = self.info.as_ref().is_some_and(|first| {
-            first.k != info.k || first.d != info.d || first.p != info.p || first.roi != info.roi
-        });
-        if changed {
-            self.changed_at.get_or_insert(info.header.stamp());
-            tally.lose("camera_info_changes", || {
-                "the calibration changes on the way; the first one is used throughout, and from \
-                 the change on tracks stay where they were"
-                    .into()
-            });
-        }
-    }
-
-    /// Returns true if the calibration has changed by this time.
-    pub(super) fn has_changed_camera(&self, stamp: Stamp) -> bool {
-        self.changed_at.is_some_and(|at| at <= stamp)
     }
 
     /// Returns the newest image with all its partners, and the number of older ones that were

@@ -2,6 +2,7 @@
 
 mod assemble;
 mod assembly;
+mod changes;
 mod intake;
 mod live;
 mod mount;

@@ -1,6 +1,7 @@
 //! Frames from small invented logs.
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
+mod cameras;
 #[path = "../common/mod.rs"]
 mod common;
 mod odometry_age;
