@@ -220,6 +220,11 @@ impl Scan {
         self
     }
 
+    /// Returns true for a source that is no file, which may have more topics later.
+    pub(crate) fn is_live(&self) -> bool {
+        self.parts.is_empty()
+    }
+
     /// Returns the frame of the images of a topic.
     pub(crate) fn frame_of(&self, topic: &str) -> Option<&str> {
         self.topics.get(topic)?.frame_id.as_deref()

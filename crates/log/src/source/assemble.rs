@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    DepthImage, EgoMotion, Frame, Images, Input, RightImage, Sensors, Stamp, planar_pose,
+    DepthImage, EgoMotion, Frame, Images, Input, ObstacleReadings, RightImage, Sensors, Stamp,
+    planar_pose,
 };
 use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole};
 use tagalong_vision::Unwrapping;
@@ -19,6 +20,7 @@ use crate::images::{
     decode_disparity, decode_plain_disparity, decode_raw, size_of_compressed, size_of_raw,
 };
 use crate::msgs::{CompressedImage, DisparityImage, Image, LaserScan, decode};
+use crate::obstacles::DepthFormat;
 use crate::odometry::{MAX_GAP_S, PoseAt, unknown_motion};
 use crate::pairing::Payload;
 use crate::register::Registration;
@@ -115,7 +117,7 @@ impl Assembler {
         &mut self,
         plan: &Plan,
         scan: &Payload,
-        intake: &Intake,
+        intake: &mut Intake,
         tally: &mut Tally,
     ) -> Option<LogFrame> {
         let Some(sweep) = decode::<LaserScan>(&scan.data).ok().filter(is_sane) else {
@@ -313,17 +315,53 @@ impl Assembler {
         each.fold(sensors, |all, (topic, sensor)| sensor.add_to(all, &moment(topic), tally))
     }
 
+    /// Returns the sensors of a frame with the readings of the further sources of obstacles, if there
+    /// are any sources.
+    fn sense_obstacles(
+        &self,
+        plan: &Plan,
+        stamp: Stamp,
+        camera: &Arc<Camera>,
+        sensors: Sensors,
+        intake: &mut Intake,
+        tally: &mut Tally,
+    ) -> Sensors {
+        if !plan.inputs.uses(Input::OBSTACLES) || plan.input.sources.is_empty() {
+            return sensors;
+        }
+        // Out of the intake, which gives the poses meanwhile.
+        let mut readers = std::mem::take(&mut intake.obstacles);
+        let odom_from_robot = |stamp| self.pose_at(plan, stamp, intake).pose;
+        let format = DepthFormat { unit_m: plan.input.depth_unit_m, limits: &plan.limits };
+        let mut readings = Vec::new();
+        for reader in &mut readers {
+            let topic = reader.topic().to_owned();
+            let moment = Moment {
+                topic: &topic,
+                stamp,
+                camera,
+                robot_frame: robot_frame(&plan.scan, &plan.input),
+                tf: &intake.tf,
+                odom_from_robot: &odom_from_robot,
+            };
+            readings.extend(reader.reading(&moment, format, tally));
+        }
+        intake.obstacles = readers;
+        sensors.with(ObstacleReadings(readings.into()))
+    }
+
     fn finish(
         &mut self,
         plan: &Plan,
         stamp: Stamp,
         camera: Arc<Camera>,
         sensors: Sensors,
-        intake: &Intake,
+        intake: &mut Intake,
         tally: &mut Tally,
     ) -> LogFrame {
         // Before `previous` is this frame: without odometry it gives the pose.
         let sensors = self.sense(plan, stamp, &camera, sensors, intake, tally);
+        let sensors = self.sense_obstacles(plan, stamp, &camera, sensors, intake, tally);
         let here = self.pose_at(plan, stamp, intake);
         note_odometry_ahead(plan, stamp, intake, tally);
         let odom_jumped = self.has_jumped(plan, stamp, intake, tally);

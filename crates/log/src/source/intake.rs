@@ -5,6 +5,7 @@ use tagalong_core::{Stamp, planar_pose};
 use super::changes::CameraWatch;
 use super::plan::Plan;
 use crate::msgs::{CdrError, CompressedImage, DisparityImage, Image, Odometry, TFMessage, decode};
+use crate::obstacles::ObstacleReader;
 use crate::odometry::PoseBuffer;
 use crate::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
 use crate::scan::{Scan, Type, is_static};
@@ -13,6 +14,11 @@ use crate::tally::Tally;
 use crate::tf::TfBuffer;
 use crate::topics::Chosen;
 use crate::walk::Message;
+
+/// Time of recording of a live message whose arrival is not told.
+pub(super) const UNKNOWN_TIME: u64 = 0;
+/// Longest time from the last frame to a message without a stamp that counts, s.
+const MAX_WAIT_S: f64 = 10.0;
 
 /// Messages that have been read and not yet become a frame.
 pub(super) struct Intake {
@@ -27,6 +33,10 @@ pub(super) struct Intake {
     pub(super) right: Waiting,
     /// Topics of the sensors beside the images, with their readers.
     pub(super) sensors: Vec<(String, Box<dyn SensorReader>)>,
+    /// Readers of the further sources of obstacles.
+    pub(super) obstacles: Vec<ObstacleReader>,
+    /// Stamp of the last message that makes a frame, and the time of its arrival, ns.
+    heard: Option<(Stamp, u64)>,
     pub(super) tf: TfBuffer,
     pub(super) poses: PoseBuffer,
 }
@@ -35,6 +45,7 @@ impl Intake {
     pub(super) fn new(plan: &Plan) -> Self {
         let Plan { scan, chosen, input, .. } = plan;
         let primary = plan.primary();
+        let sources = plan.sources.iter();
         let mut tf = scan.tf.clone();
         // The first pass left one sample of each moving transform, to know the links only.
         tf.clear_moving();
@@ -47,6 +58,8 @@ impl Intake {
             depth: Waiting::default(),
             right: Waiting::default(),
             sensors: readers(scan, chosen, primary),
+            obstacles: sources.filter_map(|it| ObstacleReader::new(it, scan.is_live())).collect(),
+            heard: None,
             tf,
             poses: PoseBuffer::default(),
         }
@@ -54,9 +67,13 @@ impl Intake {
 
     /// Takes in a message. One that cannot be decoded is counted as lost.
     pub(super) fn take(&mut self, message: &Message<'_>, tally: &mut Tally) {
+        self.take_obstacles(message, tally);
         let topic = Some(&message.channel.topic);
         let outcome = if *message.channel.topic == self.primary {
-            payload(message).map(|image| self.take_frame(image, tally))
+            payload(message).map(|image| {
+                self.heard = Some((image.stamp, message.log_time));
+                self.take_frame(image, tally);
+            })
         } else if topic == self.chosen.depth.as_ref() {
             payload(message).map(|image| self.depth.push(image))
         } else if topic == self.chosen.right.as_ref() {
@@ -75,6 +92,28 @@ impl Intake {
         if let Err(error) = outcome {
             tally.lose("messages_undecodable", || format!("{}: {error}", message.channel.topic));
         }
+    }
+
+    /// Hands a message to the sources of obstacles on its topic, which may also be one of the frames.
+    fn take_obstacles(&mut self, message: &Message<'_>, tally: &mut Tally) {
+        let topic = &message.channel.topic;
+        let arrival = self.arrival(message.log_time);
+        for reader in self.obstacles.iter_mut().filter(|reader| reader.topic() == *topic) {
+            if let Err(error) = reader.take(message.data, arrival, tally) {
+                tally.lose("messages_undecodable", || format!("{topic}: {error}"));
+            }
+        }
+    }
+
+    /// Returns the time of arrival of a message by the clock of the stamps, which may not be that of
+    /// the arrivals: that of the last frame, and the time since then where both times are known.
+    fn arrival(&self, log_time: u64) -> Stamp {
+        let Some((stamp, then)) = self.heard else { return Stamp::default() };
+        if then == UNKNOWN_TIME || log_time == UNKNOWN_TIME {
+            return stamp;
+        }
+        let since_s = log_time.saturating_sub(then) as f64 * 1e-9;
+        stamp.plus_seconds(since_s.min(MAX_WAIT_S))
     }
 
     fn take_frame(&mut self, image: Payload, tally: &mut Tally) {

@@ -70,6 +70,20 @@ impl LogWriter {
         self.bytes::<T>(topic, stamp, &encode(message));
     }
 
+    /// Writes a message of a type for which there is no definition here.
+    pub fn typed<T: Serialize>(
+        &mut self,
+        topic: &str,
+        name: &'static str,
+        stamp: Stamp,
+        message: &T,
+    ) {
+        let channel_id = self.channel(topic, name, "");
+        let time = stamp.nanos();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        self.writer.write_to_known_channel(&header, &encode(message)).unwrap();
+    }
+
     pub fn colour(&mut self, stamp: Stamp) {
         self.colour_of(stamp, 16, 12);
     }
