@@ -244,6 +244,8 @@ struct Bridge {
     frames: u64,
     heard: Instant,
     quiet: bool,
+    /// True while frames have older stamps than those before.
+    went_back: bool,
 }
 
 /// Desk of the skill, and the requests that were left there.
@@ -309,6 +311,7 @@ impl Bridge {
             frames: 0,
             heard: Instant::now(),
             quiet: false,
+            went_back: false,
         })
     }
 
@@ -371,7 +374,7 @@ impl Bridge {
             self.check_calibration()?;
             // Only the newest frame: a slow pipeline must not fall behind the robot.
             match self.source.newest_frame() {
-                Some(found) => self.step(&found, tell)?,
+                Some(found) => self.step(found, tell)?,
                 None => self.look_for_silence(tell)?,
             }
             self.report_state(tell);
@@ -468,11 +471,14 @@ impl Bridge {
     }
 
     /// Takes a frame through the pipeline and publishes the results.
-    fn step(&mut self, found: &LogFrame, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
+    fn step(&mut self, mut found: LogFrame, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         (self.heard, self.quiet) = (Instant::now(), false);
+        let timing = self.clock.record_frame(found.frame.stamp);
         if self.frames == 0 {
             self.compare_clocks(found.frame.stamp, tell);
         }
+        self.tell_old_stamps(timing.back_s, tell);
+        found.frame = found.frame.with_latency(Some(timing.latency_s));
         // Before the step, so that the command of this very frame is a stop.
         if found.odom_jumped {
             self.disarm("odometry jumped", tell);
@@ -489,7 +495,7 @@ impl Bridge {
         let report = report?;
         self.frames += 1;
         self.callers.desk.frame(self.pipeline.status(), self.frames);
-        self.publish(found, &report);
+        self.publish(&found, &report);
         if let Some(live) = &self.live {
             live.offer(&found.frame, &found.odom_from_robot, &report);
         }
@@ -568,6 +574,19 @@ impl Bridge {
                  `--clock arrival` for simulated time and replayed logs"
             ));
         }
+    }
+
+    /// Tells once that stamps went back: the clock does not, so that no command of these frames is
+    /// valid.
+    fn tell_old_stamps(&mut self, back_s: f64, tell: &dyn Fn(&str)) {
+        let went_back = back_s > 0.0;
+        if went_back && !self.went_back {
+            tell(&format!(
+                "the stamps of the images went back by {back_s:.1} s: the robot stands until they are \
+                 newer than before; restart the bridge if a simulation or a log has begun again"
+            ));
+        }
+        self.went_back = went_back;
     }
 
     /// Reports once why there are no frames.

@@ -128,7 +128,7 @@ impl Network {
         clock: &Arc<StampClock>,
     ) -> Result<Option<Ear>, BridgeError> {
         let clock = Arc::clone(clock);
-        let hear = move |stamp: Stamp| clock.hear(stamp);
+        let hear = move |stamp: Stamp| clock.record_arrival(stamp);
         let ear = match message_type {
             "sensor_msgs/msg/Image" => {
                 let encode = move |image: OwnedImage| {
@@ -146,7 +146,14 @@ impl Network {
             }
             CameraInfo::TYPE => self.plain::<CameraInfo>(topic, sensor(OTHERS), inbox),
             Odometry::TYPE => self.plain::<Odometry>(topic, sensor(OTHERS), inbox),
-            LaserScan::TYPE => self.plain::<LaserScan>(topic, sensor(OTHERS), inbox),
+            LaserScan::TYPE => {
+                // A pipeline without a camera makes its frames of scans.
+                let encode = move |scan: LaserScan| {
+                    hear(scan.header.stamp());
+                    encode(&scan)
+                };
+                self.ear(topic, message_type, sensor(OTHERS), OTHERS, inbox, encode)
+            }
             // Static transforms are sent once, usually before the bridge joins.
             TFMessage::TYPE if topic.ends_with("tf_static") => {
                 self.plain::<TFMessage>(topic, latched(), inbox)
