@@ -32,6 +32,7 @@ pub mod inbox;
 mod messages;
 mod network;
 mod options;
+mod publishers;
 mod services;
 mod skill;
 mod stamps;

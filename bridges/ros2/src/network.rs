@@ -9,8 +9,8 @@ use futures::future::{AbortHandle, Abortable, ready};
 use ros2_client::dds::rustdds::RTPSEntity;
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
-    Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
-    QosProfile, Server, ServiceMapping, ServiceTypeName, Subscription,
+    Context, ContextOptions, MessageInfo, MessageTypeName, Name, Node, NodeName, NodeOptions,
+    Publisher, QosProfile, Server, ServiceMapping, ServiceTypeName, Subscription,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -24,6 +24,7 @@ use crate::inbox::Inbox;
 use crate::messages::{
     Bool, Empty, OwnedCompressedImage, OwnedImage, SpeedLimit, ros_topic, ros_type,
 };
+use crate::publishers::Origin;
 use crate::stamps::StampClock;
 
 /// Number of images that wait for the thread that makes frames.
@@ -167,19 +168,21 @@ impl Network {
     }
 
     /// Calls `on` for each message of the enable topic, in a thread of its own that waits for no
-    /// frame. A message that cannot be read counts as false.
+    /// frame: with the origin of a true, and with `None` for a false and for a message that cannot be
+    /// read.
     pub(crate) fn listen_to_enable(
         &mut self,
         topic: &str,
         inbox: &Arc<Inbox>,
-        on: impl Fn(bool) + Send + 'static,
+        on: impl Fn(Option<Origin>) + Send + 'static,
     ) -> Result<Ear, BridgeError> {
         let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
-        let take = move |message: Option<Bool>| {
+        let take = move |message: Option<(Bool, MessageInfo)>| {
             if message.is_none() {
                 inbox.count_malformed(&name);
             }
-            on(message.is_some_and(|message| message.data));
+            let enable = message.filter(|(message, _)| message.data);
+            on(enable.map(|(_, info)| Origin::from(&info)));
         };
         self.hear(topic, "std_msgs/msg/Bool", commands(), take)
     }
@@ -189,11 +192,11 @@ impl Network {
         &mut self,
         topic: &str,
         inbox: &Arc<Inbox>,
-        on: impl Fn() + Send + 'static,
+        on: impl Fn(Origin) + Send + 'static,
     ) -> Result<Ear, BridgeError> {
         let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
-        let take = move |message: Option<Empty>| match message {
-            Some(_) => on(),
+        let take = move |message: Option<(Empty, MessageInfo)>| match message {
+            Some((_, info)) => on(Origin::from(&info)),
             None => inbox.count_malformed(&name),
         };
         self.hear(topic, "std_msgs/msg/Empty", commands(), take)
@@ -208,22 +211,27 @@ impl Network {
         on: impl Fn(SpeedLimit) + Send + 'static,
     ) -> Result<Ear, BridgeError> {
         let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
-        let take = move |message: Option<SpeedLimit>| match message {
-            Some(limit) if limit.speed_limit >= 0.0 => on(limit),
+        let take = move |message: Option<(SpeedLimit, MessageInfo)>| match message {
+            Some((limit, _)) if limit.speed_limit >= 0.0 => on(limit),
             _ => inbox.count_malformed(&name),
         };
         self.hear(topic, "nav2_msgs/msg/SpeedLimit", commands(), take)
     }
 
-    /// Returns the number of other participants' publishers on a topic.
-    pub(crate) fn others_on(&self, topic: &str) -> usize {
+    /// Returns the numbers of other participants' publishers on some topics.
+    pub(crate) fn others_on<const N: usize>(&self, topics: [&str; N]) -> [usize; N] {
         let participant = self.context.domain_participant();
-        let dds_name = format!("rt{}", full_name(self.node.namespace(), topic));
         // Our own publishers may be among those that are discovered.
         let ours = participant.guid().prefix;
         let writers = participant.discovered_writers();
-        let topic = writers.iter().filter(|w| w.publication_topic_data.topic_name == dds_name);
-        topic.filter(|writer| writer.writer_proxy.remote_writer_guid.prefix != ours).count()
+        topics.map(|topic| {
+            let dds_name = format!("rt{}", full_name(self.node.namespace(), topic));
+            let theirs = writers.iter().filter(|writer| {
+                writer.publication_topic_data.topic_name == dds_name
+                    && writer.writer_proxy.remote_writer_guid.prefix != ours
+            });
+            theirs.count()
+        })
     }
 
     fn plain<M: Message + Serialize + DeserializeOwned + Send + 'static>(
@@ -245,8 +253,8 @@ impl Network {
         encode: impl Fn(M) -> Vec<u8> + Send + 'static,
     ) -> Result<Ear, BridgeError> {
         let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
-        let put = move |message: Option<M>| match message {
-            Some(message) => inbox.push(&name, encode(message), room),
+        let put = move |message: Option<(M, MessageInfo)>| match message {
+            Some((message, _)) => inbox.push(&name, encode(message), room),
             None => inbox.count_malformed(&name),
         };
         self.hear(topic, message_type, qos, put)
@@ -259,7 +267,7 @@ impl Network {
         topic: &str,
         message_type: &str,
         qos: QosProfile,
-        take: impl Fn(Option<M>) + Send + 'static,
+        take: impl Fn(Option<(M, MessageInfo)>) + Send + 'static,
     ) -> Result<Ear, BridgeError> {
         let node = &mut self.node;
         let full = name(node.namespace(), topic)?;
@@ -270,7 +278,7 @@ impl Network {
         let thread = thread::spawn(move || {
             // A message that does not decode is of another type than its topic states.
             let put = subscription.async_stream().for_each(|message| {
-                take(message.ok().map(|(message, _)| message));
+                take(message.ok());
                 ready(())
             });
             // The stream ends by being aborted.
