@@ -688,15 +688,18 @@ fn take_enable(switch: &SwitchHandle, gate: &Gate, origin: Option<Origin>) {
         switch.take(Enable::Off, now);
         return;
     };
-    match gate.admit(origin, Instant::now(), system_time()) {
-        Ok(age) => switch.take(Enable::On, now.saturating_sub(age)),
-        Err(Unfit::Contested) => switch.take(Enable::Fault(CONTESTED), now),
-        // Too old to move the robot, but no release of the button either.
-        Err(Unfit::Untimely(age_s)) if age_s > 0.0 => {
-            let age = Duration::try_from_secs_f64(age_s).unwrap_or(Duration::MAX);
-            switch.take(Enable::On, now.saturating_sub(age));
+    let age = match gate.admit(origin, Instant::now(), system_time()) {
+        Ok(age) => age,
+        Err(Unfit::Contested) => {
+            switch.take(Enable::Fault(CONTESTED), now);
+            return;
         }
-        Err(Unfit::Untimely(_)) => {}
+        // Too old to move the robot, but no release of the button either.
+        Err(Unfit::Untimely(age_s)) => Duration::try_from_secs_f64(age_s).unwrap_or(Duration::MAX),
+    };
+    // What was published before the switch was there says nothing to it, nor does the future.
+    if let Some(published) = now.checked_sub(age) {
+        switch.take(Enable::On, published);
     }
 }
 
