@@ -193,6 +193,10 @@ fn start(
             setup.pipeline.check_sources(sources(&source))?;
             Ok(source)
         });
+        // Frames may be made of scans alone.
+        if started.is_ok() {
+            first.get_or_insert_with(Instant::now);
+        }
         match started {
             Ok(source) if gathered || is_late => {
                 // Topics that the pipeline does not use are no longer received.
