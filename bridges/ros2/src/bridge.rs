@@ -19,7 +19,7 @@ use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline,
 
 use crate::diagnostics::{Diagnostics, Status};
 use crate::http::HttpServer;
-use crate::inbox::{Inbox, Traffic};
+use crate::inbox::{Arrival, Inbox, Traffic};
 use crate::messages::SpeedLimit;
 use crate::network::{Ear, Network};
 use crate::options::{CommandType, Setup};
@@ -167,6 +167,8 @@ fn start(
     let inputs = if options.serve.is_some() { inputs.accept(Input::Colour) } else { inputs };
     let mut listening = Listening::new(&name, &setup.input, &setup.limits, inputs)?;
     let mut ears: Vec<Ear> = Vec::new();
+    let further = setup.pipeline.obstacle_sources();
+    let is_source = |topic: &str| further.iter().any(|source| source.topic == topic);
     let deadline = Instant::now() + Duration::from_secs_f64(options.wait);
     let mut attempt = Instant::now() + ATTEMPT;
     let mut first: Option<Instant> = None;
@@ -174,11 +176,16 @@ fn start(
     while !stop.load(Ordering::Relaxed) {
         for (topic, kind) in network.topics() {
             if listening.announce(&topic, &kind) && listening.wants(&topic) {
-                ears.extend(network.listen(&topic, &kind, inbox, clock)?);
+                let ear = match network.listen(&topic, &kind, inbox, clock)? {
+                    None if is_source(&topic) => Some(network.listen_raw(&topic, &kind, inbox)?),
+                    ear => ear,
+                };
+                ears.extend(ear);
             }
         }
-        let messages = inbox.take(TURN);
-        messages.iter().for_each(|(topic, data)| listening.take(topic, data));
+        for Arrival { topic, message, .. } in inbox.take(TURN) {
+            listening.take(&topic, &message);
+        }
         if first.is_none() && listening.has_image() {
             first = Some(Instant::now());
         }
@@ -386,11 +393,11 @@ impl Bridge {
     fn work(&mut self, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         self.callers.desk.open();
         while !stop.load(Ordering::Relaxed) {
-            for (topic, data) in self.inbox.take(TURN) {
+            for Arrival { topic, message, .. } in self.inbox.take(TURN) {
                 match topic {
-                    topic if topic == self.options.reset => self.reset(&data, tell),
-                    topic if topic == self.options.speed_limit => self.limit_speed(&data, tell),
-                    topic => self.source.take(&topic, &data),
+                    topic if topic == self.options.reset => self.reset(&message, tell),
+                    topic if topic == self.options.speed_limit => self.limit_speed(&message, tell),
+                    topic => self.source.take(&topic, &message),
                 }
             }
             self.serve_callers(tell);

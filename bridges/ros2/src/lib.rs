@@ -33,6 +33,7 @@ mod messages;
 mod network;
 mod options;
 mod publishers;
+mod raw;
 mod services;
 mod skill;
 mod stamps;
