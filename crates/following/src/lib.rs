@@ -21,6 +21,7 @@
 //!   command.
 //! * This is no safety function in the sense of the standards.
 
+mod collision_monitor;
 mod command_limiter;
 mod enable;
 mod settings;
@@ -28,10 +29,10 @@ mod skill;
 mod steering;
 mod target_lock;
 
-pub use command_limiter::{
-    CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource, Orders, SourceKind,
-    SourceSettings,
+pub use collision_monitor::{
+    CollisionMonitorSettings, NoReturn, ObstacleSource, SourceKind, SourceSettings,
 };
+pub use command_limiter::{CommandLimiterSettings, Orders};
 pub use enable::{Enable, EnableSwitch, Permission};
 pub use settings::{Base, FollowSettings, OdometrySource, RobotSettings};
 pub use skill::{Choice, Enrollment, EnrollmentError, FollowStatus, PersonStatus};

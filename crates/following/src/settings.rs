@@ -1,8 +1,13 @@
+use nalgebra::Point2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::DiffDrive;
+use tagalong_core::{DiffDrive, Error, Result};
 
+use crate::collision_monitor::Footprint;
 use crate::{CollisionMonitorSettings, CommandLimiterSettings, TargetSettings};
+
+/// Largest coordinate of a corner of the footprint, m.
+const MOST_M: f64 = 2.0;
 
 /// Settings of the steering.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,6 +41,12 @@ pub struct RobotSettings {
     /// Least radius of the turn of an "ackermann" base, at the middle of its driven axle, m.
     #[schemars(range(min = 0.1, max = 20.0))]
     pub min_turn_radius_m: f64,
+    /// Outline of the robot on the floor: corners in order around it, x forward and y left of the
+    /// point between its wheels, m (Nav2's `footprint`). With all that stands out, and what it carries.
+    pub footprint: Vec<[f64; 2]>,
+    /// Height of the robot with all that it carries, m.
+    #[schemars(range(min = 0.05, max = 3.0))]
+    pub height_m: f64,
     /// Source of the robot's motion: "required", or "none" for a controller that is to drive without
     /// odometry, as if the robot were always at rest.
     pub odometry: OdometrySource,
@@ -73,12 +84,52 @@ impl Default for RobotSettings {
             max_speed_mps: 0.9,
             base: Base::Differential,
             min_turn_radius_m: 0.5,
+            // An octagon around a disc of a radius of 0.25 m, somewhat more than the robot of P1.
+            footprint: vec![
+                [0.25, 0.1],
+                [0.25, -0.1],
+                [0.1, -0.25],
+                [-0.1, -0.25],
+                [-0.25, -0.1],
+                [-0.25, 0.1],
+                [-0.1, 0.25],
+                [0.1, 0.25],
+            ],
+            height_m: 1.4,
             odometry: OdometrySource::Required,
         }
     }
 }
 
 impl RobotSettings {
+    /// Refuses a footprint that is none.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] names the key and the remedy.
+    pub fn check(&self) -> Result<()> {
+        let refuse = |why: String| Err(Error::setting("footprint", why));
+        if !(3..=64).contains(&self.footprint.len()) {
+            let count = self.footprint.len();
+            return refuse(format!("must have 3 to 64 corners [x, y], not {count}"));
+        }
+        let is_near = |value: &f64| (-MOST_M..=MOST_M).contains(value);
+        if let Some(far) = self.footprint.iter().find(|corner| !corner.iter().all(is_near)) {
+            return refuse(format!("has a corner at {far:?}: they must be within {MOST_M} m"));
+        }
+        let width_m = self.footprint.iter().map(|[_, y]| y.abs()).fold(0.0, f64::max);
+        if width_m < self.wheel_half_separation_m {
+            let wheels_m = self.wheel_half_separation_m;
+            return refuse(format!(
+                "must be at least {wheels_m} m wide on each side, as `wheel_half_separation_m`, not {width_m}"
+            ));
+        }
+        let footprint = Footprint::new(&self.footprint);
+        if footprint.distance_m(&Point2::origin()) > 0.0 {
+            return refuse("must hold the point between the wheels, [0, 0]".to_owned());
+        }
+        Ok(())
+    }
+
     /// Returns the drive as the type of the core crate.
     pub fn wheels(&self) -> DiffDrive {
         DiffDrive { half_separation_m: self.wheel_half_separation_m, slip: self.wheel_slip }

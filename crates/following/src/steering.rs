@@ -5,7 +5,8 @@ use tagalong_core::{
 use tagalong_tracking::{Guarded, StepError};
 use tagalong_vision::Describer;
 
-use crate::command_limiter::{Aim, CommandLimiter, ObstacleMemory, Wish};
+use crate::collision_monitor::CollisionMonitor;
+use crate::command_limiter::{Aim, CommandLimiter, Wish};
 use crate::skill::{View, before_any_frame};
 use crate::target_lock::{Search, TargetLock};
 use crate::{
@@ -27,7 +28,7 @@ pub struct Steering {
     /// Last frame, in which an enrollment finds its person.
     view: Option<View>,
     status: FollowStatus,
-    obstacles: ObstacleMemory,
+    monitor: CollisionMonitor,
     limiter: CommandLimiter,
     robot: RobotSettings,
     fresh: u32,
@@ -67,8 +68,8 @@ impl Steering {
             search_settings: target.search.clone(),
             lock: TargetLock::new(target, describer),
             search: Search::default(),
-            obstacles: ObstacleMemory::default(),
-            limiter: CommandLimiter::new(command_limiter, collision_monitor, robot.clone()),
+            monitor: CollisionMonitor::new(collision_monitor, &robot),
+            limiter: CommandLimiter::new(command_limiter, robot.clone()),
             robot,
             fresh: FRESH_FRAMES,
             last: None,
@@ -79,7 +80,7 @@ impl Steering {
     pub fn reset(&mut self) {
         self.view = None;
         self.lock.reset();
-        self.obstacles.clear();
+        self.monitor.clear();
         self.fresh = 0;
     }
 
@@ -133,6 +134,12 @@ impl Steering {
         self.limiter.orders()
     }
 
+    /// Tells whether the base executes the commands from now on. Only then can they be compared with
+    /// the odometry: a base that does something else, or responds too late, is a fault.
+    pub fn set_driving(&mut self, is_driving: bool) {
+        self.limiter.set_driving(is_driving);
+    }
+
     /// Returns the reason why the robot stands until [`Steering::arm`], if it does.
     pub fn fault(&self) -> Option<&'static str> {
         self.limiter.fault()
@@ -159,41 +166,33 @@ impl Steering {
         motion: &EgoMotion,
         tracks: &[Track],
     ) -> Result<Steered, StepError> {
-        // Checked first: a jump of the odometry latches the fault before this frame's command is
-        // made.
-        self.limiter.check_odometry(&frame.motion);
+        // Checked first: a fault is latched before this frame's command is made.
+        self.limiter.check_motion(frame);
         let settled = self.is_settled();
         let lock = self.lock.update(frame, motion, tracks, settled);
         let lock = lock.map_err(|error| StepError::of_stage("[appearance]", frame, error))?;
         let followed = self.lock.followed();
         let target = tracks.iter().find(|track| Some(track.id) == followed);
         let twist = self.ask(frame, tracks, target)?;
-        let place = |track: &Track| track.estimate.person.position.xy();
-        let person = target.map(|track| &track.estimate.person);
-        let (monitor, camera) = (self.limiter.monitor(), &frame.camera);
-        // Obstacles are updated after the lock, because points of the target are no obstacles.
-        self.obstacles.update(monitor, camera, frame.depth().ok(), motion, person);
-        if let (Ok(left), true) = (frame.grey(), frame.right().is_ok()) {
-            self.obstacles.excuse_smooth(left);
-        }
-        self.obstacles.add_scan(monitor, frame.laser().map(|scan| &scan.points[..]), motion);
-        self.obstacles.add_tracks(tracks, followed);
-        let sighted = self.obstacles.is_sighted(monitor, self.limiter.patience_s());
+        // After the lock, because points of the target are no obstacles.
+        self.monitor.update(frame, motion, tracks, followed);
         let (wheels, aim) = self.aim(twist, tracks);
         let wish = Wish {
             wheels,
             stamp: frame.stamp,
             aim,
-            sighted,
+            stop: self.monitor.stop_reason(self.limiter.patience_s()),
             settled,
             pause_s: self.last.map_or(0.0, |last| frame.stamp.seconds_since(last)),
         };
         self.last = Some(frame.stamp);
-        let look =
-            |monitor: &_, curvature| self.obstacles.ahead(monitor, curvature, target.map(place));
-        let command = self.limiter.limit(&wish, look);
+        let command = self
+            .limiter
+            .limit(&wish, |path, speed, braking| self.monitor.allowance(path, speed, braking));
         // The search learns only now that its wish was blocked; it reacts in the next frame.
-        self.search.add_block(command.reason == Reason::Blocked, motion.dt);
+        let is_blocked =
+            matches!(command.reason, Reason::Blocked | Reason::TooClose | Reason::Unknown);
+        self.search.add_block(is_blocked, motion.dt);
         let target = target.map(|track| track.id);
         let view = View::new(tracks, &frame.camera, frame.stamp);
         self.status = view.status(&lock, target, command.reason.name(), self.fault());

@@ -120,6 +120,15 @@ impl Pipeline {
         }
     }
 
+    /// Tells whether the base executes the commands from now on; not at the start, because a log was
+    /// driven by others. Only then can the commands be compared with the odometry: a base that does
+    /// something else (wheels that are stuck, another driver), or responds too late, is a fault.
+    pub fn set_driving(&mut self, is_driving: bool) {
+        if let Some(steering) = &mut self.steering {
+            steering.set_driving(is_driving);
+        }
+    }
+
     /// Returns the state of the pursuit after the last frame, and the people to choose from; `None`
     /// without a controller.
     pub fn status(&self) -> Option<FollowStatus> {

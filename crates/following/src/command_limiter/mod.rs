@@ -9,29 +9,31 @@
 //! fault, a missing sensor, a pause of the frames, a jump of the clock, an expired command, an
 //! obstacle nearer than the robot can stop.
 
-mod collision_monitor;
-mod obstacle_memory;
 mod ramp;
+mod response;
 mod settings;
-mod sources;
 
-pub(crate) use collision_monitor::Ahead;
-pub(crate) use obstacle_memory::ObstacleMemory;
-pub use settings::{CollisionMonitorSettings, CommandLimiterSettings, ObstacleSource};
-pub use sources::{SourceKind, SourceSettings};
+pub use settings::CommandLimiterSettings;
+pub(crate) use settings::at_least;
 
 use std::time::{Duration, Instant};
 
 use ramp::{Axis, AxisLimits};
-use tagalong_core::{Command, DiffDrive, EgoMotion, Reason, Stamp, Twist, WheelSpeeds};
+use response::{Response, ResponseCheck};
+use tagalong_core::{Command, DiffDrive, Frame, Reason, Stamp, Twist, WheelSpeeds};
 
-use crate::{Base, RobotSettings};
+use crate::collision_monitor::{Allowance, Braking, Path};
+use crate::{Base, OdometrySource, RobotSettings};
 
 /// Longest time over which the robot may have changed its speed, s. A pause of frames must not
 /// allow a large step of the speed.
 const LONGEST_STEP_S: f64 = 0.2;
+/// Part of a delay of the wheels that the comparison with the odometry does not see, s.
+const UNSEEN_S: f64 = 0.2;
 /// Speeds below this are standing still, m/s.
 const STILL_MPS: f64 = 1e-6;
+/// Turn rates below this are standing still, rad/s.
+const STILL_RPS: f64 = 1e-6;
 /// Wheel speed beyond that of any robot, m/s; differences of much larger ones overflow.
 const BEYOND_MPS: f64 = 1e6;
 
@@ -44,8 +46,8 @@ pub(crate) struct Wish {
     pub(crate) stamp: Stamp,
     /// Purpose of the motion.
     pub(crate) aim: Aim,
-    /// True if the sensors of obstacles are there, or the config does without them.
-    pub(crate) sighted: bool,
+    /// Reason for which the sensors do not let the robot move, if there is one.
+    pub(crate) stop: Option<Reason>,
     /// True if enough frames came since the start or a jump.
     pub(crate) settled: bool,
     /// Time since the previous frame, s.
@@ -133,7 +135,6 @@ impl Orders {
 /// Limiter of the commands; see the [module](self).
 pub(crate) struct CommandLimiter {
     settings: CommandLimiterSettings,
-    monitor: CollisionMonitorSettings,
     robot: RobotSettings,
     wheels: DiffDrive,
     max_speed_mps: f64,
@@ -145,6 +146,14 @@ pub(crate) struct CommandLimiter {
     fault: Option<&'static str>,
     /// Time of the last command.
     made: Instant,
+    response: ResponseCheck,
+    /// Time from an image to wheels that move accordingly, s: the set one, or the measured one if that
+    /// is longer.
+    reaction_s: f64,
+    /// Reason for which time or motion do not let the robot move, if there is one.
+    late: Option<Reason>,
+    /// True if the odometry is not as young as it should be.
+    is_odometry_old: bool,
 }
 
 /// Motion of a command, with the accelerations that led to it.
@@ -166,14 +175,10 @@ fn curvature(twist: Twist) -> f64 {
 }
 
 impl CommandLimiter {
-    pub(crate) fn new(
-        settings: CommandLimiterSettings,
-        monitor: CollisionMonitorSettings,
-        robot: RobotSettings,
-    ) -> Self {
+    pub(crate) fn new(settings: CommandLimiterSettings, robot: RobotSettings) -> Self {
         Self {
+            reaction_s: settings.reaction_s,
             settings,
-            monitor,
             wheels: robot.wheels(),
             max_speed_mps: robot.max_speed_mps,
             robot,
@@ -182,16 +187,18 @@ impl CommandLimiter {
             motion: Motion::default(),
             fault: None,
             made: Instant::now(),
+            response: ResponseCheck::default(),
+            late: None,
+            is_odometry_old: false,
         }
     }
 
-    /// Returns the command for a frame. `look` returns the nearest obstacle in the corridor along
-    /// an arc of a given curvature, and is called only where the robot may move; it returns `None`
-    /// for a robot with neither depth nor laser.
+    /// Returns the command for a frame. `look` returns the largest speeds, up to a given one, that the
+    /// collision monitor allows on a path; it is asked wherever the robot may move.
     pub(crate) fn limit(
         &mut self,
         wish: &Wish,
-        look: impl FnOnce(&CollisionMonitorSettings, f64) -> Option<Ahead>,
+        look: impl Fn(Path, f64, &Braking) -> Allowance,
     ) -> Command {
         let (motion, reason) = match self.must_stop(wish) {
             Some(reason) => (Motion::default(), reason),
@@ -203,6 +210,7 @@ impl CommandLimiter {
         let twist = self.wheels.twist(wheels);
         let command = Command { twist, wheels, stamp: wish.stamp, valid_until, reason };
         // Stops are remembered, too: the ramp of the next command starts from this one.
+        self.response.add(&command);
         self.last = Some(command);
         self.made = Instant::now();
         command
@@ -218,24 +226,50 @@ impl CommandLimiter {
         }
     }
 
-    /// Latches a fault if the odometry moved faster than the robot can.
-    pub(crate) fn check_odometry(&mut self, motion: &EgoMotion) {
+    /// Judges the odometry of a frame, and how late images and wheels are. Latches a fault if the
+    /// odometry moved faster than the robot can, or the robot does not move as it was commanded.
+    pub(crate) fn check_motion(&mut self, frame: &Frame) {
+        let motion = &frame.motion;
         let travel = motion.forward.hypot(motion.left);
         // At least 50 ms: over a shorter time, small odometry errors would look like high speeds.
         if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
             self.latch("odometry jumped");
         }
+        self.late = None;
+        self.is_odometry_old = false;
+        if self.robot.odometry == OdometrySource::Required {
+            // Positive comparisons, so that a number that is none is no odometry.
+            let is_number = travel.is_finite() && motion.turn.is_finite();
+            if !(is_number && frame.odometry_age_s <= self.settings.stop_after_s) {
+                self.late = Some(Reason::Odometry);
+            }
+            self.is_odometry_old = frame.odometry_age_s > self.settings.slow_after_s;
+        }
+        let image_s = frame.latency_s.unwrap_or(0.0);
+        if !(image_s <= self.settings.reaction_s) {
+            self.late = self.late.or(Some(Reason::Late));
+        }
+        match self.response.update(frame.stamp, motion) {
+            Response::Within(wheels_s) => {
+                let answered_s = if wheels_s > 0.0 { wheels_s + UNSEEN_S } else { 0.0 };
+                self.reaction_s = self.settings.reaction_s.max(image_s + answered_s);
+                if wheels_s > 2.0 * self.settings.reaction_s {
+                    self.latch("the base responds too late to its commands");
+                }
+            }
+            Response::NotObeyed => self.latch("the base does not move as it is commanded"),
+        }
+    }
+
+    /// Tells whether the base executes the commands: only then are they compared with the odometry.
+    pub(crate) fn set_driving(&mut self, is_driving: bool) {
+        self.response.set_driving(is_driving);
     }
 
     /// Limits the speed to this, m/s, beside all other limits.
     pub(crate) fn allow_speed(&mut self, most_mps: f64) {
         // A limit that is no number is a mistake of another program, which must not drive faster.
         self.allowed_mps = if most_mps >= 0.0 { most_mps } else { 0.0 };
-    }
-
-    /// Returns the settings of the obstacle corridor.
-    pub(crate) fn monitor(&self) -> &CollisionMonitorSettings {
-        &self.monitor
     }
 
     /// Returns the time for which a sensor may be silent, s.
@@ -257,12 +291,14 @@ impl CommandLimiter {
     /// Clears the fault, after a person has checked the robot.
     pub(crate) fn arm(&mut self) {
         self.fault = None;
-        (self.last, self.motion) = (None, Motion::default());
+        self.last = None;
+        self.motion = Motion::default();
+        self.response.clear();
     }
 
     /// Returns the reason for an emergency stop, if there is one: the wheels stop at once.
     fn must_stop(&self, wish: &Wish) -> Option<Reason> {
-        let Wish { wheels, sighted, settled, pause_s, .. } = wish;
+        let Wish { wheels, stop, settled, pause_s, .. } = wish;
         let in_time = *pause_s <= self.settings.stop_after_s;
         // The order is that of severity: a fault outranks every passing state.
         if self.fault.is_some() {
@@ -271,8 +307,8 @@ impl CommandLimiter {
             Some(Reason::Settling)
         } else if !in_time {
             Some(Reason::Stalled)
-        } else if !sighted {
-            Some(Reason::Blind)
+        } else if self.late.or(*stop).is_some() {
+            self.late.or(*stop)
         } else if !(wheels.left.is_finite() && wheels.right.is_finite()) {
             Some(Reason::NotFinite)
         } else {
@@ -294,7 +330,7 @@ impl CommandLimiter {
     fn limited(
         &self,
         wish: &Wish,
-        look: impl FnOnce(&CollisionMonitorSettings, f64) -> Option<Ahead>,
+        look: impl Fn(Path, f64, &Braking) -> Allowance,
     ) -> (Motion, Reason) {
         let (before, dt) = self.before(wish.stamp);
         let (wanted, why, is_capped) = self.wanted(wish);
@@ -304,54 +340,90 @@ impl CommandLimiter {
             twist if twist == wanted || is_capped => why,
             _ => Reason::Limited,
         };
-        // A turn in place stays in place, and the corridor shows nothing behind the robot.
-        if next.forward.speed <= STILL_MPS {
-            return (next, reason);
+        let speed = next.forward.speed.abs();
+        if speed <= STILL_MPS {
+            return self.turn_in_place(&before, next, reason, dt, look);
         }
-        match look(&self.monitor, curvature(next.twist())) {
-            Some(Ahead::Blind) => (Motion::default(), Reason::Blind),
-            Some(Ahead::Something(at_m)) => {
-                let slower = self.before_obstacle(&before, next, wanted, at_m, dt);
-                slower.unwrap_or((next, reason))
-            }
-            Some(Ahead::Free) | None => (next, reason),
+        let backwards = next.forward.speed < 0.0;
+        let path = Path::Arc { curvature: curvature(next.twist()), backwards };
+        let allowed = look(path, speed, &self.settings.braking(self.reaction_s));
+        if allowed.most <= STILL_MPS {
+            let stopped = Axis::default();
+            // Turning stays allowed where it is free: it may free the path.
+            let turn = self.turned(&before, wanted.angular_rps, &stopped, dt);
+            let still = Motion { forward: stopped, turn };
+            return self.turn_in_place(&before, still, allowed.stops, dt, look);
+        }
+        match self.slower(&before, next, wanted, &allowed, dt) {
+            Some(slower) => (slower, allowed.slower),
+            None => (next, reason),
         }
     }
 
-    /// Returns the motion before an obstacle at a distance, if it is slower than `next`.
-    fn before_obstacle(
+    /// Limits a turn in place.
+    fn turn_in_place(
+        &self,
+        before: &Motion,
+        next: Motion,
+        reason: Reason,
+        dt: f64,
+        look: impl Fn(Path, f64, &Braking) -> Allowance,
+    ) -> (Motion, Reason) {
+        let speed = next.turn.speed.abs();
+        if speed <= STILL_RPS {
+            return (next, reason);
+        }
+        let path = Path::Turn { left: next.turn.speed > 0.0 };
+        let allowed = look(path, speed, &self.settings.turn_braking(self.reaction_s));
+        if allowed.most <= STILL_RPS {
+            return (Motion::default(), allowed.stops);
+        }
+        if speed <= allowed.gentle {
+            return (next, reason);
+        }
+        let gentle =
+            self.turned(before, allowed.gentle.copysign(next.turn.speed), &next.forward, dt);
+        let turn = if gentle.speed.abs() <= allowed.most {
+            gentle
+        } else {
+            let most = allowed.most.copysign(next.turn.speed);
+            before.turn.braked(most, dt, &self.turn_limits())
+        };
+        // Where the way ahead is blocked, that is what stops the robot.
+        let why = if reason.moves() { allowed.slower } else { reason };
+        (Motion { turn, ..next }, why)
+    }
+
+    /// Returns the motion within what is allowed on the path, if it is slower than `next`.
+    fn slower(
         &self,
         before: &Motion,
         next: Motion,
         wanted: Twist,
-        at_m: f64,
+        allowed: &Allowance,
         dt: f64,
-    ) -> Option<(Motion, Reason)> {
-        let room_m = at_m - self.monitor.stop_m;
-        let (gentle, most) =
-            (self.settings.gentle_within(room_m), self.settings.speed_within(room_m));
-        if most <= STILL_MPS {
-            // Turning stays allowed: it may free the path.
-            let turn = self.turned(before, wanted.angular_rps, &Axis::default(), dt);
-            return Some((Motion { forward: Axis::default(), turn }, Reason::Blocked));
-        }
-        if next.forward.speed <= gentle {
+    ) -> Option<Motion> {
+        let speed = next.forward.speed.abs();
+        if speed <= allowed.gentle {
             return None;
         }
-        let target = wanted.scaled((gentle / wanted.linear_mps.max(gentle)).min(1.0));
-        let slower = self.ramped(before, target, dt);
-        if slower.forward.speed <= most {
-            return Some((slower, Reason::Obstacle));
+        let part = (allowed.gentle / wanted.linear_mps.abs().max(allowed.gentle)).min(1.0);
+        let slower = self.ramped(before, wanted.scaled(part), dt);
+        if slower.forward.speed.abs() <= allowed.most {
+            return Some(slower);
         }
         // An emergency brakes harder than the limits of deceleration and jerk allow, and stays on the
         // arc that was looked along where it brakes so hard that the turn cannot follow.
+        let most = allowed.most.copysign(next.forward.speed);
         let forward = before.forward.braked(most, dt, &self.forward_limits());
-        let brakes_hard = most < before.forward.speed - self.settings.max_decel_mps2 * dt;
-        let turn = match brakes_hard {
-            true => Axis { speed: next.turn.speed * most / next.forward.speed, accel: 0.0 },
-            false => self.turned(before, slower.turn.speed, &forward, dt),
+        let brakes_hard =
+            allowed.most < before.forward.speed.abs() - self.settings.max_decel_mps2 * dt;
+        let turn = if brakes_hard {
+            Axis { speed: next.turn.speed * allowed.most / speed, accel: 0.0 }
+        } else {
+            self.turned(before, slower.turn.speed, &forward, dt)
         };
-        Some((Motion { forward, turn }, Reason::Obstacle))
+        Some(Motion { forward, turn })
     }
 
     /// Returns the motion that is aimed at, within the limits of the drive and those of a doubt or of
@@ -362,9 +434,13 @@ impl CommandLimiter {
         }
         let (wanted, as_wished) = self.within_drive(wish.wheels);
         let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
-        let is_late = wish.pause_s > self.settings.slow_after_s;
+        let is_late = wish.pause_s > self.settings.slow_after_s
+            || self.is_odometry_old
+            || self.reaction_s > self.settings.reaction_s;
         let half = is_late || wish.aim != Aim::Person;
         let cap = if half { 0.5 } else { 1.0 } * self.max_speed_mps;
+        // Wheels that respond late make the robot slower in the same measure.
+        let cap = cap * (self.settings.reaction_s / self.reaction_s).min(1.0);
         let speed = wanted.linear_mps.abs();
         if speed <= cap.min(self.allowed_mps) {
             return (wanted, reason, false);

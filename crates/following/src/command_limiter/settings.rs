@@ -2,8 +2,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{Error, Result};
 
-use super::SourceSettings;
 use crate::RobotSettings;
+use crate::collision_monitor::Braking;
 
 /// Limits on the robot's motion, for any wish of the controller. The figures are those that makers
 /// and users of mobile robots work with, and each has a ceiling that no config passes; this is no
@@ -92,22 +92,16 @@ impl CommandLimiterSettings {
         self.reaction_s + self.max_decel_mps2 / (2.0 * self.max_jerk_mps3)
     }
 
-    /// Returns the largest speed from which the robot stops within this distance, m/s: reaction and
-    /// braking at once, without the margin.
-    pub(super) fn speed_within(&self, distance_m: f64) -> f64 {
-        self.speed_after(self.reaction_s, distance_m)
-    }
-
-    /// Returns the largest speed from which it does so within the limit of the jerk, m/s.
-    pub(super) fn gentle_within(&self, distance_m: f64) -> f64 {
-        self.speed_after(self.gentle_reaction_s(), distance_m)
-    }
-
-    fn speed_after(&self, reaction_s: f64, distance_m: f64) -> f64 {
+    /// Returns how the robot stops on its way, if it reacts after `reaction_s`.
+    pub(crate) fn braking(&self, reaction_s: f64) -> Braking {
         let decel = self.max_decel_mps2;
-        // The positive root of v t + v² / 2 a = s.
-        let root = (reaction_s * reaction_s + 2.0 * distance_m.max(0.0) / decel).sqrt();
-        decel * (root - reaction_s)
+        Braking { reaction_s, rise_s: decel / (2.0 * self.max_jerk_mps3), decel }
+    }
+
+    /// Returns how a turn stops, if the robot reacts after `reaction_s`.
+    pub(crate) fn turn_braking(&self, reaction_s: f64) -> Braking {
+        let decel = self.max_turn_accel_radps2;
+        Braking { reaction_s, rise_s: decel / (2.0 * self.max_turn_jerk_radps3), decel }
     }
 
     /// Refuses limits that contradict each other or those of the robot.
@@ -124,123 +118,10 @@ impl CommandLimiterSettings {
 }
 
 /// Refuses a value below another setting.
-fn at_least(key: &str, value: f64, other: &str, least: f64) -> Result<()> {
+pub(crate) fn at_least(key: &str, value: f64, other: &str, least: f64) -> Result<()> {
     // Written as `>=` so that a value that is no number is refused.
     if value >= least {
         return Ok(());
     }
     Err(Error::setting(key, format!("must be at least {least}, as `{other}`, not {value}")))
-}
-
-/// Corridor before the robot in which a point counts as an obstacle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CollisionMonitorSettings {
-    /// Sensors of obstacles: "sensed" (depth or laser; without them, or when one of them falls
-    /// silent, nothing moves), or "none" for a controller that is to drive without eyes for
-    /// obstacles.
-    pub obstacles: ObstacleSource,
-    /// Half the width of the area that the robot sweeps, m.
-    #[schemars(range(min = 0.1, max = 2.0))]
-    pub half_width_m: f64,
-    /// Foremost point of the robot, ahead of the point between its wheels, m.
-    #[schemars(range(min = 0.0, max = 2.0))]
-    pub front_m: f64,
-    /// Extra half width for points that have not been static for a second and may step in, m.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub steps_in_m: f64,
-    /// Clearance to an obstacle below which the robot does not move towards it, m.
-    #[schemars(range(min = 0.2, max = 2.0))]
-    pub stop_m: f64,
-    /// Distance beyond which obstacles are ignored, m.
-    #[schemars(range(min = 0.5, max = 10.0))]
-    pub range_m: f64,
-    /// Height up to which points belong to the floor, m; it grows by 3 cm for each metre of
-    /// distance.
-    #[schemars(range(min = 0.02, max = 0.2))]
-    pub floor_m: f64,
-    /// Depth below the floor from which on there is a fall (a stair, a kerb), m; it grows by 3 cm
-    /// for each metre of distance.
-    #[schemars(range(min = 0.04, max = 0.3))]
-    pub drop_m: f64,
-    /// Height above which points are ignored because the robot passes below, m.
-    #[schemars(range(min = 0.3, max = 3.0))]
-    pub top_m: f64,
-    /// Radius around the target within which points belong to it, m.
-    #[schemars(range(min = 0.0, max = 0.8))]
-    pub target_radius_m: f64,
-    /// Number of points that make an obstacle, in a grid of 160 columns over the image.
-    #[schemars(range(min = 1, max = 100))]
-    pub min_points: u32,
-    /// Part of the image with depth below which the camera counts as blind.
-    #[schemars(range(min = 0.005, max = 1.0))]
-    pub min_seen: f64,
-    /// Time for which an obstacle is remembered that left the view beside the robot or below the
-    /// image, s.
-    #[schemars(range(min = 1.0, max = 600.0))]
-    pub memory_s: f64,
-    /// Further sources of obstacles: laser scanners, depth cameras, range sensors and bumpers.
-    pub sources: Vec<SourceSettings>,
-}
-
-/// Sensors of obstacles that a controller has.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum ObstacleSource {
-    /// Depth or laser. Without them nothing moves.
-    #[default]
-    Sensed,
-    /// The robot moves without sensors of obstacles.
-    None,
-}
-
-impl Default for CollisionMonitorSettings {
-    fn default() -> Self {
-        Self {
-            obstacles: ObstacleSource::Sensed,
-            half_width_m: 0.34,
-            steps_in_m: 0.25,
-            front_m: 0.2,
-            stop_m: 0.4,
-            range_m: 3.0,
-            floor_m: 0.08,
-            drop_m: 0.08,
-            top_m: 1.5,
-            target_radius_m: 0.45,
-            min_points: 6,
-            min_seen: 0.02,
-            memory_s: 20.0,
-            sources: Vec::new(),
-        }
-    }
-}
-
-impl CollisionMonitorSettings {
-    /// Refuses a corridor that is too narrow or too short for the robot.
-    ///
-    /// # Errors
-    /// [`Error::Settings`] names the key and the remedy.
-    pub fn check(&self, robot: &RobotSettings, limiter: &CommandLimiterSettings) -> Result<()> {
-        SourceSettings::check_all(&self.sources)?;
-        let wheels = ("wheel_half_separation_m", robot.wheel_half_separation_m);
-        at_least("half_width_m", self.half_width_m, wheels.0, wheels.1)?;
-        at_least("top_m", self.top_m, "floor_m", self.floor_m)?;
-        let stopping_m = limiter.stopping_m(robot.max_speed_mps) - limiter.margin_m + self.stop_m;
-        if self.range_m >= stopping_m {
-            return Ok(());
-        }
-        let speed_mps = robot.max_speed_mps;
-        let why = format!(
-            "must be at least {stopping_m:.2}, in which a robot at {speed_mps} m/s stops {} m before \
-             an obstacle, not {}: raise it or lower `max_speed_mps` in [robot]",
-            self.stop_m, self.range_m
-        );
-        Err(Error::setting("range_m", why))
-    }
-
-    /// Returns the number of image points that one ray of a laser scanner counts for: two rays make
-    /// an obstacle, one may be dust.
-    pub(super) fn ray_points(&self) -> u32 {
-        self.min_points.div_ceil(2)
-    }
 }

@@ -1,4 +1,9 @@
+use nalgebra::Isometry3;
 use proptest::prelude::*;
+use tagalong_core::{EgoMotion, Sensors};
+use tagalong_geometry::Camera;
+
+use std::cell::Cell;
 
 use super::*;
 
@@ -16,14 +21,14 @@ fn abrupt() -> CommandLimiterSettings {
 }
 
 fn limiter_of(settings: CommandLimiterSettings) -> CommandLimiter {
-    CommandLimiter::new(settings, CollisionMonitorSettings::default(), RobotSettings::default())
+    CommandLimiter::new(settings, RobotSettings::default())
 }
 
 /// Returns a command limiter of another base, with a least radius of 0.8 m.
 fn limiter_on(base: Base) -> CommandLimiter {
     let robot = RobotSettings { base, min_turn_radius_m: 0.8, ..RobotSettings::default() };
     let settings = CommandLimiterSettings::default();
-    CommandLimiter::new(settings, CollisionMonitorSettings::default(), robot)
+    CommandLimiter::new(settings, robot)
 }
 
 fn limiter() -> CommandLimiter {
@@ -35,14 +40,50 @@ fn wish(frame: u64, left: f64, right: f64) -> Wish {
         wheels: WheelSpeeds { left, right },
         stamp: Stamp::from_nanos(frame * 100_000_000),
         aim: Aim::Person,
-        sighted: true,
+        stop: None,
         settled: true,
         pause_s: PERIOD_S,
     }
 }
 
-fn free(_: &CollisionMonitorSettings, _: f64) -> Option<Ahead> {
-    Some(Ahead::Free)
+/// Distance that is left before an obstacle, m.
+const STOP_M: f64 = 0.4;
+
+/// What is ahead of the robot on its arc.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Ahead {
+    Free,
+    /// An obstacle at this distance, m.
+    Something(f64),
+}
+
+fn free(_: Path, _: f64, _: &Braking) -> Allowance {
+    Allowance::FREE
+}
+
+/// Returns the look at what is ahead; a turn in place is free.
+fn look(ahead: Ahead) -> impl Fn(Path, f64, &Braking) -> Allowance {
+    move |path, _, braking| match (ahead, path) {
+        (Ahead::Something(at_m), Path::Arc { .. }) => {
+            let room_m = at_m - STOP_M;
+            Allowance {
+                gentle: braking.speed_within(room_m, braking.reaction_s + braking.rise_s),
+                most: braking.speed_within(room_m, braking.reaction_s),
+                ..Allowance::FREE
+            }
+        }
+        _ => Allowance::FREE,
+    }
+}
+
+fn something(at_m: f64) -> impl Fn(Path, f64, &Braking) -> Allowance {
+    look(Ahead::Something(at_m))
+}
+
+/// A frame in which the robot has moved.
+fn moved(motion: EgoMotion) -> Frame {
+    let blind = Camera::blind(Isometry3::identity()).into();
+    Frame::of_sensors(1, Stamp::from_nanos(1), blind, motion, Sensors::default())
 }
 
 /// A command limiter after enough frames to reach the wished speed.
@@ -83,7 +124,7 @@ fn speed_grows_no_faster_than_it_may() {
 fn each_emergency_stops_at_once() {
     type Change = fn(Wish) -> Wish;
     let stops: [(Reason, Change); 4] = [
-        (Reason::Blind, |wish| Wish { sighted: false, ..wish }),
+        (Reason::Blind, |wish| Wish { stop: Some(Reason::Blind), ..wish }),
         (Reason::Settling, |wish| Wish { settled: false, ..wish }),
         (Reason::Stalled, |wish| Wish { pause_s: 0.6, ..wish }),
         (Reason::NotFinite, |wish| Wish {
@@ -187,7 +228,7 @@ fn a_base_that_steers_like_a_car_turns_by_its_radius_and_not_on_the_spot() {
     let last = commands.last().unwrap();
     assert!((last.twist.linear_mps - 0.3).abs() < 1e-9, "{last:?}");
     assert!((last.twist.angular_rps - 0.3 / 0.8).abs() < 1e-9, "{last:?}");
-    let blocked = limiter.limit(&wish(60, 0.1, 0.5), |_, _| Some(Ahead::Something(0.1)));
+    let blocked = limiter.limit(&wish(60, 0.1, 0.5), something(0.1));
     assert_eq!((blocked.wheels, blocked.reason), (WheelSpeeds::STOP, Reason::Blocked));
 }
 
@@ -219,7 +260,7 @@ fn before_a_wall_the_robot_stops_without_an_emergency() {
             // In steps of a centimetre, as the corridor tells it.
             let at_m = ((6.0_f64 - place_m) * 100.0).floor() / 100.0;
             let wish = Wish { stamp, pause_s: period_s, ..wish(0, 0.9, 0.9) };
-            let command = limiter.limit(&wish, |_, _| Some(Ahead::Something(at_m)));
+            let command = limiter.limit(&wish, something(at_m));
             let change = (limiter.motion.forward.accel - tape.forward.accel).abs();
             let longest_s = if frame == 1 { LONGEST_STEP_S } else { period_s };
             // A robot that creeps follows the centimetres of the corridor.
@@ -240,7 +281,7 @@ fn before_a_wall_the_robot_stops_without_an_emergency() {
 fn an_obstacle_slows_and_then_stops() {
     let speed = |at_m| {
         let (mut limiter, _) = at_speed(0.8, 0.8);
-        limiter.limit(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Something(at_m)))
+        limiter.limit(&wish(40, 0.8, 0.8), something(at_m))
     };
     assert_eq!(speed(2.5).reason, Reason::Follow);
     let near = speed(0.6);
@@ -252,16 +293,9 @@ fn an_obstacle_slows_and_then_stops() {
 #[test]
 fn before_an_obstacle_the_robot_may_still_turn_in_place() {
     let mut limiter = limiter();
-    let command = limiter.limit(&wish(1, 0.1, 0.3), |_, _| Some(Ahead::Something(0.1)));
+    let command = limiter.limit(&wish(1, 0.1, 0.3), something(0.1));
     assert_eq!(command.reason, Reason::Blocked);
     assert!(command.wheels.left < 0.0 && command.wheels.left == -command.wheels.right);
-}
-
-#[test]
-fn a_blind_camera_stops() {
-    let (mut limiter, _) = at_speed(0.8, 0.8);
-    let command = limiter.limit(&wish(40, 0.8, 0.8), |_, _| Some(Ahead::Blind));
-    assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Blind));
 }
 
 #[test]
@@ -291,7 +325,7 @@ fn commands_expire() {
 #[test]
 fn a_jump_of_odometry_lasts_until_armed() {
     let (mut limiter, command) = at_speed(0.5, 0.5);
-    limiter.check_odometry(&EgoMotion { forward: 2.0, ..EgoMotion::at_rest(0.1) });
+    limiter.check_motion(&moved(EgoMotion { forward: 2.0, ..EgoMotion::at_rest(0.1) }));
     assert_eq!(limiter.orders().at(command.stamp).reason, Reason::Fault);
     for frame in 40..60 {
         let command = limiter.limit(&wish(frame, 0.5, 0.5), free);
@@ -335,19 +369,71 @@ fn while_it_speeds_up_the_robot_is_on_the_arc_that_was_wished_for() {
 }
 
 #[test]
-fn what_is_ahead_is_looked_for_on_the_arc_and_only_if_the_robot_drives_ahead() {
-    let mut asked = None;
-    limiter().limit(&wish(1, 0.3, 0.4), |corridor, curvature| {
-        asked = Some((corridor.clone(), curvature));
-        None
-    });
-    let (corridor, curvature) = asked.unwrap();
-    assert_eq!(corridor, CollisionMonitorSettings::default());
+fn each_path_is_looked_along_whatever_its_kind() {
+    let asked = |settings: CommandLimiterSettings, left, right| {
+        let asked = Cell::new(None);
+        limiter_of(settings).limit(&wish(1, left, right), |path, speed, _| {
+            asked.set(Some((path, speed)));
+            Allowance::FREE
+        });
+        asked.get()
+    };
+    let Some((Path::Arc { curvature, backwards: false }, speed)) = asked(abrupt(), 0.3, 0.4) else {
+        panic!("an arc ahead");
+    };
     assert!((curvature - 0.05 / DRIVE.half_separation_m / 0.35).abs() < 1e-9, "{curvature}");
-    let nobody_asks = |_: &CollisionMonitorSettings, _: f64| -> Option<Ahead> { panic!("asked") };
-    limiter().limit(&wish(1, -0.2, 0.2), nobody_asks);
-    let settings = CommandLimiterSettings { reverse: true, ..abrupt() };
-    limiter_of(settings).limit(&wish(1, -0.2, -0.2), nobody_asks);
+    assert!((speed - 0.1).abs() < 1e-9, "the speed of this step: {speed}");
+    let turn = asked(abrupt(), -0.2, 0.2).map(|(path, _)| path);
+    assert_eq!(turn, Some(Path::Turn { left: true }));
+    let reverse = CommandLimiterSettings { reverse: true, ..abrupt() };
+    let back = asked(reverse, -0.2, -0.2).map(|(path, _)| path);
+    assert!(matches!(back, Some(Path::Arc { backwards: true, .. })), "{back:?}");
+    assert_eq!(asked(abrupt(), 0.0, 0.0), None, "a robot that stands sweeps nothing");
+}
+
+#[test]
+fn a_turn_that_is_not_free_is_slower_or_none() {
+    let most = |most: f64| {
+        move |path: Path, _: f64, _: &Braking| match path {
+            Path::Turn { .. } => Allowance { gentle: most, most, ..Allowance::FREE },
+            Path::Arc { .. } => Allowance::FREE,
+        }
+    };
+    let turned = |allowed| {
+        let mut limiter = limiter();
+        let commands = (1..40).map(|frame| limiter.limit(&wish(frame, -0.2, 0.2), most(allowed)));
+        commands.last().unwrap()
+    };
+    assert!((turned(9.0).twist.angular_rps - 0.2 / 0.167).abs() < 1e-9);
+    let slower = turned(0.5);
+    assert!((slower.twist.angular_rps - 0.5).abs() < 1e-9, "{slower:?}");
+    assert_eq!(slower.reason, Reason::Obstacle);
+    assert_eq!((turned(0.0).wheels, turned(0.0).reason), (WheelSpeeds::STOP, Reason::Blocked));
+}
+
+#[test]
+fn odometry_that_is_old_or_no_number_and_late_images_stop() {
+    let reason = |frame: Frame| {
+        let (mut limiter, _) = at_speed(0.8, 0.8);
+        limiter.check_motion(&frame);
+        let command = limiter.limit(&wish(40, 0.8, 0.8), free);
+        (command.reason, command.wheels == WheelSpeeds::STOP)
+    };
+    let still = || moved(EgoMotion::at_rest(0.1));
+    assert_eq!(reason(still()), (Reason::Follow, false));
+    assert_eq!(reason(still().with_odometry_age(0.3)), (Reason::Slow, false));
+    for age_s in [0.51, f64::INFINITY, f64::NAN] {
+        assert_eq!(reason(still().with_odometry_age(age_s)), (Reason::Odometry, true), "{age_s}");
+    }
+    for broken in [f64::NAN, f64::NEG_INFINITY] {
+        let turned = moved(EgoMotion { turn: broken, ..EgoMotion::at_rest(0.1) });
+        assert_eq!(reason(turned), (Reason::Odometry, true));
+    }
+    assert_eq!(reason(still().with_latency(Some(0.2))), (Reason::Follow, false));
+    for latency_s in [0.51, f64::NAN] {
+        let late = still().with_latency(Some(latency_s));
+        assert_eq!(reason(late), (Reason::Late, true), "{latency_s}");
+    }
 }
 
 #[test]
@@ -355,7 +441,7 @@ fn of_several_limits_the_lowest_holds_and_is_named() {
     let command = |aim, pause_s, at_m| {
         let (mut limiter, _) = at_speed(0.8, 0.8);
         let wish = Wish { aim, pause_s, ..wish(40, 0.8, 0.8) };
-        let command = limiter.limit(&wish, |_, _| Some(Ahead::Something(at_m)));
+        let command = limiter.limit(&wish, something(at_m));
         (command.reason, (command.wheels.left * 100.0).round())
     };
     assert_eq!(command(Aim::Perhaps, 0.1, 2.0), (Reason::Unsure, 70.0));
@@ -398,7 +484,7 @@ fn commands_say_until_when_they_hold_and_what_they_answer_to() {
 fn odometry_may_be_as_fast_as_the_setting_says_in_all_directions() {
     let is_fault = |forward: f64, left: f64, dt: f64| {
         let mut limiter = limiter();
-        limiter.check_odometry(&EgoMotion { forward, left, ..EgoMotion::at_rest(dt) });
+        limiter.check_motion(&moved(EgoMotion { forward, left, ..EgoMotion::at_rest(dt) }));
         limiter.fault().is_some()
     };
     assert!(!is_fault(0.29, 0.0, 0.1) && is_fault(0.31, 0.0, 0.1), "3 m/s");
@@ -468,7 +554,7 @@ const ROUNDING: f64 = 4.0 * 1e-6 / (PERIOD_S * PERIOD_S);
 impl Tape {
     /// Returns true if the motion changes no faster than it may, or if this is an emergency: then it
     /// may only end sooner.
-    fn is_gentle(&mut self, command: &Command, ahead: Option<Ahead>, dt: f64) -> bool {
+    fn is_gentle(&mut self, command: &Command, ahead: Ahead, dt: f64) -> bool {
         let settings = CommandLimiterSettings::default();
         let before = std::mem::replace(&mut self.before, command.twist);
         let Twist { linear_mps, angular_rps, .. } = command.twist;
@@ -491,12 +577,13 @@ impl Tape {
                 self.accels = None;
                 is_stop
             }
-            (Reason::Blocked, Some(Ahead::Something(_))) => {
+            (Reason::Blocked, Ahead::Something(_)) => {
                 self.accels = None;
                 linear_mps.abs() < 1e-9 && gentle_turn
             }
-            (Reason::Obstacle, Some(Ahead::Something(at_m))) => {
-                let most = settings.speed_within(at_m - CollisionMonitorSettings::default().stop_m);
+            (Reason::Obstacle, Ahead::Something(at_m)) => {
+                let braking = settings.braking(settings.reaction_s);
+                let most = braking.speed_within(at_m - STOP_M, settings.reaction_s);
                 // No slower than the obstacle demands; an emergency also where it is gentle by chance.
                 let is_emergency = accel < 0.0 && (linear_mps - most).abs() < 1e-6;
                 if is_emergency {
@@ -511,29 +598,23 @@ impl Tape {
 }
 
 /// Returns true if the robot comes to rest before an obstacle ahead, with its reaction.
-fn stops_before(command: &Command, ahead: Option<Ahead>) -> bool {
+fn stops_before(command: &Command, ahead: Ahead) -> bool {
     let speed = command.twist.linear_mps;
     match ahead {
-        Some(Ahead::Something(at_m)) if speed > STILL_MPS => {
+        Ahead::Something(at_m) if speed > STILL_MPS => {
             // At once, as in an emergency.
             let limits = CommandLimiterSettings { margin_m: 0.0, ..abrupt() };
-            limits.stopping_m(speed) + CollisionMonitorSettings::default().stop_m <= at_m + 1e-9
+            limits.stopping_m(speed) + STOP_M <= at_m + 1e-9
         }
-        Some(Ahead::Blind) => speed <= STILL_MPS,
         _ => true,
     }
 }
 
-fn any_ahead() -> impl Strategy<Value = Option<Ahead>> {
-    prop_oneof![
-        Just(None),
-        Just(Some(Ahead::Free)),
-        Just(Some(Ahead::Blind)),
-        (0.0..3.0_f64).prop_map(|at_m| Some(Ahead::Something(at_m))),
-    ]
+fn any_ahead() -> impl Strategy<Value = Ahead> {
+    prop_oneof![Just(Ahead::Free), (0.0..3.0_f64).prop_map(Ahead::Something)]
 }
 
-fn any_wish() -> impl Strategy<Value = (Wish, Option<Ahead>)> {
+fn any_wish() -> impl Strategy<Value = (Wish, Ahead)> {
     let aims = vec![Aim::Person, Aim::Perhaps, Aim::Search, Aim::Nobody];
     let flags = (
         any::<bool>(),
@@ -544,8 +625,9 @@ fn any_wish() -> impl Strategy<Value = (Wish, Option<Ahead>)> {
     (any_number(), any_number(), flags, any_number(), any_ahead()).prop_map(
         |(left, right, flags, pause, ahead)| {
             let (short, aim, settled, sighted) = flags;
+            let stop = (!sighted).then_some(Reason::Blind);
             let pause_s = if short { PERIOD_S } else { pause };
-            (Wish { aim, settled, sighted, pause_s, ..wish(0, left, right) }, ahead)
+            (Wish { aim, settled, stop, pause_s, ..wish(0, left, right) }, ahead)
         },
     )
 }
@@ -563,7 +645,7 @@ proptest! {
         for (frame, (wish, ahead)) in wishes.into_iter().enumerate() {
             let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
             let wish = Wish { stamp, ..wish };
-            let command = limiter.limit(&wish, |_, _| ahead);
+            let command = limiter.limit(&wish, look(ahead));
             let WheelSpeeds { left, right } = command.wheels;
             prop_assert!(left.abs() <= MAX_MPS && right.abs() <= MAX_MPS, "{command:?}");
             if !command.reason.moves() && command.reason != Reason::Blocked {
@@ -607,7 +689,7 @@ proptest! {
             let mut limiter = limiter_on(base);
             for (frame, (wish, ahead)) in wishes.iter().enumerate() {
                 let stamp = Stamp::from_nanos((frame as u64 + 1) * 100_000_000);
-                let command = limiter.limit(&Wish { stamp, ..wish.clone() }, |_, _| *ahead);
+                let command = limiter.limit(&Wish { stamp, ..wish.clone() }, look(*ahead));
                 let Twist { linear_mps, angular_rps, .. } = command.twist;
                 prop_assert!(linear_mps.abs() <= MAX_MPS + 1e-9, "{command:?}");
                 prop_assert!(angular_rps.abs() <= 1.5 + 1e-9, "{command:?}");
@@ -631,7 +713,7 @@ proptest! {
         for (wish, ahead) in wishes {
             frame += 1;
             let stamp = Stamp::from_nanos(frame * 100_000_000);
-            last = Some(limiter.limit(&Wish { stamp, ..wish }, |_, _| ahead));
+            last = Some(limiter.limit(&Wish { stamp, ..wish }, look(ahead)));
         }
         let mut speed = last.map_or(0.0, |command| command.twist.linear_mps.abs());
         let stated_m = limiter.settings.stopping_m(speed) - limiter.settings.margin_m;

@@ -82,6 +82,8 @@ impl Ride {
             let message = format!("{} has no [controller]: nothing can follow", contender.name);
             return Err(TrialError::Config(message));
         }
+        // The simulated base executes the commands.
+        pipeline.set_driving(true);
         let mut draw = Draw::live(scene, 1);
         let mut ride = Self {
             seed: scene.seed,

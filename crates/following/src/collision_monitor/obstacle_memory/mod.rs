@@ -2,8 +2,10 @@ use nalgebra::{Point2, Point3, Vector3};
 use tagalong_core::{DepthImage, EgoMotion, GreyImage, Person, Track, TrackId};
 use tagalong_geometry::Camera;
 
-use super::collision_monitor::{Ahead, Sign, ahead, fall, is_thing};
-use super::{CollisionMonitorSettings, ObstacleSource};
+use super::CollisionMonitorSettings;
+use super::coverage::Coverage;
+use super::footprint::Footprint;
+use super::ground::{fall, is_thing};
 
 /// Sampled columns of the image.
 const COLUMNS: usize = 160;
@@ -19,10 +21,10 @@ const STANDS_S: f64 = 1.0;
 /// Time after which a fall is one to remember, s: a floor does not walk away, but a wrong match of a
 /// stereo pair on a floor without texture lies below it for an image or two.
 const FALLS_S: f64 = 0.3;
-/// Distance ahead of the robot, m, within which an obstacle that left the image at its edge or
-/// below is believed to be there for `STEPPED_IN_S`, s, however short it was seen.
-const CLOSE_M: f64 = 0.6;
-const STEPPED_IN_S: f64 = 5.0;
+/// Distance from the footprint, m, within which a thing that left the image at its edge or below is
+/// believed to be there until it is seen that it is not, however short it was seen: that near no
+/// camera measures.
+const CLOSE_M: f64 = 0.7;
 /// Height below which a thing is part of what stands so far beside it, m: the seat of a chair, which is
 /// below the image before it was seen for a second. Nobody is so low.
 const LOW_M: f64 = 0.6;
@@ -31,7 +33,7 @@ const BESIDE_M: f64 = 0.2;
 const TORSO: Vector3<f64> = Vector3::new(0.0, 0.0, 0.35);
 /// Distance from a person within which a point may be an object that the person carries, pulls or
 /// pushes, m, ...
-const CARRIED_M: f64 = 0.8;
+pub(super) const CARRIED_M: f64 = 0.8;
 /// ... while the person is slower than this, m/s.
 const STAYS_MPS: f64 = 0.25;
 /// Distance before a place from which on a nearer surface hides it, m.
@@ -46,39 +48,32 @@ const TEXTURED: i32 = 6;
 const SMOOTH: f64 = 0.1;
 /// Depth that is assumed for an object that hides a column, m.
 const HIDES_M: f64 = 0.4;
+/// Part of the columns on each side that may be dark from the first image on: the images of some
+/// cameras have an empty border.
+const BORDER: f64 = 0.125;
 
 /// Memory of the obstacles around the robot: those in the depth image, and those seen lately that
 /// are now beside the robot, below the image, too near for the camera, or hidden.
-#[derive(Default)]
 pub(crate) struct ObstacleMemory {
+    footprint: Footprint,
     seen: Vec<Point3<f64>>,
-    /// Hits of the laser scanner; `None` without one.
-    felt: Option<Vec<Point2<f64>>>,
     /// Part of the image that has depth; `None` without a depth image.
     with_depth: Option<f64>,
-    /// Sampled columns of the image.
+    /// Sampled columns of the image, and the place of their camera.
     columns: Vec<Column>,
+    eye: Point2<f64>,
     things: Vec<Obstacle>,
     grid: Grid,
-    depth: Source,
-    laser: Source,
 }
 
-/// Sensor of obstacles, and how long it has been silent.
-#[derive(Clone, Copy, Default)]
-struct Source {
-    /// Time since its last reading, s; `None` before the first one.
-    silent_s: Option<f64>,
-}
-
-impl Source {
-    /// Takes in that the sensor delivered or did not, `dt_s` after the frame before.
-    fn update(&mut self, delivers: bool, dt_s: f64) {
-        self.silent_s = match delivers {
-            true => Some(0.0),
-            false => self.silent_s.map(|silent_s| silent_s + dt_s.max(0.0)),
-        };
-    }
+/// Thing that is not in view and believed to be there.
+pub(super) struct Remembered {
+    /// Place in the robot frame, m.
+    pub(super) at: Point2<f64>,
+    /// True for a person, who may have walked on.
+    pub(super) is_person: bool,
+    /// True for a place without a floor.
+    pub(super) is_drop: bool,
 }
 
 /// Set of heights above the floor, one bit per decimetre.
@@ -92,6 +87,10 @@ struct Column {
     at: Point2<f64>,
     /// Valid readings in it.
     read: u32,
+    /// Nearest thing in it, robot frame, m.
+    nearest: Option<Point2<f64>>,
+    /// Farthest reading in it, robot frame, m.
+    farthest: Option<Point2<f64>>,
     /// Time for which it has been dark, s; infinite if it always was: the images of some cameras
     /// have an empty border.
     dark_s: f64,
@@ -120,6 +119,19 @@ struct Obstacle {
 }
 
 impl ObstacleMemory {
+    /// Creates an empty memory of a robot.
+    pub(crate) fn new(footprint: Footprint) -> Self {
+        Self {
+            footprint,
+            seen: Vec::new(),
+            with_depth: None,
+            columns: Vec::new(),
+            eye: Point2::origin(),
+            things: Vec::new(),
+            grid: Grid::default(),
+        }
+    }
+
     /// Takes in an image; the robot moved by `motion` since the last one. Points near the followed
     /// person are remembered only if they stay when the person goes, and moving ones are not.
     pub(crate) fn update(
@@ -130,11 +142,10 @@ impl ObstacleMemory {
         motion: &EgoMotion,
         target: Option<&Person>,
     ) {
-        self.depth.update(depth.is_some(), motion.dt);
         self.add_depth(settings, camera, depth, motion.dt);
         // The order matters: old obstacles are matched with the new points before the rest of these
         // become new obstacles.
-        self.grid.count(settings, &self.seen);
+        self.grid.count(reach_m(settings, &self.footprint), &self.seen);
         self.propagate(settings, camera, depth, motion, target);
         self.remember(settings, target);
     }
@@ -148,36 +159,6 @@ impl ObstacleMemory {
                 column.dark_s = f64::INFINITY;
             }
         }
-    }
-
-    /// Takes in a laser scan. It needs no memory, because a scanner also sees to the sides and close
-    /// to the robot: between two scans the last one holds.
-    pub(crate) fn add_scan(
-        &mut self,
-        settings: &CollisionMonitorSettings,
-        laser: Option<&[Point3<f64>]>,
-        motion: &EgoMotion,
-    ) {
-        self.laser.update(laser.is_some(), motion.dt);
-        let Some(points) = laser else {
-            let felt = self.felt.iter_mut().flatten();
-            return felt.for_each(|at| *at = motion.apply_to_point(*at));
-        };
-        let heights = settings.floor_m..settings.top_m;
-        let met = points.iter().filter(|point| heights.contains(&point.z)).map(Point3::xy);
-        self.felt = Some(met.filter(|at| is_near(settings, at)).collect());
-    }
-
-    /// Returns true if the robot may move by its sensors of obstacles: one of them delivered with
-    /// this frame, and none that ever did has been silent for longer than `patience_s`. Always true
-    /// where the settings do without them.
-    pub(crate) fn is_sighted(&self, settings: &CollisionMonitorSettings, patience_s: f64) -> bool {
-        if settings.obstacles == ObstacleSource::None {
-            return true;
-        }
-        let silences = [self.depth, self.laser].map(|source| source.silent_s);
-        let delivers = silences.contains(&Some(0.0));
-        delivers && silences.iter().flatten().all(|silent_s| *silent_s <= patience_s)
     }
 
     /// Remembers other people where they were seen last, until the camera sees past that place or
@@ -198,41 +179,54 @@ impl ObstacleMemory {
         }
     }
 
-    /// Forgets all places, after a jump of the clock, but not which sensors there are.
+    /// Forgets all places, after a jump of the clock.
     pub(crate) fn clear(&mut self) {
-        let (depth, laser) = (self.depth, self.laser);
-        *self = Self { depth, laser, ..Self::default() };
+        *self = Self::new(self.footprint.clone());
     }
 
-    /// Returns the nearest obstacle on an arc, as [`ahead`]; `None` with neither depth nor laser.
-    pub(crate) fn ahead(
-        &self,
-        settings: &CollisionMonitorSettings,
-        curvature: f64,
-        target: Option<Point2<f64>>,
-    ) -> Option<Ahead> {
-        if self.with_depth.is_none() && self.felt.is_none() {
-            return None;
-        }
-        if self.with_depth.is_some_and(|part| part < settings.min_seen) {
-            return Some(Ahead::Blind);
-        }
-        let stays = |at: Point2<f64>, points| Sign { at, points, steps_in_m: 0.0, is_drop: false };
-        // Points that may move get a wider corridor; the floor stays where it is, and where it is
-        // not.
-        let seen = self.seen.iter().map(|point| match self.grid.stands(&point.xy()) {
-            _ if point.z <= 0.0 => Sign { is_drop: true, ..stays(point.xy(), 1) },
-            true => stays(point.xy(), 1),
-            false => Sign { steps_in_m: settings.steps_in_m, ..stays(point.xy(), 1) },
-        });
+    /// Returns true if there is a depth image with too few readings.
+    pub(super) fn is_blind(&self, settings: &CollisionMonitorSettings) -> bool {
+        self.with_depth.is_some_and(|part| part < settings.min_seen)
+    }
+
+    /// Returns the points of things in the image, and of falls, which have no height; robot frame, m.
+    pub(super) fn seen(&self) -> &[Point3<f64>] {
+        &self.seen
+    }
+
+    /// Returns the things that are not in view.
+    pub(super) fn remembered(&self) -> impl Iterator<Item = Remembered> {
         let unseen = self.things.iter().filter(|thing| thing.unseen_s > 0.0);
-        // A remembered obstacle was confirmed by many points, so alone it is enough to stop.
-        let unseen = unseen
-            .map(|thing| Sign { is_drop: thing.is_drop, ..stays(thing.at, settings.min_points) });
-        let hidden = self.columns.iter().filter(|column| column.is_hidden(settings));
-        let hidden = hidden.map(|column| stays(column.at, 1));
-        let felt = self.felt.iter().flatten().map(|at| stays(*at, settings.ray_points()));
-        Some(ahead(settings, seen.chain(unseen).chain(hidden).chain(felt), curvature, target))
+        unseen.map(|thing| Remembered {
+            at: thing.at,
+            is_person: thing.who.is_some(),
+            is_drop: thing.is_drop,
+        })
+    }
+
+    /// Returns the places of objects that hide columns of the image.
+    pub(super) fn hidden(&self) -> impl Iterator<Item = Point2<f64>> {
+        self.columns.iter().filter(|column| column.is_hidden()).map(|column| column.at)
+    }
+
+    /// Returns the place of the camera, and the ends of the rays up to which the image shows nothing.
+    pub(super) fn free_to(&self) -> (Point2<f64>, impl Iterator<Item = Point2<f64>>) {
+        (self.eye, self.columns.iter().filter_map(|column| column.nearest.or(column.farthest)))
+    }
+
+    /// Returns the directions in which the image has depth.
+    pub(super) fn coverage(&self, min_share: f64) -> Coverage {
+        let border = BORDER * self.columns.len() as f64;
+        let mut looks = Vec::with_capacity(self.columns.len());
+        for (at, column) in self.columns.iter().enumerate() {
+            let from_side = at.min(self.columns.len() - 1 - at);
+            let is_border = (from_side as f64) < border && column.dark_s == f64::INFINITY;
+            if !is_border {
+                let way = column.at - self.eye;
+                looks.push((way.y.atan2(way.x), column.dark_s == 0.0));
+            }
+        }
+        Coverage::new(self.eye, looks, min_share)
     }
 
     /// Moves the obstacles into the robot's new frame. Forgets those that the camera sees past,
@@ -246,10 +240,12 @@ impl ObstacleMemory {
         target: Option<&Person>,
     ) {
         let grid = &self.grid;
+        let footprint = &self.footprint;
+        let reach_m = reach_m(settings, footprint);
         self.things.retain_mut(|thing| {
             thing.at = motion.apply_to_point(thing.at);
             let at = &thing.at;
-            if !is_near(settings, at) {
+            if at.coords.norm() >= reach_m {
                 return false;
             }
             if grid.is_something(at) {
@@ -262,7 +258,7 @@ impl ObstacleMemory {
                 true => shows_floor(settings, camera, depth, at),
                 false => shows_past(camera, depth, at, thing.heights),
             });
-            !is_gone && thing.unseen_s <= thing.kept_s(settings)
+            !is_gone && thing.unseen_s <= thing.kept_s(settings, footprint)
         });
     }
 
@@ -274,12 +270,15 @@ impl ObstacleMemory {
         dt_s: f64,
     ) {
         self.seen.clear();
-        let eye = camera.robot_from_camera.translation.vector.into();
+        let reach_m = reach_m(settings, &self.footprint);
+        let eye: Point3<f64> = camera.robot_from_camera.translation.vector.into();
+        self.eye = eye.xy();
         self.with_depth = depth.map(|depth| {
             // Large images are sampled, so that `min_points` does not depend on their resolution.
             let step = depth.width().div_ceil(COLUMNS).max(1);
             let rows = depth.height().div_ceil(step);
             self.columns.resize(depth.width().div_ceil(step), Column::NEVER_SEEN);
+            self.columns.iter_mut().for_each(Column::begin);
             for y in (0..depth.height()).step_by(step) {
                 let row = depth.row(y).iter().step_by(step);
                 for (at, (z, column)) in row.zip(&mut self.columns).enumerate() {
@@ -287,14 +286,12 @@ impl ObstacleMemory {
                     if !is_reading(z) {
                         continue;
                     }
-                    column.read += 1;
                     let pixel = Point2::new((at * step) as f64, y as f64);
                     let point = camera.back_project(pixel, z);
-                    let place = match is_thing(settings, &point) {
-                        true => Some(point),
-                        false => fall(settings, &eye, &point),
-                    };
-                    self.seen.extend(place.filter(|place| is_near(settings, &place.xy())));
+                    let is_thing = is_thing(settings, &point);
+                    column.take(&eye, &point, is_thing);
+                    let place = if is_thing { Some(point) } else { fall(settings, &eye, &point) };
+                    self.seen.extend(place.filter(|place| place.xy().coords.norm() < reach_m));
                 }
             }
             let read: u32 = self.columns.iter().map(|column| column.read).sum();
@@ -312,9 +309,6 @@ impl ObstacleMemory {
         for thing in &self.things {
             // Points of a known obstacle must not become a second one below.
             self.grid.clear_around(&thing.at);
-            if thing.is_static() {
-                self.grid.mark_standing(&thing.at);
-            }
         }
         for point in &self.seen {
             let at = point.xy();
@@ -382,13 +376,15 @@ impl Obstacle {
         self.seen_s >= if self.is_drop { FALLS_S } else { STANDS_S }
     }
 
-    /// Returns the time for which it is remembered out of view, s: for long if it stood for a
-    /// second, and briefly if it was close.
-    fn kept_s(&self, settings: &CollisionMonitorSettings) -> f64 {
-        match () {
-            () if self.is_static() => settings.memory_s,
-            () if !self.of_target && is_close(settings, &self.at) => STEPPED_IN_S,
-            () => 0.0,
+    /// Returns the time for which it is remembered out of view, s: until it is seen to be gone if it
+    /// was close, and for long if it stood for a second.
+    fn kept_s(&self, settings: &CollisionMonitorSettings, footprint: &Footprint) -> f64 {
+        if !self.of_target && footprint.distance_m(&self.at) < CLOSE_M {
+            f64::INFINITY
+        } else if self.is_static() {
+            settings.memory_s
+        } else {
+            0.0
         }
     }
 }
@@ -411,12 +407,38 @@ impl Heights {
 }
 
 impl Column {
-    const NEVER_SEEN: Self = Self { at: Point2::new(0.0, 0.0), read: 0, dark_s: f64::INFINITY };
+    const NEVER_SEEN: Self = Self {
+        at: Point2::new(0.0, 0.0),
+        read: 0,
+        nearest: None,
+        farthest: None,
+        dark_s: f64::INFINITY,
+    };
 
-    /// Returns true if an object nearer than the camera measures hides the column: it had readings
-    /// a while ago and has none now, from the floor to the top of the image.
-    fn is_hidden(&self, settings: &CollisionMonitorSettings) -> bool {
-        0.0 < self.dark_s && self.dark_s <= settings.memory_s
+    /// Returns true if an object nearer than the camera measures may hide the column: it had readings
+    /// once and has none now, from the floor to the top of the image. It stays so until it has
+    /// readings again.
+    fn is_hidden(&self) -> bool {
+        0.0 < self.dark_s && self.dark_s.is_finite()
+    }
+
+    /// Begins an image.
+    fn begin(&mut self) {
+        self.nearest = None;
+        self.farthest = None;
+    }
+
+    /// Takes in a reading.
+    fn take(&mut self, eye: &Point3<f64>, point: &Point3<f64>, is_thing: bool) {
+        self.read += 1;
+        let far = |at: &Point2<f64>| (at - eye.xy()).norm_squared();
+        let at = point.xy();
+        if is_thing && self.nearest.is_none_or(|nearest| far(&at) < far(&nearest)) {
+            self.nearest = Some(at);
+        }
+        if self.farthest.is_none_or(|farthest| far(&at) > far(&farthest)) {
+            self.farthest = Some(at);
+        }
     }
 
     /// Ends an image of so many rows, after all its readings were counted.
@@ -433,21 +455,17 @@ struct Grid {
     points: Vec<u16>,
     /// Heights of the points above each cell.
     heights: Vec<Heights>,
-    /// True for cells around an obstacle that stood for long enough.
-    standing: Vec<bool>,
     side: usize,
 }
 
 impl Grid {
-    fn count(&mut self, settings: &CollisionMonitorSettings, seen: &[Point3<f64>]) {
+    fn count(&mut self, reach_m: f64, seen: &[Point3<f64>]) {
         // One cell for the middle and one of border on each side, so that neighbours always exist.
-        self.side = 2 * (reach_m(settings) / CELL_M).ceil() as usize + 3;
+        self.side = 2 * (reach_m / CELL_M).ceil() as usize + 3;
         self.points.clear();
         self.points.resize(self.side * self.side, 0);
         self.heights.clear();
         self.heights.resize(self.side * self.side, Heights::default());
-        self.standing.clear();
-        self.standing.resize(self.side * self.side, false);
         for point in seen {
             let cell = self.cell(&point.xy());
             self.points[cell] = self.points[cell].saturating_add(1);
@@ -481,15 +499,6 @@ impl Grid {
     /// Returns true if an obstacle is here, or one cell away.
     fn is_something(&self, at: &Point2<f64>) -> bool {
         self.around(at).iter().any(|cell| self.points[*cell] >= ENOUGH)
-    }
-
-    /// Returns true if a static obstacle is here, or one cell away.
-    fn stands(&self, at: &Point2<f64>) -> bool {
-        self.standing[self.cell(at)]
-    }
-
-    fn mark_standing(&mut self, at: &Point2<f64>) {
-        self.around(at).iter().for_each(|cell| self.standing[*cell] = true);
     }
 
     fn clear_around(&mut self, at: &Point2<f64>) {
@@ -547,12 +556,6 @@ fn shows_floor(
     })
 }
 
-/// Returns true for a place close before the robot, straight ahead.
-fn is_close(settings: &CollisionMonitorSettings, at: &Point2<f64>) -> bool {
-    let before_m = at.x - settings.front_m;
-    at.y.abs() < settings.half_width_m && 0.0 < before_m && before_m < CLOSE_M
-}
-
 fn far_m(person: &Person, at: &Point2<f64>) -> f64 {
     nalgebra::distance(&person.position.xy(), at)
 }
@@ -566,12 +569,9 @@ fn may_carry(person: &Person, at: &Point2<f64>) -> bool {
     far_m(person, at) < CARRIED_M && person.velocity.norm() < STAYS_MPS
 }
 
-fn is_near(settings: &CollisionMonitorSettings, at: &Point2<f64>) -> bool {
-    at.coords.norm() < reach_m(settings)
-}
-
-fn reach_m(settings: &CollisionMonitorSettings) -> f64 {
-    settings.range_m + settings.front_m
+/// Returns the distance from the middle of the robot within which things matter, m.
+fn reach_m(settings: &CollisionMonitorSettings, footprint: &Footprint) -> f64 {
+    settings.range_m + footprint.front_m()
 }
 
 #[cfg(test)]

@@ -1,0 +1,194 @@
+//! Share of valid readings in the region that the robot would sweep.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Point2, Vector2};
+use tagalong_core::{LaserScan, RayReading};
+
+use super::CollisionMonitorSettings;
+use super::footprint::{Footprint, Path};
+use super::settings::NoReturn;
+
+/// Directions in which a sensor looked in this frame, with whether it saw something there.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Coverage {
+    /// Place of the sensor in the robot frame, m.
+    eye: Point2<f64>,
+    /// Direction in the robot frame, rad, and validity of each ray or column.
+    looks: Vec<(f64, bool)>,
+    /// Least share that lets the robot move at all.
+    min_share: f64,
+}
+
+impl Coverage {
+    /// Returns the coverage of directions as given.
+    pub(super) fn new(eye: Point2<f64>, looks: Vec<(f64, bool)>, min_share: f64) -> Self {
+        Self { eye, looks, min_share }
+    }
+
+    /// Returns the coverage of a laser scan.
+    pub(super) fn of_scan(
+        settings: &CollisionMonitorSettings,
+        scan: &LaserScan,
+        min_share: f64,
+    ) -> Self {
+        let eye: Point2<f64> = scan.robot_from_scanner.translation.vector.xy().into();
+        let mut looks = Vec::with_capacity(scan.points.len() + scan.unread.len());
+        for point in scan.points.iter() {
+            looks.push((direction(&eye, &point.xy()), true));
+        }
+        for unread in scan.unread.iter() {
+            let is_valid = match unread.reading {
+                RayReading::NoReturn => settings.no_return == NoReturn::Free,
+                RayReading::TooNear(_) | RayReading::Reflection(_) => true,
+                RayReading::Invalid => false,
+            };
+            looks.push((direction(&eye, &scan.place(unread.ray, 1.0).xy()), is_valid));
+        }
+        Self { eye, looks, min_share }
+    }
+
+    /// Returns the coverage with another least share.
+    pub(super) fn with_min_share(self, min_share: f64) -> Self {
+        Self { min_share, ..self }
+    }
+
+    /// Returns the part of the speed that is allowed on a path of this length: 1 with enough valid
+    /// readings in the swept region, and 0 below the least share. A sensor that does not look there
+    /// has no say.
+    pub(super) fn allowed_part(&self, footprint: &Footprint, path: Path, way: f64) -> f64 {
+        let Some(share) = self.share(footprint, path, way) else { return 1.0 };
+        if share < self.min_share {
+            return 0.0;
+        }
+        // Full speed from twice the least share on.
+        if self.min_share > 0.0 { (share / self.min_share - 1.0).clamp(0.2, 1.0) } else { 1.0 }
+    }
+
+    /// Returns the share of valid readings among those into the swept region; `None` if there are
+    /// none.
+    fn share(&self, footprint: &Footprint, path: Path, way: f64) -> Option<f64> {
+        let sector = match path {
+            Path::Turn { .. } => Sector { middle: 0.0, half: PI },
+            Path::Arc { .. } => Sector::of(&self.eye, footprint, path, way).and(&Sector::of(
+                &self.eye,
+                footprint,
+                path,
+                0.6 * way,
+            )),
+        };
+        let mut looks = 0_u32;
+        let mut valid = 0_u32;
+        for (direction, is_valid) in &self.looks {
+            if sector.contains(*direction) {
+                looks += 1;
+                valid += u32::from(*is_valid);
+            }
+        }
+        (looks > 0).then(|| f64::from(valid) / f64::from(looks))
+    }
+}
+
+/// Directions around a middle one, rad.
+#[derive(Clone, Copy, Debug)]
+struct Sector {
+    middle: f64,
+    half: f64,
+}
+
+impl Sector {
+    /// Returns the directions from `eye` to the footprint after a way along the path.
+    fn of(eye: &Point2<f64>, footprint: &Footprint, path: Path, way: f64) -> Self {
+        let pose = path.pose(way);
+        let middle = direction(eye, &Point2::from(pose.translation.vector));
+        let mut half = 0.0_f64;
+        for corner in footprint.corners() {
+            half = half.max(off(direction(eye, &(pose * corner)), middle).abs());
+        }
+        Self { middle, half }
+    }
+
+    /// Returns the smallest sector about the middle of this one that holds both.
+    fn and(self, other: &Self) -> Self {
+        let half = self.half.max(off(other.middle, self.middle).abs() + other.half);
+        Self { half: half.min(PI), ..self }
+    }
+
+    fn contains(&self, direction: f64) -> bool {
+        off(direction, self.middle).abs() <= self.half
+    }
+}
+
+fn direction(eye: &Point2<f64>, at: &Point2<f64>) -> f64 {
+    let way: Vector2<f64> = at - eye;
+    way.y.atan2(way.x)
+}
+
+/// Returns the difference of two directions, -π to π.
+fn off(a: f64, b: f64) -> f64 {
+    (a - b + PI).rem_euclid(2.0 * PI) - PI
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+
+    const AHEAD: Path = Path::Arc { curvature: 0.0, backwards: false };
+
+    fn footprint() -> Footprint {
+        Footprint::new(&crate::RobotSettings::default().footprint)
+    }
+
+    /// A scanner of 360 rays that all measure 3 m, but those within `half_deg` ahead.
+    fn scan(half_deg: i32, instead: f64) -> LaserScan {
+        let ranges = (-180..180).map(|deg: i32| if deg.abs() <= half_deg { instead } else { 3.0 });
+        LaserScan::of_ranges(
+            Isometry3::translation(0.0, 0.0, 0.2),
+            -PI,
+            PI / 180.0,
+            [0.1, 8.0],
+            ranges,
+        )
+    }
+
+    fn part(scan: &LaserScan, path: Path, no_return: NoReturn) -> f64 {
+        let settings =
+            CollisionMonitorSettings { no_return, ..CollisionMonitorSettings::default() };
+        Coverage::of_scan(&settings, scan, 0.3).allowed_part(&footprint(), path, 1.3)
+    }
+
+    #[test]
+    fn rays_that_say_nothing_ahead_stop_the_robot_and_elsewhere_they_do_not() {
+        for instead in [0.0, f64::NAN, f64::INFINITY, 99.0] {
+            assert_eq!(part(&scan(25, instead), AHEAD, NoReturn::Unknown), 0.0, "{instead}");
+            let back = Path::Arc { curvature: 0.0, backwards: true };
+            assert_eq!(part(&scan(25, instead), back, NoReturn::Unknown), 1.0, "{instead}");
+        }
+        assert_eq!(part(&scan(-1, 0.0), AHEAD, NoReturn::Unknown), 1.0);
+        assert_eq!(part(&scan(25, 0.05), AHEAD, NoReturn::Unknown), 1.0, "nearer than it measures");
+    }
+
+    #[test]
+    fn a_scanner_whose_silence_means_free_may_say_so() {
+        assert_eq!(part(&scan(25, f64::INFINITY), AHEAD, NoReturn::Free), 1.0);
+        assert_eq!(part(&scan(25, f64::NAN), AHEAD, NoReturn::Free), 0.0);
+    }
+
+    #[test]
+    fn with_few_readings_the_robot_is_slower() {
+        let slower = part(&scan(11, 0.0), AHEAD, NoReturn::Unknown);
+        assert!(slower > 0.0 && slower < 1.0, "{slower}");
+    }
+
+    #[test]
+    fn a_sensor_that_does_not_look_there_has_no_say() {
+        let looks = (0..40).map(|deg| (f64::from(deg - 20).to_radians(), false)).collect();
+        let camera = Coverage::new(Point2::new(0.1, 0.0), looks, 0.3);
+        let back = Path::Arc { curvature: 0.0, backwards: true };
+        assert_eq!(camera.allowed_part(&footprint(), back, 0.6), 1.0);
+        assert_eq!(camera.allowed_part(&footprint(), AHEAD, 0.6), 0.0);
+        assert_eq!(camera.allowed_part(&footprint(), Path::Turn { left: true }, 0.3), 0.0);
+    }
+}

@@ -1,0 +1,190 @@
+//! State of the sensors of obstacles beside the depth image.
+
+use nalgebra::{Point2, Point3, Vector3};
+use tagalong_core::{EgoMotion, LaserScan, RangeReading, RayReading, Track};
+
+use super::binned::BinnedHazards;
+use super::coverage::Coverage;
+use super::space::SpaceGrid;
+use super::sweep::{Hazard, HazardKind};
+use super::watchdog::{ScanReference, Watch};
+use super::{CollisionMonitorSettings, People};
+
+/// Distance up to which the arc of a range sensor counts, m: farther away its cone is wider than the
+/// robot, and shows walls beside the way.
+const RANGE_M: f64 = 2.0;
+/// Distances beyond the nearest one that is measured at which something too near is placed, too, m.
+const BEFORE_FOOTPRINT_M: [f64; 3] = [0.1, 0.2, 0.3];
+/// Places on the arc of a range sensor.
+const ON_ARC: usize = 9;
+/// Length of the way that a ray without a reflection keeps free, m, where that means free.
+const FREE_M: f64 = 6.0;
+
+/// Time for which a sensor has been silent.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Silence {
+    /// Time since its last reading, s; `None` before the first one.
+    silent_s: Option<f64>,
+}
+
+impl Silence {
+    /// Takes in that the sensor delivered or did not, `dt_s` after the frame before.
+    pub(super) fn update(&mut self, delivers: bool, dt_s: f64) {
+        self.silent_s = if delivers {
+            Some(0.0)
+        } else {
+            self.silent_s.map(|silent_s| silent_s + dt_s.max(0.0))
+        };
+    }
+
+    /// Returns true if the sensor delivered with this frame.
+    pub(super) fn delivers(self) -> bool {
+        self.silent_s == Some(0.0)
+    }
+
+    /// Returns true if the sensor never delivered, or not so long ago.
+    pub(super) fn is_within(self, patience_s: f64) -> bool {
+        self.silent_s.is_none_or(|silent_s| silent_s <= patience_s)
+    }
+}
+
+/// Laser scanner: between two scans the last one holds.
+#[derive(Default)]
+pub(super) struct ScanState {
+    /// Reflections at heights that matter, robot frame, m.
+    points: Vec<Point2<f64>>,
+    coverage: Option<Coverage>,
+    space: SpaceGrid,
+    watch: Watch<ScanReference>,
+    silence: Silence,
+}
+
+impl ScanState {
+    /// Forgets all places.
+    pub(super) fn clear(&mut self) {
+        *self = Self { silence: self.silence, ..Self::default() };
+    }
+
+    pub(super) fn silence(&self) -> Silence {
+        self.silence
+    }
+
+    pub(super) fn is_frozen(&self, identical_frames: u32) -> bool {
+        self.watch.is_frozen(identical_frames)
+    }
+
+    /// Takes in the scan of a frame, if there is one, `motion` after the frame before.
+    pub(super) fn update(
+        &mut self,
+        settings: &CollisionMonitorSettings,
+        scan: Option<&LaserScan>,
+        motion: &EgoMotion,
+        tracks: &[Track],
+    ) {
+        self.silence.update(scan.is_some(), motion.dt);
+        self.space.advance(motion);
+        let Some(scan) = scan else {
+            for at in &mut self.points {
+                *at = motion.apply_to_point(*at);
+            }
+            return;
+        };
+        let heights = settings.floor_m..settings.top_m;
+        self.points.clear();
+        let low = scan.points.iter().filter(|point| heights.contains(&point.z));
+        self.points.extend(low.map(Point3::xy));
+        for unread in scan.unread.iter() {
+            if let RayReading::TooNear(range_m) = unread.reading {
+                self.points.push(scan.place(unread.ray, range_m).xy());
+            }
+        }
+        let eye: Point2<f64> = scan.robot_from_scanner.translation.vector.xy().into();
+        let silent = scan.unread.iter().filter(|unread| unread.reading == RayReading::NoReturn);
+        let passed = silent.map(|unread| scan.place(unread.ray, FREE_M).xy());
+        let ends = self.points.iter().copied().chain(passed);
+        self.space.add(eye, self.points.iter().copied(), ends);
+        self.watch.add_scan(scan, motion, tracks);
+        self.coverage = Some(Coverage::of_scan(settings, scan, settings.min_share));
+    }
+
+    /// Adds what the scan met.
+    pub(super) fn add_to(
+        &self,
+        settings: &CollisionMonitorSettings,
+        people: &People<'_>,
+        hazards: &mut BinnedHazards,
+    ) {
+        let first = hazards.len();
+        for at in &self.points {
+            hazards.add(*at, settings.ray_points(), false);
+        }
+        hazards.judge_since(first, |at| people.kind(at, self.space.presence(at)));
+    }
+
+    /// Returns the directions in which the scanner sees something, if it ever delivered.
+    pub(super) fn coverage(&self, min_share: f64) -> Option<Coverage> {
+        self.coverage.clone().map(|coverage| coverage.with_min_share(min_share))
+    }
+}
+
+/// Range sensor: sonar or infrared.
+#[derive(Default)]
+pub(super) struct RangeState {
+    /// Places on the arc at which the surface may be, robot frame, m.
+    arc: Vec<Point2<f64>>,
+    coverage: Option<Coverage>,
+}
+
+impl RangeState {
+    /// Takes in the reading of a frame, if there is one, `motion` after the frame before.
+    pub(super) fn update(&mut self, reading: Option<&RangeReading>, motion: &EgoMotion) {
+        let Some(reading) = reading else {
+            for at in &mut self.arc {
+                *at = motion.apply_to_point(*at);
+            }
+            return;
+        };
+        self.arc.clear();
+        let range_m = reading.range_m;
+        let is_too_near = range_m < reading.min_m;
+        let met_m = if is_too_near { reading.min_m } else { range_m };
+        let half_rad = 0.5 * reading.field_of_view_rad;
+        let along = |angle: f64, range_m: f64| {
+            let ahead = Vector3::new(angle.cos(), angle.sin(), 0.0) * range_m;
+            (reading.robot_from_sensor * Point3::from(ahead)).xy()
+        };
+        if met_m <= reading.max_m.min(RANGE_M) {
+            for at in 0..ON_ARC {
+                let angle = half_rad * (2.0 * at as f64 / (ON_ARC - 1) as f64 - 1.0);
+                self.arc.push(along(angle, met_m));
+                // A sensor may sit within the footprint, where places do not count: what is nearer than
+                // it measures is before the footprint.
+                for beyond_m in BEFORE_FOOTPRINT_M.into_iter().filter(|_| is_too_near) {
+                    self.arc.push(along(angle, met_m + beyond_m));
+                }
+            }
+        }
+        // An infinite range is a statement of a sensor that hears nothing; NaN is none.
+        let is_valid = !range_m.is_nan();
+        let eye: Point2<f64> = reading.robot_from_sensor.translation.vector.xy().into();
+        let mut looks = Vec::with_capacity(3);
+        for angle in [-half_rad, 0.0, half_rad] {
+            let way = along(angle, 1.0) - eye;
+            looks.push((way.y.atan2(way.x), is_valid));
+        }
+        self.coverage = Some(Coverage::new(eye, looks, 0.0));
+    }
+
+    /// Adds the arc on which something is.
+    pub(super) fn add_to(&self, settings: &CollisionMonitorSettings, hazards: &mut BinnedHazards) {
+        for at in &self.arc {
+            let points = settings.min_points;
+            hazards.push(Hazard { at: *at, points, kind: HazardKind::Still }, false);
+        }
+    }
+
+    /// Returns the directions of its cone, if it ever delivered.
+    pub(super) fn coverage(&self, min_share: f64) -> Option<Coverage> {
+        self.coverage.clone().map(|coverage| coverage.with_min_share(min_share))
+    }
+}

@@ -1,0 +1,230 @@
+//! Places that one sensor saw free or met something in, to tell what moves from what stands.
+
+use nalgebra::{Isometry2, Point2};
+use tagalong_core::EgoMotion;
+
+/// Size of a cell, m.
+const CELL_M: f64 = 0.1;
+/// Cells along each side: 12.8 m, which the robot takes along.
+const SIDE: i32 = 128;
+/// Step along a ray, m: no cell is passed over.
+const STEP_M: f64 = 0.08;
+/// Gap without a reading after which something in a cell has appeared anew, ms: a few frames.
+const GAP_MS: u32 = 400;
+/// Time after which what is in a cell stands still, ms: the leg of a walking person is off sooner.
+const STANDS_MS: u32 = 1000;
+/// Time for which a look at a free place counts, ms.
+const FREE_MS: u32 = 3000;
+
+/// What is known of the thing in a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Presence {
+    /// It has been there for a second.
+    Stands,
+    /// It appeared where nothing was known.
+    New,
+    /// It appeared where the sensor had seen that nothing was.
+    Appeared,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Cell {
+    /// Coordinates: cells far away share a slot.
+    tag: (i32, i32),
+    /// Times, ms; 0 for never.
+    free_ms: u32,
+    hit_ms: u32,
+    /// Start of the presence of what is in it.
+    since_ms: u32,
+    appeared: bool,
+}
+
+/// Grid around the robot, fixed in the world as the odometry has it.
+pub(super) struct SpaceGrid {
+    cells: Vec<Cell>,
+    grid_from_robot: Isometry2<f64>,
+    now_ms: u32,
+}
+
+impl Default for SpaceGrid {
+    fn default() -> Self {
+        Self {
+            cells: vec![Cell::default(); (SIDE * SIDE) as usize],
+            grid_from_robot: Isometry2::identity(),
+            // Not 0, which stands for never.
+            now_ms: 2 * FREE_MS,
+        }
+    }
+}
+
+impl SpaceGrid {
+    /// Moves on with the robot and the time.
+    pub(super) fn advance(&mut self, motion: &EgoMotion) {
+        // A step that is no number says nothing; the pipeline stands then.
+        if motion.forward.is_finite() && motion.left.is_finite() && motion.turn.is_finite() {
+            self.grid_from_robot *= motion.isometry();
+        }
+        let step_ms = (motion.dt.clamp(0.0, 60.0) * 1e3).round() as u32;
+        self.now_ms = self.now_ms.saturating_add(step_ms.max(1));
+    }
+
+    /// Takes in the readings of one image or scan: places where rays met something, and ends of the
+    /// rays, up to which the way from `eye` was free; robot frame, m.
+    pub(super) fn add(
+        &mut self,
+        eye: Point2<f64>,
+        met: impl Iterator<Item = Point2<f64>>,
+        free_to: impl Iterator<Item = Point2<f64>>,
+    ) {
+        // All hits first: a ray that passes by in the same cell does not free it.
+        for at in met {
+            self.hit(&at);
+        }
+        let from = self.grid_from_robot * eye;
+        for end in free_to {
+            let to = self.grid_from_robot * end;
+            let way = to - from;
+            let length_m = way.norm();
+            if !length_m.is_finite() {
+                continue;
+            }
+            let reach_m = length_m.min(0.5 * CELL_M * f64::from(SIDE));
+            let steps = ((reach_m - CELL_M) / STEP_M).max(0.0) as usize;
+            let step = way * (STEP_M / length_m.max(STEP_M));
+            for at in 0..steps {
+                let now_ms = self.now_ms;
+                let cell = self.cell_mut(&(from + step * at as f64));
+                if cell.hit_ms != now_ms {
+                    cell.free_ms = now_ms;
+                }
+            }
+        }
+    }
+
+    /// Returns what is known of a thing that was met at a place in this frame.
+    pub(super) fn presence(&self, at: &Point2<f64>) -> Presence {
+        let place = coordinates(&(self.grid_from_robot * at));
+        let Some(cell) = self.at(place) else { return Presence::New };
+        if self.stands(cell) {
+            return Presence::Stands;
+        }
+        // Noise and a wrong angle move the border of what stands by a cell.
+        for dx in -1..=1 {
+            for dy in -1..=1 {
+                let beside = self.at((place.0 + dx, place.1 + dy));
+                if beside.is_some_and(|cell| self.stands(cell)) {
+                    return Presence::Stands;
+                }
+            }
+        }
+        if cell.appeared { Presence::Appeared } else { Presence::New }
+    }
+
+    fn stands(&self, cell: &Cell) -> bool {
+        cell.hit_ms != 0
+            && self.now_ms - cell.hit_ms <= GAP_MS
+            && self.now_ms - cell.since_ms >= STANDS_MS
+    }
+
+    fn hit(&mut self, at: &Point2<f64>) {
+        let now_ms = self.now_ms;
+        let place = self.grid_from_robot * at;
+        if !(place.x.is_finite() && place.y.is_finite()) {
+            return;
+        }
+        let cell = self.cell_mut(&place);
+        if cell.hit_ms == 0 || now_ms - cell.hit_ms > GAP_MS {
+            cell.since_ms = now_ms;
+            let was_free = cell.free_ms > cell.hit_ms && now_ms - cell.free_ms <= FREE_MS;
+            cell.appeared = was_free;
+        }
+        cell.hit_ms = now_ms;
+    }
+
+    fn at(&self, place: (i32, i32)) -> Option<&Cell> {
+        let cell = &self.cells[slot(place)];
+        (cell.tag == place).then_some(cell)
+    }
+
+    fn cell_mut(&mut self, at: &Point2<f64>) -> &mut Cell {
+        let place = coordinates(at);
+        let cell = &mut self.cells[slot(place)];
+        if cell.tag != place {
+            *cell = Cell { tag: place, ..Cell::default() };
+        }
+        cell
+    }
+}
+
+fn coordinates(at: &Point2<f64>) -> (i32, i32) {
+    ((at.x / CELL_M).floor() as i32, (at.y / CELL_M).floor() as i32)
+}
+
+fn slot((x, y): (i32, i32)) -> usize {
+    (x.rem_euclid(SIDE) * SIDE + y.rem_euclid(SIDE)) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EYE: Point2<f64> = Point2::new(0.0, 0.0);
+
+    /// A wall from (3, -1) to (3, 1), and a thing before it at `at`, if any.
+    fn look(grid: &mut SpaceGrid, forward: f64, robot_m: f64, at: Option<f64>) -> Option<Presence> {
+        grid.advance(&EgoMotion { forward, ..EgoMotion::at_rest(0.1) });
+        let wall = (-10..=10).map(|y| Point2::new(3.0 - robot_m, 0.1 * f64::from(y) + 0.05));
+        let thing = at.map(|x| Point2::new(x - robot_m, 0.05));
+        let met: Vec<Point2<f64>> =
+            wall.filter(|place| thing.is_none() || place.y.abs() > 0.1).chain(thing).collect();
+        grid.add(EYE, met.iter().copied(), met.iter().copied());
+        thing.map(|thing| grid.presence(&thing))
+    }
+
+    #[test]
+    fn what_appears_in_a_free_place_moves_until_it_stood_for_a_second() {
+        let mut grid = SpaceGrid::default();
+        for _ in 0..12 {
+            look(&mut grid, 0.0, 0.0, None);
+        }
+        assert_eq!(grid.presence(&Point2::new(3.0, 0.35)), Presence::Stands, "the wall");
+        let seen: Vec<_> = (0..12).map(|_| look(&mut grid, 0.0, 0.0, Some(1.5)).unwrap()).collect();
+        assert!(seen[..9].iter().all(|presence| *presence == Presence::Appeared), "{seen:?}");
+        assert_eq!(seen[11], Presence::Stands);
+    }
+
+    #[test]
+    fn what_comes_nearer_is_seen_to_move_all_the_time() {
+        let mut grid = SpaceGrid::default();
+        for _ in 0..12 {
+            look(&mut grid, 0.0, 0.0, None);
+        }
+        for step in 0..15 {
+            let at = 2.5 - 0.15 * f64::from(step);
+            assert_eq!(look(&mut grid, 0.0, 0.0, Some(at)), Some(Presence::Appeared), "{at}");
+        }
+    }
+
+    #[test]
+    fn what_was_never_looked_at_is_new_and_a_wall_stands_while_the_robot_drives() {
+        let mut grid = SpaceGrid::default();
+        look(&mut grid, 0.0, 0.0, None);
+        assert_eq!(grid.presence(&Point2::new(3.0, 0.35)), Presence::New);
+        let mut robot_m = 0.0;
+        for _ in 0..25 {
+            robot_m += 0.05;
+            look(&mut grid, 0.05, robot_m, None);
+        }
+        assert_eq!(grid.presence(&Point2::new(3.0 - robot_m, 0.35)), Presence::Stands);
+    }
+
+    #[test]
+    fn places_that_are_no_numbers_and_far_away_are_harmless() {
+        let mut grid = SpaceGrid::default();
+        grid.advance(&EgoMotion { forward: f64::NAN, ..EgoMotion::at_rest(f64::NAN) });
+        let odd =
+            [Point2::new(f64::NAN, 1.0), Point2::new(f64::INFINITY, 0.0), Point2::new(1e9, 0.0)];
+        grid.add(EYE, odd.into_iter(), odd.into_iter());
+        assert_eq!(grid.presence(&Point2::new(1.0, 0.0)), Presence::New);
+    }
+}

@@ -1,0 +1,295 @@
+//! Watchdog for sensors that repeat themselves, or that do not change as the odometry says.
+
+use nalgebra::{Isometry2, Isometry3, Point2, Point3, UnitQuaternion, Vector3};
+use tagalong_core::{DepthImage, EgoMotion, LaserScan, Track};
+use tagalong_geometry::Camera;
+
+/// Pixels of a depth image that are compared, at most, in each direction.
+const GRID: usize = 48;
+/// Motion since the reference after which the picture must have changed: m and rad.
+const MOVED_M: f64 = 0.25;
+const TURNED_RAD: f64 = 0.1;
+/// Noise of the distances of a depth camera and of a laser scanner: m, and as a fraction.
+const DEPTH_NOISE: [f64; 2] = [0.03, 0.02];
+const SCAN_NOISE: [f64; 2] = [0.02, 0.01];
+/// Readings that tell a moved picture from an unchanged one, at least.
+const ENOUGH: u32 = 40;
+/// Part of them that is unchanged from which on the sensor contradicts the odometry.
+const UNCHANGED: f64 = 0.8;
+/// Distance from a person within which readings have no say, m: the followed person is where they
+/// were, and so is what they pull.
+const OF_PERSON_M: f64 = 1.2;
+/// Height below which a reading is of the floor, m: a floor looks the same from everywhere.
+const FLOOR_M: f64 = 0.15;
+/// Distance beyond which depth is not compared, m.
+const FAR_M: f64 = 6.0;
+
+/// Watch over one sensor.
+#[derive(Default)]
+pub(super) struct Watch<R> {
+    /// Previous readings, bit for bit.
+    previous: Vec<u32>,
+    /// Number of frames in a row with the same readings.
+    repeated: u32,
+    /// Readings and pose of an earlier frame, with which the picture is compared.
+    reference: Option<(R, Isometry2<f64>)>,
+    /// True if the last comparison contradicted the odometry.
+    contradicts: bool,
+}
+
+impl<R> Watch<R> {
+    /// Returns true if the sensor has repeated itself for so many frames, or contradicts the
+    /// odometry.
+    pub(super) fn is_frozen(&self, identical_frames: u32) -> bool {
+        self.contradicts || identical_frames > 0 && self.repeated >= identical_frames
+    }
+
+    /// Takes in readings, bit for bit: real ones have noise.
+    fn compare_bits(&mut self, readings: impl Iterator<Item = u32>) {
+        let mut is_same = true;
+        let mut count = 0;
+        for (place, reading) in readings.enumerate() {
+            count = place + 1;
+            match self.previous.get_mut(place) {
+                Some(before) if *before == reading => {}
+                Some(before) => {
+                    is_same = false;
+                    *before = reading;
+                }
+                None => {
+                    is_same = false;
+                    self.previous.push(reading);
+                }
+            }
+        }
+        if count != self.previous.len() {
+            is_same = false;
+            self.previous.truncate(count);
+        }
+        self.repeated = if is_same && count > 0 { self.repeated.saturating_add(1) } else { 0 };
+    }
+
+    /// Moves the reference by the motion since the last frame; returns the motion since it, if that
+    /// is enough to compare.
+    fn moved(&mut self, motion: &EgoMotion) -> Option<Isometry2<f64>> {
+        let (_, since) = self.reference.as_mut()?;
+        *since *= motion.isometry();
+        let is_far =
+            since.translation.vector.norm() > MOVED_M || since.rotation.angle().abs() > TURNED_RAD;
+        is_far.then_some(*since)
+    }
+}
+
+/// Depth image of a reference: sampled depths.
+#[derive(Default)]
+pub(super) struct DepthReference {
+    columns: usize,
+    depths: Vec<f32>,
+    /// Sampled pixels that belong to people, or to the floor.
+    left_out: Vec<bool>,
+}
+
+impl Watch<DepthReference> {
+    /// Takes in a depth image, `motion` after the one before.
+    pub(super) fn add_depth(
+        &mut self,
+        camera: &Camera,
+        depth: &DepthImage,
+        motion: &EgoMotion,
+        tracks: &[Track],
+    ) {
+        let step_x = depth.width().div_ceil(GRID).max(1);
+        let step_y = depth.height().div_ceil(GRID).max(1);
+        let sampled = (0..depth.height())
+            .step_by(step_y)
+            .flat_map(|y| depth.row(y).iter().step_by(step_x).map(|z| z.to_bits()));
+        self.compare_bits(sampled);
+        let moved = self.moved(motion);
+        if self.reference.is_some() && moved.is_none() {
+            return;
+        }
+        let now = reference(camera, depth, tracks, [step_x, step_y]);
+        if let (Some(moved), Some((then, _))) = (moved, &self.reference)
+            && let Some(contradicts) =
+                contradicts_depth(camera, then, &now, &moved, [step_x, step_y])
+        {
+            self.contradicts = contradicts;
+        }
+        self.reference = Some((now, Isometry2::identity()));
+    }
+}
+
+fn reference(
+    camera: &Camera,
+    depth: &DepthImage,
+    tracks: &[Track],
+    [step_x, step_y]: [usize; 2],
+) -> DepthReference {
+    let columns = depth.width().div_ceil(step_x);
+    let mut reference = DepthReference { columns, ..DepthReference::default() };
+    for y in (0..depth.height()).step_by(step_y) {
+        for (at, z) in depth.row(y).iter().step_by(step_x).enumerate() {
+            let pixel = Point2::new((at * step_x) as f64, y as f64);
+            let place = camera.back_project(pixel, f64::from(*z));
+            let is_person = tracks.iter().any(|track| {
+                (track.estimate.person.position.xy() - place.xy()).norm() < OF_PERSON_M
+            });
+            reference.left_out.push(is_person || place.z < FLOOR_M);
+            reference.depths.push(*z);
+        }
+    }
+    reference
+}
+
+/// Returns true if the picture is unchanged where the motion must have changed it, false if it is
+/// not, and `None` if too few readings tell.
+fn contradicts_depth(
+    camera: &Camera,
+    then: &DepthReference,
+    now: &DepthReference,
+    moved: &Isometry2<f64>,
+    [step_x, step_y]: [usize; 2],
+) -> Option<bool> {
+    if then.depths.len() != now.depths.len() {
+        return None;
+    }
+    let now_from_then = lifted(moved).inverse();
+    let mut counts = Counts::new(DEPTH_NOISE);
+    for (place, z) in then.depths.iter().enumerate() {
+        let z = f64::from(*z);
+        if then.left_out[place] || !(0.0 < z && z < FAR_M) {
+            continue;
+        }
+        let [column, row] = [place % then.columns, place / then.columns];
+        let pixel = Point2::new((column * step_x) as f64, (row * step_y) as f64);
+        let point = now_from_then * camera.back_project(pixel, z);
+        let Some(expected) = camera.project(&point) else { continue };
+        let [x, y] = [(expected.x / step_x as f64).round(), (expected.y / step_y as f64).round()];
+        if !(x >= 0.0 && y >= 0.0 && (x as usize) < then.columns) {
+            continue;
+        }
+        let there = y as usize * then.columns + x as usize;
+        let (Some(old), Some(new)) = (then.depths.get(there), now.depths.get(there)) else {
+            continue;
+        };
+        if now.left_out[there] || then.left_out[there] {
+            continue;
+        }
+        counts.add(camera.depth_of(&point), f64::from(*old), f64::from(*new));
+    }
+    counts.contradicts()
+}
+
+/// Scan of a reference: ranges by the number of the ray.
+#[derive(Default)]
+pub(super) struct ScanReference {
+    ranges: Vec<f32>,
+    left_out: Vec<bool>,
+}
+
+impl Watch<ScanReference> {
+    /// Takes in a scan, `motion` after the one before.
+    pub(super) fn add_scan(&mut self, scan: &LaserScan, motion: &EgoMotion, tracks: &[Track]) {
+        let origin = scan.robot_from_scanner.translation.vector;
+        let ranges: Vec<f32> =
+            scan.points.iter().map(|point| (point.coords - origin).norm() as f32).collect();
+        // Moving a scan to the time of its frame rounds the ranges: to a fiftieth of a millimetre they
+        // are the same.
+        self.compare_bits(
+            ranges
+                .iter()
+                .zip(scan.rays.iter())
+                .map(|(range, ray)| (range * 2e4).round().to_bits().rotate_left(7) ^ ray),
+        );
+        let moved = self.moved(motion);
+        if self.reference.is_some() && moved.is_none() || scan.increment_rad == 0.0 {
+            return;
+        }
+        let mut now = ScanReference::default();
+        for ((point, ray), range) in scan.points.iter().zip(scan.rays.iter()).zip(&ranges) {
+            let ray = *ray as usize;
+            if ray >= now.ranges.len() {
+                now.ranges.resize(ray + 1, f32::NAN);
+                now.left_out.resize(ray + 1, true);
+            }
+            now.ranges[ray] = *range;
+            now.left_out[ray] = tracks.iter().any(|track| {
+                (track.estimate.person.position.xy() - point.xy()).norm() < OF_PERSON_M
+            });
+        }
+        if let (Some(moved), Some((then, _))) = (moved, &self.reference)
+            && let Some(contradicts) = contradicts_scan(scan, then, &now, &moved)
+        {
+            self.contradicts = contradicts;
+        }
+        self.reference = Some((now, Isometry2::identity()));
+    }
+}
+
+fn contradicts_scan(
+    scan: &LaserScan,
+    then: &ScanReference,
+    now: &ScanReference,
+    moved: &Isometry2<f64>,
+) -> Option<bool> {
+    let now_from_then = lifted(moved).inverse();
+    let scanner_from_robot = scan.robot_from_scanner.inverse();
+    let mut counts = Counts::new(SCAN_NOISE);
+    for (ray, range) in then.ranges.iter().enumerate() {
+        let range = f64::from(*range);
+        if then.left_out[ray] || !(0.0 < range && range < FAR_M) {
+            continue;
+        }
+        let point: Point3<f64> = now_from_then * scan.place(ray as u32, range);
+        let seen = scanner_from_robot * point;
+        let turns = std::f64::consts::TAU / scan.increment_rad.abs();
+        let place = (seen.y.atan2(seen.x) - scan.first_rad) / scan.increment_rad;
+        let there = place.round().rem_euclid(turns.round().max(1.0)) as usize;
+        let (Some(old), Some(new)) = (then.ranges.get(there), now.ranges.get(there)) else {
+            continue;
+        };
+        if then.left_out[there] || now.left_out[there] {
+            continue;
+        }
+        counts.add(seen.coords.xy().norm(), f64::from(*old), f64::from(*new));
+    }
+    counts.contradicts()
+}
+
+/// Readings that tell a moved picture from an unchanged one.
+struct Counts {
+    noise: [f64; 2],
+    telling: u32,
+    unchanged: u32,
+}
+
+impl Counts {
+    fn new(noise: [f64; 2]) -> Self {
+        Self { noise, telling: 0, unchanged: 0 }
+    }
+
+    /// Adds a reading: its distance if the odometry is right, that of the reference in this
+    /// direction, and that of now.
+    fn add(&mut self, expected_m: f64, old_m: f64, new_m: f64) {
+        let noise_m = self.noise[0] + self.noise[1] * expected_m;
+        // Where both agree the reading tells nothing: a wall along the way, for example.
+        let tells = (expected_m - old_m).abs() > 2.0 * noise_m;
+        if !(tells && new_m.is_finite() && new_m > 0.0) {
+            return;
+        }
+        self.telling += 1;
+        self.unchanged += u32::from((new_m - old_m).abs() < noise_m);
+    }
+
+    fn contradicts(&self) -> Option<bool> {
+        (self.telling >= ENOUGH)
+            .then(|| f64::from(self.unchanged) >= UNCHANGED * f64::from(self.telling))
+    }
+}
+
+/// Returns a motion on the floor as one in space.
+fn lifted(motion: &Isometry2<f64>) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), motion.rotation.angle());
+    let at = Vector3::new(motion.translation.x, motion.translation.y, 0.0);
+    Isometry3::from_parts(at.into(), turn)
+}
