@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 
 use crate::LogError;
+use crate::obstacles::ObstacleTopic;
 use crate::sensors::{SENSORS, SensorType};
 
 /// Settings of the input from a log. Topics that are not named are found by message type and
@@ -65,6 +66,11 @@ pub struct InputSettings {
     /// Standard deviation of odometry as a fraction of the travel.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub odometry_sigma: f64,
+    /// Further sources of obstacles. They are no keys under `[input]`: a program fills them in from
+    /// `[[collision_monitor.sources]]` of its pipeline.
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub sources: Vec<ObstacleTopic>,
 }
 
 impl Default for InputSettings {
@@ -90,6 +96,7 @@ impl Default for InputSettings {
             panorama: [480, 120],
             reorder_frames: 3,
             odometry_sigma: 0.02,
+            sources: Vec::new(),
         }
     }
 }

@@ -17,6 +17,11 @@ const KEPT_S: f64 = 15.0;
 const MAX_POSES: usize = 16_384;
 /// Step back of the clock beyond which it has jumped, s.
 const CLOCK_JUMP_S: f64 = 1.0;
+/// Time after a frame beyond which a reading is no odometry of that frame, s.
+pub(crate) const AHEAD_S: f64 = 1.0;
+
+/// Pose with its time.
+type TimedPose = (Stamp, Isometry2<f64>);
 
 /// Pose at a given time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,10 +32,25 @@ pub struct PoseAt {
     pub stale: bool,
 }
 
+/// Returns the age of odometry at a given time, s, from the times of the readings before and after
+/// it: 0 between readings at most [`MAX_GAP_S`] apart, else the time since the reading before.
+/// Without one it is the time to the reading after, which may be the first of all. Infinite without
+/// either; a reading after the time by more than [`AHEAD_S`] is none.
+pub(crate) fn age_between(before: Option<Stamp>, after: Option<Stamp>, at: Stamp) -> f64 {
+    let after = after.filter(|after| after.seconds_since(at) <= AHEAD_S);
+    match (before, after) {
+        (_, Some(after)) if after == at => 0.0,
+        (Some(before), Some(after)) if after.seconds_since(before) <= MAX_GAP_S => 0.0,
+        (Some(before), _) => at.seconds_since(before),
+        (None, Some(after)) => after.seconds_since(at),
+        (None, None) => f64::INFINITY,
+    }
+}
+
 /// Odometry of the last seconds.
 #[derive(Clone, Debug, Default)]
 pub struct PoseBuffer {
-    poses: VecDeque<(Stamp, Isometry2<f64>)>,
+    poses: VecDeque<TimedPose>,
 }
 
 impl PoseBuffer {
@@ -67,11 +87,12 @@ impl PoseBuffer {
         }
     }
 
-    /// Returns the pose at a given time, interpolated; `None` without odometry.
+    /// Returns the pose at a given time, interpolated; `None` without odometry. Readings of more than
+    /// a second later are not used.
     pub fn at(&self, stamp: Stamp) -> Option<PoseAt> {
-        let after = self.poses.partition_point(|(at, _)| *at < stamp);
-        let before = after.checked_sub(1).map(|i| self.poses[i]);
-        match (before, self.poses.get(after).copied()) {
+        let (before, after) = self.around(stamp);
+        let after = after.filter(|(at, _)| at.seconds_since(stamp) <= AHEAD_S);
+        match (before, after) {
             (Some(a), Some(b)) => Some(PoseAt {
                 pose: blend(a, b, stamp),
                 // A pose exactly at the stamp is valid, however long the gap before it.
@@ -85,10 +106,33 @@ impl PoseBuffer {
         }
     }
 
+    /// Returns the age of odometry at a given time, s: 0 where the pose is interpolated, infinite
+    /// without any.
+    pub fn age_s(&self, stamp: Stamp) -> f64 {
+        let (before, after) = self.around(stamp);
+        age_between(before.map(|(at, _)| at), after.map(|(at, _)| at), stamp)
+    }
+
+    /// Returns the time from a frame to the next reading, s, if it is too late to be odometry of that
+    /// frame: its clock is another one, or the recording of odometry begins later.
+    pub(crate) fn ahead_s(&self, stamp: Stamp) -> Option<f64> {
+        let (_, after) = self.around(stamp);
+        after.map(|(at, _)| at.seconds_since(stamp)).filter(|ahead_s| *ahead_s > AHEAD_S)
+    }
+
+    /// Returns the last pose before a given time, and the first one at or after it.
+    fn around(&self, stamp: Stamp) -> (Option<TimedPose>, Option<TimedPose>) {
+        let after = self.poses.partition_point(|(at, _)| *at < stamp);
+        let before = after.checked_sub(1).map(|place| self.poses[place]);
+        (before, self.poses.get(after).copied())
+    }
+
     /// Extrapolates behind the last pose: the last motion goes on for a short time.
     fn beyond(&self, last: (Stamp, Isometry2<f64>), stamp: Stamp) -> PoseAt {
         let ahead = stamp.seconds_since(last.0);
-        let known = self.poses.len().checked_sub(2).map(|i| self.poses[i]);
+        // Not simply the last two of all: poses of far later times may follow.
+        let place = self.poses.partition_point(|(at, _)| *at < last.0);
+        let known = place.checked_sub(1).map(|place| self.poses[place]);
         let pose = match known {
             // Two poses far apart in time do not give the present velocity.
             Some(previous) if last.0.seconds_since(previous.0) <= MAX_GAP_S => {
@@ -111,11 +155,7 @@ impl PoseBuffer {
 }
 
 /// Interpolates linearly between two poses, and extrapolates beyond them.
-fn blend(
-    (t0, a): (Stamp, Isometry2<f64>),
-    (t1, b): (Stamp, Isometry2<f64>),
-    at: Stamp,
-) -> Isometry2<f64> {
+fn blend((t0, a): TimedPose, (t1, b): TimedPose, at: Stamp) -> Isometry2<f64> {
     let span = t1.seconds_since(t0);
     let part = if span > 0.0 { at.seconds_since(t0) / span } else { 0.0 };
     let turn = (a.rotation.inverse() * b.rotation).angle();
@@ -188,6 +228,27 @@ mod tests {
         assert_eq!(buffer.at(at(3.0)).unwrap().pose.translation.x, 7.0);
         assert!(buffer.at(at(100.0)).unwrap().stale);
         assert!(!buffer.push(at(3.1), pose(f64::NAN, 0.0)));
+    }
+
+    #[test]
+    fn age_is_the_time_since_the_last_reading_and_none_between_readings() {
+        let buffer = driven(&[10.0, 10.4, 11.4]);
+        let age = |seconds| (buffer.age_s(at(seconds)) * 1e3).round() / 1e3;
+        assert_eq!([age(10.2), age(11.4), age(12.0)], [0.0, 0.0, 0.6]);
+        // Between readings that are far apart nothing is known of the motion.
+        assert_eq!([age(10.9), age(9.7)], [0.5, 0.3]);
+        assert_eq!(PoseBuffer::default().age_s(at(1.0)), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_reading_far_ahead_is_none_of_this_time() {
+        let buffer = driven(&[10.0, 10.1, 12.0]);
+        let found = buffer.at(at(10.2)).unwrap();
+        assert!((found.pose.translation.x - 10.2).abs() < 1e-6 && !found.stale, "{found:?}");
+        assert!((buffer.age_s(at(10.2)) - 0.1).abs() < 1e-6);
+        assert!(buffer.at(at(8.9)).is_none() && buffer.age_s(at(8.9)) == f64::INFINITY);
+        assert_eq!(buffer.ahead_s(at(10.5)).map(|ahead_s| ahead_s.round()), Some(2.0));
+        assert_eq!(buffer.ahead_s(at(11.5)), None);
     }
 
     proptest! {

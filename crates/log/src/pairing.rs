@@ -232,6 +232,11 @@ impl Reorder {
         self.last
     }
 
+    /// Returns the newest stamp that waits.
+    pub(crate) fn newest(&self) -> Option<Stamp> {
+        self.queue.back().map(|image| image.stamp)
+    }
+
     /// Drops an image held back as suspect, at the end of the log; returns true if there was one.
     pub(crate) fn drop_suspect(&mut self) -> bool {
         self.suspect.take().is_some()

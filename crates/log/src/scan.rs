@@ -13,7 +13,8 @@ use crate::images::{
 };
 use crate::log_files::LogFiles;
 use crate::msgs::{
-    CameraInfo, CompressedImage, DisparityImage, Header, Image, Odometry, TFMessage, decode,
+    CameraInfo, CompressedImage, DisparityImage, Header, Image, Odometry, TFMessage,
+    TransformStamped, decode,
 };
 use crate::packed::LogFile;
 use crate::sensors::SensorType;
@@ -177,7 +178,11 @@ impl Scan {
             (scan.bytes, hash) = (scan.bytes + bytes, so_far);
         }
         let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-        let Gathering { topics, infos, tf, .. } = gathering;
+        let Gathering { topics, infos, mut tf, replaced, .. } = gathering;
+        // The frames begin with the first ones, and meet the others on the way.
+        for first in replaced.values() {
+            tf.insert(first, true);
+        }
         Ok(Self { path: path.to_owned(), sha256, topics, infos, tf, ..scan })
     }
 
@@ -215,6 +220,11 @@ impl Scan {
         self
     }
 
+    /// Returns true for a source that is no file, which may have more topics later.
+    pub(crate) fn is_live(&self) -> bool {
+        self.parts.is_empty()
+    }
+
     /// Returns the frame of the images of a topic.
     pub(crate) fn frame_of(&self, topic: &str) -> Option<&str> {
         self.topics.get(topic)?.frame_id.as_deref()
@@ -245,6 +255,8 @@ pub(crate) struct Gathering {
     infos: BTreeMap<String, CameraInfo>,
     tf: TfBuffer,
     linked: BTreeSet<(String, String)>,
+    /// First static transform of each frame that has several.
+    replaced: BTreeMap<String, TransformStamped>,
     depth_unit_m: Option<f64>,
 }
 
@@ -330,12 +342,27 @@ impl Gathering {
         let is_static = is_static(topic);
         for transform in &message.transforms {
             let link = (transform.child_frame_id.clone(), transform.header.frame_id.clone());
-            // One sample of a moving transform is enough to know the link.
-            if is_static || self.linked.insert(link) {
-                self.tf.insert(transform, is_static);
+            if is_static {
+                self.take_static(transform);
+            } else if self.linked.insert(link) {
+                // One sample of a moving transform is enough to know the link.
+                self.tf.insert(transform, false);
             }
         }
         Some(())
+    }
+
+    /// Takes in a static transform, and keeps the one that it replaces if that is the first.
+    fn take_static(&mut self, transform: &TransformStamped) {
+        let child = &transform.child_frame_id;
+        let replaced = self.tf.static_transform(child).filter(|old| {
+            old.transform != transform.transform || old.header.frame_id != transform.header.frame_id
+        });
+        if self.tf.insert(transform, true)
+            && let Some(replaced) = replaced
+        {
+            self.replaced.entry(child.clone()).or_insert(replaced);
+        }
     }
 }
 

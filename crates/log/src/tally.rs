@@ -33,6 +33,14 @@ impl Tally {
         }
     }
 
+    /// Counts an event that is no loss, and describes it once per name.
+    pub(crate) fn remark(&mut self, name: &'static str, what: impl FnOnce() -> String) {
+        self.count(name);
+        if self.counters.get(name) == Some(&1) {
+            self.note(what());
+        }
+    }
+
     /// Adds a remark once.
     pub(crate) fn note(&mut self, text: impl Into<String>) {
         let text = text.into();

@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, VecDeque};
 use nalgebra::Isometry3;
 use tagalong_core::Stamp;
 
-use crate::msgs::TransformStamped;
+use crate::msgs::{Header, Transform, TransformStamped};
+use crate::odometry::{AHEAD_S, age_between};
 
 /// Maximum time between a sample of a moving transform and a query, s.
 const REACH_S: f64 = 0.5;
@@ -18,11 +19,14 @@ const MAX_FRAMES: usize = 4096;
 /// Maximum length of a chain from a frame to the root.
 const MAX_DEPTH: usize = 64;
 
+/// Pose of a frame in its parent at a given time.
+type Sample = (Stamp, Isometry3<f64>);
+
 /// Link from a frame to its parent.
 #[derive(Clone, Debug)]
-struct Link {
+pub(crate) struct Link {
     parent: String,
-    moving: VecDeque<(Stamp, Isometry3<f64>)>,
+    moving: VecDeque<Sample>,
     fixed: Option<Isometry3<f64>>,
 }
 
@@ -33,7 +37,7 @@ pub struct TfBuffer {
 }
 
 /// Removes the leading slash that frame names of ROS 1 had.
-fn plain(name: &str) -> &str {
+pub(crate) fn plain(name: &str) -> &str {
     name.trim_start_matches('/')
 }
 
@@ -63,6 +67,30 @@ impl TfBuffer {
             link.add(transform.header.stamp(), pose);
         }
         true
+    }
+
+    /// Returns the static transform of a frame, without its time.
+    pub(crate) fn static_transform(&self, child: &str) -> Option<TransformStamped> {
+        let link = self.links.get(plain(child))?;
+        Some(TransformStamped {
+            header: Header { frame_id: link.parent.clone(), ..Header::default() },
+            child_frame_id: child.to_owned(),
+            transform: Transform::from(&link.fixed?),
+        })
+    }
+
+    /// Returns a copy of the link from a frame to its parent, for [`TfBuffer::restore`].
+    pub(crate) fn saved(&self, child: &str) -> (String, Option<Link>) {
+        let child = plain(child);
+        (child.to_owned(), self.links.get(child).cloned())
+    }
+
+    /// Returns to a link that was saved, or to none.
+    pub(crate) fn restore(&mut self, (child, link): (String, Option<Link>)) {
+        match link {
+            Some(link) => self.links.insert(child, link),
+            None => self.links.remove(&child),
+        };
     }
 
     /// Removes the samples of moving transforms.
@@ -97,6 +125,53 @@ impl TfBuffer {
         let target = self.climb(&up_t, common, at)?;
         let source = self.climb(&up_s, common, at)?;
         Some(target.inverse() * source)
+    }
+
+    /// Returns the age of the pose of frame `source` in frame `target` at a given time, s: that of the
+    /// oldest moving transform between them, by [`age_between`]. Infinite if the frames are not
+    /// connected, or by static transforms alone, which are no readings.
+    pub(crate) fn age_s(&self, target: &str, source: &str, at: Stamp) -> f64 {
+        let ages = self.moving_between(target, source).filter_map(|link| link.age_s(at));
+        ages.reduce(f64::max).unwrap_or(f64::INFINITY)
+    }
+
+    /// Returns the time from a frame to the next sample of a moving transform, s, if it is too late
+    /// to be one of that frame.
+    pub(crate) fn ahead_s(&self, target: &str, source: &str, at: Stamp) -> Option<f64> {
+        let ahead = self.moving_between(target, source).filter_map(|link| link.around(at).1);
+        let ahead_s = ahead.map(|sample| sample.0.seconds_since(at)).reduce(f64::max)?;
+        (ahead_s > AHEAD_S).then_some(ahead_s)
+    }
+
+    /// Yields the links between two frames; nothing if they are not connected.
+    fn moving_between<'a>(
+        &'a self,
+        target: &'a str,
+        source: &'a str,
+    ) -> impl Iterator<Item = &'a Link> {
+        let up_t = self.ancestors(plain(target));
+        let up_s = self.ancestors(plain(source));
+        let common = up_s.iter().find(|frame| up_t.contains(frame)).copied();
+        let below = |up: Vec<&'a str>| {
+            let frames = up.into_iter().take_while(move |frame| Some(*frame) != common);
+            frames.filter_map(|frame| self.links.get(frame)).collect::<Vec<_>>()
+        };
+        let links = common.map(|_| [below(up_t), below(up_s)].concat());
+        links.into_iter().flatten()
+    }
+
+    /// Returns the pose of frame `source` in frame `target` by the static transforms between them
+    /// alone, as if those that only move were none; `None` if the frames are not connected.
+    pub(crate) fn static_pose(&self, target: &str, source: &str) -> Option<Isometry3<f64>> {
+        let up_t = self.ancestors(plain(target));
+        let up_s = self.ancestors(plain(source));
+        let common = up_s.iter().find(|frame| up_t.contains(frame))?;
+        let climbed = |up: &[&str]| {
+            let below = up.iter().take_while(|frame| *frame != common);
+            let fixed = below.filter_map(|frame| self.links.get(*frame)?.fixed);
+            fixed.fold(Isometry3::identity(), |pose, link| link * pose)
+        };
+        Some(climbed(&up_t).inverse() * climbed(&up_s))
     }
 
     /// Returns the frame, its parent, and so on; ends at a loop.
@@ -142,13 +217,26 @@ impl Link {
         }
     }
 
-    fn at(&self, at: Stamp) -> Option<Isometry3<f64>> {
+    /// Returns the last sample before a given time, and the first one at or after it.
+    fn around(&self, at: Stamp) -> (Option<&Sample>, Option<&Sample>) {
         let after = self.moving.partition_point(|(stamp, _)| *stamp < at);
-        let near = |sample: &(Stamp, Isometry3<f64>)| {
-            (sample.0.seconds_since(at).abs() <= REACH_S).then_some(sample.1)
-        };
-        let before = after.checked_sub(1).and_then(|i| self.moving.get(i));
-        let moving = match (before, self.moving.get(after)) {
+        let before = after.checked_sub(1).and_then(|place| self.moving.get(place));
+        (before, self.moving.get(after))
+    }
+
+    /// Returns the age of a moving transform at a given time, s; `None` for a static one.
+    fn age_s(&self, at: Stamp) -> Option<f64> {
+        if self.moving.is_empty() && self.fixed.is_some() {
+            return None;
+        }
+        let (before, after) = self.around(at);
+        Some(age_between(before.map(|sample| sample.0), after.map(|sample| sample.0), at))
+    }
+
+    fn at(&self, at: Stamp) -> Option<Isometry3<f64>> {
+        let near =
+            |sample: &Sample| (sample.0.seconds_since(at).abs() <= REACH_S).then_some(sample.1);
+        let moving = match self.around(at) {
             (Some(a), Some(b)) => Some(interpolate(a, b, at)),
             (Some(one), None) | (None, Some(one)) => near(one),
             (None, None) => None,
@@ -159,11 +247,7 @@ impl Link {
 }
 
 /// Interpolates linearly in position and at constant speed in rotation.
-fn interpolate(
-    (t0, a): &(Stamp, Isometry3<f64>),
-    (t1, b): &(Stamp, Isometry3<f64>),
-    at: Stamp,
-) -> Isometry3<f64> {
+fn interpolate((t0, a): &Sample, (t1, b): &Sample, at: Stamp) -> Isometry3<f64> {
     let span = t1.seconds_since(*t0);
     let part = if span > 0.0 { at.seconds_since(*t0) / span } else { 0.0 };
     let translation = a.translation.vector.lerp(&b.translation.vector, part);
@@ -179,7 +263,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::msgs::{Header, Transform};
 
     fn link(parent: &str, child: &str, at_s: f64, pose: Isometry3<f64>) -> TransformStamped {
         TransformStamped {
@@ -221,6 +304,41 @@ mod tests {
         assert!((found.to_homogeneous() - expected.to_homogeneous()).norm() < 1e-12);
         assert!(tf.lookup("colour", "elsewhere", at(0.0)).is_none());
         assert!(tf.connects("colour", "base") && !tf.connects("base", "elsewhere"));
+    }
+
+    #[test]
+    fn the_age_is_that_of_the_oldest_moving_link() {
+        let mut tf = TfBuffer::default();
+        tf.insert(&link("odom", "base", 10.0, pose(0.0, 0.0)), false);
+        tf.insert(&link("odom", "base", 10.1, pose(0.1, 0.0)), false);
+        tf.insert(&link("base", "camera", 0.0, pose(0.2, 0.0)), true);
+        let age = |source, seconds| tf.age_s("odom", source, at(seconds));
+        assert_eq!([age("base", 10.05), age("camera", 10.05)], [0.0, 0.0]);
+        assert!((age("camera", 10.4) - 0.3).abs() < 1e-6);
+        assert_eq!(age("elsewhere", 10.0), f64::INFINITY);
+        // What never moves is no reading of a motion.
+        assert_eq!(tf.age_s("base", "camera", at(10.0)), f64::INFINITY);
+        tf.insert(&link("odom", "base", 20.0, pose(9.0, 0.0)), false);
+        assert!((tf.age_s("odom", "base", at(10.2)) - 0.1).abs() < 1e-6);
+        assert!((tf.ahead_s("odom", "base", at(10.2)).unwrap() - 9.8).abs() < 1e-6);
+    }
+
+    #[test]
+    fn static_poses_leave_out_what_moves() {
+        let mut tf = TfBuffer::default();
+        tf.insert(&link("base", "head", 10.0, pose(5.0, 1.0)), false);
+        tf.insert(&link("head", "camera", 0.0, pose(0.2, 0.0)), true);
+        let x = |tf: &TfBuffer| tf.static_pose("base", "camera").map(|pose| pose.translation.x);
+        assert_eq!((x(&tf), tf.static_pose("base", "elsewhere")), (Some(0.2), None));
+        let saved = tf.saved("/camera");
+        tf.insert(&link("head", "camera", 0.0, pose(0.3, 0.0)), true);
+        assert_eq!(x(&tf), Some(0.3));
+        tf.restore(saved);
+        assert_eq!(x(&tf), Some(0.2));
+        let none = tf.saved("lidar");
+        tf.insert(&link("head", "lidar", 0.0, pose(0.3, 0.0)), true);
+        tf.restore(none);
+        assert!(!tf.knows("lidar"));
     }
 
     #[test]

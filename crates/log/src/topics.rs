@@ -6,6 +6,7 @@ use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
 
 use crate::images::{Content, VIDEO_REMEDY, may_be_disparity, refusal_of};
+use crate::obstacles::ObstacleTopic;
 use crate::scan::{Scan, Topic, Type};
 use crate::sensors::{SENSORS, SensorType};
 use crate::{InputSettings, LogError};
@@ -68,21 +69,24 @@ pub(crate) fn choose(
     let is_disparity = input.disparity.is_some();
     // Chosen first, because such images look like those of a grey camera.
     let disparity = match is_disparity && input.depth_topic.is_none() {
-        true => best(scan, None, disparity_rank),
+        true => best(scan, &input.sources, None, disparity_rank),
         false => input.depth_topic.clone().filter(|_| is_disparity),
     };
     let colour = named("colour_topic", &input.colour_topic, is_usable_picture)?.or_else(|| {
-        best(scan, disparity.as_deref(), |name, topic| colour_rank(name, topic, false))
+        let rank = |name: &str, topic: &Topic| colour_rank(name, topic, false);
+        best(scan, &input.sources, disparity.as_deref(), rank)
     });
     let depth = match inputs.uses(Input::Depth) || colour.is_none() {
         true => self::named(scan, "depth_topic", input.depth_topic.as_deref(), is_depth)?
             .or(disparity)
-            .or_else(|| best(scan, None, depth_rank)),
+            .or_else(|| best(scan, &input.sources, None, depth_rank)),
         false => None,
     };
     let right = match inputs.uses(Input::Right) {
-        true => named("right_topic", &input.right_topic, is_usable_picture)?
-            .or_else(|| best(scan, None, |name, topic| colour_rank(name, topic, true))),
+        true => named("right_topic", &input.right_topic, is_usable_picture)?.or_else(|| {
+            let rank = |name: &str, topic: &Topic| colour_rank(name, topic, true);
+            best(scan, &input.sources, None, rank)
+        }),
         false => None,
     };
     // The settings may name the right images as the colour topic.
@@ -93,7 +97,7 @@ pub(crate) fn choose(
         sensors.extend(topic.map(|topic| (sensor.input, topic)));
     }
     let odometry = named("odometry_topic", &input.odometry_topic, is_odometry)?
-        .or_else(|| best(scan, None, odometry_rank));
+        .or_else(|| best(scan, &input.sources, None, odometry_rank));
     let info = |key, wanted: &Option<String>, image: &Option<String>| {
         let of_left = key == "depth_info_topic" && is_disparity;
         let found = || info_of(scan, image.as_deref()?, of_left);
@@ -124,7 +128,7 @@ fn choose_sensor(
     let rank = |name: &str, topic: &Topic| {
         sensor.rank.filter(|_| is_of(sensor, topic)).map(|rank| rank(name))
     };
-    Ok(named.or_else(|| best(scan, None, rank)))
+    Ok(named.or_else(|| best(scan, &input.sources, None, rank)))
 }
 
 /// Returns the topic that the settings name for a sensor.
@@ -273,7 +277,7 @@ fn remedy_as_depth(topic: &Topic) -> Option<&'static str> {
 }
 
 /// Returns type and encoding of the messages of a topic.
-fn kind_of(topic: &Topic) -> String {
+pub(crate) fn kind_of(topic: &Topic) -> String {
     match (&topic.pixels, topic.encoding.as_str()) {
         (Some(pixels), _) => format!("{}, {pixels}", topic.schema),
         (None, "cdr" | "ros1" | "") => topic.schema.clone(),
@@ -348,14 +352,18 @@ fn named(
     Err(missing(scan, format!("topic `{name}` fit for `{key}` of [input]"), hint))
 }
 
-/// Returns the topic with the highest rank but one that is taken; of equal ones that with the most
-/// messages, then the first by name.
+/// Returns the topic with the highest rank but one that is taken or is a further source of obstacles;
+/// of equal ones that with the most messages, then the first by name.
 fn best(
     scan: &Scan,
+    sources: &[ObstacleTopic],
     taken: Option<&str>,
     rank: impl Fn(&str, &Topic) -> Option<i32>,
 ) -> Option<String> {
-    let free = |(name, topic): &(&String, &Topic)| topic.count > 0 && taken != Some(name.as_str());
+    let is_source = |name: &str| sources.iter().any(|source| source.topic == name);
+    let free = |(name, topic): &(&String, &Topic)| {
+        topic.count > 0 && taken != Some(name.as_str()) && !is_source(name)
+    };
     let ranked =
         scan.topics.iter().filter(free).filter_map(|(name, topic)| {
             Some((rank(&name.to_lowercase(), topic)?, topic.count, name))
@@ -415,7 +423,7 @@ fn odometry_rank(name: &str, topic: &Topic) -> Option<i32> {
 
 /// Returns the calibration of an image topic: its `camera_info` sibling, else the only one with the
 /// same frame.
-fn info_of(scan: &Scan, image: &str, is_disparity: bool) -> Option<String> {
+pub(crate) fn info_of(scan: &Scan, image: &str, is_disparity: bool) -> Option<String> {
     let base = image.trim_end_matches("/compressedDepth").trim_end_matches("/compressed");
     let folder = base.rsplit_once('/').map_or("", |(folder, _)| folder);
     let sibling = format!("{folder}/camera_info");

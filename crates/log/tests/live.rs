@@ -6,10 +6,12 @@ mod common;
 use std::io::Cursor;
 
 use common::{LogWriter, SavedLog, at, camera, level_pose};
-use tagalong_log::LogWalker;
+use tagalong_core::{ObstacleData, ObstacleReadings};
+use tagalong_log::msgs::{BoolMsg, BumperEvent, Header, Range, encode};
 use tagalong_log::{
     FrameSource, Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogError, LogFrame,
 };
+use tagalong_log::{LogWalker, ObstacleKind, ObstacleTopic};
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
 
@@ -158,6 +160,78 @@ fn what_is_missing_is_named_until_it_comes() {
     let named = InputSettings { odometry_topic: Some("/odometry".into()), ..input };
     let text = missing(&listen(&log, &named, DEPTH));
     assert!(text.contains("did you mean `/odom`?"), "{text}");
+}
+
+#[test]
+fn sources_of_obstacles_are_waited_for_and_read() {
+    let mut log = started();
+    drive(&mut log, 6);
+    let log = log.finish();
+    let sonar = ObstacleTopic {
+        mount: Some([0.2, 0.0, 0.1, 0.0, 0.0, 0.0]),
+        ..ObstacleTopic::new("sonar", ObstacleKind::Range, "/sonar")
+    };
+    let bumper = ObstacleTopic::new("bumper", ObstacleKind::Bumper, "/bumper");
+    let button = ObstacleTopic::new("button", ObstacleKind::Bumper, "/button");
+    let sources = vec![sonar, bumper, button];
+    let input = InputSettings { sources, ..InputSettings::default() };
+    let mut listening = listen(&log, &input, DEPTH);
+    let lacks = |listening: &Listening| {
+        let missing = listening.start().err().map(|error| error.to_string());
+        missing.unwrap_or_default()
+    };
+    assert!(lacks(&listening).contains("no message of source `sonar` on /sonar"));
+    let range = Range { field_of_view: 0.5, max_range: 4.0, range: 1.5, ..Range::default() };
+    listening.announce("/sonar", "sensor_msgs/msg/Range");
+    assert!(listening.wants("/sonar"));
+    listening.take("/sonar", &encode(&range));
+    // Events need not have come: a bumper that is not pressed is silent.
+    assert!(lacks(&listening).contains("source `bumper`"));
+    listening.announce("/bumper", "kobuki_ros_interfaces/msg/BumperEvent");
+    assert!(lacks(&listening).contains("source `button`"));
+    listening.announce("/button", "std_msgs/msg/Bool");
+    listening.take("/button", &encode(&BoolMsg { data: false }));
+    let mut source = listening.start().unwrap();
+    let topics: Vec<&str> = source.topics().collect();
+    assert!(["/sonar", "/bumper", "/button"].iter().all(|topic| topics.contains(topic)));
+    let mut last = None;
+    replay(&log, |topic, _, data| {
+        source.take(topic, data);
+        last = source.newest_frame().or(last.take());
+        if topic == "/camera/color/image_raw" && source.counters().contains_key("frames") {
+            source.take_at("/button", &encode(&BoolMsg { data: true }), 1_000_000_000);
+        }
+    });
+    source.take("/bumper", &encode(&BumperEvent { bumper: 1, state: BumperEvent::PRESSED }));
+    let stamp = last.unwrap().frame.stamp.plus_seconds(0.1);
+    let header = Header::new(stamp.plus_seconds(-0.05), "sonar");
+    source.take("/sonar", &encode(&Range { header, ..range }));
+    let (colour, depth) = ("/camera/color/image_raw", "/camera/depth/image_raw");
+    let frame_at = |source: &mut LiveSource, stamp, arrival_ns| {
+        let mut next = started();
+        next.colour(stamp);
+        next.depth(stamp, "colour", 2.0);
+        replay(&next.finish(), |topic, _, data| {
+            if topic == colour || topic == depth {
+                source.take_at(topic, data, arrival_ns);
+            }
+        });
+        source.newest_frame().unwrap()
+    };
+    let found = frame_at(&mut source, stamp, 5_000_000_000);
+    let readings = &found.frame.sensor::<ObstacleReadings>().unwrap().0;
+    let names: Vec<&str> = readings.iter().map(|reading| &*reading.source).collect();
+    assert_eq!(names, ["sonar", "bumper", "button"]);
+    assert!((readings[0].age_s - 0.05).abs() < 1e-6, "{}", readings[0].age_s);
+    assert!(matches!(readings[1].data, ObstacleData::Bumper(true)) && readings[1].age_s == 0.0);
+    assert!(matches!(readings[2].data, ObstacleData::Bumper(true)));
+    // Without a time of its arrival it has that of the image before it.
+    assert!((readings[2].age_s - 0.1).abs() < 1e-6, "{}", readings[2].age_s);
+    source.take_at("/button", &encode(&BoolMsg { data: false }), 5_030_000_000);
+    let found = frame_at(&mut source, stamp.plus_seconds(0.1), 5_100_000_000);
+    let button = &found.frame.sensor::<ObstacleReadings>().unwrap().0[2];
+    assert!(matches!(button.data, ObstacleData::Bumper(false)));
+    assert!((button.age_s - 0.07).abs() < 1e-6, "{}", button.age_s);
 }
 
 #[test]

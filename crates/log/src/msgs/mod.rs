@@ -8,6 +8,7 @@
 //! than its header.
 
 mod common;
+mod contact;
 mod geometry;
 mod ros1;
 mod scene;
@@ -15,6 +16,9 @@ mod sensor;
 mod vision;
 
 pub use common::{Header, StringMsg, Time};
+pub use contact::{
+    BoolMsg, BumperEvent, BumperState, ContactCount, HazardDetection, HazardDetectionVector,
+};
 pub use geometry::{
     Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage,
     Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
@@ -27,7 +31,7 @@ pub use scene::{
 };
 pub use sensor::{
     CameraInfo, CompressedImage, DisparityImage, Image, JointState, LaserScan, PointCloud2,
-    PointField, RegionOfInterest,
+    PointField, Range, RegionOfInterest,
 };
 use serde::{Deserialize, Serialize};
 pub use vision::{

@@ -133,6 +133,26 @@ pub struct LaserScan {
 
 message!(LaserScan, "sensor_msgs/msg/LaserScan", "LaserScan.msg");
 
+/// `sensor_msgs/Range`. Newer versions have a variance behind the last field, which is not used.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Range {
+    /// Time, and the sensor, which looks along its X axis.
+    pub header: Header,
+    /// 0 for ultrasound, 1 for infrared.
+    pub radiation_type: u8,
+    /// Angle of the cone, rad.
+    pub field_of_view: f32,
+    /// Minimum range that is measured, m.
+    pub min_range: f32,
+    /// Maximum range that is measured, m.
+    pub max_range: f32,
+    /// The range, m; infinite for no reflection, and minus infinite for one below the minimum (REP
+    /// 117).
+    pub range: f32,
+}
+
+message!(Range, "sensor_msgs/msg/Range", "Range.msg");
+
 /// `sensor_msgs/JointState`: lists of one length, or empty if unknown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointState {

@@ -55,6 +55,56 @@ fn both_byte_orders_are_read() {
     assert_eq!(decode::<Detection3DArray>(&encode_big_endian(&sent)).unwrap(), sent);
 }
 
+/// Appends the header of ROS 1: sequence number, stamp and frame.
+fn ros1_header(bytes: &mut Vec<u8>) {
+    bytes.extend(ROS1_MARK);
+    bytes.extend([7_u32, 7, 8, 6].iter().flat_map(|word| word.to_le_bytes()));
+    bytes.extend(b"camera");
+}
+
+#[test]
+fn ranges_are_read_with_and_without_their_variance_and_in_ros_1() {
+    let sent = Range {
+        header: header(),
+        radiation_type: 1,
+        field_of_view: 0.5,
+        min_range: 0.1,
+        max_range: 4.0,
+        range: 1.5,
+    };
+    let written = encode(&sent);
+    assert_eq!(decode::<Range>(&written).unwrap(), sent);
+    let with_variance = [&written[..], &0.01_f32.to_le_bytes()].concat();
+    assert_eq!(decode::<Range>(&with_variance).unwrap(), sent);
+    let mut ros1 = Vec::new();
+    ros1_header(&mut ros1);
+    ros1.push(1);
+    ros1.extend([0.5_f32, 0.1, 4.0, 1.5].iter().flat_map(|number| number.to_le_bytes()));
+    assert_eq!(decode::<Range>(&ros1).unwrap(), sent);
+    for end in 0..ros1.len() {
+        assert!(decode::<Range>(&ros1[..end]).is_err(), "{end}");
+    }
+}
+
+#[test]
+fn bumpers_are_read_from_the_beginning_of_their_messages() {
+    let state = BumperState { header: header(), bumper: 2 };
+    let rest = [1.5_f32, 0.0, 0.0].iter().flat_map(|number| number.to_le_bytes());
+    let message: Vec<u8> = encode(&state).into_iter().chain(rest).collect();
+    assert_eq!(decode::<BumperState>(&message).unwrap(), state);
+    let mut ros1 = Vec::new();
+    ros1_header(&mut ros1);
+    ros1.extend(2_u32.to_le_bytes());
+    ros1.extend(b"the contacts themselves");
+    let contacts = decode::<ContactCount>(&ros1).unwrap();
+    assert_eq!(contacts, ContactCount { header: header(), contacts: 2 });
+    let event = decode::<BumperEvent>(&[ROS1_MARK.as_slice(), &[2, 1]].concat()).unwrap();
+    assert_eq!(event, BumperEvent { bumper: 2, state: BumperEvent::PRESSED });
+    let hazard = HazardDetection { header: header(), kind: HazardDetection::BUMP };
+    let hazards = HazardDetectionVector { header: header(), detections: vec![hazard] };
+    assert_eq!(decode::<HazardDetectionVector>(&encode(&hazards)).unwrap(), hazards);
+}
+
 #[test]
 fn other_encapsulations_are_refused_by_name() {
     let mut bytes = encode(&StringMsg { data: "a".into() });
@@ -106,6 +156,9 @@ proptest! {
         let _ = decode::<TFMessage>(&message);
         let _ = decode::<Odometry>(&message);
         let _ = decode::<Detection3DArray>(&message);
+        let _ = decode::<Range>(&message);
+        let _ = decode::<HazardDetectionVector>(&message);
+        let _ = decode::<BoolMsg>(&message);
     }
 
     #[test]

@@ -58,8 +58,7 @@ impl SensorReader for Scans {
             tally.note("tf does not connect the laser scanner with the robot: it is not used");
             return sensors;
         };
-        let pose = moment.odom_from_robot;
-        sensors.with(seen_from(scan, &mount, &(pose(moment.stamp).inverse() * pose(then))))
+        sensors.with(seen_from(scan, &mount, &moment.robot_from(then)))
     }
 }
 
@@ -95,10 +94,6 @@ pub(crate) fn seen_from(
     robot_from_laser: &Isometry3<f64>,
     robot_from_then: &Isometry2<f64>,
 ) -> Scan {
-    let (x, y) = (robot_from_then.translation.x, robot_from_then.translation.y);
-    let turn =
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), robot_from_then.rotation.angle());
-    let moved = Isometry3::from_parts(Vector3::new(x, y, 0.0).into(), turn);
     let moved_point = |point: Point3<f64>| {
         let then = robot_from_laser * point;
         // The robot moves on a floor: heights stay.
@@ -108,13 +103,20 @@ pub(crate) fn seen_from(
     let (rays, points): (Vec<u32>, Vec<Point3<f64>>) =
         points(scan).map(|(ray, point)| (ray, moved_point(point))).unzip();
     Scan {
-        robot_from_scanner: moved * robot_from_laser,
+        robot_from_scanner: on_floor(robot_from_then) * robot_from_laser,
         first_rad: f64::from(scan.angle_min),
         increment_rad: f64::from(scan.angle_increment),
         points: points.into(),
         rays: rays.into(),
         unread: unread(scan).collect(),
     }
+}
+
+/// Returns a motion on the floor as one in space.
+pub(crate) fn on_floor(motion: &Isometry2<f64>) -> Isometry3<f64> {
+    let (x, y) = (motion.translation.x, motion.translation.y);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), motion.rotation.angle());
+    Isometry3::from_parts(Vector3::new(x, y, 0.0).into(), turn)
 }
 
 /// Returns false for a scan with invalid angles or ranges.

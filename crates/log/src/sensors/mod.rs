@@ -96,6 +96,14 @@ pub(crate) struct Moment<'a> {
     pub(crate) odom_from_robot: &'a dyn Fn(Stamp) -> Isometry2<f64>,
 }
 
+impl Moment<'_> {
+    /// Returns the pose of the robot of another time in the robot frame of this one.
+    pub(crate) fn robot_from(&self, then: Stamp) -> Isometry2<f64> {
+        let pose = self.odom_from_robot;
+        pose(self.stamp).inverse() * pose(then)
+    }
+}
+
 impl SensorType {
     /// Returns the sensor that a message type belongs to.
     pub(crate) fn of_message(schema: &str) -> Option<&'static Self> {

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    DepthImage, EgoMotion, Frame, Images, Input, RightImage, Sensors, Stamp, planar_pose,
+    DepthImage, EgoMotion, Frame, Images, Input, ObstacleReadings, RightImage, Sensors, Stamp,
+    planar_pose,
 };
 use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole};
 use tagalong_vision::Unwrapping;
@@ -19,7 +20,8 @@ use crate::images::{
     decode_disparity, decode_plain_disparity, decode_raw, size_of_compressed, size_of_raw,
 };
 use crate::msgs::{CompressedImage, DisparityImage, Image, LaserScan, decode};
-use crate::odometry::{PoseAt, unknown_motion};
+use crate::obstacles::DepthFormat;
+use crate::odometry::{MAX_GAP_S, PoseAt, unknown_motion};
 use crate::pairing::Payload;
 use crate::register::Registration;
 use crate::scan::Type;
@@ -69,6 +71,7 @@ impl Assembler {
         self.index += 1;
         let tolerance_s = plan.input.pair_tolerance_s;
         intake.pair_sensors(image.stamp, next, tolerance_s);
+        watch_frame(plan, Some(plan.primary()), image, image.stamp, intake, tally);
         if plan.is_of_scans() {
             return self.assemble_scan(plan, image, intake, tally);
         }
@@ -79,6 +82,11 @@ impl Assembler {
         }
         if plan.chosen.right.is_some() && right.is_none() {
             tally.count("left_without_right");
+        }
+        for (topic, partner) in [(&plan.chosen.depth, &depth), (&plan.chosen.right, &right)] {
+            if let Some(partner) = partner {
+                watch_frame(plan, topic.as_deref(), partner, image.stamp, intake, tally);
+            }
         }
         let requires = |input| plan.inputs.requires(input);
         // Tested before decoding, which is the costly part.
@@ -109,7 +117,7 @@ impl Assembler {
         &mut self,
         plan: &Plan,
         scan: &Payload,
-        intake: &Intake,
+        intake: &mut Intake,
         tally: &mut Tally,
     ) -> Option<LogFrame> {
         let Some(sweep) = decode::<LaserScan>(&scan.data).ok().filter(is_sane) else {
@@ -307,25 +315,63 @@ impl Assembler {
         each.fold(sensors, |all, (topic, sensor)| sensor.add_to(all, &moment(topic), tally))
     }
 
+    /// Returns the sensors of a frame with the readings of the further sources of obstacles, if there
+    /// are any sources.
+    fn sense_obstacles(
+        &self,
+        plan: &Plan,
+        stamp: Stamp,
+        camera: &Arc<Camera>,
+        sensors: Sensors,
+        intake: &mut Intake,
+        tally: &mut Tally,
+    ) -> Sensors {
+        if !plan.inputs.uses(Input::OBSTACLES) || plan.input.sources.is_empty() {
+            return sensors;
+        }
+        // Out of the intake, which gives the poses meanwhile.
+        let mut readers = std::mem::take(&mut intake.obstacles);
+        let odom_from_robot = |stamp| self.pose_at(plan, stamp, intake).pose;
+        let format = DepthFormat { unit_m: plan.input.depth_unit_m, limits: &plan.limits };
+        let mut readings = Vec::new();
+        for reader in &mut readers {
+            let topic = reader.topic().to_owned();
+            let moment = Moment {
+                topic: &topic,
+                stamp,
+                camera,
+                robot_frame: robot_frame(&plan.scan, &plan.input),
+                tf: &intake.tf,
+                odom_from_robot: &odom_from_robot,
+            };
+            readings.extend(reader.reading(&moment, format, tally));
+        }
+        intake.obstacles = readers;
+        sensors.with(ObstacleReadings(readings.into()))
+    }
+
     fn finish(
         &mut self,
         plan: &Plan,
         stamp: Stamp,
         camera: Arc<Camera>,
         sensors: Sensors,
-        intake: &Intake,
+        intake: &mut Intake,
         tally: &mut Tally,
     ) -> LogFrame {
         // Before `previous` is this frame: without odometry it gives the pose.
         let sensors = self.sense(plan, stamp, &camera, sensors, intake, tally);
+        let sensors = self.sense_obstacles(plan, stamp, &camera, sensors, intake, tally);
         let here = self.pose_at(plan, stamp, intake);
+        note_odometry_ahead(plan, stamp, intake, tally);
         let odom_jumped = self.has_jumped(plan, stamp, intake, tally);
         let (motion, known) = self.motion(plan, stamp, here, odom_jumped, tally);
         self.previous = Some((stamp, here));
         tally.count("frames");
         LogFrame {
             frame: Frame::of_sensors(self.index, stamp, camera, motion, sensors)
-                .with_changed_calibration(intake.has_changed_camera(stamp)),
+                .with_changed_calibration(intake.watch.has_changed(stamp))
+                .with_odometry_age(odometry_age_s(plan, stamp, intake)),
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
             odom_jumped,
@@ -336,10 +382,12 @@ impl Assembler {
         let found = match &plan.odom_frames {
             None => return PoseAt { pose: Isometry2::identity(), stale: false },
             Some(None) => intake.poses.at(stamp),
-            Some(Some((odom, robot))) => intake
-                .tf
-                .lookup(odom, robot, stamp)
-                .map(|pose| PoseAt { pose: planar_pose(&pose), stale: false }),
+            Some(Some((odom, robot))) => intake.tf.lookup(odom, robot, stamp).map(|pose| {
+                let age_s = intake.tf.age_s(odom, robot, stamp);
+                // Static transforms alone have no age.
+                let stale = age_s.is_finite() && age_s > MAX_GAP_S;
+                PoseAt { pose: planar_pose(&pose), stale }
+            }),
         };
         // Without odometry the robot stays at its last pose, which is marked as stale.
         let last = self.previous.map_or_else(Isometry2::identity, |(_, last)| last.pose);
@@ -380,6 +428,47 @@ impl Assembler {
             return (unknown_motion(dt), false);
         }
         (EgoMotion::between(&before.pose, &here.pose, dt, plan.input.odometry_sigma), true)
+    }
+}
+
+/// Compares the frame of an image that a frame is made of with that of the first image of its topic.
+fn watch_frame(
+    plan: &Plan,
+    topic: Option<&str>,
+    image: &Payload,
+    frame_stamp: Stamp,
+    intake: &mut Intake,
+    tally: &mut Tally,
+) {
+    if let Some(topic) = topic {
+        let first = plan.scan.frame_of(topic);
+        intake.watch.watch_frame(topic, first, image, frame_stamp, tally);
+    }
+}
+
+/// Returns the age of odometry at a frame, s; infinite without any.
+fn odometry_age_s(plan: &Plan, stamp: Stamp, intake: &Intake) -> f64 {
+    match &plan.odom_frames {
+        None => f64::INFINITY,
+        Some(None) => intake.poses.age_s(stamp),
+        Some(Some((odom, robot))) => intake.tf.age_s(odom, robot, stamp),
+    }
+}
+
+/// Counts a frame whose next reading of odometry lies far in its future, and tells how far.
+fn note_odometry_ahead(plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut Tally) {
+    let ahead_s = match &plan.odom_frames {
+        None => None,
+        Some(None) => intake.poses.ahead_s(stamp),
+        Some(Some((odom, robot))) => intake.tf.ahead_s(odom, robot, stamp),
+    };
+    if let Some(ahead_s) = ahead_s {
+        tally.remark("odometry_ahead_frames", || {
+            format!(
+                "odometry is stamped {ahead_s:.1} s after the frame at {stamp} and is not used for \
+                 it: compare the clocks of the odometry and of the sensor that makes the frames"
+            )
+        });
     }
 }
 

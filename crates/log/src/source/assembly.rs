@@ -30,13 +30,12 @@ pub(super) struct Assembly {
 
 impl Assembly {
     pub(super) fn new(plan: Plan, tally: Tally) -> Self {
-        let intake = Intake::new(&plan.scan, &plan.chosen, plan.primary(), &plan.input);
-        Self { intake, assembler: Assembler::new(), plan, tally, ended: false }
+        Self { intake: Intake::new(&plan), assembler: Assembler::new(), plan, tally, ended: false }
     }
 
     /// Returns true for topics with messages that are used.
     pub(super) fn reads(&self, channel: &Channel) -> bool {
-        Type::of(&channel.schema_name) == Type::Tf || self.plan.chosen.has(&channel.topic)
+        Type::of(&channel.schema_name) == Type::Tf || self.plan.reads(&channel.topic)
     }
 
     pub(super) fn take(&mut self, message: &Message<'_>) {
@@ -122,6 +121,7 @@ impl Assembly {
             odometry_topic: chosen.odometry.clone(),
             laser_topic: chosen.sensor(Input::Laser).map(str::to_owned),
             sensor_topics: chosen.named_sensors(),
+            obstacle_topics: self.plan.obstacle_topics(),
             calibration_topic: self.plan.calibration_topic().cloned(),
             camera_frame: scan.frame_of(self.plan.primary()).map(str::to_owned),
             robot_frame: robot_frame(scan, &self.plan.input).to_owned(),

@@ -2,11 +2,10 @@
 
 use tagalong_core::{Stamp, planar_pose};
 
+use super::changes::CameraWatch;
 use super::plan::Plan;
-use crate::InputSettings;
-use crate::msgs::{
-    CameraInfo, CdrError, CompressedImage, DisparityImage, Image, Odometry, TFMessage, decode,
-};
+use crate::msgs::{CdrError, CompressedImage, DisparityImage, Image, Odometry, TFMessage, decode};
+use crate::obstacles::ObstacleReader;
 use crate::odometry::PoseBuffer;
 use crate::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
 use crate::scan::{Scan, Type, is_static};
@@ -16,38 +15,51 @@ use crate::tf::TfBuffer;
 use crate::topics::Chosen;
 use crate::walk::Message;
 
+/// Time of recording of a live message whose arrival is not told.
+pub(super) const UNKNOWN_TIME: u64 = 0;
+/// Longest time from the last frame to a message without a stamp that counts, s.
+const MAX_WAIT_S: f64 = 10.0;
+
 /// Messages that have been read and not yet become a frame.
 pub(super) struct Intake {
     chosen: Chosen,
     /// Topic that makes the frames: colour, or depth without it, or laser scans.
     primary: String,
-    info: Option<CameraInfo>,
-    /// Time of the first calibration that differs from `info`.
-    changed_at: Option<Stamp>,
+    pub(super) watch: CameraWatch,
+    /// Newest stamp of the messages that make the frames.
+    newest: Option<Stamp>,
     pub(super) frames: Reorder,
     pub(super) depth: Waiting,
     pub(super) right: Waiting,
     /// Topics of the sensors beside the images, with their readers.
     pub(super) sensors: Vec<(String, Box<dyn SensorReader>)>,
+    /// Readers of the further sources of obstacles.
+    pub(super) obstacles: Vec<ObstacleReader>,
+    /// Stamp of the last message that makes a frame, and the time of its arrival, ns.
+    heard: Option<(Stamp, u64)>,
     pub(super) tf: TfBuffer,
     pub(super) poses: PoseBuffer,
 }
 
 impl Intake {
-    pub(super) fn new(scan: &Scan, chosen: &Chosen, primary: &str, input: &InputSettings) -> Self {
+    pub(super) fn new(plan: &Plan) -> Self {
+        let Plan { scan, chosen, input, .. } = plan;
+        let primary = plan.primary();
+        let sources = plan.sources.iter();
         let mut tf = scan.tf.clone();
         // The first pass left one sample of each moving transform, to know the links only.
         tf.clear_moving();
-        let info = chosen.colour_info.as_ref().and_then(|topic| scan.infos.get(topic));
         Self {
             chosen: chosen.clone(),
             primary: primary.to_owned(),
-            info: info.cloned(),
-            changed_at: None,
+            watch: CameraWatch::new(plan),
+            newest: None,
             frames: Reorder::new(input.reorder_frames),
             depth: Waiting::default(),
             right: Waiting::default(),
             sensors: readers(scan, chosen, primary),
+            obstacles: sources.filter_map(|it| ObstacleReader::new(it, scan.is_live())).collect(),
+            heard: None,
             tf,
             poses: PoseBuffer::default(),
         }
@@ -55,9 +67,13 @@ impl Intake {
 
     /// Takes in a message. One that cannot be decoded is counted as lost.
     pub(super) fn take(&mut self, message: &Message<'_>, tally: &mut Tally) {
+        self.take_obstacles(message, tally);
         let topic = Some(&message.channel.topic);
         let outcome = if *message.channel.topic == self.primary {
-            payload(message).map(|image| self.take_frame(image, tally))
+            payload(message).map(|image| {
+                self.heard = Some((image.stamp, message.log_time));
+                self.take_frame(image, tally);
+            })
         } else if topic == self.chosen.depth.as_ref() {
             payload(message).map(|image| self.depth.push(image))
         } else if topic == self.chosen.right.as_ref() {
@@ -67,7 +83,7 @@ impl Intake {
         } else if topic == self.chosen.odometry.as_ref() {
             decode(message.data).map(|odometry| self.take_odometry(&odometry, tally))
         } else if topic == self.chosen.colour_info.as_ref() {
-            decode(message.data).map(|info| self.watch_info(&info, tally))
+            decode(message.data).map(|info| self.watch.watch_info(&info, tally))
         } else if Type::of(&message.channel.schema_name) == Type::Tf {
             decode(message.data).map(|tf| self.take_tf(&tf, &message.channel.topic, tally))
         } else {
@@ -78,14 +94,39 @@ impl Intake {
         }
     }
 
+    /// Hands a message to the sources of obstacles on its topic, which may also be one of the frames.
+    fn take_obstacles(&mut self, message: &Message<'_>, tally: &mut Tally) {
+        let topic = &message.channel.topic;
+        let arrival = self.arrival(message.log_time);
+        for reader in self.obstacles.iter_mut().filter(|reader| reader.topic() == *topic) {
+            if let Err(error) = reader.take(message.data, arrival, tally) {
+                tally.lose("messages_undecodable", || format!("{topic}: {error}"));
+            }
+        }
+    }
+
+    /// Returns the time of arrival of a message by the clock of the stamps, which may not be that of
+    /// the arrivals: that of the last frame, and the time since then where both times are known.
+    fn arrival(&self, log_time: u64) -> Stamp {
+        let Some((stamp, then)) = self.heard else { return Stamp::default() };
+        if then == UNKNOWN_TIME || log_time == UNKNOWN_TIME {
+            return stamp;
+        }
+        let since_s = log_time.saturating_sub(then) as f64 * 1e-9;
+        stamp.plus_seconds(since_s.min(MAX_WAIT_S))
+    }
+
     fn take_frame(&mut self, image: Payload, tally: &mut Tally) {
         let newest = self.frames.last();
+        self.newest = self.newest.max(Some(image.stamp));
         match self.frames.push(image) {
             Arrival::Queued | Arrival::Suspect => {}
             Arrival::Duplicate => tally.count("duplicate_frames"),
             Arrival::LateBefore => tally.count("late_frames"),
             Arrival::Jumped => {
                 tally.count("time_jumps_back");
+                self.newest = self.frames.newest();
+                self.watch.clock_jumps();
                 // Partners with older stamps than the newest image belong to the new time already.
                 if let Some(newest) = newest {
                     self.depth.set_aside(newest);
@@ -117,6 +158,26 @@ impl Intake {
     }
 
     fn take_tf(&mut self, tf: &TFMessage, topic: &str, tally: &mut Tally) {
+        match self.newest {
+            Some(now) if is_static(topic) => self.take_static(tf, topic, now, tally),
+            // Before the first frame, a later mount replaces an earlier one.
+            _ => self.insert_all(tf, topic, tally),
+        }
+    }
+
+    /// Takes in static transforms during the run; those that move a camera are not used.
+    fn take_static(&mut self, tf: &TFMessage, topic: &str, now: Stamp, tally: &mut Tally) {
+        let before = self.watch.mounts(&self.tf);
+        let children = tf.transforms.iter().map(|transform| &transform.child_frame_id);
+        let saved: Vec<_> = children.map(|child| self.tf.saved(child)).collect();
+        self.insert_all(tf, topic, tally);
+        if self.watch.watch_mounts(&before, &self.tf, now, tally) {
+            // In reverse order, because a frame may be there twice.
+            saved.into_iter().rev().for_each(|link| self.tf.restore(link));
+        }
+    }
+
+    fn insert_all(&mut self, tf: &TFMessage, topic: &str, tally: &mut Tally) {
         for transform in &tf.transforms {
             if !self.tf.insert(transform, is_static(topic)) {
                 tally.lose("transforms_invalid", || {
@@ -127,26 +188,6 @@ impl Intake {
                 });
             }
         }
-    }
-
-    fn watch_info(&mut self, info: &CameraInfo, tally: &mut Tally) {
-        // Field by field, because the header differs in each message.
-        let changed = self.info.as_ref().is_some_and(|first| {
-            first.k != info.k || first.d != info.d || first.p != info.p || first.roi != info.roi
-        });
-        if changed {
-            self.changed_at.get_or_insert(info.header.stamp());
-            tally.lose("camera_info_changes", || {
-                "the calibration changes on the way; the first one is used throughout, and from \
-                 the change on tracks stay where they were"
-                    .into()
-            });
-        }
-    }
-
-    /// Returns true if the calibration has changed by this time.
-    pub(super) fn has_changed_camera(&self, stamp: Stamp) -> bool {
-        self.changed_at.is_some_and(|at| at <= stamp)
     }
 
     /// Returns the newest image with all its partners, and the number of older ones that were

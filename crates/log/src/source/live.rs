@@ -9,6 +9,7 @@ use std::slice::Iter;
 use std::sync::Arc;
 
 use super::assembly::{Assembly, Messages};
+use super::intake::UNKNOWN_TIME;
 use super::plan::{plan, tally_of};
 use super::{LogFacts, LogFrame};
 use crate::scan::{Gathering, Type};
@@ -85,6 +86,9 @@ impl Listening {
     /// output has the same type.
     pub fn wants(&self, topic: &str) -> bool {
         let Some(channel) = self.channels.get(topic) else { return false };
+        if self.input.sources.iter().any(|source| source.topic == topic) {
+            return true;
+        }
         match Type::of(&channel.schema_name) {
             Type::Other => false,
             Type::Sensor => SensorType::of_message(&channel.schema_name).is_some_and(|sensor| {
@@ -143,8 +147,15 @@ impl LiveSource {
     /// Takes in a message, in CDR with its encapsulation header. One that cannot be decoded is
     /// counted.
     pub fn take(&mut self, topic: &str, data: &[u8]) {
+        self.take_at(topic, data, UNKNOWN_TIME);
+    }
+
+    /// Takes in a message as [`LiveSource::take`] with the time of its arrival, ns, of any clock that
+    /// does not go back and is not at 0: the time of messages without a stamp of their own, as those of
+    /// simple bumpers. Without it they have the stamp of the image before them.
+    pub fn take_at(&mut self, topic: &str, data: &[u8], arrival_ns: u64) {
         if let Some(channel) = self.channels.get(topic) {
-            self.assembly.take(&message(channel, data));
+            self.assembly.take(&Message { log_time: arrival_ns, ..message(channel, data) });
         }
     }
 
@@ -184,5 +195,5 @@ impl LiveSource {
 }
 
 fn message<'a>(channel: &'a Arc<Channel>, data: &'a [u8]) -> Message<'a> {
-    Message { channel, log_time: 0, publish_time: 0, sequence: 0, data }
+    Message { channel, log_time: UNKNOWN_TIME, publish_time: 0, sequence: 0, data }
 }

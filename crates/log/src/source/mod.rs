@@ -2,6 +2,7 @@
 
 mod assemble;
 mod assembly;
+mod changes;
 mod intake;
 mod live;
 mod mount;
@@ -58,6 +59,9 @@ pub struct LogFacts {
     /// Topics of the sensors that other crates define, by the names of their inputs.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub sensor_topics: BTreeMap<&'static str, String>,
+    /// Topics of the further sources of obstacles, by the names of the sources.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub obstacle_topics: BTreeMap<String, String>,
     /// Frame id of the images.
     pub camera_frame: Option<String>,
     /// Topic of the calibration of the frames.

@@ -1,5 +1,6 @@
 //! Decisions before the first frame.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use tagalong_core::DepthImage;
@@ -10,6 +11,7 @@ use super::assembly::{Assembly, Messages};
 use super::mount::{Mount, robot_frame};
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::images::StereoGeometry;
+use crate::obstacles::{PlannedSource, planned_sources};
 use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
 use crate::topics::{Chosen, choose, missing, unreadable};
@@ -34,12 +36,25 @@ pub(super) struct Plan {
     /// Source of the odometry. `None`: no odometry. `Some(None)`: its topic. Else the two frames of
     /// tf.
     pub(super) odom_frames: Option<Option<(String, String)>>,
+    /// Further sources of obstacles.
+    pub(super) sources: Vec<PlannedSource>,
 }
 
 impl Plan {
     /// Returns the topic of the images that make the frames.
     pub(super) fn primary(&self) -> &str {
         primary(&self.chosen)
+    }
+
+    /// Returns true for a topic whose messages are used.
+    pub(super) fn reads(&self, topic: &str) -> bool {
+        self.chosen.has(topic) || self.sources.iter().any(|source| source.topic.topic == topic)
+    }
+
+    /// Returns the topics of the further sources of obstacles, by the names of the sources.
+    pub(super) fn obstacle_topics(&self) -> BTreeMap<String, String> {
+        let topics = self.sources.iter().map(|source| &source.topic);
+        topics.map(|source| (source.name.clone(), source.topic.clone())).collect()
     }
 
     /// Returns the error for a calibration that does not fit the images.
@@ -160,6 +175,10 @@ pub(super) fn plan(
         None => depth_lens,
     };
     let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref(), false)?;
+    let sources = match inputs.uses(Input::OBSTACLES) {
+        true => planned_sources(&scan, input, tally)?,
+        false => Vec::new(),
+    };
     let mut plan = Plan {
         mount: Mount::assumed(),
         lens: lens.or_else(|| depth_lens.filter(|_| same_frame(&scan, &chosen))),
@@ -172,6 +191,7 @@ pub(super) fn plan(
         input: input.clone(),
         limits: limits.clone(),
         inputs,
+        sources,
     };
     check_calibration(&plan, tally)?;
     plan.disparity = stereo_geometry(&plan)?;
@@ -334,6 +354,7 @@ fn floor(plan: &Plan, reread: Reread<'_>) -> Result<Option<Mount>, LogError> {
         inputs: Inputs::NONE.require(Input::Depth),
         mount: Mount::assumed(),
         odom_frames: None,
+        sources: Vec::new(),
         ..*plan
     };
     let (mut probe, mut messages) = (Assembly::new(probe, Tally::default()), reread()?);

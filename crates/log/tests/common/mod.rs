@@ -70,14 +70,37 @@ impl LogWriter {
         self.bytes::<T>(topic, stamp, &encode(message));
     }
 
+    /// Writes a message of a type for which there is no definition here.
+    pub fn typed<T: Serialize>(
+        &mut self,
+        topic: &str,
+        name: &'static str,
+        stamp: Stamp,
+        message: &T,
+    ) {
+        let channel_id = self.channel(topic, name, "");
+        let time = stamp.nanos();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        self.writer.write_to_known_channel(&header, &encode(message)).unwrap();
+    }
+
     pub fn colour(&mut self, stamp: Stamp) {
         self.colour_of(stamp, 16, 12);
     }
 
     pub fn colour_of(&mut self, stamp: Stamp, width: u32, height: u32) {
+        self.colour_with(stamp, "colour", width, height);
+    }
+
+    /// Writes a colour image of this frame.
+    pub fn colour_from(&mut self, stamp: Stamp, frame: &str) {
+        self.colour_with(stamp, frame, 16, 12);
+    }
+
+    fn colour_with(&mut self, stamp: Stamp, frame: &str, width: u32, height: u32) {
         let data = vec![(stamp.nanos() / 1_000_000 % 251) as u8; (3 * width * height) as usize];
         let message = Image {
-            header: Header::new(stamp, "colour"),
+            header: Header::new(stamp, frame),
             height,
             width,
             encoding: "rgb8".into(),
@@ -113,7 +136,12 @@ impl LogWriter {
     }
 
     pub fn fixed(&mut self, parent: &str, child: &str, pose: &Isometry3<f64>) {
-        self.message("/tf_static", at(0.0), &transform(parent, child, at(0.0), pose));
+        self.fixed_at(at(0.0), parent, child, pose);
+    }
+
+    /// Writes a static transform at a later time of the log.
+    pub fn fixed_at(&mut self, stamp: Stamp, parent: &str, child: &str, pose: &Isometry3<f64>) {
+        self.message("/tf_static", stamp, &transform(parent, child, stamp, pose));
     }
 
     pub fn moving(&mut self, parent: &str, child: &str, stamp: Stamp, pose: &Isometry3<f64>) {
@@ -121,11 +149,16 @@ impl LogWriter {
     }
 
     pub fn odometry(&mut self, stamp: Stamp, x: f64, yaw: f64) {
+        let pose = Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::new(0.0, 0.0, yaw));
+        self.odometry_of(stamp, stamp, Pose::from(&pose));
+    }
+
+    /// Writes a pose of odometry with any stamp and any numbers at a time of the log.
+    pub fn odometry_of(&mut self, written: Stamp, stamp: Stamp, pose: Pose) {
         let mut odometry = Odometry { header: Header::new(stamp, "odom"), ..Odometry::default() };
         odometry.child_frame_id = "base_link".into();
-        let pose = Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::new(0.0, 0.0, yaw));
-        odometry.pose.pose = Pose::from(&pose);
-        self.message("/odom", stamp, &odometry);
+        odometry.pose.pose = pose;
+        self.message("/odom", written, &odometry);
     }
 
     pub fn attachment(&mut self, data: &[u8]) {

@@ -1,13 +1,16 @@
 //! Frames from small invented logs.
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
+mod cameras;
 #[path = "../common/mod.rs"]
 mod common;
+mod obstacles;
+mod odometry_age;
 mod topics;
 
 use common::{LogWriter, SavedLog, at, camera, info_of, level_pose};
 use mcap::WriteOptions;
-use nalgebra::{Isometry3, Point2, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use tagalong_core::DepthImage;
 use tagalong_geometry::Camera;
 use tagalong_log::msgs::{

@@ -1,0 +1,134 @@
+//! Sources of obstacles that a log or a robot has.
+
+use super::bumper::Contact;
+use super::{ObstacleKind, ObstacleTopic};
+use crate::camera_info::{Intrinsics, intrinsics};
+use crate::scan::{Scan, Topic, Type};
+use crate::sensors::is_type;
+use crate::tally::Tally;
+use crate::topics::{info_of, kind_of, missing};
+use crate::{InputSettings, LogError};
+
+/// Source whose topic is there.
+#[derive(Clone, Debug)]
+pub(crate) struct PlannedSource {
+    pub(crate) topic: ObstacleTopic,
+    /// Message type.
+    pub(crate) schema: String,
+    /// Lens of a depth camera.
+    pub(super) lens: Option<Intrinsics>,
+}
+
+impl ObstacleKind {
+    /// Returns true for messages of the kind, in an encoding that can be read.
+    fn reads(self, topic: &Topic) -> bool {
+        let is_readable = matches!(topic.encoding.as_str(), "cdr" | "ros1");
+        is_readable
+            && match self {
+                Self::Scan => is_type(&topic.schema, "sensor_msgs/LaserScan"),
+                Self::Depth => matches!(topic.kind, Type::Image | Type::CompressedImage),
+                Self::Range => is_type(&topic.schema, "sensor_msgs/Range"),
+                Self::Bumper => Contact::of(&topic.schema).is_some(),
+            }
+    }
+
+    /// Returns the message types in words.
+    fn type_names(self) -> String {
+        match self {
+            Self::Scan => "sensor_msgs/LaserScan".to_owned(),
+            Self::Depth => "sensor_msgs/Image, sensor_msgs/CompressedImage".to_owned(),
+            Self::Range => "sensor_msgs/Range".to_owned(),
+            Self::Bumper => Contact::type_names(),
+        }
+    }
+}
+
+/// Returns the sources of the settings that are there. One that a log lacks is told and left out, so
+/// that it never delivers; a robot is waited for.
+///
+/// # Errors
+/// A topic of another type, a calibration that cannot be used, and on a robot a source that has not
+/// delivered.
+pub(crate) fn planned_sources(
+    scan: &Scan,
+    input: &InputSettings,
+    tally: &mut Tally,
+) -> Result<Vec<PlannedSource>, LogError> {
+    let mut planned = Vec::new();
+    // Without a topic, a program fills the frames itself.
+    for source in input.sources.iter().filter(|source| !source.topic.is_empty()) {
+        match planned_source(scan, source)? {
+            Ok(found) => planned.push(found),
+            Err(lack) if scan.is_live() => {
+                return Err(missing(scan, lack.wanted, format!("; {}", lack.remedy)));
+            }
+            Err(lack) => {
+                tally.count("sources_without_messages");
+                tally.note(format!("there is no {}; {}", lack.wanted, lack.remedy));
+            }
+        }
+    }
+    Ok(planned)
+}
+
+/// Missing part of a source.
+struct Lack {
+    wanted: String,
+    remedy: String,
+}
+
+fn planned_source(
+    scan: &Scan,
+    source: &ObstacleTopic,
+) -> Result<Result<PlannedSource, Lack>, LogError> {
+    let ObstacleTopic { name, kind, topic, .. } = source;
+    let found = scan.topics.get(topic);
+    if let Some(other) = found.filter(|found| !kind.reads(found)) {
+        return Err(LogError::Source {
+            path: scan.path.clone(),
+            name: name.clone(),
+            topic: topic.clone(),
+            kind: kind_of(other),
+            wanted: kind.type_names(),
+        });
+    }
+    let may_be_silent = |found: &&Topic| {
+        found.count > 0 || Contact::of(&found.schema).is_some_and(Contact::may_be_silent)
+    };
+    let Some(found) = found.filter(may_be_silent) else {
+        let wanted = format!("message of source `{name}` on {topic}");
+        return Ok(Err(Lack { wanted, remedy: alternatives(scan, *kind) }));
+    };
+    let lens = match kind {
+        ObstacleKind::Depth => lens_of(scan, source)?,
+        ObstacleKind::Scan | ObstacleKind::Range | ObstacleKind::Bumper => None,
+    };
+    if *kind == ObstacleKind::Depth && lens.is_none() {
+        let wanted = format!("calibration (sensor_msgs/CameraInfo) of source `{name}` on {topic}");
+        let remedy = "name its topic as `info_topic` of the source".to_owned();
+        return Ok(Err(Lack { wanted, remedy }));
+    }
+    Ok(Ok(PlannedSource { topic: source.clone(), schema: found.schema.clone(), lens }))
+}
+
+/// Returns the topics that a source of this kind could have, as text.
+fn alternatives(scan: &Scan, kind: ObstacleKind) -> String {
+    let fitting = scan.topics.iter().filter(|(_, topic)| kind.reads(topic));
+    let names: Vec<String> =
+        fitting.map(|(name, topic)| format!("{name} ({} messages)", topic.count)).collect();
+    match names.is_empty() {
+        true => format!("no topic has {}", kind.type_names()),
+        false => format!("of {} there are {}", kind.type_names(), names.join(", ")),
+    }
+}
+
+/// Returns the lens of a depth camera; `None` without a calibration.
+fn lens_of(scan: &Scan, source: &ObstacleTopic) -> Result<Option<Intrinsics>, LogError> {
+    let found = || info_of(scan, &source.topic, false);
+    let Some(topic) = source.info_topic.clone().or_else(found) else { return Ok(None) };
+    let Some(info) = scan.infos.get(&topic) else { return Ok(None) };
+    // The name of the topic is the only sign that images are rectified.
+    intrinsics(info, source.topic.contains("rect"))
+        .map(Some)
+        .map_err(|source| LogError::Calibration { path: scan.path.clone(), topic, source })
+}

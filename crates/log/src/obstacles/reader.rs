@@ -1,0 +1,287 @@
+//! Readers of the sources: from messages to readings where the robot is at the time of a frame.
+
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
+use tagalong_core::{DepthImage, ObstacleData, ObstacleReading, RangeReading, Stamp};
+use tagalong_geometry::{Camera, Lens};
+
+use super::bumper::{Bumper, Contact};
+use super::plan::PlannedSource;
+use super::timed::{Readings, Timed};
+use super::{ObstacleKind, ObstacleTopic};
+use crate::Limits;
+use crate::camera_info::{Intrinsics, check_size};
+use crate::images::{ImageError, Pixels, decode_compressed, decode_raw};
+use crate::msgs::{CdrError, CompressedImage, Image, LaserScan, Range, decode};
+use crate::odometry::AHEAD_S;
+use crate::pairing::Payload;
+use crate::scan::Type;
+use crate::sensors::Moment;
+use crate::sensors::laser::{is_sane, lose_scan, on_floor, seen_from};
+use crate::tally::Tally;
+
+/// Reader of one source.
+pub(crate) struct ObstacleReader {
+    source: ObstacleTopic,
+    name: Arc<str>,
+    messages: Messages,
+    /// Time by which a reading may be later than the frame that it is used for, s.
+    later_s: f64,
+}
+
+/// Messages of a source that are kept.
+enum Messages {
+    Scan(Readings<LaserScan>),
+    Range(Readings<Range>),
+    Depth(Box<DepthMessages>),
+    Bumper(Bumper),
+}
+
+/// Depth images of a camera, of which the newest is decoded.
+struct DepthMessages {
+    kind: Type,
+    lens: Intrinsics,
+    images: Readings<Payload>,
+    /// Last decoded image with its number; `None` for one that is damaged.
+    decoded: Option<(u64, Option<Arc<DepthImage>>)>,
+}
+
+/// Settings for the decoding of depth images.
+#[derive(Clone, Copy)]
+pub(crate) struct DepthFormat<'a> {
+    /// Metres per unit, if it is not that of the encoding.
+    pub(crate) unit_m: Option<f64>,
+    /// Largest sizes.
+    pub(crate) limits: &'a Limits,
+}
+
+impl ObstacleReader {
+    /// Creates the reader of a source; `None` for a planned source that lacks a part.
+    ///
+    /// On a robot all readings that have come count, also those of after the frame, whose images take
+    /// their time. A log is read ahead, so there only those of before the frame do.
+    pub(crate) fn new(planned: &PlannedSource, is_live: bool) -> Option<Self> {
+        let later_s = if is_live { AHEAD_S } else { 0.0 };
+        let PlannedSource { topic: source, schema, lens } = planned;
+        let messages = match source.kind {
+            ObstacleKind::Scan => Messages::Scan(Readings::default()),
+            ObstacleKind::Range => Messages::Range(Readings::default()),
+            ObstacleKind::Bumper => Messages::Bumper(Bumper::new(Contact::of(schema)?)),
+            ObstacleKind::Depth => Messages::Depth(Box::new(DepthMessages {
+                kind: Type::of(schema),
+                lens: (*lens)?,
+                images: Readings::default(),
+                decoded: None,
+            })),
+        };
+        let name = source.name.as_str().into();
+        Some(Self { source: source.clone(), name, messages, later_s })
+    }
+
+    /// Returns the topic that is read.
+    pub(crate) fn topic(&self) -> &str {
+        &self.source.topic
+    }
+
+    /// Takes in a message, which has the stamp of its arrival if it has none of its own.
+    ///
+    /// # Errors
+    /// A message that cannot be decoded.
+    pub(crate) fn take(
+        &mut self,
+        data: &[u8],
+        arrival: Stamp,
+        tally: &mut Tally,
+    ) -> Result<(), CdrError> {
+        match &mut self.messages {
+            Messages::Scan(scans) => {
+                let scan: LaserScan = decode(data)?;
+                if is_sane(&scan) {
+                    scans.push(scan.header.stamp(), data.len(), scan);
+                } else {
+                    lose_scan(tally);
+                }
+            }
+            Messages::Range(ranges) => {
+                let range: Range = decode(data)?;
+                if is_possible(&range) {
+                    ranges.push(range.header.stamp(), data.len(), range);
+                } else {
+                    let name = &self.source.name;
+                    tally.lose("ranges_invalid", || {
+                        format!("source `{name}`: a range has no angle or no limits")
+                    });
+                }
+            }
+            Messages::Depth(depth) => {
+                let header = match depth.kind {
+                    Type::Image => decode::<Image<'_>>(data)?.header,
+                    _ => decode::<CompressedImage<'_>>(data)?.header,
+                };
+                let image = Payload::new(header, data);
+                depth.images.push(image.stamp, data.len(), image);
+            }
+            Messages::Bumper(bumper) => bumper.take(data, arrival)?,
+        }
+        Ok(())
+    }
+
+    /// Returns the newest reading for a frame; `None` without one, or without the pose of the sensor.
+    pub(crate) fn reading(
+        &mut self,
+        moment: &Moment<'_>,
+        format: DepthFormat<'_>,
+        tally: &mut Tally,
+    ) -> Option<ObstacleReading> {
+        self.note_ahead(moment, tally);
+        let latest = moment.stamp.plus_seconds(self.later_s);
+        let Self { source, messages, .. } = self;
+        let (stamp, data) = match messages {
+            Messages::Bumper(bumper) => {
+                let (stamp, is_pressed) = bumper.state(moment.stamp, latest)?;
+                (stamp, ObstacleData::Bumper(is_pressed))
+            }
+            Messages::Range(ranges) => {
+                let Timed { stamp, value, .. } = ranges.newest_until(latest)?;
+                let mount = mount_at(source, moment, &value.header.frame_id, *stamp, tally)?;
+                let pose = on_floor(&moment.robot_from(*stamp)) * mount;
+                (*stamp, ObstacleData::Range(range_reading(value, pose)))
+            }
+            Messages::Scan(scans) => {
+                let Timed { stamp, value, .. } = scans.newest_until(latest)?;
+                let mount = mount_at(source, moment, &value.header.frame_id, *stamp, tally)?;
+                let scan = seen_from(value, &mount, &moment.robot_from(*stamp));
+                (*stamp, ObstacleData::Scan(scan))
+            }
+            Messages::Depth(depth) => {
+                let (stamp, frame_id, image) = depth.newest(source, latest, format, tally)?;
+                let mount = mount_at(source, moment, &frame_id, stamp, tally)?;
+                let pose = on_floor(&moment.robot_from(stamp)) * mount;
+                let lens = Lens::Pinhole(depth.lens.lens);
+                let (width, height) = (image.width(), image.height());
+                let camera = Camera { lens, width, height, robot_from_camera: pose };
+                (stamp, ObstacleData::Depth { image, camera: Arc::new(camera) })
+            }
+        };
+        // A reading of after the frame is as new as it can be.
+        let age_s = moment.stamp.seconds_since(stamp).max(0.0);
+        Some(ObstacleReading { source: Arc::clone(&self.name), age_s, data })
+    }
+
+    /// Counts a frame for which the source has readings of far later times alone.
+    fn note_ahead(&self, moment: &Moment<'_>, tally: &mut Tally) {
+        let first = match &self.messages {
+            Messages::Scan(scans) => scans.first_stamp(),
+            Messages::Range(ranges) => ranges.first_stamp(),
+            Messages::Depth(depth) => depth.images.first_stamp(),
+            Messages::Bumper(bumper) => bumper.first_stamp(),
+        };
+        let ahead_s = first.map_or(0.0, |first| first.seconds_since(moment.stamp));
+        if ahead_s > AHEAD_S {
+            let (name, stamp) = (&self.source.name, moment.stamp);
+            tally.remark("source_readings_ahead", || {
+                format!(
+                    "source `{name}` is stamped {ahead_s:.1} s after the frame at {stamp} and is \
+                     not used for it: compare its clock with that of the camera"
+                )
+            });
+        }
+    }
+}
+
+impl DepthMessages {
+    /// Returns the newest image up to a time, with its stamp and frame.
+    fn newest(
+        &mut self,
+        source: &ObstacleTopic,
+        latest: Stamp,
+        format: DepthFormat<'_>,
+        tally: &mut Tally,
+    ) -> Option<(Stamp, String, Arc<DepthImage>)> {
+        let Self { kind, lens, images, decoded } = self;
+        let newest = images.newest_until(latest)?;
+        // Frames may come more often than the images of another camera.
+        if decoded.as_ref().is_none_or(|(number, _)| *number != newest.number) {
+            let image = depth_of(*kind, &newest.value, format).and_then(|image| {
+                let size = check_size(lens, image.width(), image.height());
+                size.map_err(|misfit| ImageError::Codec(misfit.to_string()))?;
+                Ok(image)
+            });
+            let (name, topic) = (&source.name, &source.topic);
+            let image = image.map_err(|error| {
+                tally.lose("source_images_unusable", || {
+                    format!("source `{name}`: {topic} at {}: {error}", newest.stamp)
+                });
+            });
+            *decoded = Some((newest.number, image.ok().map(Arc::new)));
+        }
+        let (_, image) = decoded.as_ref()?;
+        Some((newest.stamp, newest.value.frame_id.clone(), Arc::clone(image.as_ref()?)))
+    }
+}
+
+/// Decodes a depth image.
+fn depth_of(
+    kind: Type,
+    image: &Payload,
+    format: DepthFormat<'_>,
+) -> Result<DepthImage, ImageError> {
+    let garbled = |error: CdrError| ImageError::Codec(error.to_string());
+    let DepthFormat { unit_m, limits } = format;
+    let pixels = match kind {
+        Type::Image => decode_raw(&decode(&image.data).map_err(garbled)?, unit_m, limits),
+        _ => decode_compressed(&decode(&image.data).map_err(garbled)?, unit_m, limits),
+    };
+    match pixels? {
+        Pixels::Depth(depth) => Ok(depth),
+        Pixels::Colour(_) | Pixels::Grey(_) => {
+            Err(ImageError::Codec("the pixels are a picture and no depth".to_owned()))
+        }
+    }
+}
+
+/// Returns the pose of a sensor on the robot: that of the settings, else that of tf at the time of the
+/// reading. An unknown one is counted.
+fn mount_at(
+    source: &ObstacleTopic,
+    moment: &Moment<'_>,
+    frame_id: &str,
+    stamp: Stamp,
+    tally: &mut Tally,
+) -> Option<Isometry3<f64>> {
+    let found = source
+        .robot_from_sensor()
+        .or_else(|| moment.tf.lookup(moment.robot_frame, frame_id, stamp));
+    if found.is_none() {
+        tally.count("source_readings_without_pose");
+        tally.note(format!(
+            "tf does not connect `{frame_id}` of source `{}` with `{}`, so that it is not used: \
+             give its pose as `mount`",
+            source.name, moment.robot_frame
+        ));
+    }
+    found
+}
+
+/// Returns false for a range without a cone or limits.
+fn is_possible(range: &Range) -> bool {
+    let limits = range.min_range..=range.max_range;
+    let cone = 0.0..=std::f32::consts::TAU;
+    range.min_range >= 0.0
+        && range.max_range.is_finite()
+        && !limits.is_empty()
+        && cone.contains(&range.field_of_view)
+}
+
+fn range_reading(range: &Range, robot_from_sensor: Isometry3<f64>) -> RangeReading {
+    // REP 117: minus infinity is a surface nearer than the sensor measures.
+    let is_too_near = range.range == f32::NEG_INFINITY;
+    RangeReading {
+        robot_from_sensor,
+        field_of_view_rad: f64::from(range.field_of_view),
+        min_m: f64::from(range.min_range),
+        max_m: f64::from(range.max_range),
+        range_m: f64::from(if is_too_near { range.min_range } else { range.range }),
+    }
+}

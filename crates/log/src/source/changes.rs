@@ -1,0 +1,176 @@
+//! Changes of the cameras on the way, after which positions in the images are wrong.
+
+use nalgebra::Isometry3;
+use tagalong_core::{Input, Stamp};
+
+use super::mount::{Mount, robot_frame};
+use super::plan::Plan;
+use crate::msgs::CameraInfo;
+use crate::pairing::Payload;
+use crate::tally::Tally;
+use crate::tf::{TfBuffer, plain};
+
+/// Least distance by which a mount has moved, m.
+const MOVED_M: f64 = 1e-3;
+/// Least angle by which a mount has turned, degrees.
+const TURNED_DEG: f64 = 0.1;
+/// Consequence of a change, at the end of a sentence about it.
+const CONSEQUENCE: &str = "the first one is used throughout, and from the change on tracks stay \
+                           where they were";
+
+/// Watch over all that must stay as it is during a run: the calibration of the camera, the frames of
+/// the images, and the mounts that static transforms give.
+pub(super) struct CameraWatch {
+    info: Option<CameraInfo>,
+    mounts: Vec<WatchedMount>,
+    /// Time of the first change.
+    changed_at: Option<Stamp>,
+}
+
+/// Pose of a sensor that static transforms give, wholly or in part.
+struct WatchedMount {
+    target: String,
+    source: String,
+}
+
+impl CameraWatch {
+    pub(super) fn new(plan: &Plan) -> Self {
+        let info = plan.chosen.colour_info.as_ref().and_then(|topic| plan.scan.infos.get(topic));
+        Self { info: info.cloned(), mounts: watched_mounts(plan), changed_at: None }
+    }
+
+    /// Compares a calibration with the first one.
+    pub(super) fn watch_info(&mut self, info: &CameraInfo, tally: &mut Tally) {
+        // Field by field, because the header differs in each message.
+        let changed = self.info.as_ref().is_some_and(|first| {
+            first.k != info.k || first.d != info.d || first.p != info.p || first.roi != info.roi
+        });
+        if changed {
+            self.change_at(info.header.stamp());
+            tally.lose("camera_info_changes", || {
+                "the calibration changes on the way; the first one is used throughout, and from \
+                 the change on tracks stay where they were"
+                    .into()
+            });
+        }
+    }
+
+    /// Compares the frame of an image with that of the first image of its topic.
+    pub(super) fn watch_frame(
+        &mut self,
+        topic: &str,
+        first: Option<&str>,
+        image: &Payload,
+        frame_stamp: Stamp,
+        tally: &mut Tally,
+    ) {
+        let Some(first) = first.filter(|first| plain(first) != plain(&image.frame_id)) else {
+            return;
+        };
+        self.change_at(frame_stamp);
+        tally.lose("frame_id_changes", || {
+            format!(
+                "{topic}: the frame_id changes from `{first}` to `{}` at {}, which is another \
+                 camera or another mount; from the change on tracks stay where they were: give \
+                 each camera a topic of its own",
+                image.frame_id, image.stamp
+            )
+        });
+    }
+
+    /// Returns the static parts of the watched mounts, in their order.
+    pub(super) fn mounts(&self, tf: &TfBuffer) -> Vec<Option<Isometry3<f64>>> {
+        let of = |mount: &WatchedMount| tf.static_pose(&mount.target, &mount.source);
+        self.mounts.iter().map(of).collect()
+    }
+
+    /// Compares the static parts of the mounts with those from `before`; returns true if one has
+    /// changed at this time.
+    pub(super) fn watch_mounts(
+        &mut self,
+        before: &[Option<Isometry3<f64>>],
+        tf: &TfBuffer,
+        now: Stamp,
+        tally: &mut Tally,
+    ) -> bool {
+        let mut has_changed = false;
+        for (mount, (old, new)) in self.mounts.iter().zip(before.iter().zip(self.mounts(tf))) {
+            // A mount that becomes known is no change.
+            let Some(old) = old.filter(|old| has_moved(old, new.as_ref())) else { continue };
+            has_changed = true;
+            tally.lose("mount_changes", || {
+                let WatchedMount { target, source } = mount;
+                let place = new.as_ref().map_or("nowhere".to_owned(), pose_text);
+                let old = pose_text(&old);
+                format!(
+                    "tf_static moves `{source}` in `{target}` at {now} from {old} to {place}; \
+                     {CONSEQUENCE}"
+                )
+            });
+        }
+        if has_changed {
+            self.change_at(now);
+        }
+        has_changed
+    }
+
+    /// Returns true if something has changed by this time.
+    pub(super) fn has_changed(&self, stamp: Stamp) -> bool {
+        self.changed_at.is_some_and(|at| at <= stamp)
+    }
+
+    /// Keeps a change in force after a jump back of the clock, to times before it.
+    pub(super) fn clock_jumps(&mut self) {
+        if self.changed_at.is_some() {
+            self.changed_at = Some(Stamp::default());
+        }
+    }
+
+    fn change_at(&mut self, stamp: Stamp) {
+        let first = self.changed_at.map_or(stamp, |at| at.min(stamp));
+        self.changed_at = Some(first);
+    }
+}
+
+/// Returns the poses on which the frames depend: that of the camera on the robot, of the depth camera
+/// on the colour camera, and of the laser scanner on the robot.
+fn watched_mounts(plan: &Plan) -> Vec<WatchedMount> {
+    let primary = plan.scan.frame_of(plan.primary());
+    let depth = plan.chosen.depth.as_ref().and_then(|topic| plan.scan.frame_of(topic));
+    let laser = plan.chosen.sensor(Input::Laser).filter(|topic| *topic != plan.primary());
+    let laser = laser.and_then(|topic| plan.scan.frame_of(topic));
+    let camera = match &plan.mount {
+        Mount::Tf { base, camera } => Some((base.as_str(), camera.as_str())),
+        Mount::Fixed { .. } => None,
+    };
+    let pairs = [
+        camera,
+        primary.zip(depth),
+        laser.map(|laser| (robot_frame(&plan.scan, &plan.input), laser)),
+    ];
+    let watched = |(target, source): (&str, &str)| WatchedMount {
+        target: target.to_owned(),
+        source: source.to_owned(),
+    };
+    pairs.into_iter().flatten().filter(|(target, source)| target != source).map(watched).collect()
+}
+
+/// Returns true if a pose has moved or turned by more than a republished one differs, or is gone.
+fn has_moved(old: &Isometry3<f64>, new: Option<&Isometry3<f64>>) -> bool {
+    let Some(new) = new else { return true };
+    let moved_m = (old.translation.vector - new.translation.vector).norm();
+    let turned_deg = old.rotation.angle_to(&new.rotation).to_degrees();
+    moved_m > MOVED_M || turned_deg > TURNED_DEG
+}
+
+/// Returns a pose as text: position and angles.
+fn pose_text(pose: &Isometry3<f64>) -> String {
+    let at = &pose.translation.vector;
+    let (roll, pitch, yaw) = pose.rotation.euler_angles();
+    let [roll, pitch, yaw] = [roll, pitch, yaw].map(f64::to_degrees);
+    format!(
+        "x, y, z = {:.3}, {:.3}, {:.3} m and roll, pitch, yaw = {roll:.1}, {pitch:.1}, {yaw:.1} \
+         degrees",
+        at.x, at.y, at.z
+    )
+}
