@@ -1,10 +1,11 @@
 """Plays a robot on an independent DDS (Cyclone) and checks what the bridge answers.
 
-    python check_dds.py ROBOT.mcap DOMAIN HTTP_PORT BRIDGE_COMMAND ...
+    python check_dds.py CHECK ROBOT.mcap DOMAIN HTTP_PORT BRIDGE_COMMAND ...
 
 The log is one of `tagalong simulate`. Its images, calibrations, odometry and tf_static are published in
-real time with stamps of now; one packet in a hundred is lost. tf_static is published before the bridge
-starts, the switch, the callers and a second listener come late.
+real time with stamps of now; one packet in a hundred is lost. tf_static, and a `true` for late readers,
+are published before the bridge starts; the switch, the callers and a second listener come late. CHECK is
+`all`, or `camera` for the faults of the camera alone.
 """
 
 import json
@@ -383,6 +384,8 @@ class Robot:
 
     def __init__(self, participant, path):
         self.participant, self.path, self.ends = participant, path, threading.Event()
+        # Set while the camera sends its last images again, with their stamps.
+        self.repeats = threading.Event()
         self.writers = {}
         for topic, kind in INPUTS.items():
             qos = latched() if topic == "/tf_static" else sensor()
@@ -406,7 +409,7 @@ class Robot:
 
     def play(self):
         """Publishes all but the transforms, whatever of it is lost."""
-        start, first = time.time(), None
+        start, first, sent = time.time(), None, {}
         for topic, log_time, message in self.messages():
             if self.ends.is_set():
                 return
@@ -419,6 +422,9 @@ class Robot:
             stamp = message.header.stamp
             nanos = stamp.sec * 1_000_000_000 + stamp.nanosec + shift
             message.header.stamp = Time(nanos // 1_000_000_000, nanos % 1_000_000_000)
+            if self.repeats.is_set() and topic != "/odom":
+                message = sent[topic]
+            sent[topic] = message
             self.writers[topic].write(message)
 
 
@@ -429,22 +435,57 @@ class Hand:
         def writer(topic, kind):
             return DataWriter(participant, Topic(participant, topic, kind), qos=reliable())
 
+        self.participant = participant
         self.enable = writer("rt/people/enable", Bool)
         self.reset_writer = writer("rt/people/reset", Empty)
-        self.holds = False
-        threading.Thread(target=self.repeat, daemon=True).start()
+        self.holds, self.ends = False, threading.Event()
+        self.thread = threading.Thread(target=self.repeat, daemon=True)
+        self.thread.start()
 
     def repeat(self):
-        while True:
+        while not self.ends.wait(0.1):
             if self.holds:
                 self.enable.write(Bool(True))
-            time.sleep(0.1)
+
+    def close(self):
+        """Leaves the network."""
+        self.ends.set()
+        self.thread.join()
+        del self.enable, self.reset_writer, self.participant
 
     def reset(self):
         self.reset_writer.write(Empty(0))
 
     def switch_off(self):
         self.enable.write(Bool(False))
+
+
+class Resetter:
+    """A publisher of resets alone."""
+
+    def __init__(self, participant):
+        self.participant = participant
+        topic = Topic(participant, "rt/people/reset", Empty)
+        self.writer = DataWriter(participant, topic, qos=reliable())
+
+    def reset(self):
+        self.writer.write(Empty(0))
+
+    def close(self):
+        del self.writer, self.participant
+
+
+class OldEnable:
+    """A `true` that is kept for readers that come later, written before the bridge starts."""
+
+    def __init__(self, domain):
+        self.participant = DomainParticipant(domain)
+        topic = Topic(self.participant, "rt/people/enable", Bool)
+        self.writer = DataWriter(self.participant, topic, qos=latched())
+        self.writer.write(Bool(True))
+
+    def close(self):
+        del self.writer, self.participant
 
 
 class Http:
@@ -470,9 +511,10 @@ def moves(commands):
     return any(c.twist.linear.x != 0.0 or c.twist.angular.z != 0.0 for c in commands)
 
 
-def run(path, domain, port, command):
+def run(checks, path, domain, port, command):
     robot = Robot(DomainParticipant(domain), path)
     robot.publish_transforms()
+    early = OldEnable(domain)
     bridge = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     said = []
     threading.Thread(target=lambda: said.extend(bridge.stderr), daemon=True).start()
@@ -482,7 +524,14 @@ def run(path, domain, port, command):
         states = Listener(listeners, "rt/people/state", String)
         tracks = Listener(listeners, "rt/people/tracks", Detection3DArray)
         threading.Thread(target=robot.play, daemon=True).start()
-        converse(domain, Http(port), commands, states, tracks)
+        http = Http(port)
+        if checks == "all":
+            converse(domain, http, commands, states, tracks, early)
+        else:
+            early.close()
+            hand = Hand(DomainParticipant(domain))
+            start_moving(hand, http, commands)
+            repeat_images(robot, http, commands)
         bridge.send_signal(2)
         bridge.wait(timeout=10)
         check(bridge.returncode == 130, "the bridge ends by the signal")
@@ -497,7 +546,106 @@ def run(path, domain, port, command):
         bridge.kill()
 
 
-def converse(domain, http, commands, states, tracks):
+def permission(http):
+    return http.send("status")[1]["permission"]
+
+
+def stands(commands, seconds, text):
+    """Checks that no command moves the robot for a while."""
+    then = time.monotonic()
+    time.sleep(seconds)
+    check(not moves(commands.since(then)), text)
+
+
+def moves_again(commands, text):
+    then = time.monotonic()
+    wait_for(lambda: moves(commands.since(then)), 8, text)
+
+
+def reset_until(hand, http, wanted, text):
+    """Resets, again because the first may come before the bridge knows its publisher."""
+
+    def is_reset():
+        hand.reset()
+        time.sleep(0.3)
+        return permission(http) == wanted
+
+    wait_for(is_reset, 30, text)
+
+
+def start_moving(hand, http, commands):
+    wait_for(lambda: http.send("status")[1]["frames"] > 5, 30, "frames come")
+    reset_until(hand, http, "not enabled", "reset, the robot waits for the switch")
+    hand.holds = True
+    moves_again(commands, "pressed, the robot moves")
+
+
+def repeat_images(robot, http, commands):
+    """The camera sends its last images again while odometry goes on."""
+    robot.repeats.set()
+    # The validity of a command, a period of the camera and one of the commands.
+    time.sleep(0.25 + 0.1 + 0.2)
+    stands(commands, 3.0, "images that are sent again move nothing")
+    code, health = http.send("healthz")
+    check(code == 503 and "no frame for" in health["reason"], f"GET /healthz: {health['reason']}")
+    robot.repeats.clear()
+    moves_again(commands, "new images, the robot moves")
+    check(http.send("healthz")[0] == 200, "GET /healthz: well")
+
+
+def press_after_reset(hand, http, commands):
+    """An enable that goes on through a reset needs a release and a press."""
+
+    def is_off():
+        # The first may come before the bridge knows the hand.
+        hand.switch_off()
+        time.sleep(0.2)
+        return permission(http) == "switched off"
+
+    wait_for(is_off, 10, "switched off")
+    hand.holds = True
+    time.sleep(1.0)
+    check(not moves(commands.since(0)), "an enable without a reset moves nothing")
+    wanted = "release the enable and press it again"
+    reset_until(hand, http, wanted, f"reset while the switch is held: {wanted}")
+    stands(commands, 1.0, "which moves nothing")
+    hand.holds = False
+    wait_for(lambda: permission(http) == "not enabled", 3, "released")
+    hand.holds = True
+    moves_again(commands, "pressed, the robot moves")
+
+
+def count_by_source_time(hand, commands):
+    """Old enables that arrive now do not count."""
+    hand.holds = False
+    time.sleep(1.0)
+    then = time.monotonic()
+    for _ in range(10):
+        hand.enable.write(Bool(True), timestamp=time.time_ns() - 3_000_000_000)
+        time.sleep(0.1)
+    check(not moves(commands.since(then)), "enables of three seconds ago move nothing")
+    hand.holds = True
+    moves_again(commands, "enables of now do")
+
+
+def contest(domain, hand, http, commands):
+    """A second publisher at the switch, which is silent and then takes over."""
+    other = Hand(DomainParticipant(domain))
+    cause = "more than one publisher of the enable"
+    wait_for(lambda: permission(http) == cause, 10, f"a second, silent publisher: {cause}")
+    stands(commands, 0.7, "which is a stop, though the hand holds on")
+    hand.holds = False
+    other.holds = True
+    other.reset()
+    stands(commands, 1.5, "the hand lets go, and the other does not drive on")
+    check(permission(http) == cause, "nor does a reset help")
+    other.close()
+    reset_until(hand, http, "not enabled", "the other is gone: reset")
+    hand.holds = True
+    moves_again(commands, "pressed, the robot moves")
+
+
+def converse(domain, http, commands, states, tracks, early):
     found = wait_for(
         lambda: [m for m in tracks.since(0) if m.detections], 25, "people are tracked"
     )
@@ -505,6 +653,13 @@ def converse(domain, http, commands, states, tracks):
     check(1.5 < place.x < 4.5 and abs(place.y) < 1.0, f"where they are: {place.x:.2f} m ahead")
     wait_for(lambda: states.since(0), 5, "states are told")
     check(commands.since(0) == [], "no command before the switch allows it")
+
+    operator = Resetter(DomainParticipant(domain))
+    reset_until(operator, http, "not enabled", "a `true` from before the bridge is no enable")
+    time.sleep(1.0)
+    check(commands.since(0) == [], "and moves nothing after a reset")
+    early.close()
+    operator.close()
 
     # The participants of the switch, of the callers and of a second listener come only now.
     late = DomainParticipant(domain)
@@ -515,11 +670,9 @@ def converse(domain, http, commands, states, tracks):
     enroll = Caller(late, "people/enroll", SetParametersRequest, SetParametersResponse)
     clear = Caller(late, "people/clear", *trigger)
     wait_for(lambda: late_tracks.since(0), 5, "a listener that came late hears tracks")
-    hand.holds = True
-    time.sleep(1.0)
-    check(not moves(commands.since(0)), "an enable without a reset moves nothing")
-    hand.reset()
-    wait_for(lambda: moves(commands.since(0)), 8, "reset and enabled, the robot moves")
+    press_after_reset(hand, http, commands)
+    count_by_source_time(hand, commands)
+    contest(domain, hand, http, commands)
 
     code, health = http.send("healthz")
     check((code, health["ok"]) == (200, True), "GET /healthz: well")
@@ -567,9 +720,9 @@ def converse(domain, http, commands, states, tracks):
 
 
 def main():
-    path, domain, port, *command = sys.argv[1:]
+    checks, path, domain, port, *command = sys.argv[1:]
     try:
-        run(path, int(domain), int(port), command)
+        run(checks, path, int(domain), int(port), command)
     except Failed as error:
         sys.exit(f"FAILED: {error}")
 

@@ -41,9 +41,19 @@ fi
 made=$(mktemp -d)
 trap 'rm -rf "$made"' EXIT
 tagalong simulate "$here/robot.toml" -o "$made/robot.mcap" 2> /dev/null
-# A domain and a port that no other run of this check is likely to use.
+# Domains and a port that no other run of this check is likely to use.
 domain=$((100 + $$ % 100))
 port=$((20000 + $$ % 20000))
-"$venv/bin/python" "$here/check_dds.py" "$made/robot.mcap" "$domain" "$port" \
-    "$TAGALONG_ROS2" "$root/configs/depth-ekf-follow.toml" --domain "$domain" --wait 30 \
-    --http "127.0.0.1:$port" --rmw rmw_cyclonedds_cpp
+
+# check CHECK DOMAIN [OPTION ...]
+check() {
+    checks=$1
+    domain=$2
+    shift 2
+    "$venv/bin/python" "$here/check_dds.py" "$checks" "$made/robot.mcap" "$domain" "$port" \
+        "$TAGALONG_ROS2" "$root/configs/depth-ekf-follow.toml" --domain "$domain" --wait 30 \
+        --http "127.0.0.1:$port" --rmw rmw_cyclonedds_cpp "$@"
+}
+check all "$domain"
+check camera $((domain + 1))
+check camera $((domain + 2)) --clock arrival

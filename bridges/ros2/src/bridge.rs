@@ -19,14 +19,15 @@ use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline,
 
 use crate::diagnostics::{Diagnostics, Status};
 use crate::http::HttpServer;
-use crate::inbox::{Inbox, Traffic};
+use crate::inbox::{Arrival, Inbox, Traffic};
 use crate::messages::SpeedLimit;
 use crate::network::{Ear, Network};
 use crate::options::{CommandType, Setup};
+use crate::publishers::{Gate, Origin, Unfit};
 use crate::services;
 use crate::skill::{Desk, Request, Verb};
-use crate::stamps::StampClock;
-use crate::wheels::{CommandCounts, Wheels};
+use crate::stamps::{StampClock, system_time};
+use crate::wheels::{CommandCounts, SwitchHandle, Wheels};
 use crate::{BridgeError, Options};
 
 /// Longest wait for messages before the stop flag is checked.
@@ -38,10 +39,10 @@ const ATTEMPT: Duration = Duration::from_millis(500);
 const GATHER: Duration = Duration::from_secs(2);
 /// Time without a frame after which a message is logged.
 const SILENCE: Duration = Duration::from_secs(2);
-/// Least time between two heartbeats.
+/// Least time between two heartbeats, and between two looks for other publishers.
 const BEAT: Duration = Duration::from_millis(100);
-/// Time between two looks for other publishers of commands.
-const RIVALS_EACH: Duration = Duration::from_secs(1);
+/// Cause of the latch while the enable has more than one publisher.
+const CONTESTED: &str = "more than one publisher of the enable";
 /// Age on arrival above which a frame indicates clocks that disagree, s.
 const OLD_S: f64 = 0.5;
 
@@ -166,6 +167,8 @@ fn start(
     let inputs = if options.serve.is_some() { inputs.accept(Input::Colour) } else { inputs };
     let mut listening = Listening::new(&name, &setup.input, &setup.limits, inputs)?;
     let mut ears: Vec<Ear> = Vec::new();
+    let further = setup.pipeline.obstacle_sources();
+    let is_source = |topic: &str| further.iter().any(|source| source.topic == topic);
     let deadline = Instant::now() + Duration::from_secs_f64(options.wait);
     let mut attempt = Instant::now() + ATTEMPT;
     let mut first: Option<Instant> = None;
@@ -173,11 +176,16 @@ fn start(
     while !stop.load(Ordering::Relaxed) {
         for (topic, kind) in network.topics() {
             if listening.announce(&topic, &kind) && listening.wants(&topic) {
-                ears.extend(network.listen(&topic, &kind, inbox, clock)?);
+                let ear = match network.listen(&topic, &kind, inbox, clock)? {
+                    None if is_source(&topic) => Some(network.listen_raw(&topic, &kind, inbox)?),
+                    ear => ear,
+                };
+                ears.extend(ear);
             }
         }
-        let messages = inbox.take(TURN);
-        messages.iter().for_each(|(topic, data)| listening.take(topic, data));
+        for Arrival { topic, message, .. } in inbox.take(TURN) {
+            listening.take(&topic, &message);
+        }
         if first.is_none() && listening.has_image() {
             first = Some(Instant::now());
         }
@@ -192,6 +200,10 @@ fn start(
             setup.pipeline.check_sources(sources(&source))?;
             Ok(source)
         });
+        // Frames may be made of scans alone.
+        if started.is_ok() {
+            first.get_or_insert_with(Instant::now);
+        }
         match started {
             Ok(source) if gathered || is_late => {
                 // Topics that the pipeline does not use are no longer received.
@@ -227,6 +239,7 @@ struct Bridge {
     inbox: Arc<Inbox>,
     clock: Arc<StampClock>,
     wheels: Option<Wheels>,
+    gates: Gates,
     callers: Callers,
     out: Out,
     /// Largest speed of the config, m/s.
@@ -237,19 +250,35 @@ struct Bridge {
     noted: usize,
     /// Number of other publishers of commands that was told.
     rivals: usize,
-    looked: Instant,
+    /// Number of publishers of resets that was told.
+    resets: usize,
     beat: Option<Instant>,
     base_frame: String,
     odom_frame: String,
     frames: u64,
     heard: Instant,
     quiet: bool,
+    /// True while frames have older stamps than those before.
+    went_back: bool,
 }
 
 /// Desk of the skill, and the requests that were left there.
 struct Callers {
     desk: Desk,
     requests: Receiver<Request>,
+}
+
+/// Gates of the topics of the switch.
+struct Gates {
+    enable: Arc<Gate>,
+    reset: Arc<Gate>,
+}
+
+impl Gates {
+    /// Creates the gates, whose messages count for as long as an enable holds.
+    fn new(lifespan: Duration) -> Self {
+        Self { enable: Arc::new(Gate::new(lifespan)), reset: Arc::new(Gate::new(lifespan)) }
+    }
 }
 
 /// Publishers of the results.
@@ -277,7 +306,9 @@ impl Bridge {
             state: network.publisher(&options.state)?,
             heartbeat: network.publisher_of(&options.heartbeat, "std_msgs/msg/Header")?,
         };
-        let wheels = match setup.pipeline.enable_switch() {
+        let switch = setup.pipeline.enable_switch();
+        let gates = Gates::new(switch.map_or(EnableSwitch::CEILING, |switch| switch.timeout()));
+        let wheels = match switch {
             Some(switch) => {
                 Some(drive(options, &setup, switch, &base_frame, &mut network, &clock)?)
             }
@@ -297,18 +328,20 @@ impl Bridge {
             inbox,
             clock,
             wheels,
+            gates,
             callers,
             out,
             told: None,
             noted: 0,
             rivals: 0,
-            looked: Instant::now(),
+            resets: 0,
             beat: None,
             base_frame,
             odom_frame: setup.input.odom_frame,
             frames: 0,
             heard: Instant::now(),
             quiet: false,
+            went_back: false,
         })
     }
 
@@ -325,17 +358,17 @@ impl Bridge {
     fn listen_to_switch(&mut self) -> Result<Vec<Ear>, BridgeError> {
         let Some(wheels) = &self.wheels else { return Ok(Vec::new()) };
         let (Options { enable, reset, .. }, inbox) = (&self.options, &self.inbox);
-        let switch = wheels.switch();
-        let on = move |enabled| {
-            let event = if enabled { Enable::On } else { Enable::Off };
-            switch.take(event, switch.now());
-        };
+        let (switch, gate) = (wheels.switch(), Arc::clone(&self.gates.enable));
+        let on = move |origin: Option<Origin>| take_enable(&switch, &gate, origin);
         let enable = self.network.listen_to_enable(enable, inbox, on)?;
-        let (switch, topic, theirs) = (wheels.switch(), reset.clone(), Arc::clone(inbox));
-        // The thread that owns the pipeline clears its fault as well. The time is that of arrival,
-        // so that a stop that comes in between is not cleared.
-        let on = move || {
-            let nanos = u64::try_from(switch.now().as_nanos()).unwrap_or(u64::MAX);
+        let (switch, gate) = (wheels.switch(), Arc::clone(&self.gates.reset));
+        let (topic, theirs) = (reset.clone(), Arc::clone(inbox));
+        // The thread that owns the pipeline clears its fault as well. The time is that of the
+        // publication, so that a stop that comes in between is not cleared.
+        let on = move |origin: Origin| {
+            let Ok(age) = gate.admit(origin, Instant::now(), system_time()) else { return };
+            let published = switch.now().saturating_sub(age);
+            let nanos = u64::try_from(published.as_nanos()).unwrap_or(u64::MAX);
             theirs.push(&topic, nanos.to_le_bytes().to_vec(), 1);
         };
         let reset = self.network.listen_to_reset(reset, inbox, on)?;
@@ -360,18 +393,18 @@ impl Bridge {
     fn work(&mut self, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         self.callers.desk.open();
         while !stop.load(Ordering::Relaxed) {
-            for (topic, data) in self.inbox.take(TURN) {
+            for Arrival { topic, message, .. } in self.inbox.take(TURN) {
                 match topic {
-                    topic if topic == self.options.reset => self.reset(&data, tell),
-                    topic if topic == self.options.speed_limit => self.limit_speed(&data, tell),
-                    topic => self.source.take(&topic, &data),
+                    topic if topic == self.options.reset => self.reset(&message, tell),
+                    topic if topic == self.options.speed_limit => self.limit_speed(&message, tell),
+                    topic => self.source.take(&topic, &message),
                 }
             }
             self.serve_callers(tell);
             self.check_calibration()?;
             // Only the newest frame: a slow pipeline must not fall behind the robot.
             match self.source.newest_frame() {
-                Some(found) => self.step(&found, tell)?,
+                Some(found) => self.step(found, tell)?,
                 None => self.look_for_silence(tell)?,
             }
             self.report_state(tell);
@@ -419,14 +452,13 @@ impl Bridge {
         self.beat = Some(Instant::now());
         self.source.notes().iter().skip(self.noted).for_each(|note| tell(note));
         self.noted = self.source.notes().len();
+        if self.wheels.is_some() {
+            self.look_at_publishers(tell);
+        }
         let permission = self.wheels.as_ref().map(|wheels| wheels.switch().permission());
         if let Some(permission) = permission.filter(|now| Some(*now) != self.told) {
             tell(&format!("{}{}", permission.cause(), self.remedy(permission)));
             self.told = Some(permission);
-        }
-        if self.wheels.is_some() && self.looked.elapsed() > RIVALS_EACH {
-            self.looked = Instant::now();
-            self.look_for_rivals(tell);
         }
         self.callers.desk.turn(permission, self.pipeline.fault());
         let header = Header::new(self.clock.now(), "tagalong");
@@ -438,6 +470,8 @@ impl Bridge {
             permission,
             fault: self.pipeline.fault(),
             rivals: self.rivals,
+            enable_publishers: self.gates.enable.discovered(),
+            untimely: self.gates.enable.untimely() + self.gates.reset.untimely(),
             malformed: self.inbox.traffic().values().map(|topic| topic.malformed).sum(),
         });
     }
@@ -449,30 +483,66 @@ impl Bridge {
             Permission::NotEnabled | Permission::Expired => {
                 format!(": the robot stands until `true` comes on {enable}")
             }
-            Permission::Latched(_) => {
-                format!(": the robot stands until a message on {reset}, and `true` on {enable}")
-            }
+            Permission::NeedsRelease => format!(
+                ": `true` on {enable} has come since before the reset; the robot stands until it \
+                 ceases, and comes again"
+            ),
+            Permission::Latched(CONTESTED) => format!(
+                ": the robot stands, because two hands at one switch cannot stop each other; end all \
+                 publishers on {enable} but one (`ros2 topic info --verbose` names them), then send a \
+                 message on {reset}, and begin to send `true` on {enable}"
+            ),
+            Permission::Latched(_) => format!(
+                ": the robot stands until a message on {reset}, after which `true` begins on {enable}"
+            ),
         }
     }
 
-    fn look_for_rivals(&mut self, tell: &dyn Fn(&str)) {
-        let rivals = self.network.others_on(&self.options.command);
+    /// Counts the publishers on the topics of the switch and on that of the commands, and tells what
+    /// does not count for them.
+    fn look_at_publishers(&mut self, tell: &dyn Fn(&str)) {
+        let Options { enable, reset, command, .. } = &self.options;
+        let [enables, resets, rivals] = self.network.others_on([enable, reset, command]);
+        self.gates.enable.set_discovered(enables);
+        self.gates.reset.set_discovered(resets);
+        if enables > 1 {
+            self.hold_contested();
+        }
+        tell_untimely(&self.gates.enable, "`true`", enable, tell);
+        tell_untimely(&self.gates.reset, "message", reset, tell);
         if rivals > self.rivals {
             tell(&format!(
-                "{rivals} other publishers of commands on {}: two drivers at one wheel; let one of \
-                 them publish elsewhere (`--command`) and a multiplexer choose",
-                self.options.command
+                "{rivals} other publishers of commands on {command}: two drivers at one wheel; let one \
+                 of them publish elsewhere (`--command`) and a multiplexer choose"
             ));
         }
         self.rivals = rivals;
+        if resets > 1 && self.resets <= 1 {
+            tell(&format!(
+                "{resets} publishers on {reset}: no message on it counts; end all but one (`ros2 topic \
+                 info --verbose` names them)"
+            ));
+        }
+        self.resets = resets;
+    }
+
+    /// Latches the switch while its enable has more than one publisher.
+    fn hold_contested(&self) {
+        let Some(switch) = self.wheels.as_ref().map(Wheels::switch) else { return };
+        if switch.permission() != Permission::Latched(CONTESTED) {
+            switch.take(Enable::Fault(CONTESTED), switch.now());
+        }
     }
 
     /// Takes a frame through the pipeline and publishes the results.
-    fn step(&mut self, found: &LogFrame, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
+    fn step(&mut self, mut found: LogFrame, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         (self.heard, self.quiet) = (Instant::now(), false);
+        let timing = self.clock.record_frame(found.frame.stamp);
         if self.frames == 0 {
             self.compare_clocks(found.frame.stamp, tell);
         }
+        self.tell_old_stamps(timing.back_s, tell);
+        found.frame = found.frame.with_latency(Some(timing.latency_s));
         // Before the step, so that the command of this very frame is a stop.
         if found.odom_jumped {
             self.disarm("odometry jumped", tell);
@@ -489,7 +559,7 @@ impl Bridge {
         let report = report?;
         self.frames += 1;
         self.callers.desk.frame(self.pipeline.status(), self.frames);
-        self.publish(found, &report);
+        self.publish(&found, &report);
         if let Some(live) = &self.live {
             live.offer(&found.frame, &found.odom_from_robot, &report);
         }
@@ -525,8 +595,15 @@ impl Bridge {
         }
     }
 
-    /// Clears stops and faults that are not newer than the message.
+    /// Clears stops and faults that are not newer than the message; not while the enable has more than
+    /// one publisher.
     fn reset(&mut self, data: &[u8], tell: &dyn Fn(&str)) {
+        let enables = self.gates.enable.discovered();
+        if enables > 1 {
+            let enable = &self.options.enable;
+            tell(&format!("reset refused: {enables} publishers on {enable}; end all but one"));
+            return;
+        }
         let nanos = <[u8; 8]>::try_from(data).map_or(0, u64::from_le_bytes);
         self.pipeline.arm();
         if let Some(wheels) = &self.wheels {
@@ -570,6 +647,19 @@ impl Bridge {
         }
     }
 
+    /// Tells once that stamps went back: the clock does not, so that no command of these frames is
+    /// valid.
+    fn tell_old_stamps(&mut self, back_s: f64, tell: &dyn Fn(&str)) {
+        let went_back = back_s > 0.0;
+        if went_back && !self.went_back {
+            tell(&format!(
+                "the stamps of the images went back by {back_s:.1} s: the robot stands until they are \
+                 newer than before; restart the bridge if a simulation or a log has begun again"
+            ));
+        }
+        self.went_back = went_back;
+    }
+
     /// Reports once why there are no frames.
     fn look_for_silence(&mut self, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         if let Some(misfit) = self.source.misfit().filter(|_| self.frames == 0) {
@@ -599,6 +689,40 @@ impl Bridge {
         let told = self.wheels.map(Wheels::finish).unwrap_or_default();
         (Summary { told, ..summary }, self.network)
     }
+}
+
+/// Takes a message of the enable topic to the switch: `origin` is that of a true, `None` is a false.
+fn take_enable(switch: &SwitchHandle, gate: &Gate, origin: Option<Origin>) {
+    let now = switch.now();
+    let Some(origin) = origin else {
+        // A stop counts from every publisher and at every age.
+        switch.take(Enable::Off, now);
+        return;
+    };
+    let age = match gate.admit(origin, Instant::now(), system_time()) {
+        Ok(age) => age,
+        Err(Unfit::Contested) => {
+            switch.take(Enable::Fault(CONTESTED), now);
+            return;
+        }
+        // Too old to move the robot, but no release of the button either.
+        Err(Unfit::Untimely(age_s)) => Duration::try_from_secs_f64(age_s).unwrap_or(Duration::MAX),
+    };
+    // What was published before the switch was there says nothing to it, nor does the future.
+    if let Some(published) = now.checked_sub(age) {
+        switch.take(Enable::On, published);
+    }
+}
+
+/// Tells that messages of a topic do not count for their age, once for each row of them.
+fn tell_untimely(gate: &Gate, what: &str, topic: &str, tell: &dyn Fn(&str)) {
+    let Some(age_s) = gate.take_untold() else { return };
+    let state = if age_s > 0.0 { "old" } else { "ahead" };
+    tell(&format!(
+        "a {what} on {topic} was {:.1} s {state} by the clock of its publisher: it does not count; if \
+         all are, synchronise the clocks of both machines",
+        age_s.abs()
+    ));
 }
 
 /// Starts the thread of the wheels, which converts their speeds to messages.

@@ -38,6 +38,10 @@ pub(crate) struct Status {
     pub(crate) fault: Option<&'static str>,
     /// Other publishers of commands.
     pub(crate) rivals: usize,
+    /// Publishers of the enable.
+    pub(crate) enable_publishers: usize,
+    /// Enables and resets that did not count for their age.
+    pub(crate) untimely: u64,
     /// Messages that could not be decoded.
     pub(crate) malformed: u64,
 }
@@ -101,6 +105,8 @@ impl Status {
                 value("frames", self.frames.to_string()),
                 value("enable", self.permission.map_or("no controller", Permission::cause).into()),
                 value("other publishers of commands", self.rivals.to_string()),
+                value("publishers of the enable", self.enable_publishers.to_string()),
+                value("enables and resets too old or ahead", self.untimely.to_string()),
                 value("malformed messages", self.malformed.to_string()),
             ],
         }
@@ -113,6 +119,10 @@ impl Status {
         }
         if let Some(fault) = self.fault {
             return (ERROR, format!("fault: {fault}"));
+        }
+        if self.enable_publishers > 1 {
+            let publishers = self.enable_publishers;
+            return (ERROR, format!("{publishers} publishers of the enable: end all but one"));
         }
         if now.saturating_duration_since(self.heard) > STALE_AFTER {
             return (STALE, "no frames".into());
@@ -141,6 +151,8 @@ mod tests {
             permission: Some(Permission::Granted),
             fault: None,
             rivals: 0,
+            enable_publishers: 1,
+            untimely: 0,
             malformed: 0,
         };
         let worst = |status: Status| status.worst(now + Duration::from_secs(1));
@@ -149,6 +161,8 @@ mod tests {
         assert_eq!(worst(Status { rivals: 1, ..well }).0, WARN);
         let latched = Some(Permission::Latched("switched off"));
         assert_eq!(worst(Status { permission: latched, ..well }), (WARN, "switched off".into()));
+        let contested = worst(Status { enable_publishers: 2, ..well });
+        assert_eq!(contested, (ERROR, "2 publishers of the enable: end all but one".into()));
         let late = well.worst(now + Duration::from_millis(1001));
         assert_eq!(late.0, STALE);
         let fault = Status { fault: Some("odometry jumped"), permission: latched, ..well };

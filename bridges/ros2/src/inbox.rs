@@ -2,19 +2,39 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Waiting messages, a few of each topic. A slow reader misses the oldest.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Inbox {
     topics: Mutex<BTreeMap<String, Topic>>,
     arrived: Condvar,
+    /// Start of the clock of the arrivals.
+    opened: Instant,
+}
+
+/// Message of a topic with the time of its arrival.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Arrival {
+    /// The topic.
+    pub topic: String,
+    /// Time since the inbox was opened, ns.
+    pub arrival_ns: u64,
+    /// The message, in CDR with its encapsulation header.
+    pub message: Vec<u8>,
 }
 
 #[derive(Debug, Default)]
 struct Topic {
-    waiting: VecDeque<Vec<u8>>,
+    /// Times of arrival with the messages.
+    waiting: VecDeque<(u64, Vec<u8>)>,
     traffic: Traffic,
+}
+
+impl Default for Inbox {
+    fn default() -> Self {
+        Self { topics: Mutex::default(), arrived: Condvar::new(), opened: Instant::now() }
+    }
 }
 
 /// Numbers of received and of dropped messages of a topic.
@@ -31,8 +51,9 @@ pub struct Traffic {
 impl Inbox {
     /// Adds a message; of the same topic, `room` are kept and the oldest dropped.
     pub fn push(&self, topic: &str, message: Vec<u8>, room: usize) {
+        let arrival_ns = u64::try_from(self.opened.elapsed().as_nanos()).unwrap_or(u64::MAX);
         self.with_topic(topic, |Topic { waiting, traffic }| {
-            waiting.push_back(message);
+            waiting.push_back((arrival_ns, message));
             traffic.received += 1;
             while waiting.len() > room {
                 waiting.pop_front();
@@ -58,14 +79,18 @@ impl Inbox {
 
     /// Returns all waiting messages by topic, in the order of arrival within a topic; empty if none
     /// arrives within `patience`.
-    pub fn take(&self, patience: Duration) -> Vec<(String, Vec<u8>)> {
+    pub fn take(&self, patience: Duration) -> Vec<Arrival> {
         let empty = |topics: &mut BTreeMap<String, Topic>| {
             topics.values().all(|topic| topic.waiting.is_empty())
         };
         let waited = self.arrived.wait_timeout_while(self.lock(), patience, empty);
         let (mut topics, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let all = topics.iter_mut().flat_map(|(name, topic)| {
-            topic.waiting.drain(..).map(|message| (name.clone(), message))
+            topic.waiting.drain(..).map(|(arrival_ns, message)| Arrival {
+                topic: name.clone(),
+                arrival_ns,
+                message,
+            })
         });
         all.collect()
     }
@@ -90,8 +115,9 @@ mod tests {
         (0..5).for_each(|i| inbox.push("images", vec![i], 2));
         (0..5).for_each(|i| inbox.push("odometry", vec![i], 64));
         let taken = inbox.take(Duration::ZERO);
-        let images: Vec<_> = taken.iter().filter(|(topic, _)| topic == "images").collect();
-        assert_eq!(images, [&("images".into(), vec![3]), &("images".into(), vec![4])]);
+        let images: Vec<_> = taken.iter().filter(|arrival| arrival.topic == "images").collect();
+        assert_eq!([&images[0].message[..], &images[1].message[..]], [[3], [4]]);
+        assert!(images.len() == 2 && images[0].arrival_ns <= images[1].arrival_ns);
         assert_eq!(taken.len(), 7);
         assert_eq!(inbox.traffic()["images"], Traffic { received: 5, dropped: 3, malformed: 0 });
         assert!(inbox.take(Duration::from_millis(1)).is_empty());
@@ -110,7 +136,8 @@ mod tests {
         let inbox = Inbox::default();
         std::thread::scope(|scope| {
             scope.spawn(|| inbox.push("odometry", vec![7], 64));
-            assert_eq!(inbox.take(Duration::from_secs(60)), [("odometry".into(), vec![7])]);
+            let taken = inbox.take(Duration::from_secs(60));
+            assert_eq!((taken[0].topic.as_str(), &taken[0].message[..]), ("odometry", &[7][..]));
         });
     }
 }

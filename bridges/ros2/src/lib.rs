@@ -32,6 +32,8 @@ pub mod inbox;
 mod messages;
 mod network;
 mod options;
+mod publishers;
+mod raw;
 mod services;
 mod skill;
 mod stamps;

@@ -3,11 +3,19 @@
 //! Values in, values out: events with their times go in, and the permission to move at a time comes
 //! out. Times are measured from any fixed moment by a clock that only goes forward.
 //!
+//! A *press* is an `On` after a release: after an `Off`, or after no `On` for longer than the heartbeat
+//! lasts. A reset spends the press that is held at that moment, so that a button that is stuck, or a
+//! program that repeats `On` for ever, does not move the robot after it.
+//!
 //! ```text
-//!            Reset                    On                   On, in time
+//!            Reset                 press                  On, in time
 //!  Latched ────────► Waiting ────────────────► Enabled ───────────────┐
-//!     ▲                 ▲                         │  ▲                │
-//!     │                 └──────── too late ───────┘  └────────────────┘
+//!     ▲   │             ▲ ▲                       │  ▲                │
+//!     │   │ Reset       │ └─────── too late ──────┤  └────────────────┘
+//!     │   │ while held  │                         │ Reset while held
+//!     │   ▼             │ silence                 ▼
+//!     │  NeedsRelease ──┴───────────────── NeedsRelease ◄── On, in time
+//!     │
 //!     └──────── Off or Fault, in every state
 //! ```
 //!
@@ -24,7 +32,8 @@ pub enum Enable {
     Off,
     /// Stops the robot until a reset, for this cause.
     Fault(&'static str),
-    /// Clears an `Off` and a fault that are not newer. The robot moves only after the next `On`.
+    /// Clears an `Off` and a fault that are not newer. The robot moves only after the next press: an
+    /// `On` that goes on from before the reset does not count until it was released.
     Reset,
 }
 
@@ -33,8 +42,10 @@ pub enum Enable {
 pub enum Permission {
     /// The robot may move.
     Granted,
-    /// No `On` since the last reset.
+    /// No press since the last reset.
     NotEnabled,
+    /// The `On` that is repeated began before the last reset: it must be released and pressed again.
+    NeedsRelease,
     /// The last `On` is too old.
     Expired,
     /// Latched for this cause until a reset.
@@ -52,6 +63,7 @@ impl Permission {
         match self {
             Self::Granted => "enabled",
             Self::NotEnabled => "not enabled",
+            Self::NeedsRelease => "release the enable and press it again",
             Self::Expired => "the enable was not repeated in time",
             Self::Latched(cause) => cause,
         }
@@ -59,15 +71,28 @@ impl Permission {
 }
 
 /// Deadman's switch with a latch: it starts latched, moves only while an `On` is repeated, and stays
-/// stopped after an `Off` or a fault until a reset.
+/// stopped after an `Off` or a fault until a reset, a release and a press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EnableSwitch {
     timeout: Duration,
     latched: Option<&'static str>,
     /// Time of the last `Off` or fault.
     stopped: Duration,
-    /// Time of the last `On` since the last reset.
-    enabled: Option<Duration>,
+    /// Time of the last reset that cleared one.
+    reset: Duration,
+    /// Press that is held: the `On` that are repeated now, or were last.
+    press: Option<Press>,
+}
+
+/// `On` events of which each came in time after the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Press {
+    /// Time of the first `On`.
+    first: Duration,
+    /// Time of the last `On`.
+    last: Duration,
+    /// True if a reset came since the first `On`: the press no longer moves the robot.
+    spent: bool,
 }
 
 impl EnableSwitch {
@@ -81,42 +106,75 @@ impl EnableSwitch {
     /// Creates a latched switch whose `On` holds for `timeout`, at most [`EnableSwitch::CEILING`].
     pub fn new(timeout: Duration) -> Self {
         let timeout = timeout.min(Self::CEILING);
-        Self { timeout, latched: Some(Self::STARTED), stopped: Duration::ZERO, enabled: None }
+        Self {
+            timeout,
+            latched: Some(Self::STARTED),
+            stopped: Duration::ZERO,
+            reset: Duration::ZERO,
+            press: None,
+        }
+    }
+
+    /// Returns the time for which an `On` holds.
+    pub fn timeout(&self) -> Duration {
+        self.timeout
     }
 
     /// Takes in an event.
     pub fn take(&mut self, event: Enable, now: Duration) {
         match event {
-            // A switch that is latched does not remember it either: after the reset the robot moves
-            // only for an `On` that is newer.
-            Enable::On if self.latched.is_none() => self.enabled = Some(now),
-            Enable::On => {}
-            Enable::Off => self.latch(Self::SWITCHED_OFF, now),
+            Enable::On => self.repeat(now),
+            Enable::Off => {
+                self.latch(Self::SWITCHED_OFF, now);
+                self.press = None;
+            }
             Enable::Fault(cause) => self.latch(cause, now),
             // A reset that was sent before the stop came knew nothing of it.
             Enable::Reset if now < self.stopped => {}
-            Enable::Reset => (self.latched, self.enabled) = (None, None),
+            Enable::Reset => {
+                self.latched = None;
+                self.reset = self.reset.max(now);
+                // A press that began later was made by a hand that knew of the reset.
+                if let Some(press) = self.press.as_mut().filter(|press| press.first <= now) {
+                    press.spent = true;
+                }
+            }
         }
     }
 
     /// Returns the permission at a time.
     pub fn permission(&self, now: Duration) -> Permission {
-        match (self.latched, self.enabled) {
-            (Some(cause), _) => Permission::Latched(cause),
-            (None, None) => Permission::NotEnabled,
-            // A time before the `On` is a mistake of the caller, which must not move a robot.
-            (None, Some(then)) => match now.checked_sub(then) {
-                Some(age) if age <= self.timeout => Permission::Granted,
-                _ => Permission::Expired,
-            },
+        if let Some(cause) = self.latched {
+            return Permission::Latched(cause);
         }
+        let Some(press) = self.press else { return Permission::NotEnabled };
+        let is_released = self.is_released(press.last, now);
+        if press.spent {
+            return if is_released { Permission::NotEnabled } else { Permission::NeedsRelease };
+        }
+        // A time before the `On` is a mistake of the caller, which must not move a robot.
+        if is_released || now < press.last { Permission::Expired } else { Permission::Granted }
+    }
+
+    /// Takes in an `On`, which goes on with the press that is held or begins another one.
+    fn repeat(&mut self, now: Duration) {
+        let held = self.press.filter(|press| !self.is_released(press.last, now));
+        // An `On` that was sent before the reset and comes after it knew nothing of it.
+        let begun = Press { first: now, last: now, spent: now < self.reset };
+        self.press = Some(held.map_or(begun, |held| Press { last: held.last.max(now), ..held }));
+    }
+
+    /// Returns true if an `On` at `last` that was not repeated has ended at `now`.
+    fn is_released(&self, last: Duration, now: Duration) -> bool {
+        // An `On` from before the last one is no release.
+        now.checked_sub(last).is_some_and(|silence| silence > self.timeout)
     }
 
     fn latch(&mut self, cause: &'static str, now: Duration) {
         self.stopped = self.stopped.max(now);
         // The first cause is kept: later ones usually follow from it. But that of the start is none.
         let known = self.latched.filter(|known| *known != Self::STARTED);
-        (self.latched, self.enabled) = (Some(known.unwrap_or(cause)), None);
+        self.latched = Some(known.unwrap_or(cause));
     }
 }
 
@@ -160,14 +218,51 @@ mod tests {
     #[test]
     fn an_off_latches_and_a_heartbeat_does_not_clear_it() {
         for cause in [Enable::Off, Enable::Fault("odometry jumped")] {
-            let off = [(0, Enable::Reset), (0, Enable::On), (1, cause), (2, Enable::On)];
-            assert!(matches!(after(&off, 2), Permission::Latched(_)), "{cause:?}");
-            let mut reset = off.to_vec();
-            reset.push((3, Enable::Reset));
-            assert_eq!(after(&reset, 3), Permission::NotEnabled, "an older enable is forgotten");
-            reset.push((4, Enable::On));
-            assert_eq!(after(&reset, 4), Permission::Granted);
+            let mut events = vec![(0, Enable::Reset), (0, Enable::On), (1, cause), (2, Enable::On)];
+            assert!(matches!(after(&events, 2), Permission::Latched(_)), "{cause:?}");
+            events.push((3, Enable::Reset));
+            assert_eq!(after(&events, 3), Permission::NeedsRelease, "held since before the reset");
+            assert_eq!(after(&events, 503), Permission::NotEnabled, "released by silence");
+            events.push((503, Enable::On));
+            assert_eq!(after(&events, 503), Permission::Granted);
         }
+    }
+
+    #[test]
+    fn an_enable_that_goes_on_through_a_reset_moves_nothing_until_it_is_released_and_pressed() {
+        let stuck = |from: u64, until: u64| (from..until).step_by(100).map(|at| (at, Enable::On));
+        let mut events: Vec<(u64, Enable)> = stuck(0, 1000).collect();
+        events.push((1000, Enable::Reset));
+        events.extend(stuck(1050, 9000));
+        assert_eq!(after(&events, 9000), Permission::NeedsRelease);
+        assert_eq!(after(&events, 9000).cause(), "release the enable and press it again");
+        // A pause that is no longer than the timeout is no release.
+        events.push((9450, Enable::On));
+        assert_eq!(after(&events, 9450), Permission::NeedsRelease);
+        events.push((9951, Enable::On));
+        assert_eq!(after(&events, 9951), Permission::Granted, "released and pressed");
+        // A reset while the robot moves asks for another press, too.
+        events.push((9960, Enable::Reset));
+        events.push((9970, Enable::On));
+        assert_eq!(after(&events, 9970), Permission::NeedsRelease);
+        // An off is a release at once; it latches all the same.
+        events.extend([(9980, Enable::Off), (9990, Enable::Reset)]);
+        assert_eq!(after(&events, 9990), Permission::NotEnabled);
+        events.push((9991, Enable::On));
+        assert_eq!(after(&events, 9991), Permission::Granted);
+    }
+
+    #[test]
+    fn events_count_by_their_times_when_they_come_late() {
+        // The reset is taken in after a press that followed it, and before one that it did not know.
+        let press_after = [(10, Enable::On), (5, Enable::Reset)];
+        assert_eq!(after(&press_after, 10), Permission::Granted);
+        let press_before = [(5, Enable::Reset), (4, Enable::On), (6, Enable::On)];
+        assert_eq!(after(&press_before, 6), Permission::NeedsRelease);
+        // An old `On` is no release.
+        let held =
+            [(1000, Enable::On), (1001, Enable::Reset), (300, Enable::On), (1002, Enable::On)];
+        assert_eq!(after(&held, 1002), Permission::NeedsRelease);
     }
 
     #[test]
@@ -211,10 +306,11 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 4_000, ..ProptestConfig::default() })]
 
         /// The permission follows from the list of events alone: the last one that is no `On` is a
-        /// reset, and an `On` after it is young enough.
+        /// reset, an `On` after it is a press, which no `On` came before in time unless an off lies
+        /// between, and all since are repeated in time.
         #[test]
-        fn the_robot_moves_for_a_young_enable_after_a_reset_and_for_nothing_else(
-            events in prop::collection::vec((0..400_u64, any_event()), 0..50),
+        fn the_robot_moves_for_a_press_after_a_reset_and_for_nothing_else(
+            events in prop::collection::vec((0..700_u64, any_event()), 0..50),
             wait in 0..1200_u64,
         ) {
             let mut now = 0;
@@ -227,10 +323,20 @@ mod tests {
                 .collect();
             let now = now + wait;
             let last = timed.iter().rposition(|(_, event)| *event != Enable::On);
-            let is_reset = last.is_some_and(|at| timed[at].1 == Enable::Reset);
-            let newest = timed.last().filter(|(_, event)| *event == Enable::On);
-            let is_young = newest.is_some_and(|(at, _)| now - at <= TIMEOUT_MS);
-            prop_assert_eq!(after(&timed, now).is_granted(), is_reset && is_young);
+            let after_reset = match last {
+                Some(at) if timed[at].1 == Enable::Reset => at + 1..timed.len(),
+                _ => 0..0,
+            };
+            let is_press = |at: usize| {
+                let earlier = timed[..at].iter().rev();
+                let held = earlier.take_while(|(_, event)| *event != Enable::Off);
+                let mut ons = held.filter(|(_, event)| *event == Enable::On);
+                ons.all(|(then, _)| timed[at].0 - then > TIMEOUT_MS)
+            };
+            let is_pressed = after_reset.clone().any(is_press);
+            let newest = after_reset.last().map(|at| timed[at].0);
+            let is_young = newest.is_some_and(|at| now - at <= TIMEOUT_MS);
+            prop_assert_eq!(after(&timed, now).is_granted(), is_pressed && is_young);
         }
     }
 }

@@ -4,6 +4,7 @@
 //! skipped.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
 
+mod faults;
 mod peers;
 mod skill;
 
@@ -92,7 +93,7 @@ fn what_is_missing_is_named_and_the_wait_has_an_end() {
 /// The deadman's switch on the network: before an enable, while it is repeated, after it ceases,
 /// after `false`, and after a reset.
 #[test]
-fn the_robot_moves_while_the_switch_is_held_and_after_a_stop_only_after_a_reset() {
+fn the_robot_moves_while_the_switch_is_held_and_after_a_stop_only_after_a_reset_and_a_press() {
     let Some(_alone) = alone() else { return };
     let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
     let simulation = Simulation::new(&scene(25.0), 1);
@@ -106,9 +107,12 @@ fn the_robot_moves_while_the_switch_is_held_and_after_a_stop_only_after_a_reset(
     hand.hold(true);
     sleep(Duration::from_millis(1500));
     assert!(commands.so_far().is_empty(), "a restart is no reset, and says nothing to the wheels");
+    hand.reset_until_heard(&said);
+    wait_for(&said, "release the enable and press it again");
+    sleep(Duration::from_millis(1000));
+    assert!(commands.so_far().is_empty(), "a button that is held through the reset moves nothing");
     hand.hold(false);
     sleep(Duration::from_millis(700));
-    hand.reset();
     wait_for(&said, "not enabled");
     sleep(Duration::from_millis(1000));
     assert!(commands.so_far().is_empty(), "a reset is no enable");
@@ -133,8 +137,12 @@ fn the_robot_moves_while_the_switch_is_held_and_after_a_stop_only_after_a_reset(
     sleep(Duration::from_millis(1500));
     assert!(!commands.moves_since(off), "a false latches, though true is repeated");
     wait_for(&said, "switched off");
-    hand.reset();
-    commands.wait_for_move("reset, and the switch is held");
+    hand.reset_until_heard(&said);
+    let reset = Instant::now();
+    sleep(Duration::from_millis(1000));
+    assert!(!commands.moves_since(reset), "the switch is held since before the reset");
+    hand.press_again();
+    commands.wait_for_move("reset, released and pressed");
 
     stop.store(true, Ordering::Relaxed);
     bridge.join().unwrap().unwrap();

@@ -41,8 +41,8 @@ pub(crate) const LAST_MOVE_S: f64 = 0.5 + 0.04 + 0.2;
 
 /// Returns a domain that no other run of this test is likely to use.
 pub(crate) fn domain(offset: u32) -> u16 {
-    // Eight domains per process, below the limit of 232.
-    (100 + 8 * (std::process::id() % 15) + offset) as u16
+    // Twelve domains per process, up to the limit of 232.
+    (100 + 12 * (std::process::id() % 11) + offset) as u16
 }
 
 /// Returns a guard for a test that runs alone, or `None` where participants do not hear each other.
@@ -214,10 +214,25 @@ impl Hand {
     /// other), and holds the switch.
     pub(crate) fn let_go(&self, said: &Said) {
         wait_for(said, "needs a reset");
-        while !said.lock().unwrap().iter().any(|line| line == "reset") {
+        self.reset_until_heard(said);
+        self.hold(true);
+    }
+
+    /// Resets until the bridge says so once more.
+    pub(crate) fn reset_until_heard(&self, said: &Said) {
+        let before = resets(said);
+        let deadline = Instant::now() + Duration::from_secs(30);
+        while resets(said) == before {
+            assert!(Instant::now() < deadline, "no reset in {:?}", said.lock().unwrap());
             self.reset();
             sleep(Duration::from_millis(200));
         }
+    }
+
+    /// Lets go of the switch for longer than an enable holds, and presses it again.
+    pub(crate) fn press_again(&self) {
+        self.hold(false);
+        sleep(Duration::from_millis(100 + 500 + 100));
         self.hold(true);
     }
 
@@ -228,6 +243,11 @@ impl Hand {
 
 /// Log messages of a bridge.
 pub(crate) type Said = Arc<Mutex<Vec<String>>>;
+
+/// Returns the number of resets of which the bridge has said that they count.
+fn resets(said: &Said) -> usize {
+    said.lock().unwrap().iter().filter(|line| *line == "reset").count()
+}
 
 /// Waits until the bridge has said these words.
 pub(crate) fn wait_for(said: &Said, words: &str) {
@@ -299,6 +319,18 @@ pub(crate) fn can_talk() -> bool {
     !heard.finish().is_empty()
 }
 
+/// Repetition of the last images in place of new ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Repeats {
+    /// New images are published.
+    #[default]
+    Nothing,
+    /// The last images are published again as they were, with their stamps.
+    Images,
+    /// The last images are published again with new stamps.
+    Pictures,
+}
+
 /// Topics of a simulated robot.
 pub(crate) struct Robot {
     pub(crate) peer: Peer,
@@ -312,6 +344,8 @@ pub(crate) struct Robot {
     pub(crate) epoch: Stamp,
     /// True once the calibration is another one.
     pub(crate) zoomed: Arc<AtomicBool>,
+    /// What the camera repeats.
+    pub(crate) repeats: Arc<Mutex<Repeats>>,
 }
 
 impl Robot {
@@ -329,6 +363,7 @@ impl Robot {
             camera: camera.clone(),
             epoch: Stamp::from_nanos(since.as_nanos() as u64),
             zoomed: Arc::default(),
+            repeats: Arc::default(),
         }
     }
 
@@ -348,6 +383,7 @@ impl Robot {
         let start = Instant::now();
         let at = |ns| sleep((start + Duration::from_nanos(ns)) - Instant::now());
         let mut last = start;
+        let mut repeated: Option<Shot> = None;
         while let Some(event) = simulation.next_event() {
             if !is_sent(&event) {
                 continue;
@@ -359,7 +395,18 @@ impl Robot {
                 }
                 Event::Shot(shot) => {
                     at(shot.captured_ns);
-                    self.shoot(&shot);
+                    let repeats = *self.repeats.lock().unwrap();
+                    match repeated.as_mut().filter(|_| repeats != Repeats::Nothing) {
+                        Some(shown) if repeats == Repeats::Images => self.shoot(shown),
+                        Some(shown) => {
+                            shown.captured_ns = shot.captured_ns;
+                            self.shoot(shown);
+                        }
+                        None => {
+                            self.shoot(&shot);
+                            repeated = Some(*shot);
+                        }
+                    }
                     last = Instant::now();
                 }
                 Event::NoOdometry { .. } | Event::Webcam(_) => {}

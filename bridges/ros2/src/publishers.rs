@@ -1,0 +1,176 @@
+//! Gate of a topic that lets the robot move: one publisher, and only messages that are young by the
+//! clock of their publisher.
+//!
+//! Two programs at one switch cannot stop each other: where a hand lets go, the other program drives
+//! on. A message that waited on its way, in a queue or on a network that was gone, says nothing about
+//! the hand now.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use ros2_client::{Gid, MessageInfo};
+use tagalong_core::Stamp;
+
+/// Origin of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Origin {
+    /// Identity of the publisher.
+    pub(crate) publisher: Gid,
+    /// Time at which the message was published, by the clock of its machine; `None` if the middleware
+    /// does not tell it, and the message counts by its arrival.
+    pub(crate) published: Option<Stamp>,
+}
+
+impl From<&MessageInfo> for Origin {
+    fn from(info: &MessageInfo) -> Self {
+        let nanos = info.source_timestamp().and_then(|time| u64::try_from(time.to_nanos()).ok());
+        Self { publisher: info.publisher_gid(), published: nanos.map(Stamp::from_nanos) }
+    }
+}
+
+/// Cause for which a message does not count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Unfit {
+    /// The topic has more than one publisher.
+    Contested,
+    /// The message is this old by the clock of its publisher, s; ahead of this machine's clock if
+    /// negative.
+    Untimely(f64),
+}
+
+/// Gate of one topic.
+#[derive(Debug)]
+pub(crate) struct Gate {
+    lifespan: Duration,
+    state: Mutex<State>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// Publishers that discovery knows.
+    discovered: usize,
+    /// Publisher of the last message, with its arrival.
+    last: Option<(Gid, Instant)>,
+    untimely: u64,
+    /// Age of the first untimely message that was not told yet, s.
+    untold_s: Option<f64>,
+    /// True while the last message was untimely.
+    is_untimely: bool,
+}
+
+impl Gate {
+    /// Creates a gate for messages that count for `lifespan` from their publication.
+    pub(crate) fn new(lifespan: Duration) -> Self {
+        Self { lifespan, state: Mutex::default() }
+    }
+
+    /// Returns the age of a message that counts; `now` and `clock` are the time of its arrival.
+    ///
+    /// # Errors
+    /// [`Unfit`] for a message that does not count.
+    pub(crate) fn admit(
+        &self,
+        origin: Origin,
+        now: Instant,
+        clock: Stamp,
+    ) -> Result<Duration, Unfit> {
+        let mut state = self.lock();
+        let before = state.last.replace((origin.publisher, now));
+        let is_other = before.is_some_and(|(publisher, at)| {
+            publisher != origin.publisher && now.saturating_duration_since(at) <= self.lifespan
+        });
+        if state.discovered > 1 || is_other {
+            return Err(Unfit::Contested);
+        }
+        let age_s = origin.published.map_or(0.0, |published| clock.seconds_since(published));
+        let lifespan_s = self.lifespan.as_secs_f64();
+        // Ahead by more than that, nothing is known about the true age.
+        if !(-lifespan_s..=lifespan_s).contains(&age_s) {
+            if !state.is_untimely {
+                state.untold_s = Some(age_s);
+            }
+            (state.untimely, state.is_untimely) = (state.untimely + 1, true);
+            return Err(Unfit::Untimely(age_s));
+        }
+        state.is_untimely = false;
+        Ok(Duration::from_secs_f64(age_s.max(0.0)))
+    }
+
+    /// Sets the number of publishers that discovery knows.
+    pub(crate) fn set_discovered(&self, publishers: usize) {
+        self.lock().discovered = publishers;
+    }
+
+    /// Returns the number of publishers that discovery knows.
+    pub(crate) fn discovered(&self) -> usize {
+        self.lock().discovered
+    }
+
+    /// Returns the number of messages that did not count for their age.
+    pub(crate) fn untimely(&self) -> u64 {
+        self.lock().untimely
+    }
+
+    /// Returns the age of an untimely message, s, once for each row of them.
+    pub(crate) fn take_untold(&self) -> Option<f64> {
+        self.lock().untold_s.take()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIFESPAN: Duration = Duration::from_millis(500);
+
+    fn origin(publisher: u8, published_ms: u64) -> Origin {
+        let published = Some(Stamp::from_nanos(published_ms * 1_000_000));
+        Origin { publisher: Gid::from([publisher; 16]), published }
+    }
+
+    fn clock(ms: u64) -> Stamp {
+        Stamp::from_nanos(ms * 1_000_000)
+    }
+
+    #[test]
+    fn a_message_counts_by_the_time_of_its_publisher() {
+        let (gate, now) = (Gate::new(LIFESPAN), Instant::now());
+        let age = |published_ms| gate.admit(origin(1, published_ms), now, clock(9_000));
+        assert_eq!(age(8_700), Ok(Duration::from_millis(300)));
+        assert_eq!(age(8_500), Ok(LIFESPAN));
+        assert_eq!(age(8_499), Err(Unfit::Untimely(0.501)));
+        assert_eq!(age(1_000), Err(Unfit::Untimely(8.0)));
+        assert_eq!(
+            (gate.untimely(), gate.take_untold(), gate.take_untold()),
+            (2, Some(0.501), None)
+        );
+        assert_eq!(age(9_400), Ok(Duration::ZERO), "clocks differ a little");
+        assert!(matches!(age(9_600), Err(Unfit::Untimely(age_s)) if age_s < -0.5), "clocks differ");
+        assert!(gate.take_untold().is_some_and(|age_s| age_s < -0.5));
+        let unknown = Origin { published: None, ..origin(1, 0) };
+        assert_eq!(gate.admit(unknown, now, clock(9_000)), Ok(Duration::ZERO), "by arrival");
+    }
+
+    #[test]
+    fn two_publishers_close_the_gate_by_their_messages_or_by_discovery() {
+        let (gate, start) = (Gate::new(LIFESPAN), Instant::now());
+        let admit = |publisher, after_ms| {
+            let now = start + Duration::from_millis(after_ms);
+            gate.admit(origin(publisher, 9_000), now, clock(9_000))
+        };
+        assert!(admit(1, 0).is_ok());
+        assert_eq!(admit(2, 400), Err(Unfit::Contested));
+        assert_eq!(admit(1, 500), Err(Unfit::Contested));
+        assert!(admit(1, 600).is_ok());
+        // A publisher that takes over later is a hand of its own.
+        assert!(admit(2, 1_200).is_ok());
+        gate.set_discovered(2);
+        assert_eq!(admit(2, 1_300), Err(Unfit::Contested), "though the other is silent");
+        gate.set_discovered(1);
+        assert!(admit(2, 1_400).is_ok());
+    }
+}
