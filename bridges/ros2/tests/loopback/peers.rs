@@ -362,7 +362,7 @@ impl Robot {
                     self.shoot(&shot);
                     last = Instant::now();
                 }
-                Event::NoOdometry { .. } | Event::Webcam(_) => {}
+                Event::NoOdometry { .. } | Event::Sensor(_) | Event::Webcam(_) => {}
             }
         }
         last

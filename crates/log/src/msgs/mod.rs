@@ -14,7 +14,7 @@ mod scene;
 mod sensor;
 mod vision;
 
-pub use common::{Header, StringMsg, Time};
+pub use common::{Bool, Header, StringMsg, Time};
 pub use geometry::{
     Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage,
     Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
@@ -27,7 +27,7 @@ pub use scene::{
 };
 pub use sensor::{
     CameraInfo, CompressedImage, DisparityImage, Image, JointState, LaserScan, PointCloud2,
-    PointField, RegionOfInterest,
+    PointField, Range, RegionOfInterest,
 };
 use serde::{Deserialize, Serialize};
 pub use vision::{

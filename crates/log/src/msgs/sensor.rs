@@ -133,6 +133,32 @@ pub struct LaserScan {
 
 message!(LaserScan, "sensor_msgs/msg/LaserScan", "LaserScan.msg");
 
+/// `sensor_msgs/Range`: the distance to the nearest surface within a cone.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Range {
+    /// Time, and the sensor, which looks along its x axis.
+    pub header: Header,
+    /// [`Range::ULTRASOUND`] or [`Range::INFRARED`].
+    pub radiation_type: u8,
+    /// Angle of the cone, rad.
+    pub field_of_view: f32,
+    /// Minimum range that is measured, m.
+    pub min_range: f32,
+    /// Maximum range that is measured, m.
+    pub max_range: f32,
+    /// Range, m; infinite if nothing is within the limits (REP 117).
+    pub range: f32,
+}
+
+impl Range {
+    /// Type of sonars.
+    pub const ULTRASOUND: u8 = 0;
+    /// Type of infrared sensors.
+    pub const INFRARED: u8 = 1;
+}
+
+message!(Range, "sensor_msgs/msg/Range", "Range.msg");
+
 /// `sensor_msgs/JointState`: lists of one length, or empty if unknown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointState {

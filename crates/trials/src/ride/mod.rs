@@ -10,13 +10,9 @@ pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_config::Registry;
 use tagalong_core::{Frame, Stamp, WheelSpeeds};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources};
-use tagalong_sim::{Clearance, Event, Scene, ScheduledFault, Simulation};
+use tagalong_sim::{Clearance, Event, ROBOT_RADIUS_M, Scene, ScheduledFault, Simulation};
 
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
-
-/// The robot's body is a disc of this radius, m: somewhat more than the robot of
-/// the papers, which is 0.38 m wide and 0.47 m long.
-const RADIUS_M: f64 = 0.25;
 
 /// Observer of a ride, for example one that writes a log.
 pub trait Witness {
@@ -42,7 +38,7 @@ pub struct Tick {
     pub at_s: f64,
     /// True forward speed, m/s.
     pub speed_mps: f64,
-    /// Free distance around it.
+    /// Free distance around it: around its footprint, or a disc if the scene has none.
     pub clearance: Clearance,
 }
 
@@ -157,7 +153,7 @@ fn tick(simulation: &Simulation, at_ns: u64) -> Tick {
     Tick {
         at_s: at_ns as f64 * 1e-9,
         speed_mps: simulation.speed_mps(),
-        clearance: simulation.clearance(RADIUS_M),
+        clearance: simulation.clearance(ROBOT_RADIUS_M),
     }
 }
 
