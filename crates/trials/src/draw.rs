@@ -226,7 +226,7 @@ impl Draw {
     /// Returns the time from the stamp of an image to its arrival, s, on a robot; a log has none.
     fn latency_s(&self, stamp_ns: u64, arrived_ns: u64) -> Option<f64> {
         let is_live = self.patience == 0;
-        is_live.then(|| (arrived_ns as f64 - stamp_ns as f64) * 1e-9)
+        is_live.then_some((arrived_ns as f64 - stamp_ns as f64) * 1e-9)
     }
 
     /// Converts images as a log does: depth is stored in millimetres, and log readers unwrap
@@ -301,7 +301,7 @@ fn seen_by(simulation: &Simulation) -> Camera {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_sim::{FaultKind, FaultSettings, InjectedFault};
+    use tagalong_sim::{FaultKind, FaultSettings, InjectedFault, Variant};
 
     use super::*;
 
@@ -512,5 +512,43 @@ mod tests {
         let ages: Vec<f64> = readings_of(&all, "bumper").iter().map(|reading| reading.0).collect();
         assert_eq!(ages.len(), all.len());
         assert!(ages.iter().fold(0.0, |most: f64, age_s| most.max(*age_s)) > 2.9);
+    }
+
+    /// Frames of a robot that drives straight ahead in the scene of the glass wall, each with the room
+    /// to things and the nearest range of its sonars, m.
+    fn driven_at_glass(seed: u64, heading_deg: f64) -> Vec<(f64, f64)> {
+        let text = include_str!("../../../configs/scenes/behind-glass-sonar.toml");
+        let variant = Variant::of_seed(seed)
+            .with("camera.width", 16)
+            .with("camera.height", 12)
+            .with("robot.heading_deg", format!("{heading_deg:?}"));
+        let mut draw = Draw::live(&Scene::parse_with(text, &variant).unwrap(), 1);
+        let mut frames = Vec::new();
+        while let Some(one) = draw.next_frame() {
+            draw.steer(WheelSpeeds { left: 0.4, right: 0.4 });
+            let readings = one.frame.sensor::<ObstacleReadings>().unwrap();
+            let range_m = |reading: &ObstacleReading| match reading.data {
+                ObstacleData::Range(reading) => reading.range_m,
+                _ => f64::INFINITY,
+            };
+            let nearest_m = readings.0.iter().map(range_m).fold(f64::INFINITY, f64::min);
+            frames.push((draw.simulation().clearance(0.25).things_m, nearest_m));
+        }
+        frames
+    }
+
+    #[test]
+    fn forward_sonars_see_the_pane_before_the_robot_touches_it() {
+        for (seed, heading_deg) in [(1, 0.0), (2, 8.0), (3, -8.0), (4, 0.0)] {
+            let frames = driven_at_glass(seed, heading_deg);
+            let contact = frames.iter().position(|frame| frame.0 < 0.0).unwrap();
+            let near = frames[..contact].iter().filter(|frame| frame.0 < 0.7);
+            let seen = near.clone().filter(|frame| frame.1 < frame.0 + 0.3).count();
+            assert!(
+                seen >= 8 && seen == near.count(),
+                "{seed}: {:?}",
+                &frames[contact - 20..contact]
+            );
+        }
     }
 }
