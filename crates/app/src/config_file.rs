@@ -43,6 +43,7 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "follow-arc"
     "follow-depth"
     "follow-low"
+    "follow-sonar"
     "joint-particle"
     "joint-particle-all"
     "joint-particle-as-printed"

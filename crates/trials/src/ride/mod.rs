@@ -13,14 +13,11 @@ use tagalong_config::Registry;
 use tagalong_core::{Command, Frame, Reason, Stamp};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources};
 use tagalong_sim::{
-    ApproachInView, ApproachState, Clearance, Event, Scene, ScheduledFault, Simulation,
+    ApproachInView, ApproachState, Clearance, Event, ROBOT_RADIUS_M, Scene, ScheduledFault,
+    Simulation,
 };
 
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
-
-/// The robot's body is a disc of this radius, m: somewhat more than the robot of
-/// the papers, which is 0.38 m wide and 0.47 m long.
-const RADIUS_M: f64 = 0.25;
 
 /// Observer of a ride, for example one that writes a log.
 pub trait Witness {
@@ -51,7 +48,7 @@ pub struct Tick {
     pub speed_mps: f64,
     /// True turn rate, rad/s.
     pub turn_rate: f64,
-    /// Free distance around it.
+    /// Free distance around it: around its footprint, or a disc if the scene has none.
     pub clearance: Clearance,
     /// State of the approacher of the scene, once it is there.
     pub approach: Option<ApproachState>,
@@ -63,7 +60,7 @@ impl Tick {
     /// Returns the largest speed over ground of a point of the robot's body, m/s: forward, or by
     /// the turn.
     pub fn body_mps(&self) -> f64 {
-        self.speed_mps.abs().max(self.turn_rate.abs() * RADIUS_M)
+        self.speed_mps.abs().max(self.turn_rate.abs() * ROBOT_RADIUS_M)
     }
 }
 
@@ -181,7 +178,7 @@ impl Ride {
 
     /// Notes the sensors that the approacher is in view of when an image arrives.
     fn look(&mut self, simulation: &Simulation, event: &Event) {
-        if let (Event::Shot(_), Some(_)) = (event, simulation.approach(RADIUS_M)) {
+        if let (Event::Shot(_), Some(_)) = (event, simulation.approach(ROBOT_RADIUS_M)) {
             let at_s = self.ticks.last().map_or(0.0, |tick| tick.at_s);
             self.in_view.push((at_s, simulation.approach_in_view()));
         }
@@ -199,8 +196,8 @@ fn tick(simulation: &Simulation, at_ns: u64, reason: Option<Reason>) -> Tick {
         at_s: at_ns as f64 * 1e-9,
         speed_mps: simulation.speed_mps(),
         turn_rate: simulation.turn_rate(),
-        clearance: simulation.clearance(RADIUS_M),
-        approach: simulation.approach(RADIUS_M),
+        clearance: simulation.clearance(ROBOT_RADIUS_M),
+        approach: simulation.approach(ROBOT_RADIUS_M),
         reason,
     }
 }
