@@ -13,6 +13,7 @@ use tagalong_geometry::{Camera, Distortion, Panorama, Pinhole, Rect};
 use crate::approach::{ApproachBy, ApproachInView, ApproachState, Approacher, Surroundings};
 use crate::behaviour::{Obstacle, Walker, hidden_by, lead_of, others, play_tricks};
 use crate::body::Skeleton;
+use crate::faults::ScheduledFault;
 use crate::furniture::{Furniture, FurnitureKind};
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorCamera;
@@ -28,9 +29,11 @@ use crate::split::{SUBJECTS, Split};
 use crate::webcam::Webcam;
 use crate::world::{self, Hit, Object, Stage, World};
 
+mod injector;
 mod joints;
 mod walkers;
 
+use injector::Injector;
 pub use joints::Joint;
 use joints::{Spot, joints};
 use walkers::{approaching_person, walkers};
@@ -60,10 +63,26 @@ const LEAST_VISIBLE: f64 = 0.2;
 pub enum Event {
     /// The odometry.
     Odometry(OdometryReading),
+    /// The odometry is silent where it would have spoken: a step of the simulation all the same.
+    NoOdometry {
+        /// Since the start, ns.
+        at_ns: u64,
+    },
     /// An image, or a pair of them, with the truth.
     Shot(Box<Shot>),
     /// An image of a camera in the room.
     Webcam(WebcamShot),
+}
+
+impl Event {
+    /// Returns the time of a step of the simulation, since the start, ns; `None` for other events.
+    pub fn step_ns(&self) -> Option<u64> {
+        match self {
+            Self::Odometry(reading) => Some(reading.at_ns),
+            Self::NoOdometry { at_ns } => Some(*at_ns),
+            Self::Shot(_) | Self::Webcam(_) => None,
+        }
+    }
 }
 
 /// Images of a camera in the room; they are neither lost nor late.
@@ -82,6 +101,8 @@ pub struct WebcamShot {
 pub struct OdometryReading {
     /// Since the start, ns.
     pub at_ns: u64,
+    /// The same by the stamp of the message, ns: another time if a clock is wrong.
+    pub stamp_ns: u64,
     /// The robot in the frame of the odometry, m and rad.
     pub odom_from_robot: Isometry2<f64>,
     /// Forward, m/s.
@@ -101,10 +122,16 @@ pub struct OdometryReading {
 pub struct Shot {
     /// Since the start, ns.
     pub captured_ns: u64,
-    /// When it is written to the log, ns; not before it was captured.
+    /// The same by the stamp of the message, ns: another time if the robot's clock is wrong.
+    pub stamp_ns: u64,
+    /// When it arrives and is written to the log, ns; not before it was captured.
     pub recorded_ns: u64,
-    /// When the depth was taken: the offset of the camera later.
+    /// The same by the robot's clock, ns.
+    pub arrived_ns: u64,
+    /// Stamp of the depth, ns: the offset of the camera later.
     pub depth_ns: u64,
+    /// The camera as the robot describes it at that time.
+    pub camera: Arc<Camera>,
     /// Colour and depth, the grey images of a stereo pair, or the circular image
     /// of a mirror.
     pub images: Images,
@@ -154,9 +181,12 @@ pub struct Clearance {
 /// A scene in motion. Same scene, same events, whatever the number of threads.
 pub struct Simulation {
     scene: Scene,
-    camera: Camera,
-    /// The camera as it is really mounted.
+    camera: Arc<Camera>,
+    /// The camera as it was really mounted at the start ...
+    first_camera: Camera,
+    /// ... and as it is now.
     true_camera: Camera,
+    injector: Injector,
     /// The mirror above the camera, if it is a panorama camera.
     mirror: Option<MirrorCamera>,
     webcams: Vec<Webcam>,
@@ -205,8 +235,10 @@ impl Simulation {
         walkers.extend(approaching_person(scene, &mut stream(9)));
         let true_camera = shaken(&camera, scene.camera.mount_error_deg, &mut stream(2));
         Self {
+            first_camera: true_camera.clone(),
             true_camera,
-            camera,
+            camera: Arc::new(camera),
+            injector: Injector::new(scene.scheduled_faults(), scene.seed),
             mirror,
             webcams: scene.webcams.iter().map(|webcam| Webcam::new(webcam, threads)).collect(),
             stage: Arc::new(Stage::new(fixed, lamps, scene.light.lux * scene.light.ambient)),
@@ -340,6 +372,16 @@ impl Simulation {
         seen.take(LEAST_SPOTS).count() == LEAST_SPOTS
     }
 
+    /// Returns the injected faults.
+    pub fn faults(&self) -> &[ScheduledFault] {
+        self.injector.faults()
+    }
+
+    /// Returns the time on the robot's clock, which faults may set, at a time since the start, ns.
+    pub fn robot_clock_ns(&self, at_ns: u64) -> u64 {
+        self.injector.robot_clock_ns(at_ns)
+    }
+
     /// The robot's forward speed over ground, m/s.
     pub fn speed_mps(&self) -> f64 {
         self.robot.speed_mps()
@@ -369,10 +411,12 @@ impl Simulation {
         let leader = self.walkers.first().map(|walker| walker.stance.place);
         // The order within a step matters: a robot reads its wheels before the camera of the same
         // moment.
+        self.robot.set_faults(self.injector.wheels(self.now_ns));
         self.robot.decide(now_s, leader);
         self.appear(now_s);
-        let odometry = self.read_odometry();
-        self.record(self.now_ns, odometry);
+        let reading = self.read_odometry();
+        let heard = self.injector.hear(reading);
+        self.record(self.now_ns, heard);
         if self.now_ns >= due_ns {
             self.shots += 1;
             self.shoot();
@@ -447,18 +491,19 @@ impl Simulation {
         self.counter += 1;
     }
 
-    fn read_odometry(&self) -> Event {
+    fn read_odometry(&self) -> OdometryReading {
         let (speed_mps, turn_rate) = self.robot.measured();
         let (commanded_mps, commanded_turn_rate) = self.robot.commanded();
-        Event::Odometry(OdometryReading {
+        OdometryReading {
             at_ns: self.now_ns,
+            stamp_ns: self.now_ns,
             odom_from_robot: self.robot.odometry,
             speed_mps,
             turn_rate,
             encoders: self.robot.encoders(),
             commanded_mps,
             commanded_turn_rate,
-        })
+        }
     }
 
     fn shoot(&mut self) {
@@ -466,12 +511,14 @@ impl Simulation {
         // Drawn for every image, so that a change of one fault leaves the others as they are.
         let (dropped, late) = (self.chance.chance(faults.dropped), self.chance.chance(faults.late));
         let delay_ns = (self.chance.between(0.05, 0.15) * 1e9) as u64;
-        if dropped {
+        if dropped || self.injector.drops(self.now_ns) {
             return;
         }
+        self.true_camera = self.injector.mounted(&self.first_camera, self.now_ns);
         let recorded_ns = self.now_ns + if late { delay_ns } else { 0 };
-        let shot = self.shot(recorded_ns);
-        self.record(recorded_ns, Event::Shot(Box::new(shot)));
+        let taken = self.shot(recorded_ns);
+        let shot = self.injector.deliver(taken);
+        self.record(shot.recorded_ns, Event::Shot(Box::new(shot)));
     }
 
     fn shoot_webcams(&mut self) {
@@ -508,8 +555,18 @@ impl Simulation {
             |laser: &LaserSettings| laser.measure(&world, &pose, self.moment(0, 1.0).seed);
         let laser = self.laser().map(measured);
         let (captured_ns, world_from_robot) = (self.now_ns, self.robot.pose);
-        let depth_ns = captured_ns + (self.scene.camera.depth_offset_s * 1e9) as u64;
-        Shot { captured_ns, recorded_ns, depth_ns, images, laser, truth, world_from_robot }
+        Shot {
+            captured_ns,
+            stamp_ns: captured_ns,
+            recorded_ns,
+            arrived_ns: recorded_ns,
+            depth_ns: captured_ns + (self.scene.camera.depth_offset_s * 1e9) as u64,
+            camera: self.injector.described(&self.camera, captured_ns),
+            images,
+            laser,
+            truth,
+            world_from_robot,
+        }
     }
 
     /// Returns the people in the room, with their numbers.

@@ -362,7 +362,7 @@ impl Robot {
                     self.shoot(&shot);
                     last = Instant::now();
                 }
-                Event::Webcam(_) => {}
+                Event::NoOdometry { .. } | Event::Webcam(_) => {}
             }
         }
         last

@@ -23,7 +23,7 @@ use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_pipeline::LooksSettings;
 use tagalong_reproduce::Table;
-use tagalong_sim::{Scene, Seeds, Split, Variant};
+use tagalong_sim::{InjectedFault, Scene, ScheduledFault, Seeds, Split, Variant};
 use tagalong_simulate::scenes;
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
@@ -60,6 +60,10 @@ pub struct FollowArgs {
     /// Lose this fraction of the images, instead of the scene's.
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     pub drop: Option<f64>,
+    /// Inject a fault, repeatable: a kind like `freeze-depth`, or `random`, from AT seconds on, for
+    /// LASTS seconds; the seed draws what is left out.
+    #[arg(long, value_name = "KIND[@AT[+LASTS]]")]
+    pub inject: Vec<InjectedFault>,
     /// Replace a value in each scene: a dotted key, like `crowd=5`.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = tagalong_simulate::key_and_value)]
     pub set: Vec<(String, String)>,
@@ -128,6 +132,9 @@ pub struct Followed {
     pub swept: Option<String>,
     /// Name of the pipeline.
     pub pipeline: String,
+    /// Faults that were injected.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<ScheduledFault>,
     /// Scores of the ride.
     #[serde(flatten)]
     pub ridden: Ridden,
@@ -205,7 +212,9 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
                 for seed in seeds.numbers() {
                     let mut variant = variant(args, seed);
                     variant.set.extend(value.clone());
-                    let scene = tagalong_simulate::read(&path, &variant)?;
+                    let mut scene = tagalong_simulate::read(&path, &variant)?;
+                    scene.faults.inject.extend(args.inject.iter().cloned());
+                    scene.check_faults().map_err(Failure::usage)?;
                     let (suite, swept) = (suite.clone(), swept.clone());
                     jobs.push(Job { suite, swept, scene, contender: contender.clone() });
                 }
@@ -284,6 +293,7 @@ fn ride(
         pipeline: contender.name.clone(),
         ridden: RideJudge::default().judge(&ride),
         story: story::story(&ride),
+        faults: ride.faults,
         took_ms: ride.took_ms,
     })
 }

@@ -12,13 +12,18 @@ pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_config::Registry;
 use tagalong_core::{Command, Frame, Reason, Stamp};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources};
-use tagalong_sim::{ApproachInView, ApproachState, Clearance, Event, Scene, Simulation};
+use tagalong_sim::{
+    ApproachInView, ApproachState, Clearance, Event, Scene, ScheduledFault, Simulation,
+};
 
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
 
 /// The robot's body is a disc of this radius, m: somewhat more than the robot of
 /// the papers, which is 0.38 m wide and 0.47 m long.
 const RADIUS_M: f64 = 0.25;
+
+/// Steps between two looks at the approacher.
+const LOOKS_EVERY: usize = 5;
 
 /// Observer of a ride, for example one that writes a log.
 pub trait Witness {
@@ -80,9 +85,11 @@ pub struct Ride {
     pub took_ms: Vec<f64>,
     /// The robot, step by step.
     pub ticks: Vec<Tick>,
-    /// Sensors that the approacher of the scene was in view of, at each image; the times are s
-    /// since the start.
+    /// Sensors that the approacher of the scene was in view of, every tenth of a second; the
+    /// times are s since the start.
     pub in_view: Vec<(f64, ApproachInView)>,
+    /// Faults that were injected.
+    pub faults: Vec<ScheduledFault>,
 }
 
 impl Ride {
@@ -113,6 +120,7 @@ impl Ride {
             took_ms: Vec::new(),
             ticks: Vec::new(),
             in_view: Vec::new(),
+            faults: draw.simulation().faults().to_vec(),
         };
         let failed =
             |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
@@ -157,24 +165,23 @@ impl Ride {
         }
         draw.next_frame_while(|simulation, event| {
             witness.event(event);
-            // Only the odometry ticks: it is the fastest message of the robot.
-            let Event::Odometry(reading) = event else {
-                self.look(simulation, event);
-                return None;
-            };
-            let command = command(pipeline, Stamp::from_nanos(reading.at_ns), framed);
-            let tick = tick(simulation, reading.at_ns, command.map(|command| command.reason));
+            // Wheels ask for commands at each step, whether the odometry speaks or not.
+            let at_ns = event.step_ns()?;
+            let since_frame = Stamp::from_nanos(at_ns).seconds_since(framed);
+            let now = Stamp::from_nanos(simulation.robot_clock_ns(at_ns));
+            let command = command(pipeline, now, since_frame);
+            let tick = tick(simulation, at_ns, command.map(|command| command.reason));
+            self.look(simulation, &tick);
             witness.tick(&tick);
             self.ticks.push(tick);
             command.map(|command| command.wheels)
         })
     }
 
-    /// Notes the sensors that the approacher is in view of when an image arrives.
-    fn look(&mut self, simulation: &Simulation, event: &Event) {
-        if let (Event::Shot(_), Some(_)) = (event, simulation.approach(RADIUS_M)) {
-            let at_s = self.ticks.last().map_or(0.0, |tick| tick.at_s);
-            self.in_view.push((at_s, simulation.approach_in_view()));
+    /// Notes the sensors that the approacher is in view of, at every few steps.
+    fn look(&mut self, simulation: &Simulation, tick: &Tick) {
+        if tick.approach.is_some() && self.ticks.len().is_multiple_of(LOOKS_EVERY) {
+            self.in_view.push((tick.at_s, simulation.approach_in_view()));
         }
     }
 }
@@ -196,7 +203,7 @@ fn tick(simulation: &Simulation, at_ns: u64, reason: Option<Reason>) -> Tick {
     }
 }
 
-fn command(pipeline: &Pipeline, now: Stamp, framed: Stamp) -> Option<Command> {
-    let since_frame = Duration::from_secs_f64(now.seconds_since(framed).max(0.0));
+fn command(pipeline: &Pipeline, now: Stamp, since_frame_s: f64) -> Option<Command> {
+    let since_frame = Duration::from_secs_f64(since_frame_s.max(0.0));
     pipeline.command_after(now, since_frame)
 }
