@@ -19,6 +19,9 @@ use tagalong_sim::{
 
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
 
+/// Steps between two looks at the approacher.
+const LOOKS_EVERY: usize = 5;
+
 /// Observer of a ride, for example one that writes a log.
 pub trait Witness {
     /// Something that the robot recorded.
@@ -79,11 +82,11 @@ pub struct Ride {
     pub took_ms: Vec<f64>,
     /// The robot, step by step.
     pub ticks: Vec<Tick>,
+    /// Sensors that the approacher of the scene was in view of, every tenth of a second; the
+    /// times are s since the start.
+    pub in_view: Vec<(f64, ApproachInView)>,
     /// Faults that were injected.
     pub faults: Vec<ScheduledFault>,
-    /// Sensors that the approacher of the scene was in view of, at each image; the times are s
-    /// since the start.
-    pub in_view: Vec<(f64, ApproachInView)>,
 }
 
 impl Ride {
@@ -115,8 +118,8 @@ impl Ride {
             reports: Vec::new(),
             took_ms: Vec::new(),
             ticks: Vec::new(),
-            faults: draw.simulation().faults().to_vec(),
             in_view: Vec::new(),
+            faults: draw.simulation().faults().to_vec(),
         };
         let failed =
             |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
@@ -162,25 +165,22 @@ impl Ride {
         draw.next_frame_while(|simulation, event| {
             witness.event(event);
             // Wheels ask for commands at each step, whether the odometry speaks or not.
-            let Some(at_ns) = event.step_ns() else {
-                self.look(simulation, event);
-                return None;
-            };
+            let at_ns = event.step_ns()?;
             let since_frame = Stamp::from_nanos(at_ns).seconds_since(framed);
             let now = Stamp::from_nanos(simulation.robot_clock_ns(at_ns));
             let command = command(pipeline, now, since_frame);
             let tick = tick(simulation, at_ns, command.map(|command| command.reason));
+            self.look(simulation, &tick);
             witness.tick(&tick);
             self.ticks.push(tick);
             command.map(|command| command.wheels)
         })
     }
 
-    /// Notes the sensors that the approacher is in view of when an image arrives.
-    fn look(&mut self, simulation: &Simulation, event: &Event) {
-        if let (Event::Shot(_), Some(_)) = (event, simulation.approach(ROBOT_RADIUS_M)) {
-            let at_s = self.ticks.last().map_or(0.0, |tick| tick.at_s);
-            self.in_view.push((at_s, simulation.approach_in_view()));
+    /// Notes the sensors that the approacher is in view of, at every few steps.
+    fn look(&mut self, simulation: &Simulation, tick: &Tick) {
+        if tick.approach.is_some() && self.ticks.len().is_multiple_of(LOOKS_EVERY) {
+            self.in_view.push((tick.at_s, simulation.approach_in_view()));
         }
     }
 }
