@@ -205,11 +205,23 @@ found, the distance, the room to people and things, and how smooth the ride was.
 its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames); --overlay puts a
 picture per frame beside it.
 
+--inject breaks the robot in the middle of a ride: a sensor freezes, goes dark, is late or repeats itself,
+the odometry is silent or wrong, the clock jumps, the wheels do not obey.
+
+With --approaches a person or a trolley comes at the robot from any side, at 0.2 to 1.6 m/s, at any
+moment of a short ride, and does not avoid it. Prints in how many approaches the robot moved at a
+contact, with the exact bound of 95 % that the number of approaches allows. --replay tells the course
+of one of them by its seed.
+
 Examples:
   tagalong follow
   tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml -o rides --overlay
   tagalong follow configs/follow-depth.toml --seeds 50 --against configs/follow-as-printed.toml
-  tagalong follow configs/follow-depth.toml --latency-ms 150 --drop 0.2 --format markdown";
+  tagalong follow configs/follow-depth.toml --latency-ms 150 --drop 0.2 --format markdown
+  tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml --inject freeze-depth@5
+  tagalong follow configs/follow-depth.toml --seeds 50 --inject random
+  tagalong follow configs/follow-depth.toml --approaches 1000 --faults one -o contacts
+  tagalong follow configs/follow-depth.toml --replay 2000000007 --faults one";
 
 const REPRODUCE_HELP: &str = "\
 Everything is simulated with seeds of the test split. The whole of a system takes minutes to an hour.

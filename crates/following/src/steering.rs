@@ -153,6 +153,7 @@ impl Steering {
     /// Lets the robot move again after a fault.
     pub fn arm(&mut self) {
         self.limiter.arm();
+        self.monitor.arm();
     }
 
     /// Returns the command for a frame, and the target; `motion` is the robot's since the last

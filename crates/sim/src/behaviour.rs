@@ -217,6 +217,15 @@ impl Walker {
         }
     }
 
+    /// Places a walker whose steps are decided elsewhere; the legs move at this speed.
+    pub fn carry(&mut self, place: Point2<f64>, heading_rad: f64, speed_mps: f64, dt: f64) {
+        self.velocity = Rotation2::new(heading_rad) * Vector2::new(speed_mps, 0.0);
+        self.stance.place = place;
+        self.stance.heading_rad = heading_rad;
+        self.stance.speed_mps = speed_mps;
+        self.stride(dt);
+    }
+
     /// Moves the walker out of obstacles, because pushes of others must not lead through them.
     fn stay_outside(&mut self, obstacles: &[Obstacle]) {
         for obstacle in obstacles {

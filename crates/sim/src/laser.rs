@@ -9,7 +9,10 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::LaserScan;
 
 use crate::random::normal_at;
-use crate::world::World;
+use crate::world::{self, Object, World};
+
+/// So many rays must meet an object that counts as seen.
+const LEAST_RAYS: usize = 2;
 
 /// A laser scanner on the robot, above the point between its wheels. It looks
 /// whenever the camera does.
@@ -104,6 +107,25 @@ impl LaserSettings {
         (0..).zip(self.directions()).map(range).collect()
     }
 
+    /// Returns true if two rays or more meet an object within the range, with none of the others
+    /// before it.
+    pub(crate) fn reaches(
+        &self,
+        own: &Object,
+        others: &[&Object],
+        world_from_robot: &Isometry3<f64>,
+    ) -> bool {
+        let eye = world_from_robot * Point3::new(0.0, 0.0, self.height_m);
+        let meets = self.directions().filter(|direction| {
+            let ahead = Vector3::new(direction.cos(), direction.sin(), 0.0);
+            let ray = world_from_robot.rotation * ahead;
+            let metres = world::distance([own], &eye, &ray);
+            (self.min_range_m..=self.max_range_m).contains(&metres)
+                && world::distance(others.iter().copied(), &eye, &ray) > metres
+        });
+        meets.take(LEAST_RAYS).count() == LEAST_RAYS
+    }
+
     /// Returns the scan that some ranges stand for; the scanner sits above the robot's origin.
     pub fn scan(&self, ranges: &[f32]) -> LaserScan {
         let mount = Isometry3::translation(0.0, 0.0, self.height_m);
@@ -122,7 +144,7 @@ mod tests {
     use super::*;
     use crate::material::Material;
     use crate::shape::{Form, Shape};
-    use crate::world::{Object, Stage};
+    use crate::world::Stage;
 
     const FOUR: LaserSettings = LaserSettings {
         rays: 4,

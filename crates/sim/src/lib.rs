@@ -40,9 +40,11 @@
 // iterators zipped over all of them would hide the arithmetic.
 #![allow(clippy::needless_range_loop)]
 
+mod approach;
 mod behaviour;
 mod body;
 mod daylight;
+mod faults;
 mod furniture;
 mod gait;
 mod lanes;
@@ -68,7 +70,9 @@ mod variation;
 mod webcam;
 mod world;
 
+pub use approach::{ApproachBy, ApproachInView, ApproachSettings, ApproachState};
 pub use daylight::Daylight;
+pub use faults::{FaultKind, InjectedFault, ScheduledFault};
 pub use furniture::{Furniture, FurnitureKind};
 pub use laser::LaserSettings;
 pub use mirror::MirrorSettings;

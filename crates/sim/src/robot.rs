@@ -26,6 +26,25 @@ pub struct Encoder {
     pub rate_rad_s: f64,
 }
 
+/// State of wheels that may fail.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WheelFaults {
+    /// They stand, whatever is commanded.
+    pub stuck: bool,
+    /// They go on with the command of before.
+    pub runaway: bool,
+    /// Part of their travel that reaches the ground.
+    pub grip: f64,
+    /// From a command to its effect, s, instead of that of the settings.
+    pub latency_s: Option<f64>,
+}
+
+impl Default for WheelFaults {
+    fn default() -> Self {
+        Self { stuck: false, runaway: false, grip: 1.0, latency_s: None }
+    }
+}
+
 /// The robot on its way.
 #[derive(Clone, Debug)]
 pub struct Robot {
@@ -34,7 +53,7 @@ pub struct Robot {
     pub pose: Isometry2<f64>,
     /// Where its odometry believes to be, in a frame that starts at zero.
     pub odometry: Isometry2<f64>,
-    /// Speeds of the wheels over ground, m/s.
+    /// Speeds of the rims of the wheels, m/s.
     wheels: [f64; 2],
     /// Speeds that the encoders measure, m/s.
     measured: [f64; 2],
@@ -47,6 +66,9 @@ pub struct Robot {
     /// The last command, which may not work yet.
     given: WheelSpeeds,
     command: WheelSpeeds,
+    /// The last command that has reached the wheels, which run away from it.
+    arrived: WheelSpeeds,
+    faults: WheelFaults,
     steered: bool,
     ahead: usize,
     nod_rad: f64,
@@ -72,6 +94,8 @@ impl Robot {
             commands: VecDeque::new(),
             given: WheelSpeeds::STOP,
             command: WheelSpeeds::STOP,
+            arrived: WheelSpeeds::STOP,
+            faults: WheelFaults::default(),
             steered: false,
             ahead: 0,
             nod_rad: 0.0,
@@ -101,14 +125,23 @@ impl Robot {
 
     fn give(&mut self, now_s: f64, command: WheelSpeeds) {
         self.given = command;
-        self.commands.push_back((now_s + self.settings.latency_s, command));
+        let latency_s = self.faults.latency_s.unwrap_or(self.settings.latency_s);
+        self.commands.push_back((now_s + latency_s, command));
+    }
+
+    /// Sets the state of the wheels from now on.
+    pub fn set_faults(&mut self, faults: WheelFaults) {
+        self.faults = faults;
     }
 
     /// Moves by a short time.
     pub fn step(&mut self, now_s: f64, dt: f64) {
         while let Some(command) = self.commands.front().filter(|c| c.0 <= now_s).map(|c| c.1) {
-            self.command = command;
+            self.arrived = command;
             self.commands.pop_front();
+        }
+        if !self.faults.runaway {
+            self.command = self.arrived;
         }
         self.drive(dt);
     }
@@ -122,6 +155,9 @@ impl Robot {
         let wheels = self.wheels.iter_mut().zip(&mut self.measured);
         for (((wheel, measured), target), radius) in wheels.zip(targets).zip(self.radius) {
             *wheel += (target - *wheel) * part;
+            if self.faults.stuck {
+                *wheel = 0.0;
+            }
             // The wheel slips; the encoder sees the wheel and not the ground.
             *measured = *wheel / radius * (1.0 + self.settings.slip * self.random.normal());
         }
@@ -137,7 +173,7 @@ impl Robot {
 
     /// Where it is after a short time, or was before it, at the speed of now.
     pub fn pose_after(&self, dt: f64) -> Isometry2<f64> {
-        self.pose * moved(self.wheels, self.half_separation_m, dt)
+        self.pose * moved(self.over_ground(), self.half_separation_m, dt)
     }
 
     /// Speeds that lead to the point ahead.
@@ -164,14 +200,21 @@ impl Robot {
         WheelSpeeds { left: speed - turn, right: speed + turn }
     }
 
+    /// Returns the speeds of the wheels over ground, m/s.
+    fn over_ground(&self) -> [f64; 2] {
+        self.wheels.map(|wheel| wheel * self.faults.grip)
+    }
+
     /// Forward, over ground, m/s.
     pub fn speed_mps(&self) -> f64 {
-        0.5 * (self.wheels[0] + self.wheels[1])
+        let [left, right] = self.over_ground();
+        0.5 * (left + right)
     }
 
     /// About the vertical, rad/s.
     pub fn turn_rate(&self) -> f64 {
-        (self.wheels[1] - self.wheels[0]) / (2.0 * self.half_separation_m)
+        let [left, right] = self.over_ground();
+        (right - left) / (2.0 * self.half_separation_m)
     }
 
     /// Forward speed, m/s, and turn rate, rad/s, as the encoders see them.

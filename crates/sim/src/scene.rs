@@ -7,7 +7,9 @@ use tagalong_config::ConfigError;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
+use crate::approach::{ApproachBy, ApproachSettings};
 use crate::daylight::Daylight;
+use crate::faults::InjectedFault;
 use crate::furniture::Furniture;
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorSettings;
@@ -49,6 +51,8 @@ pub struct Scene {
     pub furniture: Vec<Furniture>,
     /// People.
     pub people: Vec<PersonSettings>,
+    /// A person or a trolley that comes at the robot; none if left out.
+    pub approach: Option<ApproachSettings>,
 }
 
 impl Default for Scene {
@@ -67,6 +71,7 @@ impl Default for Scene {
             webcams: Vec::new(),
             furniture: Vec::new(),
             people: Vec::new(),
+            approach: None,
         }
     }
 }
@@ -110,7 +115,8 @@ impl Scene {
     /// Returns the number of people, companions and crowd included.
     pub fn number_of_people(&self) -> usize {
         let with_companions = self.people.iter().map(|p| 1 + p.companions);
-        with_companions.fold(self.crowd, usize::saturating_add)
+        let comes = self.approach.iter().filter(|approach| approach.by == ApproachBy::Person);
+        with_companions.fold(self.crowd + comes.count(), usize::saturating_add)
     }
 
     /// Returns the same room with each person alone in it for `each_s`, one after the
@@ -217,11 +223,12 @@ impl Scene {
         let laser = self.laser.iter().flat_map(LaserSettings::rules);
         let ramp = self.room.ramp.iter().flat_map(Ramp::rules);
         let day = self.light.day.iter().flat_map(|day| day.rules(&self.room));
-        let parts = webcams.chain(laser).chain(ramp).chain(day);
+        let approach = self.approach.iter().flat_map(ApproachSettings::rules);
+        let parts = webcams.chain(laser).chain(ramp).chain(day).chain(approach);
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
-            None => Ok(()),
+            None => self.check_faults().map_err(ConfigError::new),
         }
     }
 }
@@ -456,11 +463,14 @@ pub struct FaultSettings {
     pub dropped: f64,
     /// Fraction of images that are recorded late, up to 0.15 s.
     pub late: f64,
+    /// Faults that begin at a time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub inject: Vec<InjectedFault>,
 }
 
 impl Default for FaultSettings {
     fn default() -> Self {
-        Self { dropped: 0.01, late: 0.02 }
+        Self { dropped: 0.01, late: 0.02, inject: Vec::new() }
     }
 }
 

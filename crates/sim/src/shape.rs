@@ -94,6 +94,18 @@ impl Shape {
         }
     }
 
+    /// Returns its middle, and of a block the middles of its sides too, in the world, m.
+    pub fn spots(&self) -> Vec<Point3<f64>> {
+        let Form::Block(half) = self.form else { return vec![self.bound().0] };
+        let sides = (0..3).flat_map(|axis| [-1.0, 1.0].map(|sign| (axis, sign)));
+        let middle = |(axis, sign): (usize, f64)| {
+            let mut own = Vector3::zeros();
+            own[axis] = sign * half[axis];
+            self.origin + self.world_from_own * own
+        };
+        std::iter::once(self.origin).chain(sides.map(middle)).collect()
+    }
+
     /// False if a ray passes by the ball around the solid: the cheap question
     /// to ask first. `per_length` is one over the squared length of the ray.
     pub fn near(&self, eye: &Point3<f64>, ray: &Vector3<f64>, per_length: f64) -> bool {

@@ -10,8 +10,10 @@ use nalgebra::{
 use tagalong_core::{Image, Images, RgbImage, RightImage, WheelSpeeds};
 use tagalong_geometry::{Camera, Distortion, Panorama, Pinhole, Rect};
 
+use crate::approach::{ApproachBy, ApproachInView, ApproachState, Approacher, Surroundings};
 use crate::behaviour::{Obstacle, Walker, hidden_by, lead_of, others, play_tricks};
 use crate::body::Skeleton;
+use crate::faults::ScheduledFault;
 use crate::furniture::{Furniture, FurnitureKind};
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorCamera;
@@ -27,12 +29,14 @@ use crate::split::{SUBJECTS, Split};
 use crate::webcam::Webcam;
 use crate::world::{self, Hit, Object, Stage, World};
 
+mod injector;
 mod joints;
 mod walkers;
 
+use injector::Injector;
 pub use joints::Joint;
 use joints::{Spot, joints};
-use walkers::walkers;
+use walkers::{approaching_person, walkers};
 
 /// People, robot and odometry move in steps of this many nanoseconds.
 const STEP_NS: u64 = 20_000_000;
@@ -49,6 +53,8 @@ const FEELERS_M: [f64; 4] = [0.15, 0.45, 0.8, 1.2];
 const STANDS_ON_M: f64 = 0.15;
 /// Half the width of a person, m.
 const BODY_M: f64 = 0.2;
+/// So many points of an approacher must be in view of a camera to count as seen.
+const LEAST_SPOTS: usize = 2;
 /// Visible fraction below which no detector can be expected to find a person.
 const LEAST_VISIBLE: f64 = 0.2;
 
@@ -57,10 +63,26 @@ const LEAST_VISIBLE: f64 = 0.2;
 pub enum Event {
     /// The odometry.
     Odometry(OdometryReading),
+    /// The odometry is silent where it would have spoken: a step of the simulation all the same.
+    NoOdometry {
+        /// Since the start, ns.
+        at_ns: u64,
+    },
     /// An image, or a pair of them, with the truth.
     Shot(Box<Shot>),
     /// An image of a camera in the room.
     Webcam(WebcamShot),
+}
+
+impl Event {
+    /// Returns the time of a step of the simulation, since the start, ns; `None` for other events.
+    pub fn step_ns(&self) -> Option<u64> {
+        match self {
+            Self::Odometry(reading) => Some(reading.at_ns),
+            Self::NoOdometry { at_ns } => Some(*at_ns),
+            Self::Shot(_) | Self::Webcam(_) => None,
+        }
+    }
 }
 
 /// Images of a camera in the room; they are neither lost nor late.
@@ -79,6 +101,8 @@ pub struct WebcamShot {
 pub struct OdometryReading {
     /// Since the start, ns.
     pub at_ns: u64,
+    /// The same by the stamp of the message, ns: another time if a clock is wrong.
+    pub stamp_ns: u64,
     /// The robot in the frame of the odometry, m and rad.
     pub odom_from_robot: Isometry2<f64>,
     /// Forward, m/s.
@@ -98,10 +122,16 @@ pub struct OdometryReading {
 pub struct Shot {
     /// Since the start, ns.
     pub captured_ns: u64,
-    /// When it is written to the log, ns; not before it was captured.
+    /// The same by the stamp of the message, ns: another time if the robot's clock is wrong.
+    pub stamp_ns: u64,
+    /// When it arrives and is written to the log, ns; not before it was captured.
     pub recorded_ns: u64,
-    /// When the depth was taken: the offset of the camera later.
+    /// The same by the robot's clock, ns.
+    pub arrived_ns: u64,
+    /// Stamp of the depth, ns: the offset of the camera later.
     pub depth_ns: u64,
+    /// The camera as the robot describes it at that time.
+    pub camera: Arc<Camera>,
     /// Colour and depth, the grey images of a stereo pair, or the circular image
     /// of a mirror.
     pub images: Images,
@@ -151,9 +181,12 @@ pub struct Clearance {
 /// A scene in motion. Same scene, same events, whatever the number of threads.
 pub struct Simulation {
     scene: Scene,
-    camera: Camera,
-    /// The camera as it is really mounted.
+    camera: Arc<Camera>,
+    /// The camera as it was really mounted at the start ...
+    first_camera: Camera,
+    /// ... and as it is now.
     true_camera: Camera,
+    injector: Injector,
     /// The mirror above the camera, if it is a panorama camera.
     mirror: Option<MirrorCamera>,
     webcams: Vec<Webcam>,
@@ -161,6 +194,8 @@ pub struct Simulation {
     pieces: Vec<Furniture>,
     obstacles: Vec<Obstacle>,
     walkers: Vec<Walker>,
+    /// The last of the walkers, or a trolley.
+    approacher: Option<Approacher>,
     robot: Robot,
     exposures: [Exposure; 2],
     chance: Random,
@@ -196,14 +231,19 @@ impl Simulation {
         let camera = mirror
             .as_ref()
             .map_or_else(|| camera(scene), |mirror| mirror.camera(scene.camera.height_m));
+        let mut walkers = walkers(scene, &obstacles, &mut stream(3));
+        walkers.extend(approaching_person(scene, &mut stream(9)));
         let true_camera = shaken(&camera, scene.camera.mount_error_deg, &mut stream(2));
         Self {
+            first_camera: true_camera.clone(),
             true_camera,
-            camera,
+            camera: Arc::new(camera),
+            injector: Injector::new(scene.scheduled_faults(), scene.seed),
             mirror,
             webcams: scene.webcams.iter().map(|webcam| Webcam::new(webcam, threads)).collect(),
             stage: Arc::new(Stage::new(fixed, lamps, scene.light.lux * scene.light.ambient)),
-            walkers: walkers(scene, &obstacles, &mut stream(3)),
+            walkers,
+            approacher: scene.approach.as_ref().map(Approacher::new),
             pieces,
             obstacles,
             robot: Robot::new(&scene.robot, stream(4)),
@@ -265,17 +305,91 @@ impl Simulation {
             (0..FEELERS).map(move |i| (height_m, TAU * f64::from(i) / f64::from(FEELERS)))
         });
         let floor_m = self.scene.room.floor_m(&robot);
+        let trolley = self.trolleys().map(|trolley| trolley.distance_m(&robot));
         let things = rays.map(|(height_m, angle)| {
             let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
             let from = Point3::new(robot.x, robot.y, floor_m + height_m);
             world::distance(&self.stage.objects, &from, &ray)
         });
+        let things = things.chain(trolley);
         Clearance { people_m: least(&mut { people }), things_m: least(&mut { things }) }
+    }
+
+    /// Returns the injected faults.
+    pub fn faults(&self) -> &[ScheduledFault] {
+        self.injector.faults()
+    }
+
+    /// Returns the time on the robot's clock, which faults may set, at a time since the start, ns.
+    pub fn robot_clock_ns(&self, at_ns: u64) -> u64 {
+        self.injector.robot_clock_ns(at_ns)
+    }
+
+    /// Returns the state of the approacher in respect of a round robot of this radius; `None`
+    /// before it appears, and in a scene without one.
+    pub fn approach(&self, radius_m: f64) -> Option<ApproachState> {
+        let approacher = self.approacher.as_ref().filter(|one| one.is_there())?;
+        let robot = Point2::from(self.robot.pose.translation.vector);
+        let own = self.robot.pose.inverse_transform_point(&approacher.place);
+        Some(ApproachState {
+            gap_m: approacher.distance_m(&robot) - radius_m,
+            bearing_rad: own.y.atan2(own.x),
+            speed_mps: approacher.speed_mps(),
+        })
+    }
+
+    /// Returns which of the robot's sensors could observe the approacher now.
+    pub fn approach_in_view(&self) -> ApproachInView {
+        let Some(approacher) = self.approacher.as_ref().filter(|one| one.is_there()) else {
+            return ApproachInView::default();
+        };
+        let mut people = self.world().0.people;
+        let of_person = approacher.by() == ApproachBy::Person;
+        let own = people.iter().rposition(|object| object.person.is_some() == of_person);
+        let Some(own) = own.map(|index| people.remove(index)) else {
+            return ApproachInView::default();
+        };
+        let others: Vec<&Object> = self.stage.objects.iter().chain(&people).collect();
+        let pose = self.world_from_robot(0.5);
+        ApproachInView {
+            camera: self.camera_reaches(&own, &others, &pose),
+            laser: self.laser().is_some_and(|laser| laser.reaches(&own, &others, &pose)),
+        }
+    }
+
+    /// Returns true if the camera has some of these solids in its image, within the range of its
+    /// depth, with nothing before them.
+    fn camera_reaches(&self, own: &Object, others: &[&Object], pose: &Isometry3<f64>) -> bool {
+        let camera = &self.true_camera;
+        let settings = &self.scene.camera;
+        let eye = pose * camera.robot_from_camera * Point3::origin();
+        let spots = own.shapes.iter().flat_map(Shape::spots);
+        let seen = spots.filter(|spot| {
+            let in_robot = pose.inverse_transform_point(spot);
+            let in_camera = camera.robot_from_camera.inverse_transform_point(&in_robot);
+            let is_within = (settings.min_depth_m..=settings.max_depth_m).contains(&in_camera.z);
+            let size = [camera.width as f64, camera.height as f64];
+            let in_image = camera.project_from_camera(&in_camera).is_some_and(|pixel| {
+                (0.0..size[0]).contains(&pixel.x) && (0.0..size[1]).contains(&pixel.y)
+            });
+            let way = spot - eye;
+            is_within
+                && in_image
+                && way.try_normalize(1e-6).is_some_and(|ray| {
+                    world::distance(others.iter().copied(), &eye, &ray) > way.norm()
+                })
+        });
+        seen.take(LEAST_SPOTS).count() == LEAST_SPOTS
     }
 
     /// The robot's forward speed over ground, m/s.
     pub fn speed_mps(&self) -> f64 {
         self.robot.speed_mps()
+    }
+
+    /// The robot's turn rate, rad/s.
+    pub fn turn_rate(&self) -> f64 {
+        self.robot.turn_rate()
     }
 
     /// The next thing that the robot records; `None` at the end of the scene.
@@ -297,9 +411,12 @@ impl Simulation {
         let leader = self.walkers.first().map(|walker| walker.stance.place);
         // The order within a step matters: a robot reads its wheels before the camera of the same
         // moment.
+        self.robot.set_faults(self.injector.wheels(self.now_ns));
         self.robot.decide(now_s, leader);
-        let odometry = self.read_odometry();
-        self.record(self.now_ns, odometry);
+        self.appear(now_s);
+        let reading = self.read_odometry();
+        let heard = self.injector.hear(reading);
+        self.record(self.now_ns, heard);
         if self.now_ns >= due_ns {
             self.shots += 1;
             self.shoot();
@@ -321,10 +438,52 @@ impl Simulation {
         let ahead = self.robot.pose.rotation * Vector2::new(GOES_M, 0.0);
         // The robot is an obstacle of this step only, because it moves.
         self.obstacles.push(Obstacle { at: robot, radius_m: ROBOT_M, ahead });
-        for (walker, (lead, others)) in self.walkers.iter_mut().zip(&ways) {
+        let steps = self.walkers.len() - usize::from(self.person_approaches());
+        for (walker, (lead, others)) in self.walkers.iter_mut().zip(&ways).take(steps) {
             walker.step(now_s, dt, lead.as_ref(), others, &self.obstacles);
         }
         self.obstacles.pop();
+        self.approach_robot(dt);
+    }
+
+    /// Returns true if the last of the walkers is the approacher.
+    fn person_approaches(&self) -> bool {
+        self.approacher.as_ref().is_some_and(|one| one.by() == ApproachBy::Person)
+    }
+
+    /// Returns the approacher if it is a trolley that is there.
+    fn trolleys(&self) -> impl Iterator<Item = &Approacher> {
+        let trolley = |one: &&Approacher| one.is_there() && one.by() == ApproachBy::Trolley;
+        self.approacher.iter().filter(trolley)
+    }
+
+    /// Lets the approacher appear, if it is time.
+    fn appear(&mut self, now_s: f64) {
+        self.move_approacher(0.0, |approacher, around| approacher.appear(now_s, around));
+    }
+
+    /// Moves the approacher on by a short time.
+    fn approach_robot(&mut self, dt: f64) {
+        self.move_approacher(dt, |approacher, around| approacher.step(dt, around));
+    }
+
+    /// Moves the approacher, and the walker that is its body.
+    fn move_approacher(&mut self, dt: f64, by: impl FnOnce(&mut Approacher, &Surroundings<'_>)) {
+        let others = self.walkers.len() - usize::from(self.person_approaches());
+        let now_s = self.now_ns as f64 * 1e-9;
+        let Some(approacher) = &mut self.approacher else { return };
+        let there = self.walkers[..others].iter().filter(|walker| walker.is_there(now_s));
+        let around = Surroundings {
+            robot: self.robot.pose,
+            room_m: self.scene.room.size_m,
+            obstacles: &self.obstacles,
+            people: there.map(|walker| walker.stance.place).collect(),
+        };
+        by(approacher, &around);
+        if let Some(body) = self.walkers.get_mut(others).filter(|_| approacher.is_there()) {
+            let speed_mps = approacher.speed_mps();
+            body.carry(approacher.place, approacher.heading_rad, speed_mps, dt);
+        }
     }
 
     fn record(&mut self, at_ns: u64, event: Event) {
@@ -332,18 +491,19 @@ impl Simulation {
         self.counter += 1;
     }
 
-    fn read_odometry(&self) -> Event {
+    fn read_odometry(&self) -> OdometryReading {
         let (speed_mps, turn_rate) = self.robot.measured();
         let (commanded_mps, commanded_turn_rate) = self.robot.commanded();
-        Event::Odometry(OdometryReading {
+        OdometryReading {
             at_ns: self.now_ns,
+            stamp_ns: self.now_ns,
             odom_from_robot: self.robot.odometry,
             speed_mps,
             turn_rate,
             encoders: self.robot.encoders(),
             commanded_mps,
             commanded_turn_rate,
-        })
+        }
     }
 
     fn shoot(&mut self) {
@@ -351,12 +511,14 @@ impl Simulation {
         // Drawn for every image, so that a change of one fault leaves the others as they are.
         let (dropped, late) = (self.chance.chance(faults.dropped), self.chance.chance(faults.late));
         let delay_ns = (self.chance.between(0.05, 0.15) * 1e9) as u64;
-        if dropped {
+        if dropped || self.injector.drops(self.now_ns) {
             return;
         }
+        self.true_camera = self.injector.mounted(&self.first_camera, self.now_ns);
         let recorded_ns = self.now_ns + if late { delay_ns } else { 0 };
-        let shot = self.shot(recorded_ns);
-        self.record(recorded_ns, Event::Shot(Box::new(shot)));
+        let taken = self.shot(recorded_ns);
+        let shot = self.injector.deliver(taken);
+        self.record(shot.recorded_ns, Event::Shot(Box::new(shot)));
     }
 
     fn shoot_webcams(&mut self) {
@@ -393,8 +555,18 @@ impl Simulation {
             |laser: &LaserSettings| laser.measure(&world, &pose, self.moment(0, 1.0).seed);
         let laser = self.laser().map(measured);
         let (captured_ns, world_from_robot) = (self.now_ns, self.robot.pose);
-        let depth_ns = captured_ns + (self.scene.camera.depth_offset_s * 1e9) as u64;
-        Shot { captured_ns, recorded_ns, depth_ns, images, laser, truth, world_from_robot }
+        Shot {
+            captured_ns,
+            stamp_ns: captured_ns,
+            recorded_ns,
+            arrived_ns: recorded_ns,
+            depth_ns: captured_ns + (self.scene.camera.depth_offset_s * 1e9) as u64,
+            camera: self.injector.described(&self.camera, captured_ns),
+            images,
+            laser,
+            truth,
+            world_from_robot,
+        }
     }
 
     /// Returns the people in the room, with their numbers.
@@ -413,6 +585,8 @@ impl Simulation {
             people.push(Object::new(shapes, Some(id), true));
             uppers.push(upper);
         }
+        let floor = |one: &Approacher| self.scene.room.floor_m(&one.place);
+        people.extend(self.trolleys().map(|trolley| trolley.trolley(floor(trolley))));
         (World::new(&self.stage, people), uppers)
     }
 
@@ -453,6 +627,7 @@ impl Simulation {
         }
         // The depth camera looks later, so the world is moved on and back again.
         let (robot, walkers) = (self.robot.clone(), self.walkers.clone());
+        let approacher = self.approacher.clone();
         let now_s = self.now_ns as f64 * 1e-9;
         self.robot.step(now_s, offset_s);
         self.walk(now_s, offset_s);
@@ -462,6 +637,7 @@ impl Simulation {
         let seen =
             WorldCamera { world: &world, camera, pose: &pose, lit: false }.draw(self.threads);
         (self.robot, self.walkers) = (robot, walkers);
+        self.approacher = approacher;
         Some(seen)
     }
 

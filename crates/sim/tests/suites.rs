@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use tagalong_sim::{CameraKind, Event, Scene, Shot, Simulation, Split, Variant};
+use tagalong_sim::{ApproachBy, CameraKind, Event, Scene, Shot, Simulation, Split, Variant};
 
 fn suites() -> Vec<(String, String)> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
@@ -44,6 +44,8 @@ fn every_scene_can_be_drawn_for_every_split_and_camera() {
             let shot = first_shot(scene.clone());
             let late = scene.people.iter().filter(|person| person.enters_s > 0.0);
             let late: usize = late.map(|person| 1 + person.companions).sum();
+            let comes = scene.approach.iter().filter(|one| one.by == ApproachBy::Person);
+            let late = late + comes.count();
             assert_eq!(shot.truth.len() + late, scene.number_of_people(), "{name}");
             for kind in ["rgbd", "stereo"] {
                 let other = parse(&variant.clone().with("camera.kind", kind));

@@ -180,7 +180,8 @@ const EVENTS_AHEAD: usize = 16;
 
 #[cfg(test)]
 mod tests {
-    use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, inspect};
+    use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame, inspect};
+    use tagalong_sim::{FaultKind, InjectedFault};
     use tagalong_trials::Draw;
 
     use super::*;
@@ -205,6 +206,72 @@ mod tests {
             assert_eq!((found.schema.as_str(), found.count, found.undecodable), (schema, 150, 0));
         }
         assert!((seen.skew.unwrap().median_s - 0.015).abs() < 1e-6, "{:?}", seen.skew);
+    }
+
+    /// Records the scene with a fault from 1 s to 2 s, and returns its frames.
+    fn logged(kind: FaultKind) -> Vec<LogFrame> {
+        let mut scene = Scene::parse(SCENE).unwrap();
+        scene.faults.inject = vec![InjectedFault::new(kind).at(1.0).lasting(1.0)];
+        scene.faults.late = 0.0;
+        scene.faults.dropped = 0.0;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.mcap");
+        record(Simulation::new(&scene, 1), &scene, &path, &|| true).unwrap();
+        let inputs = Inputs::ANY.require(Input::Depth);
+        let mut source =
+            FrameSource::open(&path, &InputSettings::default(), &Limits::default(), inputs)
+                .unwrap();
+        std::iter::from_fn(|| source.next_frame()).collect()
+    }
+
+    /// Frames of a log whose first stamp is the start of the scene, from 1 s to 2 s.
+    fn within(frames: &[LogFrame]) -> &[LogFrame] {
+        let start = frames[0].frame.stamp;
+        let seconds = |frame: &LogFrame| frame.frame.stamp.seconds_since(start);
+        let first = frames.iter().position(|frame| seconds(frame) > 0.99).unwrap();
+        let end = frames.iter().position(|frame| seconds(frame) > 1.99).unwrap();
+        &frames[first..end]
+    }
+
+    #[test]
+    fn injected_faults_are_in_the_log() {
+        let depth = |frame: &LogFrame| -> Vec<u32> {
+            frame.frame.depth().unwrap().pixels().iter().map(|z| z.to_bits()).collect()
+        };
+        let frozen = logged(FaultKind::FreezeDepth);
+        let first = depth(&within(&frozen)[0]);
+        assert_eq!(within(&frozen).len(), 20);
+        assert!(within(&frozen).iter().all(|frame| depth(frame) == first));
+        assert!(depth(&frozen[45]) != depth(&frozen[46]));
+
+        let blank = logged(FaultKind::BlankDepth);
+        let is_dark = |frame: &LogFrame, column: usize| {
+            frame
+                .frame
+                .depth()
+                .unwrap()
+                .pixels()
+                .iter()
+                .skip(column)
+                .step_by(64)
+                .all(|z| z.is_nan())
+        };
+        assert!(within(&blank).iter().all(|frame| (0..64).all(|column| is_dark(frame, column))));
+        let dark = logged(FaultKind::DarkColumns);
+        for frame in within(&dark) {
+            assert!((0..64).filter(|column| is_dark(frame, *column)).count() >= 56);
+        }
+        assert_eq!(logged(FaultKind::Drop).len(), 40);
+
+        let frozen = logged(FaultKind::OdometryFrozen);
+        assert!(within(&frozen)[2..].iter().all(|frame| frame.frame.motion.forward == 0.0));
+        let silent = logged(FaultKind::OdometrySilent);
+        assert!(within(&silent)[12..18].iter().all(|frame| frame.odom_stale));
+        let lost = logged(FaultKind::NanOdometry);
+        assert!(within(&lost)[12..18].iter().all(|frame| frame.odom_stale));
+        let changed = logged(FaultKind::CalibrationChanged);
+        assert!(within(&changed).iter().all(|frame| frame.frame.calibration_changed));
+        assert!(!changed[19].frame.calibration_changed);
     }
 
     /// Trials skip the log; they must give the same frames as a pipeline that reads it.

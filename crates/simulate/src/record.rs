@@ -1,5 +1,6 @@
 use std::io;
 use std::path::Path;
+use std::sync::Arc;
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
@@ -85,6 +86,7 @@ impl Recorder {
     pub fn write(&mut self, event: &Event) -> Result<(), WriteError> {
         match event {
             Event::Odometry(reading) => self.odometry(reading),
+            Event::NoOdometry { .. } => Ok(()),
             Event::Shot(shot) => self.shot(shot),
             Event::Webcam(shot) => self.webcam(shot),
         }
@@ -119,8 +121,10 @@ impl Recorder {
     }
 
     fn shot(&mut self, shot: &Shot) -> Result<(), WriteError> {
-        let (captured, recorded) = (after(shot.captured_ns), after(shot.recorded_ns));
+        let captured = after(shot.stamp_ns);
+        let recorded = after(shot.recorded_ns);
         let header = Header::new(captured, CAMERA_FRAME);
+        self.describe(recorded, &shot.camera)?;
         let images = &shot.images;
         if let Some((laser, ranges)) = self.laser.as_ref().zip(shot.laser.as_ref()) {
             self.log.send("/scan", recorded, &scan(captured, laser, ranges))?;
@@ -131,10 +135,9 @@ impl Recorder {
         }
         if let Some(depth) = &images.depth {
             // Depth has a capture time of its own, and cannot be recorded before it.
-            let (header, recorded) = (
-                Header::new(after(shot.depth_ns), CAMERA_FRAME),
-                recorded.max(after(shot.depth_ns)),
-            );
+            let offset_ns = shot.depth_ns.saturating_sub(shot.stamp_ns);
+            let recorded = recorded.max(after(shot.captured_ns + offset_ns));
+            let header = Header::new(after(shot.depth_ns), CAMERA_FRAME);
             self.info("aligned_depth_to_color", recorded, &header, 0.0)?;
             self.depth(recorded, &header, depth)?;
         }
@@ -146,6 +149,16 @@ impl Recorder {
         }
         self.log.send(TRUE_ROBOT_TOPIC, recorded, &true_robot(captured, &shot.world_from_robot))?;
         self.log.send_truth(recorded, &truth(captured, &shot.truth))
+    }
+
+    /// Takes the camera of the next images; a mount that has moved is told once.
+    fn describe(&mut self, at: Stamp, camera: &Arc<Camera>) -> Result<(), WriteError> {
+        let pose = camera.robot_from_camera;
+        if pose != self.camera.robot_from_camera {
+            self.log.send("/tf_static", at, &mount("base_link", [(CAMERA_FRAME.into(), pose)]))?;
+        }
+        self.camera = Camera::clone(camera);
+        Ok(())
     }
 
     fn webcam(&mut self, shot: &WebcamShot) -> Result<(), WriteError> {
@@ -284,7 +297,7 @@ fn true_robot(captured: Stamp, world_from_robot: &Isometry2<f64>) -> PoseStamped
 
 fn odometry(reading: &OdometryReading) -> Odometry {
     let mut odometry = Odometry {
-        header: Header::new(after(reading.at_ns), "odom"),
+        header: Header::new(after(reading.stamp_ns), "odom"),
         child_frame_id: "base_link".into(),
         ..Odometry::default()
     };
@@ -296,7 +309,7 @@ fn odometry(reading: &OdometryReading) -> Odometry {
 
 fn wheels(reading: &OdometryReading) -> JointState {
     JointState {
-        header: Header::new(after(reading.at_ns), "base_link"),
+        header: Header::new(after(reading.stamp_ns), "base_link"),
         name: WHEEL_JOINTS.map(String::from).to_vec(),
         position: reading.encoders.map(|encoder| encoder.angle_rad).to_vec(),
         velocity: reading.encoders.map(|encoder| encoder.rate_rad_s).to_vec(),

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 54] = [
+const BUILT_IN: [(&str, &str); 55] = [
+    ("approach", include_str!("../../../configs/scenes/approach.toml")),
     ("behind-glass", include_str!("../../../configs/scenes/behind-glass.toml")),
     ("cafeteria", include_str!("../../../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../../../configs/scenes/cafeteria-high.toml")),

@@ -1,7 +1,7 @@
 //! Intervals: how far a figure can be trusted.
 
 use serde::{Deserialize, Deserializer, Serialize};
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{Beta, ContinuousCDF, StudentsT};
 use statrs::function::erf::erf_inv;
 
 /// Confidence of all intervals.
@@ -83,6 +83,25 @@ fn open_above<'de, D: Deserializer<'de>>(end: D) -> Result<f64, D::Error> {
 pub fn wilson(successes: u64, trials: u64, confidence: f64) -> Option<Interval> {
     let rate = successes.min(trials) as f64 / trials as f64;
     (trials > 0).then(|| score_interval(rate, trials as f64, confidence))
+}
+
+/// Returns the exact upper bound of a rate (Clopper and Pearson, Biometrika 1934): at any higher
+/// rate so few events, or fewer, have a probability below `1 - confidence`. One-sided: for rare
+/// events, like contacts, of which only the upper end matters. `None` without trials.
+///
+/// ```
+/// let bound = tagalong_stats::exact_upper_bound(0, 3000, 0.95).unwrap();
+/// assert!((bound - 0.001).abs() < 1e-5, "three thousand without an event: one in a thousand");
+/// ```
+pub fn exact_upper_bound(events: u64, trials: u64, confidence: f64) -> Option<f64> {
+    if trials == 0 {
+        return None;
+    }
+    if events >= trials {
+        return Some(1.0);
+    }
+    let law = Beta::new(events as f64 + 1.0, (trials - events) as f64).ok()?;
+    Some(law.inverse_cdf(confidence.clamp(0.0, 1.0)))
 }
 
 fn score_interval(estimate: f64, trials: f64, confidence: f64) -> Interval {

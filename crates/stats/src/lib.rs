@@ -5,8 +5,9 @@
 //!   numbers without a state, for threads that work in any order; [`fingerprint`] turns bytes into
 //!   one.
 //! * [`mean`], [`mean_and_deviation`], [`median`], [`percentile`]: summaries of values.
-//! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`]: how far a figure can
-//!   be trusted; [`paired_gain`], [`sign_flip`], [`holm`]: how far a difference can.
+//! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`],
+//!   [`exact_upper_bound`]: how far a figure can be trusted; [`paired_gain`], [`sign_flip`],
+//!   [`holm`]: how far a difference can.
 //! * [`exp2_of_negative`]: an exponential function for loops over many numbers.
 //!
 //! There is no clock and no global generator: the same seed gives the same bytes.
@@ -17,7 +18,9 @@ mod random;
 mod significance;
 mod summary;
 
-pub use intervals::{CONFIDENCE, Interval, clustered_share, draws_interval, mean_interval, wilson};
+pub use intervals::{
+    CONFIDENCE, Interval, clustered_share, draws_interval, exact_upper_bound, mean_interval, wilson,
+};
 pub use power::exp2_of_negative;
 pub use random::{ChaCha, RandomSource, SplitMix64, XorShift64, fingerprint, mix, number_at};
 pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};

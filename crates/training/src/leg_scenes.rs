@@ -107,7 +107,7 @@ fn scene(seed: u64) -> Scene {
             speed_mps: chance.between(0.2, 0.8),
             ..RobotSettings::default()
         },
-        faults: FaultSettings { dropped: 0.0, late: 0.0 },
+        faults: FaultSettings { dropped: 0.0, late: 0.0, ..FaultSettings::default() },
         laser: Some(scanner(&mut chance)),
         furniture,
         people,

@@ -99,7 +99,7 @@ fn room(seed: u64, people: usize) -> Scene {
             speed_mps: chance.between(0.2, 0.5),
             ..RobotSettings::default()
         },
-        faults: FaultSettings { dropped: 0.0, late: 0.0 },
+        faults: FaultSettings { dropped: 0.0, late: 0.0, ..FaultSettings::default() },
         furniture: (0..6).map(|_| piece(&mut chance, &view)).collect(),
         people: (0..people).map(|_| walker(&mut chance, &view)).collect(),
         ..Scene::default()

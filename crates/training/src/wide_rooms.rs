@@ -82,7 +82,7 @@ pub fn wide_scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene,
             heading_deg: chance.between(-15.0, 15.0),
             ..RobotSettings::default()
         },
-        faults: FaultSettings { dropped: 0.0, late: 0.0 },
+        faults: FaultSettings { dropped: 0.0, late: 0.0, ..FaultSettings::default() },
         furniture,
         people,
         ..Scene::default()

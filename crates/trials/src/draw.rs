@@ -1,10 +1,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::Isometry2;
+use nalgebra::{Isometry2, Matrix3};
 use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Stamp, WheelSpeeds};
 use tagalong_geometry::{Camera, Lens};
-use tagalong_sim::{Event, Scene, Shot, Simulation, Truth};
+use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Truth};
 use tagalong_vision::Unwrapping;
 
 /// Standard deviation of odometry as a fraction of the travel, as the log
@@ -16,6 +16,10 @@ const REORDERED: usize = 3;
 /// Odometry is kept for this long before the oldest image that waits, ns: longer than any image is
 /// late.
 const KEPT_NS: u64 = 1_000_000_000;
+/// Gap in the odometry beyond which the motion is unknown, s, as the log reader takes it.
+const MAX_GAP_S: f64 = 0.5;
+/// Longest time for which an unknown motion may have gone on, s, as the log reader takes it.
+const LONGEST_UNKNOWN_S: f64 = 5.0;
 
 /// Input of a pipeline at one moment of a scene, and the truth at that moment.
 pub struct SimulatedFrame {
@@ -39,7 +43,16 @@ pub struct Draw {
     waiting: BTreeMap<u64, Shot>,
     patience: usize,
     previous: Option<(Stamp, Isometry2<f64>)>,
+    calibration_changed: bool,
     index: u64,
+}
+
+/// Pose of the robot by the odometry.
+#[derive(Clone, Copy)]
+struct KnownPose {
+    odom_from_robot: Isometry2<f64>,
+    /// Age of the odometry, s; infinite without any.
+    age_s: f64,
 }
 
 impl Draw {
@@ -64,6 +77,7 @@ impl Draw {
             waiting: BTreeMap::new(),
             patience,
             previous: None,
+            calibration_changed: false,
             index: 0,
         }
     }
@@ -100,12 +114,9 @@ impl Draw {
                 self.simulation.steer(wheels);
             }
             match event {
-                Some(Event::Odometry(reading)) => {
-                    self.odometry.insert(reading.at_ns, reading.odom_from_robot);
-                    self.forget_odometry(reading.at_ns);
-                }
-                Some(Event::Shot(shot)) => drop(self.waiting.insert(shot.captured_ns, *shot)),
-                Some(Event::Webcam(_)) => {}
+                Some(Event::Odometry(reading)) => self.hear(&reading),
+                Some(Event::Shot(shot)) => drop(self.waiting.insert(shot.stamp_ns, *shot)),
+                Some(Event::NoOdometry { .. } | Event::Webcam(_)) => {}
                 None => break,
             }
         }
@@ -113,33 +124,66 @@ impl Draw {
         Some(self.simulated(shot))
     }
 
-    /// Drops odometry that is older than any image to come: at few images a second those that wait
-    /// to be put in order are old themselves.
+    /// Takes in a pose; one that is no number is refused, as log readers do.
+    fn hear(&mut self, reading: &OdometryReading) {
+        let pose = reading.odom_from_robot;
+        if pose.translation.vector.iter().any(|metres| !metres.is_finite()) {
+            return;
+        }
+        self.odometry.insert(reading.stamp_ns, pose);
+        self.forget_odometry(self.simulation.robot_clock_ns(reading.at_ns));
+    }
+
+    /// Drops odometry that is older than any image to come, except the newest of it: at few images a
+    /// second those that wait to be put in order are old themselves.
     fn forget_odometry(&mut self, now_ns: u64) {
         let oldest_ns = self.waiting.keys().next().map_or(now_ns, |waits| now_ns.min(*waits));
-        self.odometry = self.odometry.split_off(&oldest_ns.saturating_sub(KEPT_NS));
+        let least_ns = oldest_ns.saturating_sub(KEPT_NS);
+        // Odometry that fell silent is old, but all that is known.
+        let last_before = self.odometry.range(..least_ns).next_back().map(|(at_ns, _)| *at_ns);
+        self.odometry = self.odometry.split_off(&last_before.unwrap_or(least_ns));
+    }
+
+    /// Returns the pose by the newest odometry that is not from the future of a stamp.
+    fn known_pose(&self, stamp_ns: u64) -> KnownPose {
+        let newest = self.odometry.range(..=stamp_ns).next_back();
+        newest.map_or(
+            KnownPose { odom_from_robot: Isometry2::identity(), age_s: f64::INFINITY },
+            |(at_ns, pose)| KnownPose {
+                odom_from_robot: *pose,
+                age_s: (stamp_ns - at_ns) as f64 * 1e-9,
+            },
+        )
     }
 
     fn simulated(&mut self, shot: Shot) -> SimulatedFrame {
         self.index += 1;
-        let stamp = Stamp::from_nanos(shot.captured_ns);
+        let stamp = Stamp::from_nanos(shot.stamp_ns);
         // The odometry speaks at every step of the simulation, so at this one.
-        let odom_from_robot = self
-            .odometry
-            .range(..=shot.captured_ns)
-            .next_back()
-            .map_or_else(Isometry2::identity, |(_, pose)| *pose);
-        let motion = self.motion(stamp, odom_from_robot);
+        let pose = self.known_pose(shot.stamp_ns);
+        let motion = self.motion(stamp, pose);
         let camera = Arc::clone(&self.camera);
         let scan = self.simulation.laser().zip(shot.laser.as_deref());
         let laser = scan.map(|(laser, ranges)| laser.scan(ranges));
-        let frame = Frame::new(self.index, stamp, camera, motion, self.as_logged(shot.images));
+        // As log readers: the first calibration stays, and a change is never taken back.
+        self.calibration_changed |= *shot.camera != *self.simulation.camera();
+        let frame = Frame::new(self.index, stamp, camera, motion, self.as_logged(shot.images))
+            .with_laser(laser)
+            .with_changed_calibration(self.calibration_changed)
+            .with_odometry_age(pose.age_s)
+            .with_latency(self.latency_s(shot.stamp_ns, shot.arrived_ns));
         SimulatedFrame {
-            frame: frame.with_laser(laser),
+            frame,
             truth: shot.truth,
-            odom_from_robot,
+            odom_from_robot: pose.odom_from_robot,
             world_from_robot: shot.world_from_robot,
         }
+    }
+
+    /// Returns the time from the stamp of an image to its arrival, s, on a robot; a log has none.
+    fn latency_s(&self, stamp_ns: u64, arrived_ns: u64) -> Option<f64> {
+        let is_live = self.patience == 0;
+        is_live.then(|| (arrived_ns as f64 - stamp_ns as f64) * 1e-9)
     }
 
     /// Converts images as a log does: depth is stored in millimetres, and log readers unwrap
@@ -154,16 +198,26 @@ impl Draw {
     }
 
     /// From the frame before; none to a frame that is older than that.
-    fn motion(&mut self, stamp: Stamp, here: Isometry2<f64>) -> EgoMotion {
+    fn motion(&mut self, stamp: Stamp, here: KnownPose) -> EgoMotion {
         // An image that is older than the last one has no motion since then.
         let before = self.previous.filter(|(then, _)| *then < stamp);
         if before.is_some() || self.previous.is_none() {
-            self.previous = Some((stamp, here));
+            self.previous = Some((stamp, here.odom_from_robot));
         }
-        before.map_or(EgoMotion::at_rest(0.0), |(then, pose)| {
-            EgoMotion::between(&pose, &here, stamp.seconds_since(then), ODOMETRY_SIGMA)
-        })
+        let Some((then, pose)) = before else { return EgoMotion::at_rest(0.0) };
+        let dt = stamp.seconds_since(then);
+        if here.age_s > MAX_GAP_S {
+            return unknown_motion(dt);
+        }
+        EgoMotion::between(&pose, &here.odom_from_robot, dt, ODOMETRY_SIGMA)
     }
+}
+
+/// Returns the motion over `dt` seconds without odometry, as log readers do: at rest, with the
+/// uncertainty of a robot that may have driven at 1 m/s and turned at 1 rad/s.
+fn unknown_motion(dt: f64) -> EgoMotion {
+    let reach = dt.clamp(0.0, LONGEST_UNKNOWN_S);
+    EgoMotion { covariance: Matrix3::identity() * (reach * reach), ..EgoMotion::at_rest(dt) }
 }
 
 /// The camera of the frames: that of the log, with the circular image of a
@@ -183,6 +237,8 @@ fn seen_by(simulation: &Simulation) -> Camera {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_sim::{FaultKind, FaultSettings, InjectedFault};
+
     use super::*;
 
     const SCENE: &str = "seed = 3\nduration_s = 4.0\n[camera]\nwidth = 32\nheight = 24\n\
@@ -244,5 +300,105 @@ mod tests {
             draw.steer(WheelSpeeds { left: -0.2, right: -0.2 });
         }
         assert!(last.translation.x < 0.85, "{last}");
+    }
+
+    /// Frames on a robot, all of them in time, with a fault from 1 s to 3 s.
+    fn broken(kind: FaultKind) -> Vec<SimulatedFrame> {
+        let mut scene = scene();
+        scene.faults = FaultSettings {
+            dropped: 0.0,
+            late: 0.0,
+            inject: vec![InjectedFault::new(kind).at(1.0).lasting(2.0)],
+        };
+        simulated(Draw::live(&scene, 1))
+    }
+
+    fn at_s(simulated: &SimulatedFrame) -> f64 {
+        simulated.frame.stamp.nanos() as f64 * 1e-9
+    }
+
+    fn moved_m(simulated: &SimulatedFrame) -> f64 {
+        simulated.frame.motion.forward.hypot(simulated.frame.motion.left)
+    }
+
+    #[test]
+    fn odometry_that_says_nothing_grows_old_and_the_motion_is_unknown() {
+        for kind in
+            [FaultKind::OdometrySilent, FaultKind::NanOdometry, FaultKind::OdometryLateStamps]
+        {
+            let all = broken(kind);
+            assert_eq!(all.len(), 80);
+            for one in &all {
+                let since_s = at_s(one) - 0.98;
+                let age_s = if (1.0..3.0).contains(&at_s(one)) { since_s } else { 0.0 };
+                let frame = &one.frame;
+                assert!((frame.odometry_age_s - age_s).abs() < 1e-6, "{kind} {}", at_s(one));
+                let motion = &frame.motion;
+                assert!([motion.forward, motion.left, motion.turn].iter().all(|m| m.is_finite()));
+                if age_s > 0.0 {
+                    assert!(moved_m(one) < 0.02, "{kind} {}", at_s(one));
+                }
+                if age_s > MAX_GAP_S {
+                    assert!(motion.covariance[(0, 0)] > 1e-3, "anything may have happened");
+                }
+            }
+        }
+        let mut scene = scene();
+        scene.faults.inject.push(InjectedFault::new(FaultKind::OdometrySilent).at(0.0));
+        let first = Draw::live(&scene, 1).next_frame().unwrap();
+        assert_eq!(first.frame.odometry_age_s, f64::INFINITY);
+    }
+
+    #[test]
+    fn frozen_odometry_is_new_and_stands_still() {
+        let all = broken(FaultKind::OdometryFrozen);
+        assert!(all.iter().all(|one| one.frame.odometry_age_s == 0.0));
+        let inside = |one: &&SimulatedFrame| (1.1..3.0).contains(&at_s(one));
+        assert!(all.iter().filter(inside).all(|one| moved_m(one) == 0.0));
+        let places = all.iter().filter(inside).map(|one| one.world_from_robot.translation.x);
+        let first = places.clone().next().unwrap();
+        assert!(places.last().unwrap() - first > 0.3, "the robot drives on");
+        let outside = |one: &&SimulatedFrame| (0.5..1.0).contains(&at_s(one)) || at_s(one) >= 3.0;
+        assert!(all.iter().filter(outside).all(|one| moved_m(one) > 0.0));
+    }
+
+    #[test]
+    fn the_latency_is_that_from_the_stamp_to_the_arrival() {
+        for one in broken(FaultKind::Delay) {
+            let late_s = if (1.0..3.0).contains(&at_s(&one)) { 1.5 } else { 0.0 };
+            assert!((one.frame.latency_s.unwrap() - late_s).abs() < 1e-9, "{}", at_s(&one));
+        }
+        // Both of stamp and arrival are times of the clock that jumps.
+        for one in broken(FaultKind::ClockForward) {
+            assert!(one.frame.latency_s.unwrap().abs() < 1e-9, "{}", at_s(&one));
+        }
+        let late = simulated(Draw::live(&scene(), 1));
+        assert!(late.iter().any(|one| one.frame.latency_s.unwrap() > 0.04));
+        let log = simulated(Draw::new(&scene(), 1));
+        assert!(log.iter().all(|one| one.frame.latency_s.is_none()), "a log has no such clock");
+    }
+
+    #[test]
+    fn a_calibration_that_changed_stays_changed() {
+        for kind in [FaultKind::CalibrationChanged, FaultKind::MountMoved] {
+            for one in broken(kind) {
+                assert_eq!(one.frame.calibration_changed, at_s(&one) >= 1.0, "{kind}");
+            }
+        }
+        assert!(broken(FaultKind::MountKnocked).iter().all(|one| !one.frame.calibration_changed));
+    }
+
+    #[test]
+    fn broken_images_are_those_of_the_frames() {
+        for one in broken(FaultKind::BlankDepth) {
+            let is_blank = one.frame.depth().unwrap().pixels().iter().all(|z| z.is_nan());
+            assert_eq!(is_blank, (1.0..3.0).contains(&at_s(&one)));
+        }
+        let resent = broken(FaultKind::Resend);
+        // The image before the fault, and the forty that it takes the place of.
+        assert_eq!(resent.iter().filter(|one| (0.9..1.0).contains(&at_s(one))).count(), 42);
+        let stamps: Vec<f64> = resent.iter().map(at_s).collect();
+        assert!(stamps[20..60].iter().all(|stamp_s| *stamp_s == stamps[19]), "{stamps:?}");
+        assert!(broken(FaultKind::Drop).len() == 40);
     }
 }

@@ -16,7 +16,8 @@
 //! re-identified after it?).
 //!
 //! A [`Ride`] closes the loop: the contender drives the robot, and a [`RideJudge`] measures how
-//! well it stayed with the person.
+//! well it stayed with the person. Where a person or a trolley comes at the robot, an
+//! [`ApproachJudge`] says whether the robot moved when they touched.
 //!
 //! A [`GivenSequence`] needs no scene: the boxes of another detector on a recorded sequence, for
 //! comparisons of associations and filters alone.
@@ -43,5 +44,8 @@ pub use given::{GivenSequence, GivenTracks, for_given_boxes};
 pub use judge::{Judge, Judged};
 pub use occlusion::{Occlusion, Outcome, occlusions, outcome};
 pub use parallel::{each, in_order};
-pub use ride::{Episode, Ridden, Ride, RideJudge, Tick, Witness};
+pub use ride::{
+    ApproachJudge, ApproachWatch, Approached, Contact, Episode, Ridden, Ride, RideJudge, Side,
+    Tick, Touched, Witness,
+};
 pub use trial::{Moment, Run, Trial, TrialError};

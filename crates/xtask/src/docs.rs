@@ -1,7 +1,8 @@
 //! Parts of the documents that a command prints.
 //!
 //! Between `<!-- begin: tagalong ... -->` and `<!-- end -->` stands the output of that command, and
-//! likewise that of `cargo xtask faults`.
+//! likewise that of `cargo xtask faults`. `<!-- begin: excerpt PAGE TITLE -->` repeats the table of
+//! another page that is titled so, in bold, with its notes.
 //! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
 //! become stale. Slow parts, the tables of `reproduce`, `follow` and `bench`, are filled only on
 //! request.
@@ -16,6 +17,9 @@ use crate::workspace::{Workspace, output};
 
 const BEGIN: &str = "<!-- begin: ";
 const END: &str = "<!-- end -->";
+
+/// Beginning of a command that repeats a table of another page.
+const EXCERPT: &str = "excerpt ";
 
 /// Commands that take minutes to hours.
 const SLOW: &[&str] =
@@ -97,11 +101,31 @@ fn filled(
     Ok(out + rest)
 }
 
+/// Returns the table of a page that has this title, in bold, and everything up to the next title.
+fn excerpt(page: &str, title: &str) -> Option<String> {
+    let bold = format!("**{title}**");
+    let mut lines = page.lines().skip_while(|line| *line != bold);
+    let first = lines.next()?;
+    let rest: Vec<&str> = lines.take_while(|line| !ends_excerpt(line)).collect();
+    Some(format!("{first}\n{}\n", rest.join("\n")))
+}
+
+/// Returns true for a line with the next title, a heading or a marker.
+fn ends_excerpt(line: &str) -> bool {
+    ["**", "#", "<!--"].iter().any(|mark| line.starts_with(mark))
+}
+
 /// Returns the output of the command, with the program of this workspace; the table of faults is
 /// this program's own.
 fn printed(workspace: &Workspace, command: &str) -> Result<String> {
     if let Some(rows) = command.strip_prefix(faults::COMMAND) {
         return faults::markdown(workspace, &rows.split_whitespace().collect::<Vec<_>>());
+    }
+    if let Some(source) = command.strip_prefix(EXCERPT) {
+        let (page, title) =
+            source.split_once(' ').context("an excerpt names a page and a title")?;
+        return excerpt(&workspace.read(page)?, title)
+            .with_context(|| format!("{page} has no table `{title}`"));
     }
     let mut words = command.split_whitespace();
     if words.next() != Some("tagalong") {
@@ -132,6 +156,16 @@ mod tests {
         );
         assert!(out.contains("\ntable\n") && out.ends_with("c\n"), "{out}");
         assert_eq!(filled(&out, |command| !is_slow(command), print).unwrap(), out);
+    }
+
+    #[test]
+    fn an_excerpt_is_one_table_with_its_notes() {
+        let page =
+            "# a\n\n**first**\n\n| 1 |\n\n**second**\n\n| 2 |\n\n* note\n\n<!-- end -->\n| 3 |\n";
+        let second = excerpt(page, "second").unwrap();
+        assert_eq!(second.trim(), "**second**\n\n| 2 |\n\n* note");
+        assert_eq!(excerpt(page, "first").unwrap().trim(), "**first**\n\n| 1 |");
+        assert_eq!(excerpt(page, "third"), None);
     }
 
     #[test]

@@ -409,7 +409,7 @@ impl Robot {
                     }
                     last = Instant::now();
                 }
-                Event::Webcam(_) => {}
+                Event::NoOdometry { .. } | Event::Webcam(_) => {}
             }
         }
         last

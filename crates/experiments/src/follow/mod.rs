@@ -1,5 +1,6 @@
 //! `tagalong follow`: a pipeline steers the simulated robot through scenes.
 
+mod approaches;
 mod fit;
 mod log;
 mod story;
@@ -8,6 +9,7 @@ mod table;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+pub use approaches::{ApproachFaults, ApproachLaser};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use log::RideLog;
@@ -21,7 +23,7 @@ use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_pipeline::LooksSettings;
 use tagalong_reproduce::Table;
-use tagalong_sim::{Scene, Seeds, Split, Variant};
+use tagalong_sim::{InjectedFault, Scene, ScheduledFault, Seeds, Split, Variant};
 use tagalong_simulate::scenes;
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
@@ -58,6 +60,10 @@ pub struct FollowArgs {
     /// Lose this fraction of the images, instead of the scene's.
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     pub drop: Option<f64>,
+    /// Inject a fault, repeatable: a kind like `freeze-depth`, or `random`, from AT seconds on, for
+    /// LASTS seconds; the seed draws what is left out.
+    #[arg(long, value_name = "KIND[@AT[+LASTS]]")]
+    pub inject: Vec<InjectedFault>,
     /// Replace a value in each scene: a dotted key, like `crowd=5`.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = tagalong_simulate::key_and_value)]
     pub set: Vec<(String, String)>,
@@ -82,6 +88,22 @@ pub struct FollowArgs {
     /// Print the settings [target.looks] that fit these rides best; use the split `train`.
     #[arg(long)]
     pub fit: bool,
+    /// Ride this many random approaches instead: a person or a trolley comes at the robot from any
+    /// side and does not avoid it. Prints the contacts while the robot moves; with -o each of them
+    /// leaves its log. The scenes are those with a table `[approach]` [default: approach.toml].
+    #[arg(long, value_name = "N", conflicts_with_all = ["seeds", "fit"],
+          value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    pub approaches: Option<u64>,
+    /// Ride the approach with this seed again, and tell its course; with -o it leaves its log.
+    #[arg(long, value_name = "SEED",
+          conflicts_with_all = ["approaches", "seeds", "first_seed", "split", "fit"])]
+    pub replay: Option<u64>,
+    /// Inject a fault into each approach: at a time, and of a kind, that its seed draws.
+    #[arg(long, value_enum, default_value_t)]
+    pub faults: ApproachFaults,
+    /// Approaches to a robot with a laser scanner.
+    #[arg(long, value_enum, default_value_t)]
+    pub laser: ApproachLaser,
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
@@ -110,6 +132,9 @@ pub struct Followed {
     pub swept: Option<String>,
     /// Name of the pipeline.
     pub pipeline: String,
+    /// Faults that were injected.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<ScheduledFault>,
     /// Scores of the ride.
     #[serde(flatten)]
     pub ridden: Ridden,
@@ -137,6 +162,13 @@ struct Findings<'a> {
 /// Scenes and configs that cannot be used are exit code 2; plugins that fail and files that cannot
 /// be written are 1.
 pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
+    if args.approaches.is_some() || args.replay.is_some() {
+        return approaches::approaches(args, registry);
+    }
+    if args.faults != ApproachFaults::None || args.laser != ApproachLaser::Half {
+        let message = "--faults and --laser are for --approaches: add it, or leave them out";
+        return Err(Failure::usage(message));
+    }
     let signals = Signals::listen()?;
     let seeds = args.split.seeds(args.first_seed, args.seeds).map_err(Failure::usage)?;
     let jobs = jobs(args, seeds, registry)?;
@@ -180,7 +212,9 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
                 for seed in seeds.numbers() {
                     let mut variant = variant(args, seed);
                     variant.set.extend(value.clone());
-                    let scene = tagalong_simulate::read(&path, &variant)?;
+                    let mut scene = tagalong_simulate::read(&path, &variant)?;
+                    scene.faults.inject.extend(args.inject.iter().cloned());
+                    scene.check_faults().map_err(Failure::usage)?;
                     let (suite, swept) = (suite.clone(), swept.clone());
                     jobs.push(Job { suite, swept, scene, contender: contender.clone() });
                 }
@@ -259,6 +293,7 @@ fn ride(
         pipeline: contender.name.clone(),
         ridden: RideJudge::default().judge(&ride),
         story: story::story(&ride),
+        faults: ride.faults,
         took_ms: ride.took_ms,
     })
 }

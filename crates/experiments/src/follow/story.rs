@@ -2,22 +2,37 @@ use tagalong_pipeline::FrameReport;
 use tagalong_trials::Ride;
 
 /// Returns the course of a ride: a line for each change of the target and of the reason for the
-/// motion.
+/// motion, and for the begin and the end of each injected fault.
 pub fn story(ride: &Ride) -> Vec<String> {
     let mut before = None;
-    let mut lines = Vec::new();
+    let mut events = fault_events(ride);
     let frames = ride.moments.iter().zip(&ride.reports);
     for (moment, report) in frames.filter(|(_, report)| report.outcome.is_processed()) {
         let now = words(report);
         if before.as_ref() != Some(&now) {
-            lines.push(format!("{:>6.1} s  {now}", moment.stamp.nanos() as f64 * 1e-9));
+            events.push((moment.stamp.nanos() as f64 * 1e-9, now.clone()));
             before = Some(now);
         }
     }
-    lines
+    // Stable: a fault comes before the frame of the same time, which it changes.
+    events.sort_by(|a, b| a.0.total_cmp(&b.0));
+    events.into_iter().map(|(at_s, said)| format!("{at_s:>6.1} s  {said}")).collect()
 }
 
-fn words(report: &FrameReport) -> String {
+/// Returns the begin and the end of each fault within the ride, s, with a text.
+fn fault_events(ride: &Ride) -> Vec<(f64, String)> {
+    let end_s = ride.ticks.last().map_or(0.0, |tick| tick.at_s);
+    let mut events = Vec::new();
+    for fault in &ride.faults {
+        events.push((fault.from_s, format!("injected fault begins: {}", fault.kind)));
+        events.push((fault.to_s, format!("injected fault ends: {}", fault.kind)));
+    }
+    events.retain(|(at_s, _)| *at_s <= end_s);
+    events
+}
+
+/// Returns the target and the reason for the motion in words.
+pub(super) fn words(report: &FrameReport) -> String {
     let whom = report.target.map_or("nobody".into(), |id| format!("track {id}"));
     let lock = report
         .lock

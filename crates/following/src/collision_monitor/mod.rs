@@ -118,6 +118,14 @@ impl CollisionMonitor {
         self.hazards.clear();
     }
 
+    /// Forgets that a sensor was frozen, after a person has checked the robot.
+    pub(crate) fn arm(&mut self) {
+        self.depth_watch = Watch::default();
+        self.laser.arm();
+        self.scans.values_mut().for_each(ScanState::arm);
+        self.depths.values_mut().for_each(|depth| depth.watch = Watch::default());
+    }
+
     /// Takes in a frame, `motion` after the one before, in which `followed` is the target.
     pub(crate) fn update(
         &mut self,

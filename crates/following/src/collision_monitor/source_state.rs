@@ -65,6 +65,11 @@ impl ScanState {
         *self = Self { silence: self.silence, ..Self::default() };
     }
 
+    /// Forgets that the scanner was frozen.
+    pub(super) fn arm(&mut self) {
+        self.watch = Watch::default();
+    }
+
     pub(super) fn silence(&self) -> Silence {
         self.silence
     }

@@ -12,6 +12,8 @@ const TURNED_RAD: f64 = 0.1;
 /// Noise of the distances of a depth camera and of a laser scanner: m, and as a fraction.
 const DEPTH_NOISE: [f64; 2] = [0.03, 0.02];
 const SCAN_NOISE: [f64; 2] = [0.02, 0.01];
+/// Comparisons in a row that contradict the odometry, from which on the sensor is frozen.
+const IN_A_ROW: u32 = 2;
 /// Readings that tell a moved picture from an unchanged one, at least.
 const ENOUGH: u32 = 40;
 /// Part of them that is unchanged from which on the sensor contradicts the odometry.
@@ -25,7 +27,6 @@ const FLOOR_M: f64 = 0.15;
 const FAR_M: f64 = 6.0;
 
 /// Watch over one sensor.
-#[derive(Default)]
 pub(super) struct Watch<R> {
     /// Previous readings, bit for bit.
     previous: Vec<u32>,
@@ -33,15 +34,31 @@ pub(super) struct Watch<R> {
     repeated: u32,
     /// Readings and pose of an earlier frame, with which the picture is compared.
     reference: Option<(R, Isometry2<f64>)>,
-    /// True if the last comparison contradicted the odometry.
-    contradicts: bool,
+    /// Comparisons in a row that contradicted the odometry.
+    contradictions: u32,
+}
+
+impl<R> Default for Watch<R> {
+    fn default() -> Self {
+        Self { previous: Vec::new(), repeated: 0, reference: None, contradictions: 0 }
+    }
 }
 
 impl<R> Watch<R> {
     /// Returns true if the sensor has repeated itself for so many frames, or contradicts the
     /// odometry.
     pub(super) fn is_frozen(&self, identical_frames: u32) -> bool {
-        self.contradicts || identical_frames > 0 && self.repeated >= identical_frames
+        // A robot that stands cannot be contradicted: until it is armed again it stays so.
+        self.contradictions >= IN_A_ROW || identical_frames > 0 && self.repeated >= identical_frames
+    }
+
+    /// Takes in the result of a comparison, if it had one.
+    fn judge(&mut self, contradicts: Option<bool>) {
+        self.contradictions = match contradicts {
+            Some(true) => self.contradictions.saturating_add(1),
+            Some(false) => 0,
+            None => self.contradictions,
+        };
     }
 
     /// Takes in readings, bit for bit: real ones have noise.
@@ -80,13 +97,11 @@ impl<R> Watch<R> {
     }
 }
 
-/// Depth image of a reference: sampled depths.
-#[derive(Default)]
+/// Depth image of a reference.
 pub(super) struct DepthReference {
-    columns: usize,
-    depths: Vec<f32>,
-    /// Sampled pixels that belong to people, or to the floor.
-    left_out: Vec<bool>,
+    depth: DepthImage,
+    /// Places of the people in it, robot frame, m.
+    people: Vec<Point2<f64>>,
 }
 
 impl Watch<DepthReference> {
@@ -108,37 +123,22 @@ impl Watch<DepthReference> {
         if self.reference.is_some() && moved.is_none() {
             return;
         }
-        let now = reference(camera, depth, tracks, [step_x, step_y]);
-        if let (Some(moved), Some((then, _))) = (moved, &self.reference)
-            && let Some(contradicts) =
-                contradicts_depth(camera, then, &now, &moved, [step_x, step_y])
-        {
-            self.contradicts = contradicts;
+        let people = places(tracks);
+        if let (Some(moved), Some((then, _))) = (moved, &self.reference) {
+            let found = contradicts_depth(camera, then, depth, &people, &moved, [step_x, step_y]);
+            self.judge(found);
         }
-        self.reference = Some((now, Isometry2::identity()));
+        self.reference =
+            Some((DepthReference { depth: depth.clone(), people }, Isometry2::identity()));
     }
 }
 
-fn reference(
-    camera: &Camera,
-    depth: &DepthImage,
-    tracks: &[Track],
-    [step_x, step_y]: [usize; 2],
-) -> DepthReference {
-    let columns = depth.width().div_ceil(step_x);
-    let mut reference = DepthReference { columns, ..DepthReference::default() };
-    for y in (0..depth.height()).step_by(step_y) {
-        for (at, z) in depth.row(y).iter().step_by(step_x).enumerate() {
-            let pixel = Point2::new((at * step_x) as f64, y as f64);
-            let place = camera.back_project(pixel, f64::from(*z));
-            let is_person = tracks.iter().any(|track| {
-                (track.estimate.person.position.xy() - place.xy()).norm() < OF_PERSON_M
-            });
-            reference.left_out.push(is_person || place.z < FLOOR_M);
-            reference.depths.push(*z);
-        }
-    }
-    reference
+fn places(tracks: &[Track]) -> Vec<Point2<f64>> {
+    tracks.iter().map(|track| track.estimate.person.position.xy()).collect()
+}
+
+fn is_of_person(people: &[Point2<f64>], at: &Point2<f64>) -> bool {
+    people.iter().any(|person| (person - at).norm() < OF_PERSON_M)
 }
 
 /// Returns true if the picture is unchanged where the motion must have changed it, false if it is
@@ -146,38 +146,55 @@ fn reference(
 fn contradicts_depth(
     camera: &Camera,
     then: &DepthReference,
-    now: &DepthReference,
+    now: &DepthImage,
+    people: &[Point2<f64>],
     moved: &Isometry2<f64>,
     [step_x, step_y]: [usize; 2],
 ) -> Option<bool> {
-    if then.depths.len() != now.depths.len() {
+    if (then.depth.width(), then.depth.height()) != (now.width(), now.height()) {
         return None;
     }
     let now_from_then = lifted(moved).inverse();
     let mut counts = Counts::new(DEPTH_NOISE);
-    for (place, z) in then.depths.iter().enumerate() {
-        let z = f64::from(*z);
-        if then.left_out[place] || !(0.0 < z && z < FAR_M) {
-            continue;
+    for y in (0..now.height()).step_by(step_y) {
+        for x in (0..now.width()).step_by(step_x) {
+            let z = f64::from(then.depth.row(y)[x]);
+            if !(0.0 < z && z < FAR_M) {
+                continue;
+            }
+            let before = camera.back_project(Point2::new(x as f64, y as f64), z);
+            let point = now_from_then * before;
+            let is_telling = point.z > FLOOR_M
+                && !is_of_person(&then.people, &before.xy())
+                && !is_of_person(people, &point.xy());
+            let Some(expected) = camera.project(&point).filter(|_| is_telling) else { continue };
+            let place = [expected.x.round() as i64, expected.y.round() as i64];
+            let (Some(old), Some(new)) = (flat(&then.depth, place), flat(now, place)) else {
+                continue;
+            };
+            let old_at = camera.back_project(Point2::new(place[0] as f64, place[1] as f64), old);
+            if old_at.z > FLOOR_M && !is_of_person(&then.people, &old_at.xy()) {
+                counts.add(camera.depth_of(&point), old, new);
+            }
         }
-        let [column, row] = [place % then.columns, place / then.columns];
-        let pixel = Point2::new((column * step_x) as f64, (row * step_y) as f64);
-        let point = now_from_then * camera.back_project(pixel, z);
-        let Some(expected) = camera.project(&point) else { continue };
-        let [x, y] = [(expected.x / step_x as f64).round(), (expected.y / step_y as f64).round()];
-        if !(x >= 0.0 && y >= 0.0 && (x as usize) < then.columns) {
-            continue;
-        }
-        let there = y as usize * then.columns + x as usize;
-        let (Some(old), Some(new)) = (then.depths.get(there), now.depths.get(there)) else {
-            continue;
-        };
-        if now.left_out[there] || then.left_out[there] {
-            continue;
-        }
-        counts.add(camera.depth_of(&point), f64::from(*old), f64::from(*new));
     }
     counts.contradicts()
+}
+
+/// Returns the depth at a pixel whose neighbours are about as far: on a slanted surface and at an edge
+/// a part of a pixel makes another depth.
+fn flat(depth: &DepthImage, [x, y]: [i64; 2]) -> Option<f64> {
+    let middle = f64::from(depth.get(x, y)?);
+    for dx in [-2, 2] {
+        let beside = f64::from(depth.get(x + dx, y)?);
+        let noise_m = DEPTH_NOISE[0] + DEPTH_NOISE[1] * middle;
+        // Positive comparison, so that a missing reading is none.
+        let is_flat = (beside - middle).abs() < noise_m;
+        if !is_flat {
+            return None;
+        }
+    }
+    Some(middle)
 }
 
 /// Scan of a reference: ranges by the number of the ray.
@@ -185,6 +202,20 @@ fn contradicts_depth(
 pub(super) struct ScanReference {
     ranges: Vec<f32>,
     left_out: Vec<bool>,
+}
+
+impl ScanReference {
+    /// Returns true if the neighbours of a ray are about as far: along a slanted wall a part of a ray
+    /// makes another range.
+    fn is_flat(&self, ray: usize) -> bool {
+        let range = f64::from(self.ranges[ray]);
+        let noise_m = SCAN_NOISE[0] + SCAN_NOISE[1] * range;
+        let near = |other: Option<usize>| {
+            let beside = other.and_then(|other| self.ranges.get(other));
+            beside.is_some_and(|beside| (f64::from(*beside) - range).abs() < noise_m)
+        };
+        near(ray.checked_sub(1)) && near(Some(ray + 1))
+    }
 }
 
 impl Watch<ScanReference> {
@@ -205,6 +236,7 @@ impl Watch<ScanReference> {
         if self.reference.is_some() && moved.is_none() || scan.increment_rad == 0.0 {
             return;
         }
+        let people = places(tracks);
         let mut now = ScanReference::default();
         for ((point, ray), range) in scan.points.iter().zip(scan.rays.iter()).zip(&ranges) {
             let ray = *ray as usize;
@@ -213,14 +245,11 @@ impl Watch<ScanReference> {
                 now.left_out.resize(ray + 1, true);
             }
             now.ranges[ray] = *range;
-            now.left_out[ray] = tracks.iter().any(|track| {
-                (track.estimate.person.position.xy() - point.xy()).norm() < OF_PERSON_M
-            });
+            now.left_out[ray] = is_of_person(&people, &point.xy());
         }
-        if let (Some(moved), Some((then, _))) = (moved, &self.reference)
-            && let Some(contradicts) = contradicts_scan(scan, then, &now, &moved)
-        {
-            self.contradicts = contradicts;
+        if let (Some(moved), Some((then, _))) = (moved, &self.reference) {
+            let found = contradicts_scan(scan, then, &now, &moved);
+            self.judge(found);
         }
         self.reference = Some((now, Isometry2::identity()));
     }
@@ -248,7 +277,7 @@ fn contradicts_scan(
         let (Some(old), Some(new)) = (then.ranges.get(there), now.ranges.get(there)) else {
             continue;
         };
-        if then.left_out[there] || now.left_out[there] {
+        if then.left_out[there] || now.left_out[there] || !then.is_flat(there) {
             continue;
         }
         counts.add(seen.coords.xy().norm(), f64::from(*old), f64::from(*new));

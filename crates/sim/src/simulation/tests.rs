@@ -168,6 +168,7 @@ fn events_come_in_the_order_of_recording_and_late_images_after_their_time() {
     let text = format!("{SMALL}[faults]\nlate = 0.5\ndropped = 0.2\n");
     let recorded = |event: &Event| match event {
         Event::Odometry(reading) => reading.at_ns,
+        Event::NoOdometry { at_ns } => *at_ns,
         Event::Shot(shot) => shot.recorded_ns,
         Event::Webcam(shot) => shot.captured_ns,
     };

@@ -27,6 +27,23 @@ pub(super) fn walkers(scene: &Scene, obstacles: &[Obstacle], random: &mut Random
     walkers
 }
 
+/// Far away from the room, where an approacher waits, m.
+const AWAY_M: [f64; 2] = [-100.0, -100.0];
+
+/// Returns the person of an approach, if it is one by a person. The steps are those of the
+/// approacher.
+pub(super) fn approaching_person(scene: &Scene, random: &mut Random) -> Option<Walker> {
+    let approach = scene.approach.as_ref().filter(|one| one.by == ApproachBy::Person)?;
+    let person = PersonSettings {
+        path: vec![AWAY_M],
+        speed_mps: approach.speed_mps,
+        enters_s: approach.start_s,
+        height_m: approach.height_m,
+        ..PersonSettings::default()
+    };
+    Some(somebody(person, scene.split(), random))
+}
+
 /// Adds a person and their companions, to the left and to the right of them.
 fn add_group(
     walkers: &mut Vec<Walker>,

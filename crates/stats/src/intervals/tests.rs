@@ -172,3 +172,29 @@ fn wilson_agrees_with_its_published_example() {
     assert!(none.lower == 0.0 && (none.upper - 0.1611).abs() < 5e-5);
     assert_eq!(wilson(0, 0, 0.95), None);
 }
+
+/// Returns the probability of at most `events` events in `trials` trials.
+fn at_most(events: u64, trials: u64, rate: f64) -> f64 {
+    let term = |count: u64| {
+        let choose = (1..=count).map(|k| ((trials - count + k) as f64 / k as f64).ln());
+        let rest = (trials - count) as f64 * (-rate).ln_1p();
+        (choose.sum::<f64>() + count as f64 * rate.ln() + rest).exp()
+    };
+    (0..=events).map(term).sum()
+}
+
+#[test]
+fn exact_bounds_are_those_of_tables_and_of_their_definition() {
+    let bound = |events, trials| exact_upper_bound(events, trials, 0.95).unwrap();
+    // One event in ten, of the tables; none: 1 - 0.05^(1/n).
+    assert!((bound(1, 10) - 0.394_16).abs() < 1e-4, "{}", bound(1, 10));
+    for trials in [10, 1000, 10_000, 1_000_000] {
+        let none = 1.0 - 0.05_f64.powf(1.0 / trials as f64);
+        assert!((bound(0, trials) / none - 1.0).abs() < 1e-6, "{trials}");
+    }
+    for (events, trials) in [(1, 10), (3, 200), (17, 1000), (5, 10_000)] {
+        let left = at_most(events, trials, bound(events, trials));
+        assert!((left - 0.05).abs() < 1e-6, "{events} of {trials}: {left}");
+    }
+    assert_eq!((bound(7, 7), exact_upper_bound(0, 0, 0.95)), (1.0, None));
+}

@@ -371,7 +371,14 @@ mod tests {
     fn a_steady_speed_has_no_jerk_and_a_sudden_stop_has() {
         let clearance = tagalong_sim::Clearance { people_m: 1.0, things_m: 1.0 };
         let ride = |speed: &dyn Fn(usize) -> f64| -> Vec<Tick> {
-            let tick = |i: usize| Tick { at_s: i as f64 * 0.02, speed_mps: speed(i), clearance };
+            let tick = |i: usize| Tick {
+                at_s: i as f64 * 0.02,
+                speed_mps: speed(i),
+                turn_rate: 0.0,
+                clearance,
+                approach: None,
+                reason: None,
+            };
             (0..200).map(tick).collect()
         };
         assert!(jerk(&ride(&|_| 0.5)) < 1e-9);

@@ -1,16 +1,20 @@
 //! Closed loops: the contender's controller drives the robot through the scene.
 
+mod approach;
 mod judge;
 
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
 
+pub use approach::{ApproachJudge, ApproachWatch, Approached, Contact, Side, Touched};
 pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_config::Registry;
-use tagalong_core::{Frame, Stamp, WheelSpeeds};
+use tagalong_core::{Command, Frame, Reason, Stamp};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources};
-use tagalong_sim::{Clearance, Event, Scene, Simulation};
+use tagalong_sim::{
+    ApproachInView, ApproachState, Clearance, Event, Scene, ScheduledFault, Simulation,
+};
 
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
 
@@ -22,6 +26,9 @@ const RADIUS_M: f64 = 0.25;
 pub trait Witness {
     /// Something that the robot recorded.
     fn event(&mut self, _event: &Event) {}
+
+    /// Takes the state of the robot at a step of the simulation.
+    fn tick(&mut self, _tick: &Tick) {}
 
     /// Takes a frame and the report of the pipeline on it.
     fn frame(&mut self, _drawn: &SimulatedFrame, _report: &FrameReport) {}
@@ -42,8 +49,22 @@ pub struct Tick {
     pub at_s: f64,
     /// True forward speed, m/s.
     pub speed_mps: f64,
+    /// True turn rate, rad/s.
+    pub turn_rate: f64,
     /// Free distance around it.
     pub clearance: Clearance,
+    /// State of the approacher of the scene, once it is there.
+    pub approach: Option<ApproachState>,
+    /// Reason of the command in force.
+    pub reason: Option<Reason>,
+}
+
+impl Tick {
+    /// Returns the largest speed over ground of a point of the robot's body, m/s: forward, or by
+    /// the turn.
+    pub fn body_mps(&self) -> f64 {
+        self.speed_mps.abs().max(self.turn_rate.abs() * RADIUS_M)
+    }
 }
 
 /// A scene in which a pipeline drove the robot.
@@ -61,6 +82,11 @@ pub struct Ride {
     pub took_ms: Vec<f64>,
     /// The robot, step by step.
     pub ticks: Vec<Tick>,
+    /// Faults that were injected.
+    pub faults: Vec<ScheduledFault>,
+    /// Sensors that the approacher of the scene was in view of, at each image; the times are s
+    /// since the start.
+    pub in_view: Vec<(f64, ApproachInView)>,
 }
 
 impl Ride {
@@ -92,6 +118,8 @@ impl Ride {
             reports: Vec::new(),
             took_ms: Vec::new(),
             ticks: Vec::new(),
+            faults: draw.simulation().faults().to_vec(),
+            in_view: Vec::new(),
         };
         let failed =
             |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
@@ -136,11 +164,27 @@ impl Ride {
         }
         draw.next_frame_while(|simulation, event| {
             witness.event(event);
-            // Only the odometry ticks: it is the fastest message of the robot.
-            let Event::Odometry(reading) = event else { return None };
-            self.ticks.push(tick(simulation, reading.at_ns));
-            command(pipeline, Stamp::from_nanos(reading.at_ns), framed)
+            // Wheels ask for commands at each step, whether the odometry speaks or not.
+            let Some(at_ns) = event.step_ns() else {
+                self.look(simulation, event);
+                return None;
+            };
+            let since_frame = Stamp::from_nanos(at_ns).seconds_since(framed);
+            let now = Stamp::from_nanos(simulation.robot_clock_ns(at_ns));
+            let command = command(pipeline, now, since_frame);
+            let tick = tick(simulation, at_ns, command.map(|command| command.reason));
+            witness.tick(&tick);
+            self.ticks.push(tick);
+            command.map(|command| command.wheels)
         })
+    }
+
+    /// Notes the sensors that the approacher is in view of when an image arrives.
+    fn look(&mut self, simulation: &Simulation, event: &Event) {
+        if let (Event::Shot(_), Some(_)) = (event, simulation.approach(RADIUS_M)) {
+            let at_s = self.ticks.last().map_or(0.0, |tick| tick.at_s);
+            self.in_view.push((at_s, simulation.approach_in_view()));
+        }
     }
 }
 
@@ -150,15 +194,18 @@ fn sources(frame: &Frame) -> Sources {
     Sources { depth: frame.depth().is_ok(), right, laser, odometry: true }
 }
 
-fn tick(simulation: &Simulation, at_ns: u64) -> Tick {
+fn tick(simulation: &Simulation, at_ns: u64, reason: Option<Reason>) -> Tick {
     Tick {
         at_s: at_ns as f64 * 1e-9,
         speed_mps: simulation.speed_mps(),
+        turn_rate: simulation.turn_rate(),
         clearance: simulation.clearance(RADIUS_M),
+        approach: simulation.approach(RADIUS_M),
+        reason,
     }
 }
 
-fn command(pipeline: &Pipeline, now: Stamp, framed: Stamp) -> Option<WheelSpeeds> {
-    let since_frame = Duration::from_secs_f64(now.seconds_since(framed).max(0.0));
-    pipeline.command_after(now, since_frame).map(|command| command.wheels)
+fn command(pipeline: &Pipeline, now: Stamp, since_frame_s: f64) -> Option<Command> {
+    let since_frame = Duration::from_secs_f64(since_frame_s.max(0.0));
+    pipeline.command_after(now, since_frame)
 }

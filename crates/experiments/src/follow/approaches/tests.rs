@@ -1,0 +1,164 @@
+use std::collections::BTreeSet;
+
+use clap::Parser;
+use tagalong_core::{Controller, Scene as Steered, Twist};
+use tagalong_sim::ApproachBy;
+use tagalong_trials::Side;
+
+use super::*;
+
+#[derive(Parser)]
+struct Cli {
+    #[command(flatten)]
+    follow: FollowArgs,
+}
+
+fn args(line: &str) -> FollowArgs {
+    Cli::parse_from(std::iter::once("follow").chain(line.split_whitespace())).follow
+}
+
+/// Always drives so fast, whatever there is.
+struct Unheeding(f64);
+
+impl Controller for Unheeding {
+    fn command(&mut self, _: &Steered<'_>) -> Twist {
+        Twist::new(self.0, 0.0)
+    }
+}
+
+fn registry() -> Registry {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let unheeding = |mps| move |_: Unset, _: &_| Ok(Unheeding(mps));
+    registry.controller("drives-on", "drives on", unheeding(0.5));
+    registry.controller("stands", "stands", unheeding(0.0));
+    registry
+}
+
+/// Settings of a controller without any.
+#[derive(Clone, Default, Serialize, serde::Deserialize, schemars::JsonSchema)]
+struct Unset {}
+
+/// A pipeline whose collision monitor is off.
+fn unheeding(controller: &str) -> Contender {
+    let config = format!(
+        "[[detectors]]\nplugin = \"depth-template\"\nroles = [\"track\", \"discover\"]\n\
+         [filter]\nplugin = \"ekf\"\n[controller]\nplugin = \"{controller}\"\n\
+         [collision_monitor]\nobstacles = \"none\"\n"
+    );
+    Contender::new(controller, config)
+}
+
+/// Rides these approaches, some at a time.
+fn ridden(controller: &str, count: u64, line: &str, threads: usize) -> Vec<Approached> {
+    let contenders = [unheeding(controller)];
+    let args = args(line);
+    let paths = scenes(&args);
+    let jobs = jobs(&args, &contenders, &paths, Split::Test.seeds(0, count).unwrap());
+    let registry = registry();
+    let work = |job: &Job<'_>| approach(job, &args, &registry, &Signals::default());
+    let results = in_order(&jobs, threads, work, |_| {}).unwrap();
+    results.into_iter().map(|one| one.unwrap().approached).collect()
+}
+
+#[test]
+fn approaches_come_from_all_sides_at_all_speeds() {
+    let args = args("--approaches 500 --faults one");
+    let contenders = [unheeding("stands")];
+    let paths = scenes(&args);
+    let jobs = jobs(&args, &contenders, &paths, seeds(&args).unwrap());
+    let scenes: Vec<Scene> = jobs.iter().map(|job| read_scene(job, &args).unwrap()).collect();
+    assert_eq!(scenes.len(), 500);
+    let count = |is: &dyn Fn(&Scene) -> bool| scenes.iter().filter(|scene| is(scene)).count();
+    let approach = |scene: &Scene| scene.approach.clone().unwrap();
+    for eighth in 0..8 {
+        let is_in = |s: &Scene| (approach(s).bearing_deg / 45.0) as i32 == eighth;
+        assert!((40..90).contains(&count(&is_in)), "{eighth}: {}", count(&is_in));
+    }
+    for seventh in 0..7 {
+        let low = 0.2 + 0.2 * f64::from(seventh);
+        let is_in = |s: &Scene| (low..low + 0.2).contains(&approach(s).speed_mps);
+        assert!((45..100).contains(&count(&is_in)), "{low} m/s: {}", count(&is_in));
+    }
+    for side in Side::ALL {
+        let is_near = |s: &Scene| {
+            let approach = approach(s);
+            Side::of_bearing(approach.bearing_deg) == side && approach.distance_m() < 3.0
+        };
+        assert!(count(&is_near) > 20, "{side}");
+    }
+    for by in [ApproachBy::Person, ApproachBy::Trolley] {
+        assert!(count(&|s| approach(s).by == by && approach(s).aims) > 90, "{by:?}");
+    }
+    for height_m in [0.3, 0.5, 0.8, 1.2] {
+        for latency_s in [0.1, 0.4] {
+            let is = |s: &Scene| s.camera.height_m == height_m && s.robot.latency_s == latency_s;
+            assert!(count(&is) > 35, "{height_m} m, {latency_s} s: {}", count(&is));
+        }
+    }
+    assert_eq!(count(&|scene| scene.laser.is_some()), 250);
+    let faults: Vec<_> = scenes.iter().flat_map(Scene::scheduled_faults).collect();
+    let kinds: BTreeSet<&str> = faults.iter().map(|fault| fault.kind.name()).collect();
+    assert!(faults.len() == 500 && kinds.len() > 20, "{kinds:?}");
+    assert!(
+        scenes
+            .iter()
+            .all(|scene| { scene.scheduled_faults()[0].from_s <= approach(scene).arrives_s() })
+    );
+}
+
+#[test]
+fn a_robot_that_heeds_nothing_moves_at_contacts_and_one_that_stands_does_not() {
+    let driven = ridden("drives-on", 12, "--approaches 12", 2);
+    let contacts = driven.iter().filter(|one| one.contact.is_some()).count();
+    assert!(contacts >= 4, "{contacts}");
+    let stood = ridden("stands", 12, "--approaches 12", 2);
+    assert!(stood.iter().all(|one| one.contact.is_none() && !one.moved));
+    let touched = stood.iter().filter(|one| one.touched.is_some()).count();
+    assert!(touched >= 8, "an approacher reaches a robot that stands: {touched}");
+}
+
+#[test]
+fn a_seed_gives_the_same_approach_on_any_number_of_jobs() {
+    let line = "--approaches 4 --faults one";
+    let alone = ridden("drives-on", 4, line, 1);
+    assert_eq!(alone, ridden("drives-on", 4, line, 2));
+    let seeds: Vec<u64> = alone.iter().map(|one| one.seed).collect();
+    assert_eq!(seeds, [2_000_000_000, 2_000_000_001, 2_000_000_002, 2_000_000_003]);
+}
+
+#[test]
+fn contacts_leave_a_log_and_other_approaches_do_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = format!("--approaches 6 -o {}", folder.path().display());
+    let ridden = ridden("drives-on", 6, &line, 2);
+    for one in &ridden {
+        let file = folder.path().join(format!("approach-drives-on-{}.mcap", one.seed));
+        assert_eq!(file.exists(), one.contact.is_some(), "{}", file.display());
+    }
+    assert!(ridden.iter().any(|one| one.contact.is_some()));
+}
+
+#[test]
+fn a_replay_tells_what_came_from_where() {
+    let contenders = [unheeding("drives-on")];
+    let args = args("--replay 2000000003 --faults one");
+    let paths = scenes(&args);
+    let jobs = jobs(&args, &contenders, &paths, seeds(&args).unwrap());
+    let [job] = &jobs[..] else { panic!("one job") };
+    let told = approach(job, &args, &registry(), &Signals::default()).unwrap().unwrap();
+    assert_eq!(told.approached, ridden("drives-on", 4, "--approaches 4 --faults one", 1)[3]);
+    let story = told.story.join("\n");
+    assert!(story.starts_with("seed 2000000003: a "), "{story}");
+    assert!(story.contains("\nfault: ") && story.contains("the approacher is"), "{story}");
+}
+
+#[test]
+fn a_scene_without_an_approach_is_refused_with_a_remedy() {
+    let args = args("configs/follow-depth.toml demo --approaches 2");
+    let contenders = [unheeding("stands")];
+    let paths = scenes(&args);
+    let jobs = jobs(&args, &contenders, &paths, seeds(&args).unwrap());
+    let error = read_scene(&jobs[0], &args).unwrap_err();
+    assert!(error.message.contains("add one, or leave out the scene"), "{}", error.message);
+}
