@@ -393,11 +393,11 @@ impl Bridge {
     fn work(&mut self, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         self.callers.desk.open();
         while !stop.load(Ordering::Relaxed) {
-            for Arrival { topic, message, .. } in self.inbox.take(TURN) {
+            for Arrival { topic, arrival_ns, message } in self.inbox.take(TURN) {
                 match topic {
                     topic if topic == self.options.reset => self.reset(&message, tell),
                     topic if topic == self.options.speed_limit => self.limit_speed(&message, tell),
-                    topic => self.source.take(&topic, &message),
+                    topic => self.source.take_at(&topic, &message, arrival_ns),
                 }
             }
             self.serve_callers(tell);

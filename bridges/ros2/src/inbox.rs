@@ -18,7 +18,7 @@ pub struct Inbox {
 pub struct Arrival {
     /// The topic.
     pub topic: String,
-    /// Time since the inbox was opened, ns.
+    /// Time since the inbox was opened, ns; not 0.
     pub arrival_ns: u64,
     /// The message, in CDR with its encapsulation header.
     pub message: Vec<u8>,
@@ -51,7 +51,7 @@ pub struct Traffic {
 impl Inbox {
     /// Adds a message; of the same topic, `room` are kept and the oldest dropped.
     pub fn push(&self, topic: &str, message: Vec<u8>, room: usize) {
-        let arrival_ns = u64::try_from(self.opened.elapsed().as_nanos()).unwrap_or(u64::MAX);
+        let arrival_ns = u64::try_from(self.opened.elapsed().as_nanos()).unwrap_or(u64::MAX).max(1);
         self.with_topic(topic, |Topic { waiting, traffic }| {
             waiting.push_back((arrival_ns, message));
             traffic.received += 1;

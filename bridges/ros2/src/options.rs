@@ -2,8 +2,8 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use tagalong_config::{FileLimit, Registry, read_text};
-use tagalong_log::{InputSettings, Limits};
-use tagalong_pipeline::{Pipeline, RobotSettings};
+use tagalong_log::{InputSettings, Limits, ObstacleKind, ObstacleTopic};
+use tagalong_pipeline::{Pipeline, RobotSettings, SourceKind, SourceSettings};
 
 use crate::{BridgeError, ClockSource, Middleware};
 
@@ -159,7 +159,8 @@ impl Options {
             |error: tagalong_config::ConfigError| BridgeError::Config(error.render(&shown, &text));
         let (pipeline, run) =
             Pipeline::from_toml_with(&text, folder, registry, &pipelines).map_err(mistake)?;
-        let input = run.table("input").map_err(mistake)?;
+        let mut input: InputSettings = run.table("input").map_err(mistake)?;
+        input.sources = pipeline.obstacle_sources().iter().map(obstacle_topic).collect();
         let limits = run.table("limits").map_err(mistake)?;
         Ok(Setup { pipeline, robot: run.robot, input: self.named(input), limits })
     }
@@ -172,6 +173,22 @@ impl Options {
             odometry_topic: self.odometry.clone().or(input.odometry_topic),
             ..input
         }
+    }
+}
+
+/// Returns the topic of a source of obstacles.
+fn obstacle_topic(source: &SourceSettings) -> ObstacleTopic {
+    ObstacleTopic {
+        name: source.name.clone(),
+        kind: match source.kind {
+            SourceKind::Scan => ObstacleKind::Scan,
+            SourceKind::Depth => ObstacleKind::Depth,
+            SourceKind::Range => ObstacleKind::Range,
+            SourceKind::Bumper => ObstacleKind::Bumper,
+        },
+        topic: source.topic.clone(),
+        info_topic: Some(source.info_topic.clone()).filter(|topic| !topic.is_empty()),
+        mount: source.mount,
     }
 }
 

@@ -174,6 +174,8 @@ mod tests {
             assert!(clock.now() >= before, "{source:?}: an old image");
             assert_eq!(clock.record_frame(at_s(1)).back_s, 4.0);
             assert!(clock.now() >= before, "{source:?}: a frame of an old image");
+            sleep(Duration::from_millis(20));
+            assert!(clock.now().seconds_since(before) >= 0.02, "{source:?}: nor does it stand");
         }
         // A simulation at half the speed: each frame is older than the time that has passed.
         let clock = StampClock::new(ClockSource::Arrival);

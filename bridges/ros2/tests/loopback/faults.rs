@@ -1,5 +1,6 @@
 //! Faults of the camera and of the switch, injected between two participants.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, sleep};
@@ -74,7 +75,6 @@ fn images_that_are_sent_again_move_nothing_by_the_time_of_arrival() {
 
 /// The camera repeats its last picture with new stamps.
 #[test]
-#[ignore = "the pipeline does not yet watch for frozen sensors"]
 fn the_same_picture_with_new_stamps_is_a_stop() {
     let Some(_alone) = alone() else { return };
     let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
@@ -166,4 +166,74 @@ fn two_publishers_of_the_enable_are_a_stop_and_an_old_enable_moves_nothing() {
     bridge.join().unwrap().unwrap();
     heard_all.store(true, Ordering::Relaxed);
     drop(playing.join().unwrap());
+}
+
+/// A bumper of the collision monitor is waited for, is pressed for a moment, and falls silent.
+#[test]
+fn a_bumper_that_is_pressed_or_silent_stops_the_robot() {
+    let Some(_alone) = alone() else { return };
+    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let simulation = Simulation::new(&scene(40.0), 1);
+    let mut robot = Robot::new(domain(12), simulation.camera());
+    let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
+    let states = robot.peer.collect::<StringMsg>("/people/state", &heard_all);
+    let bumper = robot.peer.publisher_of::<Bool>("/bumper", "std_msgs/msg/Bool", sensor());
+    let base = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/depth-ekf-follow.toml");
+    let config = std::env::temp_dir().join(format!("tagalong-bumper-{}.toml", std::process::id()));
+    let base = base.canonicalize().unwrap();
+    let text = format!(
+        "extends = '{}'\n[[collision_monitor.sources]]\nname = 'front'\ntype = 'bumper'\n\
+         topic = '/bumper'\n",
+        base.display()
+    );
+    std::fs::write(&config, text).unwrap();
+    let options = Options { config: config.clone(), ..options(domain(12), "30") };
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let (bridge, said) = bridge_with(options, registry, &stop);
+    let hand = Hand::new(domain(12), &stop);
+    let playing = thread::spawn(move || (robot.play(simulation), robot).1);
+    sleep(Duration::from_secs(4));
+    let waits = said.lock().unwrap().iter().all(|line| !line.starts_with("reads "));
+    assert!(waits, "it waits for the bumper: {:?}", said.lock().unwrap());
+
+    let pressed = Arc::new(AtomicBool::new(false));
+    let silent = Arc::new(AtomicBool::new(false));
+    let (is_pressed, is_silent, ended) =
+        (Arc::clone(&pressed), Arc::clone(&silent), Arc::clone(&stop));
+    let bumping = thread::spawn(move || {
+        while !ended.load(Ordering::Relaxed) {
+            if !is_silent.load(Ordering::Relaxed) {
+                bumper.publish(Bool { data: is_pressed.load(Ordering::Relaxed) }).unwrap();
+            }
+            sleep(Duration::from_millis(50));
+        }
+    });
+    hand.let_go(&said);
+    commands.wait_for_move("the bumper is free");
+    assert!(said.lock().unwrap().iter().any(|line| line.contains("/bumper")), "it is read");
+
+    pressed.store(true, Ordering::Relaxed);
+    sleep(Duration::from_millis(500));
+    let contact = Instant::now();
+    sleep(Duration::from_millis(700));
+    assert!(!commands.moves_since(contact), "pressed");
+    let told = states.so_far();
+    assert!(told.iter().any(|(_, state)| state.data.starts_with("contact;")), "{told:?}");
+    pressed.store(false, Ordering::Relaxed);
+    commands.wait_for_move("the bumper is free again");
+
+    silent.store(true, Ordering::Relaxed);
+    // The age at which the source is silent, and a period of the camera.
+    sleep(Duration::from_millis(500 + 100) + EXPIRED);
+    let ceased = Instant::now();
+    sleep(Duration::from_millis(700));
+    assert!(!commands.moves_since(ceased), "silent");
+
+    stop.store(true, Ordering::Relaxed);
+    bridge.join().unwrap().unwrap();
+    heard_all.store(true, Ordering::Relaxed);
+    bumping.join().unwrap();
+    drop(playing.join().unwrap());
+    std::fs::remove_file(config).unwrap();
 }

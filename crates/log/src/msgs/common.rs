@@ -60,9 +60,9 @@ message!(StringMsg, "std_msgs/msg/String", "String.msg");
 
 /// `std_msgs/Bool`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Bool {
+pub struct BoolMsg {
     /// The value.
     pub data: bool,
 }
 
-message!(Bool, "std_msgs/msg/Bool", "Bool.msg");
+message!(BoolMsg, "std_msgs/msg/Bool", "Bool.msg");
