@@ -133,8 +133,9 @@ impl PyPipeline {
     /// `[input]` of its config, and returns its frames.
     fn frames(&self, py: Python<'_>, log: PathBuf) -> PyResult<PyFrames> {
         let (inputs, outer) = {
-            let pipeline = &self.work()?.pipeline;
-            (pipeline.inputs(), self.config.outer_for(pipeline).map_err(raised)?)
+            let work = self.work()?;
+            let outer = self.config.outer_for(&work.pipeline).map_err(raised)?;
+            (work.pipeline.inputs(), outer)
         };
         PyFrames::open(py, &log, &self.config, &outer, inputs)
     }
@@ -252,7 +253,9 @@ fn age_of(is_known: bool, given: Option<f64>) -> PyResult<f64> {
         (true, None) => Ok(0.0),
         // Positive comparison, so that NaN is refused.
         (true, Some(age_s)) if age_s >= 0.0 => Ok(age_s),
-        (true, Some(age_s)) => Err(wrong(format!("odometry_age_s is {age_s}; it has to be 0 or more"))),
+        (true, Some(age_s)) => {
+            Err(wrong(format!("odometry_age_s is {age_s}; it has to be 0 or more")))
+        }
         (false, _) => Ok(f64::INFINITY),
     }
 }

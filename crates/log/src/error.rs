@@ -69,21 +69,14 @@ pub enum LogError {
         remedy: String,
     },
     /// The topic of a source of obstacles has messages of another type.
-    #[error(
-        "`{}`: source `{name}` of [[collision_monitor.sources]] names {topic}, which is {kind}; it \
-         has to be one of: {wanted}", path.display()
-    )]
+    #[error("`{}`: source `{name}` of [[collision_monitor.sources]] names {why}", path.display())]
     Source {
         /// Path of the file.
         path: PathBuf,
         /// Name of the source.
         name: String,
-        /// Topic of the source.
-        topic: String,
-        /// Type of its messages.
-        kind: String,
-        /// Types that the source reads.
-        wanted: String,
+        /// Topic and type of its messages, with the types that the source reads.
+        why: String,
     },
     /// A calibration cannot be used.
     #[error("`{}`, topic {topic}: {source}", path.display())]

@@ -82,13 +82,9 @@ fn planned_source(scan: &Scan, source: &ObstacleTopic) -> Result<Planned, LogErr
     let ObstacleTopic { name, kind, topic, .. } = source;
     let found = scan.topics.get(topic);
     if let Some(other) = found.filter(|found| !kind.reads(found)) {
-        return Err(LogError::Source {
-            path: scan.path.clone(),
-            name: name.clone(),
-            topic: topic.clone(),
-            kind: kind_of(other),
-            wanted: kind.type_names(),
-        });
+        let wanted = kind.type_names();
+        let why = format!("{topic}, which is {}; it has to be one of: {wanted}", kind_of(other));
+        return Err(LogError::Source { path: scan.path.clone(), name: name.clone(), why });
     }
     // Of some bumpers, silence says that they are not pressed.
     let may_be_silent =

@@ -213,7 +213,7 @@ fn a_second_scanner_is_read_beside_the_first() {
 
 /// Writes a depth image of a camera at the back.
 fn rear_depth(log: &mut LogWriter, t: f64, metres: f32) {
-    let data: Vec<u8> = vec![metres; 8 * 6].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let data: Vec<u8> = [metres; 8 * 6].iter().flat_map(|v| v.to_le_bytes()).collect();
     let message = Image {
         header: Header::new(at(t), "rear"),
         height: 6,
