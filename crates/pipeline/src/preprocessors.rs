@@ -68,6 +68,9 @@ impl Preprocessor for MotionOfCorners {
 fn seen_by(frame: &Frame, camera: Camera) -> Frame {
     let sensors = frame.sensors().clone();
     Frame::of_sensors(frame.index, frame.stamp, Arc::new(camera), frame.motion, sensors)
+        .with_changed_calibration(frame.calibration_changed)
+        .with_odometry_age(frame.odometry_age_s)
+        .with_latency(frame.latency_s)
 }
 
 /// Returns the stage of `[odometry]`.

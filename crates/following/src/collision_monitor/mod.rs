@@ -357,7 +357,7 @@ impl People<'_> {
                 return HazardKind::Followed(closing_mps(target));
             }
             // What moves beside the followed person is carried, pulled or pushed by them.
-            if away_m < CARRIED_M && presence != Presence::Stands {
+            if away_m < CARRIED_M && matches!(presence, Presence::Appeared | Presence::New) {
                 return HazardKind::Followed(closing_mps(target) + UNSURE_MPS);
             }
         }
@@ -375,6 +375,8 @@ impl People<'_> {
             Presence::Stands => HazardKind::Still,
             // What comes into view may be a person, who is seen to move in the next frame.
             Presence::New => HazardKind::Still,
+            // A person who came and stands, for example, may walk on.
+            Presence::Parked => HazardKind::Moves(0.0),
             Presence::Appeared => HazardKind::Moves(self.settings.people_mps),
         }
     }

@@ -15,12 +15,19 @@ const GAP_MS: u32 = 400;
 const STANDS_MS: u32 = 1000;
 /// Time for which a look at a free place counts, ms.
 const FREE_MS: u32 = 3000;
+/// Cells around one that were free, of 8, for something in it to have come there: at the border of what
+/// is in view a cell is half free and half a wall.
+const FREE_AROUND: usize = 6;
+/// Time for which what came by itself and stands may go on, ms.
+const PARKED_MS: u32 = 10_000;
 
 /// What is known of the thing in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Presence {
     /// It has been there for a second.
     Stands,
+    /// It has been there for a second, and came by itself.
+    Parked,
     /// It appeared where nothing was known.
     New,
     /// It appeared where the sensor had seen that nothing was.
@@ -106,13 +113,14 @@ impl SpaceGrid {
         let place = coordinates(&(self.grid_from_robot * at));
         let Some(cell) = self.at(place) else { return Presence::New };
         if self.stands(cell) {
-            return Presence::Stands;
+            let is_parked = cell.appeared && self.now_ms - cell.since_ms <= PARKED_MS;
+            return if is_parked { Presence::Parked } else { Presence::Stands };
         }
         // Noise and a wrong angle move the border of what stands by a cell.
         for dx in -1..=1 {
             for dy in -1..=1 {
-                let beside = self.at((place.0 + dx, place.1 + dy));
-                if beside.is_some_and(|cell| self.stands(cell)) {
+                let beside = self.at((place.0.saturating_add(dx), place.1.saturating_add(dy)));
+                if beside.is_some_and(|cell| self.stands(cell) && !cell.appeared) {
                     return Presence::Stands;
                 }
             }
@@ -132,13 +140,30 @@ impl SpaceGrid {
         if !(place.x.is_finite() && place.y.is_finite()) {
             return;
         }
+        let is_amid_free = self.is_amid_free(coordinates(&place));
         let cell = self.cell_mut(&place);
         if cell.hit_ms == 0 || now_ms - cell.hit_ms > GAP_MS {
             cell.since_ms = now_ms;
             let was_free = cell.free_ms > cell.hit_ms && now_ms - cell.free_ms <= FREE_MS;
-            cell.appeared = was_free;
+            cell.appeared = was_free && is_amid_free;
         }
         cell.hit_ms = now_ms;
+    }
+
+    /// Returns true if most of the cells around one were seen free lately.
+    fn is_amid_free(&self, (x, y): (i32, i32)) -> bool {
+        let mut free = 0;
+        for dx in -1..=1 {
+            for dy in -1..=1 {
+                let is_middle = dx == 0 && dy == 0;
+                let beside =
+                    self.at((x.saturating_add(dx), y.saturating_add(dy))).filter(|_| !is_middle);
+                let was_free = beside
+                    .is_some_and(|cell| cell.free_ms != 0 && self.now_ms - cell.free_ms <= FREE_MS);
+                free += usize::from(was_free);
+            }
+        }
+        free >= FREE_AROUND
     }
 
     fn at(&self, place: (i32, i32)) -> Option<&Cell> {
@@ -190,7 +215,9 @@ mod tests {
         assert_eq!(grid.presence(&Point2::new(3.0, 0.35)), Presence::Stands, "the wall");
         let seen: Vec<_> = (0..12).map(|_| look(&mut grid, 0.0, 0.0, Some(1.5)).unwrap()).collect();
         assert!(seen[..9].iter().all(|presence| *presence == Presence::Appeared), "{seen:?}");
-        assert_eq!(seen[11], Presence::Stands);
+        assert_eq!(seen[11], Presence::Parked);
+        let last = (0..100).map(|_| look(&mut grid, 0.0, 0.0, Some(1.5)).unwrap()).last();
+        assert_eq!(last, Some(Presence::Stands), "for good");
     }
 
     #[test]

@@ -54,6 +54,8 @@ pub(crate) struct Braking {
     pub(crate) rise_s: f64,
     /// Deceleration.
     pub(crate) decel: f64,
+    /// Time from one image to the next, s: what moves is that much nearer before it is seen again.
+    pub(crate) between_s: f64,
 }
 
 impl Braking {
@@ -313,7 +315,8 @@ impl<'a> Sweep<'a> {
     fn speed_beside(&self, delay_s: f64, margin_m: impl Fn(f64) -> f64) -> f64 {
         let is_free = |speed: f64| {
             let nearest_m = self.nearest_within(self.braking.way(speed, delay_s));
-            nearest_m >= margin_m(self.braking.time_s(speed, delay_s))
+            let time_s = self.braking.between_s + self.braking.time_s(speed, delay_s);
+            nearest_m >= margin_m(time_s)
         };
         if is_free(self.speed) {
             return f64::INFINITY;
@@ -339,7 +342,7 @@ impl<'a> Sweep<'a> {
 mod tests {
     use super::*;
 
-    const BRAKING: Braking = Braking { reaction_s: 0.5, rise_s: 0.1, decel: 1.0 };
+    const BRAKING: Braking = Braking { reaction_s: 0.5, rise_s: 0.1, decel: 1.0, between_s: 0.0 };
     const AHEAD: Path = Path::Arc { curvature: 0.0, backwards: false };
 
     fn octagon() -> Footprint {

@@ -346,7 +346,7 @@ impl CommandLimiter {
         }
         let backwards = next.forward.speed < 0.0;
         let path = Path::Arc { curvature: curvature(next.twist()), backwards };
-        let allowed = look(path, speed, &self.settings.braking(self.reaction_s));
+        let allowed = look(path, speed, &self.settings.braking(self.reaction_s, dt));
         if allowed.most <= STILL_MPS {
             let stopped = Axis::default();
             // Turning stays allowed where it is free: it may free the path.
@@ -374,7 +374,7 @@ impl CommandLimiter {
             return (next, reason);
         }
         let path = Path::Turn { left: next.turn.speed > 0.0 };
-        let allowed = look(path, speed, &self.settings.turn_braking(self.reaction_s));
+        let allowed = look(path, speed, &self.settings.turn_braking(self.reaction_s, dt));
         if allowed.most <= STILL_RPS {
             return (Motion::default(), allowed.stops);
         }

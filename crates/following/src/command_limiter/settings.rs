@@ -92,16 +92,17 @@ impl CommandLimiterSettings {
         self.reaction_s + self.max_decel_mps2 / (2.0 * self.max_jerk_mps3)
     }
 
-    /// Returns how the robot stops on its way, if it reacts after `reaction_s`.
-    pub(crate) fn braking(&self, reaction_s: f64) -> Braking {
+    /// Returns how the robot stops on its way, if it reacts after `reaction_s` to images that are
+    /// `between_s` apart.
+    pub(crate) fn braking(&self, reaction_s: f64, between_s: f64) -> Braking {
         let decel = self.max_decel_mps2;
-        Braking { reaction_s, rise_s: decel / (2.0 * self.max_jerk_mps3), decel }
+        Braking { reaction_s, rise_s: decel / (2.0 * self.max_jerk_mps3), decel, between_s }
     }
 
-    /// Returns how a turn stops, if the robot reacts after `reaction_s`.
-    pub(crate) fn turn_braking(&self, reaction_s: f64) -> Braking {
+    /// Returns how a turn stops, as [`CommandLimiterSettings::braking`].
+    pub(crate) fn turn_braking(&self, reaction_s: f64, between_s: f64) -> Braking {
         let decel = self.max_turn_accel_radps2;
-        Braking { reaction_s, rise_s: decel / (2.0 * self.max_turn_jerk_radps3), decel }
+        Braking { reaction_s, rise_s: decel / (2.0 * self.max_turn_jerk_radps3), decel, between_s }
     }
 
     /// Refuses limits that contradict each other or those of the robot.

@@ -582,7 +582,7 @@ impl Tape {
                 linear_mps.abs() < 1e-9 && gentle_turn
             }
             (Reason::Obstacle, Ahead::Something(at_m)) => {
-                let braking = settings.braking(settings.reaction_s);
+                let braking = settings.braking(settings.reaction_s, 0.0);
                 let most = braking.speed_within(at_m - STOP_M, settings.reaction_s);
                 // No slower than the obstacle demands; an emergency also where it is gentle by chance.
                 let is_emergency = accel < 0.0 && (linear_mps - most).abs() < 1e-6;
