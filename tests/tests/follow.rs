@@ -70,7 +70,7 @@ fn follow() -> Vec<Step> {
     while let Some(event) = simulation.next_event() {
         match event {
             Event::Odometry(reading) => recorder.odometry = reading.odom_from_robot,
-            Event::NoOdometry { .. } | Event::Webcam(_) => {}
+            Event::NoOdometry { .. } | Event::Sensor(_) | Event::Webcam(_) => {}
             Event::Shot(shot) => {
                 let report = pipeline.step(&recorder.frame(&shot)).unwrap();
                 simulation.steer(report.command.unwrap().wheels);

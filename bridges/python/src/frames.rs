@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
-use tagalong_app::config_file::ConfigFile;
+use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_core::{DepthImage, GreyImage, Input, Inputs, RgbImage};
 use tagalong_log::{FrameSource, LogFrame};
 
@@ -80,6 +80,12 @@ impl PyFrame {
         self.0.odom_stale
     }
 
+    /// Age of the newest odometry at the time of the frame, s; infinite if there never was any.
+    #[getter]
+    fn odometry_age_s(&self) -> f64 {
+        self.0.frame.odometry_age_s
+    }
+
     fn __repr__(&self) -> String {
         format!("Frame({}, {} s)", self.0.frame.index, self.0.frame.stamp)
     }
@@ -98,12 +104,17 @@ fn of_grey<'py>(py: Python<'py>, image: &GreyImage) -> PyResult<Bound<'py, PyArr
 pub struct PyFrames(Mutex<FrameSource>);
 
 impl PyFrames {
-    /// Opens a log for a pipeline with these inputs.
+    /// Opens a log with these settings, for a pipeline with these inputs.
     ///
     /// # Errors
     /// As `FrameSource::open`.
-    pub fn open(py: Python<'_>, log: &Path, config: &ConfigFile, inputs: Inputs) -> PyResult<Self> {
-        let outer = config.outer().map_err(raised)?;
+    pub fn open(
+        py: Python<'_>,
+        log: &Path,
+        config: &ConfigFile,
+        outer: &OuterSettings,
+        inputs: Inputs,
+    ) -> PyResult<Self> {
         // Colour is for the caller to look at, whether or not the pipeline uses it.
         let inputs = inputs.accept(Input::Colour);
         let source = py.detach(|| FrameSource::open(log, &outer.input, &outer.limits, inputs));

@@ -45,6 +45,7 @@ struct Moment {
     pose: Option<Isometry2<f64>>,
     images: Images,
     scan: Option<LaserScan>,
+    odometry_age_s: f64,
 }
 
 #[pymethods]
@@ -80,9 +81,11 @@ impl PyPipeline {
     /// images. pose: of the robot in the odometry frame, (x, y, heading) or 4 x 4; None without
     /// odometry. stamp: capture time, ns as an int or seconds as a float. scan: float64, rows of
     /// x, y or x, y, z of a laser scan in the robot frame. right, baseline_m: the right image of a
-    /// rectified stereo pair. index: number of the frame [default: frames so far].
+    /// rectified stereo pair. index: number of the frame [default: frames so far]. odometry_age_s: age of
+    /// the reading of odometry from which the pose is, at the time of the stamp; a robot is not
+    /// steered by an old one [default: 0, and infinite without a pose].
     #[pyo3(signature = (colour, depth, camera, pose, stamp, *, scan=None, right=None,
-        baseline_m=None, index=None))]
+        baseline_m=None, index=None, odometry_age_s=None))]
     #[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python method")]
     fn step(
         &self,
@@ -96,6 +99,7 @@ impl PyPipeline {
         right: Option<&Bound<'_, PyAny>>,
         baseline_m: Option<f64>,
         index: Option<u64>,
+        odometry_age_s: Option<f64>,
     ) -> PyResult<PyReport> {
         let mut images = Images::default();
         colour.map(|array| arrays::add_colour(&mut images, array)).transpose()?;
@@ -105,7 +109,9 @@ impl PyPipeline {
         let scan = scan.map(arrays::points).transpose()?.map(LaserScan::of_points);
         let pose = pose.map(arrays::pose).transpose()?;
         let stamp = self::stamp(stamp)?;
-        let moment = Moment { index, stamp, camera: Arc::clone(&camera), pose, images, scan };
+        let odometry_age_s = age_of(pose.is_some(), odometry_age_s)?;
+        let camera_of = Arc::clone(&camera);
+        let moment = Moment { index, stamp, camera: camera_of, pose, images, scan, odometry_age_s };
         let report = py.detach(|| self.work()?.step(moment))?;
         PyReport::new(py, report, &camera)
     }
@@ -126,8 +132,11 @@ impl PyPipeline {
     /// Opens a log (.mcap, .db3, .bag, or the folder of a recording) for this pipeline, with the
     /// `[input]` of its config, and returns its frames.
     fn frames(&self, py: Python<'_>, log: PathBuf) -> PyResult<PyFrames> {
-        let inputs = self.work()?.pipeline.inputs();
-        PyFrames::open(py, &log, &self.config, inputs)
+        let (inputs, outer) = {
+            let pipeline = &self.work()?.pipeline;
+            (pipeline.inputs(), self.config.outer_for(pipeline).map_err(raised)?)
+        };
+        PyFrames::open(py, &log, &self.config, &outer, inputs)
     }
 
     /// The command in force at a time (as `stamp` of `step`): the last one until it expires, zero
@@ -231,7 +240,20 @@ impl Moment {
 
     fn frame(self, motion: EgoMotion, count: u64) -> Frame {
         let index = self.index.unwrap_or(count);
-        Frame::new(index, self.stamp, self.camera, motion, self.images).with_laser(self.scan)
+        Frame::new(index, self.stamp, self.camera, motion, self.images)
+            .with_laser(self.scan)
+            .with_odometry_age(self.odometry_age_s)
+    }
+}
+
+/// Returns the age of odometry, s: as given, else 0 with a pose and infinite without.
+fn age_of(is_known: bool, given: Option<f64>) -> PyResult<f64> {
+    match (is_known, given) {
+        (true, None) => Ok(0.0),
+        // Positive comparison, so that NaN is refused.
+        (true, Some(age_s)) if age_s >= 0.0 => Ok(age_s),
+        (true, Some(age_s)) => Err(wrong(format!("odometry_age_s is {age_s}; it has to be 0 or more"))),
+        (false, _) => Ok(f64::INFINITY),
     }
 }
 

@@ -220,3 +220,14 @@ def test_the_interpreter_is_free_while_a_pipeline_works(log):
             assert len(ticks) > before, f"no tick in {took} s"
     counted.set()
     other.join()
+
+
+def test_frames_tell_the_age_of_odometry(log):
+    pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+    ages = [frame.odometry_age_s for frame in pipeline.frames(log)]
+    assert len(ages) > 20 and all(0 <= age < 0.1 for age in ages), ages
+    pipeline.step(COLOUR, DEPTH, CAMERA, (0, 0, 0), 1.0, odometry_age_s=0.2)
+    with pytest.raises(ValueError, match="odometry_age_s is -1"):
+        pipeline.step(COLOUR, DEPTH, CAMERA, (0, 0, 0), 2.0, odometry_age_s=-1.0)
+    with pytest.raises(ValueError, match="odometry_age_s is NaN"):
+        pipeline.step(COLOUR, DEPTH, CAMERA, (0, 0, 0), 3.0, odometry_age_s=float("nan"))

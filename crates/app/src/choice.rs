@@ -147,7 +147,7 @@ fn refusal(config: &str, log: &Path, why: &Failure) -> String {
 /// Takes the first frame of a log through a pipeline.
 fn try_config(config: &ConfigFile, log: &Path, registry: &Registry) -> Result<(), Failure> {
     let (mut pipeline, settings) = config.pipeline(registry, None)?;
-    let outer = config.outer()?;
+    let outer = config.outer_for(&pipeline)?;
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
     let Some(item) = source.next_frame() else {
         return Err(Failure::failed("no frame that can be used"));

@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tagalong_config::{ConfigError, FileLimit, Registry, Settings, parse_settings, read_text};
 use tagalong_log::write::OutputSettings;
-use tagalong_log::{InputSettings, Limits, LogError};
+use tagalong_log::{InputSettings, Limits, LogError, ObstacleKind, ObstacleTopic};
 use tagalong_pipeline::{
-    Document, Options, Pipeline, RunSettings, check_tuning, flattened, flattened_with,
+    Document, Options, Pipeline, RunSettings, SourceKind, SourceSettings, check_tuning, flattened,
+    flattened_with,
 };
 
 use crate::outcome::Failure;
@@ -43,6 +44,7 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "follow-arc"
     "follow-depth"
     "follow-low"
+    "follow-sonar"
     "joint-particle"
     "joint-particle-all"
     "joint-particle-as-printed"
@@ -270,6 +272,17 @@ impl ConfigFile {
         read().map_err(|error| self.mistake(&error))
     }
 
+    /// Returns the tables that are not the pipeline's, with the sources of obstacles that its collision
+    /// monitor asks for as part of the input.
+    ///
+    /// # Errors
+    /// As for [`ConfigFile::pipeline`].
+    pub fn outer_for(&self, pipeline: &Pipeline) -> Result<OuterSettings, Failure> {
+        let mut outer = self.outer()?;
+        outer.input.sources = pipeline.obstacle_sources().iter().map(obstacle_topic).collect();
+        Ok(outer)
+    }
+
     /// Reads one top-level table, with spans for its mistakes.
     fn table<T: Settings>(&self, name: &str) -> Result<T, ConfigError> {
         let document = self.document()?;
@@ -322,6 +335,22 @@ impl Place {
     }
 }
 
+/// Returns the topic of a source of obstacles.
+fn obstacle_topic(source: &SourceSettings) -> ObstacleTopic {
+    ObstacleTopic {
+        name: source.name.clone(),
+        kind: match source.kind {
+            SourceKind::Scan => ObstacleKind::Scan,
+            SourceKind::Depth => ObstacleKind::Depth,
+            SourceKind::Range => ObstacleKind::Range,
+            SourceKind::Bumper => ObstacleKind::Bumper,
+        },
+        topic: source.topic.clone(),
+        info_topic: Some(source.info_topic.clone()).filter(|topic| !topic.is_empty()),
+        mount: source.mount,
+    }
+}
+
 fn options(seed: Option<u64>, threads: Option<usize>) -> Options {
     Options { foreign: OuterSettings::TABLES.map(str::to_owned).to_vec(), seed, threads }
 }
@@ -352,6 +381,31 @@ impl OuterSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sources_of_obstacles_reach_the_input() {
+        let text = "extends = 'follow-depth.toml'\n[[collision_monitor.sources]]\nname = 'sonar'\n\
+                    type = 'range'\ntopic = '/sonar'\nmount = [0.3, 0, 0.2, 0, 0, 90]\n\
+                    [[collision_monitor.sources]]\nname = 'rear'\ntype = 'depth'\n\
+                    topic = '/rear/depth'\ninfo_topic = '/rear/info'\n";
+        let mut registry = Registry::default();
+        tagalong_catalog::register(&mut registry);
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+        let config = ConfigFile::of_text(text.to_owned(), &folder);
+        let (pipeline, _) = config.pipeline(&registry, None).unwrap();
+        assert!(config.outer().unwrap().input.sources.is_empty());
+        let outer = config.outer_for(&pipeline).unwrap();
+        let mount = Some([0.3, 0.0, 0.2, 0.0, 0.0, 90.0]);
+        let sonar = ObstacleTopic::new("sonar", ObstacleKind::Range, "/sonar");
+        let rear = ObstacleTopic::new("rear", ObstacleKind::Depth, "/rear/depth");
+        let expected = [
+            ObstacleTopic { mount, ..sonar },
+            ObstacleTopic { info_topic: Some("/rear/info".to_owned()), ..rear },
+        ];
+        assert_eq!(outer.input.sources, expected);
+        // They are keys of the collision monitor, and none of the input.
+        assert!(!outer.resolved().unwrap().contains("sonar"));
+    }
 
     #[test]
     fn all_configs_of_the_folder_are_built_in_but_those_with_a_model_of_their_own() {

@@ -50,7 +50,7 @@ impl Visit {
     /// A config or a log that cannot be read.
     pub fn make(config: ConfigFile, scope: Scope, registry: &Registry) -> Result<Self, Failure> {
         let (mut pipeline, settings) = config.pipeline(registry, None)?;
-        let outer = config.outer()?;
+        let outer = config.outer_for(&pipeline)?;
         let inputs = pipeline.inputs();
         // Light and coverage are judged, and pictures are rendered, also where the pipeline does
         // not use colour or depth.

@@ -227,6 +227,12 @@ fn messages(bytes: &[u8], _: &Path) {
     drop(decode::<msgs::Odometry>(bytes));
     drop(decode::<msgs::LaserScan>(bytes));
     drop(decode::<msgs::StringMsg>(bytes));
+    drop(decode::<msgs::Range>(bytes));
+    drop(decode::<msgs::BoolMsg>(bytes));
+    drop(decode::<msgs::BumperEvent>(bytes));
+    drop(decode::<msgs::BumperState>(bytes));
+    drop(decode::<msgs::ContactCount>(bytes));
+    drop(decode::<msgs::HazardDetectionVector>(bytes));
 }
 
 fn images(bytes: &[u8], _: &Path) {

@@ -48,6 +48,10 @@ pub enum FaultKind {
     Drop,
     /// The laser scanner delivers no scan.
     DropLaser,
+    /// The further sensors of obstacles (`lasers`, `ranges`, `bumpers`) repeat their readings.
+    FreezeSensors,
+    /// The further sensors of obstacles are silent.
+    DropSensors,
     /// The poses of the odometry are no numbers.
     NanOdometry,
     /// The odometry is silent.
@@ -84,11 +88,12 @@ enum Part {
     Any,
     Depth,
     Laser,
+    Sensors,
 }
 
 impl FaultKind {
     /// All kinds.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 29] = [
         Self::FreezeDepth,
         Self::FreezeAll,
         Self::FreezeLaser,
@@ -102,6 +107,8 @@ impl FaultKind {
         Self::Resend,
         Self::Drop,
         Self::DropLaser,
+        Self::FreezeSensors,
+        Self::DropSensors,
         Self::NanOdometry,
         Self::OdometrySilent,
         Self::OdometryFrozen,
@@ -134,6 +141,8 @@ impl FaultKind {
             Self::Resend => "resend",
             Self::Drop => "drop",
             Self::DropLaser => "drop-laser",
+            Self::FreezeSensors => "freeze-sensors",
+            Self::DropSensors => "drop-sensors",
             Self::NanOdometry => "nan-odometry",
             Self::OdometrySilent => "odometry-silent",
             Self::OdometryFrozen => "odometry-frozen",
@@ -157,6 +166,7 @@ impl FaultKind {
             Part::Any => true,
             Part::Depth => scene.camera.kind == CameraKind::Rgbd,
             Part::Laser => scene.laser.is_some(),
+            Part::Sensors => scene.has_obstacle_sensors(),
         }
     }
 
@@ -170,6 +180,7 @@ impl FaultKind {
             Self::FreezeLaser | Self::LaserInvalid | Self::LaserNear | Self::DropLaser => {
                 Part::Laser
             }
+            Self::FreezeSensors | Self::DropSensors => Part::Sensors,
             _ => Part::Any,
         }
     }
@@ -333,10 +344,10 @@ impl InjectedFault {
         if kind.applies_to(scene) {
             return None;
         }
-        let part = if kind.part() == Part::Laser {
-            "a laser scanner: add a table [laser]"
-        } else {
-            "a depth camera: set camera.kind = \"rgbd\""
+        let part = match kind.part() {
+            Part::Laser => "a laser scanner: add a table [laser]",
+            Part::Sensors => "a further sensor: add one of [[lasers]], [[ranges]], [[bumpers]]",
+            Part::Depth | Part::Any => "a depth camera: set camera.kind = \"rgbd\"",
         };
         Some(format!("faults.inject: {kind} needs {part}"))
     }
@@ -424,6 +435,11 @@ fn finite<S: serde::Serializer>(seconds: &f64, serializer: S) -> Result<S::Ok, S
 }
 
 impl Scene {
+    /// Returns true if the robot has further sensors of obstacles.
+    fn has_obstacle_sensors(&self) -> bool {
+        !(self.lasers.is_empty() && self.ranges.is_empty() && self.bumpers.is_empty())
+    }
+
     /// Returns the injected faults with their times, in the order of the scene.
     pub fn scheduled_faults(&self) -> Vec<ScheduledFault> {
         let stream = |number: usize| Random::new(self.seed, FIRST_STREAM + number as u64);
@@ -452,7 +468,9 @@ mod tests {
     #[test]
     fn names_are_those_of_toml() {
         for kind in FaultKind::ALL {
-            let text = format!("[laser]\n[[faults.inject]]\nkind = \"{kind}\"\n");
+            let text = format!(
+                "[laser]\n[[bumpers]]\nname = \"b\"\n[[faults.inject]]\nkind = \"{kind}\"\n"
+            );
             let read = scene(&text).unwrap();
             assert_eq!(read.faults.inject, [InjectedFault::new(kind)]);
             assert_eq!(kind.name().parse(), Ok(kind));
@@ -482,8 +500,8 @@ mod tests {
         assert_eq!(drawn(1), drawn(1));
         let kinds: std::collections::BTreeSet<FaultKind> =
             (0..300).map(|seed| drawn(seed).kind).collect();
-        // The default robot has a depth camera, but no laser scanner.
-        assert_eq!(kinds.len(), FaultKind::ALL.len() - 4);
+        // The default robot has a depth camera, but no laser scanner and no further sensors.
+        assert_eq!(kinds.len(), FaultKind::ALL.len() - 6);
         assert!((0..300).all(|seed| (2.0..=6.0).contains(&drawn(seed).from_s)));
         assert!(drawn(1).to_s.is_infinite());
     }

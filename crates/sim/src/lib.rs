@@ -45,12 +45,14 @@ mod behaviour;
 mod body;
 mod daylight;
 mod faults;
+mod footprint;
 mod furniture;
 mod gait;
 mod lanes;
 mod laser;
 mod material;
 mod mirror;
+mod obstacle_sensors;
 mod parallel;
 mod person;
 mod ramp;
@@ -73,9 +75,13 @@ mod world;
 pub use approach::{ApproachBy, ApproachInView, ApproachSettings, ApproachState};
 pub use daylight::Daylight;
 pub use faults::{FaultKind, InjectedFault, ScheduledFault};
+pub use footprint::ROBOT_RADIUS_M;
 pub use furniture::{Furniture, FurnitureKind};
 pub use laser::LaserSettings;
 pub use mirror::MirrorSettings;
+pub use obstacle_sensors::{
+    BumperSettings, RangeKind, RangeSettings, ScannerSettings, SensorData, SensorReading,
+};
 pub use person::Extra;
 pub use ramp::Ramp;
 pub use robot::Encoder;

@@ -10,9 +10,11 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 use crate::approach::{ApproachBy, ApproachSettings};
 use crate::daylight::Daylight;
 use crate::faults::InjectedFault;
+use crate::footprint;
 use crate::furniture::Furniture;
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorSettings;
+use crate::obstacle_sensors::{self, BumperSettings, RangeSettings, ScannerSettings};
 use crate::person::Extra;
 use crate::ramp::Ramp;
 use crate::split::{SUBJECTS, Split};
@@ -45,6 +47,15 @@ pub struct Scene {
     pub faults: FaultSettings,
     /// A laser scanner on the robot, if it has one; `laser = {}` is an ordinary one.
     pub laser: Option<LaserSettings>,
+    /// Further laser scanners, as sources of obstacles.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lasers: Vec<ScannerSettings>,
+    /// Sonars and infrared sensors.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ranges: Vec<RangeSettings>,
+    /// Bumpers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bumpers: Vec<BumperSettings>,
     /// Cameras that hang in the room.
     pub webcams: Vec<WebcamSettings>,
     /// Furniture.
@@ -68,6 +79,9 @@ impl Default for Scene {
             robot: RobotSettings::default(),
             faults: FaultSettings::default(),
             laser: None,
+            lasers: Vec::new(),
+            ranges: Vec::new(),
+            bumpers: Vec::new(),
             webcams: Vec::new(),
             furniture: Vec::new(),
             people: Vec::new(),
@@ -136,6 +150,12 @@ impl Scene {
     /// Returns the split, which is the purpose for which the log may be used.
     pub fn split(&self) -> Split {
         Split::of(self.seed)
+    }
+
+    /// Refuses further sensors that cannot work, and faults that cannot be injected.
+    fn check_parts(&self) -> Result<(), String> {
+        obstacle_sensors::problem(self).map_or(Ok(()), Err)?;
+        self.check_faults()
     }
 
     fn check(&self) -> Result<(), ConfigError> {
@@ -224,11 +244,12 @@ impl Scene {
         let ramp = self.room.ramp.iter().flat_map(Ramp::rules);
         let day = self.light.day.iter().flat_map(|day| day.rules(&self.room));
         let approach = self.approach.iter().flat_map(ApproachSettings::rules);
-        let parts = webcams.chain(laser).chain(ramp).chain(day).chain(approach);
+        let outline = footprint::rules(&self.robot.footprint);
+        let parts = webcams.chain(laser).chain(ramp).chain(day).chain(approach).chain(outline);
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
-            None => self.check_faults().map_err(ConfigError::new),
+            None => self.check_parts().map_err(ConfigError::new),
         }
     }
 }
@@ -411,6 +432,9 @@ pub struct RobotSettings {
     pub start: [f64; 2],
     /// Where it looks at the start, degrees.
     pub heading_deg: f64,
+    /// Corners of its outline, robot frame, m; left out, it is a disc with a radius of 0.25 m.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub footprint: Vec<[f64; 2]>,
     /// Points that it drives to one after the other; none is a robot at rest.
     pub path: Vec<[f64; 2]>,
     /// Comes after the first person of the scene and stays this far away, m, whatever the
@@ -441,6 +465,7 @@ impl Default for RobotSettings {
         Self {
             start: [1.0, 3.0],
             heading_deg: 0.0,
+            footprint: Vec::new(),
             path: Vec::new(),
             behind_m: 0.0,
             speed_mps: 0.5,

@@ -6,6 +6,9 @@ use crate::lanes::{LANES, Lanes, Vectors, dot, product, transposed_product};
 use crate::material::Material;
 use crate::seen::SolidView;
 
+/// Half a side from which on a flat side is large, m.
+const SLAB_M: f64 = 0.3;
+
 /// The geometry of a solid in its own axes, origin at its centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
@@ -123,6 +126,13 @@ impl Shape {
             Form::Block(half) => own.abs().dot(&half),
             Form::Capsule { length, first, second } => first.max(own.z * length + second),
         }
+    }
+
+    /// Returns true for a block with a large flat side: a wall, a pane, the floor.
+    pub fn is_slab(&self) -> bool {
+        let Form::Block(half) = self.form else { return false };
+        let large = half.iter().filter(|metres| **metres >= SLAB_M).count();
+        large >= 2
     }
 
     /// A point of the world in the solid's own axes.

@@ -14,9 +14,11 @@ use crate::approach::{ApproachBy, ApproachInView, ApproachState, Approacher, Sur
 use crate::behaviour::{Obstacle, Walker, hidden_by, lead_of, others, play_tricks};
 use crate::body::Skeleton;
 use crate::faults::ScheduledFault;
+use crate::footprint::{Gap, Outline};
 use crate::furniture::{Furniture, FurnitureKind};
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorCamera;
+use crate::obstacle_sensors::SensorReading;
 use crate::person::Person;
 use crate::random::Random;
 use crate::render::{Visibility, WorldCamera};
@@ -31,11 +33,13 @@ use crate::world::{self, Hit, Object, Stage, World};
 
 mod injector;
 mod joints;
+mod sensing;
 mod walkers;
 
 use injector::Injector;
 pub use joints::Joint;
 use joints::{Spot, joints};
+use sensing::Sensing;
 use walkers::{approaching_person, walkers};
 
 /// People, robot and odometry move in steps of this many nanoseconds.
@@ -70,6 +74,8 @@ pub enum Event {
     },
     /// An image, or a pair of them, with the truth.
     Shot(Box<Shot>),
+    /// A reading of a further sensor of obstacles.
+    Sensor(SensorReading),
     /// An image of a camera in the room.
     Webcam(WebcamShot),
 }
@@ -80,7 +86,7 @@ impl Event {
         match self {
             Self::Odometry(reading) => Some(reading.at_ns),
             Self::NoOdometry { at_ns } => Some(*at_ns),
-            Self::Shot(_) | Self::Webcam(_) => None,
+            Self::Shot(_) | Self::Sensor(_) | Self::Webcam(_) => None,
         }
     }
 }
@@ -189,6 +195,7 @@ pub struct Simulation {
     injector: Injector,
     /// The mirror above the camera, if it is a panorama camera.
     mirror: Option<MirrorCamera>,
+    sensing: Sensing,
     webcams: Vec<Webcam>,
     stage: Arc<Stage>,
     pieces: Vec<Furniture>,
@@ -240,6 +247,7 @@ impl Simulation {
             camera: Arc::new(camera),
             injector: Injector::new(scene.scheduled_faults(), scene.seed),
             mirror,
+            sensing: Sensing::new(scene),
             webcams: scene.webcams.iter().map(|webcam| Webcam::new(webcam, threads)).collect(),
             stage: Arc::new(Stage::new(fixed, lamps, scene.light.lux * scene.light.ambient)),
             walkers,
@@ -293,26 +301,48 @@ impl Simulation {
         self.robot.steer(self.now_ns as f64 * 1e-9, command);
     }
 
-    /// Returns the free distance around a round robot of this radius at its present place.
+    /// Returns the free distance around the robot at its present place: around its footprint, or
+    /// around a disc of this radius if the scene has none.
     pub fn clearance(&self, radius_m: f64) -> Clearance {
-        let robot = Point2::from(self.robot.pose.translation.vector);
-        let people =
-            self.present().map(|(walker, _)| (walker.stance.place - robot).norm() - BODY_M);
-        let least = |distances: &mut dyn Iterator<Item = f64>| {
-            distances.fold(f64::INFINITY, f64::min) - radius_m
+        let outline = self.outline(radius_m);
+        let least = |gaps: &mut dyn Iterator<Item = Gap>| {
+            gaps.fold(f64::INFINITY, |least, gap| least.min(gap.distance_m))
         };
+        Clearance {
+            people_m: least(&mut self.gaps_to_people(&outline)),
+            things_m: least(&mut self.gaps_to_things(&outline)),
+        }
+    }
+
+    /// Returns the gaps between the robot and people.
+    fn gaps_to_people(&self, outline: &Outline<'_>) -> impl Iterator<Item = Gap> {
+        let robot = Point2::from(self.robot.pose.translation.vector);
+        self.present().map(move |(walker, _)| {
+            let way = walker.stance.place - robot;
+            let direction = way.try_normalize(1e-9).unwrap_or_else(Vector2::x);
+            outline.gap(&self.robot.pose, &direction, way.norm(), BODY_M)
+        })
+    }
+
+    /// Returns the gaps between the robot and furniture and walls, all around it.
+    fn gaps_to_things(&self, outline: &Outline<'_>) -> impl Iterator<Item = Gap> {
+        let robot = Point2::from(self.robot.pose.translation.vector);
+        let floor_m = self.scene.room.floor_m(&robot);
         let rays = FEELERS_M.into_iter().flat_map(|height_m| {
             (0..FEELERS).map(move |i| (height_m, TAU * f64::from(i) / f64::from(FEELERS)))
         });
-        let floor_m = self.scene.room.floor_m(&robot);
-        let trolley = self.trolleys().map(|trolley| trolley.distance_m(&robot));
-        let things = rays.map(|(height_m, angle)| {
+        let things = rays.map(move |(height_m, angle)| {
             let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
             let from = Point3::new(robot.x, robot.y, floor_m + height_m);
-            world::distance(&self.stage.objects, &from, &ray)
+            let away_m = world::distance(&self.stage.objects, &from, &ray);
+            outline.gap(&self.robot.pose, &ray.xy(), away_m, 0.0)
         });
-        let things = things.chain(trolley);
-        Clearance { people_m: least(&mut { people }), things_m: least(&mut { things }) }
+        let trolleys = self.trolleys().map(move |trolley| {
+            let way = trolley.place - robot;
+            let direction = way.try_normalize(1e-9).unwrap_or_else(Vector2::x);
+            outline.gap(&self.robot.pose, &direction, trolley.distance_m(&robot), 0.0)
+        });
+        things.chain(trolleys)
     }
 
     /// Returns the injected faults.
@@ -417,6 +447,8 @@ impl Simulation {
         let reading = self.read_odometry();
         let heard = self.injector.hear(reading);
         self.record(self.now_ns, heard);
+        // Before the camera, so that a frame has the readings of its own moment.
+        self.sense();
         if self.now_ns >= due_ns {
             self.shots += 1;
             self.shoot();

@@ -45,6 +45,10 @@ impl Object {
 /// only that such cameras hardly measure anything out of doors.
 const WASHED_OUT_LUX: f64 = 200.0;
 
+/// Least cosine between the direction of sound and the normal of a large smooth surface that sends it
+/// back: that of 30 degrees.
+const ECHO_COSINE: f64 = 0.866;
+
 /// A lamp: a point that shines on all sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
@@ -130,6 +134,16 @@ impl World {
         let on = mirrored(ray, &solid.normal(&solid.own(&at)));
         let others = solids().filter(|(_, other)| !ptr::eq(*other, solid));
         meet(others, &at, &on).map_or(f64::INFINITY, |(further, ..)| t + further)
+    }
+
+    /// Returns the range of an echo of sound in a direction of length one, m; infinite without one.
+    /// Glass and mirrors are surfaces as others. A large smooth one throws the sound away unless it
+    /// is met nearly straight on; edges and rough, small and round things scatter it.
+    pub(crate) fn echo(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
+        let Some((t, _, solid)) = meet(self.solids(), eye, ray) else { return f64::INFINITY };
+        let normal = solid.normal(&solid.own(&(eye + ray * t)));
+        let is_oblique = -normal.dot(ray) < ECHO_COSINE;
+        if is_oblique && solid.is_slab() { f64::INFINITY } else { t }
     }
 
     /// The first of some solids that a ray meets, through glass and by way of mirrors: for rays

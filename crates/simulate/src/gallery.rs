@@ -46,7 +46,7 @@ pub fn paint(mut simulation: Simulation, scene: &Scene, folder: &Path) -> Result
                 webcams[shot.webcam] = shot.image;
                 continue;
             }
-            Event::Odometry(_) | Event::NoOdometry { .. } => continue,
+            Event::Odometry(_) | Event::NoOdometry { .. } | Event::Sensor(_) => continue,
         };
         // Half an interval in: the pictures then lie in the middle of equal parts of the scene.
         if shot.captured_ns < drawn * every_ns + every_ns / 2 {

@@ -274,6 +274,25 @@ mod tests {
         assert!(!changed[19].frame.calibration_changed);
     }
 
+    #[test]
+    fn further_sensors_have_topics_by_their_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.mcap");
+        let sensors = "[[ranges]]\nname = \"front\"\n[[bumpers]]\nname = \"skirt\"\n\
+            [[lasers]]\nname = \"rear\"\nmount = [-0.2, 0.0, 0.2, 180.0]\n";
+        let scene = Scene::parse(&format!("{SCENE}{sensors}")).unwrap();
+        record(Simulation::new(&scene, 1), &scene, &path, &|| true).unwrap();
+        let seen = inspect(&path, &InputSettings::default(), &Limits::default()).unwrap();
+        for (topic, schema, count) in [
+            ("/range/front", "sensor_msgs/msg/Range", 30),
+            ("/bumper/skirt", "std_msgs/msg/Bool", 150),
+            ("/scan/rear", "sensor_msgs/msg/LaserScan", 30),
+        ] {
+            let found = seen.topics.iter().find(|t| t.topic == topic).unwrap();
+            assert_eq!((found.schema.as_str(), found.count, found.undecodable), (schema, count, 0));
+        }
+    }
+
     /// Trials skip the log; they must give the same frames as a pipeline that reads it.
     #[test]
     fn a_recorded_scene_gives_the_frames_of_a_trial() {

@@ -6,17 +6,18 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Isometry2, Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::Serialize;
-use tagalong_core::{DepthImage, GreyImage, RgbImage, Stamp};
+use tagalong_core::{DepthImage, GreyImage, RangeReading, RgbImage, Stamp};
 use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
 use tagalong_log::camera_info::{CONICAL_MIRROR, mirror_coefficients};
 use tagalong_log::msgs::{
-    CameraInfo, CompressedImage, Header, Image, JointState, LaserScan, Odometry, PoseStamped,
-    StringMsg, TFMessage, TransformStamped, TwistStamped,
+    BoolMsg, CameraInfo, CompressedImage, Header, Image, JointState, LaserScan, Odometry,
+    PoseStamped, Range, StringMsg, TFMessage, TransformStamped, TwistStamped,
 };
 use tagalong_log::write::{MessageLog, WriteError};
 use tagalong_log::{TruthFrame, TruthJoint, TruthPerson};
 use tagalong_sim::{
-    Event, Joint, LaserSettings, OdometryReading, Scene, Shot, Simulation, Truth, WebcamShot,
+    Event, Joint, LaserSettings, OdometryReading, RangeKind, Scene, SensorData, SensorReading,
+    Shot, Simulation, Truth, WebcamShot,
 };
 
 /// Start time of every simulated log.
@@ -69,6 +70,12 @@ impl Recorder {
             let above = Isometry3::translation(0.0, 0.0, laser.height_m);
             log.send("/tf_static", EPOCH, &mount("base_link", [(LASER_FRAME.into(), above)]))?;
         }
+        let scanners = scene.lasers.iter().map(|s| (s.name.clone(), s.robot_from_scanner()));
+        let ranges = scene.ranges.iter().map(|s| (s.name.clone(), s.robot_from_sensor()));
+        let sensors: Vec<(String, Isometry3<f64>)> = scanners.chain(ranges).collect();
+        if !sensors.is_empty() {
+            log.send("/tf_static", EPOCH, &mount("base_link", sensors))?;
+        }
         let webcams: Vec<Camera> = simulation.webcams().cloned().collect();
         if !webcams.is_empty() {
             let poses = webcams.iter().map(|camera| camera.robot_from_camera);
@@ -87,6 +94,7 @@ impl Recorder {
         match event {
             Event::Odometry(reading) => self.odometry(reading),
             Event::NoOdometry { .. } => Ok(()),
+            Event::Sensor(reading) => self.sensor(reading),
             Event::Shot(shot) => self.shot(shot),
             Event::Webcam(shot) => self.webcam(shot),
         }
@@ -127,7 +135,8 @@ impl Recorder {
         self.describe(recorded, &shot.camera)?;
         let images = &shot.images;
         if let Some((laser, ranges)) = self.laser.as_ref().zip(shot.laser.as_ref()) {
-            self.log.send("/scan", recorded, &scan(captured, laser, ranges))?;
+            let header = Header::new(captured, LASER_FRAME);
+            self.log.send("/scan", recorded, &scan(header, laser, ranges))?;
         }
         if let Some(colour) = &images.colour {
             self.info("color", recorded, &header, 0.0)?;
@@ -149,6 +158,26 @@ impl Recorder {
         }
         self.log.send(TRUE_ROBOT_TOPIC, recorded, &true_robot(captured, &shot.world_from_robot))?;
         self.log.send_truth(recorded, &truth(captured, &shot.truth))
+    }
+
+    /// Writes a reading of a further sensor of obstacles under the topic of its kind and name.
+    fn sensor(&mut self, reading: &SensorReading) -> Result<(), WriteError> {
+        let name: &str = &reading.name;
+        let at = after(reading.at_ns);
+        let stamp = after(reading.stamp_ns);
+        match &reading.data {
+            SensorData::Scan { scanner, ranges } => {
+                let message = scan(Header::new(stamp, name), &scanner.laser(), ranges);
+                self.log.send(&format!("/scan/{name}"), at, &message)
+            }
+            SensorData::Range { sensor, reading } => {
+                let message = range(Header::new(stamp, name), sensor.kind, reading);
+                self.log.send(&format!("/range/{name}"), at, &message)
+            }
+            SensorData::Bumper(is_pressed) => {
+                self.log.send(&format!("/bumper/{name}"), at, &BoolMsg { data: *is_pressed })
+            }
+        }
     }
 
     /// Takes the camera of the next images; a mount that has moved is told once.
@@ -269,10 +298,24 @@ fn mount(parent: &str, sensors: impl IntoIterator<Item = (String, Isometry3<f64>
     TFMessage { transforms: sensors.into_iter().map(transform).collect() }
 }
 
-fn scan(captured: Stamp, laser: &LaserSettings, ranges: &[f32]) -> LaserScan {
+fn range(header: Header, kind: RangeKind, reading: &RangeReading) -> Range {
+    Range {
+        header,
+        radiation_type: match kind {
+            RangeKind::Sonar => Range::ULTRASOUND,
+            RangeKind::Infrared => Range::INFRARED,
+        },
+        field_of_view: reading.field_of_view_rad as f32,
+        min_range: reading.min_m as f32,
+        max_range: reading.max_m as f32,
+        range: reading.range_m as f32,
+    }
+}
+
+fn scan(header: Header, laser: &LaserSettings, ranges: &[f32]) -> LaserScan {
     let (first, step) = (laser.first_rad(), laser.step_rad());
     LaserScan {
-        header: Header::new(captured, LASER_FRAME),
+        header,
         angle_min: first as f32,
         angle_max: (first + step * (laser.rays - 1) as f64) as f32,
         angle_increment: step as f32,

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 55] = [
+const BUILT_IN: [(&str, &str); 56] = [
     ("approach", include_str!("../../../configs/scenes/approach.toml")),
     ("behind-glass", include_str!("../../../configs/scenes/behind-glass.toml")),
+    ("behind-glass-sonar", include_str!("../../../configs/scenes/behind-glass-sonar.toml")),
     ("cafeteria", include_str!("../../../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../../../configs/scenes/cafeteria-high.toml")),
     ("corridor", include_str!("../../../configs/scenes/corridor.toml")),

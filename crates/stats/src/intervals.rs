@@ -7,6 +7,8 @@ use statrs::function::erf::erf_inv;
 /// Confidence of all intervals.
 pub const CONFIDENCE: f64 = 0.95;
 
+/// Halvings of an interval from 0 to 1 that leave a part of it of 1e-18.
+const HALVINGS: u32 = 60;
 /// Draws that differ by less than this part of the figure do not differ.
 const ROUNDING: f64 = 1e-9;
 
@@ -101,7 +103,17 @@ pub fn exact_upper_bound(events: u64, trials: u64, confidence: f64) -> Option<f6
         return Some(1.0);
     }
     let law = Beta::new(events as f64 + 1.0, (trials - events) as f64).ok()?;
-    Some(law.inverse_cdf(confidence.clamp(0.0, 1.0)))
+    // The inverse of the library is not exact for a million trials; its distribution is.
+    let [mut low, mut high] = [0.0, 1.0];
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if law.cdf(middle) < confidence {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Some(high)
 }
 
 fn score_interval(estimate: f64, trials: f64, confidence: f64) -> Interval {

@@ -1,10 +1,15 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Matrix3};
-use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Stamp, WheelSpeeds};
+use nalgebra::{Isometry2, Isometry3, Matrix3, UnitQuaternion, Vector3};
+use tagalong_core::{
+    DepthImage, EgoMotion, Frame, Images, ObstacleData, ObstacleReading, ObstacleReadings,
+    RangeReading, Stamp, WheelSpeeds,
+};
 use tagalong_geometry::{Camera, Lens};
-use tagalong_sim::{Event, OdometryReading, Scene, Shot, Simulation, Truth};
+use tagalong_sim::{
+    Event, OdometryReading, Scene, SensorData, SensorReading, Shot, Simulation, Truth,
+};
 use tagalong_vision::Unwrapping;
 
 /// Standard deviation of odometry as a fraction of the travel, as the log
@@ -16,6 +21,8 @@ const REORDERED: usize = 3;
 /// Odometry is kept for this long before the oldest image that waits, ns: longer than any image is
 /// late.
 const KEPT_NS: u64 = 1_000_000_000;
+/// Readings of each further sensor that are kept: those of some seconds.
+const KEPT_READINGS: usize = 256;
 /// Gap in the odometry beyond which the motion is unknown, s, as the log reader takes it.
 const MAX_GAP_S: f64 = 0.5;
 /// Longest time for which an unknown motion may have gone on, s, as the log reader takes it.
@@ -44,6 +51,8 @@ pub struct Draw {
     patience: usize,
     previous: Option<(Stamp, Isometry2<f64>)>,
     calibration_changed: bool,
+    /// Readings of the further sensors by their names, the newest at the end.
+    readings: BTreeMap<Arc<str>, VecDeque<SensorReading>>,
     index: u64,
 }
 
@@ -78,6 +87,7 @@ impl Draw {
             patience,
             previous: None,
             calibration_changed: false,
+            readings: BTreeMap::new(),
             index: 0,
         }
     }
@@ -116,6 +126,7 @@ impl Draw {
             match event {
                 Some(Event::Odometry(reading)) => self.hear(&reading),
                 Some(Event::Shot(shot)) => drop(self.waiting.insert(shot.stamp_ns, *shot)),
+                Some(Event::Sensor(reading)) => self.feel(reading),
                 Some(Event::NoOdometry { .. } | Event::Webcam(_)) => {}
                 None => break,
             }
@@ -144,6 +155,34 @@ impl Draw {
         self.odometry = self.odometry.split_off(&last_before.unwrap_or(least_ns));
     }
 
+    /// Takes in a reading of a further sensor.
+    fn feel(&mut self, reading: SensorReading) {
+        let readings = self.readings.entry(Arc::clone(&reading.name)).or_default();
+        readings.push_back(reading);
+        if readings.len() > KEPT_READINGS {
+            readings.pop_front();
+        }
+    }
+
+    /// Returns the newest reading of each further sensor, in the robot frame at a time; `None`
+    /// without such sensors.
+    fn obstacle_readings(&self, stamp_ns: u64, here: &Isometry2<f64>) -> Option<ObstacleReadings> {
+        let is_live = self.patience == 0;
+        let mut newest = Vec::new();
+        for (name, readings) in &self.readings {
+            // On a robot a bumper that was pressed after a late image counts, too.
+            let known = |reading: &&SensorReading| is_live || reading.stamp_ns <= stamp_ns;
+            let Some(reading) = readings.iter().rev().find(known) else { continue };
+            let then = self.known_pose(reading.stamp_ns).odom_from_robot;
+            newest.push(ObstacleReading {
+                source: Arc::clone(name),
+                age_s: stamp_ns.saturating_sub(reading.stamp_ns) as f64 * 1e-9,
+                data: moved_along(&reading.data, &spatial(&(here.inverse() * then))),
+            });
+        }
+        (!newest.is_empty()).then(|| ObstacleReadings(newest.into()))
+    }
+
     /// Returns the pose by the newest odometry that is not from the future of a stamp.
     fn known_pose(&self, stamp_ns: u64) -> KnownPose {
         let newest = self.odometry.range(..=stamp_ns).next_back();
@@ -167,11 +206,15 @@ impl Draw {
         let laser = scan.map(|(laser, ranges)| laser.scan(ranges));
         // As log readers: the first calibration stays, and a change is never taken back.
         self.calibration_changed |= *shot.camera != *self.simulation.camera();
-        let frame = Frame::new(self.index, stamp, camera, motion, self.as_logged(shot.images))
+        let readings = self.obstacle_readings(shot.stamp_ns, &pose.odom_from_robot);
+        let mut frame = Frame::new(self.index, stamp, camera, motion, self.as_logged(shot.images))
             .with_laser(laser)
             .with_changed_calibration(self.calibration_changed)
             .with_odometry_age(pose.age_s)
             .with_latency(self.latency_s(shot.stamp_ns, shot.arrived_ns));
+        if let Some(readings) = readings {
+            frame = frame.with_sensor(readings);
+        }
         SimulatedFrame {
             frame,
             truth: shot.truth,
@@ -183,7 +226,7 @@ impl Draw {
     /// Returns the time from the stamp of an image to its arrival, s, on a robot; a log has none.
     fn latency_s(&self, stamp_ns: u64, arrived_ns: u64) -> Option<f64> {
         let is_live = self.patience == 0;
-        is_live.then(|| (arrived_ns as f64 - stamp_ns as f64) * 1e-9)
+        is_live.then_some((arrived_ns as f64 - stamp_ns as f64) * 1e-9)
     }
 
     /// Converts images as a log does: depth is stored in millimetres, and log readers unwrap
@@ -213,6 +256,27 @@ impl Draw {
     }
 }
 
+/// Returns data of a further sensor in the robot frame of another moment.
+fn moved_along(data: &SensorData, now_from_then: &Isometry3<f64>) -> ObstacleData {
+    match data {
+        SensorData::Scan { scanner, ranges } => {
+            let mount = now_from_then * scanner.robot_from_scanner();
+            ObstacleData::Scan(scanner.scan(mount, ranges))
+        }
+        SensorData::Range { reading, .. } => ObstacleData::Range(RangeReading {
+            robot_from_sensor: now_from_then * reading.robot_from_sensor,
+            ..*reading
+        }),
+        SensorData::Bumper(is_pressed) => ObstacleData::Bumper(*is_pressed),
+    }
+}
+
+/// Returns a motion on the floor.
+fn spatial(planar: &Isometry2<f64>) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
+    Isometry3::from_parts(planar.translation.vector.push(0.0).into(), turn)
+}
+
 /// Returns the motion over `dt` seconds without odometry, as log readers do: at rest, with the
 /// uncertainty of a robot that may have driven at 1 m/s and turned at 1 rad/s.
 fn unknown_motion(dt: f64) -> EgoMotion {
@@ -237,7 +301,7 @@ fn seen_by(simulation: &Simulation) -> Camera {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_sim::{FaultKind, FaultSettings, InjectedFault};
+    use tagalong_sim::{FaultKind, FaultSettings, InjectedFault, Variant};
 
     use super::*;
 
@@ -400,5 +464,91 @@ mod tests {
         let stamps: Vec<f64> = resent.iter().map(at_s).collect();
         assert!(stamps[20..60].iter().all(|stamp_s| *stamp_s == stamps[19]), "{stamps:?}");
         assert!(broken(FaultKind::Drop).len() == 40);
+    }
+
+    /// Readings of one source in each frame, with their ages.
+    fn readings_of(all: &[SimulatedFrame], name: &str) -> Vec<(f64, ObstacleData)> {
+        let of = |one: &SimulatedFrame| {
+            let readings = one.frame.sensor::<ObstacleReadings>().ok()?.clone();
+            let reading = readings.0.iter().find(|reading| &*reading.source == name)?.clone();
+            Some((reading.age_s, reading.data))
+        };
+        all.iter().filter_map(of).collect()
+    }
+
+    #[test]
+    fn further_sensors_are_in_the_frames_by_their_names() {
+        let sensors = "[[ranges]]\nname = \"sonar\"\nrate_hz = 4.0\nsigma_m = 0.0\n\
+            [[bumpers]]\nname = \"bumper\"\n[[lasers]]\nname = \"rear\"\n\
+            mount = [-0.2, 0.0, 0.3, 180.0]\nrays = 91\nfield_of_view_deg = 90.0\n";
+        let text = format!("{SCENE}{sensors}");
+        for draw in [Draw::live, Draw::new] {
+            let all = simulated(draw(&Scene::parse(&text).unwrap(), 1));
+            let sonar = readings_of(&all, "sonar");
+            assert_eq!(sonar.len(), all.len());
+            assert!(sonar.iter().all(|(age_s, _)| (0.0..0.27).contains(age_s)));
+            assert!(sonar.iter().any(|(age_s, _)| *age_s > 0.1));
+            for (age_s, data) in &sonar {
+                let ObstacleData::Range(reading) = data else { panic!("{data:?}") };
+                assert_eq!(reading.max_m, 4.0);
+                // The robot has driven on since an old reading, and was not there yet at a late frame.
+                let x = reading.robot_from_sensor.translation.x;
+                let late_s = if *age_s > 0.0 { 0.0 } else { 0.15 };
+                assert!(x < 0.201 + 0.6 * late_s && x > 0.199 - 0.6 * age_s, "{x} {age_s}");
+            }
+            assert!(matches!(readings_of(&all, "bumper")[9].1, ObstacleData::Bumper(false)));
+            let ObstacleData::Scan(scan) = &readings_of(&all, "rear")[0].1 else { panic!() };
+            assert!(scan.points.len() > 80 && scan.points.iter().all(|point| point.x < -0.2));
+        }
+        let none = simulated(Draw::live(&scene(), 1));
+        assert!(none.iter().all(|one| one.frame.sensor::<ObstacleReadings>().is_err()));
+    }
+
+    #[test]
+    fn a_further_sensor_that_falls_silent_grows_old() {
+        let mut scene = Scene::parse(&format!("{SCENE}[[bumpers]]\nname = \"bumper\"\n")).unwrap();
+        scene.faults.inject.push(InjectedFault::new(FaultKind::DropSensors).at(1.0));
+        let all = simulated(Draw::live(&scene, 1));
+        let ages: Vec<f64> = readings_of(&all, "bumper").iter().map(|reading| reading.0).collect();
+        assert_eq!(ages.len(), all.len());
+        assert!(ages.iter().fold(0.0, |most: f64, age_s| most.max(*age_s)) > 2.9);
+    }
+
+    /// Frames of a robot that drives straight ahead in the scene of the glass wall, each with the room
+    /// to things and the nearest range of its sonars, m.
+    fn driven_at_glass(seed: u64, heading_deg: f64) -> Vec<(f64, f64)> {
+        let text = include_str!("../../../configs/scenes/behind-glass-sonar.toml");
+        let variant = Variant::of_seed(seed)
+            .with("camera.width", 16)
+            .with("camera.height", 12)
+            .with("robot.heading_deg", format!("{heading_deg:?}"));
+        let mut draw = Draw::live(&Scene::parse_with(text, &variant).unwrap(), 1);
+        let mut frames = Vec::new();
+        while let Some(one) = draw.next_frame() {
+            draw.steer(WheelSpeeds { left: 0.4, right: 0.4 });
+            let readings = one.frame.sensor::<ObstacleReadings>().unwrap();
+            let range_m = |reading: &ObstacleReading| match reading.data {
+                ObstacleData::Range(reading) => reading.range_m,
+                _ => f64::INFINITY,
+            };
+            let nearest_m = readings.0.iter().map(range_m).fold(f64::INFINITY, f64::min);
+            frames.push((draw.simulation().clearance(0.25).things_m, nearest_m));
+        }
+        frames
+    }
+
+    #[test]
+    fn forward_sonars_see_the_pane_before_the_robot_touches_it() {
+        for (seed, heading_deg) in [(1, 0.0), (2, 8.0), (3, -8.0), (4, 0.0)] {
+            let frames = driven_at_glass(seed, heading_deg);
+            let contact = frames.iter().position(|frame| frame.0 < 0.0).unwrap();
+            let near = frames[..contact].iter().filter(|frame| frame.0 < 0.7);
+            let seen = near.clone().filter(|frame| frame.1 < frame.0 + 0.3).count();
+            assert!(
+                seen >= 8 && seen == near.count(),
+                "{seed}: {:?}",
+                &frames[contact - 20..contact]
+            );
+        }
     }
 }

@@ -409,7 +409,7 @@ impl Robot {
                     }
                     last = Instant::now();
                 }
-                Event::NoOdometry { .. } | Event::Webcam(_) => {}
+                Event::NoOdometry { .. } | Event::Sensor(_) | Event::Webcam(_) => {}
             }
         }
         last

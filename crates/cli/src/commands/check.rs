@@ -21,7 +21,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     let file = ConfigFile::read(config)?;
     let (pipeline, _) = file.pipeline(registry, None)?;
     file.check_tuning(registry)?;
-    let outer = file.outer()?;
+    let outer = file.outer_for(&pipeline)?;
     let inputs = pipeline.inputs();
     let fit = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
     let data_lost = fit.as_ref().is_some_and(|fit| fit.data_lost);

@@ -119,7 +119,7 @@ impl Job {
         };
         let threads = args.threads.map(usize::from);
         let (pipeline, settings) = config.pipeline_on(registry, args.seed, threads)?;
-        let outer = config.outer()?;
+        let outer = config.outer_for(&pipeline)?;
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();

@@ -41,3 +41,39 @@ pub(super) fn words(report: &FrameReport) -> String {
     let why = report.command.map_or("-", |command| command.reason.name());
     format!("{whom}{lock}: {why}")
 }
+
+#[cfg(test)]
+mod tests {
+    use tagalong_sim::{Clearance, FaultKind, InjectedFault, Scene};
+    use tagalong_trials::Tick;
+
+    use super::*;
+
+    #[test]
+    fn faults_are_told_where_they_begin_and_end_within_the_ride() {
+        let mut scene = Scene::default();
+        scene.faults.inject = vec![
+            InjectedFault::new(FaultKind::Drop).at(3.0).lasting(2.0),
+            InjectedFault::new(FaultKind::WheelsStuck).at(4.0),
+            InjectedFault::new(FaultKind::Delay).at(12.0),
+        ];
+        let clearance = Clearance { people_m: 1.0, things_m: 1.0 };
+        let ride = Ride {
+            seed: 1,
+            stand_off_m: None,
+            moments: Vec::new(),
+            reports: Vec::new(),
+            took_ms: Vec::new(),
+            ticks: vec![Tick { at_s: 9.98, speed_mps: 0.0, clearance }],
+            faults: scene.scheduled_faults(),
+        };
+        assert_eq!(
+            story(&ride),
+            [
+                "   3.0 s  injected fault begins: drop",
+                "   4.0 s  injected fault begins: wheels-stuck",
+                "   5.0 s  injected fault ends: drop",
+            ]
+        );
+    }
+}

@@ -6,8 +6,9 @@ use super::sweep::{Hazard, HazardKind};
 
 /// Size of a bin, m.
 const BIN_M: f64 = 0.05;
-/// Distance from the footprint within which a reading is of the robot itself, m.
-const ITSELF_M: f64 = 1e-6;
+/// Depth within the footprint from which on a reading is of the robot itself, m: what touches it may
+/// be measured a little inside.
+const ITSELF_M: f64 = 0.1;
 
 /// Hazards of a frame: points of sensors in bins, each with the point nearest to the robot.
 #[derive(Default)]
@@ -79,12 +80,13 @@ impl BinnedHazards {
     pub(super) fn push(&mut self, hazard: Hazard, is_drop: bool) -> bool {
         let Some(footprint) = &self.footprint else { return false };
         // Positive comparison, so that a place that is no number is left out.
-        let is_outside = footprint.distance_m(&hazard.at) > ITSELF_M;
-        if is_outside {
+        let counts =
+            footprint.distance_m(&hazard.at) > 0.0 || footprint.depth_m(&hazard.at) < ITSELF_M;
+        if counts {
             self.hazards.push(hazard);
             self.drops.push(is_drop);
         }
-        is_outside
+        counts
     }
 
     /// Sets the kind of the hazards from number `first` on, and closes their bins. A fall stays as it
@@ -137,10 +139,13 @@ mod tests {
     #[test]
     fn readings_of_the_robot_itself_and_beyond_the_reach_are_left_out() {
         let mut hazards = hazards();
-        for (x, y) in [(0.0, 0.0), (0.2, 0.0), (99.0, 0.0), (f64::NAN, 0.0), (0.0, f64::INFINITY)] {
+        for (x, y) in [(0.0, 0.0), (0.12, 0.0), (99.0, 0.0), (f64::NAN, 0.0), (0.0, f64::INFINITY)]
+        {
             hazards.add(Point2::new(x, y), 9, false);
         }
         assert_eq!(hazards.len(), 0);
+        hazards.add(Point2::new(0.2, 0.0), 9, false);
+        assert_eq!(hazards.len(), 1, "it touches the front");
     }
 
     #[test]

@@ -33,11 +33,23 @@ impl Footprint {
 
     /// Returns the distance from the outline to a place in the robot frame, m; 0 inside.
     pub(crate) fn distance_m(&self, at: &Point2<f64>) -> f64 {
+        let (from_edge_m, is_inside) = self.from_edge(at);
+        if is_inside { 0.0 } else { from_edge_m }
+    }
+
+    /// Returns how deep within the outline a place in the robot frame is, m; 0 outside.
+    pub(crate) fn depth_m(&self, at: &Point2<f64>) -> f64 {
+        let (from_edge_m, is_inside) = self.from_edge(at);
+        if is_inside { from_edge_m } else { 0.0 }
+    }
+
+    /// Returns the distance of a place from the nearest edge, m, and whether it is inside.
+    fn from_edge(&self, at: &Point2<f64>) -> (f64, bool) {
         let mut nearest = f64::INFINITY;
         let mut is_inside = false;
         let mut from = match self.corners.last() {
             Some(last) => *last,
-            None => return at.coords.norm(),
+            None => return (at.coords.norm(), false),
         };
         for to in &self.corners {
             let edge: Vector2<f64> = to - from;
@@ -51,7 +63,7 @@ impl Footprint {
             }
             from = *to;
         }
-        if is_inside { 0.0 } else { nearest.sqrt() }
+        (nearest.sqrt(), is_inside)
     }
 }
 
@@ -113,6 +125,8 @@ mod tests {
         assert!((far(0.6, 0.6) - 0.5).abs() < 1e-12, "3-4-5 from the corner");
         assert!((square.radius_m() - 0.13_f64.sqrt()).abs() < 1e-12);
         assert_eq!(square.front_m(), 0.3);
+        let deep = |x: f64, y: f64| square.depth_m(&Point2::new(x, y));
+        assert!((deep(0.25, 0.0) - 0.05).abs() < 1e-12 && deep(0.8, 0.0) == 0.0);
     }
 
     #[test]

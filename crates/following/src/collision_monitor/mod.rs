@@ -373,7 +373,8 @@ impl People<'_> {
         }
         match presence {
             Presence::Stands => HazardKind::Still,
-            Presence::New => HazardKind::Moves(0.0),
+            // What comes into view may be a person, who is seen to move in the next frame.
+            Presence::New => HazardKind::Still,
             Presence::Appeared => HazardKind::Moves(self.settings.people_mps),
         }
     }

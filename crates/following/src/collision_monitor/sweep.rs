@@ -18,6 +18,8 @@ const HALVINGS: u32 = 10;
 /// An obstacle that is nearer than the clearance already may come nearer by this much, m: the robot
 /// may drive along it, and turn away.
 const SLACK_M: f64 = 0.02;
+/// Distance, m, below which something may touch the robot: then nothing moves.
+const TOUCH_M: f64 = 0.03;
 /// Angle that is left before a thing when a turn in place stops, rad.
 const TURN_STOP_RAD: f64 = 0.05;
 
@@ -281,6 +283,9 @@ impl<'a> Sweep<'a> {
             Path::Turn { .. } => 0.5 * self.settings.side_m,
         };
         let first = self.nearest[0];
+        if first < TOUCH_M {
+            return 0.0;
+        }
         // A thing that is nearer already may stay as near.
         let clearance_m = clearance_m.min((first - SLACK_M).max(0.0));
         let Some(hit) =
@@ -384,6 +389,15 @@ mod tests {
     }
 
     #[test]
+    fn what_touches_the_robot_holds_it_still() {
+        for path in
+            [AHEAD, Path::Turn { left: true }, Path::Arc { curvature: 0.0, backwards: true }]
+        {
+            assert_eq!(allowed(still(-0.27, 0.0), path, 0.4).most, 0.0, "{path:?}");
+        }
+    }
+
+    #[test]
     fn reverse_is_looked_along_backwards() {
         let back = Path::Arc { curvature: 0.0, backwards: true };
         assert_eq!(allowed(still(-0.6, 0.0), back, 0.4).most, 0.0);
@@ -393,7 +407,7 @@ mod tests {
     #[test]
     fn along_a_thing_that_is_near_already_the_robot_may_drive_and_turn() {
         assert_eq!(allowed(still(0.0, 0.3), AHEAD, 0.5), Allowance::FREE);
-        assert_eq!(allowed(still(0.0, 0.29), Path::Turn { left: true }, 1.0), Allowance::FREE);
+        assert_eq!(allowed(still(0.0, 0.3), Path::Turn { left: true }, 1.0), Allowance::FREE);
         assert!(allowed(still(0.28, 0.0), AHEAD, 0.5).most < 0.01);
     }
 

@@ -28,8 +28,6 @@ use crate::{Base, OdometrySource, RobotSettings};
 /// Longest time over which the robot may have changed its speed, s. A pause of frames must not
 /// allow a large step of the speed.
 const LONGEST_STEP_S: f64 = 0.2;
-/// Part of a delay of the wheels that the comparison with the odometry does not see, s.
-const UNSEEN_S: f64 = 0.2;
 /// Speeds below this are standing still, m/s.
 const STILL_MPS: f64 = 1e-6;
 /// Turn rates below this are standing still, rad/s.
@@ -251,8 +249,10 @@ impl CommandLimiter {
         }
         match self.response.update(frame.stamp, motion) {
             Response::Within(wheels_s) => {
-                let answered_s = if wheels_s > 0.0 { wheels_s + UNSEEN_S } else { 0.0 };
-                self.reaction_s = self.settings.reaction_s.max(image_s + answered_s);
+                // What comes up right after an image is in the next one.
+                let answered_s =
+                    if wheels_s > 0.0 { image_s + motion.dt + wheels_s } else { image_s };
+                self.reaction_s = self.settings.reaction_s.max(answered_s);
                 if wheels_s > 2.0 * self.settings.reaction_s {
                     self.latch("the base responds too late to its commands");
                 }

@@ -57,3 +57,12 @@ pub struct StringMsg {
 }
 
 message!(StringMsg, "std_msgs/msg/String", "String.msg");
+
+/// `std_msgs/Bool`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BoolMsg {
+    /// The value.
+    pub data: bool,
+}
+
+message!(BoolMsg, "std_msgs/msg/Bool", "Bool.msg");

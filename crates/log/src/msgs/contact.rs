@@ -4,13 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::Header;
 
-/// `std_msgs/Bool`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct BoolMsg {
-    /// The value.
-    pub data: bool,
-}
-
 /// `kobuki_ros_interfaces/BumperEvent`, and `kobuki_msgs/BumperEvent` of ROS 1: sent when one of the
 /// bumpers is pressed or released.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -15,10 +15,8 @@ mod scene;
 mod sensor;
 mod vision;
 
-pub use common::{Header, StringMsg, Time};
-pub use contact::{
-    BoolMsg, BumperEvent, BumperState, ContactCount, HazardDetection, HazardDetectionVector,
-};
+pub use common::{BoolMsg, Header, StringMsg, Time};
+pub use contact::{BumperEvent, BumperState, ContactCount, HazardDetection, HazardDetectionVector};
 pub use geometry::{
     Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage,
     Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,

@@ -151,6 +151,13 @@ pub struct Range {
     pub range: f32,
 }
 
+impl Range {
+    /// [`Range::radiation_type`] of a sonar.
+    pub const ULTRASOUND: u8 = 0;
+    /// [`Range::radiation_type`] of an infrared sensor.
+    pub const INFRARED: u8 = 1;
+}
+
 message!(Range, "sensor_msgs/msg/Range", "Range.msg");
 
 /// `sensor_msgs/JointState`: lists of one length, or empty if unknown.

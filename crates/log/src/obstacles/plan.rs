@@ -58,29 +58,27 @@ pub(crate) fn planned_sources(
     // Without a topic, a program fills the frames itself.
     for source in input.sources.iter().filter(|source| !source.topic.is_empty()) {
         match planned_source(scan, source)? {
-            Ok(found) => planned.push(found),
-            Err(lack) if scan.is_live() => {
-                return Err(missing(scan, lack.wanted, format!("; {}", lack.remedy)));
+            Planned::Found(found) => planned.push(*found),
+            Planned::Lacks { wanted, remedy } if scan.is_live() => {
+                return Err(missing(scan, wanted, format!("; {remedy}")));
             }
-            Err(lack) => {
+            Planned::Lacks { wanted, remedy } => {
                 tally.count("sources_without_messages");
-                tally.note(format!("there is no {}; {}", lack.wanted, lack.remedy));
+                tally.note(format!("there is no {wanted}; {remedy}"));
             }
         }
     }
     Ok(planned)
 }
 
-/// Missing part of a source.
-struct Lack {
-    wanted: String,
-    remedy: String,
+/// Result of the search for a source.
+enum Planned {
+    Found(Box<PlannedSource>),
+    Lacks { wanted: String, remedy: String },
 }
 
-fn planned_source(
-    scan: &Scan,
-    source: &ObstacleTopic,
-) -> Result<Result<PlannedSource, Lack>, LogError> {
+/// Looks for the topic of a source, and for the calibration of a depth camera.
+fn planned_source(scan: &Scan, source: &ObstacleTopic) -> Result<Planned, LogError> {
     let ObstacleTopic { name, kind, topic, .. } = source;
     let found = scan.topics.get(topic);
     if let Some(other) = found.filter(|found| !kind.reads(found)) {
@@ -92,12 +90,12 @@ fn planned_source(
             wanted: kind.type_names(),
         });
     }
-    let may_be_silent = |found: &&Topic| {
-        found.count > 0 || Contact::of(&found.schema).is_some_and(Contact::may_be_silent)
-    };
-    let Some(found) = found.filter(may_be_silent) else {
+    // Of some bumpers, silence says that they are not pressed.
+    let may_be_silent =
+        |found: &Topic| Contact::of(&found.schema).is_some_and(Contact::may_be_silent);
+    let Some(found) = found.filter(|found| found.count > 0 || may_be_silent(found)) else {
         let wanted = format!("message of source `{name}` on {topic}");
-        return Ok(Err(Lack { wanted, remedy: alternatives(scan, *kind) }));
+        return Ok(Planned::Lacks { wanted, remedy: alternatives(scan, *kind) });
     };
     let lens = match kind {
         ObstacleKind::Depth => lens_of(scan, source)?,
@@ -106,9 +104,10 @@ fn planned_source(
     if *kind == ObstacleKind::Depth && lens.is_none() {
         let wanted = format!("calibration (sensor_msgs/CameraInfo) of source `{name}` on {topic}");
         let remedy = "name its topic as `info_topic` of the source".to_owned();
-        return Ok(Err(Lack { wanted, remedy }));
+        return Ok(Planned::Lacks { wanted, remedy });
     }
-    Ok(Ok(PlannedSource { topic: source.clone(), schema: found.schema.clone(), lens }))
+    let schema = found.schema.clone();
+    Ok(Planned::Found(Box::new(PlannedSource { topic: source.clone(), schema, lens })))
 }
 
 /// Returns the topics that a source of this kind could have, as text.

@@ -1,5 +1,7 @@
 //! Changes of the cameras on the way, after which positions in the images are wrong.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Isometry3;
 use tagalong_core::{Input, Stamp};
 
@@ -18,10 +20,11 @@ const TURNED_DEG: f64 = 0.1;
 const CONSEQUENCE: &str = "the first one is used throughout, and from the change on tracks stay \
                            where they were";
 
-/// Watch over all that must stay as it is during a run: the calibration of the camera, the frames of
+/// Watch over all that must stay as it is during a run: the calibrations of the cameras, the frames of
 /// the images, and the mounts that static transforms give.
 pub(super) struct CameraWatch {
-    info: Option<CameraInfo>,
+    /// First calibrations, by topic.
+    infos: BTreeMap<String, CameraInfo>,
     mounts: Vec<WatchedMount>,
     /// Time of the first change.
     changed_at: Option<Stamp>,
@@ -35,22 +38,28 @@ struct WatchedMount {
 
 impl CameraWatch {
     pub(super) fn new(plan: &Plan) -> Self {
-        let info = plan.chosen.colour_info.as_ref().and_then(|topic| plan.scan.infos.get(topic));
-        Self { info: info.cloned(), mounts: watched_mounts(plan), changed_at: None }
+        let chosen = &plan.chosen;
+        let topics = [&chosen.colour_info, &chosen.depth_info, &chosen.right_info];
+        let info = |topic: &String| Some((topic.clone(), plan.scan.infos.get(topic)?.clone()));
+        let infos = topics.into_iter().flatten().filter_map(info).collect();
+        Self { infos, mounts: watched_mounts(plan), changed_at: None }
     }
 
-    /// Compares a calibration with the first one.
-    pub(super) fn watch_info(&mut self, info: &CameraInfo, tally: &mut Tally) {
+    /// Returns true for the topic of a calibration.
+    pub(super) fn has_info(&self, topic: &str) -> bool {
+        self.infos.contains_key(topic)
+    }
+
+    /// Compares a calibration with the first one of its topic.
+    pub(super) fn watch_info(&mut self, topic: &str, info: &CameraInfo, tally: &mut Tally) {
         // Field by field, because the header differs in each message.
-        let changed = self.info.as_ref().is_some_and(|first| {
+        let changed = self.infos.get(topic).is_some_and(|first| {
             first.k != info.k || first.d != info.d || first.p != info.p || first.roi != info.roi
         });
         if changed {
             self.change_at(info.header.stamp());
             tally.lose("camera_info_changes", || {
-                "the calibration changes on the way; the first one is used throughout, and from \
-                 the change on tracks stay where they were"
-                    .into()
+                format!("{topic}: the calibration changes on the way; {CONSEQUENCE}")
             });
         }
     }

@@ -82,8 +82,9 @@ impl Intake {
             reader.take(message, tally)
         } else if topic == self.chosen.odometry.as_ref() {
             decode(message.data).map(|odometry| self.take_odometry(&odometry, tally))
-        } else if topic == self.chosen.colour_info.as_ref() {
-            decode(message.data).map(|info| self.watch.watch_info(&info, tally))
+        } else if self.watch.has_info(&message.channel.topic) {
+            let topic = &message.channel.topic;
+            decode(message.data).map(|info| self.watch.watch_info(topic, &info, tally))
         } else if Type::of(&message.channel.schema_name) == Type::Tf {
             decode(message.data).map(|tf| self.take_tf(&tf, &message.channel.topic, tally))
         } else {

@@ -135,3 +135,20 @@ fn a_change_stays_after_a_jump_of_the_clock() {
     assert_eq!(found.len(), 20);
     assert!(found[10..].iter().all(|found| found.frame.calibration_changed));
 }
+
+#[test]
+fn c1_a_calibration_of_depth_that_changes_marks_the_frames_after_it() {
+    let mut log = LogWriter::plain();
+    log.fixed("base_link", "depth", &level_pose());
+    for i in 0..10 {
+        let stamp = at(0.1 * f64::from(i));
+        let info = info_of("depth", &camera(16, 12, if i < 6 { 14.0 } else { 20.0 }));
+        let header = Header::new(stamp, "depth");
+        log.message("/camera/depth/camera_info", stamp, &CameraInfo { header, ..info });
+        log.depth(stamp, "depth", 3.0);
+    }
+    let (mut source, _saved) = open(log, Inputs::ANY);
+    assert_eq!(changed(&frames(&mut source)), [7, 8, 9, 10]);
+    let told = notes_with(&source, "/camera/depth/camera_info: the calibration changes");
+    assert_eq!(told.len(), 1, "{:?}", source.notes());
+}

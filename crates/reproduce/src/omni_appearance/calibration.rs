@@ -38,7 +38,7 @@ fn hats(lab: &Lab, scene: &Scene) -> (Vec<Station>, Vec<Known>) {
                 let sight = hat.map(|hat| Sight { station: shot.webcam, pixel: hat.centre });
                 sights.entry(shot.captured_ns).or_default().extend(sight);
             }
-            Event::Odometry(_) | Event::NoOdometry { .. } => {}
+            Event::Odometry(_) | Event::NoOdometry { .. } | Event::Sensor(_) => {}
         }
     }
     // The position is known only at the capture times of the robot's camera.

@@ -1,5 +1,6 @@
 //! Injected faults on the way from the sensors to the robot's computer.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3, UnitQuaternion, Vector2, Vector3};
@@ -9,6 +10,7 @@ use tagalong_stats::number_at;
 
 use super::{Event, OdometryReading, Shot};
 use crate::faults::{FaultKind, ScheduledFault};
+use crate::obstacle_sensors::{SensorData, SensorReading};
 use crate::random::{normal_at, uniform_at};
 use crate::robot::{Encoder, WheelFaults};
 
@@ -26,6 +28,8 @@ pub(super) struct Injector {
     held: Images,
     /// Scan before a freeze, m.
     held_scan: Option<Vec<f32>>,
+    /// Readings of further sensors before a freeze, by the name of the sensor.
+    held_readings: BTreeMap<Arc<str>, SensorData>,
     /// Shot that arrived last.
     last: Option<Box<Shot>>,
     /// Odometry before a freeze.
@@ -51,6 +55,7 @@ impl Injector {
             seed,
             held: Images::default(),
             held_scan: None,
+            held_readings: BTreeMap::new(),
             last: None,
             reading: None,
             whole: None,
@@ -213,6 +218,23 @@ impl Injector {
                 }
             }
         }
+    }
+
+    /// Returns the reading of a further sensor as it arrives; `None` if it does not.
+    pub(super) fn feel(&mut self, mut reading: SensorReading) -> Option<SensorReading> {
+        let at_ns = reading.at_ns;
+        reading.stamp_ns = self.robot_clock_ns(at_ns);
+        if self.is_active(FaultKind::DropSensors, at_ns) {
+            return None;
+        }
+        let is_frozen = self.is_active(FaultKind::FreezeSensors, at_ns);
+        match self.held_readings.get(&reading.name) {
+            Some(held) if is_frozen => reading.data = held.clone(),
+            _ => {
+                self.held_readings.insert(Arc::clone(&reading.name), reading.data.clone());
+            }
+        }
+        Some(reading)
     }
 
     /// Returns the reading of the odometry as it arrives, or that there is none.

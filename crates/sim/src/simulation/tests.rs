@@ -1,4 +1,5 @@
 use super::*;
+use crate::obstacle_sensors::SensorData;
 use crate::ramp::Ramp;
 use crate::scene::RoomSettings;
 
@@ -170,6 +171,7 @@ fn events_come_in_the_order_of_recording_and_late_images_after_their_time() {
         Event::Odometry(reading) => reading.at_ns,
         Event::NoOdometry { at_ns } => *at_ns,
         Event::Shot(shot) => shot.recorded_ns,
+        Event::Sensor(reading) => reading.at_ns,
         Event::Webcam(shot) => shot.captured_ns,
     };
     let events = events(&text, 2);
@@ -372,4 +374,65 @@ fn sunlight_makes_images_bright_and_takes_away_depth() {
     // In the shade it measures as before.
     let shade = at(40, 110);
     assert!((all.pixels()[shade] - left.pixels()[shade]).abs() < 0.01);
+}
+
+#[test]
+fn a_footprint_takes_the_place_of_the_disc() {
+    let at = |footprint: &str, heading_deg: f64| {
+        let text = format!(
+            "[room]\nsize_m = [9.0, 6.0]\n[robot]\nstart = [2.0, 3.0]\nheading_deg = {heading_deg:?}\n\
+             {footprint}\n[[people]]\npath = [[3.5, 3.0]]\n"
+        );
+        Simulation::new(&Scene::parse(&text).unwrap(), 1).clearance(0.25)
+    };
+    let long = "footprint = [[0.6, 0.2], [-0.1, 0.2], [-0.1, -0.2], [0.6, -0.2]]";
+    assert!((at("", 0.0).people_m - 1.05).abs() < 1e-9);
+    assert!((at(long, 0.0).people_m - 0.7).abs() < 1e-9);
+    assert!((at(long, 180.0).people_m - 1.2).abs() < 1e-9);
+    // The wall behind the robot, 2 m away.
+    assert!((at(long, 0.0).things_m - 1.9).abs() < 0.01, "{:?}", at(long, 0.0));
+    assert!((at(long, 180.0).things_m - 1.4).abs() < 0.01, "{:?}", at(long, 180.0));
+}
+
+#[test]
+fn a_bumper_is_pressed_by_what_touches_its_side_of_the_body() {
+    let text = "duration_s = 2.6\n[camera]\nwidth = 8\nheight = 8\n[robot]\nstart = [1.0, 3.0]\n\
+        [[bumpers]]\nname = \"front\"\narc_deg = [-60.0, 60.0]\n\
+        [[bumpers]]\nname = \"back\"\narc_deg = [120.0, 240.0]\nrate_hz = 10.0\n";
+    let mut simulation = Simulation::new(&Scene::parse(text).unwrap(), 1);
+    let mut pressed: [Vec<bool>; 2] = Default::default();
+    let mut touched = 0;
+    // Backwards into the wall.
+    while let Some(event) = simulation.next_event() {
+        simulation.steer(WheelSpeeds { left: -0.4, right: -0.4 });
+        touched += usize::from(
+            matches!(event, Event::Odometry(_)) && simulation.clearance(0.25).things_m < 0.0,
+        );
+        let Event::Sensor(SensorReading { name, data: SensorData::Bumper(is_pressed), .. }) = event
+        else {
+            continue;
+        };
+        pressed[usize::from(&*name == "back")].push(is_pressed);
+    }
+    assert_eq!((pressed[0].len(), pressed[1].len()), (130, 26));
+    assert!(touched > 5 && pressed[0].iter().all(|is_pressed| !is_pressed), "{touched}");
+    assert!(!pressed[1][15] && pressed[1][25], "{:?}", pressed[1]);
+}
+
+#[test]
+fn further_scanners_look_from_where_they_are_mounted() {
+    let text = "duration_s = 0.2\n[camera]\nwidth = 8\nheight = 8\n[robot]\nstart = [2.0, 3.0]\n\
+        [[lasers]]\nname = \"rear\"\nmount = [-0.3, 0.0, 0.3, 180.0]\nrays = 3\n\
+        field_of_view_deg = 180.0\nsigma_m = 0.0\n";
+    let events = events(text, 1);
+    let scans: Vec<&SensorReading> = events
+        .iter()
+        .filter_map(|event| if let Event::Sensor(reading) = event { Some(reading) } else { None })
+        .collect();
+    assert_eq!(scans.len(), 2);
+    let SensorData::Scan { scanner, ranges } = &scans[0].data else { panic!("no scan") };
+    // To the left wall, the one behind, and the right one: right to left of one that looks back.
+    assert!((ranges[0] - 3.0).abs() < 1e-3 && (ranges[1] - 1.7).abs() < 1e-3, "{ranges:?}");
+    let scan = scanner.scan(scanner.robot_from_scanner(), ranges);
+    assert!((scan.points[1] - Point3::new(-2.0, 0.0, 0.3)).norm() < 1e-3, "{:?}", scan.points);
 }

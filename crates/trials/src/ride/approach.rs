@@ -343,6 +343,7 @@ mod tests {
             moments: Vec::new(),
             reports: Vec::new(),
             took_ms: Vec::new(),
+            faults: Vec::new(),
             ticks: ticks.collect(),
             in_view: vec![
                 (2.9, ApproachInView { camera: true, laser: false }),

@@ -13,14 +13,14 @@ use tagalong_config::Registry;
 use tagalong_core::{Command, Frame, Reason, Stamp};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources};
 use tagalong_sim::{
-    ApproachInView, ApproachState, Clearance, Event, Scene, ScheduledFault, Simulation,
+    ApproachInView, ApproachState, Clearance, Event, ROBOT_RADIUS_M, Scene, ScheduledFault,
+    Simulation,
 };
 
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
 
-/// The robot's body is a disc of this radius, m: somewhat more than the robot of
-/// the papers, which is 0.38 m wide and 0.47 m long.
-const RADIUS_M: f64 = 0.25;
+/// Steps between two looks at the approacher.
+const LOOKS_EVERY: usize = 5;
 
 /// Observer of a ride, for example one that writes a log.
 pub trait Witness {
@@ -51,7 +51,7 @@ pub struct Tick {
     pub speed_mps: f64,
     /// True turn rate, rad/s.
     pub turn_rate: f64,
-    /// Free distance around it.
+    /// Free distance around it: around its footprint, or a disc if the scene has none.
     pub clearance: Clearance,
     /// State of the approacher of the scene, once it is there.
     pub approach: Option<ApproachState>,
@@ -63,7 +63,7 @@ impl Tick {
     /// Returns the largest speed over ground of a point of the robot's body, m/s: forward, or by
     /// the turn.
     pub fn body_mps(&self) -> f64 {
-        self.speed_mps.abs().max(self.turn_rate.abs() * RADIUS_M)
+        self.speed_mps.abs().max(self.turn_rate.abs() * ROBOT_RADIUS_M)
     }
 }
 
@@ -82,11 +82,11 @@ pub struct Ride {
     pub took_ms: Vec<f64>,
     /// The robot, step by step.
     pub ticks: Vec<Tick>,
+    /// Sensors that the approacher of the scene was in view of, every tenth of a second; the
+    /// times are s since the start.
+    pub in_view: Vec<(f64, ApproachInView)>,
     /// Faults that were injected.
     pub faults: Vec<ScheduledFault>,
-    /// Sensors that the approacher of the scene was in view of, at each image; the times are s
-    /// since the start.
-    pub in_view: Vec<(f64, ApproachInView)>,
 }
 
 impl Ride {
@@ -118,8 +118,8 @@ impl Ride {
             reports: Vec::new(),
             took_ms: Vec::new(),
             ticks: Vec::new(),
-            faults: draw.simulation().faults().to_vec(),
             in_view: Vec::new(),
+            faults: draw.simulation().faults().to_vec(),
         };
         let failed =
             |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
@@ -165,25 +165,22 @@ impl Ride {
         draw.next_frame_while(|simulation, event| {
             witness.event(event);
             // Wheels ask for commands at each step, whether the odometry speaks or not.
-            let Some(at_ns) = event.step_ns() else {
-                self.look(simulation, event);
-                return None;
-            };
+            let at_ns = event.step_ns()?;
             let since_frame = Stamp::from_nanos(at_ns).seconds_since(framed);
             let now = Stamp::from_nanos(simulation.robot_clock_ns(at_ns));
             let command = command(pipeline, now, since_frame);
             let tick = tick(simulation, at_ns, command.map(|command| command.reason));
+            self.look(simulation, &tick);
             witness.tick(&tick);
             self.ticks.push(tick);
             command.map(|command| command.wheels)
         })
     }
 
-    /// Notes the sensors that the approacher is in view of when an image arrives.
-    fn look(&mut self, simulation: &Simulation, event: &Event) {
-        if let (Event::Shot(_), Some(_)) = (event, simulation.approach(RADIUS_M)) {
-            let at_s = self.ticks.last().map_or(0.0, |tick| tick.at_s);
-            self.in_view.push((at_s, simulation.approach_in_view()));
+    /// Notes the sensors that the approacher is in view of, at every few steps.
+    fn look(&mut self, simulation: &Simulation, tick: &Tick) {
+        if tick.approach.is_some() && self.ticks.len().is_multiple_of(LOOKS_EVERY) {
+            self.in_view.push((tick.at_s, simulation.approach_in_view()));
         }
     }
 }
@@ -199,8 +196,8 @@ fn tick(simulation: &Simulation, at_ns: u64, reason: Option<Reason>) -> Tick {
         at_s: at_ns as f64 * 1e-9,
         speed_mps: simulation.speed_mps(),
         turn_rate: simulation.turn_rate(),
-        clearance: simulation.clearance(RADIUS_M),
-        approach: simulation.approach(RADIUS_M),
+        clearance: simulation.clearance(ROBOT_RADIUS_M),
+        approach: simulation.approach(ROBOT_RADIUS_M),
         reason,
     }
 }

@@ -169,12 +169,15 @@ fn read_scene(job: &Job<'_>, args: &FollowArgs) -> Result<Scene, Failure> {
              out the scene for {SCENE}"
         )));
     };
+    let arrives_s = approach.arrives_s();
+    scene.faults.inject.extend(args.inject.iter().cloned());
     if args.faults == ApproachFaults::One {
         let mut random = SplitMix64::new(job.seed);
-        let last_s = approach.arrives_s().max(FAULT_FROM_S);
+        let last_s = arrives_s.max(FAULT_FROM_S);
         let at_s = FAULT_FROM_S + (last_s - FAULT_FROM_S) * random.positive_uniform();
         scene.faults.inject.push(InjectedFault::random().at(at_s));
     }
+    scene.check_faults().map_err(Failure::usage)?;
     Ok(scene)
 }
 

@@ -1,6 +1,6 @@
 use tagalong_reproduce::{Cell, Row, Table};
 use tagalong_sim::{ApproachBy, Seeds};
-use tagalong_stats::{CONFIDENCE, exact_upper_bound, median, percentile};
+use tagalong_stats::{CONFIDENCE, exact_upper_bound, percentile};
 use tagalong_trials::{ApproachJudge, Approached, Contact, Side, Touched};
 
 use super::Outlived;
@@ -27,7 +27,7 @@ pub fn tables(results: &[Outlived], seeds: Seeds) -> Vec<Table> {
     names.iter().map(table).collect()
 }
 
-const COLUMNS: [&str; 14] = [
+const COLUMNS: [&str; 15] = [
     "approaches",
     "moved",
     "contacts",
@@ -36,6 +36,7 @@ const COLUMNS: [&str; 14] = [
     "by approacher",
     "seen",
     "unseen",
+    "by turn",
     "standing",
     "least room m",
     "stops",
@@ -110,6 +111,8 @@ fn cells(all: &[&Approached]) -> Vec<Cell> {
     let came = contacts.iter().filter(|contact| contact.with == Touched::Approacher);
     let [seen, unseen] = [true, false]
         .map(|seen| came.clone().filter(|one| (one.camera_saw || one.laser_saw) == seen).count());
+    let moves_mps = ApproachJudge::default().moves_mps;
+    let turning = contacts.iter().filter(|one| one.speed_mps.abs() <= moves_mps).count();
     let share = 100.0 * contacts.len() as f64 / all.len() as f64;
     let bound = exact_upper_bound(contacts.len() as u64, all.len() as u64, CONFIDENCE);
     let near = all.iter().filter(|one| one.came_near).count();
@@ -127,10 +130,11 @@ fn cells(all: &[&Approached]) -> Vec<Cell> {
         number(seen + unseen),
         number(seen),
         number(unseen),
+        number(turning),
         count(|one| one.contact.is_none() && one.touched.is_some()),
         optional(room),
         Cell::number(100.0 * stops.len() as f64 / near as f64, 0),
-        optional(median(stops.iter().copied())),
+        optional(percentile(&stops, 0.5)),
         optional(percentile(&stops, 0.95)),
         optional(fastest),
     ]
@@ -153,6 +157,7 @@ fn notes(seeds: Seeds) -> Vec<String> {
         "seen, unseen: of those, whether the approacher was in view of the camera, within its depth, \
          or of the laser in the last second"
             .into(),
+        "by turn: of the contacts, those of a robot that only turned".into(),
         "moved: the robot moved after the approacher appeared; standing: contacts of a robot that \
          stood, which are the approacher's"
             .into(),

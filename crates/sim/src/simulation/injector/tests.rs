@@ -8,7 +8,7 @@ use crate::simulation::Simulation;
 /// A robot that drives past a person; every image comes, and none is late.
 const SCENE: &str = "seed = 3\nduration_s = 3.0\n[laser]\nrays = 72\n[camera]\nwidth = 32\nheight = 24\n\
     mount_error_deg = 0.0\n[robot]\npath = [[6.0, 4.0]]\nwheel_bias = 0.0\nslip = 0.0\n[faults]\nlate = 0.0\n\
-    dropped = 0.0\n[[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
+    dropped = 0.0\n[[ranges]]\nname = \"sonar\"\nmount = [-0.2, 0.0, 0.25, 180.0]\n[[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
 /// The faults of these tests begin at this time and last for a second, s.
 const FROM_S: f64 = 1.0;
 
@@ -388,4 +388,22 @@ fn the_same_seed_gives_the_same_faults() {
     };
     assert_eq!(broken(3), broken(3));
     assert_ne!(broken(3)[12], broken(4)[12]);
+}
+
+#[test]
+fn further_sensors_fall_silent_or_repeat_themselves() {
+    let readings = |faults: &[InjectedFault]| -> Vec<SensorReading> {
+        let of = |event| if let Event::Sensor(reading) = event { Some(reading) } else { None };
+        events(faults).into_iter().filter_map(of).collect()
+    };
+    let whole = readings(&[]);
+    let silent = readings(&[fault(FaultKind::DropSensors)]);
+    assert_eq!((whole.len(), silent.len()), (30, 20));
+    assert!(silent.iter().all(|reading| !is_within(reading.at_ns) && whole.contains(reading)));
+    let frozen = readings(&[fault(FaultKind::FreezeSensors)]);
+    for (frozen, whole) in frozen.iter().zip(&whole) {
+        assert_eq!(frozen.stamp_ns, whole.at_ns);
+        assert_eq!(frozen.data == whole.data, !is_within(whole.at_ns));
+    }
+    assert!(frozen[10..20].iter().all(|reading| reading.data == frozen[10].data));
 }
