@@ -357,12 +357,16 @@ impl Bridge {
     /// controller.
     fn listen_to_switch(&mut self) -> Result<Vec<Ear>, BridgeError> {
         let Some(wheels) = &self.wheels else { return Ok(Vec::new()) };
-        let (Options { enable, reset, .. }, inbox) = (&self.options, &self.inbox);
-        let (switch, gate) = (wheels.switch(), Arc::clone(&self.gates.enable));
+        let Options { enable, reset, .. } = &self.options;
+        let inbox = &self.inbox;
+        let switch = wheels.switch();
+        let gate = Arc::clone(&self.gates.enable);
         let on = move |origin: Option<Origin>| take_enable(&switch, &gate, origin);
         let enable = self.network.listen_to_enable(enable, inbox, on)?;
-        let (switch, gate) = (wheels.switch(), Arc::clone(&self.gates.reset));
-        let (topic, theirs) = (reset.clone(), Arc::clone(inbox));
+        let switch = wheels.switch();
+        let gate = Arc::clone(&self.gates.reset);
+        let topic = reset.clone();
+        let theirs = Arc::clone(inbox);
         // The thread that owns the pipeline clears its fault as well. The time is that of the
         // publication, so that a stop that comes in between is not cleared.
         let on = move |origin: Origin| {

@@ -59,7 +59,7 @@ pub enum BridgeError {
     Serve(std::net::SocketAddr, std::io::Error),
     /// An input of the pipeline did not arrive, or cannot be used.
     #[error(transparent)]
-    Input(#[from] tagalong_log::LogError),
+    Input(Box<tagalong_log::LogError>),
     /// The controller lacks a source that its config demands.
     #[error(transparent)]
     Sources(#[from] tagalong_pipeline::MissingSource),
@@ -72,6 +72,12 @@ pub enum BridgeError {
     /// A plugin failed; the robot was told to stop.
     #[error(transparent)]
     Pipeline(#[from] tagalong_pipeline::StepError),
+}
+
+impl From<tagalong_log::LogError> for BridgeError {
+    fn from(error: tagalong_log::LogError) -> Self {
+        Self::Input(Box::new(error))
+    }
 }
 
 impl BridgeError {

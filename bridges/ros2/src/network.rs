@@ -186,22 +186,22 @@ impl Network {
             .create_simple_datareader_no_key::<Vec<u8>, RawAdapter>(&handle, Some(policies))
             .map_err(failed)?;
         let (abort, registration) = AbortHandle::new_pair();
-        let (inbox, topic) = (Arc::clone(inbox), topic.to_owned());
-        let ear_topic = topic.clone();
+        let inbox = Arc::clone(inbox);
+        let name = topic.to_owned();
         let thread = thread::spawn(move || {
             // The reader lives as long as its subscriber.
             let _subscriber = subscriber;
             let put = reader.as_async_stream().for_each(|message| {
                 match message {
-                    Ok(message) => inbox.push(&topic, message.into_value(), OTHERS),
-                    Err(_) => inbox.count_malformed(&topic),
+                    Ok(message) => inbox.push(&name, message.into_value(), OTHERS),
+                    Err(_) => inbox.count_malformed(&name),
                 }
                 ready(())
             });
             // The stream ends by being aborted.
             let _aborted = block_on(Abortable::new(put, registration));
         });
-        Ok(Ear::new(&ear_topic, abort, thread))
+        Ok(Ear::new(topic, abort, thread))
     }
 
     /// Calls `on` for each message of the enable topic, in a thread of its own that waits for no

@@ -89,7 +89,8 @@ impl Gate {
             if !state.is_untimely {
                 state.untold_s = Some(age_s);
             }
-            (state.untimely, state.is_untimely) = (state.untimely + 1, true);
+            state.untimely += 1;
+            state.is_untimely = true;
             return Err(Unfit::Untimely(age_s));
         }
         state.is_untimely = false;
@@ -138,7 +139,8 @@ mod tests {
 
     #[test]
     fn a_message_counts_by_the_time_of_its_publisher() {
-        let (gate, now) = (Gate::new(LIFESPAN), Instant::now());
+        let gate = Gate::new(LIFESPAN);
+        let now = Instant::now();
         let age = |published_ms| gate.admit(origin(1, published_ms), now, clock(9_000));
         assert_eq!(age(8_700), Ok(Duration::from_millis(300)));
         assert_eq!(age(8_500), Ok(LIFESPAN));
@@ -157,7 +159,8 @@ mod tests {
 
     #[test]
     fn two_publishers_close_the_gate_by_their_messages_or_by_discovery() {
-        let (gate, start) = (Gate::new(LIFESPAN), Instant::now());
+        let gate = Gate::new(LIFESPAN);
+        let start = Instant::now();
         let admit = |publisher, after_ms| {
             let now = start + Duration::from_millis(after_ms);
             gate.admit(origin(publisher, 9_000), now, clock(9_000))

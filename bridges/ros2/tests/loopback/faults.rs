@@ -25,7 +25,8 @@ fn address(offset: u32) -> String {
 
 /// The camera repeats its last images, with their stamps, while odometry goes on.
 fn repeat_images(clock: ClockSource, offset: u32) {
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(25.0), 1);
     let mut robot = Robot::new(domain(offset), simulation.camera());
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
@@ -77,7 +78,8 @@ fn images_that_are_sent_again_move_nothing_by_the_time_of_arrival() {
 #[test]
 fn the_same_picture_with_new_stamps_is_a_stop() {
     let Some(_alone) = alone() else { return };
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(25.0), 1);
     let mut robot = Robot::new(domain(10), simulation.camera());
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
@@ -108,7 +110,8 @@ fn the_same_picture_with_new_stamps_is_a_stop() {
 #[test]
 fn two_publishers_of_the_enable_are_a_stop_and_an_old_enable_moves_nothing() {
     let Some(_alone) = alone() else { return };
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(45.0), 1);
     let mut robot = Robot::new(domain(11), simulation.camera());
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
@@ -172,7 +175,8 @@ fn two_publishers_of_the_enable_are_a_stop_and_an_old_enable_moves_nothing() {
 #[test]
 fn a_bumper_that_is_pressed_or_silent_stops_the_robot() {
     let Some(_alone) = alone() else { return };
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(40.0), 1);
     let mut robot = Robot::new(domain(12), simulation.camera());
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
@@ -199,8 +203,9 @@ fn a_bumper_that_is_pressed_or_silent_stops_the_robot() {
 
     let pressed = Arc::new(AtomicBool::new(false));
     let silent = Arc::new(AtomicBool::new(false));
-    let (is_pressed, is_silent, ended) =
-        (Arc::clone(&pressed), Arc::clone(&silent), Arc::clone(&stop));
+    let is_pressed = Arc::clone(&pressed);
+    let is_silent = Arc::clone(&silent);
+    let ended = Arc::clone(&stop);
     let bumping = thread::spawn(move || {
         while !ended.load(Ordering::Relaxed) {
             if !is_silent.load(Ordering::Relaxed) {
