@@ -51,7 +51,7 @@ check() {
     domain=$2
     shift 2
     "$venv/bin/python" "$here/check_dds.py" "$checks" "$made/robot.mcap" "$domain" "$port" \
-        "$TAGALONG_ROS2" "$root/configs/depth-ekf-follow.toml" --domain "$domain" --wait 30 \
+        "$TAGALONG_ROS2" "$root/bridges/ros2/tests/driven-by-others.toml" --domain "$domain" --wait 30 \
         --http "127.0.0.1:$port" --rmw rmw_cyclonedds_cpp "$@"
 }
 check all "$domain"

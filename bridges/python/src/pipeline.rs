@@ -160,6 +160,13 @@ impl PyPipeline {
         Ok(())
     }
 
+    /// Tells whether the base executes the commands from now on. Only then are they compared with the
+    /// odometry: a base that does something else, or responds too late, is a fault.
+    fn set_driving(&self, is_driving: bool) -> PyResult<()> {
+        self.work()?.pipeline.set_driving(is_driving);
+        Ok(())
+    }
+
     /// Lets the robot move again after a fault that a person has checked.
     fn arm(&self) -> PyResult<()> {
         self.work()?.pipeline.arm();

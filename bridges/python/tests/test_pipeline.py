@@ -188,6 +188,20 @@ def test_a_jump_of_the_odometry_stops_the_robot():
         assert (pipeline.fault is not None) == (x == 5.0)
 
 
+def test_frozen_depth_and_old_odometry_stop_the_robot():
+    pipeline = tagalong.Pipeline.from_toml("follow-depth")
+    rng = np.random.default_rng(1)
+    noisy = lambda: (DEPTH + rng.normal(0.0, 0.003, DEPTH.shape)).astype(np.float32)
+    reason = lambda depth, at, **more: pipeline.step(
+        None, depth, CAMERA, (0.0, 0.0, 0.0), 1.0 + 0.1 * at, **more
+    ).command.reason
+    live = [reason(noisy(), at) for at in range(8)]
+    assert live[-1] not in {"frozen", "odometry"}, live
+    assert reason(noisy(), 8, odometry_age_s=0.9) == "odometry"
+    same = noisy()
+    assert [reason(same, at) for at in range(9, 16)][-1] == "frozen"
+
+
 def test_a_scan_alone_makes_a_frame():
     pipeline = tagalong.Pipeline.from_toml("laser-legs")
     angles = np.linspace(-1.0, 1.0, 181)

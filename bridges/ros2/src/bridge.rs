@@ -552,6 +552,11 @@ impl Bridge {
             self.disarm("odometry jumped", tell);
         }
         self.diagnostics.begin_frame();
+        let is_driving = self
+            .wheels
+            .as_ref()
+            .is_some_and(|wheels| wheels.switch().permission().is_granted() && !found.odom_stale);
+        self.pipeline.set_driving(is_driving);
         let known = self.pipeline.fault();
         let report = self.pipeline.step(&found.frame);
         if let Some(cause) = self.pipeline.fault().filter(|cause| Some(*cause) != known) {

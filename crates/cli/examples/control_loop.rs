@@ -11,6 +11,7 @@
 
 use std::error::Error;
 use std::path::Path;
+use std::time::Duration;
 
 use tagalong_config::Registry;
 use tagalong_core::{Command, Stamp};
@@ -33,13 +34,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         .map_err(|error| error.render("configs/scenes/follow-passing.toml", &scene))?;
     let mut robot = Draw::live(&scene, 1);
 
+    // The base executes the commands from now on: they are compared with its odometry.
+    pipeline.set_driving(true);
+    let mut now = Stamp::default();
+    let mut framed = now;
     loop {
         // Until the next frame comes, the last command is requested again and again. It expires by
         // itself: if the camera stops, so does the robot.
         let next = robot.next_frame_while(|_, event| {
             let Event::Odometry(reading) = event else { return None };
-            let now = Stamp::from_nanos(reading.at_ns);
-            pipeline.command_at(now).map(|command| command.wheels)
+            now = Stamp::from_nanos(reading.at_ns);
+            // In simulated time; on a robot `command_at`, which asks the clock of the machine.
+            let since_frame = Duration::from_secs_f64(now.seconds_since(framed));
+            pipeline.command_after(now, since_frame).map(|command| command.wheels)
         });
         let Some(drawn) = next else { break };
         let frame = drawn.frame;
@@ -48,6 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         // A pipeline that fails has stopped the robot already: `command_at` is zero from now on.
         let report = pipeline.step(&frame)?;
+        framed = now;
         if let (Some(command), Some(lock), 1) = (report.command, report.lock, frame.index % 10) {
             tell(&frame.stamp, &command, lock.state.name(), lock.why);
         }

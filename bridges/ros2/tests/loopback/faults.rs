@@ -182,7 +182,7 @@ fn a_bumper_that_is_pressed_or_silent_stops_the_robot() {
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
     let states = robot.peer.collect::<StringMsg>("/people/state", &heard_all);
     let bumper = robot.peer.publisher_of::<Bool>("/bumper", "std_msgs/msg/Bool", sensor());
-    let base = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/depth-ekf-follow.toml");
+    let base = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/driven-by-others.toml");
     let config = std::env::temp_dir().join(format!("tagalong-bumper-{}.toml", std::process::id()));
     let base = base.canonicalize().unwrap();
     let text = format!(

@@ -476,7 +476,7 @@ impl Robot {
 }
 
 pub(crate) fn options(domain: u16, wait_s: &str) -> Options {
-    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/depth-ekf-follow.toml");
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/driven-by-others.toml");
     let domain = domain.to_string();
     let config = config.to_str().unwrap();
     Options::parse_from(["tagalong-ros2", config, "--domain", &domain, "--wait", wait_s])

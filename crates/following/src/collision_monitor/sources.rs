@@ -17,8 +17,8 @@ pub struct SourceSettings {
     pub topic: String,
     /// Topic of the calibration of a depth camera; left out, it is found beside `topic`.
     pub info_topic: String,
-    /// Pose of the sensor in the robot frame: x, y, z in m, roll, pitch, yaw in degrees; left out,
-    /// that of tf.
+    /// Pose of the sensor in the robot frame: x, y, z in m, roll, pitch, yaw in degrees; it looks along
+    /// its x axis, a camera too. Left out, that of tf.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mount: Option<[f64; 6]>,
     /// Age of its newest reading above which the robot stops, s (Nav2's `source_timeout`).

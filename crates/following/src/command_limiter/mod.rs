@@ -263,7 +263,7 @@ impl CommandLimiter {
 
     /// Tells whether the base executes the commands: only then are they compared with the odometry.
     pub(crate) fn set_driving(&mut self, is_driving: bool) {
-        self.response.set_driving(is_driving);
+        self.response.set_driving(is_driving && self.settings.check_response);
     }
 
     /// Limits the speed to this, m/s, beside all other limits.

@@ -51,6 +51,10 @@ pub struct CommandLimiterSettings {
     /// again.
     #[schemars(range(min = 0.1, max = 5.0))]
     pub max_odometry_mps: f64,
+    /// Compares the commands with the odometry while the base executes them: a base that does something
+    /// else, or responds too late, is a fault. Off only where the odometry is not that of the base, as
+    /// in a test with a recorded drive.
+    pub check_response: bool,
     /// Time for which an enable holds unless it is repeated, s.
     #[schemars(range(min = 0.1, max = 1.0))]
     pub enable_s: f64,
@@ -72,6 +76,7 @@ impl Default for CommandLimiterSettings {
             slow_after_s: 0.25,
             stop_after_s: 0.5,
             max_odometry_mps: 3.0,
+            check_response: true,
             enable_s: 0.5,
         }
     }
