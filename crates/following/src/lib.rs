@@ -23,6 +23,7 @@
 
 mod collision_monitor;
 mod command_limiter;
+mod distances;
 mod enable;
 mod settings;
 mod skill;
@@ -33,6 +34,7 @@ pub use collision_monitor::{
     CollisionMonitorSettings, NoReturn, ObstacleSource, SourceKind, SourceSettings,
 };
 pub use command_limiter::{CommandLimiterSettings, Orders};
+pub use distances::{BlindZone, SafetyDistances};
 pub use enable::{Enable, EnableSwitch, Permission};
 pub use settings::{Base, FollowSettings, OdometrySource, RobotSettings};
 pub use skill::{Choice, Enrollment, EnrollmentError, FollowStatus, PersonStatus};

@@ -54,10 +54,10 @@ pub use report::FrameReport;
 pub use settings::{PipelineSettings, PluginSettings};
 pub use sources::{MissingSource, Sources};
 pub use tagalong_following::{
-    Base, Choice, ChoiceRule, CollisionMonitorSettings, CommandLimiterSettings, Differences,
-    Enable, EnableSwitch, Enrollment, EnrollmentError, FollowStatus, Likeness, LockReport,
-    LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission, RobotSettings,
-    SearchSettings, SourceKind, SourceSettings, TargetSettings,
+    Base, BlindZone, Choice, ChoiceRule, CollisionMonitorSettings, CommandLimiterSettings,
+    Differences, Enable, EnableSwitch, Enrollment, EnrollmentError, FollowStatus, Likeness,
+    LockReport, LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission,
+    RobotSettings, SafetyDistances, SearchSettings, SourceKind, SourceSettings, TargetSettings,
 };
 pub use tagalong_odometry::{MotionSource, OdometrySettings};
 pub use tagalong_stereo::StereoSettings;

@@ -6,7 +6,10 @@ use tagalong_tracking::StepError;
 use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 
 use crate::{Enrollment, EnrollmentError, FollowStatus, FrameReport, Orders, PipelineSettings};
-use tagalong_following::{EnableSwitch, SourceSettings, Steered, Steering};
+use tagalong_following::{
+    BlindZone, EnableSwitch, SafetyDistances, SourceSettings, Steered, Steering,
+};
+use tagalong_geometry::Camera;
 use tagalong_vision::Describer;
 
 /// Tracker, with the controller that drives the robot after one of its tracks.
@@ -72,6 +75,16 @@ impl Pipeline {
     /// the time since the last frame that led to a command.
     pub fn command_after(&self, now: Stamp, since_frame: Duration) -> Option<Command> {
         Some(self.orders()?.after(now, since_frame))
+    }
+
+    /// Returns the distances that follow from the settings of the robot; `None` without a controller.
+    pub fn safety_distances(&self) -> Option<SafetyDistances> {
+        self.has_controller().then(|| SafetyDistances::of(&self.settings.following()))
+    }
+
+    /// Returns the region around the robot that a camera does not see; `None` without a controller.
+    pub fn blind_zone(&self, camera: &Camera) -> Option<BlindZone> {
+        self.has_controller().then(|| BlindZone::of(&self.settings.following(), camera))
     }
 
     /// Returns the further sources of obstacles of `[[collision_monitor.sources]]`; none without a

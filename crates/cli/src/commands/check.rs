@@ -8,7 +8,7 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Inputs, Usage};
-use tagalong_pipeline::Pipeline;
+use tagalong_pipeline::{BlindZone, Pipeline, SafetyDistances};
 
 /// Frames of the log that are tried.
 const FRAMES: u64 = 3;
@@ -23,13 +23,21 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     file.check_tuning(registry)?;
     let outer = file.outer_for(&pipeline)?;
     let inputs = pipeline.inputs();
+    let distances = pipeline.safety_distances();
     let fit = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
+    let blind_zone = fit.as_ref().and_then(|fit| fit.blind_zone);
     let data_lost = fit.as_ref().is_some_and(|fit| fit.data_lost);
     let notes = fit.map(|fit| fit.notes);
     let config = config.display();
     print(&match format {
         Format::Text => {
             let mut out = format!("{config}: right; {}\n", in_words(inputs));
+            if let Some(distances) = &distances {
+                out += &told(distances);
+            }
+            if let Some(zone) = &blind_zone {
+                out += &told_zone(zone);
+            }
             if let (Some(log), Some(notes)) = (log, notes) {
                 let _ = writeln!(out, "{}: fits", log.display());
                 notes.iter().for_each(|note| out += &format!("  {note}\n"));
@@ -40,7 +48,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
             let (needs, uses) = (names(inputs, Usage::Required), names(inputs, Usage::Optional));
             let answer = serde_json::json!({
                 "config": config.to_string(), "needs": needs, "uses": uses, "log": log,
-                "notes": notes,
+                "notes": notes, "distances": distances, "blind_zone": blind_zone,
             });
             format!("{answer:#}\n")
         }
@@ -54,6 +62,40 @@ struct Fit {
     notes: Vec<String>,
     /// Part of the log was lost.
     data_lost: bool,
+    /// Region that the camera of the log does not see, for a config with a controller.
+    blind_zone: Option<BlindZone>,
+}
+
+/// Returns the distances of a robot in lines.
+fn told(distances: &SafetyDistances) -> String {
+    let SafetyDistances {
+        speed_mps,
+        stopping_m,
+        before_things_m,
+        separation_m,
+        least_separation_m,
+        followed_m,
+        turning_radius_m,
+    } = distances;
+    format!(
+        "  at {speed_mps} m/s it stops within {stopping_m:.2} m, and brakes for things from \
+         {before_things_m:.2} m on\n  \
+         people who come need {separation_m:.2} m at that speed; nearer than {least_separation_m:.2} m \
+         it stands\n  \
+         it stops {followed_m:.2} m before the followed person; a turn sweeps a radius of \
+         {turning_radius_m:.2} m\n  \
+         (all but the radius from the footprint; see docs/safety.md)\n"
+    )
+}
+
+/// Returns what the camera does not see in a line.
+fn told_zone(zone: &BlindZone) -> String {
+    let floor = match zone.floor_m {
+        Some(floor_m) => format!("no floor nearer than {floor_m:.2} m before the footprint"),
+        None => "no floor".to_owned(),
+    };
+    let degrees = zone.field_of_view_deg;
+    format!("  its camera sees {floor}, and {degrees:.0} degrees in width\n")
 }
 
 /// Tries the first frames of the log.
@@ -63,9 +105,11 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit
     let missing = |why| Failure::failed(format!("`{}`: {why}", log.display()));
     pipeline.check_sources(sources(&source)).map_err(missing)?;
     let mut tried = 0;
+    let mut blind_zone = None;
     while tried < FRAMES
         && let Some(item) = source.next_frame()
     {
+        blind_zone = pipeline.blind_zone(&item.frame.camera);
         pipeline.step(&item.frame).map_err(Failure::failed)?;
         tried += 1;
     }
@@ -73,7 +117,7 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit
     if tried == 0 {
         return Err(Failure::failed(format!("{}: no frame that can be used", log.display())));
     }
-    Ok(Fit { notes: source.notes().to_vec(), data_lost: source.data_lost() })
+    Ok(Fit { notes: source.notes().to_vec(), data_lost: source.data_lost(), blind_zone })
 }
 
 fn names(inputs: Inputs, usage: Usage) -> Vec<&'static str> {

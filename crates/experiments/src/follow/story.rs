@@ -64,7 +64,15 @@ mod tests {
             moments: Vec::new(),
             reports: Vec::new(),
             took_ms: Vec::new(),
-            ticks: vec![Tick { at_s: 9.98, speed_mps: 0.0, clearance }],
+            ticks: vec![Tick {
+                at_s: 9.98,
+                speed_mps: 0.0,
+                turn_rate: 0.0,
+                clearance,
+                approach: None,
+                reason: None,
+            }],
+            in_view: Vec::new(),
             faults: scene.scheduled_faults(),
         };
         assert_eq!(

@@ -9,20 +9,31 @@ use super::CollisionMonitorSettings;
 use super::footprint::{Footprint, Path};
 use super::settings::NoReturn;
 
-/// Directions in which a sensor looked in this frame, with whether it saw something there.
+/// Statement of a sensor in one direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Look {
+    /// It saw something.
+    Seen,
+    /// Nothing came back: free, if another sensor sees that region.
+    Silent,
+    /// No statement.
+    Unknown,
+}
+
+/// Directions in which a sensor looked in this frame, with what it saw there.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Coverage {
     /// Place of the sensor in the robot frame, m.
     eye: Point2<f64>,
-    /// Direction in the robot frame, rad, and validity of each ray or column.
-    looks: Vec<(f64, bool)>,
+    /// Direction in the robot frame, rad, and statement of each ray or column.
+    looks: Vec<(f64, Look)>,
     /// Least share that lets the robot move at all.
     min_share: f64,
 }
 
 impl Coverage {
     /// Returns the coverage of directions as given.
-    pub(super) fn new(eye: Point2<f64>, looks: Vec<(f64, bool)>, min_share: f64) -> Self {
+    pub(super) fn new(eye: Point2<f64>, looks: Vec<(f64, Look)>, min_share: f64) -> Self {
         Self { eye, looks, min_share }
     }
 
@@ -35,15 +46,16 @@ impl Coverage {
         let eye: Point2<f64> = scan.robot_from_scanner.translation.vector.xy().into();
         let mut looks = Vec::with_capacity(scan.points.len() + scan.unread.len());
         for point in scan.points.iter() {
-            looks.push((direction(&eye, &point.xy()), true));
+            looks.push((direction(&eye, &point.xy()), Look::Seen));
         }
         for unread in scan.unread.iter() {
-            let is_valid = match unread.reading {
-                RayReading::NoReturn => settings.no_return == NoReturn::Free,
-                RayReading::TooNear(_) | RayReading::Reflection(_) => true,
-                RayReading::Invalid => false,
+            let look = match unread.reading {
+                RayReading::NoReturn if settings.no_return == NoReturn::Free => Look::Seen,
+                RayReading::NoReturn => Look::Silent,
+                RayReading::TooNear(_) | RayReading::Reflection(_) => Look::Seen,
+                RayReading::Invalid => Look::Unknown,
             };
-            looks.push((direction(&eye, &scan.place(unread.ray, 1.0).xy()), is_valid));
+            looks.push((direction(&eye, &scan.place(unread.ray, 1.0).xy()), look));
         }
         Self { eye, looks, min_share }
     }
@@ -54,20 +66,28 @@ impl Coverage {
     }
 
     /// Returns the part of the speed that is allowed on a path of this length: 1 with enough valid
-    /// readings in the swept region, and 0 below the least share. A sensor that does not look there
-    /// has no say.
-    pub(super) fn allowed_part(&self, footprint: &Footprint, path: Path, way: f64) -> f64 {
-        let Some(share) = self.share(footprint, path, way) else { return 1.0 };
+    /// readings in the swept region, and 0 below the least share; `None` of a sensor that does not look
+    /// there, which has no say. Where another sensor sees the region, directions from which nothing
+    /// came back are free.
+    fn allowed_part(
+        &self,
+        footprint: &Footprint,
+        path: Path,
+        way: f64,
+        others_see: bool,
+    ) -> Option<f64> {
+        let share = self.share(footprint, path, way, others_see)?;
         if share < self.min_share {
-            return 0.0;
+            return Some(0.0);
         }
         // Full speed from twice the least share on.
-        if self.min_share > 0.0 { (share / self.min_share - 1.0).clamp(0.2, 1.0) } else { 1.0 }
+        let is_limited = self.min_share > 0.0;
+        Some(if is_limited { (share / self.min_share - 1.0).clamp(0.2, 1.0) } else { 1.0 })
     }
 
     /// Returns the share of valid readings among those into the swept region; `None` if there are
     /// none.
-    fn share(&self, footprint: &Footprint, path: Path, way: f64) -> Option<f64> {
+    fn share(&self, footprint: &Footprint, path: Path, way: f64, others_see: bool) -> Option<f64> {
         let sector = match path {
             Path::Turn { .. } => Sector { middle: 0.0, half: PI },
             Path::Arc { .. } => Sector::of(&self.eye, footprint, path, way).and(&Sector::of(
@@ -79,14 +99,39 @@ impl Coverage {
         };
         let mut looks = 0_u32;
         let mut valid = 0_u32;
-        for (direction, is_valid) in &self.looks {
+        for (direction, look) in &self.looks {
             if sector.contains(*direction) {
                 looks += 1;
-                valid += u32::from(*is_valid);
+                let is_valid = *look == Look::Seen || others_see && *look == Look::Silent;
+                valid += u32::from(is_valid);
             }
         }
         (looks > 0).then(|| f64::from(valid) / f64::from(looks))
     }
+}
+
+/// Returns the part of the speed that all sensors together allow on a path of this length.
+pub(super) fn allowed_part(
+    coverages: &[Coverage],
+    footprint: &Footprint,
+    path: Path,
+    way: f64,
+) -> f64 {
+    let alone: Vec<Option<f64>> = coverages
+        .iter()
+        .map(|coverage| coverage.allowed_part(footprint, path, way, false))
+        .collect();
+    let mut least = 1.0_f64;
+    for (at, coverage) in coverages.iter().enumerate() {
+        let Some(mut part) = alone[at] else { continue };
+        let others_see =
+            alone.iter().enumerate().any(|(other, part)| other != at && *part == Some(1.0));
+        if part < 1.0 && others_see {
+            part = coverage.allowed_part(footprint, path, way, true).unwrap_or(part);
+        }
+        least = least.min(part);
+    }
+    least
 }
 
 /// Directions around a middle one, rad.
@@ -156,7 +201,8 @@ mod tests {
     fn part(scan: &LaserScan, path: Path, no_return: NoReturn) -> f64 {
         let settings =
             CollisionMonitorSettings { no_return, ..CollisionMonitorSettings::default() };
-        Coverage::of_scan(&settings, scan, 0.3).allowed_part(&footprint(), path, 1.3)
+        let coverage = Coverage::of_scan(&settings, scan, 0.3);
+        allowed_part(&[coverage], &footprint(), path, 1.3)
     }
 
     #[test]
@@ -184,11 +230,28 @@ mod tests {
 
     #[test]
     fn a_sensor_that_does_not_look_there_has_no_say() {
-        let looks = (0..40).map(|deg| (f64::from(deg - 20).to_radians(), false)).collect();
-        let camera = Coverage::new(Point2::new(0.1, 0.0), looks, 0.3);
         let back = Path::Arc { curvature: 0.0, backwards: true };
-        assert_eq!(camera.allowed_part(&footprint(), back, 0.6), 1.0);
-        assert_eq!(camera.allowed_part(&footprint(), AHEAD, 0.6), 0.0);
-        assert_eq!(camera.allowed_part(&footprint(), Path::Turn { left: true }, 0.3), 0.0);
+        let blind = [camera(Look::Unknown)];
+        assert_eq!(allowed_part(&blind, &footprint(), back, 0.6), 1.0);
+        assert_eq!(allowed_part(&blind, &footprint(), AHEAD, 0.6), 0.0);
+        assert_eq!(allowed_part(&blind, &footprint(), Path::Turn { left: true }, 0.3), 0.0);
+    }
+
+    /// A camera that looks 60 degrees to each side.
+    fn camera(look: Look) -> Coverage {
+        let looks = (-60..=60).map(|deg| (f64::from(deg).to_radians(), look)).collect();
+        Coverage::new(Point2::new(0.1, 0.0), looks, 0.3)
+    }
+
+    #[test]
+    fn rays_from_which_nothing_came_back_are_free_where_a_camera_sees() {
+        let settings = CollisionMonitorSettings::default();
+        let both = |instead, look| {
+            let scanner = Coverage::of_scan(&settings, &scan(30, instead), 0.3);
+            allowed_part(&[camera(look), scanner], &footprint(), AHEAD, 1.3)
+        };
+        assert_eq!(both(f64::INFINITY, Look::Seen), 1.0, "a hall larger than the range");
+        assert_eq!(both(f64::INFINITY, Look::Unknown), 0.0);
+        assert_eq!(both(f64::NAN, Look::Seen), 0.0, "a scanner that says nothing");
     }
 }

@@ -37,7 +37,7 @@ pub use settings::{CollisionMonitorSettings, NoReturn, ObstacleSource};
 use source_state::{RangeState, ScanState, Silence};
 pub use sources::{SourceKind, SourceSettings};
 use space::{Presence, SpaceGrid};
-pub(crate) use sweep::{Allowance, Braking};
+pub(crate) use sweep::{Allowance, Braking, reach_m};
 use sweep::{Hazard, HazardKind, allowance};
 use tagalong_core::{
     EgoMotion, Frame, ObstacleData, ObstacleReading, ObstacleReadings, Reason, Track, TrackId,
@@ -300,8 +300,7 @@ impl CollisionMonitor {
             Path::Arc { .. } => braking.farthest(speed) + self.settings.stop_m,
             Path::Turn { .. } => 0.0,
         };
-        let part_of = |coverage: &Coverage| coverage.allowed_part(&self.footprint, path, way);
-        let part = self.coverages.iter().map(part_of).fold(1.0, f64::min);
+        let part = coverage::allowed_part(&self.coverages, &self.footprint, path, way);
         if part >= 1.0 {
             return Allowance::FREE;
         }

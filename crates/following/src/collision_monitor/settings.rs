@@ -65,8 +65,9 @@ pub struct CollisionMonitorSettings {
     /// robot is slower below twice this share, and stands below it.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_share: f64,
-    /// Meaning of a laser ray without a reflection: "unknown", or "free" for a scanner that misses
-    /// nothing within its range, in halls that are larger than it.
+    /// Meaning of a laser ray from which nothing came back: "unknown" unless a camera sees the same
+    /// region, or "free" for a scanner that misses nothing within its range, alone in rooms that are
+    /// larger than that.
     pub no_return: NoReturn,
     /// Number of frames in a row with the very same depth image, or the same scan, after which the
     /// sensor counts as frozen: real ones have noise.

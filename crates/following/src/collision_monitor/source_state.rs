@@ -4,7 +4,7 @@ use nalgebra::{Point2, Point3, Vector3};
 use tagalong_core::{EgoMotion, LaserScan, RangeReading, RayReading, Track};
 
 use super::binned::BinnedHazards;
-use super::coverage::Coverage;
+use super::coverage::{Coverage, Look};
 use super::space::SpaceGrid;
 use super::sweep::{Hazard, HazardKind};
 use super::watchdog::{ScanReference, Watch};
@@ -170,12 +170,12 @@ impl RangeState {
             }
         }
         // An infinite range is a statement of a sensor that hears nothing; NaN is none.
-        let is_valid = !range_m.is_nan();
+        let look = if range_m.is_nan() { Look::Unknown } else { Look::Seen };
         let eye: Point2<f64> = reading.robot_from_sensor.translation.vector.xy().into();
         let mut looks = Vec::with_capacity(3);
         for angle in [-half_rad, 0.0, half_rad] {
             let way = along(angle, 1.0) - eye;
-            looks.push((way.y.atan2(way.x), is_valid));
+            looks.push((way.y.atan2(way.x), look));
         }
         self.coverage = Some(Coverage::new(eye, looks, 0.0));
     }

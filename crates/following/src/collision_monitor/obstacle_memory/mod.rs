@@ -3,7 +3,7 @@ use tagalong_core::{DepthImage, EgoMotion, GreyImage, Person, Track, TrackId};
 use tagalong_geometry::Camera;
 
 use super::CollisionMonitorSettings;
-use super::coverage::Coverage;
+use super::coverage::{Coverage, Look};
 use super::footprint::Footprint;
 use super::ground::{fall, is_thing};
 
@@ -223,7 +223,8 @@ impl ObstacleMemory {
             let is_border = (from_side as f64) < border && column.dark_s == f64::INFINITY;
             if !is_border {
                 let way = column.at - self.eye;
-                looks.push((way.y.atan2(way.x), column.dark_s == 0.0));
+                let look = if column.dark_s == 0.0 { Look::Seen } else { Look::Unknown };
+                looks.push((way.y.atan2(way.x), look));
             }
         }
         Coverage::new(self.eye, looks, min_share)

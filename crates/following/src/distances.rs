@@ -1,0 +1,112 @@
+use nalgebra::Point2;
+use serde::Serialize;
+use tagalong_geometry::Camera;
+
+use crate::FollowSettings;
+use crate::collision_monitor::{Footprint, reach_m};
+
+/// Distances that follow from the settings of a robot, to be put beside the robot itself.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SafetyDistances {
+    /// Largest speed, m/s.
+    pub speed_mps: f64,
+    /// Way from full speed until the robot stands, m: reaction and braking.
+    pub stopping_m: f64,
+    /// Distance of a thing ahead from the footprint at which a robot at full speed begins to brake, m.
+    pub before_things_m: f64,
+    /// Distance from the footprint that a person needs who comes at full speed towards a robot at full
+    /// speed (ISO 13855: S = (v_h + v_r) t + v_h v_r / a + v_r² / 2a + C), m.
+    pub separation_m: f64,
+    /// The same for a robot that has nearly stopped: nearer it stands, m.
+    pub least_separation_m: f64,
+    /// Distance of the footprint from the followed person at which the robot stops, m.
+    pub followed_m: f64,
+    /// Radius of the area that the footprint sweeps in a turn, m.
+    pub turning_radius_m: f64,
+}
+
+impl SafetyDistances {
+    /// Returns the distances of these settings.
+    pub fn of(settings: &FollowSettings) -> Self {
+        let FollowSettings { robot, command_limiter, collision_monitor, .. } = settings;
+        let speed_mps = robot.max_speed_mps;
+        let stopping_m = command_limiter.stopping_m(speed_mps) - command_limiter.margin_m;
+        let reaction_s = command_limiter.reaction_s;
+        let stopping_s = reaction_s + speed_mps / command_limiter.max_decel_mps2;
+        let comes = |time_s| reach_m(collision_monitor, collision_monitor.people_mps, time_s);
+        let protective_m = collision_monitor.protective_m;
+        Self {
+            speed_mps,
+            stopping_m,
+            before_things_m: stopping_m + collision_monitor.stop_m,
+            separation_m: comes(stopping_s) + stopping_m + protective_m,
+            least_separation_m: comes(reaction_s) + protective_m,
+            followed_m: collision_monitor.followed_stop_m,
+            turning_radius_m: Footprint::new(&robot.footprint).radius_m(),
+        }
+    }
+}
+
+/// Region around the robot that its camera does not see.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BlindZone {
+    /// Distance ahead of the footprint up to which the camera sees no floor, m; `None` for a camera that
+    /// sees no floor at all.
+    pub floor_m: Option<f64>,
+    /// Width of the view, degrees: what is beside it is not seen.
+    pub field_of_view_deg: f64,
+}
+
+impl BlindZone {
+    /// Returns what a camera does not see.
+    pub fn of(settings: &FollowSettings, camera: &Camera) -> Self {
+        let eye = camera.robot_from_camera.translation.vector;
+        let middle = Point2::new(0.5 * (camera.width as f64 - 1.0), camera.height as f64 - 1.0);
+        let down = camera.back_project(middle, 1.0).coords - eye;
+        // The ray of the lowest row meets the floor, if it falls.
+        let meets_m = (down.z < 0.0).then(|| eye.x - down.x * eye.z / down.z);
+        let front_m = Footprint::new(&settings.robot.footprint).front_m();
+        let height = 0.5 * (camera.height as f64 - 1.0);
+        let side = |x: f64| camera.back_project(Point2::new(x, height), 1.0).coords - eye;
+        let field_of_view = side(0.0).angle(&side(camera.width as f64 - 1.0));
+        Self {
+            floor_m: meets_m.map(|at_m| (at_m - front_m).max(0.0)),
+            field_of_view_deg: field_of_view.to_degrees(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+
+    #[test]
+    fn the_separation_is_that_of_the_standard() {
+        let settings = FollowSettings::default();
+        let found = SafetyDistances::of(&settings);
+        // (1.6 + 0.9) 0.5 + 1.6 0.9 + 0.9² / 2 + 0.2, and the rise of the deceleration.
+        let stated = 2.5 * 0.5 + 1.6 * 0.9 + 0.405 + 0.2 + 0.9 * 0.1;
+        assert!((found.separation_m - stated).abs() < 1e-9, "{found:?}");
+        assert!((found.least_separation_m - 1.0).abs() < 1e-9);
+        assert!(found.stopping_m < found.before_things_m);
+        assert!((found.turning_radius_m - 0.25_f64.hypot(0.1)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_level_camera_sees_the_floor_where_its_lowest_ray_meets_it() {
+        let lens =
+            Pinhole { fx: 100.0, fy: 100.0, cx: 99.5, cy: 49.5, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 200, 100, 1.0, 0.0, 0.0);
+        let zone = BlindZone::of(&FollowSettings::default(), &camera);
+        let expected = 1.0 / 0.495 - 0.25;
+        assert!((zone.floor_m.unwrap() - expected).abs() < 1e-6, "{zone:?}");
+        assert!((zone.field_of_view_deg - 2.0 * 0.995_f64.atan().to_degrees()).abs() < 1e-6);
+        let up = Camera::mounted(lens, 200, 100, 1.0, -0.6, 0.0);
+        let down = Camera::mounted(lens, 200, 100, 1.0, 0.6, 0.0);
+        let seen =
+            [up, down].map(|camera| BlindZone::of(&FollowSettings::default(), &camera).floor_m);
+        assert!(seen.contains(&None) && seen.iter().any(Option::is_some), "{seen:?}");
+    }
+}

@@ -1,0 +1,114 @@
+//! Faults in the middle of a ride: the robot stands soon after each of them, whatever it was doing.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
+
+use std::path::Path;
+
+use tagalong_config::Registry;
+use tagalong_core::Reason;
+use tagalong_sim::{FaultKind, InjectedFault, Scene, Variant};
+use tagalong_trials::{Contender, Ride};
+
+/// Start of the fault, s.
+const AT_S: f64 = 5.0;
+/// Speed below which the robot stands, m/s.
+const STANDS_MPS: f64 = 0.02;
+
+/// Returns a ride after a person who walks ahead along a room, with a fault in its middle.
+fn ride(kind: FaultKind) -> Ride {
+    let walk = Variant::default()
+        .with("duration_s", 11.0)
+        .with("camera.rate_hz", 15.0)
+        .with("people.0.path", "[[3.0, 2.0], [10.5, 2.4]]")
+        .with("people.0.speed_mps", 0.7)
+        .with("people.0.start_s", 1.0)
+        .with("room.clutter", 6)
+        .with("laser", "{}");
+    let mut scene = Scene::parse_with(include_str!("../scenes/small-room.toml"), &walk).unwrap();
+    scene.faults.inject.push(InjectedFault::new(kind).at(AT_S));
+    scene.check_faults().unwrap();
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let text = std::fs::read_to_string(configs.join("follow-depth.toml")).unwrap();
+    let contender = Contender { folder: configs, ..Contender::new("follow-depth", text) };
+    Ride::new(&scene, &contender, &registry, &mut ()).unwrap()
+}
+
+/// Asserts that the robot drove before the fault, stands from `within_s` after it on, and says why.
+fn assert_stands(kind: FaultKind, within_s: f64, reasons: &[Reason]) {
+    let ride = ride(kind);
+    let before = ride.ticks.iter().filter(|tick| (AT_S - 1.0..AT_S).contains(&tick.at_s));
+    let drove = before.map(|tick| tick.speed_mps).fold(0.0, f64::max);
+    assert!(drove > 0.3, "{kind:?}: it drives before the fault, {drove}");
+    let after: Vec<_> = ride.ticks.iter().filter(|tick| tick.at_s > AT_S + within_s).collect();
+    assert!(after.len() > 50, "{kind:?}");
+    let moving = after.iter().find(|tick| tick.body_mps() > STANDS_MPS);
+    assert!(moving.is_none(), "{kind:?}: {moving:?}");
+    let told: Vec<Reason> = after.iter().filter_map(|tick| tick.reason).collect();
+    assert!(told.iter().any(|reason| reasons.contains(reason)), "{kind:?}: {:?}", told.first());
+    let contact =
+        ride.ticks.iter().any(|tick| tick.clearance.people_m.min(tick.clearance.things_m) <= 0.0);
+    assert!(!contact, "{kind:?}: no contact");
+}
+
+#[test]
+fn s1_a_camera_that_freezes_or_goes_dark_stops_the_robot() {
+    for kind in [FaultKind::FreezeDepth, FaultKind::FreezeAll] {
+        assert_stands(kind, 1.0, &[Reason::Frozen]);
+    }
+    for kind in [FaultKind::BlankDepth, FaultKind::SaturateDepth] {
+        assert_stands(kind, 0.8, &[Reason::Blind]);
+    }
+    assert_stands(FaultKind::DarkColumns, 1.2, &[Reason::Unknown]);
+}
+
+#[test]
+fn t8_images_that_cease_come_again_or_come_late_stop_the_robot() {
+    for kind in [FaultKind::Drop, FaultKind::Resend] {
+        assert_stands(kind, 1.0, &[Reason::Expired]);
+    }
+    assert_stands(FaultKind::Delay, 3.0, &[Reason::Late, Reason::Expired]);
+}
+
+#[test]
+fn t8_a_scanner_that_freezes_falls_silent_or_says_nothing_ahead_stops_the_robot() {
+    assert_stands(FaultKind::FreezeLaser, 1.0, &[Reason::Frozen]);
+    assert_stands(FaultKind::DropLaser, 1.3, &[Reason::Blind]);
+    assert_stands(FaultKind::LaserInvalid, 1.2, &[Reason::Unknown, Reason::Frozen]);
+    assert_stands(FaultKind::LaserNear, 1.0, &[Reason::Blocked, Reason::TooClose]);
+}
+
+#[test]
+fn t7_odometry_that_is_silent_broken_or_stands_still_stops_the_robot() {
+    for kind in [FaultKind::OdometrySilent, FaultKind::NanOdometry, FaultKind::OdometryLateStamps] {
+        assert_stands(kind, 1.4, &[Reason::Odometry]);
+    }
+    // Values that stand still are those of a base that does not obey.
+    assert_stands(FaultKind::OdometryFrozen, 3.5, &[Reason::Fault, Reason::Frozen]);
+}
+
+#[test]
+fn c1_a_calibration_or_a_mount_that_changes_stops_the_robot() {
+    for kind in [FaultKind::CalibrationChanged, FaultKind::MountMoved] {
+        assert_stands(kind, 0.8, &[Reason::Fault]);
+    }
+}
+
+#[test]
+fn t1_a_clock_that_is_set_back_stops_the_robot() {
+    let ride = ride(FaultKind::ClockBack);
+    let just_after = ride.ticks.iter().filter(|tick| (AT_S + 0.6..AT_S + 0.8).contains(&tick.at_s));
+    let fastest = just_after.map(|tick| tick.body_mps()).fold(0.0, f64::max);
+    assert!(fastest < 0.3, "{fastest}");
+}
+
+/// What software can see of wheels that do not obey it tells, and commands a stop.
+#[test]
+fn wheels_that_do_not_obey_are_a_fault() {
+    for kind in [FaultKind::WheelsStuck, FaultKind::WheelsRunaway] {
+        let ride = ride(kind);
+        let fault = ride.ticks.iter().find(|tick| tick.reason == Some(Reason::Fault));
+        let at_s = fault.map(|tick| tick.at_s);
+        assert!(at_s.is_some_and(|at_s| at_s < AT_S + 5.0), "{kind:?}: {at_s:?}");
+    }
+}
