@@ -2,7 +2,8 @@
 //!
 //! Between `<!-- begin: tagalong ... -->` and `<!-- end -->` stands the output of that command, and
 //! likewise that of `cargo xtask faults`. `<!-- begin: excerpt PAGE TITLE -->` repeats the table of
-//! another page that is titled so, in bold, with its notes.
+//! another page that is titled so, in bold, with its notes, and `<!-- begin: rows PAGE ROW; ROW -->`
+//! repeats the rows of tables of another page that begin so, below their head.
 //! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
 //! become stale. Slow parts, the tables of `reproduce`, `follow` and `bench`, are filled only on
 //! request.
@@ -20,6 +21,9 @@ const END: &str = "<!-- end -->";
 
 /// Beginning of a command that repeats a table of another page.
 const EXCERPT: &str = "excerpt ";
+
+/// Beginning of a command that repeats rows of the tables of another page.
+const ROWS: &str = "rows ";
 
 /// Commands that take minutes to hours.
 const SLOW: &[&str] =
@@ -115,6 +119,33 @@ fn ends_excerpt(line: &str) -> bool {
     ["**", "#", "<!--"].iter().any(|mark| line.starts_with(mark))
 }
 
+/// Returns the rows of a page with these first cells, each the first of its kind, below the head that
+/// their tables have in common.
+fn rows(page: &str, names: &str) -> Result<String> {
+    let lines: Vec<&str> = page.lines().collect();
+    let mut table: Vec<&str> = Vec::new();
+    for name in names.split(';') {
+        let begin = format!("| {} |", name.trim());
+        let at = lines.iter().position(|line| line.starts_with(&begin));
+        let at = at.with_context(|| format!("no row `{}`", name.trim()))?;
+        let head = head_above(&lines[..at]);
+        if table.is_empty() {
+            table.extend(head);
+        } else if !table.starts_with(head) {
+            bail!("the table of the row `{}` has another head", name.trim());
+        }
+        table.push(lines[at]);
+    }
+    Ok(table.join("\n"))
+}
+
+/// Returns the first two lines of the table that these lines end in: titles and rule.
+fn head_above<'a, 'b>(lines: &'a [&'b str]) -> &'a [&'b str] {
+    let before = lines.iter().rposition(|line| !line.starts_with('|'));
+    let table = &lines[before.map_or(0, |at| at + 1)..];
+    &table[..table.len().min(2)]
+}
+
 /// Returns the output of the command, with the program of this workspace; the table of faults is
 /// this program's own.
 fn printed(workspace: &Workspace, command: &str) -> Result<String> {
@@ -126,6 +157,10 @@ fn printed(workspace: &Workspace, command: &str) -> Result<String> {
             source.split_once(' ').context("an excerpt names a page and a title")?;
         return excerpt(&workspace.read(page)?, title)
             .with_context(|| format!("{page} has no table `{title}`"));
+    }
+    if let Some(source) = command.strip_prefix(ROWS) {
+        let (page, names) = source.split_once(' ').context("rows name a page and a row")?;
+        return rows(&workspace.read(page)?, names).with_context(|| format!("in {page}"));
     }
     let mut words = command.split_whitespace();
     if words.next() != Some("tagalong") {
@@ -166,6 +201,18 @@ mod tests {
         assert_eq!(second.trim(), "**second**\n\n| 2 |\n\n* note");
         assert_eq!(excerpt(page, "first").unwrap().trim(), "**first**\n\n| 1 |");
         assert_eq!(excerpt(page, "third"), None);
+    }
+
+    #[test]
+    fn rows_of_several_tables_stand_below_one_head() {
+        let page = "# a\n\n|  | m |\n| --- | --- |\n| b 1 | 1 |\n| all: b | 2 |\n\ntext\n\n\
+                    |  | m |\n| --- | --- |\n| all: c | 3 |\n| all: b | 4 |\n\n\
+                    |  | s |\n| --- | --- |\n| all: d | 5 |\n";
+        let both = rows(page, "all: b; all: c").unwrap();
+        assert_eq!(both, "|  | m |\n| --- | --- |\n| all: b | 2 |\n| all: c | 3 |");
+        assert!(rows(page, "all").unwrap_err().to_string().contains("no row `all`"));
+        let error = rows(page, "all: b; all: d").unwrap_err().to_string();
+        assert!(error.contains("`all: d` has another head"), "{error}");
     }
 
     #[test]
