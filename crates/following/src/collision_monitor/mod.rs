@@ -312,8 +312,8 @@ impl CollisionMonitor {
 /// Adds the places that a depth image shows to be free.
 fn add_free_space(memory: &ObstacleMemory, space: &mut SpaceGrid) {
     let (eye, free_to) = memory.free_to();
-    let met = memory.seen().iter().filter(|point| point.z > 0.0).map(Point3::xy);
-    space.add(eye, met, free_to);
+    let near = memory.seen().iter().filter(|point| point.z > 0.0).map(Point3::xy);
+    space.add(eye, near.chain(memory.nearest()), free_to);
 }
 
 /// Adds the things in a depth image, those that are remembered, and those that hide a part of it.

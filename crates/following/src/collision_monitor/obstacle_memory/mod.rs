@@ -214,6 +214,12 @@ impl ObstacleMemory {
         (self.eye, self.columns.iter().filter_map(|column| column.nearest.or(column.farthest)))
     }
 
+    /// Returns the nearest thing in each column, also beyond the reach within which things matter: what
+    /// stands farther away must not seem to appear when the robot comes nearer.
+    pub(super) fn nearest(&self) -> impl Iterator<Item = Point2<f64>> {
+        self.columns.iter().filter_map(|column| column.nearest)
+    }
+
     /// Returns the directions in which the image has depth.
     pub(super) fn coverage(&self, min_share: f64) -> Coverage {
         let border = BORDER * self.columns.len() as f64;
