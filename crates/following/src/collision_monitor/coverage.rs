@@ -9,6 +9,9 @@ use super::CollisionMonitorSettings;
 use super::footprint::{Footprint, Path};
 use super::settings::NoReturn;
 
+/// Share of rays without a statement up to which those from which nothing came back may be free.
+const MOST_UNKNOWN: f64 = 0.1;
+
 /// Statement of a sensor in one direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Look {
@@ -52,8 +55,9 @@ impl Coverage {
             let look = match unread.reading {
                 RayReading::NoReturn if settings.no_return == NoReturn::Free => Look::Seen,
                 RayReading::NoReturn => Look::Silent,
-                RayReading::TooNear(_) | RayReading::Reflection(_) => Look::Seen,
-                RayReading::Invalid => Look::Unknown,
+                RayReading::Reflection(_) => Look::Seen,
+                // Dirt on the scanner, or a hand on it: what is behind is not seen.
+                RayReading::TooNear(_) | RayReading::Invalid => Look::Unknown,
             };
             looks.push((direction(&eye, &scan.place(unread.ray, 1.0).xy()), look));
         }
@@ -98,14 +102,19 @@ impl Coverage {
             )),
         };
         let mut looks = 0_u32;
-        let mut valid = 0_u32;
+        let mut seen = 0_u32;
+        let mut silent = 0_u32;
         for (direction, look) in &self.looks {
             if sector.contains(*direction) {
                 looks += 1;
-                let is_valid = *look == Look::Seen || others_see && *look == Look::Silent;
-                valid += u32::from(is_valid);
+                seen += u32::from(*look == Look::Seen);
+                silent += u32::from(*look == Look::Silent);
             }
         }
+        // A scanner of which many rays say nothing at all is not believed where nothing came back.
+        let unknown = looks - seen - silent;
+        let is_sound = f64::from(unknown) <= MOST_UNKNOWN * f64::from(looks);
+        let valid = if others_see && is_sound { seen + silent } else { seen };
         (looks > 0).then(|| f64::from(valid) / f64::from(looks))
     }
 }
@@ -213,7 +222,7 @@ mod tests {
             assert_eq!(part(&scan(25, instead), back, NoReturn::Unknown), 1.0, "{instead}");
         }
         assert_eq!(part(&scan(-1, 0.0), AHEAD, NoReturn::Unknown), 1.0);
-        assert_eq!(part(&scan(25, 0.05), AHEAD, NoReturn::Unknown), 1.0, "nearer than it measures");
+        assert_eq!(part(&scan(25, 0.05), AHEAD, NoReturn::Unknown), 0.0, "nearer than it measures");
     }
 
     #[test]

@@ -46,6 +46,8 @@ use watchdog::{DepthReference, Watch};
 
 use crate::RobotSettings;
 
+/// Least length of the way of which the sensors must see enough, m.
+const LOOKED_AT_M: f64 = 1.0;
 /// Distance from a person within which points belong to them, m.
 const PERSON_M: f64 = 0.4;
 /// Radius of the body of a person, m.
@@ -297,7 +299,8 @@ impl CollisionMonitor {
 
     fn by_coverage(&self, path: Path, speed: f64, braking: &Braking) -> Allowance {
         let way = match path {
-            Path::Arc { .. } => braking.farthest(speed) + self.settings.stop_m,
+            // Also before a robot that creeps: what is right before it is seen from all directions.
+            Path::Arc { .. } => (braking.farthest(speed) + self.settings.stop_m).max(LOOKED_AT_M),
             Path::Turn { .. } => 0.0,
         };
         let part = coverage::allowed_part(&self.coverages, &self.footprint, path, way);
