@@ -33,18 +33,18 @@ impl Footprint {
 
     /// Returns the distance from the outline to a place in the robot frame, m; 0 inside.
     pub(crate) fn distance_m(&self, at: &Point2<f64>) -> f64 {
-        let (from_edge_m, is_inside) = self.from_edge(at);
-        if is_inside { 0.0 } else { from_edge_m }
+        let (edge_m, is_inside) = self.edge_distance(at);
+        if is_inside { 0.0 } else { edge_m }
     }
 
     /// Returns how deep within the outline a place in the robot frame is, m; 0 outside.
     pub(crate) fn depth_m(&self, at: &Point2<f64>) -> f64 {
-        let (from_edge_m, is_inside) = self.from_edge(at);
-        if is_inside { from_edge_m } else { 0.0 }
+        let (edge_m, is_inside) = self.edge_distance(at);
+        if is_inside { edge_m } else { 0.0 }
     }
 
     /// Returns the distance of a place from the nearest edge, m, and whether it is inside.
-    fn from_edge(&self, at: &Point2<f64>) -> (f64, bool) {
+    fn edge_distance(&self, at: &Point2<f64>) -> (f64, bool) {
         let mut nearest = f64::INFINITY;
         let mut is_inside = false;
         let mut from = match self.corners.last() {

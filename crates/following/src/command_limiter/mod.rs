@@ -244,7 +244,8 @@ impl CommandLimiter {
             self.is_odometry_old = frame.odometry_age_s > self.settings.slow_after_s;
         }
         let image_s = frame.latency_s.unwrap_or(0.0);
-        if !(image_s <= self.settings.reaction_s) {
+        let is_in_time = image_s <= self.settings.reaction_s;
+        if !is_in_time {
             self.late = self.late.or(Some(Reason::Late));
         }
         match self.response.update(frame.stamp, motion) {

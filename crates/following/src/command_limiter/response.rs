@@ -87,7 +87,9 @@ impl ResponseCheck {
     pub(super) fn update(&mut self, now: Stamp, motion: &EgoMotion) -> Response {
         let since = self.commands.front().map_or(0.0, |first| now.seconds_since(first.stamp));
         // Commands from before the first one are not known.
-        if !self.is_driving || since < LONGEST_S || !(motion.dt >= SHORTEST_S) {
+        // Positive comparisons, so that a time that is no number is not compared.
+        let is_comparable = since >= LONGEST_S && motion.dt >= SHORTEST_S;
+        if !(self.is_driving && is_comparable) {
             return Response::Within(self.largest_delay_s(now));
         }
         let measured = Twist::new(motion.forward / motion.dt, motion.turn / motion.dt);

@@ -67,7 +67,8 @@ fn a_pipeline_declares_what_its_parts_declare() {
     let depth = inputs(&script("depth"));
     assert_eq!(depth, Inputs::NONE.require(Input::Depth));
     let controller = format!("{}\n[controller]\nplugin = 'drive'", script("depth"));
-    assert_eq!(inputs(&controller), depth.accept(Input::Colour).accept(Input::Laser));
+    let steering = depth.accept(Input::Colour).accept(Input::Laser).accept(Input::OBSTACLES);
+    assert_eq!(inputs(&controller), steering);
     let images = Inputs::NONE.require(Input::Colour).require(Input::Depth);
     assert_eq!(inputs(&format!("odometry = {{}}\n{PLAIN}")), images);
 }
