@@ -22,6 +22,8 @@ fn reports() -> Option<Vec<FrameReport>> {
     let path = tagalong_testdata::find("logs/kitti-stereo.mcap")?;
     let configs = root.join("configs");
     let text = std::fs::read_to_string(configs.join("stereo-street.toml")).unwrap();
+    // The log has no odometry, without which no robot drives unless the config says so.
+    let text = format!("robot.odometry = \"none\"\n{text}");
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();

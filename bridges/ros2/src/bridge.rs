@@ -30,6 +30,10 @@ use crate::stamps::{StampClock, system_time};
 use crate::wheels::{CommandCounts, SwitchHandle, Wheels};
 use crate::{BridgeError, Options};
 
+mod wheels;
+
+use wheels::*;
+
 /// Longest wait for messages before the stop flag is checked.
 const TURN: Duration = Duration::from_millis(50);
 /// Time between two attempts to start.
@@ -698,93 +702,4 @@ impl Bridge {
         let told = self.wheels.map(Wheels::finish).unwrap_or_default();
         (Summary { told, ..summary }, self.network)
     }
-}
-
-/// Takes a message of the enable topic to the switch: `origin` is that of a true, `None` is a false.
-fn take_enable(switch: &SwitchHandle, gate: &Gate, origin: Option<Origin>) {
-    let now = switch.now();
-    let Some(origin) = origin else {
-        // A stop counts from every publisher and at every age.
-        switch.take(Enable::Off, now);
-        return;
-    };
-    let age = match gate.admit(origin, Instant::now(), system_time()) {
-        Ok(age) => age,
-        Err(Unfit::Contested) => {
-            switch.take(Enable::Fault(CONTESTED), now);
-            return;
-        }
-        // Too old to move the robot, but no release of the button either.
-        Err(Unfit::Untimely(age_s)) => Duration::try_from_secs_f64(age_s).unwrap_or(Duration::MAX),
-    };
-    // What was published before the switch was there says nothing to it, nor does the future.
-    if let Some(published) = now.checked_sub(age) {
-        switch.take(Enable::On, published);
-    }
-}
-
-/// Tells that messages of a topic do not count for their age, once for each row of them.
-fn tell_untimely(gate: &Gate, what: &str, topic: &str, tell: &dyn Fn(&str)) {
-    let Some(age_s) = gate.take_untold() else { return };
-    let state = if age_s > 0.0 { "old" } else { "ahead" };
-    tell(&format!(
-        "a {what} on {topic} was {:.1} s {state} by the clock of its publisher: it does not count; if \
-         all are, synchronise the clocks of both machines",
-        age_s.abs()
-    ));
-}
-
-/// Starts the thread of the wheels, which converts their speeds to messages.
-fn drive(
-    options: &Options,
-    setup: &Setup,
-    switch: EnableSwitch,
-    base_frame: &str,
-    network: &mut Network,
-    clock: &Arc<StampClock>,
-) -> Result<Wheels, BridgeError> {
-    let half_m = setup.robot.wheels().half_separation_m;
-    let publish = command_publisher(options, network)?;
-    let (base_frame, clock) = (base_frame.to_owned(), Arc::clone(clock));
-    let now = {
-        let clock = Arc::clone(&clock);
-        move || clock.now()
-    };
-    let tell = move |wheels| {
-        let header = Header::new(clock.now(), base_frame.as_str());
-        publish(TwistStamped { header, twist: twist(wheels, half_m) });
-    };
-    Ok(Wheels::start(Duration::from_secs_f64(1.0 / options.rate), switch, now, tell))
-}
-
-/// Returns a function that publishes commands as the type that the options name.
-fn command_publisher(
-    options: &Options,
-    network: &mut Network,
-) -> Result<Box<dyn Fn(TwistStamped) + Send>, BridgeError> {
-    let topic = &options.command;
-    // A full queue means that the previous command has not been read.
-    Ok(match options.command_type {
-        CommandType::TwistStamped => {
-            let publisher: Publisher<TwistStamped> = network.publisher(topic)?;
-            Box::new(move |command| {
-                let _lost = publisher.publish(command);
-            })
-        }
-        CommandType::Twist => {
-            let publisher: Publisher<TwistMessage> =
-                network.publisher_of(topic, "geometry_msgs/msg/Twist")?;
-            Box::new(move |command| {
-                let _lost = publisher.publish(command.twist);
-            })
-        }
-    })
-}
-
-/// Converts wheel speeds to the velocity of the robot's centre.
-fn twist(WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> TwistMessage {
-    let mut twist = TwistMessage::default();
-    twist.linear.x = 0.5 * (left + right);
-    twist.angular.z = 0.5 * (right - left) / half_m;
-    twist
 }

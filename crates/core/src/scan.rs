@@ -24,7 +24,7 @@ pub struct LaserScan {
 pub struct UnreadRay {
     /// Ray number.
     pub ray: u32,
-    /// What the scanner said instead.
+    /// Its reading.
     pub reading: RayReading,
 }
 

@@ -33,6 +33,7 @@ use crate::world::{self, Hit, Object, Stage, World};
 
 mod injector;
 mod joints;
+mod nearness;
 mod sensing;
 mod walkers;
 
@@ -301,50 +302,6 @@ impl Simulation {
         self.robot.steer(self.now_ns as f64 * 1e-9, command);
     }
 
-    /// Returns the free distance around the robot at its present place: around its footprint, or
-    /// around a disc of this radius if the scene has none.
-    pub fn clearance(&self, radius_m: f64) -> Clearance {
-        let outline = self.outline(radius_m);
-        let least = |gaps: &mut dyn Iterator<Item = Gap>| {
-            gaps.fold(f64::INFINITY, |least, gap| least.min(gap.distance_m))
-        };
-        Clearance {
-            people_m: least(&mut self.gaps_to_people(&outline)),
-            things_m: least(&mut self.gaps_to_things(&outline)),
-        }
-    }
-
-    /// Returns the gaps between the robot and people.
-    fn gaps_to_people(&self, outline: &Outline<'_>) -> impl Iterator<Item = Gap> {
-        let robot = Point2::from(self.robot.pose.translation.vector);
-        self.present().map(move |(walker, _)| {
-            let way = walker.stance.place - robot;
-            let direction = way.try_normalize(1e-9).unwrap_or_else(Vector2::x);
-            outline.gap(&self.robot.pose, &direction, way.norm(), BODY_M)
-        })
-    }
-
-    /// Returns the gaps between the robot and furniture and walls, all around it.
-    fn gaps_to_things(&self, outline: &Outline<'_>) -> impl Iterator<Item = Gap> {
-        let robot = Point2::from(self.robot.pose.translation.vector);
-        let floor_m = self.scene.room.floor_m(&robot);
-        let rays = FEELERS_M.into_iter().flat_map(|height_m| {
-            (0..FEELERS).map(move |i| (height_m, TAU * f64::from(i) / f64::from(FEELERS)))
-        });
-        let things = rays.map(move |(height_m, angle)| {
-            let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            let from = Point3::new(robot.x, robot.y, floor_m + height_m);
-            let away_m = world::distance(&self.stage.objects, &from, &ray);
-            outline.gap(&self.robot.pose, &ray.xy(), away_m, 0.0)
-        });
-        let trolleys = self.trolleys().map(move |trolley| {
-            let way = trolley.place - robot;
-            let direction = way.try_normalize(1e-9).unwrap_or_else(Vector2::x);
-            outline.gap(&self.robot.pose, &direction, trolley.distance_m(&robot), 0.0)
-        });
-        things.chain(trolleys)
-    }
-
     /// Returns the injected faults.
     pub fn faults(&self) -> &[ScheduledFault] {
         self.injector.faults()
@@ -353,63 +310,6 @@ impl Simulation {
     /// Returns the time on the robot's clock, which faults may set, at a time since the start, ns.
     pub fn robot_clock_ns(&self, at_ns: u64) -> u64 {
         self.injector.robot_clock_ns(at_ns)
-    }
-
-    /// Returns the state of the approacher in respect of a round robot of this radius; `None`
-    /// before it appears, and in a scene without one.
-    pub fn approach(&self, radius_m: f64) -> Option<ApproachState> {
-        let approacher = self.approacher.as_ref().filter(|one| one.is_there())?;
-        let robot = Point2::from(self.robot.pose.translation.vector);
-        let own = self.robot.pose.inverse_transform_point(&approacher.place);
-        Some(ApproachState {
-            gap_m: approacher.distance_m(&robot) - radius_m,
-            bearing_rad: own.y.atan2(own.x),
-            speed_mps: approacher.speed_mps(),
-        })
-    }
-
-    /// Returns which of the robot's sensors could observe the approacher now.
-    pub fn approach_in_view(&self) -> ApproachInView {
-        let Some(approacher) = self.approacher.as_ref().filter(|one| one.is_there()) else {
-            return ApproachInView::default();
-        };
-        let mut people = self.world().0.people;
-        let of_person = approacher.by() == ApproachBy::Person;
-        let own = people.iter().rposition(|object| object.person.is_some() == of_person);
-        let Some(own) = own.map(|index| people.remove(index)) else {
-            return ApproachInView::default();
-        };
-        let others: Vec<&Object> = self.stage.objects.iter().chain(&people).collect();
-        let pose = self.world_from_robot(0.5);
-        ApproachInView {
-            camera: self.camera_reaches(&own, &others, &pose),
-            laser: self.laser().is_some_and(|laser| laser.reaches(&own, &others, &pose)),
-        }
-    }
-
-    /// Returns true if the camera has some of these solids in its image, within the range of its
-    /// depth, with nothing before them.
-    fn camera_reaches(&self, own: &Object, others: &[&Object], pose: &Isometry3<f64>) -> bool {
-        let camera = &self.true_camera;
-        let settings = &self.scene.camera;
-        let eye = pose * camera.robot_from_camera * Point3::origin();
-        let spots = own.shapes.iter().flat_map(Shape::spots);
-        let seen = spots.filter(|spot| {
-            let in_robot = pose.inverse_transform_point(spot);
-            let in_camera = camera.robot_from_camera.inverse_transform_point(&in_robot);
-            let is_within = (settings.min_depth_m..=settings.max_depth_m).contains(&in_camera.z);
-            let size = [camera.width as f64, camera.height as f64];
-            let in_image = camera.project_from_camera(&in_camera).is_some_and(|pixel| {
-                (0.0..size[0]).contains(&pixel.x) && (0.0..size[1]).contains(&pixel.y)
-            });
-            let way = spot - eye;
-            is_within
-                && in_image
-                && way.try_normalize(1e-6).is_some_and(|ray| {
-                    world::distance(others.iter().copied(), &eye, &ray) > way.norm()
-                })
-        });
-        seen.take(LEAST_SPOTS).count() == LEAST_SPOTS
     }
 
     /// The robot's forward speed over ground, m/s.
@@ -476,46 +376,6 @@ impl Simulation {
         }
         self.obstacles.pop();
         self.approach_robot(dt);
-    }
-
-    /// Returns true if the last of the walkers is the approacher.
-    fn person_approaches(&self) -> bool {
-        self.approacher.as_ref().is_some_and(|one| one.by() == ApproachBy::Person)
-    }
-
-    /// Returns the approacher if it is a trolley that is there.
-    fn trolleys(&self) -> impl Iterator<Item = &Approacher> {
-        let trolley = |one: &&Approacher| one.is_there() && one.by() == ApproachBy::Trolley;
-        self.approacher.iter().filter(trolley)
-    }
-
-    /// Lets the approacher appear, if it is time.
-    fn appear(&mut self, now_s: f64) {
-        self.move_approacher(0.0, |approacher, around| approacher.appear(now_s, around));
-    }
-
-    /// Moves the approacher on by a short time.
-    fn approach_robot(&mut self, dt: f64) {
-        self.move_approacher(dt, |approacher, around| approacher.step(dt, around));
-    }
-
-    /// Moves the approacher, and the walker that is its body.
-    fn move_approacher(&mut self, dt: f64, by: impl FnOnce(&mut Approacher, &Surroundings<'_>)) {
-        let others = self.walkers.len() - usize::from(self.person_approaches());
-        let now_s = self.now_ns as f64 * 1e-9;
-        let Some(approacher) = &mut self.approacher else { return };
-        let there = self.walkers[..others].iter().filter(|walker| walker.is_there(now_s));
-        let around = Surroundings {
-            robot: self.robot.pose,
-            room_m: self.scene.room.size_m,
-            obstacles: &self.obstacles,
-            people: there.map(|walker| walker.stance.place).collect(),
-        };
-        by(approacher, &around);
-        if let Some(body) = self.walkers.get_mut(others).filter(|_| approacher.is_there()) {
-            let speed_mps = approacher.speed_mps();
-            body.carry(approacher.place, approacher.heading_rad, speed_mps, dt);
-        }
     }
 
     fn record(&mut self, at_ns: u64, event: Event) {

@@ -1,6 +1,6 @@
-//! Collision monitor: what the sensors of obstacles let the robot do.
+//! Collision monitor: limits of the motion by the sensors of obstacles.
 //!
-//! It gathers what stands in the way and what comes nearer, from the depth image, the laser scan and
+//! It gathers obstacles and people, from the depth image, the laser scan and
 //! further sources, checks that these sensors see anything, and that they are not frozen, and returns
 //! the largest speed on a path that the robot is about to take.
 //!
@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `footprint` | outline of the robot, and the paths that it takes |
 //! | `obstacle_memory` | things in the depth image, and those that left it |
-//! | `space` | places that were seen free: what appears there moves |
+//! | `space` | places that were seen free: a thing that appears there moves |
 //! | `sweep` | speed on a path before things and beside people |
 //! | `coverage` | share of valid readings in the swept region: unknown is not free |
 //! | `watchdog` | sensors that repeat themselves or contradict the odometry |
@@ -54,7 +54,7 @@ const PERSON_M: f64 = 0.4;
 const BODY_M: f64 = 0.2;
 /// Time without a detection after which a track no longer says where its points are, s.
 const FRESH_S: f64 = 0.3;
-/// Time without a detection after which a track is no hazard of its own, s; what was seen there is
+/// Time without a detection after which a track is no hazard of its own, s; its last place is
 /// remembered.
 const PREDICTED_S: f64 = 1.0;
 /// Speed that is added to the measured one of a person, m/s: it is that uncertain.
@@ -178,7 +178,7 @@ impl CollisionMonitor {
         self.memory.add_tracks(tracks, target.map(|track| track.id));
     }
 
-    /// Takes in the further sources. One that delivers nothing with this frame keeps what it said.
+    /// Takes in the further sources. One that delivers nothing with this frame keeps its last reading.
     fn update_sources(
         &mut self,
         readings: Option<&ObstacleReadings>,
@@ -299,7 +299,7 @@ impl CollisionMonitor {
 
     fn by_coverage(&self, path: Path, speed: f64, braking: &Braking) -> Allowance {
         let way = match path {
-            // Also before a robot that creeps: what is right before it is seen from all directions.
+            // Also before a robot that creeps: things right before it lie in all directions.
             Path::Arc { .. } => (braking.farthest(speed) + self.settings.stop_m).max(LOOKED_AT_M),
             Path::Turn { .. } => 0.0,
         };
@@ -343,7 +343,7 @@ fn add_depth_hazards(
     }
 }
 
-/// People around the robot, for the question what a point may do.
+/// People around the robot, to judge the motion of a point.
 struct People<'a> {
     settings: &'a CollisionMonitorSettings,
     tracks: &'a [Track],
@@ -351,14 +351,14 @@ struct People<'a> {
 }
 
 impl People<'_> {
-    /// Returns the motion that is expected of a thing at a place.
+    /// Returns the motion to expect of a thing at a place.
     fn kind(&self, at: &Point2<f64>, presence: Presence) -> HazardKind {
         if let Some(target) = self.target.filter(|target| target.unseen_s <= FRESH_S) {
             let away_m = (place(target) - at).norm();
             if away_m < self.settings.target_radius_m {
                 return HazardKind::Followed(closing_mps(target));
             }
-            // What moves beside the followed person is carried, pulled or pushed by them.
+            // A thing that moves beside the followed person is carried, pulled or pushed.
             if away_m < CARRIED_M && matches!(presence, Presence::Appeared | Presence::New) {
                 return HazardKind::Followed(closing_mps(target) + UNSURE_MPS);
             }
@@ -375,7 +375,7 @@ impl People<'_> {
         }
         match presence {
             Presence::Stands => HazardKind::Still,
-            // What comes into view may be a person, who is seen to move in the next frame.
+            // A person who comes into view is seen to move in the next frame.
             Presence::New => HazardKind::Still,
             // A person who came and stands, for example, may walk on.
             Presence::Parked => HazardKind::Moves(0.0),

@@ -1,4 +1,4 @@
-//! Places that one sensor saw free or met something in, to tell what moves from what stands.
+//! Places that one sensor saw free or met something in, to tell moving things from standing ones.
 
 use nalgebra::{Isometry2, Point2};
 use tagalong_core::EgoMotion;
@@ -11,17 +11,17 @@ const SIDE: i32 = 128;
 const STEP_M: f64 = 0.08;
 /// Gap without a reading after which something in a cell has appeared anew, ms: a few frames.
 const GAP_MS: u32 = 400;
-/// Time after which what is in a cell stands still, ms: the leg of a walking person is off sooner.
+/// Time after which a thing in a cell stands still, ms: the leg of a walking person is off sooner.
 const STANDS_MS: u32 = 1000;
 /// Time for which a look at a free place counts, ms.
 const FREE_MS: u32 = 3000;
-/// Cells around one that were free, of 8, for something in it to have come there: at the border of what
-/// is in view a cell is half free and half a wall.
+/// Cells around one that were free, of 8, for something in it to have come there: at the border of
+/// the view a cell is half free and half a wall.
 const FREE_AROUND: usize = 6;
-/// Time for which what came by itself and stands may go on, ms.
+/// Time for which a thing that came by itself and stands may go on, ms.
 const PARKED_MS: u32 = 10_000;
 
-/// What is known of the thing in a cell.
+/// History of the thing in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Presence {
     /// It has been there for a second.
@@ -41,7 +41,7 @@ struct Cell {
     /// Times, ms; 0 for never.
     free_ms: u32,
     hit_ms: u32,
-    /// Start of the presence of what is in it.
+    /// Start of the presence of the thing in it.
     since_ms: u32,
     appeared: bool,
 }
@@ -108,7 +108,7 @@ impl SpaceGrid {
         }
     }
 
-    /// Returns what is known of a thing that was met at a place in this frame.
+    /// Returns the history of a thing that was met at a place in this frame.
     pub(super) fn presence(&self, at: &Point2<f64>) -> Presence {
         let place = coordinates(&(self.grid_from_robot * at));
         let Some(cell) = self.at(place) else { return Presence::New };
@@ -116,7 +116,7 @@ impl SpaceGrid {
             let is_parked = cell.appeared && self.now_ms - cell.since_ms <= PARKED_MS;
             return if is_parked { Presence::Parked } else { Presence::Stands };
         }
-        // Noise and a wrong angle move the border of what stands by a cell.
+        // Noise and a wrong angle move the border of a standing thing by a cell.
         for dx in -1..=1 {
             for dy in -1..=1 {
                 let beside = self.at((place.0.saturating_add(dx), place.1.saturating_add(dy)));

@@ -30,7 +30,7 @@ pub(crate) struct Hazard {
     pub(crate) at: Point2<f64>,
     /// Weight, in points of the depth image.
     pub(crate) points: u32,
-    /// What it may do before the robot stands.
+    /// Motion that is expected before the robot stands.
     pub(crate) kind: HazardKind,
 }
 
@@ -45,7 +45,7 @@ pub(crate) enum HazardKind {
     Followed(f64),
 }
 
-/// How the robot stops along a path: m and m/s, or rad and rad/s for a turn in place.
+/// Reaction and deceleration along a path: m and m/s, or rad and rad/s for a turn in place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Braking {
     /// Time from an image to wheels that move accordingly, s.

@@ -250,7 +250,7 @@ impl CommandLimiter {
         }
         match self.response.update(frame.stamp, motion) {
             Response::Within(wheels_s) => {
-                // What comes up right after an image is in the next one.
+                // A thing that comes up right after an image is in the next one.
                 let answered_s =
                     if wheels_s > 0.0 { image_s + motion.dt + wheels_s } else { image_s };
                 self.reaction_s = self.settings.reaction_s.max(answered_s);

@@ -92,7 +92,7 @@ fn clear_slows_the_robot_down_and_no_person_is_followed_after_it() {
     ride.pipeline.clear();
     let status = ride.go_on(1);
     assert_eq!((status.state, status.reason), (LockState::Initial.name(), "cleared"));
-    // Who was followed is now a person like others, from whom the robot keeps away.
+    // The former target is a person like others now: the robot keeps away.
     let gentle = [Reason::Stopping, Reason::Near].map(Reason::name);
     assert!(gentle.contains(&status.command), "no emergency: {}", status.command);
     let status = ride.go_on(30);

@@ -9,7 +9,7 @@ use super::super::sweep::{Braking, HazardKind, allowance};
 use super::super::{People, add_depth_hazards};
 use super::*;
 
-/// What is ahead of the robot on an arc.
+/// Result of a look along an arc.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Ahead {
     Free,
