@@ -13,7 +13,7 @@ const AT_S: f64 = 5.0;
 /// Speed below which the robot stands, m/s.
 const STANDS_MPS: f64 = 0.02;
 
-/// Returns a ride after a person who walks ahead along a room, with a fault in its middle.
+/// Returns a ride after a person walking ahead along a room, with a fault in its middle.
 fn ride(kind: FaultKind) -> Ride {
     let walk = Variant::default()
         .with("duration_s", 11.0)

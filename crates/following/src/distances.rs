@@ -14,7 +14,7 @@ pub struct SafetyDistances {
     pub stopping_m: f64,
     /// Distance of a thing ahead from the footprint at which a robot at full speed begins to brake, m.
     pub before_things_m: f64,
-    /// Distance from the footprint that a person needs who comes at full speed towards a robot at full
+    /// Distance from the footprint to an approaching person at full speed, for a robot at full
     /// speed (ISO 13855: S = (v_h + v_r) t + v_h v_r / a + v_r² / 2a + C), m.
     pub separation_m: f64,
     /// The same for a robot that has nearly stopped: nearer it stands, m.

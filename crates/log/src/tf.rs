@@ -316,7 +316,7 @@ mod tests {
         assert_eq!([age("base", 10.05), age("camera", 10.05)], [0.0, 0.0]);
         assert!((age("camera", 10.4) - 0.3).abs() < 1e-6);
         assert_eq!(age("elsewhere", 10.0), f64::INFINITY);
-        // What never moves is no reading of a motion.
+        // A transform that never moves is no reading of a motion.
         assert_eq!(tf.age_s("base", "camera", at(10.0)), f64::INFINITY);
         tf.insert(&link("odom", "base", 20.0, pose(9.0, 0.0)), false);
         assert!((tf.age_s("odom", "base", at(10.2)) - 0.1).abs() < 1e-6);

@@ -19,7 +19,7 @@ pub(super) fn take_enable(switch: &SwitchHandle, gate: &Gate, origin: Option<Ori
         // Too old to move the robot, but no release of the button either.
         Err(Unfit::Untimely(age_s)) => Duration::try_from_secs_f64(age_s).unwrap_or(Duration::MAX),
     };
-    // What was published before the switch was there says nothing to it, nor does the future.
+    // A message from before the switch was there says nothing to it, nor does one from the future.
     if let Some(published) = now.checked_sub(age) {
         switch.take(Enable::On, published);
     }

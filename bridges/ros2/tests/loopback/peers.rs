@@ -344,7 +344,7 @@ pub(crate) struct Robot {
     pub(crate) epoch: Stamp,
     /// True once the calibration is another one.
     pub(crate) zoomed: Arc<AtomicBool>,
-    /// What the camera repeats.
+    /// Images that the camera repeats.
     pub(crate) repeats: Arc<Mutex<Repeats>>,
 }
 

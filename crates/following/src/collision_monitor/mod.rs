@@ -375,9 +375,9 @@ impl People<'_> {
         }
         match presence {
             Presence::Stands => HazardKind::Still,
-            // A person who comes into view is seen to move in the next frame.
+            // A person in a new place is seen to move in the next frame.
             Presence::New => HazardKind::Still,
-            // A person who came and stands, for example, may walk on.
+            // A person that came and stands, for example, may walk on.
             Presence::Parked => HazardKind::Moves(0.0),
             Presence::Appeared => HazardKind::Moves(self.settings.people_mps),
         }

@@ -23,7 +23,7 @@ pub struct CollisionMonitorSettings {
     /// Keeps away from people, and from things that move, so far that the robot stands before they
     /// can reach it; see `people_mps`.
     pub separation: bool,
-    /// Speed of a person who comes nearer, m/s (1.6 in ISO 13855).
+    /// Speed of an approaching person, m/s (1.6 in ISO 13855).
     #[schemars(range(min = 0.5, max = 2.5))]
     pub people_mps: f64,
     /// Acceleration with which a person may begin to come nearer, m/s².

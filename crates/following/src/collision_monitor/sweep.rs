@@ -1,5 +1,5 @@
 //! Speed at which a path is free: the area that the robot sweeps until it stands, against obstacles
-//! that stand still and people who may come nearer meanwhile.
+//! that stand still and people that may come nearer meanwhile.
 //!
 //! For a robot of speed v that reacts after t and brakes with a, the way until it stands is
 //! `L = v t + v²/2a` and the time `T = t + v/a`. An obstacle that stands is cleared if the robot stops
@@ -41,7 +41,7 @@ pub(crate) enum HazardKind {
     Still,
     /// It comes nearer at this speed now, m/s, and may speed up to that of a person.
     Moves(f64),
-    /// It is the followed person, who comes nearer at this speed, m/s.
+    /// It is the followed person, approaching at this speed, m/s.
     Followed(f64),
 }
 
@@ -110,7 +110,7 @@ impl Allowance {
     }
 }
 
-/// Returns the distance, m, by which a person who comes nearer at `closing_mps` may be nearer after
+/// Returns the distance, m, by which a person approaching at `closing_mps` may be nearer after
 /// `time_s`: they speed up to `people_mps` by `people_accel_mps2`.
 pub(crate) fn reach_m(settings: &CollisionMonitorSettings, closing_mps: f64, time_s: f64) -> f64 {
     let fastest = settings.people_mps;

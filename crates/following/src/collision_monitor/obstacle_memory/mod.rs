@@ -70,7 +70,7 @@ pub(crate) struct ObstacleMemory {
 pub(super) struct Remembered {
     /// Place in the robot frame, m.
     pub(super) at: Point2<f64>,
-    /// True for a person, who may have walked on.
+    /// True for a person, which may have walked on.
     pub(super) is_person: bool,
     /// True for a place without a floor.
     pub(super) is_drop: bool,
