@@ -221,17 +221,6 @@ fn start(
     Ok(None)
 }
 
-/// Returns the data that a controller may need and that has arrived.
-fn sources(source: &LiveSource) -> Sources {
-    let facts = source.facts();
-    Sources {
-        depth: facts.depth_topic.is_some(),
-        right: facts.right_topic.is_some(),
-        laser: facts.laser_topic.is_some(),
-        odometry: source.has_odometry(),
-    }
-}
-
 /// A pipeline between input and output topics.
 struct Bridge {
     network: Network,

@@ -312,16 +312,6 @@ impl Simulation {
         self.injector.robot_clock_ns(at_ns)
     }
 
-    /// The robot's forward speed over ground, m/s.
-    pub fn speed_mps(&self) -> f64 {
-        self.robot.speed_mps()
-    }
-
-    /// The robot's turn rate, rad/s.
-    pub fn turn_rate(&self) -> f64 {
-        self.robot.turn_rate()
-    }
-
     /// The next thing that the robot records; `None` at the end of the scene.
     pub fn next_event(&mut self) -> Option<Event> {
         let end_ns = (self.scene.duration_s * 1e9) as u64;

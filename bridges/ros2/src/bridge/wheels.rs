@@ -90,3 +90,14 @@ pub(super) fn twist(WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> Tw
     twist.angular.z = 0.5 * (right - left) / half_m;
     twist
 }
+
+/// Returns the data that a controller may need and that has arrived.
+pub(super) fn sources(source: &LiveSource) -> Sources {
+    let facts = source.facts();
+    Sources {
+        depth: facts.depth_topic.is_some(),
+        right: facts.right_topic.is_some(),
+        laser: facts.laser_topic.is_some(),
+        odometry: source.has_odometry(),
+    }
+}

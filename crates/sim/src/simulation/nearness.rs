@@ -143,4 +143,14 @@ impl Simulation {
             body.carry(approacher.place, approacher.heading_rad, speed_mps, dt);
         }
     }
+
+    /// The robot's forward speed over ground, m/s.
+    pub fn speed_mps(&self) -> f64 {
+        self.robot.speed_mps()
+    }
+
+    /// The robot's turn rate, rad/s.
+    pub fn turn_rate(&self) -> f64 {
+        self.robot.turn_rate()
+    }
 }
