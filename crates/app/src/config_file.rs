@@ -43,6 +43,7 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "follow-as-printed"
     "follow-arc"
     "follow-depth"
+    "follow-depth-near"
     "follow-low"
     "follow-sonar"
     "joint-particle"
