@@ -35,6 +35,7 @@
 //! | `track: ...` | a track, by the reason for which it ended |
 
 mod appearance;
+mod builder;
 mod config;
 mod pipeline;
 mod preprocessors;
@@ -45,9 +46,12 @@ mod sources;
 mod tests;
 
 pub use appearance::AppearanceSettings;
+pub use builder::PipelineBuilder;
+#[cfg(feature = "plugins")]
+pub use builder::{builtin_registry, register_plugins};
 pub use config::{
-    DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, ReadBase, RunSettings, Suits, Tunable,
-    check_tuning, flattened, flattened_with, with_values,
+    BuildError, ConfigSource, DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, ResolvedConfig, Suits,
+    Tunable, flattened, with_values,
 };
 pub use pipeline::Pipeline;
 pub use report::FrameReport;
