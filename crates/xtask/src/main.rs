@@ -6,6 +6,7 @@ mod faults;
 mod markdown;
 mod metadata;
 mod new_plugin;
+mod package;
 mod program;
 mod record;
 mod rehearse;
@@ -73,6 +74,13 @@ enum Command {
         #[arg(long, default_value = "tagalong-cli")]
         package: String,
     },
+    /// Packages every crate, and checks the examples of the library in a crate outside of this
+    /// repository that has nothing but the packages
+    Package {
+        /// Build and run the examples, too: some minutes.
+        #[arg(long)]
+        run: bool,
+    },
     /// Runs everything that the server runs (`.ci/run`)
     Ci,
 }
@@ -122,6 +130,7 @@ fn run(command: Command) -> Result<()> {
         Command::Sbom { file, folder, package } => {
             workspace.write(file, &sbom::sbom(&workspace, &folder, &package)?)
         }
+        Command::Package { run } => package::try_out(&workspace, run),
         Command::Ci => ci::ci(&workspace),
     }
 }
