@@ -35,8 +35,9 @@ Examples:
   tagalong demo
   tagalong run configs/depth-ekf.toml robot.mcap --overlay
 
-Results go to stdout, talk goes to stderr. Exit codes: 0 ok, 1 failed, 2 wrong usage or config, 3
-finished but part of the log was lost or the doctor found something bad, 130 and 143 stopped by a signal (the files are valid).";
+Results go to stdout, log messages to stderr. Exit codes: 0 ok; 1 failed; 2 wrong usage or config; 3
+finished, but part of the log was lost or `doctor` found a defect; 130 and 143 stopped by a signal (the
+files are valid).";
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]
