@@ -100,7 +100,7 @@ fn a_person_who_is_long_gone_or_far_away_gets_a_new_number() {
         scene.show(1, &red, &[]);
         let returned = track(2, y_m, 1.6);
         let region = returned.estimate.region;
-        assert_eq!(region.clipped(320, 240), region, "the person is whole in the image");
+        assert!(region.x > 0.0 && region.right() < 320.0, "the person is whole in the image");
         assert_eq!(scene.show(1, &red, &[returned]), [number], "to {y_m} m in a fifth of a second");
     }
 }
