@@ -10,7 +10,6 @@ mod package;
 mod program;
 mod record;
 mod rehearse;
-mod sbom;
 mod tidy;
 mod try_out;
 mod walk_through;
@@ -62,17 +61,6 @@ enum Command {
         /// A built program to record, instead of this workspace's.
         #[arg(long)]
         program: Option<PathBuf>,
-    },
-    /// Writes the parts list (SBOM) of a program, CycloneDX in JSON
-    Sbom {
-        /// The file to write.
-        file: PathBuf,
-        /// Folder of the workspace, for example `bridges/python`.
-        #[arg(long, default_value = ".")]
-        folder: PathBuf,
-        /// The package whose parts are listed.
-        #[arg(long, default_value = "tagalong-cli")]
-        package: String,
     },
     /// Packages every crate, and checks the examples of the library in a crate outside of this
     /// repository that has nothing but the packages
@@ -127,9 +115,6 @@ fn run(command: Command) -> Result<()> {
         Command::Tidy => tidy::tidy(&workspace),
         Command::Record { file, program } => record::record(&workspace, &file, program),
         Command::Rehearse => rehearse::rehearse(&workspace),
-        Command::Sbom { file, folder, package } => {
-            workspace.write(file, &sbom::sbom(&workspace, &folder, &package)?)
-        }
         Command::Package { run } => package::try_out(&workspace, run),
         Command::Ci => ci::ci(&workspace),
     }

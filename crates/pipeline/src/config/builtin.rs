@@ -55,7 +55,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "rgbd-faces"
     "rgbd-follow"
     "rgbd-kalman"
-    "rgbd-mosse"
     "rgbd-upper-bodies"
     "stereo-ekf"
     "stereo-ekf-as-printed"

@@ -150,7 +150,7 @@ fn too_long_and_too_deep_configs_are_refused() {
     assert!(build(&format!("input{} = 1\n{PLAIN}", ".a".repeat(50_000))).is_err());
 }
 
-#[derive(Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct Input {
     /// A topic.
