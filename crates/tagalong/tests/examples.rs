@@ -51,7 +51,7 @@ fn the_examples_find_the_people() {
     let driven = run("follow");
     assert!(driven.iter().any(|line| line.starts_with("track ")), "{driven:?}");
     let person = run("own_arrays");
-    assert!(person.last().is_some_and(|line| line.contains("1 at 2.")), "{person:?}");
+    assert!(person.last().is_some_and(|line| line.contains(" 1 at 3.0")), "{person:?}");
     let nearest = run("own_detector");
     assert!(nearest.last().is_some_and(|line| line.contains(" 1 at 2.")), "{nearest:?}");
 }
@@ -79,7 +79,7 @@ fn the_input_of_the_config_reaches_the_reader() {
     assert!(shown.contains("/none") && shown.contains("present:"), "{shown}");
     let shown = frames("depth_topik = \"/none\"").unwrap_err().to_string();
     assert!(shown.contains("config.toml:3:1: ") && shown.contains("`depth_topic`"), "{shown}");
-    let shown = frames("depth_topic = \"/camera/color/image_raw\"").unwrap_err().to_string();
+    let shown = frames("depth_topic = \"/camera/color/camera_info\"").unwrap_err().to_string();
     assert!(shown.contains("config.toml:3:15: "), "the line of a topic of a wrong kind: {shown}");
 }
 
