@@ -446,10 +446,12 @@ impl CommandLimiter {
         if speed <= cap.min(self.allowed_mps) {
             return (wanted, reason, false);
         }
-        let why = match () {
-            () if self.allowed_mps < cap => Reason::Limited,
-            () if is_late => Reason::Slow,
-            () => wish.aim.reason(),
+        let why = if self.allowed_mps < cap {
+            Reason::Limited
+        } else if is_late {
+            Reason::Slow
+        } else {
+            wish.aim.reason()
         };
         let cap = cap.min(self.allowed_mps);
         (wanted.scaled(cap / speed), why, true)
@@ -464,10 +466,8 @@ impl CommandLimiter {
             .wheels
             .twist(WheelSpeeds { left: wheels.left * scale, right: wheels.right * scale });
         let twist = self.wheels.twist(self.in_reach(twist));
-        let twist = match self.settings.reverse {
-            false if twist.linear_mps < 0.0 => Twist { linear_mps: 0.0, ..twist },
-            _ => twist,
-        };
+        let is_refused = twist.linear_mps < 0.0 && !self.settings.reverse;
+        let twist = if is_refused { Twist { linear_mps: 0.0, ..twist } } else { twist };
         let limit = self.settings.max_turn_radps;
         // Forward speed and turn rate shrink by the same factor, which keeps the curvature.
         let mut slower = twist.scaled(limit / twist.angular_rps.abs().max(limit));
@@ -505,9 +505,10 @@ impl CommandLimiter {
         let forward = before.forward.track(target, dt, &self.forward_limits(), target.abs());
         // A robot that stops stays on the arc that it drives.
         let arc = if wanted == Twist::STOP { before.twist() } else { wanted };
-        let turn = match arc.linear_mps.abs() > STILL_MPS {
-            true => arc.angular_rps * (forward.speed / arc.linear_mps).clamp(0.0, 1.0),
-            false => wanted.angular_rps,
+        let turn = if arc.linear_mps.abs() > STILL_MPS {
+            arc.angular_rps * (forward.speed / arc.linear_mps).clamp(0.0, 1.0)
+        } else {
+            wanted.angular_rps
         };
         Motion { forward, turn: self.turned(before, turn, &forward, dt) }
     }
@@ -522,9 +523,10 @@ impl CommandLimiter {
         }
         // Steered wheels turn no faster than they roll, however suddenly they slow down.
         let most = self.robot.turn_at(forward.speed);
-        match turn.speed.abs() <= most {
-            true => turn,
-            false => Axis { speed: most.copysign(turn.speed), accel: 0.0 },
+        if turn.speed.abs() <= most {
+            turn
+        } else {
+            Axis { speed: most.copysign(turn.speed), accel: 0.0 }
         }
     }
 
