@@ -73,7 +73,7 @@ fn t8_images_that_cease_come_again_or_come_late_stop_the_robot() {
 #[test]
 fn t8_a_scanner_that_freezes_falls_silent_or_says_nothing_ahead_stops_the_robot() {
     assert_stands(FaultKind::FreezeLaser, 1.0, &[Reason::Frozen]);
-    assert_stands(FaultKind::DropLaser, 1.3, &[Reason::Blind]);
+    assert_stands(FaultKind::DropLaser, 1.3, &[Reason::Silent]);
     assert_stands(FaultKind::LaserInvalid, 1.2, &[Reason::Unknown, Reason::Frozen]);
     assert_stands(FaultKind::LaserNear, 1.2, &[Reason::Unknown, Reason::Blocked]);
 }

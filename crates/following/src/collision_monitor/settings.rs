@@ -69,8 +69,8 @@ pub struct CollisionMonitorSettings {
     /// region, or "free" for a scanner that misses nothing within its range, alone in rooms that are
     /// larger than that.
     pub no_return: NoReturn,
-    /// Number of frames in a row with the very same depth image, or the same scan, after which the
-    /// sensor counts as frozen: real ones have noise.
+    /// Number of new depth images or scans in a row that repeat the one before, after which the sensor
+    /// counts as frozen: real ones have noise. One that comes with several frames is new once.
     #[schemars(range(min = 2, max = 100))]
     pub identical_frames: u32,
     /// The sensors are simulated without noise: equal images are not taken to be frozen.
