@@ -14,6 +14,7 @@
 //! | `space` | places that were seen free: a thing that appears there moves |
 //! | `sweep` | speed on a path before things and beside people |
 //! | `coverage` | share of valid readings in the swept region: unknown is not free |
+//! | `zones` | stop and slowdown polygons |
 //! | `watchdog` | sensors that repeat themselves or contradict the odometry |
 
 mod binned;
@@ -30,6 +31,7 @@ mod sources;
 mod space;
 mod sweep;
 mod watchdog;
+mod zones;
 
 use binned::BinnedHazards;
 use coverage::Coverage;
@@ -48,6 +50,7 @@ use sweep::{Hazard, HazardKind, allowance};
 use tagalong_core::{
     CameraImage, DepthImage, EgoMotion, Frame, ObstacleReadings, Reason, Track, TrackId,
 };
+use zones::Zones;
 
 use crate::RobotSettings;
 
@@ -77,6 +80,7 @@ pub(crate) struct CollisionMonitor {
     laser_age: Freshness,
     sources: Vec<FurtherSource>,
     hazards: BinnedHazards,
+    zones: Zones,
     coverages: Vec<Coverage>,
 }
 
@@ -91,6 +95,7 @@ impl CollisionMonitor {
             laser_age: Freshness::default(),
             sources: sources.map(|source| FurtherSource::new(source, &footprint)).collect(),
             hazards: BinnedHazards::default(),
+            zones: Zones::new(&settings),
             coverages: Vec::new(),
             footprint,
             settings,
@@ -146,6 +151,7 @@ impl CollisionMonitor {
             self.coverages.extend(source.coverage());
         }
         people.add_to(hazards);
+        self.zones.update(hazards.all());
     }
 
     fn update_depth(
@@ -192,7 +198,18 @@ impl CollisionMonitor {
         if !self.has_eyes() || self.is_blind() {
             return Some(Reason::Blind);
         }
-        self.is_frozen().then_some(Reason::Frozen)
+        if self.is_frozen() {
+            return Some(Reason::Frozen);
+        }
+        self.zones.stop_reason()
+    }
+
+    /// Returns the factor of the speed, and its reason, if something is in the slowdown polygon.
+    pub(crate) fn slowdown(&self) -> Option<(f64, Reason)> {
+        if self.settings.obstacles == ObstacleSource::None {
+            return None;
+        }
+        Some((self.settings.slowdown_ratio, self.zones.slowdown_reason()?))
     }
 
     /// Returns true if a sensor that once delivered, or a configured source, is silent.

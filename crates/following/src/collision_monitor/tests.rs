@@ -480,4 +480,33 @@ fn a_jump_of_the_clock_does_not_forget_which_sensors_there_were() {
     assert_eq!(monitor.stop_reason(0.5), Some(Reason::Silent));
 }
 
+/// A wall is 4 m away; a scan meets something at 0.9 m.
+#[test]
+fn something_in_a_polygon_stops_or_slows_the_robot() {
+    let square = |side_m: f64| {
+        vec![[side_m, side_m], [side_m, -side_m], [-side_m, -side_m], [-side_m, side_m]]
+    };
+    let settings = CollisionMonitorSettings {
+        stop: square(0.5),
+        slowdown: square(1.0),
+        ..CollisionMonitorSettings::default()
+    };
+    for (met_m, stop, slowdown) in [
+        (None, None, None),
+        (Some(0.9), None, Some((0.5, Reason::Obstacle))),
+        (Some(0.4), Some(Reason::Blocked), Some((0.5, Reason::Obstacle))),
+    ] {
+        let mut monitor = monitor_of(settings.clone());
+        for index in 0..20 {
+            // Beside the robot.
+            let thing = |deg: i32| met_m.filter(|_| (86..95).contains(&deg));
+            let scan = scan_at(index, 0.0, 0.0, thing);
+            let frame = frame(index, EgoMotion::at_rest(0.1), None, Some(scan));
+            monitor.update(&frame, &frame.motion, &[], None);
+        }
+        assert_eq!(monitor.stop_reason(0.5), stop, "{met_m:?}");
+        assert_eq!(monitor.slowdown(), slowdown, "{met_m:?}");
+    }
+}
+
 mod slow_sensors;

@@ -46,6 +46,8 @@ pub(crate) struct Wish {
     pub(crate) aim: Aim,
     /// Reason for which the sensors do not let the robot move, if there is one.
     pub(crate) stop: Option<Reason>,
+    /// Factor of the speed that the sensors allow, with its reason, if it is limited.
+    pub(crate) slowdown: Option<(f64, Reason)>,
     /// True if enough frames came since the start or a jump.
     pub(crate) settled: bool,
     /// Time since the previous frame, s.
@@ -435,6 +437,10 @@ impl CommandLimiter {
         }
         let (wanted, as_wished) = self.within_drive(wish.wheels);
         let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
+        let (wanted, reason) = match wish.slowdown {
+            Some((ratio, why)) => (wanted.scaled(ratio), why),
+            None => (wanted, reason),
+        };
         let is_late = wish.pause_s > self.settings.slow_after_s
             || self.is_odometry_old
             || self.reaction_s > self.settings.reaction_s;
@@ -444,7 +450,7 @@ impl CommandLimiter {
         let cap = cap * (self.settings.reaction_s / self.reaction_s).min(1.0);
         let speed = wanted.linear_mps.abs();
         if speed <= cap.min(self.allowed_mps) {
-            return (wanted, reason, false);
+            return (wanted, reason, wish.slowdown.is_some());
         }
         let why = if self.allowed_mps < cap {
             Reason::Limited
