@@ -261,6 +261,9 @@ impl CommandLimiter {
                 }
             }
             Response::NotObeyed => self.latch("the base does not move as it is commanded"),
+            Response::Still => {
+                self.latch("the odometry stands still while the robot is commanded to move");
+            }
         }
     }
 
