@@ -8,31 +8,31 @@ use std::time::{Duration, Instant};
 
 use ros2_client::Publisher;
 use tagalong_config::Registry;
-use tagalong_core::{Stamp, WheelSpeeds};
+use tagalong_core::Stamp;
 use tagalong_live::Live;
 use tagalong_log::msgs::{
-    Detection3DArray, Header, PoseStamped, StringMsg, Twist as TwistMessage, TwistStamped,
+    Detection3DArray, Header, PoseStamped, StringMsg,
 };
 use tagalong_log::write::{self, FrameRecord};
 use tagalong_log::{Input, Listening, LiveSource, LogFrame};
-use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, Sources};
+use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline};
 
 use crate::diagnostics::{Diagnostics, Status};
 use crate::http::HttpServer;
 use crate::inbox::{Arrival, Inbox, Traffic};
 use crate::messages::SpeedLimit;
 use crate::network::{Ear, Network};
-use crate::options::{CommandType, Setup};
-use crate::publishers::{Gate, Origin, Unfit};
+use crate::options::Setup;
+use crate::publishers::{Gate, Origin};
 use crate::services;
 use crate::skill::{Desk, Request, Verb};
 use crate::stamps::{StampClock, system_time};
-use crate::wheels::{CommandCounts, SwitchHandle, Wheels};
+use crate::wheels::{CommandCounts, Wheels};
 use crate::{BridgeError, Options};
 
 mod wheels;
 
-use wheels::*;
+use wheels::{drive, sources, take_enable, tell_untimely};
 
 /// Longest wait for messages before the stop flag is checked.
 const TURN: Duration = Duration::from_millis(50);
