@@ -4,7 +4,6 @@
 
 use std::f64::consts::PI;
 use std::hint::black_box;
-use std::path::Path;
 use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -78,8 +77,7 @@ fn frames(c: &mut Criterion) {
     });
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let (mut pipeline, _) =
-        Pipeline::from_toml(CONFIG, Path::new("."), &registry).expect("shipped config");
+    let mut pipeline = Pipeline::builder(&registry).from_toml(CONFIG).expect("shipped config");
     let mut index = 0;
     c.bench_function("depth-ekf, whole frame, 640x480, 4 people", |b| {
         b.iter(|| {

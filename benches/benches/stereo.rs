@@ -5,7 +5,6 @@
 #![allow(clippy::print_stdout, reason = "the shares of the stages are for whoever runs it")]
 
 use std::hint::black_box;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -147,8 +146,8 @@ impl Bench {
         stereo.insert("threads".into(), 1.into());
         let controller = toml::Table::from_iter([("plugin".to_owned(), "arc-follow".into())]);
         config.insert("controller".into(), controller.into());
-        let (pipeline, _) = Pipeline::from_toml(&config.to_string(), Path::new("."), &registry)
-            .expect("a shipped config");
+        let pipeline =
+            Pipeline::builder(&registry).from_toml(&config.to_string()).expect("a shipped config");
         Self { pipeline, camera, images, index: 0 }
     }
 

@@ -3,7 +3,6 @@
 #![allow(clippy::expect_used, missing_docs, reason = "a broken test or bench may stop loudly")]
 
 use std::hint::black_box;
-use std::path::Path;
 use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -88,7 +87,8 @@ fn boxes(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(frames.len() as u64));
     group.bench_function("200 frames", |bencher| {
         bencher.iter(|| {
-            let (mut pipeline, _) = Pipeline::from_toml(RECORDED, Path::new("."), &registry)
+            let mut pipeline = Pipeline::builder(&registry)
+                .from_toml(RECORDED)
                 .expect("the shipped config is right");
             for frame in &frames {
                 black_box(pipeline.step(frame).expect("nothing can fail"));

@@ -14,7 +14,7 @@ use std::path::Path;
 use cpu_time::ThreadTime;
 use tagalong_config::Registry;
 use tagalong_log::FrameSource;
-use tagalong_pipeline::{FrameReport, Options, Pipeline};
+use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_stats::percentile;
 
 const RUNS: usize = 5;
@@ -48,12 +48,9 @@ fn least(before: Vec<Timed>, now: Vec<Timed>) -> Vec<Timed> {
 }
 
 fn run(log: &str, config: &str, registry: &Registry) -> Result<Vec<Timed>, Box<dyn Error>> {
-    let text = std::fs::read_to_string(config)?;
-    let folder = Path::new(config).parent().unwrap_or(Path::new(""));
-    let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();
-    let options = Options { foreign, threads: Some(1), ..Options::default() };
-    let (mut pipeline, settings) = Pipeline::from_toml_with(&text, folder, registry, &options)?;
-    let (input, limits) = (settings.table("input")?, settings.table("limits")?);
+    let mut pipeline = Pipeline::builder(registry).threads(1).from_toml_file(config)?;
+    let input = pipeline.config().table("input")?;
+    let limits = pipeline.config().table("limits")?;
     let mut source = FrameSource::open(Path::new(log), &input, &limits, pipeline.inputs())?;
     let mut frames = Vec::new();
     while let Some(item) = source.next_frame() {

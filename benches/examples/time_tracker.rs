@@ -6,7 +6,6 @@
 //! ```
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
 
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -80,8 +79,8 @@ fn median_us(people: usize) -> f64 {
          [filter]\nplugin = 'ekf'\n[associator]\nplugin = 'associate-hungarian'\n\
          [manager]\nplugin = 'manage-sprt'\n"
     );
-    let (mut pipeline, _) =
-        Pipeline::from_toml(&config, Path::new("."), &registry).expect("the config is right");
+    let mut pipeline =
+        Pipeline::builder(&registry).from_toml(&config).expect("the config is right");
     let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.5, 0.0, 0.0));
     let mut times = Vec::new();

@@ -6,9 +6,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use tagalong_config::{ConfigError, Registry};
+use tagalong_config::Registry;
 use tagalong_log::{InputSettings, Limits};
-use tagalong_pipeline::{Pipeline, RunSettings};
+use tagalong_pipeline::{BuildError, Pipeline};
 
 const GOOD: &str = r#"seed = 3
 
@@ -29,15 +29,15 @@ gate_m = 1.0
 confirm_hits = 3
 "#;
 
-fn build(text: &str) -> Result<RunSettings, ConfigError> {
+fn build(text: &str) -> Result<Pipeline, BuildError> {
     build_in(Path::new("."), text)
 }
 
 /// Builds a config that refers to files beside the configs of this folder.
-fn build_in(folder: &Path, text: &str) -> Result<RunSettings, ConfigError> {
+fn build_in(folder: &Path, text: &str) -> Result<Pipeline, BuildError> {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    Pipeline::from_toml(text, folder, &registry).map(|(_, run)| run)
+    Pipeline::builder(&registry).folder(folder).from_toml(text)
 }
 
 /// Returns the message for `GOOD` with `from` replaced by `to`.
@@ -46,7 +46,7 @@ fn message(from: &str, to: &str) -> String {
     let text = GOOD.replacen(from, to, 1);
     match build(&text) {
         Ok(_) => panic!("accepted: {from:?} -> {to:?}"),
-        Err(error) => error.render("my.toml", &text),
+        Err(error) => error.to_string(),
     }
 }
 
@@ -102,7 +102,7 @@ fn a_method_that_was_removed_from_the_config_is_gone() {
     let removed = GOOD.replace("config = { max_depth_m = 5.0 }\n", "");
     let filterless = removed.replace("roles = [\"track\", \"discover\"]", "roles = [\"discover\"]");
     build(&filterless).unwrap();
-    let message = build("[filter]\nplugin = \"ekf\"\n").err().map(|error| error.message);
+    let message = build("[filter]\nplugin = \"ekf\"\n").err().map(|error| error.to_string());
     assert!(message.as_ref().is_some_and(|m| m.contains("detector")), "{message:?}");
 }
 
@@ -123,13 +123,12 @@ fn every_shipped_config_builds() {
     assert!(!shipped().is_empty());
     for path in shipped() {
         let text = fs::read_to_string(&path).unwrap();
-        let name = path.display().to_string();
-        let tables = build_in(path.parent().unwrap(), &text).and_then(|run| {
-            run.table::<InputSettings>("input")?;
-            run.table::<Limits>("limits")
+        let tables = build_in(path.parent().unwrap(), &text).and_then(|pipeline| {
+            pipeline.config().table::<InputSettings>("input")?;
+            pipeline.config().table::<Limits>("limits")
         });
         if let Err(error) = tables {
-            panic!("{}", error.render(&name, &text));
+            panic!("{}: {error}", path.display());
         }
     }
 }

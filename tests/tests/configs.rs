@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use tagalong_config::Registry;
-use tagalong_pipeline::{Options, Pipeline};
+use tagalong_pipeline::Pipeline;
 use toml::{Table, Value};
 
 fn folder() -> PathBuf {
@@ -21,10 +21,8 @@ fn configs() -> Vec<(String, String)> {
 }
 
 fn resolved(registry: &Registry, text: &str) -> Option<String> {
-    let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();
-    let options = Options { foreign, seed: None, threads: None };
-    let built = Pipeline::from_toml_with(text, &folder(), registry, &options);
-    built.ok().map(|(pipeline, _)| pipeline.resolved())
+    let built = Pipeline::builder(registry).folder(folder()).from_toml(text);
+    built.ok().map(|pipeline| pipeline.config().to_toml().to_owned())
 }
 
 /// Adds the paths of all values that are no tables.

@@ -36,7 +36,7 @@ fn pipeline(config: &str) -> Pipeline {
     tagalong_catalog::register(&mut registry);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let text = std::fs::read_to_string(folder.join(config)).unwrap();
-    Pipeline::from_toml(&text, &folder, &registry).unwrap().0
+    Pipeline::builder(&registry).folder(&folder).from_toml(&text).unwrap()
 }
 
 fn at(index: usize) -> Stamp {

@@ -51,7 +51,7 @@ fn pipeline() -> Pipeline {
     tagalong_catalog::register(&mut registry);
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let text = std::fs::read_to_string(configs.join("depth-ekf-follow.toml")).unwrap();
-    Pipeline::from_toml(&text, &configs, &registry).unwrap().0
+    Pipeline::builder(&registry).folder(&configs).from_toml(&text).unwrap()
 }
 
 /// One frame of the run.

@@ -27,7 +27,7 @@ fn pipeline() -> Pipeline {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     registry.detector("legs", "pairs of legs", |legs: Legs, _| Ok(legs));
-    Pipeline::from_toml(CONFIG, Path::new("."), &registry).unwrap().0
+    Pipeline::builder(&registry).from_toml(CONFIG).unwrap()
 }
 
 /// The wheelchair drives 110 m by the odometry of the log, and people beside it are tracked
@@ -77,7 +77,7 @@ const LEGS: &str = "[[detectors]]\nplugin = \"laser-legs\"\n[filter]\nplugin = \
 fn people_at_rest_stay_at_rest_while_the_robot_drives() {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let (mut pipeline, _) = Pipeline::from_toml(LEGS, Path::new("."), &registry).unwrap();
+    let mut pipeline = Pipeline::builder(&registry).from_toml(LEGS).unwrap();
     let Some(mut source) = source("laser/laser-moving.mcap", &pipeline) else { return };
     let truth = tagalong_testdata::find("laser/laser-moving.people-floor.csv").unwrap();
     let rows = floor::parse(&std::fs::read_to_string(truth).unwrap(), "truth").unwrap();
@@ -124,7 +124,7 @@ fn a_person_who_stands_still_starts_a_track() {
     let text = std::fs::read_to_string(configs.join("laser-follow.toml")).unwrap();
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
+    let mut pipeline = Pipeline::builder(&registry).folder(&configs).from_toml(&text).unwrap();
     let Some(mut source) = source("laser/laser-following.mcap", &pipeline) else { return };
     let truth = tagalong_testdata::find("laser/laser-following.people-floor.csv").unwrap();
     let rows = floor::parse(&std::fs::read_to_string(truth).unwrap(), "truth").unwrap();

@@ -71,8 +71,8 @@ fn run(follower: bool) -> Vec<FrameReport> {
     tagalong_catalog::register(&mut registry);
     let models = root().join("crates/network/tests/models");
     let text = config(follower);
-    let built = Pipeline::from_toml(&text, &models, &registry);
-    let (mut pipeline, _) = built.map_err(|error| error.render("onnx.toml", &text)).unwrap();
+    let built = Pipeline::builder(&registry).folder(&models).from_toml(&text);
+    let mut pipeline = built.unwrap();
     (0..FRAMES).map(|index| pipeline.step(&frame(index)).unwrap()).collect()
 }
 

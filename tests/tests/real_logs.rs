@@ -34,7 +34,7 @@ fn run(path: &Path, config: &str) -> Run {
     let text = std::fs::read_to_string(configs.join(format!("{config}.toml"))).unwrap();
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
+    let mut pipeline = Pipeline::builder(&registry).folder(&configs).from_toml(&text).unwrap();
     let mut source =
         FrameSource::open(path, &InputSettings::default(), &Limits::default(), pipeline.inputs())
             .unwrap();

@@ -26,7 +26,7 @@ fn reports() -> Option<Vec<FrameReport>> {
     let text = format!("robot.odometry = \"none\"\n{text}");
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let (mut pipeline, _) = Pipeline::from_toml(&text, &configs, &registry).unwrap();
+    let mut pipeline = Pipeline::builder(&registry).folder(&configs).from_toml(&text).unwrap();
     let inputs = Inputs::ANY.require(Input::Colour).require(Input::Right);
     let mut source =
         FrameSource::open(&path, &InputSettings::default(), &Limits::default(), inputs).unwrap();

@@ -11,7 +11,7 @@ use numpy::{
 };
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use tagalong_core::{DepthImage, GreyImage, Images, RgbImage, planar_pose};
+use tagalong::core::{DepthImage, GreyImage, Images, RgbImage, planar_pose};
 
 use crate::errors::wrong;
 
@@ -196,7 +196,7 @@ pub fn of_rgb<'py>(py: Python<'py>, image: &RgbImage) -> PyResult<Bound<'py, PyA
 /// Returns an image of one channel as rows x columns.
 pub fn of_plane<'py, T: numpy::Element + Copy>(
     py: Python<'py>,
-    image: &tagalong_core::Image<T>,
+    image: &tagalong::core::Image<T>,
 ) -> PyResult<Bound<'py, PyArray2<T>>> {
     image.pixels().to_pyarray(py).reshape([image.height(), image.width()])
 }

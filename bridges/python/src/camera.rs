@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
+use tagalong::geometry::{Camera, Distortion, Lens, Pinhole};
 
 use crate::arrays;
 use crate::errors::wrong;
@@ -103,11 +102,6 @@ impl PyCamera {
         let focal = self.0.focal_px();
         format!("Camera({width} x {height}, focal {focal:.1} px, {:.3} m high)", at.z)
     }
-}
-
-/// Returns a placeholder for frames of a laser scan alone.
-pub fn blind() -> Arc<Camera> {
-    Arc::new(Camera::blind(Isometry3::identity()))
 }
 
 fn check(width: usize, height: usize, lens: &Pinhole) -> PyResult<()> {

@@ -13,7 +13,6 @@ use tagalong_app::signals::Signals;
 use tagalong_cli::{EvalArgs, RunArgs, SimilarityChoice, eval_json, main_from, run_until};
 
 use crate::errors::{failed, raised, wrong};
-use crate::pipeline::registry;
 
 /// Time between two looks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(10);
@@ -26,7 +25,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     let all = [OsString::from("tagalong")].into_iter().chain(arguments);
     let all: Vec<OsString> = all.collect();
-    py.detach(|| main_from(all, tagalong_catalog::register))
+    py.detach(|| main_from(all, tagalong::pipeline::register_plugins))
 }
 
 /// Runs a pipeline over a log and writes the files of `tagalong run`; returns true if part of the
@@ -77,7 +76,8 @@ pub fn run(
 fn interruptible(py: Python<'_>, args: RunArgs) -> PyResult<Outcome> {
     let signals = Signals::default();
     let asked = signals.clone();
-    let running = thread::spawn(move || run_until(&args, &registry(), || Ok(asked)));
+    let running =
+        thread::spawn(move || run_until(&args, &tagalong::builtin_registry(), || Ok(asked)));
     while !running.is_finished() {
         py.detach(|| thread::sleep(LOOK));
         if let Err(interrupt) = py.check_signals() {

@@ -24,7 +24,8 @@ create_exception!(
 const USAGE: u8 = 2;
 
 /// Returns the exception of a failed command.
-pub fn raised(failure: Failure) -> PyErr {
+pub fn raised(failure: impl Into<Failure>) -> PyErr {
+    let failure = failure.into();
     match failure.code {
         USAGE => ConfigError::new_err(failure.message),
         _ => TagalongError::new_err(failure.message),

@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
-use tagalong_app::config_file::{ConfigFile, OuterSettings};
-use tagalong_core::{DepthImage, GreyImage, Input, Inputs, RgbImage};
-use tagalong_log::{FrameSource, LogFrame};
+use tagalong::core::{DepthImage, GreyImage, Input, RgbImage};
+use tagalong::log::{FrameSource, LogFrame};
+use tagalong::{Frames, Log, Pipeline};
 
 use crate::arrays;
 use crate::camera::PyCamera;
@@ -101,29 +101,23 @@ fn of_grey<'py>(py: Python<'py>, image: &GreyImage) -> PyResult<Bound<'py, PyArr
 
 /// Frames of a log, one after the other.
 #[pyclass(name = "Frames", module = "tagalong", frozen)]
-pub struct PyFrames(Mutex<FrameSource>);
+pub struct PyFrames(Mutex<Frames>);
 
 impl PyFrames {
-    /// Opens a log with these settings, for a pipeline with these inputs.
+    /// Opens a log for a pipeline.
     ///
     /// # Errors
-    /// As `FrameSource::open`.
-    pub fn open(
-        py: Python<'_>,
-        log: &Path,
-        config: &ConfigFile,
-        outer: &OuterSettings,
-        inputs: Inputs,
-    ) -> PyResult<Self> {
+    /// As `Log::frames_for`.
+    pub fn open(log: &Path, pipeline: &Pipeline) -> tagalong::Result<Self> {
         // Colour is for the caller to look at, whether or not the pipeline uses it.
-        let inputs = inputs.accept(Input::Colour);
-        let source = py.detach(|| FrameSource::open(log, &outer.input, &outer.limits, inputs));
-        let source = source.map_err(|error| raised(config.refusal(error)))?;
-        Ok(Self(Mutex::new(source)))
+        let inputs = pipeline.inputs().accept(Input::Colour);
+        let frames = Log::open(log)?.frames_for(pipeline, inputs)?;
+        // The counters tell of a loss, as in the program.
+        Ok(Self(Mutex::new(frames.accept_loss())))
     }
 
-    fn with<T>(&self, look: impl FnOnce(&mut FrameSource) -> T) -> T {
-        look(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    fn with<T>(&self, look: impl FnOnce(&FrameSource) -> T) -> T {
+        look(self.0.lock().unwrap_or_else(PoisonError::into_inner).source())
     }
 }
 
@@ -134,9 +128,9 @@ impl PyFrames {
     }
 
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<PyFrame>> {
-        let next = py.detach(|| self.0.lock().map(|mut source| source.next_frame()).ok());
+        let next = py.detach(|| self.0.lock().map(|mut frames| frames.next()).ok());
         let next = next.ok_or_else(|| failed("the log reader failed at an earlier frame"))?;
-        Ok(next.map(|frame| PyFrame(Arc::new(frame))))
+        Ok(next.transpose().map_err(raised)?.map(|frame| PyFrame(Arc::new(frame))))
     }
 
     /// Counters so far: messages read, images skipped with their reasons, damage.

@@ -6,15 +6,13 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use nalgebra::Isometry2;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
-use tagalong_app::config_file::ConfigFile;
-use tagalong_config::Registry;
-use tagalong_core::{EgoMotion, Frame, Images, LaserScan, RightImage, Stamp, TrackId};
-use tagalong_geometry::Camera;
-use tagalong_log::odometry::{PoseBuffer, unknown_motion};
-use tagalong_pipeline::{Choice, Enrollment, FrameReport, Pipeline, Sources};
+use tagalong::core::{Images, LaserScan, RightImage, Stamp, TrackId};
+use tagalong::geometry::Camera;
+use tagalong::pipeline::{Choice, Enrollment};
+use tagalong::{ConfigSource, FrameMaker, FrameReport, LogSettings, Pipeline};
 
 use crate::arrays;
-use crate::camera::{PyCamera, blind};
+use crate::camera::PyCamera;
 use crate::errors::{ConfigError, failed, raised, wrong};
 use crate::frames::{PyFrame, PyFrames};
 use crate::report::{PyCommand, PyReport, stamp};
@@ -22,30 +20,26 @@ use crate::report::{PyCommand, PyReport, stamp};
 /// A pipeline: detectors, verifiers, association, filter, and a controller where the config has one.
 #[pyclass(name = "Pipeline", module = "tagalong", frozen)]
 pub struct PyPipeline {
-    config: ConfigFile,
     work: Mutex<Work>,
 }
 
-/// Pipeline with the motion of the robot so far.
+/// Pipeline with the maker of its frames.
 struct Work {
     pipeline: Pipeline,
-    poses: PoseBuffer,
-    /// Stamp and pose of the last processed frame.
-    previous: Option<(Stamp, Isometry2<f64>)>,
-    /// Standard deviation of odometry as a fraction of the travel.
-    odometry_sigma: f64,
-    frames: u64,
+    maker: FrameMaker,
+    /// True before the first frame of arrays, at which the sources of a controller are checked.
+    is_new: bool,
 }
 
 /// Data of one moment.
-struct Moment {
+struct Data {
     index: Option<u64>,
     stamp: Stamp,
-    camera: Arc<Camera>,
+    camera: Option<PyCamera>,
     pose: Option<Isometry2<f64>>,
     images: Images,
     scan: Option<LaserScan>,
-    odometry_age_s: f64,
+    odometry_age_s: Option<f64>,
 }
 
 #[pymethods]
@@ -65,13 +59,8 @@ impl PyPipeline {
         folder: Option<PathBuf>,
         seed: Option<u64>,
     ) -> PyResult<Self> {
-        let config = config(source, folder.as_deref())?;
-        let built = py.detach(|| config.pipeline(&registry(), seed).map(|(pipeline, _)| pipeline));
-        let pipeline = built.map_err(raised)?;
-        let odometry_sigma = config.outer().map_err(raised)?.input.odometry_sigma;
-        let (poses, previous, frames) = (PoseBuffer::default(), None, 0);
-        let work = Mutex::new(Work { pipeline, poses, previous, odometry_sigma, frames });
-        Ok(Self { config, work })
+        let source = config(source, folder.as_deref())?;
+        py.detach(|| Self::build(&source, seed)).map_err(raised)
     }
 
     /// Takes one frame through the pipeline and returns a Report.
@@ -107,7 +96,6 @@ impl PyPipeline {
         colour.map(|array| arrays::add_colour(&mut images, array)).transpose()?;
         images.depth = depth.map(arrays::depth).transpose()?.map(Arc::new);
         images.right = right.map(|array| right_image(array, baseline_m)).transpose()?.map(Arc::new);
-        let camera = fitting(camera, &images)?;
         let scan = scan.map(arrays::points).transpose()?.map(LaserScan::of_points);
         let scan_stamp = scan_stamp.map(self::stamp).transpose()?;
         let scan = match (scan, scan_stamp) {
@@ -116,10 +104,8 @@ impl PyPipeline {
         };
         let pose = pose.map(arrays::pose).transpose()?;
         let stamp = self::stamp(stamp)?;
-        let odometry_age_s = age_of(pose.is_some(), odometry_age_s)?;
-        let camera_of = Arc::clone(&camera);
-        let moment = Moment { index, stamp, camera: camera_of, pose, images, scan, odometry_age_s };
-        let report = py.detach(|| self.work()?.step(moment))?;
+        let data = Data { index, stamp, camera, pose, images, scan, odometry_age_s };
+        let (report, camera) = py.detach(|| self.work()?.step(data))?;
         PyReport::new(py, report, &camera)
     }
 
@@ -127,11 +113,8 @@ impl PyPipeline {
     fn step_frame(&self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyReport> {
         let frame = &frame.0;
         let report = py.detach(|| {
-            let mut work = self.work()?;
-            if frame.odom_jumped {
-                work.pipeline.disarm("odometry jumped");
-            }
-            work.pipeline.step(&frame.frame).map_err(failed)
+            let step = self.work()?.pipeline.step(&**frame);
+            step.map_err(failed)
         })?;
         PyReport::new(py, report, &frame.frame.camera)
     }
@@ -139,12 +122,7 @@ impl PyPipeline {
     /// Opens a log (.mcap, .db3, .bag, or the folder of a recording) for this pipeline, with the
     /// `[input]` of its config, and returns its frames.
     fn frames(&self, py: Python<'_>, log: PathBuf) -> PyResult<PyFrames> {
-        let (inputs, outer) = {
-            let work = self.work()?;
-            let outer = self.config.outer_for(&work.pipeline).map_err(raised)?;
-            (work.pipeline.inputs(), outer)
-        };
-        PyFrames::open(py, &log, &self.config, &outer, inputs)
+        py.detach(|| PyFrames::open(&log, &self.work()?.pipeline).map_err(raised))
     }
 
     /// The command in force at a time (as `stamp` of `step`): the last one until it expires, zero
@@ -195,11 +173,25 @@ impl PyPipeline {
     /// The config with every default filled in, as TOML.
     #[getter]
     fn resolved(&self) -> PyResult<String> {
-        Ok(self.work()?.pipeline.resolved())
+        Ok(self.work()?.pipeline.config().to_toml().to_owned())
     }
 }
 
 impl PyPipeline {
+    /// Builds a pipeline. A mistake in a table for logs is one of the config, so it is told here.
+    fn build(source: &ConfigSource, seed: Option<u64>) -> tagalong::Result<Self> {
+        let registry = tagalong::builtin_registry();
+        let builder = Pipeline::builder(&registry);
+        let builder = match seed {
+            Some(seed) => builder.seed(seed),
+            None => builder,
+        };
+        let pipeline = builder.build(source)?;
+        let sigma = LogSettings::of(&pipeline)?.input.odometry_sigma;
+        let maker = FrameMaker::without_camera().with_odometry_sigma(sigma);
+        Ok(Self { work: Mutex::new(Work { pipeline, maker, is_new: true }) })
+    }
+
     fn work(&self) -> PyResult<MutexGuard<'_, Work>> {
         self.work
             .lock()
@@ -208,89 +200,44 @@ impl PyPipeline {
 }
 
 impl Work {
-    fn step(&mut self, moment: Moment) -> PyResult<FrameReport> {
-        if self.frames == 0 {
-            self.pipeline
-                .check_sources(moment.sources())
-                .map_err(|why| ConfigError::new_err(why.to_string()))?;
+    fn step(&mut self, data: Data) -> PyResult<(FrameReport, Arc<Camera>)> {
+        let mut moment = self.maker.at(data.stamp).images(data.images);
+        if let Some(camera) = data.camera {
+            moment = moment.camera(camera.0);
         }
-        let stamp = moment.stamp;
-        let here = moment.pose.unwrap_or_else(Isometry2::identity);
-        let motion = self.motion(stamp, here, moment.pose.is_some());
-        self.frames += 1;
-        let report = self.pipeline.step(&moment.frame(motion, self.frames)).map_err(failed)?;
-        if report.outcome.is_processed() {
-            self.previous = Some((stamp, here));
+        if let Some(index) = data.index {
+            moment = moment.index(index);
         }
-        Ok(report)
+        if let Some(pose) = data.pose {
+            moment = moment.pose(pose);
+        }
+        if let Some(scan) = data.scan {
+            moment = moment.laser(scan);
+        }
+        if let Some(age_s) = data.odometry_age_s {
+            moment = moment.odometry_age_s(age_s);
+        }
+        if self.is_new {
+            let checked = self.pipeline.check_sources(moment.sources());
+            checked.map_err(|why| ConfigError::new_err(why.to_string()))?;
+        }
+        let frame = moment.frame().map_err(wrong)?;
+        let report = self.pipeline.step(&frame).map_err(failed)?;
+        self.is_new = false;
+        Ok((report, frame.camera))
     }
-
-    /// Returns the motion since the last frame, as the log reader computes it. A jump of the
-    /// odometry stops the robot.
-    fn motion(&mut self, stamp: Stamp, here: Isometry2<f64>, is_known: bool) -> EgoMotion {
-        if is_known {
-            self.poses.push(stamp, here);
-        }
-        let Some((then, before)) = self.previous.filter(|(then, _)| *then < stamp) else {
-            return EgoMotion::at_rest(0.0);
-        };
-        let dt = stamp.seconds_since(then);
-        if self.poses.jumped_between(then, stamp) {
-            self.pipeline.disarm("odometry jumped");
-            return unknown_motion(dt);
-        }
-        EgoMotion::between(&before, &here, dt, self.odometry_sigma)
-    }
-}
-
-impl Moment {
-    fn sources(&self) -> Sources {
-        Sources {
-            depth: self.images.depth.is_some(),
-            right: self.images.right.is_some(),
-            laser: self.scan.is_some(),
-            odometry: self.pose.is_some(),
-        }
-    }
-
-    fn frame(self, motion: EgoMotion, count: u64) -> Frame {
-        let index = self.index.unwrap_or(count);
-        Frame::new(index, self.stamp, self.camera, motion, self.images)
-            .with_laser(self.scan)
-            .with_odometry_age(self.odometry_age_s)
-    }
-}
-
-/// Returns the age of odometry, s: as given, else 0 with a pose and infinite without.
-fn age_of(is_known: bool, given: Option<f64>) -> PyResult<f64> {
-    match (is_known, given) {
-        (true, None) => Ok(0.0),
-        // Positive comparison, so that NaN is refused.
-        (true, Some(age_s)) if age_s >= 0.0 => Ok(age_s),
-        (true, Some(age_s)) => {
-            Err(wrong(format!("odometry_age_s is {age_s}; it has to be 0 or more")))
-        }
-        (false, _) => Ok(f64::INFINITY),
-    }
-}
-
-/// Returns the plugins of this workspace.
-pub fn registry() -> Registry {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
-    registry
 }
 
 /// Returns the config that a path, a name or a text stands for.
-fn config(source: &Bound<'_, PyAny>, folder: Option<&Path>) -> PyResult<ConfigFile> {
+fn config(source: &Bound<'_, PyAny>, folder: Option<&Path>) -> PyResult<ConfigSource> {
     if let Ok(text) = source.cast::<PyString>() {
         let text = text.to_string();
         // No name of a config has either.
         if text.contains(['\n', '=']) {
-            return Ok(ConfigFile::of_text(text, folder.unwrap_or(Path::new(""))));
+            return Ok(ConfigSource::from_text(text, folder.unwrap_or(Path::new(""))));
         }
     }
-    ConfigFile::read(&source.extract::<PathBuf>()?).map_err(raised)
+    ConfigSource::open(source.extract::<PathBuf>()?).map_err(raised)
 }
 
 fn right_image(array: &Bound<'_, PyAny>, baseline_m: Option<f64>) -> PyResult<RightImage> {
@@ -298,31 +245,5 @@ fn right_image(array: &Bound<'_, PyAny>, baseline_m: Option<f64>) -> PyResult<Ri
     match baseline_m.filter(|baseline| *baseline > 0.0 && baseline.is_finite()) {
         Some(baseline_m) => Ok(RightImage { image, baseline_m }),
         None => Err(wrong("right needs baseline_m=, the distance of the cameras, above 0")),
-    }
-}
-
-/// Returns the camera of the images, which have its size; a placeholder without images.
-fn fitting(camera: Option<PyCamera>, images: &Images) -> PyResult<Arc<Camera>> {
-    let sizes = [
-        ("colour", images.colour.as_ref().map(|image| (image.width(), image.height()))),
-        ("colour", images.grey.as_ref().map(|image| (image.width(), image.height()))),
-        ("depth", images.depth.as_ref().map(|image| (image.width(), image.height()))),
-        ("right", images.right.as_ref().map(|right| (right.image.width(), right.image.height()))),
-    ];
-    let mut given = sizes.into_iter().filter_map(|(name, size)| Some((name, size?)));
-    let Some(camera) = camera.map(|camera| camera.0) else {
-        return match given.next() {
-            None => Ok(blind()),
-            Some(_) => Err(wrong("camera is None, and there are images: give their Camera")),
-        };
-    };
-    let wanted = (camera.width, camera.height);
-    match given.find(|(_, size)| *size != wanted) {
-        None => Ok(camera),
-        Some((name, (width, height))) => Err(wrong(format!(
-            "{name} has {width} x {height} pixels and the camera {} x {}; register depth to colour, \
-             or give the camera of these images",
-            wanted.0, wanted.1
-        ))),
     }
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use numpy::{PyArray1, PyArray2, ToPyArray as _};
 use pyo3::prelude::*;
-use tagalong_core::{Command, Stamp, Track};
-use tagalong_geometry::Camera;
-use tagalong_pipeline::{FrameReport, Outcome};
+use tagalong::core::{Command, Stamp, Track};
+use tagalong::geometry::Camera;
+use tagalong::pipeline::{FrameReport, Outcome};
 
 /// A tracked person in one frame. Lengths are metres in the robot's frame: x forward, y left, z up.
 #[pyclass(name = "Track", module = "tagalong", frozen)]

@@ -7,15 +7,13 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use ros2_client::Publisher;
-use tagalong_config::Registry;
-use tagalong_core::Stamp;
+use tagalong::config::Registry;
+use tagalong::core::Stamp;
+use tagalong::log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg};
+use tagalong::log::write::{self, FrameRecord};
+use tagalong::log::{Input, Listening, LiveSource, LogFrame};
+use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline};
 use tagalong_live::Live;
-use tagalong_log::msgs::{
-    Detection3DArray, Header, PoseStamped, StringMsg,
-};
-use tagalong_log::write::{self, FrameRecord};
-use tagalong_log::{Input, Listening, LiveSource, LogFrame};
-use tagalong_pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline};
 
 use crate::diagnostics::{Diagnostics, Status};
 use crate::http::HttpServer;
@@ -92,8 +90,7 @@ pub fn run(
     stop: &AtomicBool,
     tell: &dyn Fn(&str),
 ) -> Result<Summary, BridgeError> {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong::builtin_registry();
     run_with(options, &registry, stop, tell)
 }
 
@@ -146,10 +143,10 @@ fn serve(
     setup: &Setup,
     tell: &dyn Fn(&str),
 ) -> Result<Live, BridgeError> {
-    let config = setup.pipeline.resolved().parse().unwrap_or_default();
+    let config = setup.pipeline.config().values();
     let name = options.config.file_stem().unwrap_or_default().to_string_lossy();
     let input = format!("ROS domain {}", options.domain);
-    let live = Live::start(at, &name, &input, &config);
+    let live = Live::start(at, &name, &input, config);
     let live = live.map_err(|error| BridgeError::Serve(at, error))?;
     tell(&format!("live: open {} in a browser; it is the key to the page", live.address()));
     Ok(live)
@@ -541,7 +538,7 @@ impl Bridge {
         self.tell_old_stamps(timing.back_s, tell);
         found.frame = found.frame.with_latency(Some(timing.latency_s));
         // Before the step, so that the command of this very frame is a stop.
-        if found.odom_jumped {
+        if found.frame.odometry_jumped {
             self.disarm("odometry jumped", tell);
         }
         self.diagnostics.begin_frame();

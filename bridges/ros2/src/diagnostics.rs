@@ -6,8 +6,8 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use ros2_client::Publisher;
-use tagalong_log::msgs::Header;
-use tagalong_pipeline::Permission;
+use tagalong::log::msgs::Header;
+use tagalong::pipeline::Permission;
 
 use crate::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::skill::STUCK;

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
 use serde::Serialize;
-use tagalong_pipeline::Enrollment;
+use tagalong::pipeline::Enrollment;
 use tagalong_serve::{Access, Changes, Request, Response, Server, Site};
 
 use crate::BridgeError;

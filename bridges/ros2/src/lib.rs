@@ -2,7 +2,7 @@
 //! it: images, calibrations, transforms and odometry come in over DDS; tracks, the pose of the
 //! target and commands for the wheels go out.
 //!
-//! Frames are made from messages by [`tagalong_log::Listening`] and [`tagalong_log::LiveSource`],
+//! Frames are made from messages by [`tagalong::log::Listening`] and [`tagalong::log::LiveSource`],
 //! the same code that reads logs: images are paired by the stamps in their headers, topics are
 //! found by type, and a config that ran on a recorded log runs live.
 //!
@@ -59,10 +59,10 @@ pub enum BridgeError {
     Serve(std::net::SocketAddr, std::io::Error),
     /// An input of the pipeline did not arrive, or cannot be used.
     #[error(transparent)]
-    Input(Box<tagalong_log::LogError>),
+    Input(Box<tagalong::log::LogError>),
     /// The controller lacks a source that its config demands.
     #[error(transparent)]
-    Sources(#[from] tagalong_pipeline::MissingSource),
+    Sources(#[from] tagalong::pipeline::MissingSource),
     /// The camera's calibration changed while the robot was driven by the former one.
     #[error(
         "the calibration of the camera changed (topic {0}): the robot was told to stop; restart the \
@@ -71,12 +71,25 @@ pub enum BridgeError {
     Calibration(String),
     /// A plugin failed; the robot was told to stop.
     #[error(transparent)]
-    Pipeline(#[from] tagalong_pipeline::StepError),
+    Pipeline(#[from] tagalong::pipeline::StepError),
 }
 
-impl From<tagalong_log::LogError> for BridgeError {
-    fn from(error: tagalong_log::LogError) -> Self {
+impl From<tagalong::log::LogError> for BridgeError {
+    fn from(error: tagalong::log::LogError) -> Self {
         Self::Input(Box::new(error))
+    }
+}
+
+impl From<tagalong::pipeline::BuildError> for BridgeError {
+    fn from(error: tagalong::pipeline::BuildError) -> Self {
+        Self::Config(error.to_string())
+    }
+}
+
+impl From<tagalong::Error> for BridgeError {
+    /// Converts the error of the settings of a config.
+    fn from(error: tagalong::Error) -> Self {
+        Self::Config(error.to_string())
     }
 }
 

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
-use tagalong_log::msgs::{CompressedImage, Header, Image, encode};
+use tagalong::log::msgs::{CompressedImage, Header, Image, encode};
 
 /// `sensor_msgs/Image` that owns its pixels; field by field as [`Image`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -121,8 +121,8 @@ pub(crate) fn ros_topic(dds: &str) -> Option<&str> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::Stamp;
-    use tagalong_log::msgs::decode;
+    use tagalong::core::Stamp;
+    use tagalong::log::msgs::decode;
 
     use super::*;
 

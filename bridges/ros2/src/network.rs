@@ -14,8 +14,8 @@ use ros2_client::{
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use tagalong_core::Stamp;
-use tagalong_log::msgs::{
+use tagalong::core::Stamp;
+use tagalong::log::msgs::{
     CameraInfo, Detection2DArray, Detection3DArray, LaserScan, Message, Odometry, TFMessage, encode,
 };
 

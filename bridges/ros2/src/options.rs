@@ -1,9 +1,10 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use tagalong_config::{FileLimit, Registry, read_text};
-use tagalong_log::{InputSettings, Limits, ObstacleKind, ObstacleTopic};
-use tagalong_pipeline::{Pipeline, RobotSettings, SourceKind, SourceSettings};
+use tagalong::config::Registry;
+use tagalong::log::{InputSettings, Limits};
+use tagalong::pipeline::RobotSettings;
+use tagalong::{LogSettings, Pipeline};
 
 use crate::{BridgeError, ClockSource, Middleware};
 
@@ -149,20 +150,10 @@ impl Options {
     /// [`BridgeError::Config`], with file, line and remedy.
     pub(crate) fn setup(&self, registry: &Registry) -> Result<Setup, BridgeError> {
         check_security(|name| std::env::var(name).ok())?;
-        let shown = self.config.display().to_string();
-        let text = read_text(&self.config, FileLimit::Config)
-            .map_err(|error| BridgeError::Config(format!("cannot read config {shown}: {error}")))?;
-        let folder = self.config.parent().unwrap_or("".as_ref());
-        let foreign = ["input", "limits", "output"].map(str::to_owned).to_vec();
-        let pipelines = tagalong_pipeline::Options { foreign, ..Default::default() };
-        let mistake =
-            |error: tagalong_config::ConfigError| BridgeError::Config(error.render(&shown, &text));
-        let (pipeline, run) =
-            Pipeline::from_toml_with(&text, folder, registry, &pipelines).map_err(mistake)?;
-        let mut input: InputSettings = run.table("input").map_err(mistake)?;
-        input.sources = pipeline.obstacle_sources().iter().map(obstacle_topic).collect();
-        let limits = run.table("limits").map_err(mistake)?;
-        Ok(Setup { pipeline, robot: run.robot, input: self.named(input), limits })
+        let pipeline = Pipeline::builder(registry).from_toml_file(&self.config)?;
+        let LogSettings { input, limits, .. } = LogSettings::of(&pipeline)?;
+        let robot = pipeline.config().robot.clone();
+        Ok(Setup { pipeline, robot, input: self.named(input), limits })
     }
 
     /// Returns the settings with the topics of the command line.
@@ -173,22 +164,6 @@ impl Options {
             odometry_topic: self.odometry.clone().or(input.odometry_topic),
             ..input
         }
-    }
-}
-
-/// Returns the topic of a source of obstacles.
-fn obstacle_topic(source: &SourceSettings) -> ObstacleTopic {
-    ObstacleTopic {
-        name: source.name.clone(),
-        kind: match source.kind {
-            SourceKind::Scan => ObstacleKind::Scan,
-            SourceKind::Depth => ObstacleKind::Depth,
-            SourceKind::Range => ObstacleKind::Range,
-            SourceKind::Bumper => ObstacleKind::Bumper,
-        },
-        topic: source.topic.clone(),
-        info_topic: Some(source.info_topic.clone()).filter(|topic| !topic.is_empty()),
-        mount: source.mount,
     }
 }
 

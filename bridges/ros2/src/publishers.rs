@@ -9,7 +9,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use ros2_client::{Gid, MessageInfo};
-use tagalong_core::Stamp;
+use tagalong::core::Stamp;
 
 /// Origin of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -47,8 +47,8 @@ impl<'de> Decode<'de, Vec<u8>> for RawDecoder {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::Stamp;
-    use tagalong_log::msgs::{Header, decode, encode};
+    use tagalong::core::Stamp;
+    use tagalong::log::msgs::{Header, decode, encode};
 
     use super::*;
 

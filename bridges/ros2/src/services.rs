@@ -9,8 +9,8 @@ use ros2_client::parameters::raw::{Parameter, ParameterType, ParameterValue, Set
 use ros2_client::rcl_interfaces::{SetParametersRequest, SetParametersResponse};
 use ros2_client::{Message, Server, ServiceMapping};
 use serde::{Deserialize, Serialize};
-use tagalong_core::TrackId;
-use tagalong_pipeline::{Choice, Enrollment};
+use tagalong::core::TrackId;
+use tagalong::pipeline::{Choice, Enrollment};
 
 use crate::BridgeError;
 use crate::network::{Ear, Network};

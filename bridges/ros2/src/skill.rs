@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use tagalong_pipeline::{Choice, Enrollment, FollowStatus, Permission};
+use tagalong::pipeline::{Choice, Enrollment, FollowStatus, Permission};
 
 /// Longest wait for an answer of the pipeline.
 const PATIENCE: Duration = Duration::from_secs(2);

@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use tagalong_core::Stamp;
+use tagalong::core::Stamp;
 
 /// Number of first arrivals that are remembered: those of a few streams during a frame that takes
 /// seconds.

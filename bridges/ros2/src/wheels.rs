@@ -4,8 +4,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tagalong_core::{Stamp, WheelSpeeds};
-use tagalong_pipeline::{Enable, EnableSwitch, Orders, Permission};
+use tagalong::core::{Stamp, WheelSpeeds};
+use tagalong::pipeline::{Enable, EnableSwitch, Orders, Permission};
 
 /// Duration of zero commands after the last frame, or the last time with permission to move, s; then
 /// none are sent, so that other nodes may drive (the `stop_pub_timeout` of Nav2).

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, InputSettings, Limits};
-use tagalong_pipeline::Sources;
 
 use crate::config_file::ConfigFile;
 use crate::outcome::Failure;
@@ -98,17 +97,6 @@ impl Fittings {
         let (log, refusals) = (log.display(), &self.refusals);
         let hint = format!("`tagalong inspect {log}` lists its topics");
         Failure::failed(format!("{log}: no built-in pipeline fits:{refusals}\n{damage}{hint}"))
-    }
-}
-
-/// Returns the data of a log that a controller may need.
-pub fn sources(source: &FrameSource) -> Sources {
-    let facts = source.facts();
-    Sources {
-        depth: facts.depth_topic.is_some(),
-        right: facts.right_topic.is_some(),
-        laser: facts.laser_topic.is_some(),
-        odometry: source.has_odometry(),
     }
 }
 

@@ -206,8 +206,8 @@ fn task(
 /// Returns the hash of the resolved config: comments and order do not matter, changed defaults do.
 fn config_hash(config: &PlannedConfig, seed: u64, registry: &Registry) -> Result<String, Failure> {
     let (pipeline, _) = config.file.pipeline(registry, Some(seed))?;
-    let text = format!("{}\n{}", pipeline.resolved(), config.outer.resolved()?);
-    Ok(sha256(text.as_bytes()))
+    let resolved = config.outer.resolved_with(pipeline.config())?;
+    Ok(sha256(resolved.to_toml().as_bytes()))
 }
 
 /// Returns the reason for which the config cannot run on the log, if there is one.

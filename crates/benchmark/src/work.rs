@@ -339,11 +339,11 @@ fn deciding(
     pipeline: &Result<Pipeline, String>,
     result: &TaskResult,
 ) -> BTreeMap<String, Vec<String>> {
-    let resolved = pipeline.as_ref().ok().map(Pipeline::resolved).unwrap_or_default();
-    let config: toml::Table = toml::from_str(&resolved).unwrap_or_default();
+    let Ok(pipeline) = pipeline else { return BTreeMap::new() };
+    let config = pipeline.config().values();
     let tests: BTreeSet<&String> =
         result.missed.iter().filter_map(|missed| missed.test.as_ref()).collect();
-    let lines = |test: &String| Some((test.clone(), remedies::of(test)?.lines(&config)));
+    let lines = |test: &String| Some((test.clone(), remedies::of(test)?.lines(config)));
     tests.into_iter().filter_map(lines).collect()
 }
 

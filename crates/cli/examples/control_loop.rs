@@ -10,7 +10,6 @@
 #![allow(clippy::print_stdout, reason = "an example tells what it does")]
 
 use std::error::Error;
-use std::path::Path;
 use std::time::Duration;
 
 use tagalong_config::Registry;
@@ -25,9 +24,8 @@ const SECONDS: f64 = 8.0;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let config = std::fs::read_to_string("configs/follow-depth.toml")?;
-    let (mut pipeline, _) = Pipeline::from_toml(&config, Path::new("configs"), &registry)
-        .map_err(|error| error.render("configs/follow-depth.toml", &config))?;
+    let builder = Pipeline::builder(&registry);
+    let mut pipeline = builder.from_toml_file("configs/follow-depth.toml")?;
 
     let scene = std::fs::read_to_string("configs/scenes/follow-passing.toml")?;
     let scene = Scene::parse_with(&scene, &Variant::default())

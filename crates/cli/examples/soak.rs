@@ -7,7 +7,6 @@
 #![allow(clippy::print_stdout, reason = "an example tells what it does")]
 
 use std::error::Error;
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -46,9 +45,8 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     let hours: f64 = std::env::args().nth(1).map_or(Ok(1.0), |hours| hours.parse())?;
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let config = std::fs::read_to_string("configs/follow-depth.toml")?;
-    let (mut pipeline, _) = Pipeline::from_toml(&config, Path::new("configs"), &registry)
-        .map_err(|error| error.render("configs/follow-depth.toml", &config))?;
+    let builder = Pipeline::builder(&registry);
+    let mut pipeline = builder.from_toml_file("configs/follow-depth.toml")?;
     println!(
         "| until, h | frames | with the target % | most tracks | last number | ms/frame | memory, MiB |"
     );

@@ -15,12 +15,12 @@ use tagalong_simulate::record;
 
 use crate::run::{self, RunArgs};
 
-const SCENE: &str = include_str!("../../../configs/scenes/demo.toml");
+const SCENE: &str = include_str!("../configs/scenes/demo.toml");
 
 /// Compared pipelines, with the text of their configs.
 const PIPELINES: [(&str, &str); 2] = [
-    ("depth-ekf", include_str!("../../../configs/depth-ekf.toml")),
-    ("naive", include_str!("../../../configs/naive.toml")),
+    ("depth-ekf", include_str!("../configs/depth-ekf.toml")),
+    ("naive", include_str!("../configs/naive.toml")),
 ];
 
 /// Arguments of `tagalong demo`.

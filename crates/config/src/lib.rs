@@ -22,6 +22,6 @@ pub use names::nearest;
 pub use or_auto::OrAuto;
 pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use settings::{
-    ConfigError, Settings, Value, check_settings, commented_defaults, parse_settings,
+    ConfigError, NoSettings, Settings, Value, check_settings, commented_defaults, parse_settings,
 };
 pub use trainer::{AnnotatedPerson, Example, Fitted, Trainer};

@@ -2,7 +2,7 @@ use std::fmt::{self, Write as _};
 use std::ops;
 
 use schemars::JsonSchema;
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use toml::{Spanned, de::DeValue};
 
 use crate::nearest;
@@ -16,6 +16,11 @@ pub type Value<'a> = Spanned<DeValue<'a>>;
 pub trait Settings: Default + Serialize + DeserializeOwned + JsonSchema + 'static {}
 
 impl<T: Default + Serialize + DeserializeOwned + JsonSchema + 'static> Settings for T {}
+
+/// Settings of a plugin that has none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct NoSettings {}
 
 /// An error in a config, with its place in the text.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -48,6 +53,12 @@ impl ConfigError {
         Self { message: error.to_string(), span: Some(named.unwrap_or_else(|| value.span())) }
     }
 
+    /// Returns the line of the error in the text, from 1; `None` if it concerns the file as a whole.
+    pub fn line(&self, text: &str) -> Option<usize> {
+        let span = self.span.as_ref().filter(|span| span.start <= text.len())?;
+        Some(text.get(..span.start).unwrap_or_default().matches('\n').count() + 1)
+    }
+
     /// Formats the error for the terminal: file, line, column, and the line itself with the place
     /// marked.
     pub fn render(&self, file: &str, text: &str) -> String {
@@ -55,7 +66,7 @@ impl ConfigError {
             return format!("{file}: {}", self.message);
         };
         let before = text.get(..span.start).unwrap_or_default();
-        let line = before.matches('\n').count() + 1;
+        let line = self.line(text).unwrap_or(1);
         let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
         let source = text.lines().nth(line - 1).unwrap_or_default();
         // A span may cover several lines; the marks end with the line that is shown.

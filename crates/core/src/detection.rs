@@ -19,6 +19,22 @@ pub struct Detection {
 }
 
 impl Detection {
+    /// Creates the detection of a plugin without a box in the image: the centre of a head in the robot
+    /// frame, m, its covariance, m², and the log-odds that this is a person.
+    pub fn new(
+        source: &'static str,
+        position: Point3<f64>,
+        covariance: Matrix3<f64>,
+        score: f64,
+    ) -> Self {
+        Self { image: None, position, covariance, score, source }
+    }
+
+    /// Returns the detection with its box in the image.
+    pub fn with_image(self, image: ImageBox) -> Self {
+        Self { image: Some(image), ..self }
+    }
+
     /// Returns the rectangle of the box in the image, if there is one.
     pub fn rect(&self) -> Option<Rect> {
         self.image.map(|image| image.rect)
@@ -51,13 +67,8 @@ mod tests {
         let lens = Pinhole { fx: 50.0, fy: 50.0, cx: 32.0, cy: 24.0, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 64, 48, 1.2, 0.0, 0.0);
         let rect = Rect::new(1.0, 2.0, 3.0, 3.0);
-        let boxed = Detection {
-            image: Some(ImageBox::full_body(rect)),
-            position: Point3::new(3.0, 0.0, 1.6),
-            covariance: Matrix3::zeros(),
-            score: 0.5,
-            source: "test",
-        };
+        let boxed = Detection::new("test", Point3::new(3.0, 0.0, 1.6), Matrix3::zeros(), 0.5)
+            .with_image(ImageBox::full_body(rect));
         assert_eq!((boxed.rect(), boxed.rect_in(&camera)), (Some(rect), rect));
         let scanned = Detection { image: None, ..boxed };
         assert!(scanned.is_sane());

@@ -105,6 +105,9 @@ pub struct Frame {
     /// Age of the newest odometry at the time of the frame, s; infinite if there never was any. A
     /// robot is not steered by old odometry.
     pub odometry_age_s: f64,
+    /// True if odometry has jumped since the previous frame: where the robot drove is unknown, and
+    /// a robot that is steered stops.
+    pub odometry_jumped: bool,
     /// Time from the capture of the frame until it was handed over, s, by the clock of the stamps;
     /// `None` where there is no such clock, as for a log.
     pub latency_s: Option<f64>,
@@ -141,6 +144,7 @@ impl Frame {
             motion,
             calibration_changed: false,
             odometry_age_s: 0.0,
+            odometry_jumped: false,
             latency_s: None,
             sensors,
             grey: OnceLock::new(),
@@ -156,6 +160,11 @@ impl Frame {
     /// Returns the frame with [`Frame::odometry_age_s`] as given.
     pub fn with_odometry_age(self, odometry_age_s: f64) -> Self {
         Self { odometry_age_s, ..self }
+    }
+
+    /// Returns the frame with [`Frame::odometry_jumped`] as given.
+    pub fn with_odometry_jump(self, odometry_jumped: bool) -> Self {
+        Self { odometry_jumped, ..self }
     }
 
     /// Returns the frame with [`Frame::latency_s`] as given.
@@ -312,6 +321,7 @@ impl Frame {
         Self::of_sensors(self.index, self.stamp, camera, self.motion, sensors)
             .with_changed_calibration(self.calibration_changed)
             .with_odometry_age(self.odometry_age_s)
+            .with_odometry_jump(self.odometry_jumped)
             .with_latency(self.latency_s)
     }
 
@@ -329,6 +339,12 @@ impl Frame {
         CameraImage<T>: Sensor,
     {
         self.sensor::<CameraImage<T>>().map(|taken| &*taken.image)
+    }
+}
+
+impl AsRef<Frame> for Frame {
+    fn as_ref(&self) -> &Self {
+        self
     }
 }
 
@@ -372,9 +388,9 @@ mod tests {
     fn depth_that_is_added_leaves_the_rest() {
         let laser = LaserScan::of_points([Point3::new(1.0, 0.5, 0.2)]);
         let frame = frame(Images::default()).with_laser(Some(laser)).with_recorded(Some(vec![]));
-        let frame = frame.with_changed_calibration(true);
+        let frame = frame.with_changed_calibration(true).with_odometry_jump(true);
         let with_depth = frame.with_depth(Arc::new(DepthImage::filled(4, 4, 2.0)));
-        assert!(with_depth.calibration_changed);
+        assert!(with_depth.calibration_changed && with_depth.odometry_jumped);
         assert!(with_depth.depth().is_ok());
         assert_eq!(with_depth.laser().unwrap().points[..], [Point3::new(1.0, 0.5, 0.2)]);
         assert_eq!(with_depth.recorded().map(<[_]>::len), Some(0));

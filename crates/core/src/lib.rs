@@ -58,7 +58,7 @@ pub use inputs::{Capabilities, Input, Inputs, Usage};
 pub use manager::{
     Initiation, Observation, ObservedTrack, TrackChanges, TrackHealth, TrackManager, Unassociated,
 };
-pub use motion::{DiffDrive, EgoMotion, planar_pose};
+pub use motion::{DiffDrive, EgoMotion, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, planar_pose};
 pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReading};
 pub use scan::{LaserScan, RayReading, UnreadRay};
 pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};

@@ -1,6 +1,13 @@
 use crate::{Twist, WheelSpeeds};
 use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Vector2, Vector3};
 
+/// Step between neighbouring poses beyond which the odometry has jumped, m.
+pub const MAX_ODOMETRY_STEP_M: f64 = 1.0;
+/// Gap in the odometry beyond which poses are stale, s.
+pub const MAX_ODOMETRY_GAP_S: f64 = 0.5;
+/// Longest time over which the uncertainty of an unknown motion grows, s.
+const MAX_UNKNOWN_S: f64 = 5.0;
+
 /// Motion of the robot between two image stamps, in its frame at the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EgoMotion {
@@ -51,6 +58,13 @@ impl EgoMotion {
     /// Returns the motion of a robot at rest for `dt` seconds.
     pub fn at_rest(dt: f64) -> Self {
         Self { dt, forward: 0.0, left: 0.0, turn: 0.0, covariance: Matrix3::zeros() }
+    }
+
+    /// Returns the motion over `dt` seconds without valid odometry: at rest, with the uncertainty of a
+    /// robot that may have driven at 1 m/s and turned at 1 rad/s, for at most 5 s.
+    pub fn unknown(dt: f64) -> Self {
+        let reach = dt.clamp(0.0, MAX_UNKNOWN_S);
+        Self { covariance: Matrix3::identity() * (reach * reach), ..Self::at_rest(dt) }
     }
 
     /// Integrates wheel speeds held for `dt` seconds (P1, section 2.3.1). The chord is `v dt

@@ -1,8 +1,9 @@
 use std::fmt;
+use std::ops::Deref;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Estimate;
+use crate::{Estimate, Person};
 
 /// Number of a track, unique within a run and never reused.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
@@ -33,4 +34,13 @@ pub struct Track {
     pub unseen_s: f64,
     /// Log-odds that this is a person, smoothed over the track.
     pub score: f64,
+}
+
+/// A track reads as its person: `track.position`, `track.velocity`.
+impl Deref for Track {
+    type Target = Person;
+
+    fn deref(&self) -> &Person {
+        &self.estimate.person
+    }
 }

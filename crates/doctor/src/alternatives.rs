@@ -8,7 +8,7 @@ use tagalong_app::remedies::{self, Change, is_present};
 use tagalong_config::Registry;
 use tagalong_core::Inputs;
 use tagalong_log::{FrameSource, LogFrame};
-use tagalong_pipeline::{Pipeline, with_values};
+use tagalong_pipeline::Pipeline;
 use toml::Table;
 
 use super::coverage::{Course, Coverage};
@@ -81,11 +81,12 @@ impl Runner {
 
 /// Returns a pipeline for each change of the config, and for other configs.
 fn runners(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Runner> {
-    let resolved = visit.pipeline.resolved();
-    let changes = changes(visit, &resolved);
+    let config = visit.pipeline.config();
+    let changes = changes(visit, config.values());
     let built = changes.into_iter().filter_map(|change| {
-        let text = with_values(&resolved, &[(&change.key, &change.value)]).ok()?;
-        let pipeline = visit.config.variant(&text, registry).ok()?;
+        let text = config.with_values(&[(&change.key, &change.value)]).ok()?;
+        let changed = config.source().with_text(text);
+        let pipeline = Pipeline::builder(registry).build(&changed).ok()?;
         Some(Runner::new(change.line, pipeline))
     });
     built.chain(others(&visit.config, scope, registry)).collect()
@@ -93,14 +94,13 @@ fn runners(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Runner> {
 
 /// Returns the changes that are tried: the values of `[tune]` and those that the table of remedies
 /// offers, none of them equal to the present one.
-fn changes(visit: &Visit, resolved: &str) -> Vec<Change> {
-    let table: Table = toml::from_str(resolved).unwrap_or_default();
+fn changes(visit: &Visit, resolved: &Table) -> Vec<Change> {
     let tuned = visit.tunables.iter().flat_map(|tunable| {
         let others = tunable.values.iter().filter(|value| !is_present(value, &tunable.now));
-        others.map(|value| Change::of(&table, &tunable.key, value))
+        others.map(|value| Change::of(resolved, &tunable.key, value))
     });
     let mut changes: Vec<Change> = Vec::new();
-    for change in tuned.chain(remedies::offered(&table)) {
+    for change in tuned.chain(remedies::offered(resolved)) {
         if !changes.iter().any(|other| other.line == change.line) {
             changes.push(change);
         }

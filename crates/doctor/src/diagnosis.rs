@@ -64,11 +64,11 @@ impl Diagnosis {
         folder: Option<&Path>,
     ) -> Result<Self, Failure> {
         let evidence = &visit.evidence;
-        let resolved = format!("{}\n{}", visit.pipeline.resolved(), visit.outer.resolved()?);
-        let resolved: toml::Table = toml::from_str(&resolved).unwrap_or_default();
+        let resolved = visit.outer.resolved_with(visit.pipeline.config())?;
+        let resolved = resolved.values();
         let found = checks::ALL.iter().filter_map(|check| check(evidence));
         let findings = found.map(|finding| Finding {
-            remedy: finding.remedy.as_deref().and_then(|text| present::differing(text, &resolved)),
+            remedy: finding.remedy.as_deref().and_then(|text| present::differing(text, resolved)),
             ..finding
         });
         Ok(Self {
@@ -80,7 +80,7 @@ impl Diagnosis {
             coverage: evidence.coverage.clone(),
             alternatives: evidence.alternatives.clone(),
             pictures: None,
-            funnel: funnel(visit, &resolved, folder)?,
+            funnel: funnel(visit, resolved, folder)?,
         })
     }
 }

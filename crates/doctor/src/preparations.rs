@@ -62,8 +62,7 @@ struct Bench<'a> {
 
 /// Tries the preparations of each network of a config.
 pub fn tried(visit: &Visit, when: Trying, scope: Scope, registry: &Registry) -> Vec<Preparations> {
-    let resolved: Table = toml::from_str(&visit.pipeline.resolved()).unwrap_or_default();
-    let sections = resolved.get("detectors").and_then(Value::as_array);
+    let sections = visit.pipeline.config().values().get("detectors").and_then(Value::as_array);
     let configs: Vec<&Table> = sections.into_iter().flatten().filter_map(network_config).collect();
     if configs.is_empty() || when == Trying::Never {
         return Vec::new();

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use tagalong_app::choice::{CHOICES, fitting, sources};
-use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong::logs::sources_of;
+use tagalong_app::choice::{CHOICES, fitting};
+use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
 use tagalong_app::outcome::Failure;
 use tagalong_app::progress::Progress;
 use tagalong_config::Registry;
@@ -59,7 +60,7 @@ impl Visit {
         // A topic of a wrong kind is a mistake of the config, and shown as such.
         let is_mistake = matches!(found.refusal, Some(LogError::WrongTopic { .. }));
         if let Some(error) = found.refusal.take_if(|_| is_mistake) {
-            return Err(config.refusal(error));
+            return Err(refused_log(error, pipeline.config()));
         }
         let expected = expected_frames(&found.inspection).min(scope.frames);
         let mut evidence = Evidence {
@@ -83,7 +84,7 @@ impl Visit {
         };
         let mut views = Views::of(expected);
         if let Some(frames) = found.frames {
-            evidence.missing = pipeline.check_sources(sources(&frames)).err();
+            evidence.missing = pipeline.check_sources(sources_of(&frames)).err();
             let progress = Progress::titled(&config.stem());
             look(frames, &mut pipeline, scope, &mut evidence, &mut views, &progress);
         }

@@ -253,7 +253,7 @@ fn config(bytes: &[u8], _: &Path) {
         };
     }
     as_text(bytes, |text| {
-        REGISTRY.with(|registry| drop(Pipeline::from_toml(text, Path::new("."), registry)));
+        REGISTRY.with(|registry| drop(Pipeline::builder(registry).from_toml(text)));
     });
 }
 

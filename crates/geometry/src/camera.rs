@@ -22,6 +22,15 @@ pub struct Pinhole {
     pub distortion: Distortion,
 }
 
+impl Pinhole {
+    /// Returns a lens without distortion whose optical axis meets the middle of the image.
+    pub fn centred(focal_px: f64, width: usize, height: usize) -> Self {
+        let cx = 0.5 * (width as f64 - 1.0);
+        let cy = 0.5 * (height as f64 - 1.0);
+        Self { fx: focal_px, fy: focal_px, cx, cy, distortion: Distortion::None }
+    }
+}
+
 /// Projection model of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -54,8 +63,8 @@ impl Camera {
     ///
     /// ```
     /// use nalgebra::{Point2, Point3};
-    /// use tagalong_geometry::{Camera, Distortion, Pinhole};
-    /// let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+    /// use tagalong_geometry::{Camera, Pinhole};
+    /// let lens = Pinhole::centred(500.0, 640, 480);
     /// let camera = Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0);
     /// let pixel = camera.project(&Point3::new(2.0, 0.0, 1.2)).unwrap();
     /// assert!((pixel - Point2::new(319.5, 239.5)).norm() < 1e-9);

@@ -6,7 +6,7 @@ use tagalong_app::outcome::Failure;
 use toml::Table;
 
 /// The shipped config, which is changed as little as possible.
-const SHIPPED: &str = include_str!("../../../configs/recorded.toml");
+const SHIPPED: &str = include_str!("../configs/recorded.toml");
 
 /// Returns the config that tracks the whole bodies of a `det.txt`.
 ///

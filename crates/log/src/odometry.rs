@@ -2,13 +2,9 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Isometry2, Matrix3};
-use tagalong_core::{EgoMotion, Stamp};
+use nalgebra::Isometry2;
+use tagalong_core::{MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, Stamp};
 
-/// Gap in the odometry beyond which poses are stale, s.
-pub const MAX_GAP_S: f64 = 0.5;
-/// Step between neighbouring poses beyond which the odometry has jumped, m.
-pub const MAX_STEP_M: f64 = 1.0;
 /// Time for which the motion is continued behind the last pose, s.
 const EXTRAPOLATE_S: f64 = 0.2;
 /// Time for which poses are kept, s.
@@ -33,14 +29,14 @@ pub struct PoseAt {
 }
 
 /// Returns the age of odometry at a given time, s, from the times of the readings before and after
-/// it: 0 between readings at most [`MAX_GAP_S`] apart, else the time since the reading before.
+/// it: 0 between readings at most [`MAX_ODOMETRY_GAP_S`] apart, else the time since the reading before.
 /// Without one it is the time to the reading after, which may be the first of all. Infinite without
 /// either; a reading after the time by more than [`AHEAD_S`] is none.
 pub(crate) fn age_between(before: Option<Stamp>, after: Option<Stamp>, at: Stamp) -> f64 {
     let after = after.filter(|after| after.seconds_since(at) <= AHEAD_S);
     match (before, after) {
         (_, Some(after)) if after == at => 0.0,
-        (Some(before), Some(after)) if after.seconds_since(before) <= MAX_GAP_S => 0.0,
+        (Some(before), Some(after)) if after.seconds_since(before) <= MAX_ODOMETRY_GAP_S => 0.0,
         (Some(before), _) => at.seconds_since(before),
         (None, Some(after)) => after.seconds_since(at),
         (None, None) => f64::INFINITY,
@@ -96,11 +92,11 @@ impl PoseBuffer {
             (Some(a), Some(b)) => Some(PoseAt {
                 pose: blend(a, b, stamp),
                 // A pose exactly at the stamp is valid, however long the gap before it.
-                stale: b.0 != stamp && b.0.seconds_since(a.0) > MAX_GAP_S,
+                stale: b.0 != stamp && b.0.seconds_since(a.0) > MAX_ODOMETRY_GAP_S,
             }),
             (Some(last), None) => Some(self.beyond(last, stamp)),
             (None, Some((first, pose))) => {
-                Some(PoseAt { pose, stale: first.seconds_since(stamp) > MAX_GAP_S })
+                Some(PoseAt { pose, stale: first.seconds_since(stamp) > MAX_ODOMETRY_GAP_S })
             }
             (None, None) => None,
         }
@@ -135,21 +131,21 @@ impl PoseBuffer {
         let known = place.checked_sub(1).map(|place| self.poses[place]);
         let pose = match known {
             // Two poses far apart in time do not give the present velocity.
-            Some(previous) if last.0.seconds_since(previous.0) <= MAX_GAP_S => {
+            Some(previous) if last.0.seconds_since(previous.0) <= MAX_ODOMETRY_GAP_S => {
                 blend(previous, last, last.0.plus_seconds(ahead.min(EXTRAPOLATE_S)))
             }
             _ => last.1,
         };
-        PoseAt { pose, stale: ahead > MAX_GAP_S }
+        PoseAt { pose, stale: ahead > MAX_ODOMETRY_GAP_S }
     }
 
     /// Returns true if the poses between two times contain a jump.
     pub fn jumped_between(&self, from: Stamp, to: Stamp) -> bool {
         let pairs = self.poses.iter().zip(self.poses.iter().skip(1));
         pairs.filter(|(a, b)| a.0 < to && from < b.0).any(|(a, b)| {
-            (b.1.translation.vector - a.1.translation.vector).norm() > MAX_STEP_M
+            (b.1.translation.vector - a.1.translation.vector).norm() > MAX_ODOMETRY_STEP_M
                 // A long step over a gap may be travel.
-                && b.0.seconds_since(a.0) <= MAX_GAP_S
+                && b.0.seconds_since(a.0) <= MAX_ODOMETRY_GAP_S
         })
     }
 }
@@ -163,13 +159,6 @@ fn blend((t0, a): TimedPose, (t1, b): TimedPose, at: Stamp) -> Isometry2<f64> {
         a.translation.vector.lerp(&b.translation.vector, part),
         a.rotation.angle() + part * turn,
     )
-}
-
-/// Returns the motion over `dt` seconds without valid odometry: at rest, with the uncertainty of a
-/// robot that may have driven at 1 m/s and turned at 1 rad/s, for at most 5 s.
-pub fn unknown_motion(dt: f64) -> EgoMotion {
-    let reach = dt.clamp(0.0, 5.0);
-    EgoMotion { covariance: Matrix3::identity() * (reach * reach), ..EgoMotion::at_rest(dt) }
 }
 
 #[cfg(test)]

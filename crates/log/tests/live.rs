@@ -85,7 +85,7 @@ fn whoever_keeps_up_gets_the_frames_of_the_log() {
         assert_eq!(frame.frame.motion, recorded.frame.motion);
         assert_eq!(frame.frame.colour().unwrap(), recorded.frame.colour().unwrap());
         assert_eq!(frame.frame.depth().unwrap(), recorded.frame.depth().unwrap());
-        assert!(!frame.odom_stale && !frame.odom_jumped);
+        assert!(!frame.odom_stale && !frame.frame.odometry_jumped);
     }
     assert_eq!(count(&live, "frames_skipped"), 0);
     let facts = live.facts();
@@ -128,7 +128,8 @@ fn a_jump_of_odometry_is_told_with_its_frame() {
         log.depth(at(f64::from(i) * 0.1), "colour", 2.0);
     }
     let (found, _) = live(&log.finish(), DEPTH);
-    let jumped: Vec<u64> = found.iter().filter(|f| f.odom_jumped).map(|f| f.frame.index).collect();
+    let jumped: Vec<u64> =
+        found.iter().filter(|f| f.frame.odometry_jumped).map(|f| f.frame.index).collect();
     assert_eq!((found.len(), jumped), (20, vec![11]));
 }
 

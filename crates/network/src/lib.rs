@@ -10,6 +10,24 @@
 //! deadline. A call that is given up keeps its thread until it ends; a network has one thread, and
 //! every call until then is late as well. That is no sandbox: a file made to do harm may still use up the memory, so take
 //! networks from where you would take a program.
+//!
+//! ```
+//! use tagalong_core::RgbImage;
+//! use tagalong_network::{Choices, Limits, PersonNetwork};
+//!
+//! # let models = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models");
+//! let mut network =
+//!     PersonNetwork::load(&models.join("yolox.onnx"), &Choices::default(), &Limits::default())?;
+//! let preparation = network.family().preparation();
+//! // A bright person in front of a dark wall, as this test network knows them.
+//! let image = RgbImage::from_fn(64, 64, |x, y| {
+//!     let is_person = (32..48).contains(&x) && (16..48).contains(&y);
+//!     [0, 10, 20].map(|brighter| if is_person { 230 + brighter } else { 20 })
+//! });
+//! let found = network.find(&image, &preparation, 0.5, 0.5)?.expect("within the deadline");
+//! assert_eq!(found.len(), 1);
+//! # Ok::<(), String>(())
+//! ```
 
 mod decode;
 mod detector;

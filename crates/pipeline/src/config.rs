@@ -20,21 +20,26 @@ use tagalong_following::{CommandLimiterSettings, RobotSettings, Steering};
 use tagalong_stats::mix;
 use tagalong_vision::Describer;
 
+mod builtin;
 mod checks;
 mod document;
 mod inputs;
 mod resolve;
+mod resolved;
+mod source;
 mod suits;
 #[cfg(test)]
 mod tests;
 mod tune;
 
 use checks::check;
-pub use document::{Document, ReadBase, flattened, flattened_with};
+pub use document::{Document, flattened};
 use inputs::{Declared, declared_inputs};
 use resolve::resolve;
+pub use resolved::ResolvedConfig;
+pub use source::{BuildError, ConfigSource};
 pub use suits::Suits;
-pub use tune::{Tunable, check_tuning, with_values};
+pub use tune::{Tunable, with_values};
 
 const OWN: [&str; 13] = [
     "seed",
@@ -58,6 +63,9 @@ pub const DEFAULT_ASSOCIATOR: &str = "associate-hungarian";
 /// The track manager of a config that names none.
 pub const DEFAULT_MANAGER: &str = "manage-m-of-n";
 
+/// Tables of a config that belong to the reader of logs and the writer of runs.
+const FOREIGN: [&str; 3] = ["input", "limits", "output"];
+
 /// Keys of older configs, with their replacement.
 const RENAMED: [(&str, &str); 3] = [
     (
@@ -71,9 +79,9 @@ const RENAMED: [(&str, &str); 3] = [
 
 /// Options for reading a config.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Options {
+pub(crate) struct Options {
     /// Top-level tables that belong to other programs. They are ignored; see
-    /// [`RunSettings::table`].
+    /// [`ResolvedConfig::table`].
     pub foreign: Vec<String>,
     /// Seed that replaces the config's.
     pub seed: Option<u64>,
@@ -83,75 +91,35 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { foreign: vec!["input".into(), "limits".into()], seed: None, threads: None }
-    }
-}
-
-/// Settings of a config beside the pipeline.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RunSettings {
-    /// Seed of the run.
-    pub seed: u64,
-    /// The robot.
-    pub robot: RobotSettings,
-    /// `[tune]`: the settings that may be fitted. A run ignores them.
-    pub tune: Vec<Tunable>,
-    /// `[suits]`: the cameras that the config is for. A run ignores it.
-    pub suits: Suits,
-    document: Document,
-}
-
-impl RunSettings {
-    /// Returns a top-level table that belongs to another program; the defaults where the config
-    /// does not have it.
-    ///
-    /// # Errors
-    /// Unknown keys and wrong types, with their place in the config.
-    pub fn table<T: Settings>(&self, name: &str) -> Result<T, ConfigError> {
-        parse_settings(self.document.root()?.remove(name))
-            .map_err(|error| self.document.locate(error))
+        Self { foreign: FOREIGN.map(str::to_owned).to_vec(), seed: None, threads: None }
     }
 }
 
 impl Pipeline {
-    /// Builds the pipeline that a config describes. Paths in it are resolved
-    /// against `base_dir`.
+    /// Builds the pipeline that a config describes.
     ///
     /// # Errors
     /// Any mistake in the config, with its place in the text; see [`ConfigError::render`].
-    pub fn from_toml(
-        text: &str,
-        base_dir: &Path,
-        registry: &Registry,
-    ) -> Result<(Self, RunSettings), ConfigError> {
-        Self::from_toml_with(text, base_dir, registry, &Options::default())
-    }
-
-    /// Builds the pipeline like [`Pipeline::from_toml`], with options.
-    ///
-    /// # Errors
-    /// As for [`Pipeline::from_toml`].
-    pub fn from_toml_with(
-        text: &str,
-        base_dir: &Path,
+    pub(crate) fn from_source(
+        source: &ConfigSource,
         registry: &Registry,
         options: &Options,
-    ) -> Result<(Self, RunSettings), ConfigError> {
-        let document = Document::read(text, base_dir)?;
-        Self::from_document(&document, base_dir, registry, options)
+    ) -> Result<Self, ConfigError> {
+        let document = source.document()?;
+        Self::from_document(&document, source, registry, options)
             .map_err(|error| document.locate(error))
     }
 
     fn from_document(
         document: &Document,
-        base_dir: &Path,
+        source: &ConfigSource,
         registry: &Registry,
         options: &Options,
-    ) -> Result<(Self, RunSettings), ConfigError> {
+    ) -> Result<Self, ConfigError> {
         let mut root = document.root()?;
         refuse_unknown(&root, options)?;
         let settings = own_settings(&root, options)?;
-        let builder = Builder { registry, base_dir, settings: &settings };
+        let builder = Builder { registry, base_dir: source.folder(), settings: &settings };
         let (detectors, places) = builder.detectors(root.remove("detectors"))?;
         let verifiers = builder.verifiers(root.remove("verifiers"))?;
         let associator = builder.associator(root.remove("associator"))?;
@@ -171,19 +139,24 @@ impl Pipeline {
             .collect();
         let without_span = root.get("without").map(Spanned::span);
         let inputs = declared_inputs(&settings, &plugins, steering.is_some(), without_span)?;
-        let resolved = resolve(document.table()?, &settings, registry)?;
-        let tune = tune::read(root.remove(tune::TABLE), &resolved)?;
-        let suits = suits::read(root.remove(suits::TABLE))?;
-        let resolved =
-            toml::to_string(&resolved).map_err(|error| ConfigError::new(error.to_string()))?;
+        let values = resolve(document.table()?, &settings, registry)?;
+        let config = ResolvedConfig {
+            seed: settings.seed,
+            robot: settings.robot.clone(),
+            tune: tune::read(root.remove(tune::TABLE), &values)?,
+            suits: suits::read(root.remove(suits::TABLE))?,
+            source: source.clone(),
+            document: document.clone(),
+            text: resolved::to_text(&values)?,
+            values,
+            foreign: options.foreign.clone(),
+        };
         let on_threads = |stereo: &StereoSettings| match options.threads {
             Some(most) => StereoDepth::new(stereo.on_threads(most)),
             None => StereoDepth::new(stereo.clone()),
         };
         let stereo = settings.stereo.as_ref().map(on_threads).transpose();
         let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
-        let (seed, robot) = (settings.seed, settings.robot.clone());
-        let run = RunSettings { seed, robot, tune, suits, document: document.clone() };
         let preprocessors = preprocessors(stereo, settings.odometry.clone());
         let parts = Parts {
             preprocessors,
@@ -194,17 +167,15 @@ impl Pipeline {
             manager,
             describer: describer.clone(),
         };
-        let pipeline = Self {
+        Ok(Self {
             inputs,
             tracker: Tracker::new(parts, settings.tracker()),
             settings,
             steering,
             describer,
-            resolved,
+            config,
             failed: None,
-            base_dir: base_dir.to_owned(),
-        };
-        Ok((pipeline, run))
+        })
     }
 }
 

@@ -1,8 +1,59 @@
 //! Pipeline of a person-following robot, built from a TOML config.
 //!
-//! [`Pipeline::from_toml`] builds the plugins that a config names; [`Pipeline::step`] takes one
+//! [`Pipeline::builder`] builds the plugins that a config names; [`Pipeline::step`] takes one
 //! frame through them and returns a [`FrameReport`] with the tracks and, for every rejected
 //! candidate, the test that dropped it.
+//!
+//! With plugins of the caller and those that it registers; the feature `plugins` registers all of
+//! Tagalong's:
+//!
+//! ```
+//! use tagalong_config::{NoSettings, Registry};
+//! use tagalong_core::*;
+//! use tagalong_pipeline::Pipeline;
+//!
+//! /// Takes the nearest point of the laser scan for a person.
+//! # struct Nearest;
+//! # impl Detector for Nearest {
+//! #     fn capabilities(&self) -> Capabilities {
+//! #         let inputs = Inputs::NONE.require(Input::Laser);
+//! #         Capabilities { inputs, discovers: true, ..Capabilities::default() }
+//! #     }
+//! #     fn detect(
+//! #         &mut self,
+//! #         frame: &Frame,
+//! #         _: &Query<'_>,
+//! #         _: &mut Funnel,
+//! #     ) -> Result<Vec<Detection>> {
+//! #         let points = frame.scan()?.points.iter();
+//! #         let nearest = points.min_by(|a, b| a.coords.norm().total_cmp(&b.coords.norm()));
+//! #         let covariance = nalgebra::Matrix3::from_diagonal_element(0.01);
+//! #         let found = nearest.map(|at| Detection::new("nearest", *at, covariance, 2.0));
+//! #         Ok(found.into_iter().collect())
+//! #     }
+//! # }
+//!
+//! let mut registry = Registry::default();
+//! tagalong_associate_hungarian::register(&mut registry);
+//! tagalong_ekf::register(&mut registry);
+//! tagalong_manage_m_of_n::register(&mut registry);
+//! registry.detector("nearest", "the nearest laser point", |_: NoSettings, _| Ok(Nearest));
+//! let config = "filter.plugin = 'ekf'\n[[detectors]]\nplugin = 'nearest'\n";
+//! let mut pipeline = Pipeline::builder(&registry).from_toml(config)?;
+//!
+//! let camera = std::sync::Arc::new(tagalong_geometry::Camera::blind(nalgebra::one()));
+//! let mut tracks = Vec::new();
+//! for index in 1..=10 {
+//!     let scan = LaserScan::of_points([[2.0, 0.5, 0.3].into()]);
+//!     let stamp = Stamp::default().plus_seconds(0.1 * index as f64);
+//!     let sensors = Sensors::default().with(scan);
+//!     let motion = EgoMotion::at_rest(0.1);
+//!     let frame = Frame::of_sensors(index, stamp, camera.clone(), motion, sensors);
+//!     tracks = pipeline.step(&frame)?.tracks;
+//! }
+//! assert!(tracks[0].confirmed && (tracks[0].position.x - 2.0).abs() < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! # Invariants
 //!
@@ -35,6 +86,7 @@
 //! | `track: ...` | a track, by the reason for which it ended |
 
 mod appearance;
+mod builder;
 mod config;
 mod pipeline;
 mod preprocessors;
@@ -45,9 +97,12 @@ mod sources;
 mod tests;
 
 pub use appearance::AppearanceSettings;
+pub use builder::PipelineBuilder;
+#[cfg(feature = "plugins")]
+pub use builder::{builtin_registry, register_plugins};
 pub use config::{
-    DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, Options, ReadBase, RunSettings, Suits, Tunable,
-    check_tuning, flattened, flattened_with, with_values,
+    BuildError, ConfigSource, DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, ResolvedConfig, Suits,
+    Tunable, flattened, with_values,
 };
 pub use pipeline::Pipeline;
 pub use report::FrameReport;

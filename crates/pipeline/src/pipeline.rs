@@ -1,11 +1,13 @@
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use tagalong_core::{Command, Frame, Inputs, Reason, Stamp};
 use tagalong_tracking::StepError;
 use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 
-use crate::{Enrollment, EnrollmentError, FollowStatus, FrameReport, Orders, PipelineSettings};
+use crate::{
+    Enrollment, EnrollmentError, FollowStatus, FrameReport, Orders, PipelineSettings,
+    ResolvedConfig,
+};
 use tagalong_following::{
     BlindZone, EnableSwitch, SafetyDistances, SourceSettings, Steered, Steering,
 };
@@ -19,10 +21,8 @@ pub struct Pipeline {
     pub(crate) tracker: Tracker,
     pub(crate) steering: Option<Steering>,
     pub(crate) describer: Describer,
-    pub(crate) resolved: String,
+    pub(crate) config: ResolvedConfig,
     pub(crate) failed: Option<u64>,
-    /// Folder against which relative paths of the config are resolved.
-    pub(crate) base_dir: PathBuf,
 }
 
 /// Stages that [`FrameReport::timings`] names: those of the tracker, then the controller.
@@ -35,14 +35,23 @@ const STAGES: [&str; 9] = {
 impl Pipeline {
     /// Takes one frame through the pipeline. Data of the frame beyond [`Pipeline::inputs`] is
     /// ignored. From a frame with [`Frame::calibration_changed`] on, the tracks stay where they were
-    /// and the robot stands, also after [`Pipeline::arm`].
+    /// and the robot stands, also after [`Pipeline::arm`]. At a frame with
+    /// [`Frame::odometry_jumped`] the robot stops until [`Pipeline::arm`].
     ///
     /// # Errors
     /// [`StepError`] if a plugin fails or panics. The pipeline is stopped then: each further call
     /// fails.
-    pub fn step(&mut self, frame: &Frame) -> Result<FrameReport, StepError> {
+    pub fn step(&mut self, frame: impl AsRef<Frame>) -> Result<FrameReport, StepError> {
+        self.step_frame(frame.as_ref())
+    }
+
+    fn step_frame(&mut self, frame: &Frame) -> Result<FrameReport, StepError> {
         if let Some(failed) = self.failed {
             return Err(StepError::Stopped { frame: failed });
+        }
+        // Before the frame is processed, so that the command of this very frame is a stop.
+        if frame.odometry_jumped {
+            self.disarm("odometry jumped");
         }
         let restricted = frame.restricted_to(&self.inputs);
         let report = self
@@ -193,10 +202,10 @@ impl Pipeline {
     pub fn share_findings(&mut self) {
         // Two plugins are interchangeable only with the same name, config, place, seed, base
         // directory and robot.
-        let resolved: toml::Table = toml::from_str(&self.resolved).unwrap_or_default();
+        let resolved = self.config.values();
         let around = format!(
             "{} {} {:?}",
-            self.base_dir.display(),
+            self.config.source().folder().display(),
             self.settings.seed,
             resolved.get("robot")
         );
@@ -222,9 +231,14 @@ impl Pipeline {
         &STAGES
     }
 
+    /// Returns the config with every default filled in.
+    pub fn config(&self) -> &ResolvedConfig {
+        &self.config
+    }
+
     /// Returns the config with every default filled in, as TOML.
     pub fn resolved(&self) -> String {
-        self.resolved.clone()
+        self.config.to_toml().to_owned()
     }
 
     fn process(&mut self, frame: &Frame) -> Result<FrameReport, StepError> {

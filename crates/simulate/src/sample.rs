@@ -9,7 +9,7 @@ use tagalong_sim::{Scene, Simulation};
 
 use crate::record;
 
-const SCENE: &str = include_str!("../../../configs/scenes/sample.toml");
+const SCENE: &str = include_str!("../configs/scenes/sample.toml");
 
 /// Simulates the log and writes it to `path`.
 ///

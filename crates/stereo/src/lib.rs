@@ -3,6 +3,36 @@
 //! [`StereoDepth`] computes the depth of a frame with a right image; [`Matcher`] computes the
 //! disparities.
 //!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use tagalong_core::{EgoMotion, Frame, Funnel, GreyImage, Images, RightImage, Stamp};
+//! use tagalong_geometry::{Camera, Pinhole};
+//! use tagalong_stereo::{StereoDepth, StereoSettings};
+//!
+//! /// Brightness of a wall with a random pattern.
+//! fn wall(column: usize, row: usize) -> u8 {
+//!     ((column * 7919 + row * 104_729).wrapping_mul(2_654_435_761) >> 16) as u8
+//! }
+//!
+//! // The right camera, 0.1 m beside the left one, sees the wall 10 pixels farther to the left.
+//! let left = GreyImage::from_fn(160, 120, wall);
+//! let right = GreyImage::from_fn(160, 120, |column, row| wall(column + 10, row));
+//! let camera = Camera::mounted(Pinhole::centred(200.0, 160, 120), 160, 120, 1.0, 0.0, 0.0);
+//! let images = Images {
+//!     grey: Some(Arc::new(left)),
+//!     right: Some(Arc::new(RightImage { image: right, baseline_m: 0.1 })),
+//!     ..Images::default()
+//! };
+//! let motion = EgoMotion::at_rest(0.0);
+//! let frame = Frame::new(1, Stamp::default(), Arc::new(camera), motion, images);
+//! let mut stereo = StereoDepth::new(StereoSettings::default())?;
+//! let depth = stereo.depth(&frame, &mut Funnel::default())?;
+//! let middle_m = depth.get(100, 60).expect("within the image");
+//! assert!((middle_m - 200.0 * 0.1 / 10.0).abs() < 0.05, "{middle_m}");
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
+//!
 //! # One pass, a row at a time
 //!
 //! Both methods compare census strings, which tolerate cameras that differ in exposure; the

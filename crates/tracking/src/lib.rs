@@ -20,6 +20,73 @@
 //! The tracker itself decides nothing about people: it calls the plugins in this order, checks
 //! their results, and counts the candidates that they drop.
 //!
+//! A tracker without a config, of a detector of the caller and three plugins:
+//!
+//! ```
+//! use tagalong_core::*;
+//! use tagalong_filtering::PerPerson;
+//! use tagalong_tracking::{
+//!     DetectorSettings, DetectorSlot, Guarded, Parts, Tracker, TrackerSettings,
+//! };
+//! use tagalong_vision::Describer;
+//!
+//! /// Takes the nearest point of the laser scan for a person.
+//! # struct Nearest;
+//! # impl Detector for Nearest {
+//! #     fn capabilities(&self) -> Capabilities {
+//! #         let inputs = Inputs::NONE.require(Input::Laser);
+//! #         Capabilities { inputs, discovers: true, ..Capabilities::default() }
+//! #     }
+//! #     fn detect(
+//! #         &mut self,
+//! #         frame: &Frame,
+//! #         _: &Query<'_>,
+//! #         _: &mut Funnel,
+//! #     ) -> Result<Vec<Detection>> {
+//! #         let points = frame.scan()?.points.iter();
+//! #         let nearest = points.min_by(|a, b| a.coords.norm().total_cmp(&b.coords.norm()));
+//! #         let covariance = nalgebra::Matrix3::from_diagonal_element(0.01);
+//! #         let found = nearest.map(|at| Detection::new("nearest", *at, covariance, 2.0));
+//! #         Ok(found.into_iter().collect())
+//! #     }
+//! # }
+//!
+//! let parts = Parts {
+//!     preprocessors: Vec::new(),
+//!     detectors: vec![DetectorSlot {
+//!         settings: DetectorSettings::default(),
+//!         plugin: Guarded::new("nearest", Box::new(Nearest)),
+//!     }],
+//!     verifiers: Vec::new(),
+//!     associator: {
+//!         let hungarian = tagalong_associate_hungarian::Hungarian::new(Default::default())?;
+//!         Guarded::new("associate-hungarian", Box::new(hungarian))
+//!     },
+//!     filter: {
+//!         let ekf = tagalong_ekf::Ekf::new(Default::default())?;
+//!         Guarded::new("ekf", Box::new(PerPerson::new(ekf)))
+//!     },
+//!     manager: {
+//!         let counts = tagalong_manage_m_of_n::MOfN::new(Default::default())?;
+//!         Guarded::new("manage-m-of-n", Box::new(counts))
+//!     },
+//!     describer: Describer::default(),
+//! };
+//! let mut tracker = Tracker::new(parts, TrackerSettings::default());
+//! let camera = std::sync::Arc::new(tagalong_geometry::Camera::blind(nalgebra::one()));
+//! let mut tracks = Vec::new();
+//! for index in 1..=10 {
+//!     let scan = LaserScan::of_points([[2.0, 0.5, 0.3].into()]);
+//!     let stamp = Stamp::default().plus_seconds(0.1 * index as f64);
+//!     let sensors = Sensors::default().with(scan);
+//!     let motion = EgoMotion::at_rest(0.1);
+//!     let frame = Frame::of_sensors(index, stamp, camera.clone(), motion, sensors);
+//!     tracks = tracker.step(&frame)?.report.tracks;
+//! }
+//! assert!(tracks[0].confirmed && (tracks[0].position.x - 2.0).abs() < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # Invariants
 //!
 //! * Time never runs backwards for a plugin.

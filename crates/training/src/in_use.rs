@@ -9,8 +9,8 @@ use tagalong_sim::CameraKind;
 use tagalong_stereo::StereoSettings;
 use toml::{Table, Value};
 
-const RGBD: &str = include_str!("../../../configs/depth-ekf.toml");
-const STEREO: &str = include_str!("../../../configs/stereo-verified.toml");
+const RGBD: &str = include_str!("../configs/depth-ekf.toml");
+const STEREO: &str = include_str!("../configs/stereo-verified.toml");
 /// Changes of the config for collecting candidates.
 const PROPOSING: &str = include_str!("proposing.toml");
 
@@ -99,8 +99,7 @@ impl InUse {
 /// # Errors
 /// A mistake in the config: exit code 2.
 pub fn pipeline(text: &str, registry: &Registry) -> Result<Pipeline, Failure> {
-    let built = Pipeline::from_toml(text, Path::new("."), registry);
-    built.map(|(pipeline, _)| pipeline).map_err(Failure::usage)
+    Ok(Pipeline::builder(registry).from_toml(text)?)
 }
 
 fn without_verifiers(mut config: Table) -> Table {

@@ -17,7 +17,7 @@ pub const NAME: &str = "omni-distance";
 
 /// Scene with two people, one after the other: another room, other people and another mirror with
 /// every seed.
-const ROOM: &str = include_str!("../../../configs/scenes/omni-room.toml");
+const ROOM: &str = include_str!("../configs/scenes/omni-room.toml");
 /// First group number of the people in other rooms.
 const STRANGER: u64 = 100;
 /// Time for which each person of the first room is seen, s: each gets a regression head of their

@@ -20,15 +20,15 @@ const LOOK_ALIKES: [FurnitureKind; 6] = [
 
 /// Suites that take turns.
 const SUITES: [&str; 9] = [
-    include_str!("../../../configs/scenes/empty-clutter.toml"),
-    include_str!("../../../configs/scenes/office.toml"),
-    include_str!("../../../configs/scenes/crowd.toml"),
-    include_str!("../../../configs/scenes/full-occlusion.toml"),
-    include_str!("../../../configs/scenes/empty-clutter.toml"),
-    include_str!("../../../configs/scenes/square-walk.toml"),
-    include_str!("../../../configs/scenes/cafeteria.toml"),
-    include_str!("../../../configs/scenes/turntable.toml"),
-    include_str!("../../../configs/scenes/following.toml"),
+    include_str!("../configs/scenes/empty-clutter.toml"),
+    include_str!("../configs/scenes/office.toml"),
+    include_str!("../configs/scenes/crowd.toml"),
+    include_str!("../configs/scenes/full-occlusion.toml"),
+    include_str!("../configs/scenes/empty-clutter.toml"),
+    include_str!("../configs/scenes/square-walk.toml"),
+    include_str!("../configs/scenes/cafeteria.toml"),
+    include_str!("../configs/scenes/turntable.toml"),
+    include_str!("../configs/scenes/following.toml"),
 ];
 
 /// Rate and duration of a scene's images.

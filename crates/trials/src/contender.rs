@@ -1,12 +1,9 @@
 use std::path::PathBuf;
 
 use tagalong_config::Registry;
-use tagalong_pipeline::{Options, Pipeline};
+use tagalong_pipeline::{ConfigSource, Pipeline};
 
 use crate::TrialError;
-
-/// Tables of a config that speak of logs and files; here are neither.
-const FOREIGN: [&str; 3] = ["input", "limits", "output"];
 
 /// A pipeline that takes part in trials.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,10 +28,8 @@ impl Contender {
     /// [`TrialError::Config`] with the place of the mistake.
     pub fn pipeline(&self, registry: &Registry, seed: u64) -> Result<Pipeline, TrialError> {
         // The seed of the scene: each draw gives the plugins other random numbers, too.
-        let foreign = FOREIGN.map(str::to_owned).to_vec();
-        let options = Options { foreign, seed: Some(seed), threads: None };
-        Pipeline::from_toml_with(&self.config, &self.folder, registry, &options)
-            .map(|(pipeline, _)| pipeline)
-            .map_err(|error| TrialError::Config(error.render(&self.name, &self.config)))
+        let source = ConfigSource::from_text(&*self.config, &self.folder).with_name(&self.name);
+        let built = Pipeline::builder(registry).seed(seed).build(&source);
+        built.map_err(|error| TrialError::Config(error.to_string()))
     }
 }

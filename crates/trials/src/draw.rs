@@ -1,10 +1,10 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Isometry3, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry2, Isometry3, UnitQuaternion, Vector3};
 use tagalong_core::{
-    DepthImage, EgoMotion, Frame, Images, ObstacleData, ObstacleReading, ObstacleReadings,
-    RangeReading, Stamp, WheelSpeeds,
+    DepthImage, EgoMotion, Frame, Images, MAX_ODOMETRY_GAP_S, ObstacleData, ObstacleReading,
+    ObstacleReadings, RangeReading, Stamp, WheelSpeeds,
 };
 use tagalong_geometry::{Camera, Lens};
 use tagalong_sim::{
@@ -23,10 +23,6 @@ const REORDERED: usize = 3;
 const KEPT_NS: u64 = 1_000_000_000;
 /// Readings of each further sensor that are kept: those of some seconds.
 const KEPT_READINGS: usize = 256;
-/// Gap in the odometry beyond which the motion is unknown, s, as the log reader takes it.
-const MAX_GAP_S: f64 = 0.5;
-/// Longest time for which an unknown motion may have gone on, s, as the log reader takes it.
-const LONGEST_UNKNOWN_S: f64 = 5.0;
 
 /// Input of a pipeline at one moment of a scene, and the truth at that moment.
 pub struct SimulatedFrame {
@@ -250,8 +246,8 @@ impl Draw {
         }
         let Some((then, pose)) = before else { return EgoMotion::at_rest(0.0) };
         let dt = stamp.seconds_since(then);
-        if here.age_s > MAX_GAP_S {
-            return unknown_motion(dt);
+        if here.age_s > MAX_ODOMETRY_GAP_S {
+            return EgoMotion::unknown(dt);
         }
         EgoMotion::between(&pose, &here.odom_from_robot, dt, ODOMETRY_SIGMA)
     }
@@ -276,13 +272,6 @@ fn moved_along(data: &SensorData, now_from_then: &Isometry3<f64>) -> ObstacleDat
 fn spatial(planar: &Isometry2<f64>) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
     Isometry3::from_parts(planar.translation.vector.push(0.0).into(), turn)
-}
-
-/// Returns the motion over `dt` seconds without odometry, as log readers do: at rest, with the
-/// uncertainty of a robot that may have driven at 1 m/s and turned at 1 rad/s.
-fn unknown_motion(dt: f64) -> EgoMotion {
-    let reach = dt.clamp(0.0, LONGEST_UNKNOWN_S);
-    EgoMotion { covariance: Matrix3::identity() * (reach * reach), ..EgoMotion::at_rest(dt) }
 }
 
 /// The camera of the frames: that of the log, with the circular image of a
@@ -403,7 +392,7 @@ mod tests {
                 if age_s > 0.0 {
                     assert!(moved_m(one) < 0.02, "{kind} {}", at_s(one));
                 }
-                if age_s > MAX_GAP_S {
+                if age_s > MAX_ODOMETRY_GAP_S {
                     assert!(motion.covariance[(0, 0)] > 1e-3, "anything may have happened");
                 }
             }
@@ -518,7 +507,7 @@ mod tests {
     /// Frames of a robot that drives straight ahead in the scene of the glass wall, each with the room
     /// to things and the nearest range of its sonars, m.
     fn driven_at_glass(seed: u64, heading_deg: f64) -> Vec<(f64, f64)> {
-        let text = include_str!("../../../configs/scenes/behind-glass-sonar.toml");
+        let text = include_str!("../configs/scenes/behind-glass-sonar.toml");
         let variant = Variant::of_seed(seed)
             .with("camera.width", 16)
             .with("camera.height", 12)

@@ -4,6 +4,8 @@
 //! likewise that of `cargo xtask faults`. `<!-- begin: excerpt PAGE TITLE -->` repeats the table of
 //! another page that is titled so, in bold, with its notes, and `<!-- begin: rows PAGE ROW; ROW -->`
 //! repeats the rows of tables of another page that begin so, below their head.
+//! `<!-- begin: source FILE -->` repeats a file of code, such as an example, without the comment at its
+//! head, and `<!-- begin: source FILE NAME -->` one function of it.
 //! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
 //! become stale. Slow parts, the tables of `reproduce`, `follow` and `bench`, are filled only on
 //! request.
@@ -24,6 +26,9 @@ const EXCERPT: &str = "excerpt ";
 
 /// Beginning of a command that repeats rows of the tables of another page.
 const ROWS: &str = "rows ";
+
+/// Beginning of a command that repeats code.
+const SOURCE: &str = "source ";
 
 /// Commands that take minutes to hours.
 const SLOW: &[&str] =
@@ -146,6 +151,38 @@ fn head_above<'a, 'b>(lines: &'a [&'b str]) -> &'a [&'b str] {
     &table[..table.len().min(2)]
 }
 
+/// Returns a file of code without the comment at its head, or one function of it, in a fence.
+fn code(file: &str, text: &str, function: &str) -> Option<String> {
+    // A documentation test of Rust compiles the block, and does not look for the log that it reads.
+    let language = match file.rsplit('.').next()? {
+        "rs" => "rust,no_run",
+        "py" => "python",
+        other => other,
+    };
+    let is_comment = |line: &&str| line.starts_with("//! ") || line.starts_with("# ");
+    let body = text.lines().skip_while(is_comment);
+    let lines: Vec<&str> = if function.is_empty() {
+        body.collect()
+    } else {
+        let begin = format!("fn {function}(");
+        let head = body.clone().take_while(|line| line.starts_with("use ") || line.is_empty());
+        let inner = body.skip_while(|line| !line.starts_with(&begin));
+        let mut lines: Vec<&str> = head.collect();
+        let before = lines.len();
+        for line in inner {
+            lines.push(line);
+            if line == "}" {
+                break;
+            }
+        }
+        if lines.len() == before {
+            return None;
+        }
+        lines
+    };
+    Some(format!("```{language}\n{}\n```", lines.join("\n").trim()))
+}
+
 /// Returns the output of the command, with the program of this workspace; the table of faults is
 /// this program's own.
 fn printed(workspace: &Workspace, command: &str) -> Result<String> {
@@ -161,6 +198,11 @@ fn printed(workspace: &Workspace, command: &str) -> Result<String> {
     if let Some(source) = command.strip_prefix(ROWS) {
         let (page, names) = source.split_once(' ').context("rows name a page and a row")?;
         return rows(&workspace.read(page)?, names).with_context(|| format!("in {page}"));
+    }
+    if let Some(source) = command.strip_prefix(SOURCE) {
+        let (file, name) = source.split_once(' ').unwrap_or((source, ""));
+        return code(file, &workspace.read(file)?, name)
+            .with_context(|| format!("{file} has no function `{name}`"));
     }
     let mut words = command.split_whitespace();
     if words.next() != Some("tagalong") {
@@ -191,6 +233,17 @@ mod tests {
         );
         assert!(out.contains("\ntable\n") && out.ends_with("c\n"), "{out}");
         assert_eq!(filled(&out, |command| !is_slow(command), print).unwrap(), out);
+    }
+
+    #[test]
+    fn code_is_repeated_without_the_comment_at_its_head() {
+        let text = "//! An example.\n\nuse a::b;\n\nfn main() {\n    f();\n}\n\nfn f() {\n}\n";
+        let whole = code("x/y.rs", text, "").unwrap();
+        assert!(whole.starts_with("```rust,no_run\nuse a::b;\n\nfn main() {"), "{whole}");
+        assert!(whole.ends_with("fn f() {\n}\n```"), "{whole}");
+        let one = code("x/y.rs", text, "main").unwrap();
+        assert_eq!(one, "```rust,no_run\nuse a::b;\n\nfn main() {\n    f();\n}\n```");
+        assert_eq!(code("x/y.rs", text, "g"), None);
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod faults;
 mod markdown;
 mod metadata;
 mod new_plugin;
+mod package;
 mod program;
 mod record;
 mod rehearse;
@@ -61,6 +62,13 @@ enum Command {
         #[arg(long)]
         program: Option<PathBuf>,
     },
+    /// Packages every crate, and checks the examples of the library in a crate outside of this
+    /// repository that has nothing but the packages
+    Package {
+        /// Build and run the examples, too: some minutes.
+        #[arg(long)]
+        run: bool,
+    },
     /// Runs everything that the server runs (`.ci/run`)
     Ci,
 }
@@ -107,6 +115,7 @@ fn run(command: Command) -> Result<()> {
         Command::Tidy => tidy::tidy(&workspace),
         Command::Record { file, program } => record::record(&workspace, &file, program),
         Command::Rehearse => rehearse::rehearse(&workspace),
+        Command::Package { run } => package::try_out(&workspace, run),
         Command::Ci => ci::ci(&workspace),
     }
 }

@@ -63,17 +63,20 @@ impl Workspace {
 
     /// All files that git tracks or would track, relative to the root, sorted.
     pub fn files(&self) -> Result<Vec<PathBuf>> {
+        let mut files = self.listed()?;
+        // Git still lists files that were removed, and links to folders.
+        files.retain(|path| self.root.join(path).is_file());
+        Ok(files)
+    }
+
+    /// All paths that git tracks or would track, relative to the root, sorted.
+    fn listed(&self) -> Result<Vec<PathBuf>> {
         let mut git = Command::new("git");
         // New files count, too; ignored ones do not.
         git.args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]);
         let listed = output(git.current_dir(&self.root))?;
-        let mut files: Vec<PathBuf> = listed
-            .split('\0')
-            .filter(|name| !name.is_empty())
-            .map(PathBuf::from)
-            // Git still lists files that were removed.
-            .filter(|path| self.root.join(path).is_file())
-            .collect();
+        let names = listed.split('\0').filter(|name| !name.is_empty());
+        let mut files: Vec<PathBuf> = names.map(PathBuf::from).collect();
         files.sort();
         files.dedup();
         Ok(files)
@@ -81,12 +84,31 @@ impl Workspace {
 
     /// Copies those of its files that are wanted into a folder.
     pub fn copy_to(&self, folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> Result<()> {
-        let files = self.files()?.into_iter().filter(|file| is_wanted(file));
-        for file in files {
-            copy_file(&self.root.join(&file), &folder.join(&file))?;
+        for path in self.listed()?.into_iter().filter(|path| is_wanted(path)) {
+            let from = self.root.join(&path);
+            if from.is_file() {
+                copy_file(&from, &folder.join(&path))?;
+            } else if from.is_dir() {
+                // A link to a folder, whose files the crate embeds.
+                copy_folder(&from, &folder.join(&path))?;
+            }
         }
         Ok(())
     }
+}
+
+/// Copies a folder with everything in it.
+fn copy_folder(from: &Path, to: &Path) -> Result<()> {
+    for entry in fs::read_dir(from).with_context(|| format!("cannot list {}", from.display()))? {
+        let entry = entry?;
+        let there = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy_folder(&entry.path(), &there)?;
+        } else {
+            copy_file(&entry.path(), &there)?;
+        }
+    }
+    Ok(())
 }
 
 /// Copies a file, and makes the folders above it.

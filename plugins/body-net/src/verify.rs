@@ -5,7 +5,7 @@ use tagalong_learn::ScoreCalibration;
 use crate::{Config, Model, NetworkInput, Pass};
 
 /// The model that is part of the program.
-const BUILT_IN: &str = include_str!("../../../configs/models/body-net.toml");
+const BUILT_IN: &str = include_str!("../models/body-net.toml");
 
 /// The verifier.
 pub struct BodyNet {

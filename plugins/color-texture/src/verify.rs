@@ -5,7 +5,7 @@ use tagalong_learn::ScoreCalibration;
 use crate::{Config, Features, Model};
 
 /// The model that is part of the program.
-const BUILT_IN: &str = include_str!("../../../configs/models/color-texture.toml");
+const BUILT_IN: &str = include_str!("../models/color-texture.toml");
 
 /// The verifier.
 pub struct ColorTexture {

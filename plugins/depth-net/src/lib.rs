@@ -43,7 +43,7 @@ pub const NAME: &str = "depth-net";
 pub const VERIFIER: &str = "depth-net-verifier";
 
 /// The model that is built in.
-pub(crate) const BUILT_IN: &str = include_str!("../../../configs/models/depth-net.toml");
+pub(crate) const BUILT_IN: &str = include_str!("../models/depth-net.toml");
 
 /// Registers the detector, the verifier, and the trainer if that is compiled in.
 pub fn register(registry: &mut Registry) {

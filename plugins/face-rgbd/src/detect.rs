@@ -8,7 +8,7 @@ use tagalong_geometry::{Camera, FaceDepth, ImageBox, PointEstimate, Rect};
 use crate::{Cascade, Config, Group, Grouping, Hit, NAME, Proposals, Scanner, scales, whole};
 
 /// Cascade that is compiled into the program.
-const BUILT_IN: &str = include_str!("../../../configs/models/cascade.xml");
+const BUILT_IN: &str = include_str!("../models/cascade.xml");
 
 /// Detector of people by their faces.
 pub struct FaceRgbd {

@@ -12,9 +12,9 @@ use crate::{
 };
 
 /// Models that are compiled into the program.
-const TREES: &str = include_str!("../../../configs/models/hog-upper-body.toml");
-const WHOLE_BODIES: &str = include_str!("../../../configs/models/hog-whole-body.toml");
-const LINEAR: &str = include_str!("../../../configs/models/hog-upper-body-linear.toml");
+const TREES: &str = include_str!("../models/hog-upper-body.toml");
+const WHOLE_BODIES: &str = include_str!("../models/hog-whole-body.toml");
+const LINEAR: &str = include_str!("../models/hog-upper-body-linear.toml");
 
 /// Distance above the square at which depth is read to test for the end of a head, in sides; the
 /// windows that show a head best end well above it.

@@ -9,7 +9,7 @@ use crate::past::PastScans;
 use crate::{Beams, Config, Model, NAME, features};
 
 /// The model that is part of the program.
-const BUILT_IN: &str = include_str!("../../../configs/models/laser-legs.toml");
+const BUILT_IN: &str = include_str!("../models/laser-legs.toml");
 
 /// Variance of a height that is not known, m².
 const UNKNOWN_HEIGHT: f64 = 1e3;

@@ -8,7 +8,7 @@ use tagalong_geometry::{Camera, ImageBox};
 use crate::{Blob, Config, Distance, Eyes, Geometry, Model, NAME, PanoramaGeometry};
 
 /// Model that is compiled into the program.
-const BUILT_IN: &str = include_str!("../../../configs/models/omni-distance.toml");
+const BUILT_IN: &str = include_str!("../models/omni-distance.toml");
 /// Distance from the centre of a head to its top, m.
 const HALF_HEAD_M: f64 = 0.115;
 /// Score of a person of usual height.

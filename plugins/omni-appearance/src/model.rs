@@ -377,7 +377,7 @@ mod tests {
 
     #[test]
     fn a_head_with_one_broken_part_is_none() {
-        let text = include_str!("../../../configs/models/omni-distance.toml");
+        let text = include_str!("../models/omni-distance.toml");
         let head = Model::from_text(text).unwrap().general;
         assert!(head.is_sane());
         let broken: [fn(&mut Head); 9] = [

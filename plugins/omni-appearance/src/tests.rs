@@ -201,7 +201,7 @@ fn a_model_of_another_camera_is_refused_in_words() {
 
 #[test]
 fn the_shipped_model_is_one() {
-    let text = include_str!("../../../configs/models/omni-distance.toml");
+    let text = include_str!("../models/omni-distance.toml");
     let model = Model::from_text(text).unwrap();
     assert_eq!(Model::from_text(&model.to_text().unwrap()).unwrap(), model);
     assert_eq!(model.people.len(), 2);

@@ -5,7 +5,7 @@ use tagalong_learn::ScoreCalibration;
 use crate::{Config, Model};
 
 /// Model that is compiled into the program.
-const BUILT_IN: &str = include_str!("../../../configs/models/svm-patch.toml");
+const BUILT_IN: &str = include_str!("../models/svm-patch.toml");
 
 /// Verifier by a support vector machine on grey patches.
 pub struct SvmPatch {

@@ -7,8 +7,7 @@ use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 
 use ros2_client::qos::Durability;
-use tagalong_config::Registry;
-use tagalong_log::msgs::{StringMsg, TwistStamped};
+use tagalong::log::msgs::{StringMsg, TwistStamped};
 use tagalong_ros2::{ClockSource, Options};
 use tagalong_sim::Simulation;
 
@@ -33,8 +32,7 @@ fn repeat_images(clock: ClockSource, offset: u32) {
     let address = address(offset % 4);
     let http_address = Some(address.parse().unwrap());
     let options = Options { clock, http: http_address, ..options(domain(offset), "20") };
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong::builtin_registry();
     let (bridge, said) = bridge_with(options, registry, &stop);
     let hand = Hand::new(domain(offset), &stop);
     let repeats = Arc::clone(&robot.repeats);
@@ -192,8 +190,7 @@ fn a_bumper_that_is_pressed_or_silent_stops_the_robot() {
     );
     std::fs::write(&config, text).unwrap();
     let options = Options { config: config.clone(), ..options(domain(12), "30") };
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong::builtin_registry();
     let (bridge, said) = bridge_with(options, registry, &stop);
     let hand = Hand::new(domain(12), &stop);
     let playing = thread::spawn(move || (robot.play(simulation), robot).1);

@@ -15,11 +15,9 @@ use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 
 use peers::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use tagalong_config::Registry;
-use tagalong_core::{Controller, Twist};
-use tagalong_log::msgs::{
+use tagalong::config::NoSettings;
+use tagalong::core::{Controller, Twist};
+use tagalong::log::msgs::{
     Detection3DArray, Header, Message, Odometry, PoseStamped, StringMsg, TwistStamped,
 };
 use tagalong_ros2::{Options, run};
@@ -202,12 +200,8 @@ struct Stuck(Arc<AtomicBool>);
 /// Time for which it is stuck.
 const STUCK: Duration = Duration::from_millis(3000);
 
-#[derive(Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-struct NoSettings {}
-
 impl Controller for Stuck {
-    fn command(&mut self, _: &tagalong_core::Scene<'_>) -> Twist {
+    fn command(&mut self, _: &tagalong::core::Scene<'_>) -> Twist {
         if self.0.swap(false, Ordering::Relaxed) {
             sleep(STUCK);
         }
@@ -229,8 +223,7 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     let beats =
         robot.peer.collect_of::<Header>("/people/heartbeat", "std_msgs/msg/Header", &heard_all);
     let is_stuck = Arc::new(AtomicBool::new(false));
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let mut registry = tagalong::builtin_registry();
     let flag = Arc::clone(&is_stuck);
     registry.controller("stuck", "is stuck", move |_: NoSettings, _| Ok(Stuck(Arc::clone(&flag))));
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
@@ -300,8 +293,7 @@ fn a_controller_without_odometry_is_refused_and_tells_the_wheels_nothing() {
     let simulation = Simulation::new(&scene(9.0), 1);
     let mut robot = Robot::new(domain(6), simulation.camera());
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong::builtin_registry();
     let (bridge, _) = bridge_with(options(domain(6), "6"), registry, &stop);
     robot.play_while(simulation, &|event| !matches!(event, Event::Odometry(_)));
     let error = bridge.join().unwrap().unwrap_err();

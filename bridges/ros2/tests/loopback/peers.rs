@@ -14,10 +14,10 @@ use ros2_client::{
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use tagalong_config::Registry;
-use tagalong_core::Stamp;
-use tagalong_geometry::{Camera, Lens, Pinhole};
-use tagalong_log::msgs::{
+use tagalong::config::Registry;
+use tagalong::core::Stamp;
+use tagalong::geometry::{Camera, Lens, Pinhole};
+use tagalong::log::msgs::{
     CameraInfo, Header, Image, Message, Odometry, Pose, StringMsg, TFMessage, TransformStamped,
     Twist, TwistStamped,
 };
@@ -485,8 +485,7 @@ pub(crate) fn options(domain: u16, wait_s: &str) -> Options {
 pub(crate) type Ended = JoinHandle<Result<Summary, BridgeError>>;
 
 pub(crate) fn bridge(domain: u16, stop: &Arc<AtomicBool>) -> (Ended, Said) {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong::builtin_registry();
     bridge_with(options(domain, "20"), registry, stop)
 }
 

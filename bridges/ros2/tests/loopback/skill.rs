@@ -11,8 +11,7 @@ use ros2_client::parameters::raw::{Parameter, ParameterValue};
 use ros2_client::rcl_interfaces::{SetParametersRequest, SetParametersResponse};
 use ros2_client::{Client, Message, ServiceMapping, ServiceTypeName};
 use serde::{Deserialize, Serialize};
-use tagalong_config::Registry;
-use tagalong_log::msgs::{Header, Twist};
+use tagalong::log::msgs::{Header, Twist};
 use tagalong_ros2::{CommandType, Options};
 use tagalong_sim::Simulation;
 
@@ -116,8 +115,7 @@ fn a_person_is_enrolled_and_cleared_by_services_and_over_http() {
         command_type: CommandType::Twist,
         ..options(domain(7), "20")
     };
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong::builtin_registry();
     let (bridge, said) = bridge_with(options, registry, &stop);
     wait_for(&said, "answers at http://127.0.0.1:");
     assert_eq!(http(&address, "GET", "healthz", "").0, 503, "no frame yet");

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::outcome::Failure;
 use tagalong_config::Registry;
-use tagalong_pipeline::{Tunable, with_values};
+use tagalong_pipeline::{ResolvedConfig, Tunable};
 use tagalong_tuning::candidates;
 
 use super::RoomsArgs;
@@ -59,10 +59,10 @@ impl Contestant {
     ) -> Result<Self, Failure> {
         config.file.check_tuning(registry)?;
         let (pipeline, _) = config.file.pipeline(registry, None)?;
-        let (resolved, budget) = (pipeline.resolved(), usize::from(args.budget));
+        let budget = usize::from(args.budget);
         let (mut settings, mut refused) = (Vec::new(), 0);
         for values in candidates(&config.tune, budget, args.seed) {
-            match Setting::new(&config, &resolved, values, locations, registry)? {
+            match Setting::new(&config, pipeline.config(), values, locations, registry)? {
                 Some(setting) => settings.push(setting),
                 None => refused += 1,
             }
@@ -98,24 +98,24 @@ impl Setting {
     /// Returns `None` if each value is allowed, but not all of them together.
     fn new(
         config: &PlannedConfig,
-        resolved: &str,
+        resolved: &ResolvedConfig,
         values: Vec<toml::Value>,
         locations: &[Location],
         registry: &Registry,
     ) -> Result<Option<Self>, Failure> {
         let keys = config.tune.iter().map(|tunable| tunable.key.as_str());
         let named: Vec<(&str, &toml::Value)> = keys.zip(&values).collect();
-        let text = with_values(resolved, &named).map_err(|error| Failure::usage(error.message))?;
-        let file = config.file.with_text(text.clone());
+        let text = resolved.with_values(&named).map_err(|error| Failure::usage(error.message))?;
+        let file = config.file.with_text(text);
         // `check_tuning` has accepted each value alone, so the combination is at fault.
-        let Ok((pipeline, _)) = file.pipeline(registry, None) else { return Ok(None) };
-        let as_is = Variant::new(config, file, pipeline.resolved())?;
+        let Ok((_, chosen)) = file.pipeline(registry, None) else { return Ok(None) };
+        let as_is = Variant::new(config, file, &chosen)?;
         let mut unseen = BTreeMap::new();
         for Location { name, models, .. } in locations {
-            if let Some(text) = with_models(&text, models)? {
+            if let Some(text) = with_models(chosen.values(), models)? {
                 let file = config.file.with_text(text);
-                let (pipeline, _) = file.pipeline(registry, None)?;
-                unseen.insert(name.clone(), Variant::new(config, file, pipeline.resolved())?);
+                let (_, resolved) = file.pipeline(registry, None)?;
+                unseen.insert(name.clone(), Variant::new(config, file, &resolved)?);
             }
         }
         Ok(Some(Self { values, as_is, unseen }))
@@ -135,10 +135,14 @@ impl Setting {
 
 impl Variant {
     /// `resolved` is the config with every default.
-    fn new(config: &PlannedConfig, file: ConfigFile, resolved: String) -> Result<Self, Failure> {
-        let outer = config.outer.resolved()?;
+    fn new(
+        config: &PlannedConfig,
+        file: ConfigFile,
+        resolved: &ResolvedConfig,
+    ) -> Result<Self, Failure> {
+        let whole = config.outer.resolved_with(resolved)?;
         let files = plan::file_hashes(&file)?;
-        let everything = format!("{resolved}\n{outer}\n{files:?}");
+        let everything = format!("{}\n{files:?}", whole.to_toml());
         Ok(Self { file, hash: sha256(everything.as_bytes()) })
     }
 
@@ -154,10 +158,10 @@ impl Variant {
 /// Returns the config with a room's models where it has the built-in ones; `None` if it has none
 /// of these. `resolved` has every setting.
 fn with_models(
-    resolved: &str,
+    resolved: &toml::Table,
     models: &BTreeMap<String, PathBuf>,
 ) -> Result<Option<String>, Failure> {
-    let mut root: toml::Table = resolved.parse().map_err(Failure::failed)?;
+    let mut root = resolved.clone();
     let mut changed = false;
     for (_, section) in &mut root {
         let slots = match section {
@@ -191,7 +195,7 @@ mod tests {
                     [[detectors]]\nplugin = 'net'\nconfig = { model = 'mine.toml' }\n\
                     [[verifiers]]\nplugin = 'other'\nconfig = { model = '' }\n\
                     [filter]\nplugin = 'net'\nconfig = { model = '' }\n";
-        let text = with_models(text, &models).unwrap().unwrap();
+        let text = with_models(&text.parse().unwrap(), &models).unwrap().unwrap();
         let root: toml::Table = text.parse().unwrap();
         let model = |slot: &toml::Value| slot["config"]["model"].as_str().unwrap().to_owned();
         assert_eq!(model(&root["detectors"][0]), "/without.toml");
@@ -199,6 +203,6 @@ mod tests {
         assert_eq!(model(&root["verifiers"][0]), "");
         assert_eq!(model(&root["filter"]), "/without.toml");
         let none = "[[verifiers]]\nplugin = 'other'\nconfig = { model = '' }\n";
-        assert!(with_models(none, &models).unwrap().is_none());
+        assert!(with_models(&none.parse().unwrap(), &models).unwrap().is_none());
     }
 }

@@ -1,7 +1,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use tagalong_app::choice::sources;
+use tagalong::logs::sources_of;
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
@@ -121,7 +121,7 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit
     check_log_path(log)?;
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
     let missing = |why| Failure::failed(format!("`{}`: {why}", log.display()));
-    pipeline.check_sources(sources(&source)).map_err(missing)?;
+    pipeline.check_sources(sources_of(&source)).map_err(missing)?;
     let mut tried = 0;
     let mut blind_zone = None;
     while tried < FRAMES

@@ -19,8 +19,8 @@ use frames::{Frames, Item};
 use pace::Pace;
 use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
-use tagalong_app::choice::sources;
-use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong::logs::sources_of;
+use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
 use tagalong_app::format::Format;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
@@ -36,7 +36,7 @@ use tagalong_config::Registry;
 use tagalong_live::Live;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input};
-use tagalong_pipeline::{FrameReport, Pipeline, StepError};
+use tagalong_pipeline::{FrameReport, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
 
@@ -102,7 +102,7 @@ struct Job {
     pipeline: Pipeline,
     outer: OuterSettings,
     source: FrameSource,
-    resolved: String,
+    resolved: ResolvedConfig,
     folder: PathBuf,
     report: RunReport,
 }
@@ -114,7 +114,7 @@ impl Job {
         check_log_path(args.log())?;
         let config = match named {
             Some(config) => config,
-            None if !args.has_log() => ConfigFile::built_in(),
+            None if !args.has_log() => ConfigFile::built_in()?,
             None => choice::choose(args.log(), registry)?,
         };
         let threads = args.threads.map(usize::from);
@@ -127,13 +127,13 @@ impl Job {
         let wants_pictures = args.overlay || args.with_images || args.serve.is_some();
         let inputs = if wants_pictures { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
-            .map_err(|error| config.refusal(error))?;
+            .map_err(|error| refused_log(error, pipeline.config()))?;
         let missing = |why| Failure::failed(format!("`{}`: {why}", args.log().display()));
         // A config that the program chose is for the tracks alone; no robot follows its commands.
         if is_named {
-            pipeline.check_sources(sources(&source)).map_err(missing)?;
+            pipeline.check_sources(sources_of(&source)).map_err(missing)?;
         }
-        let resolved = format!("{}\n{}", pipeline.resolved(), outer.resolved()?);
+        let resolved = outer.resolved_with(pipeline.config())?;
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let mut report = blank_report(&config, settings.seed, log);
         if settings.suits.odometry && !source.has_odometry() {
@@ -184,13 +184,11 @@ fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
 fn serve(
     at: SocketAddr,
     args: &RunArgs,
-    resolved: &str,
+    resolved: &ResolvedConfig,
     report: &RunReport,
 ) -> Result<Live, Failure> {
-    // It was made from settings that were read; without it the page quotes none.
-    let config = toml::from_str(resolved).unwrap_or_default();
     let name = report.config.name.trim_end_matches(".toml");
-    let live = Live::start(at, name, &log_name(args), &config).map_err(|error| {
+    let live = Live::start(at, name, &log_name(args), resolved.values()).map_err(|error| {
         Failure::usage(format!(
             "cannot serve on {at}: {error}; name another port with --serve=PORT"
         ))
@@ -227,9 +225,6 @@ fn work(
         pace.wait_for(item.frame.frame.stamp, signals);
         desk.timings.add("read", ms_since(waiting));
         desk.tally.read(item.frame.odom_stale);
-        if item.frame.odom_jumped {
-            pipeline.disarm("odometry jumped");
-        }
         let report = match pipeline.step(&item.frame.frame) {
             Ok(report) => report,
             Err(error) => return Ok(Some(error)),
@@ -274,7 +269,7 @@ impl Desk {
             odom: input.odom_frame.clone(),
             camera: camera.unwrap_or_else(|| "camera".into()),
         };
-        let log = TrackLog::create(dir, names, job.outer.output.clone(), &job.resolved)
+        let log = TrackLog::create(dir, names, job.outer.output.clone(), job.resolved.to_toml())
             .map_err(refused)?;
         let (tally, timings) = (Tally::default(), Timings::default());
         Ok(Self { log, overlay, tally, timings, with_images: args.with_images })

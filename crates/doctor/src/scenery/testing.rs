@@ -87,7 +87,6 @@ impl Room {
             frame: Frame::new(number + 1, stamp, Arc::new(camera), motion, images),
             odom_from_robot: Isometry2::new(Vector2::new(told, 0.0), 0.0),
             odom_stale: false,
-            odom_jumped: false,
         }
     }
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    DepthImage, EgoMotion, Frame, Images, Input, ObstacleReadings, RightImage, Sensors, Stamp,
-    planar_pose,
+    DepthImage, EgoMotion, Frame, Images, Input, MAX_ODOMETRY_GAP_S, ObstacleReadings, RightImage,
+    Sensors, Stamp, planar_pose,
 };
 use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole};
 use tagalong_vision::Unwrapping;
@@ -21,7 +21,7 @@ use crate::images::{
 };
 use crate::msgs::{CompressedImage, DisparityImage, Image, LaserScan, decode};
 use crate::obstacles::DepthFormat;
-use crate::odometry::{MAX_GAP_S, PoseAt, unknown_motion};
+use crate::odometry::PoseAt;
 use crate::pairing::Payload;
 use crate::register::Registration;
 use crate::scan::Type;
@@ -371,10 +371,10 @@ impl Assembler {
         LogFrame {
             frame: Frame::of_sensors(self.index, stamp, camera, motion, sensors)
                 .with_changed_calibration(intake.watch.has_changed(stamp))
-                .with_odometry_age(odometry_age_s(plan, stamp, intake)),
+                .with_odometry_age(odometry_age_s(plan, stamp, intake))
+                .with_odometry_jump(odom_jumped),
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
-            odom_jumped,
         }
     }
 
@@ -385,7 +385,7 @@ impl Assembler {
             Some(Some((odom, robot))) => intake.tf.lookup(odom, robot, stamp).map(|pose| {
                 let age_s = intake.tf.age_s(odom, robot, stamp);
                 // Static transforms alone have no age.
-                let stale = age_s.is_finite() && age_s > MAX_GAP_S;
+                let stale = age_s.is_finite() && age_s > MAX_ODOMETRY_GAP_S;
                 PoseAt { pose: planar_pose(&pose), stale }
             }),
         };
@@ -425,7 +425,7 @@ impl Assembler {
         };
         let dt = stamp.seconds_since(then);
         if here.stale || before.stale || jumped {
-            return (unknown_motion(dt), false);
+            return (EgoMotion::unknown(dt), false);
         }
         (EgoMotion::between(&before.pose, &here.pose, dt, plan.input.odometry_sigma), true)
     }

@@ -33,8 +33,12 @@ pub struct LogFrame {
     pub odom_from_robot: Isometry2<f64>,
     /// True if the pose is a guess: there was a long gap in the odometry, or a jump.
     pub odom_stale: bool,
-    /// True if odometry has jumped since the previous frame.
-    pub odom_jumped: bool,
+}
+
+impl AsRef<Frame> for LogFrame {
+    fn as_ref(&self) -> &Frame {
+        &self.frame
+    }
 }
 
 /// Facts about a log.

@@ -1,17 +1,14 @@
-use std::path::Path;
-
 use proptest::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::commented_defaults;
 
-use super::{Options, RunSettings};
 use crate::tests::doubles::{PLAIN, World, frame, person};
 use crate::{MissingSource, Pipeline, PipelineSettings, Sources};
 
-fn build(text: &str) -> Result<(Pipeline, RunSettings), String> {
-    Pipeline::from_toml(text, Path::new("."), &World::default().registry())
-        .map_err(|error| error.render("a.toml", text))
+fn build(text: &str) -> Result<Pipeline, String> {
+    let built = Pipeline::builder(&World::default().registry()).from_toml(text);
+    built.map_err(|error| error.to_string())
 }
 
 const FILTER: &str = "filter.plugin = 'steady'\n";
@@ -25,91 +22,107 @@ fn mistakes_are_shown_with_their_place_and_the_remedy() {
     let cases: Vec<(String, &[&str])> = vec![
         (
             own("suits.camera_height_m = [2.0, 1.0]"),
-            &["a.toml:1:", "the lowest and the highest value"],
+            &["config.toml:1:", "the lowest and the highest value"],
         ),
-        (own("suits.heigth = [1.0, 2.0]"), &["a.toml:1:7", "unknown field `heigth`"]),
-        (own("sed = 1"), &["a.toml:1:1", "unknown key `sed`", "did you mean `seed`?"]),
-        (own("manager.config.confirm_hit = 1"), &["a.toml:1:16", "did you mean `confirm_hits`?"]),
-        (own("associator.config.cost = 'overlapp'"), &["a.toml:1:26", "did you mean `overlap`?"]),
-        (own("associator.config.gate = -1.0"), &["a.toml:1:26", "`gate` must be positive"]),
-        (own("associator.config.gate_m = nan"), &["a.toml:1:28", "`gate_m` must be positive"]),
+        (own("suits.heigth = [1.0, 2.0]"), &["config.toml:1:7", "unknown field `heigth`"]),
+        (own("sed = 1"), &["config.toml:1:1", "unknown key `sed`", "did you mean `seed`?"]),
+        (
+            own("manager.config.confirm_hit = 1"),
+            &["config.toml:1:16", "did you mean `confirm_hits`?"],
+        ),
+        (
+            own("associator.config.cost = 'overlapp'"),
+            &["config.toml:1:26", "did you mean `overlap`?"],
+        ),
+        (own("associator.config.gate = -1.0"), &["config.toml:1:26", "`gate` must be positive"]),
+        (own("associator.config.gate_m = nan"), &["config.toml:1:28", "`gate_m` must be positive"]),
         (
             own("occlusion.min_visible = 1.5"),
-            &["a.toml:1:25", "must be positive and at most 1, not 1.5"],
+            &["config.toml:1:25", "must be positive and at most 1, not 1.5"],
         ),
         (
             own("manager.config.confirm_hits = 9"),
-            &["a.toml:1:", "`confirm_within` must be at least 9"],
+            &["config.toml:1:", "`confirm_within` must be at least 9"],
         ),
         (
             own("manager.config.confirm_within = 40"),
-            &["a.toml:1:33", "`confirm_within` must lie between 1 and 32"],
+            &["config.toml:1:33", "`confirm_within` must lie between 1 and 32"],
         ),
-        (own("association.gate = 9.0"), &["a.toml:1:1", "now `[associator.config]`", "[merge]"]),
-        (own("governor.margin_m = 0.5"), &["a.toml:1:1", "now `[command_limiter]`"]),
-        (plain("roles = ['follow']"), &["a.toml:4:10", "role `follow` is now `track`"]),
-        (own("lifecycle.confirm_hits = 2"), &["a.toml:1:1", "now `[manager.config]`"]),
-        (own("manager.plugin = 'steady'"), &["a.toml:1:18", "`steady` is a filter, not a track"]),
+        (
+            own("association.gate = 9.0"),
+            &["config.toml:1:1", "now `[associator.config]`", "[merge]"],
+        ),
+        (own("governor.margin_m = 0.5"), &["config.toml:1:1", "now `[command_limiter]`"]),
+        (plain("roles = ['follow']"), &["config.toml:4:10", "role `follow` is now `track`"]),
+        (own("lifecycle.confirm_hits = 2"), &["config.toml:1:1", "now `[manager.config]`"]),
+        (
+            own("manager.plugin = 'steady'"),
+            &["config.toml:1:18", "`steady` is a filter, not a track"],
+        ),
         (
             own("associator.plugin = 'manage-m-of-n'"),
             &["not an associator; available", "hungarian"],
         ),
         (
             own("robot.max_speed_mps = inf"),
-            &["a.toml:1:23", "must lie between 0.05 and 0.9, not inf"],
+            &["config.toml:1:23", "must lie between 0.05 and 0.9, not inf"],
         ),
-        (own("stereo.window = 4"), &["a.toml:1:17", "`stereo.window` must be 3, 5, 7 or 9"]),
+        (own("stereo.window = 4"), &["config.toml:1:17", "`stereo.window` must be 3, 5, 7 or 9"]),
         (
             own("odometry.cell_px = 4"),
-            &["a.toml:1:20", "`odometry.cell_px` must lie between 8 and 256"],
+            &["config.toml:1:20", "`odometry.cell_px` must lie between 8 and 256"],
         ),
-        (own("stereo.metod = 'block'"), &["a.toml:1:8", "did you mean `method`?"]),
-        (own("stereo.method = 'blok'"), &["a.toml:1:17", "did you mean `block`?"]),
-        (own("seed = 'x'"), &["a.toml:1:8", "invalid type"]),
-        (own("seed = -4"), &["a.toml:1:8"]),
-        (own("seed = "), &["a.toml:1:8"]),
-        (own("seed = 1\nseed = 2"), &["a.toml:2:1", "duplicate key"]),
-        (SCRIPT.into(), &["a.toml: no filter: add a section [filter]"]),
+        (own("stereo.metod = 'block'"), &["config.toml:1:8", "did you mean `method`?"]),
+        (own("stereo.method = 'blok'"), &["config.toml:1:17", "did you mean `block`?"]),
+        (own("seed = 'x'"), &["config.toml:1:8", "invalid type"]),
+        (own("seed = -4"), &["config.toml:1:8"]),
+        (own("seed = "), &["config.toml:1:8"]),
+        (own("seed = 1\nseed = 2"), &["config.toml:2:1", "duplicate key"]),
+        (SCRIPT.into(), &["config.toml: no filter: add a section [filter]"]),
         (FILTER.into(), &["no detector discovers anybody"]),
-        (plain("every = 0"), &["a.toml:4:9", "`every` must be at least 1"]),
-        (plain("every = 2\noffset = 2"), &["a.toml:5:10", "2 is not below 2"]),
-        (plain("roles = []"), &["a.toml:4:9", "`script` has no role"]),
-        (plain("roles = ['trak']"), &["a.toml:4:10", "did you mean `track`?"]),
-        (plain("roles = ['track']"), &["a.toml:2:1", "give one of [[detectors]] the role"]),
-        (plain("roles = ['discover', 'weigh']"), &["a.toml:4:9", "cannot weigh scenes"]),
+        (plain("every = 0"), &["config.toml:4:9", "`every` must be at least 1"]),
+        (plain("every = 2\noffset = 2"), &["config.toml:5:10", "2 is not below 2"]),
+        (plain("roles = []"), &["config.toml:4:9", "`script` has no role"]),
+        (plain("roles = ['trak']"), &["config.toml:4:10", "did you mean `track`?"]),
+        (plain("roles = ['track']"), &["config.toml:2:1", "give one of [[detectors]] the role"]),
+        (plain("roles = ['discover', 'weigh']"), &["config.toml:4:9", "cannot weigh scenes"]),
         (
             plain("config = { how = 'track' }"),
-            &["a.toml:2:1", "`script` cannot discover people: remove the role discover"],
+            &["config.toml:2:1", "`script` cannot discover people: remove the role discover"],
         ),
         (
             plain("roles = ['discover', 'track']\nconfig = { how = 'discover' }"),
-            &["a.toml:4:9", "cannot find a tracked person again: remove the role track"],
+            &["config.toml:4:9", "cannot find a tracked person again: remove the role track"],
         ),
-        (own("without = ['dept']"), &["a.toml:1:12", "did you mean `depth`?"]),
+        (own("without = ['dept']"), &["config.toml:1:12", "did you mean `depth`?"]),
         (
             format!("without = ['depth']\n{}config = {{ how = 'depth' }}", plain("")),
-            &["a.toml:1:11", "`script` requires depth images", "remove \"depth\" from `without`"],
+            &[
+                "config.toml:1:11",
+                "`script` requires depth images",
+                "remove \"depth\" from `without`",
+            ],
         ),
         (
             format!("without = ['depth']\nodometry = {{}}\n{}", plain("")),
-            &["a.toml:1:11", "`[odometry]` requires depth images"],
+            &["config.toml:1:11", "`[odometry]` requires depth images"],
         ),
         (
             format!("without = ['right']\nstereo = {{}}\n{}", plain("")),
-            &["a.toml:1:11", "`[stereo]` requires right images of a stereo pair"],
+            &["config.toml:1:11", "`[stereo]` requires right images of a stereo pair"],
         ),
-        (plain("rolls = ['discover']"), &["a.toml:4:1", "did you mean `roles`?"]),
-        (plain("config = { scrip = 1 }"), &["a.toml:4:12", "did you mean `script`?"]),
-        (plain("[controller]\nplugin = 'script'"), &["a.toml:5:10", "not a controller"]),
+        (plain("rolls = ['discover']"), &["config.toml:4:1", "did you mean `roles`?"]),
+        (plain("config = { scrip = 1 }"), &["config.toml:4:12", "did you mean `script`?"]),
+        (plain("[controller]\nplugin = 'script'"), &["config.toml:5:10", "not a controller"]),
         (
             format!("{FILTER}[[detectors]]\nplugin = 'scripts'"),
-            &["a.toml:3:10", "unknown detector plugin `scripts`", "did you mean `script`?"],
+            &["config.toml:3:10", "unknown detector plugin `scripts`", "did you mean `script`?"],
         ),
-        (format!("{SCRIPT}[filter]\nplugin = 'choosy'"), &["a.toml:4:10", "is a verifier"]),
-        (format!("{FILTER}[detectors]\nplugin = 'script'"), &["a.toml:2:1", "[[detectors]]"]),
-        (format!("{FILTER}detectors = [1]"), &["a.toml:2:14", "must be a table"]),
-        (format!("{weighing}{SCRIPT}"), &["a.toml:1:21", "add the role weigh to a detector"]),
-        ("\u{0}".into(), &["a.toml:1:"]),
+        (format!("{SCRIPT}[filter]\nplugin = 'choosy'"), &["config.toml:4:10", "is a verifier"]),
+        (format!("{FILTER}[detectors]\nplugin = 'script'"), &["config.toml:2:1", "[[detectors]]"]),
+        (format!("{FILTER}detectors = [1]"), &["config.toml:2:14", "must be a table"]),
+        (format!("{weighing}{SCRIPT}"), &["config.toml:1:21", "add the role weigh to a detector"]),
+        ("\u{0}".into(), &["config.toml:1:"]),
     ];
     for (text, expected) in cases {
         let shown = build(&text).map(|_| ()).expect_err(&text);
@@ -131,13 +144,13 @@ fn too_long_and_too_deep_configs_are_refused() {
     let long = format!("{PLAIN}\n# {}", "x".repeat(1 << 20));
     assert!(build(&long).err().unwrap().contains("at most 1048576 are read"));
     let deep = format!("input = {}1{}\n{PLAIN}", "[".repeat(40), "]".repeat(40));
-    assert!(build(&deep).err().unwrap().contains("a.toml:1:9: nested deeper than 32 levels"));
+    assert!(build(&deep).err().unwrap().contains("config.toml:1:9: nested deeper than 32 levels"));
     let deeper = format!("input = {}1{}\n{PLAIN}", "[".repeat(50_000), "]".repeat(50_000));
     assert!(build(&deeper).is_err());
     assert!(build(&format!("input{} = 1\n{PLAIN}", ".a".repeat(50_000))).is_err());
 }
 
-#[derive(Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct Input {
     /// A topic.
@@ -147,36 +160,35 @@ struct Input {
 #[test]
 fn tables_of_others_are_left_to_them() {
     let text = format!("{PLAIN}\n[input]\ntopic = '/depth'\n[limits]\ntpoic = 1");
-    let (_, run) = build(&text).unwrap();
-    assert_eq!(run.table::<Input>("input").unwrap().topic, "/depth");
-    assert_eq!(run.table::<Input>("absent").unwrap().topic, "");
-    let error = run.table::<Input>("limits").err().unwrap().render("a.toml", &text);
+    let pipeline = build(&text).unwrap();
+    let config = pipeline.config();
+    assert_eq!(config.table::<Input>("input").unwrap().topic, "/depth");
+    assert_eq!(config.table::<Input>("absent").unwrap().topic, "");
+    let error = config.table::<Input>("limits").unwrap_err().to_string();
     assert!(error.contains("did you mean `topic`?") && error.contains("tpoic = 1"), "{error}");
 }
 
 #[test]
 fn the_resolved_config_holds_every_default_and_means_the_same() {
     let text = format!("{PLAIN}\n[manager.config]\nconfirm_hits = 2\n[input]\ntopic = 'x'");
-    let (pipeline, _) = build(&text).unwrap();
+    let pipeline = build(&text).unwrap();
     let resolved = pipeline.resolved();
     for line in ["gate = 11.34", "confirm_hits = 2", "every = 1", "how = \"\"", "topic = \"x\""] {
         assert!(resolved.contains(line), "{line} in\n{resolved}");
     }
-    let (again, _) = build(&resolved).unwrap();
+    let again = build(&resolved).unwrap();
     assert_eq!(again.resolved(), resolved);
 }
 
 #[test]
 fn the_seed_can_be_replaced() {
-    let options = Options { seed: Some(42), ..Options::default() };
     let registry = World::default().registry();
-    let built = Pipeline::from_toml_with(PLAIN, Path::new("."), &registry, &options);
-    let (pipeline, run) = built.unwrap();
-    assert_eq!(run.seed, 42);
+    let builder = Pipeline::builder(&registry);
+    let pipeline = builder.clone().seed(42).from_toml(PLAIN).unwrap();
+    assert_eq!(pipeline.config().seed, 42);
     assert!(pipeline.resolved().contains("seed = 42"));
-    let options = Options { seed: Some(u64::MAX), ..options };
-    let built = Pipeline::from_toml_with(PLAIN, Path::new("."), &registry, &options);
-    assert!(built.err().unwrap().message.contains("`seed` must be at most"));
+    let error = builder.seed(u64::MAX).from_toml(PLAIN).err().unwrap();
+    assert!(error.to_string().contains("`seed` must be at most"));
 }
 
 #[test]
@@ -223,7 +235,7 @@ fn no_setting_may_be_no_number() {
     assert!(lines.len() > 40, "{}", lines.len());
     for line in lines {
         let shown = build(&format!("{line}\n{PLAIN}")).map(|_| ()).expect_err(&line);
-        assert!(shown.starts_with("a.toml:1:"), "{line}: {shown}");
+        assert!(shown.starts_with("config.toml:1:"), "{line}: {shown}");
     }
 }
 
@@ -314,7 +326,7 @@ fn a_limit_beyond_its_ceiling_is_shown_with_its_line_and_the_remedy() {
         ("collision_monitor.range_m = 1.2", "raise it or lower `max_speed_mps` in [robot]"),
     ] {
         let shown = refused(line);
-        assert!(shown.contains("a.toml:2:"), "{shown}");
+        assert!(shown.contains("config.toml:2:"), "{shown}");
         assert!(shown.contains(words), "{shown}");
     }
 }
@@ -327,7 +339,8 @@ fn a_controller_without_sensors_of_obstacles_is_refused_unless_the_config_says_s
     };
     let blind = "without = ['depth', 'laser']";
     let refused = with(blind).unwrap_err();
-    for words in ["a.toml:1:", "no sensor of obstacles", "obstacles = \"none\"", "without = "] {
+    for words in ["config.toml:1:", "no sensor of obstacles", "obstacles = \"none\"", "without = "]
+    {
         assert!(refused.contains(words), "{refused}");
     }
     assert_eq!(with("without = ['depth']"), Ok(()), "a laser may be there");
@@ -340,9 +353,7 @@ fn a_controller_without_sensors_of_obstacles_is_refused_unless_the_config_says_s
 fn a_source_without_the_data_of_a_controller_is_refused_unless_the_config_says_so() {
     let check = |head: &str, tail: &str, sources: Sources| {
         let text = format!("{head}\n{PLAIN}{tail}");
-        let (pipeline, _) =
-            Pipeline::from_toml(&text, Path::new("."), &World::default().registry()).unwrap();
-        pipeline.check_sources(sources)
+        build(&text).unwrap().check_sources(sources)
     };
     let all = Sources { depth: true, right: false, laser: true, odometry: true };
     let (eyes, odometry) =
@@ -397,8 +408,7 @@ fn seeds(run: u64) -> Vec<u64> {
     let verifiers =
         ["one", "other", "one"].map(|name| format!("[[verifiers]]\nplugin = '{name}'\n"));
     let text = format!("{PLAIN}{}[controller]\nplugin = 'draws'\n", verifiers.concat());
-    let options = Options { seed: Some(run), ..Options::default() };
-    Pipeline::from_toml_with(&text, Path::new("."), &registry, &options).unwrap();
+    Pipeline::builder(&registry).seed(run).from_toml(&text).unwrap();
     seen.lock().unwrap().clone()
 }
 
@@ -461,7 +471,7 @@ proptest! {
             text.replace_range(at..(at + removed).min(text.len()), &inserted);
         }
         if let Err(shown) = build(&text) {
-            prop_assert!(shown.starts_with("a.toml:"), "{shown}");
+            prop_assert!(shown.starts_with("config.toml:"), "{shown}");
         }
     }
 }
@@ -469,14 +479,16 @@ proptest! {
 #[test]
 fn a_config_states_its_cameras_and_inherits_the_statement() {
     let text = format!("{FILTER}{SCRIPT}[suits]\ncamera_height_m = [0.9, 2.4]\n");
-    let (pipeline, run) = build(&text).unwrap();
-    assert_eq!(run.suits.camera_height_m, Some([0.9, 2.4]));
-    assert_eq!(run.suits.pitch_down_deg, None);
-    let (plain, _) = build(&format!("{FILTER}{SCRIPT}")).unwrap();
+    let pipeline = build(&text).unwrap();
+    let suits = pipeline.config().suits;
+    assert_eq!(suits.camera_height_m, Some([0.9, 2.4]));
+    assert_eq!(suits.pitch_down_deg, None);
+    let plain = build(&format!("{FILTER}{SCRIPT}")).unwrap();
     assert_eq!(pipeline.resolved(), plain.resolved(), "a run takes no notice of it");
     let home = tempfile::tempdir().unwrap();
     std::fs::write(home.path().join("base.toml"), text).unwrap();
     let registry = World::default().registry();
-    let (_, run) = Pipeline::from_toml("extends = 'base.toml'\n", home.path(), &registry).unwrap();
-    assert_eq!(run.suits.camera_height_m, Some([0.9, 2.4]));
+    let builder = Pipeline::builder(&registry).folder(home.path());
+    let heir = builder.from_toml("extends = 'base.toml'\n").unwrap();
+    assert_eq!(heir.config().suits.camera_height_m, Some([0.9, 2.4]));
 }

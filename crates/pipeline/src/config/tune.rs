@@ -1,13 +1,12 @@
 //! `[tune]`: the settings of a config that may be fitted, and the values to try for each.
 
 use std::ops::Range;
-use std::path::Path;
 
 use serde::Deserialize;
 use tagalong_config::{ConfigError, Registry, Value, nearest};
 use toml::de::{DeArray, DeValue};
 
-use super::{OWN, Options, PLUGINS};
+use super::{BuildError, OWN, Options, PLUGINS};
 use crate::Pipeline;
 
 /// Name of the table.
@@ -53,27 +52,31 @@ pub(super) fn read(
     named.into_iter().map(read_one).collect()
 }
 
-/// Builds the pipeline with each value of each setting in turn, the others unchanged.
-///
-/// # Errors
-/// A value that the setting does not allow, with its place in the text.
-pub fn check_tuning(
-    tunables: &[Tunable],
-    pipeline: &Pipeline,
-    base_dir: &Path,
-    registry: &Registry,
-    options: &Options,
-) -> Result<(), ConfigError> {
-    for Tunable { key, values, places, .. } in tunables {
-        for (value, place) in values.iter().zip(places) {
-            let text = with_values(&pipeline.resolved, &[(key, value)])?;
-            if let Err(error) = Pipeline::from_toml_with(&text, base_dir, registry, options) {
-                let message = format!("`{key}` = {value} is not allowed: {}", error.message);
-                return Err(ConfigError { message, span: Some(place.clone()) });
+impl Pipeline {
+    /// Builds the pipeline with each value of each setting of `[tune]` in turn, the others unchanged.
+    ///
+    /// # Errors
+    /// A value that the setting does not allow, with its line in the config.
+    pub fn check_tuning(&self, registry: &Registry) -> Result<(), BuildError> {
+        let config = &self.config;
+        self.check_values(registry)
+            .map_err(|error| config.source.mistake(&config.document.locate(error)))
+    }
+
+    fn check_values(&self, registry: &Registry) -> Result<(), ConfigError> {
+        let config = &self.config;
+        let options = Options { foreign: config.foreign.clone(), ..Options::default() };
+        for Tunable { key, values, places, .. } in &config.tune {
+            for (value, place) in values.iter().zip(places) {
+                let changed = config.source.with_text(config.with_values(&[(key, value)])?);
+                if let Err(error) = Self::from_source(&changed, registry, &options) {
+                    let message = format!("`{key}` = {value} is not allowed: {}", error.message);
+                    return Err(ConfigError { message, span: Some(place.clone()) });
+                }
             }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 /// Returns the config with other values for some settings. `resolved` is the text of
@@ -82,7 +85,18 @@ pub fn check_tuning(
 /// # Errors
 /// A setting that the config does not have.
 pub fn with_values(resolved: &str, values: &[(&str, &toml::Value)]) -> Result<String, ConfigError> {
-    let mut root = toml::Value::Table(toml::from_str(resolved)?);
+    values_replaced(toml::from_str(resolved)?, values)
+}
+
+/// Returns the text of a table with other values at some dotted keys.
+///
+/// # Errors
+/// A key that the table does not have.
+pub(super) fn values_replaced(
+    table: toml::Table,
+    values: &[(&str, &toml::Value)],
+) -> Result<String, ConfigError> {
+    let mut root = toml::Value::Table(table);
     for (key, value) in values {
         let place = key.split('.').try_fold(&mut root, |inner, part| match inner {
             toml::Value::Array(items) => items.get_mut(part.parse::<usize>().ok()?),
@@ -244,18 +258,20 @@ mod tests {
     use super::*;
     use crate::tests::doubles::{PLAIN, World};
 
-    fn build(tune: &str) -> Result<(Pipeline, Vec<Tunable>), String> {
-        let text = format!("{PLAIN}[tune]\n{tune}\n");
-        Pipeline::from_toml(&text, Path::new("."), &World::default().registry())
-            .map(|(pipeline, run)| (pipeline, run.tune))
-            .map_err(|error| error.render("a.toml", &text))
+    fn text(tune: &str) -> String {
+        format!("{PLAIN}[tune]\n{tune}\n")
+    }
+
+    fn build(tune: &str) -> Result<Pipeline, String> {
+        Pipeline::builder(&World::default().registry())
+            .folder("a")
+            .from_toml(&text(tune))
+            .map_err(|error| error.to_string())
     }
 
     fn check(tune: &str) -> Result<(), String> {
-        let (pipeline, tunables) = build(tune)?;
-        let (registry, options) = (World::default().registry(), Options::default());
-        check_tuning(&tunables, &pipeline, Path::new("."), &registry, &options)
-            .map_err(|error| error.render("a.toml", &format!("{PLAIN}[tune]\n{tune}\n")))
+        let checked = build(tune)?.check_tuning(&World::default().registry());
+        checked.map_err(|error| error.to_string())
     }
 
     #[test]
@@ -267,8 +283,10 @@ mod tests {
             "associator.config.gate_m = { between = [0.5, 1.0], steps = 3 }",
             "associator.config.cost = [\"overlap\", \"mahalanobis\"]",
         ];
-        let (_, tunables) = build(&lines.join("\n")).unwrap();
-        let shown: Vec<String> = tunables
+        let pipeline = build(&lines.join("\n")).unwrap();
+        let shown: Vec<String> = pipeline
+            .config()
+            .tune
             .iter()
             .map(|t| format!("{} {}", t.key, toml::Value::Array(t.values.clone())))
             .collect();
@@ -289,21 +307,21 @@ mod tests {
         let cases: &[(&str, &[&str])] = &[
             (
                 "\"manager.config.confirm_hit\" = [1]",
-                &["a.toml:7:1", "`manager.config.confirm_hits`?"],
+                &["config.toml:7:1", "`manager.config.confirm_hits`?"],
             ),
             (
                 "manager.config.confirm_hit = [1]",
-                &["a.toml:7:16", "`manager.config.confirm_hits`?"],
+                &["config.toml:7:16", "`manager.config.confirm_hits`?"],
             ),
             ("\"detectors.1.config.script\" = [1]", &["`detectors.0.config.script`?"]),
-            ("seed = [1, 2]", &["a.toml:7:1", "nothing to tune is called `seed`"]),
+            ("seed = [1, 2]", &["config.toml:7:1", "nothing to tune is called `seed`"]),
             ("\"filter.plugin\" = ['odd']", &["nothing to tune is called `filter.plugin`"]),
             ("lifecycle = [1]", &["nothing to tune is called `lifecycle`"]),
-            ("manager.config.confirm_hits = 2", &["a.toml:7:31", "needs a list of values"]),
-            ("manager.config.confirm_hits = []", &["a.toml:7:31", "needs a list of values"]),
-            ("manager.config.confirm_hits = [1, 2.5]", &["a.toml:7:35", "float, not integer"]),
-            ("manager.config.confirm_hits = ['x']", &["a.toml:7:32", "string, not integer"]),
-            ("manager.config.confirm_hits = [1, 1]", &["a.toml:7:35", "twice"]),
+            ("manager.config.confirm_hits = 2", &["config.toml:7:31", "needs a list of values"]),
+            ("manager.config.confirm_hits = []", &["config.toml:7:31", "needs a list of values"]),
+            ("manager.config.confirm_hits = [1, 2.5]", &["config.toml:7:35", "float, not integer"]),
+            ("manager.config.confirm_hits = ['x']", &["config.toml:7:32", "string, not integer"]),
+            ("manager.config.confirm_hits = [1, 1]", &["config.toml:7:35", "twice"]),
             (
                 "associator.config.gate = { between = [2, 1], steps = 3 }",
                 &["the lower number first"],
@@ -314,7 +332,7 @@ mod tests {
             ),
             (
                 "associator.config.gate = { between = [1, 2] }",
-                &["a.toml:7", "missing field `steps`"],
+                &["config.toml:7", "missing field `steps`"],
             ),
             ("associator.config.gate = { between = [1, 2], stps = 3 }", &["did you mean `steps`?"]),
             ("associator.config.cost = { between = [1, 2], steps = 2 }", &["float, not string"]),
@@ -330,15 +348,18 @@ mod tests {
     #[test]
     fn values_that_a_setting_does_not_allow_are_shown_with_their_line() {
         let shown = check("manager.config.confirm_hits = [1, 2, 9]").unwrap_err();
-        assert!(shown.contains("a.toml:7:38") && shown.contains("must be at least 9"), "{shown}");
+        assert!(
+            shown.contains("config.toml:7:38") && shown.contains("must be at least 9"),
+            "{shown}"
+        );
         let shown = check("\"associator.config.cost\" = ['overlap', 'far']").unwrap_err();
-        assert!(shown.contains("a.toml:7:40") && shown.contains("unknown variant"), "{shown}");
+        assert!(shown.contains("config.toml:7:40") && shown.contains("unknown variant"), "{shown}");
     }
 
     #[test]
     fn the_table_leaves_the_pipeline_as_it_is() {
         let plain = World::default().pipeline(PLAIN).resolved();
-        let (tuned, _) = build("manager.config.confirm_hits = [1, 2]").unwrap();
+        let tuned = build("manager.config.confirm_hits = [1, 2]").unwrap();
         assert_eq!(tuned.resolved(), plain);
     }
 

@@ -109,8 +109,8 @@ fn late_calls_are_counted_and_leave_no_appearance() {
 fn a_network_that_cannot_be_used_is_an_error_with_its_line() {
     let world = World::default();
     let refusal = |text: &str| {
-        let built = Pipeline::from_toml(text, std::path::Path::new("."), &world.registry());
-        built.err().unwrap().render("test.toml", text)
+        let built = Pipeline::builder(&world.registry()).from_toml(text);
+        built.err().unwrap().to_string()
     };
     let other = config("", "").replace("osnet.onnx", "yolox.onnx");
     let why = refusal(&other);

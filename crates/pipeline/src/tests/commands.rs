@@ -50,6 +50,15 @@ fn t7_a_gap_of_the_odometry_stops_and_a_jump_is_a_fault_at_once() {
 }
 
 #[test]
+fn t7_a_jump_that_the_frame_source_has_seen_is_a_fault_at_this_very_frame() {
+    let (_, mut pipeline) = driving("");
+    let jumped = after(21, 2.1, EgoMotion::at_rest(0.1)).with_odometry_jump(true);
+    let command = pipeline.step(&jumped).unwrap().command.unwrap();
+    assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
+    assert_eq!(pipeline.fault(), Some("odometry jumped"));
+}
+
+#[test]
 fn c1_another_calibration_freezes_the_tracks_and_holds_the_robot() {
     let (world, mut pipeline) = driving("");
     let before = pipeline.step(&frame(21, 2.1)).unwrap().tracks;

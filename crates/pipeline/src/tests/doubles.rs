@@ -1,7 +1,6 @@
 //! Scripted plugins: the test gives their answers.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
@@ -115,9 +114,9 @@ impl World {
     }
 
     pub fn pipeline(&self, config: &str) -> Pipeline {
-        match Pipeline::from_toml(config, Path::new("."), &self.registry()) {
-            Ok((pipeline, _)) => pipeline,
-            Err(error) => panic!("{}", error.render("test.toml", config)),
+        match Pipeline::builder(&self.registry()).from_toml(config) {
+            Ok(pipeline) => pipeline,
+            Err(error) => panic!("{error}"),
         }
     }
 

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use std::path::Path;
-
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, Images, Input, Inputs,
     Query, Result, RgbImage, RightImage, Sensor,
@@ -128,7 +126,7 @@ fn a_sensor_that_another_crate_defines_reaches_the_plugins_that_declare_it() {
     let mut registry = world().registry();
     registry.detector("radar", "reads echoes", |_: Config, _| Ok(RadarDetector));
     let config = PLAIN.replace("'script'", "'radar'");
-    let mut pipeline = Pipeline::from_toml(&config, Path::new("."), &registry).unwrap().0;
+    let mut pipeline = Pipeline::builder(&registry).from_toml(&config).unwrap();
     assert_eq!(pipeline.inputs(), Inputs::NONE.require(Radar::INPUT));
     let seen = |index| frame(index, index as f64 * 0.1).with_sensor(Radar(vec![2.5]));
     let report = pipeline.step(&seen(1)).unwrap();

@@ -12,9 +12,9 @@ use tagalong_trials::{Contender, Run, Trial, TrialError, each};
 use super::{Check, mean, scene, scenes};
 
 const GROUP: &str = "failures that must show";
-const EMPTY: &str = include_str!("../../../../configs/scenes/empty-clutter.toml");
-const EKF: &str = include_str!("../../../../configs/depth-ekf.toml");
-const AS_PRINTED: &str = include_str!("../../../../configs/depth-ekf-as-printed.toml");
+const EMPTY: &str = include_str!("../../configs/scenes/empty-clutter.toml");
+const EKF: &str = include_str!("../../configs/depth-ekf.toml");
+const AS_PRINTED: &str = include_str!("../../configs/depth-ekf-as-printed.toml");
 
 pub fn checks(registry: &Registry, seeds: u64) -> Result<Vec<Check>, TrialError> {
     let alarms = false_alarms(registry, seeds)?;

@@ -1,0 +1,10 @@
+# Prints the people of a log: `people.mcap` in the current folder.
+
+import math
+
+import tagalong
+
+pipeline = tagalong.Pipeline.from_toml("depth-verified")
+for frame in pipeline.frames("people.mcap"):
+    for track in pipeline.step_frame(frame).tracks:
+        print(f"{track.id} at {math.hypot(*track.position):.2f} m")

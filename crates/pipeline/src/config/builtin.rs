@@ -1,0 +1,113 @@
+//! Configs that are part of the program.
+
+use std::io::{self, ErrorKind};
+use std::path::Path;
+
+use super::document::flattened_with;
+
+/// Names and texts of configs.
+macro_rules! configs {
+    ($($name:literal)*) => {
+        &[$(($name, include_str!(concat!("../../configs/", $name, ".toml")))),*]
+    };
+}
+
+/// Configs that need no file: all of the folder but those with a model in a file of its own.
+const BUILT_IN: &[(&str, &str)] = configs! {
+    "depth-alone"
+    "depth-color-ekf"
+    "depth-ekf"
+    "depth-ekf-as-printed"
+    "depth-ekf-follow"
+    "depth-jpda"
+    "depth-laser"
+    "depth-net-ekf"
+    "depth-sprt"
+    "depth-svm-ekf"
+    "depth-two-stage"
+    "depth-verified"
+    "follow-as-printed"
+    "follow-arc"
+    "follow-depth"
+    "follow-depth-near"
+    "follow-low"
+    "follow-sonar"
+    "joint-particle"
+    "joint-particle-all"
+    "joint-particle-as-printed"
+    "joint-particle-kde30"
+    "joint-particle-kde50"
+    "joint-particle-table"
+    "laser-follow"
+    "laser-legs"
+    "mono"
+    "naive"
+    "omni-appearance"
+    "omni-ekf"
+    "omni-rich"
+    "particle-verified"
+    "recorded"
+    "recorded-observation-centric"
+    "rgbd-compressive"
+    "rgbd-compressive-as-printed"
+    "rgbd-detector"
+    "rgbd-ekf"
+    "rgbd-faces"
+    "rgbd-follow"
+    "rgbd-kalman"
+    "rgbd-upper-bodies"
+    "stereo-ekf"
+    "stereo-ekf-as-printed"
+    "stereo-follow"
+    "stereo-particle"
+    "stereo-street"
+    "stereo-svm-ekf"
+    "stereo-verified"
+};
+
+/// Returns the names of the built-in configs.
+pub(super) fn builtin_names() -> impl Iterator<Item = &'static str> {
+    BUILT_IN.iter().map(|(name, _)| *name)
+}
+
+/// Returns the text of a built-in config with those that it extends; `None` if there is none of this
+/// name.
+pub(super) fn builtin_text(name: &str) -> Option<String> {
+    let text = text_alone(name)?;
+    let whole = flattened_with(text, Path::new("configs"), &read_base);
+    Some(whole.unwrap_or_else(|_| text.to_owned()))
+}
+
+fn text_alone(name: &str) -> Option<&'static str> {
+    BUILT_IN.iter().find(|(builtin, _)| *builtin == name).map(|(_, text)| *text)
+}
+
+/// Returns the text of a config that another one extends: it is built in, too.
+fn read_base(path: &Path) -> io::Result<String> {
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy());
+    let base = stem.and_then(|stem| text_alone(&stem));
+    base.map(str::to_owned).ok_or_else(|| ErrorKind::NotFound.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn all_configs_of_the_folder_are_built_in_but_those_with_a_model_of_their_own() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+        let mut left_out = Vec::new();
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
+            let is_config = path.extension().is_some_and(|extension| extension == "toml");
+            if is_config && builtin_text(&stem).is_none() {
+                left_out.push(stem);
+            }
+        }
+        left_out.sort();
+        assert_eq!(left_out, ["omni-appearance-as-printed", "onnx", "stereo-svm-ekf-as-printed"]);
+    }
+}

@@ -1,0 +1,22 @@
+//! Steers a robot after the person in front of it. The frames come from a log here, `people.mcap`; on
+//! a robot they come from its sensors, and a control loop asks `command_at` between them.
+
+use tagalong::prelude::*;
+
+fn main() -> Result<()> {
+    let mut pipeline = Pipeline::builtin("follow-depth")?;
+    pipeline.enroll(&Enrollment::of(Choice::Nearest))?;
+    for frame in Log::open("people.mcap")?.frames(&pipeline)? {
+        let frame = frame?;
+        let report = pipeline.step(&frame)?;
+        let Some(target) = report.target else { continue };
+        if let Some(command) = pipeline.command_at(frame.frame.stamp) {
+            let Twist { linear_mps, angular_rps, .. } = command.twist;
+            println!(
+                "track {target}: {linear_mps:.2} m/s, {angular_rps:.2} rad/s ({})",
+                command.reason
+            );
+        }
+    }
+    Ok(())
+}

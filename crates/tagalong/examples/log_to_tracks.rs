@@ -1,0 +1,13 @@
+//! Prints the people of a log: `people.mcap` in the current folder.
+
+use tagalong::prelude::*;
+
+fn main() -> Result<()> {
+    let mut pipeline = Pipeline::builtin("depth-verified")?; // or from_toml_file
+    for frame in Log::open("people.mcap")?.frames(&pipeline)? {
+        for track in pipeline.step(&frame?)?.tracks {
+            println!("{} at {:.2} m", track.id, track.position.coords.norm());
+        }
+    }
+    Ok(())
+}

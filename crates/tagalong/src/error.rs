@@ -1,0 +1,72 @@
+use std::fmt;
+
+use tagalong_pipeline::{BuildError, EnrollmentError, MissingSource, StepError};
+
+/// Failure of a pipeline, a log, or a frame. Its text names the thing, the cause and the remedy; of a
+/// config also the file and the line.
+///
+/// The form for debugging is the same text, because `fn main() -> tagalong::Result<()>` prints that.
+#[derive(thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A config from which no pipeline can be built.
+    #[error(transparent)]
+    Config(#[from] BuildError),
+    /// A log that cannot be used at all.
+    #[cfg(feature = "logs")]
+    #[error(transparent)]
+    Log(#[from] tagalong_log::LogError),
+    /// A log of which part was lost; the frames before this error are those that are intact.
+    #[cfg(feature = "logs")]
+    #[error(
+        "`{}`: part of the log was lost: {notes}; record it again or look for a whole copy, or accept \
+         the loss with `Frames::accept_loss`",
+        log.display()
+    )]
+    Damaged {
+        /// The log.
+        log: std::path::PathBuf,
+        /// What was lost, and where.
+        notes: String,
+    },
+    /// A controller is to drive without a source of data that it needs.
+    #[error(transparent)]
+    Source(#[from] MissingSource),
+    /// Images, a pose or a scan that make no frame.
+    #[error("the frame at {stamp} s: {why}")]
+    Frame {
+        /// Time of the frame.
+        stamp: tagalong_core::Stamp,
+        /// The cause and the remedy.
+        why: String,
+    },
+    /// A plugin that failed at a frame.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// A plugin that refuses its settings or an input.
+    #[error(transparent)]
+    Plugin(#[from] tagalong_core::Error),
+    /// A person that cannot be followed.
+    #[error(transparent)]
+    Enrollment(#[from] EnrollmentError),
+}
+
+/// Result of a call of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_that_ends_with_an_error_prints_its_text() {
+        let error = Error::from(MissingSource::Odometry);
+        assert_eq!(format!("{error:?}"), MissingSource::Odometry.to_string());
+    }
+}

@@ -1,0 +1,20 @@
+//! Names of nearly every program: `use tagalong::prelude::*;`.
+//!
+//! [`Result`] is that of this crate. Plugins return the `Result` of [`crate::core`], which is
+//! [`PluginResult`] here.
+
+#[cfg(feature = "logs")]
+pub use crate::logs::{Frames, Log};
+#[cfg(feature = "plugins")]
+pub use crate::pipeline::builtin_registry;
+pub use crate::{Error, FrameMaker, Moment, Result};
+
+pub use tagalong_config::{Context, NoSettings, Registry};
+pub use tagalong_core::Result as PluginResult;
+pub use tagalong_core::{
+    Capabilities, Command, Controller, DepthImage, Detection, Detector, EgoMotion, Frame, Funnel,
+    GreyImage, Images, Input, Inputs, LaserScan, Query, Reason, RgbImage, Sensor, Stamp, Track,
+    TrackId, Twist, Verifier,
+};
+pub use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
+pub use tagalong_pipeline::{Choice, Enrollment, FrameReport, Outcome, Pipeline};
