@@ -8,7 +8,6 @@ use tagalong_benchmark::BenchArgs;
 use tagalong_doctor::DoctorArgs;
 use tagalong_experiments::boxes::{BoxesArgs, HELP as BOXES_HELP};
 use tagalong_experiments::follow::FollowArgs;
-use tagalong_experiments::reproduce::ReproduceArgs;
 use tagalong_experiments::trials::TrialsArgs;
 use tagalong_import::ImportArgs;
 use tagalong_simulate::SimulateArgs;
@@ -123,9 +122,6 @@ pub enum Command {
     /// Tracks the boxes of another detector, without images, and compares associations
     #[command(after_help = BOXES_HELP)]
     Boxes(BoxesArgs),
-    /// Prints the tables of a published system beside ours
-    #[command(after_help = REPRODUCE_HELP)]
-    Reproduce(ReproduceArgs),
     /// Makes the model file of a plugin, and its card
     #[command(after_help = TRAIN_HELP)]
     Train(TrainArgs),
@@ -222,15 +218,6 @@ Examples:
   tagalong follow configs/follow-depth.toml --seeds 50 --inject random
   tagalong follow configs/follow-depth.toml --approaches 1000 --faults one -o contacts
   tagalong follow configs/follow-depth.toml --replay 2000000007 --faults one";
-
-const REPRODUCE_HELP: &str = "\
-Everything is simulated with seeds of the test split. The whole of a system takes minutes to an hour.
-
-Examples:
-  tagalong reproduce
-  tagalong reproduce stereo-svm-ekf --quick
-  tagalong reproduce stereo-svm-ekf --only occlusion --format json
-  tagalong reproduce stereo-svm-ekf -o tables";
 
 const TRIALS_HELP: &str = "\
 Prints MOTA, IDF1, position errors, and how often everybody is tracked in all frames, with intervals

@@ -49,7 +49,7 @@ const FINE: [&str; 6] = [
 ];
 
 /// Other mistakes: description, command, exit code, and part of the message.
-const OTHERS: [(&str, &str, i32, &str); 31] = [
+const OTHERS: [(&str, &str, i32, &str); 30] = [
     ("no depth", "run nearest.toml no-depth.mcap -o out", 1, "depth"),
     ("no depth", "check nearest.toml no-depth.mcap", 1, "depth"),
     ("an unknown key", "run typo.toml good.mcap -o out", 2, "typo.toml:4"),
@@ -81,7 +81,6 @@ const OTHERS: [(&str, &str, i32, &str); 31] = [
     ("an existing output", "import images photos -o good.mcap", 2, "--overwrite"),
     ("an unknown plugin", "config nearest-thin", 2, "nearest-thing"),
     ("an unknown plugin", "train svm-pitch", 2, "svm-patch"),
-    ("an unknown system", "reproduce stereo-smv-ekf", 2, "stereo-svm-ekf"),
     ("an unknown layout", "import tmu folder.csv", 2, "tum"),
     (
         "no odometry for a controller",
@@ -218,7 +217,6 @@ fn a_closed_pipe_is_a_quiet_end_for_every_command_that_prints() {
         "inspect good.mcap",
         "check nearest.toml",
         "doctor nearest.toml good.mcap",
-        "reproduce",
         "eval --truth good.people.csv --tracks good.people.csv",
         "--help",
     ];
@@ -242,7 +240,6 @@ fn json_is_printed_by_every_command_that_prints_data() {
         "config ekf",
         "doctor nearest.toml good.mcap",
         "run nearest.toml good.mcap -o json-out",
-        "reproduce",
         "simulate scene.toml -o json.mcap",
     ];
     for line in lines {

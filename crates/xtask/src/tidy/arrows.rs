@@ -32,24 +32,6 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("report", &["eval"]),
     ("trials", &["vision", "stereo", "pipeline", "sim", "eval"]),
     ("tuning", &["pipeline", "eval"]),
-    // A reproduced result may be the training of a plugin.
-    (
-        "reproduce",
-        &[
-            "vision",
-            "stereo",
-            "pipeline",
-            "log",
-            "sim",
-            "eval",
-            "report",
-            "trials",
-            "triangulate",
-            "plugins",
-            "learn",
-            "tracking",
-        ],
-    ),
     ("conformance", &[]),
     ("catalog", &["plugins"]),
     ("app", &["pipeline", "log"]),
@@ -67,7 +49,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
     (
         "benchmark",
-        &["app", "scoring", "render", "pipeline", "log", "eval", "report", "reproduce", "tuning"],
+        &["app", "scoring", "render", "pipeline", "log", "eval", "report", "tuning"],
     ),
     ("import", &["app", "log", "eval"]),
     ("webcams", &["app", "scoring", "log", "sim", "triangulate"]),
@@ -82,7 +64,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "sim",
             "eval",
             "trials",
-            "reproduce",
+            "report",
             "learn",
             "tuning",
         ],
@@ -158,7 +140,7 @@ fn allowed(folder: &str) -> Option<Option<&'static [&'static str]>> {
         Some(("crates", room)) => {
             ARROWS.iter().find(|(name, _)| *name == room).map(|(_, allowed)| Some(*allowed))
         }
-        _ => matches!(folder, "tests" | "benches").then_some(None),
+        _ => matches!(folder, "tests" | "benches" | "benches/papers").then_some(None),
     }
 }
 
@@ -214,6 +196,7 @@ mod tests {
         assert!(!wrong("plugins/ekf", "crates/conformance", true));
         assert!(!wrong("crates/catalog", "plugins/ekf", false));
         assert!(!wrong("tests", "plugins/ekf", false));
+        assert!(!wrong("benches/papers", "crates/cli", false));
         assert!(wrong("plugins/ekf", "crates/conformance", false));
         assert!(wrong("plugins/ekf", "plugins/depth-template", true));
         assert!(wrong("plugins/ekf", "crates/pipeline", true));

@@ -1,4 +1,4 @@
-//! `tagalong reproduce`: the tables of a published system beside ours.
+//! `tagalong-papers reproduce`: the tables of a published system beside ours.
 
 use std::path::{Path, PathBuf};
 
@@ -9,12 +9,13 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, wr
 use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
-use tagalong_reproduce::{
-    Experiment, ExperimentFindings, Lab, Progress, SYSTEMS, SimulatedScenes, System, Table, system,
-};
 use tagalong_sim::Split;
 
-/// Arguments of `tagalong reproduce`.
+use crate::{
+    Experiment, ExperimentFindings, Lab, Progress, SYSTEMS, SimulatedScenes, System, Table, system,
+};
+
+/// Arguments of `tagalong-papers reproduce`.
 #[derive(Args, Debug)]
 pub struct ReproduceArgs {
     /// The published system; without one, lists the systems and their tables.
@@ -50,6 +51,16 @@ pub struct ReproduceArgs {
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
 }
+
+/// Examples of the command.
+pub const HELP: &str = "\
+Everything is simulated with seeds of the test split. The whole of a system takes minutes to an hour.
+
+Examples:
+  tagalong-papers reproduce
+  tagalong-papers reproduce stereo-svm-ekf --quick
+  tagalong-papers reproduce stereo-svm-ekf --only occlusion --format json
+  tagalong-papers reproduce stereo-svm-ekf -o tables";
 
 /// Runs the experiments and prints their tables.
 ///
@@ -185,9 +196,8 @@ impl Progress for Bar {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_reproduce::Findings;
-
     use super::*;
+    use crate::Findings;
 
     fn system() -> &'static System {
         &SYSTEMS[0]
@@ -209,10 +219,27 @@ mod tests {
     }
 
     #[test]
+    fn seeds_that_the_split_does_not_have_and_unknown_systems_are_refused() {
+        #[derive(clap::Parser)]
+        struct Line {
+            #[command(flatten)]
+            args: ReproduceArgs,
+        }
+        let refusal = |line: &str| {
+            let line = <Line as clap::Parser>::parse_from(line.split(' '));
+            reproduce(&line.args, &Registry::default()).unwrap_err()
+        };
+        let failure = refusal("reproduce stereo-ekf --seeds 2 --first-seed 999999999");
+        assert!(failure.code == 2 && failure.message.contains("the split"), "{failure:?}");
+        let failure = refusal("reproduce stereo-smv-ekf");
+        assert!(failure.code == 2 && failure.message.contains("stereo-svm-ekf"), "{failure:?}");
+    }
+
+    #[test]
     fn files_hold_tables_and_pictures() {
         let folder = tempfile::tempdir().unwrap();
         let table = Table { title: "A table".into(), ..Table::default() };
-        let picture = tagalong_reproduce::Picture { name: "plot".into(), svg: "<svg/>".into() };
+        let picture = crate::Picture { name: "plot".into(), svg: "<svg/>".into() };
         let findings = Findings { tables: vec![table], pictures: vec![picture] };
         let found = ExperimentFindings { experiment: "one", simulated: Vec::new(), findings };
         write(folder.path(), &[found]).unwrap();

@@ -11,6 +11,7 @@
 //! To add a table, write a function `fn(&Lab) -> Result<Findings, ReproduceError>` in the file of
 //! its system and name it in the system's list.
 
+pub mod command;
 mod draws;
 mod findings;
 mod forms;
@@ -24,9 +25,15 @@ mod recorded;
 mod rgbd_compressive;
 mod scatter;
 mod stereo;
-mod table;
 mod variant;
+
+use tagalong_config::Registry;
+
+/// Registers all plugins of the workspace, and those of the printed equations.
+pub fn register(registry: &mut Registry) {
+    tagalong_catalog::register(registry);
+}
 
 pub use findings::{Experiment, ExperimentFindings, Findings, Picture, SYSTEMS, System, system};
 pub use lab::{Lab, Progress, ReproduceError, SimulatedScene, SimulatedScenes};
-pub use table::{Cell, Row, Table};
+pub use tagalong_report::{Cell, Row, Table};

@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use tagalong_config::Registry;
-use tagalong_reproduce::{Lab, Progress, SimulatedScenes, Table, system};
+use tagalong_papers::{Lab, Progress, SimulatedScenes, Table, system};
 
 /// Published MOTA of SORT for its six validation sequences together, per cent (its README).
 const SORT_MOTA: f64 = 34.0;
@@ -21,8 +21,8 @@ impl Progress for Silent {
 /// Returns the first table of an experiment, of so many seeds.
 fn table(of: [&str; 2], data: Option<PathBuf>, seeds: Option<u64>) -> Table {
     let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    tagalong_papers::register(&mut registry);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let lab = Lab {
         registry: &registry,
         configs: root.join("configs"),
