@@ -40,6 +40,9 @@ pub struct ReproduceArgs {
     /// The folder with the configs and scenes.
     #[arg(long, value_name = "DIR", default_value = "configs")]
     pub configs: PathBuf,
+    /// The folder with the configs of the printed forms.
+    #[arg(long, value_name = "DIR", default_value = "benches/papers/configs")]
+    pub printed_configs: PathBuf,
     /// The folder with real logs and labelled images; experiments that need them are left out where
     /// there is none.
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
@@ -96,6 +99,7 @@ fn lab<'a>(args: &ReproduceArgs, registry: &'a Registry, progress: &'a Bar) -> L
     Lab {
         registry,
         configs: args.configs.clone(),
+        printed_configs: args.printed_configs.clone(),
         data: args.data.is_dir().then(|| args.data.clone()),
         quick: args.quick,
         seeds: args.seeds,

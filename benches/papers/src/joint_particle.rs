@@ -154,8 +154,8 @@ fn compare(
     Ok(Trials::new(lab, scene, &scenes, contenders)?.table(title, false).into())
 }
 
-const KERNEL: (&str, &str) = ("filter.config.compat_printed_kernel", "false");
-const NOISE: (&str, &str) = ("filter.config.compat_shared_noise", "false");
+const KERNEL: (&str, &str) = ("filter.config.printed_kernel", "false");
+const NOISE: (&str, &str) = ("filter.config.shared_noise", "false");
 const ROOT: [(&str, &str); 2] = [
     ("detectors.0.config.weighing", "\"rms\""),
     ("detectors.0.config.likelihood_sigma", RMS_SIGMA),
@@ -169,9 +169,9 @@ fn misprints(lab: &Lab) -> std::result::Result<Findings, ReproduceError> {
     let resampled: Vec<(&str, &str)> = all
         .into_iter()
         .chain([
-            ("filter.config.compat_condensation", "false"),
-            ("filter.config.compat_top", "false"),
-            ("filter.config.compat_printed_axes", "false"),
+            ("filter.config.condensation", "false"),
+            ("filter.config.top", "false"),
+            ("filter.config.printed_axes", "false"),
         ])
         .collect();
     let repaired = [

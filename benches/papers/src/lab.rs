@@ -77,6 +77,8 @@ pub struct Lab<'a> {
     pub registry: &'a Registry,
     /// Folder of the configs, which holds the folder `scenes`.
     pub configs: PathBuf,
+    /// Folder of the configs of the printed forms, with their models.
+    pub printed_configs: PathBuf,
     /// Folder of real logs and labelled images, if there is one.
     pub data: Option<PathBuf>,
     /// True for a quick version of about a minute.
@@ -156,18 +158,24 @@ impl Lab<'_> {
         names.iter().map(|name| self.contender(name)).collect()
     }
 
-    /// Returns the shipped config of this name.
+    /// Returns the config of this name, of a printed form or a shipped one.
     ///
     /// # Errors
     /// A config that cannot be read.
     pub fn contender(&self, name: &str) -> Result<Contender, ReproduceError> {
-        let path = self.configs.join(format!("{name}.toml"));
+        let folder = self.folder_of(name);
+        let path = folder.join(format!("{name}.toml"));
         let text = read(&path)?;
-        let text = flattened(&text, &self.configs).map_err(|error| {
+        let text = flattened(&text, folder).map_err(|error| {
             ReproduceError::Other(error.render(&path.display().to_string(), &text))
         })?;
         // Paths in a config are relative to its folder.
-        Ok(Contender { folder: self.configs.clone(), ..Contender::new(name, text) })
+        Ok(Contender { folder: folder.to_owned(), ..Contender::new(name, text) })
+    }
+
+    /// Returns the folder of the config of this name.
+    pub fn folder_of(&self, name: &str) -> &Path {
+        if name.ends_with("-as-printed") { &self.printed_configs } else { &self.configs }
     }
 
     /// Runs all contenders on all scenes and keeps the results of `keep` for each trial, in the
@@ -230,10 +238,19 @@ pub(crate) mod testing {
     }
 
     pub(crate) fn lab(registry: &Registry, quick: bool, seeds: Option<u64>) -> Lab<'_> {
-        let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
-        let (first_seed, simulated) = (0, SimulatedScenes::default());
-        let (jobs, progress) = (1, &Silent);
-        Lab { registry, configs, data: None, quick, seeds, first_seed, simulated, jobs, progress }
+        let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+        Lab {
+            registry,
+            configs: own.join("../../configs"),
+            printed_configs: own.join("configs"),
+            data: None,
+            quick,
+            seeds,
+            first_seed: 0,
+            simulated: SimulatedScenes::default(),
+            jobs: 1,
+            progress: &Silent,
+        }
     }
 }
 
@@ -281,6 +298,18 @@ mod tests {
         lab.first_seed = 999_999_999;
         let error = lab.scenes("crowd", &[], 2).unwrap_err().to_string();
         assert!(error.contains("leave the split test"), "{error}");
+    }
+
+    #[test]
+    fn printed_forms_are_read_from_their_own_folder_and_extend_shipped_configs() {
+        let registry = Registry::default();
+        let lab = lab(&registry, false, None);
+        let printed = lab.contender("stereo-ekf-as-printed").unwrap();
+        assert_eq!(printed.folder, lab.printed_configs);
+        let table: toml::Table = printed.config.parse().unwrap();
+        assert_eq!(table["filter"]["plugin"].as_str(), Some("ekf-as-printed"));
+        assert!(table.contains_key("stereo"), "of the config that it extends");
+        assert_eq!(lab.contender("stereo-ekf").unwrap().folder, lab.configs);
     }
 
     #[test]

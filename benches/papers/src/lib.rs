@@ -20,6 +20,7 @@ mod joint_particle;
 mod lab;
 mod laser;
 mod omni_appearance;
+mod printed;
 mod real;
 mod recorded;
 mod rgbd_compressive;
@@ -32,6 +33,7 @@ use tagalong_config::Registry;
 /// Registers all plugins of the workspace, and those of the printed equations.
 pub fn register(registry: &mut Registry) {
     tagalong_catalog::register(registry);
+    printed::register(registry);
 }
 
 pub use findings::{Experiment, ExperimentFindings, Findings, Picture, SYSTEMS, System, system};

@@ -57,7 +57,9 @@ mod tests {
     #[test]
     fn other_commands_are_those_of_the_product() {
         let cli = Cli::try_parse_from(["tagalong-papers", "list", "--format", "json"]).unwrap();
-        assert!(matches!(cli.command, Command::Product(words) if words == ["list", "--format", "json"]));
+        assert!(
+            matches!(cli.command, Command::Product(words) if words == ["list", "--format", "json"])
+        );
         let cli = Cli::try_parse_from(["tagalong-papers", "reproduce", "laser"]).unwrap();
         assert!(matches!(cli.command, Command::Reproduce(_)));
     }

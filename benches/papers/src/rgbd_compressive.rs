@@ -365,7 +365,7 @@ fn boxes(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
 fn searching(contender: Contender, radius: f64, each_pixel: bool, tolerance_m: f64) -> Contender {
     let section = "plugin = \"compressive\"\n";
     let config = format!(
-        "{section}config = {{ compat_full_search = {each_pixel}, search_radius = {radius:?}, \
+        "{section}config = {{ full_search = {each_pixel}, search_radius = {radius:?}, \
          depth_tolerance_m = {tolerance_m:?} }}\n"
     );
     Contender { config: contender.config.replace(section, &config), ..contender }

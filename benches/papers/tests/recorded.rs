@@ -26,6 +26,7 @@ fn table(of: [&str; 2], data: Option<PathBuf>, seeds: Option<u64>) -> Table {
     let lab = Lab {
         registry: &registry,
         configs: root.join("configs"),
+        printed_configs: root.join("benches/papers/configs"),
         data,
         quick: false,
         seeds,

@@ -31,7 +31,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "depth-alone"
     "depth-color-ekf"
     "depth-ekf"
-    "depth-ekf-as-printed"
     "depth-ekf-follow"
     "depth-jpda"
     "depth-laser"
@@ -40,7 +39,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "depth-svm-ekf"
     "depth-two-stage"
     "depth-verified"
-    "follow-as-printed"
     "follow-arc"
     "follow-depth"
     "follow-depth-near"
@@ -48,7 +46,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "follow-sonar"
     "joint-particle"
     "joint-particle-all"
-    "joint-particle-as-printed"
     "joint-particle-kde30"
     "joint-particle-kde50"
     "joint-particle-table"
@@ -63,7 +60,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "recorded"
     "recorded-observation-centric"
     "rgbd-compressive"
-    "rgbd-compressive-as-printed"
     "rgbd-detector"
     "rgbd-ekf"
     "rgbd-faces"
@@ -72,7 +68,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "rgbd-mosse"
     "rgbd-upper-bodies"
     "stereo-ekf"
-    "stereo-ekf-as-printed"
     "stereo-follow"
     "stereo-particle"
     "stereo-street"
@@ -414,7 +409,7 @@ mod tests {
         let files = crate::suggest::toml_files(&folder);
         let stems = files.iter().map(|file| file.file_stem().unwrap().to_str().unwrap());
         let left_out: Vec<&str> = stems.filter(|stem| ConfigFile::named(stem).is_none()).collect();
-        assert_eq!(left_out, ["omni-appearance-as-printed", "onnx", "stereo-svm-ekf-as-printed"]);
+        assert_eq!(left_out, ["onnx"]);
         for name in ConfigFile::built_in_names() {
             let built_in = ConfigFile::named(name).unwrap();
             let table: toml::Table = built_in.text.parse().unwrap();

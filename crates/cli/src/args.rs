@@ -212,7 +212,7 @@ of one of them by its seed.
 Examples:
   tagalong follow
   tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml -o rides --overlay
-  tagalong follow configs/follow-depth.toml --seeds 50 --against configs/follow-as-printed.toml
+  tagalong follow configs/follow-depth.toml --seeds 50 --against configs/follow-arc.toml
   tagalong follow configs/follow-depth.toml --latency-ms 150 --drop 0.2 --format markdown
   tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml --inject freeze-depth@5
   tagalong follow configs/follow-depth.toml --seeds 50 --inject random

@@ -26,9 +26,6 @@ pub struct Config {
     pub min_overlap: f64,
     /// Overlap: `iou` or `dice`.
     pub overlap: Overlap,
-    /// Overlap, as P2 prints it (eq. 10): a pair that overlaps less costs nothing, and
-    /// so comes first.
-    pub compat_printed_cost: bool,
     /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
     /// place (`sum`), or the better of both counts (`minimum`).
     pub fusion: Fusion,
@@ -53,7 +50,6 @@ impl Default for Config {
             overlap: Overlap::Iou,
             fusion: Fusion::Sum,
             fusion_gate: 0.0,
-            compat_printed_cost: false,
             miss_factor: 1.0,
         }
     }

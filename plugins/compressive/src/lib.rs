@@ -20,6 +20,7 @@ mod candidates;
 mod config;
 mod detect;
 mod features;
+mod learning;
 #[cfg(test)]
 mod tests;
 
@@ -27,6 +28,7 @@ pub use appearance::Appearance;
 pub use config::Config;
 pub use detect::Compressive;
 pub use features::{Features, Rectangle, Scaled};
+pub use learning::{Learning, LearningRule};
 use tagalong_config::Registry;
 
 /// The name of this plugin in configs.

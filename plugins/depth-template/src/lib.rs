@@ -17,20 +17,21 @@ mod body;
 mod candidates;
 mod config;
 mod detector;
-mod dissimilarity;
+mod extension;
 mod matching;
 mod people;
-mod printed;
 mod scores;
 mod view;
 mod weigher;
 
 pub use bank::{Bank, Direction, Pose, Template, TemplateRow};
 pub use body::{Part, Relief, body_parts, render};
-pub use config::{Cost, DepthTemplateConfig, Weighing};
-pub use detector::DepthTemplate;
+pub use config::{Cost, DepthTemplateConfig};
+pub use detector::{DepthTemplate, background};
+pub use extension::{FrameComparison, FrameLikelihood, SceneLikelihood, SilhouetteComparison};
 pub use matching::{Match, Matcher};
-pub use weigher::Weigher;
+pub use view::Working;
+pub use weigher::{PlacedPerson, Span, Weigher, outside};
 
 use tagalong_config::Registry;
 

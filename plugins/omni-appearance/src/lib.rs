@@ -34,7 +34,7 @@ mod warp;
 
 pub use background::Background;
 pub use blob::{Blob, FEATURES, Features};
-pub use config::{Config, Distance};
+pub use config::{AfterMeasuring, Config, Distance};
 pub use detector::OmniAppearance;
 pub use eyes::Eyes;
 pub use model::{Geometry, Head, Line, Model, PanoramaGeometry, Person, Ridge, Signature};

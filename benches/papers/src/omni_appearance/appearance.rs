@@ -11,6 +11,7 @@ use super::splits::Split;
 use super::{FRESH, in_turn};
 use crate::draws::{difference, mean, means, over_draws};
 use crate::lab::read;
+use crate::printed::omni_appearance;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Number of rooms, with two people each.
@@ -72,23 +73,30 @@ fn failed(error: impl ToString) -> ReproduceError {
 
 impl Shipped {
     fn new(lab: &Lab, name: &str) -> Result<Self, ReproduceError> {
-        let text = read(&lab.configs.join(format!("{name}.toml")))?;
+        let folder = lab.folder_of(name);
+        let text = read(&folder.join(format!("{name}.toml")))?;
         let config = settings(&text).map_err(failed)?;
         let model = match config.model.as_str() {
             // An empty name selects the built-in model, of which this is the source.
-            "" => "models/omni-distance.toml",
-            model => model,
+            "" => lab.configs.join("models/omni-distance.toml"),
+            model => folder.join(model),
         };
-        let model = Model::from_text(&read(&lab.configs.join(model))?).map_err(failed)?;
+        let model = Model::from_text(&read(&model)?).map_err(failed)?;
         Ok(Self { config, head: model.general })
     }
 }
 
-/// Returns the settings of the detector in a config.
+/// Returns the settings of the detector in a config, with the misprint of the printed one.
 fn settings(text: &str) -> Result<Config, toml::de::Error> {
     let config: toml::Table = text.parse()?;
-    let detector = config.get("detectors").and_then(|all| all.get(0)?.get("config")).cloned();
-    detector.map_or_else(|| Ok(Config::default()), toml::Value::try_into)
+    let detector = config.get("detectors").and_then(|all| all.get(0));
+    let settings = detector.and_then(|detector| detector.get("config")).cloned();
+    let settings = settings.unwrap_or_else(|| toml::Table::new().into());
+    let name = detector.and_then(|detector| detector.get("plugin")?.as_str());
+    if name == Some(omni_appearance::NAME) {
+        return Ok(settings.try_into::<omni_appearance::Config>()?.printed());
+    }
+    settings.try_into()
 }
 
 /// Simulates a scene and collects the samples of both detectors in it.
@@ -373,12 +381,14 @@ mod tests {
     /// The model of the printed method is fitted to the features of the printed method.
     #[test]
     fn the_printed_method_is_trained_with_the_settings_it_is_used_with() {
-        let printed = include_str!("../../../../configs/omni-appearance-as-printed.toml");
-        let trained: Config = toml::from_str(include_str!(
-            "../../../../configs/models/omni-distance-as-printed.settings.toml"
+        let printed = include_str!("../../configs/omni-appearance-as-printed.toml");
+        let trained: omni_appearance::Config = toml::from_str(include_str!(
+            "../../configs/models/omni-distance-as-printed.settings.toml"
         ))
         .unwrap();
+        let trained = trained.printed();
         let used = settings(printed).unwrap();
+        assert!(used.after_measuring.is_some(), "the seam");
         assert_eq!(used.distance, Distance::Printed);
         assert_eq!(used.model, "models/omni-distance-as-printed.toml");
         let Config { model, distance, .. } = used.clone();

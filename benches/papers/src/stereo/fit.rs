@@ -58,7 +58,7 @@ fn threshold() -> Step {
 }
 
 fn noise() -> Step {
-    let keys = ["filter.config.printed_sigma_w", "filter.config.printed_sigma_v_m"];
+    let keys = ["filter.config.sigma_w", "filter.config.sigma_v_m"];
     Step { goal: Goal::Place, tried: each_with_each(keys, &SIGMAS_W, &SIGMAS_V) }
 }
 

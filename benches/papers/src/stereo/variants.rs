@@ -29,15 +29,15 @@ pub enum Setting {
 
 use Setting::{Is, Number};
 
-const NO_VELOCITY: (&str, Setting) = ("filter.config.compat_printed_velocity", Is(false));
-const NO_NOISE: (&str, Setting) = ("filter.config.compat_printed_noise", Is(false));
-const NO_UPDATE: (&str, Setting) = ("filter.config.compat_printed_update", Is(false));
+const NO_VELOCITY: (&str, Setting) = ("filter.config.velocity", Is(false));
+const NO_NOISE: (&str, Setting) = ("filter.config.noise", Is(false));
+const NO_UPDATE: (&str, Setting) = ("filter.config.update", Is(false));
 /// The table `[odometry]`, with a default in it.
 const ODOMETRY: (&str, Setting) = ("odometry.wheel_error", Number(0.01));
-const NO_MEASUREMENT: (&str, Setting) = ("filter.config.compat_printed_measurement", Is(false));
+const NO_MEASUREMENT: (&str, Setting) = ("filter.config.measurement", Is(false));
 
 /// P1, from the printed form to the best. Free parameters are fitted in each printed form
-/// (`tagalong reproduce stereo-ekf --only fit-printed`).
+/// (`tagalong-papers reproduce stereo-ekf --only fit-printed`).
 pub const OF_P1: [Variant; 5] = [
     Variant { name: "stereo-ekf-as-printed", of: "stereo-ekf-as-printed", set: &[] },
     Variant {
@@ -45,8 +45,8 @@ pub const OF_P1: [Variant; 5] = [
         of: "stereo-ekf-as-printed",
         set: &[
             NO_VELOCITY,
-            ("filter.config.printed_sigma_w", Number(2.5)),
-            ("filter.config.printed_sigma_v_m", Number(0.1)),
+            ("filter.config.sigma_w", Number(2.5)),
+            ("filter.config.sigma_v_m", Number(0.1)),
         ],
     },
     Variant { name: "stereo-ekf", of: "stereo-ekf", set: &[] },
@@ -63,8 +63,8 @@ pub const OF_P4: [Variant; 6] = [
         of: "stereo-svm-ekf-as-printed",
         set: &[
             NO_VELOCITY,
-            ("filter.config.printed_sigma_w", Number(1.0)),
-            ("filter.config.printed_sigma_v_m", Number(0.03)),
+            ("filter.config.sigma_w", Number(1.0)),
+            ("filter.config.sigma_v_m", Number(0.03)),
         ],
     },
     Variant {

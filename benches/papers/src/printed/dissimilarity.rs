@@ -1,10 +1,32 @@
 use std::sync::Arc;
 
-use crate::bank::Template;
-use crate::matching::Match;
-use crate::printed::Metres;
+use tagalong_core::{Frame, Result};
+use tagalong_depth_template::{FrameComparison, Match, SilhouetteComparison, Template, background};
+use tagalong_vision::RowSums;
 
-/// P4's dissimilarity: the plain sum of squared differences between the depths of a
+use super::scene_likelihood::Metres;
+
+/// P4's comparison of silhouettes with an image.
+#[derive(Clone, Copy, Debug)]
+pub struct PrintedComparison {
+    /// Background of the frame as a percentile of its depths.
+    pub background_percentile: f64,
+    /// Fraction of the person's pixels that must have a reading.
+    pub min_foreground_valid: f64,
+}
+
+impl SilhouetteComparison for PrintedComparison {
+    fn prepare(&self, frame: &Frame) -> Result<Box<dyn FrameComparison>> {
+        let inverse = background(frame.depth()?, self.background_percentile);
+        Ok(Box::new(Dissimilarity {
+            metres: frame.derived()?,
+            background_m: RowSums::UNITS / inverse,
+            min_foreground_valid: self.min_foreground_valid,
+        }))
+    }
+}
+
+/// P4's dissimilarity in one frame: the plain sum of squared differences between the depths of a
 /// binary template and those of the image, over the whole window, m².
 #[derive(Clone, Debug)]
 pub struct Dissimilarity {
@@ -16,12 +38,12 @@ pub struct Dissimilarity {
     pub min_foreground_valid: f64,
 }
 
-impl Dissimilarity {
+impl FrameComparison for Dissimilarity {
     /// Compares `template` with its head centre on the reduced pixel (`x`, `y`) and the
     /// foreground at `depth_m`. Where there is no reading, of which the papers say
     /// nothing, the mean of the other pixels stands. `None` if too little of the person
     /// has one.
-    pub fn fit(&self, template: &Template, (x, y): (i64, i64), depth_m: f64) -> Option<Match> {
+    fn fit(&self, template: &Template, (x, y): (i64, i64), depth_m: f64) -> Option<Match> {
         let (mut read, mut person, mut person_read, mut sum) = (0.0, 0.0, 0.0, 0.0);
         for row in &template.rows {
             // The outline lies in the middle of the guard.
@@ -55,10 +77,9 @@ fn window(template: &Template) -> f64 {
 mod tests {
     use proptest::prelude::*;
     use tagalong_core::DepthImage;
-    use tagalong_vision::RowSums;
+    use tagalong_depth_template::{Bank, Direction, Pose, TemplateRow};
 
     use super::*;
-    use crate::bank::{Bank, Direction, Pose, TemplateRow};
 
     const BACKGROUND_M: f64 = 7.0;
 

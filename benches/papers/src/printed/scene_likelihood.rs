@@ -1,24 +1,31 @@
 use std::f64::consts::PI;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use tagalong_core::{Derived, Frame, Result};
+use tagalong_depth_template::{
+    FrameLikelihood, PlacedPerson, SceneLikelihood, Span, TemplateRow, Working, background, outside,
+};
 use tagalong_vision::RowSums;
-
-use crate::bank::TemplateRow;
-use crate::config::{DepthTemplateConfig, Weighing};
-use crate::detector::background;
-use crate::view::Working;
-use crate::weigher::{Placed, Span, outside};
 
 /// P3's likelihood of a scene, `exp(-d² / (2 sigma²)) / (sqrt(2 pi) sigma)`: `d` is the
 /// printed dissimilarity of the depths in a window around all silhouettes from a
 /// picture of two values a person, near over far, in front of one background.
+#[derive(Debug)]
+pub struct PrintedLikelihood {
+    settings: Settings,
+    /// The frame that was asked for last.
+    kept: Mutex<Option<Arc<Canvas>>>,
+}
+
+/// Free parameters of the likelihood.
 #[derive(Clone, Copy, Debug)]
-pub struct Printed {
-    sigma: f64,
-    percentile: f64,
+pub struct Settings {
+    /// Standard deviation of the dissimilarity of a scene that is as imagined, m.
+    pub sigma_m: f64,
+    /// Background of the frame as a percentile of its depths.
+    pub background_percentile: f64,
     /// The size of the window stands inside of the root.
-    is_rms: bool,
+    pub is_rms: bool,
 }
 
 /// The depths of a frame with running sums along each row, m: the papers compare depths,
@@ -87,69 +94,79 @@ impl Metres {
 }
 
 /// A frame, ready for scenes.
+#[derive(Debug)]
 pub struct Canvas {
+    settings: Settings,
     metres: Arc<Metres>,
     background_m: f64,
 }
 
-impl Printed {
-    /// The printed form; `None` where the settings choose another one.
-    pub fn new(config: &DepthTemplateConfig) -> Option<Self> {
-        (config.weighing != Weighing::Ratio).then_some(Self {
-            sigma: config.likelihood_sigma,
-            percentile: config.background_percentile,
-            is_rms: config.weighing == Weighing::Rms,
-        })
+impl PrintedLikelihood {
+    /// Creates the likelihood.
+    pub fn new(settings: Settings) -> Self {
+        Self { settings, kept: Mutex::new(None) }
     }
 
-    /// Returns the image that the scenes of a frame are compared with; `kept` is that of the last
-    /// frame.
-    pub fn canvas(&self, frame: &Frame, kept: &mut Option<Arc<Canvas>>) -> Result<Arc<Canvas>> {
+    /// Returns the image that the scenes of a frame are compared with.
+    fn canvas(&self, frame: &Frame) -> Result<Arc<Canvas>> {
         let metres = frame.derived::<Metres>()?;
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(canvas) = kept.as_ref().filter(|kept| Arc::ptr_eq(&kept.metres, &metres)) {
             return Ok(Arc::clone(canvas));
         }
-        let inverse = background(frame.depth()?, self.percentile);
+        let inverse = background(frame.depth()?, self.settings.background_percentile);
         let background_m = RowSums::UNITS / inverse.max(f64::MIN_POSITIVE);
-        Ok(Arc::clone(kept.insert(Arc::new(Canvas { metres, background_m }))))
+        let canvas = Canvas { settings: self.settings, metres, background_m };
+        Ok(Arc::clone(kept.insert(Arc::new(canvas))))
     }
+}
 
-    /// Log-likelihood of a scene, near to far.
-    pub fn log(&self, canvas: &Canvas, scene: &[Placed]) -> f64 {
-        let constant = -(2.0 * PI).sqrt().ln() - self.sigma.ln();
-        let dissimilarity = self.dissimilarity(canvas, scene);
-        let log = dissimilarity.map(|d| constant - d * d / (2.0 * self.sigma * self.sigma));
+impl SceneLikelihood for PrintedLikelihood {
+    fn prepare(&self, frame: &Frame) -> Result<Arc<dyn FrameLikelihood>> {
+        let canvas: Arc<dyn FrameLikelihood> = self.canvas(frame)?;
+        Ok(canvas)
+    }
+}
+
+impl FrameLikelihood for Canvas {
+    fn log_likelihood(&self, scene: &[PlacedPerson]) -> f64 {
+        let sigma_m = self.settings.sigma_m;
+        let constant = -(2.0 * PI).sqrt().ln() - sigma_m.ln();
+        let dissimilarity = self.dissimilarity(scene);
+        let log = dissimilarity.map(|d| constant - d * d / (2.0 * sigma_m * sigma_m));
         log.map_or(LEAST, |log| log.max(LEAST))
     }
+}
 
-    /// `None` without a reading; m.
-    fn dissimilarity(&self, canvas: &Canvas, scene: &[Placed]) -> Option<f64> {
-        let columns = bounds(scene.iter().map(Placed::columns))?;
-        let lines = bounds(scene.iter().map(Placed::lines))?;
+impl Canvas {
+    /// Returns the dissimilarity of a scene, m; `None` without a reading.
+    fn dissimilarity(&self, scene: &[PlacedPerson]) -> Option<f64> {
+        let columns = bounds(scene.iter().map(PlacedPerson::columns))?;
+        let lines = bounds(scene.iter().map(PlacedPerson::lines))?;
         let (mut count, mut error) = (0.0, 0.0);
-        let lines = lines.0.max(0)..lines.1.min(canvas.metres.height);
+        let lines = lines.0.max(0)..lines.1.min(self.metres.height);
         for line in lines {
-            let row = canvas.metres.run(line, columns);
+            let row = self.metres.run(line, columns);
             count += row.count;
-            error += row.squared_error(canvas.background_m);
+            error += row.squared_error(self.background_m);
             for (k, person) in scene.iter().enumerate() {
                 let Some(body) = person.row(line).and_then(silhouette(person)) else { continue };
                 let nearer = scene[..k].iter();
                 let nearer = nearer.filter_map(|p| p.row(line).and_then(silhouette(p)));
                 for part in outside(body, nearer.collect()) {
-                    let pixels = canvas.metres.run(line, part);
+                    let pixels = self.metres.run(line, part);
                     error += pixels.squared_error(person.depth_m);
-                    error -= pixels.squared_error(canvas.background_m);
+                    error -= pixels.squared_error(self.background_m);
                 }
             }
         }
         let root = error.max(0.0).sqrt();
-        (count > 0.0).then(|| if self.is_rms { root / count.sqrt() } else { root / count })
+        (count > 0.0).then(|| if self.settings.is_rms { root / count.sqrt() } else { root / count })
     }
 }
 
 /// The body in a row, up to the middle of its guard.
-fn silhouette(person: &Placed) -> impl Fn(&TemplateRow) -> Option<Span> {
+fn silhouette(person: &PlacedPerson) -> impl Fn(&TemplateRow) -> Option<Span> {
     let x = person.x;
     move |row| {
         let span = (x + (row.from + row.guard_from) / 2, x + (row.to + row.guard_to) / 2);
@@ -166,11 +183,10 @@ mod tests {
     use nalgebra::{Point3, Vector2};
     use proptest::prelude::*;
     use tagalong_core::{DepthImage, EgoMotion, Images, Likelihood, Person, Stamp};
+    use tagalong_depth_template::{Bank, DepthTemplateConfig, Direction, Pose, Template, Weigher};
     use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     use super::*;
-    use crate::bank::{Bank, Direction, Pose, Template};
-    use crate::weigher::Weigher;
 
     const HEIGHT_M: f64 = 1.5;
     const WALL_M: f32 = 5.0;
@@ -185,8 +201,13 @@ mod tests {
         Frame::new(1, Stamp::default(), Arc::new(camera()), EgoMotion::at_rest(0.1), images)
     }
 
-    fn config(weighing: Weighing) -> DepthTemplateConfig {
-        DepthTemplateConfig { weighing, likelihood_sigma: 0.1, ..Default::default() }
+    fn likelihood(sigma_m: f64, is_rms: bool) -> PrintedLikelihood {
+        PrintedLikelihood::new(Settings { sigma_m, background_percentile: 90.0, is_rms })
+    }
+
+    fn weigher(sigma_m: f64, is_rms: bool) -> Weigher {
+        let weigher = Weigher::new(&DepthTemplateConfig::default());
+        weigher.with_likelihood(Box::new(likelihood(sigma_m, is_rms)))
     }
 
     fn standing(x: f64, y: f64) -> Person {
@@ -259,14 +280,12 @@ mod tests {
             near in -0.8f64..0.8, far in -1.2f64..1.2, is_rms in any::<bool>(),
         ) {
             let frame = frame(DepthImage::from_pixels(80, 60, pixels).unwrap());
-            let config = config(if is_rms { Weighing::Rms } else { Weighing::Printed });
-            let printed = Printed::new(&config).unwrap();
-            let background_m = printed.canvas(&frame, &mut None).unwrap().background_m;
+            let background_m = likelihood(0.1, is_rms).canvas(&frame).unwrap().background_m;
             let scene = [standing(3.0, far), standing(1.8, near)];
             let cast = [&scene[0], &scene[1]].map(|p| Painted::new(p, Direction::Along));
             let d = slow(&frame, &cast, background_m, is_rms).unwrap();
             let log = -(0.1 * (2.0 * PI).sqrt()).ln() - d * d / (2.0 * 0.01);
-            let found = Weigher::new(&config).log_likelihood(&frame, &scene).unwrap();
+            let found = weigher(0.1, is_rms).log_likelihood(&frame, &scene).unwrap();
             prop_assert!((found - log.max(LEAST)).abs() < 1e-6 * log.abs().max(1.0), "{} {}", found, log);
         }
     }
@@ -276,8 +295,8 @@ mod tests {
         let people = [standing(1.8, 0.1), standing(3.0, -0.3)];
         let cast = [0, 1].map(|i| Painted::new(&people[i], Direction::Along));
         let frame = frame(picture(&cast));
-        for weighing in [Weighing::Printed, Weighing::Rms] {
-            let weigher = Weigher::new(&config(weighing));
+        for is_rms in [false, true] {
+            let weigher = weigher(0.1, is_rms);
             let log = weigher.log_likelihood(&frame, &people).unwrap();
             let most = -(0.1 * (2.0 * PI).sqrt()).ln();
             assert!((log - most).abs() < 0.02, "{log} {most}");
@@ -288,27 +307,26 @@ mod tests {
 
     #[test]
     fn the_printed_form_tells_less_of_large_windows_than_a_root_mean_square() {
-        let d = |weighing, x: f64| {
+        let d = |is_rms, x: f64| {
             // A person expected where there is only the wall.
             let frame = frame(picture(&[]));
-            let config = DepthTemplateConfig { likelihood_sigma: 1.0, ..config(weighing) };
-            let log = Weigher::new(&config).log_likelihood(&frame, &[standing(x, 0.0)]).unwrap();
+            let log = weigher(1.0, is_rms).log_likelihood(&frame, &[standing(x, 0.0)]).unwrap();
             (-2.0 * (log + (2.0 * PI).sqrt().ln())).sqrt()
         };
         // The square of the window is four times as large at half the distance.
-        let ratio = |weighing| {
-            let of_depth = |x: f64| d(weighing, x) / (f64::from(WALL_M) - x);
+        let ratio = |is_rms| {
+            let of_depth = |x: f64| d(is_rms, x) / (f64::from(WALL_M) - x);
             of_depth(3.6) / of_depth(1.8)
         };
-        assert!((ratio(Weighing::Rms) - 1.0).abs() < 0.15, "{}", ratio(Weighing::Rms));
-        assert!((ratio(Weighing::Printed) - 2.0).abs() < 0.3, "{}", ratio(Weighing::Printed));
+        assert!((ratio(true) - 1.0).abs() < 0.15, "{}", ratio(true));
+        assert!((ratio(false) - 2.0).abs() < 0.3, "{}", ratio(false));
     }
 
     #[test]
     fn one_person_takes_the_best_template_and_two_those_of_their_motion() {
         let near = standing(1.8, 0.0);
         let frame = frame(picture(&[Painted::new(&near, Direction::Left)]));
-        let weigher = Weigher::new(&config(Weighing::Printed));
+        let weigher = weigher(0.1, false);
         let log = |scene: &[Person]| weigher.log_likelihood(&frame, scene).unwrap();
         let moving = |vy| Person { velocity: Vector2::new(0.0, vy), ..near };
         assert_eq!(log(&[near]), log(&[moving(1.0)]));
@@ -321,7 +339,7 @@ mod tests {
     #[test]
     fn where_nothing_is_seen_no_scene_is_likely() {
         let frame = frame(DepthImage::filled(80, 60, f32::NAN));
-        let weigher = Weigher::new(&config(Weighing::Printed));
+        let weigher = weigher(0.1, false);
         assert_eq!(weigher.log_likelihood(&frame, &[standing(2.0, 0.0)]).unwrap(), LEAST);
         assert_eq!(weigher.log_likelihood(&frame, &[standing(-2.0, 0.0)]).unwrap(), LEAST);
         assert_eq!(weigher.log_likelihood(&frame, &[]).unwrap(), 0.0);
