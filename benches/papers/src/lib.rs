@@ -26,7 +26,9 @@ mod recorded;
 mod rgbd_compressive;
 mod scatter;
 mod stereo;
+mod triangulate;
 mod variant;
+pub mod webcams;
 
 use tagalong_config::Registry;
 

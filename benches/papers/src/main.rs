@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tagalong_config::Registry;
 use tagalong_papers::command::{HELP, ReproduceArgs, reproduce};
+use tagalong_papers::webcams::{self, TriangulateArgs, triangulate};
 
 /// Repeats the experiments of five published systems. Every other command is that of `tagalong`,
 /// with the plugins of the printed equations in addition.
@@ -22,6 +23,9 @@ enum Command {
     /// Prints the tables of a published system beside ours
     #[command(after_help = HELP)]
     Reproduce(ReproduceArgs),
+    /// Measures the position of a coloured hat with fixed cameras in a log
+    #[command(after_help = webcams::HELP)]
+    Triangulate(TriangulateArgs),
     /// Any command of `tagalong`, like `run` and `list`
     #[command(external_subcommand)]
     Product(Vec<OsString>),
@@ -29,18 +33,20 @@ enum Command {
 
 fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().collect();
-    let for_programs = tagalong_cli::wants_json(&arguments);
     let outcome = match Cli::parse().command {
         Command::Reproduce(args) => {
             let mut registry = Registry::default();
             tagalong_papers::register(&mut registry);
             reproduce(&args, &registry)
         }
-        Command::Product(_) => {
-            return ExitCode::from(tagalong_cli::main_from(arguments, tagalong_papers::register));
+        Command::Triangulate(args) => triangulate(&args),
+        Command::Product(words) => {
+            // The name of the program comes before its words, as in any command line.
+            let line = arguments.first().cloned().into_iter().chain(words);
+            return ExitCode::from(tagalong_cli::main_from(line, tagalong_papers::register));
         }
     };
-    ExitCode::from(tagalong_cli::exit_code(&outcome, for_programs))
+    ExitCode::from(tagalong_cli::exit_code(&outcome, tagalong_cli::wants_json(&arguments)))
 }
 
 #[cfg(test)]

@@ -13,7 +13,6 @@ use tagalong_import::ImportArgs;
 use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
 use tagalong_view::{HELP as VIEW_HELP, ViewArgs};
-use tagalong_webcams::TriangulateArgs;
 
 use crate::commands::{EvalArgs, ModelArgs};
 use crate::demo::DemoArgs;
@@ -125,9 +124,6 @@ pub enum Command {
     /// Makes the model file of a plugin, and its card
     #[command(after_help = TRAIN_HELP)]
     Train(TrainArgs),
-    /// Measures the position of a coloured hat with fixed cameras in a log
-    #[command(after_help = TRIANGULATE_HELP)]
-    Triangulate(TriangulateArgs),
     /// Says what a neural network in an ONNX file is, and how to use it
     #[command(after_help = MODEL_HELP)]
     Model(ModelArgs),
@@ -227,18 +223,6 @@ Examples:
   tagalong trials
   tagalong trials configs/scenes/crossing.toml --seeds 50 --configs configs/depth-ekf.toml
   tagalong trials --format json | jq .gains";
-
-const TRIANGULATE_HELP: &str = "\
-Calibrates the cameras by places that are known, and says how far measured places are from known
-ones that it was not told.
-
-Examples:
-  tagalong simulate configs/scenes/omni-hat.toml -o runs/hat.mcap
-  tagalong triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml -o runs/hat.csv
-  tagalong triangulate lab.mcap --cameras cameras.toml --known places.csv --hue 240
-  tagalong triangulate lab.mcap --cameras cameras.toml --known places.csv --robot 5,2.5,0 \
-    --truth lab.truth.jsonl    (then `tagalong bench --logs lab.mcap`)
-  tagalong triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml --format json | jq .held_out";
 
 const RUN_HELP: &str = "\
 Files: tracks.mcap (for `tagalong view`, Foxglove and Rerun), tracks.csv (MOTChallenge columns,

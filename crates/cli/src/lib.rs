@@ -112,7 +112,6 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Follow(args) => tagalong_experiments::follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
-        Command::Triangulate(args) => tagalong_webcams::triangulate(args),
         Command::Boxes(args) => tagalong_experiments::boxes::boxes(args, registry),
         Command::Trials(args) => tagalong_experiments::trials::trials(args, registry),
         Command::Train(args) => tagalong_training::train(args, registry),

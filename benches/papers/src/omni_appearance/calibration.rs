@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::triangulate::{Cameras, HatColour, Known, Sight, Station, calibrate, find_hat};
 use nalgebra::{Point2, Vector2, Vector3};
 use tagalong_geometry::{Camera, Lens};
 use tagalong_sim::{Event, Scene, Simulation};
-use tagalong_triangulate::{Cameras, HatColour, Known, Sight, Station, calibrate, find_hat};
 
 use crate::draws::over_draws;
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};

@@ -19,7 +19,7 @@ const BAD_FILES: [(&str, &str); 6] = [
 ];
 
 /// Commands with a place for a file, its extension, and the exit code where the file is bad.
-const FILES: [(&str, &str, i32); 16] = [
+const FILES: [(&str, &str, i32); 15] = [
     ("run nearest.toml FILE -o out", "mcap", 1),
     ("run FILE good.mcap -o out", "toml", 2),
     ("check nearest.toml FILE", "mcap", 1),
@@ -35,7 +35,6 @@ const FILES: [(&str, &str, i32); 16] = [
     ("simulate FILE -o out.mcap", "toml", 2),
     ("follow steered.toml FILE", "toml", 2),
     ("trials FILE --seeds 1 --configs nearest.toml", "toml", 2),
-    ("triangulate FILE --cameras hat.toml", "mcap", 1),
 ];
 
 /// Empty files that are valid: settings without keys are defaults, and tracks may be empty.
@@ -124,7 +123,6 @@ fn lay_out(home: &Path) {
     write("fast.toml", &format!("robot.max_speed_mps = 50.0\n{steered}"));
     write("typo.toml", &fine.replace("roles = ", "rolls = "));
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
-    write("hat.toml", &fs::read_to_string(scenes.join("omni-hat.toml")).unwrap());
     let scene = fs::read_to_string(scenes.join("sample.toml")).unwrap();
     write("scene.toml", &scene);
     write("scene-typo.toml", &scene.replace("duration_s", "durations"));

@@ -29,5 +29,4 @@ mod shell;
 mod signals;
 mod simulate;
 mod train;
-mod triangulate;
 mod view;

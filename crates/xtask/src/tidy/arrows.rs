@@ -27,7 +27,6 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("log", &["vision"]),
     ("sim", &[]),
     ("serve", &[]),
-    ("triangulate", &[]),
     ("eval", &["matching"]),
     ("report", &["eval"]),
     ("trials", &["vision", "stereo", "pipeline", "sim", "eval"]),
@@ -49,7 +48,6 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
     ("benchmark", &["app", "scoring", "render", "pipeline", "log", "eval", "report", "tuning"]),
     ("import", &["app", "log", "eval"]),
-    ("webcams", &["app", "scoring", "log", "sim", "triangulate"]),
     (
         "experiments",
         &[
@@ -78,7 +76,6 @@ const ARROWS: &[(&str, &[&str])] = &[
             "simulate",
             "training",
             "view",
-            "webcams",
         ],
     ),
     ("testdata", &[]),

@@ -1,11 +1,24 @@
-//! `tagalong triangulate`, from a simulated log with webcams to the truth of that log.
+//! `tagalong-papers triangulate`, from a simulated log with webcams to the truth of that log.
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Output};
 
 use tagalong_log::{Limits, TruthFrame, read_truth, read_truth_lines};
 
-use crate::common::{code, tagalong, text};
+/// Returns a call of the program.
+fn papers() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_tagalong-papers"))
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap()
+}
 
 /// A room in which a person with a green hat walks before four webcams; the robot's own images are
 /// too small for anything.
@@ -26,7 +39,7 @@ fn webcams(off_m: f64, off_deg: f64) -> String {
 }
 
 fn run(folder: &Path, arguments: &[&str]) -> String {
-    let output = tagalong().current_dir(folder).args(arguments).output().unwrap();
+    let output = papers().current_dir(folder).args(arguments).output().unwrap();
     assert_eq!(code(&output), 0, "{arguments:?}: {}", text(&output.stderr));
     text(&output.stdout)
 }
@@ -131,11 +144,31 @@ fn webcams_make_the_truth_of_a_log() {
 #[test]
 fn a_robot_of_which_nobody_says_where_it_stands_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let output = tagalong()
+    let output = papers()
         .current_dir(folder.path())
         .args(["triangulate", "no.mcap", "--cameras", "c.toml", "--robot", "here"])
         .output()
         .unwrap();
     assert_eq!(code(&output), 2);
     assert!(text(&output.stderr).contains("5,2.5,90"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn commands_of_the_product_know_the_printed_plugins_and_its_own_ones_tell_their_failures() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |words: &[&str]| papers().args(words).current_dir(folder.path()).output().unwrap();
+    let listed = run(&["list"]);
+    assert_eq!(code(&listed), 0);
+    for plugin in ["ekf", "ekf-as-printed", "arc-follow-as-printed"] {
+        assert!(text(&listed.stdout).contains(&format!("{plugin} ")), "{plugin}");
+    }
+    let unknown = run(&["reproduce", "stereo-smv-ekf", "--format", "json"]);
+    let told = text(&unknown.stderr);
+    let last = told.lines().next_back().unwrap_or_default();
+    let error: serde_json::Value = serde_json::from_str(last).unwrap();
+    assert!(error["error"].as_str().unwrap().contains("stereo-svm-ekf"), "{told}");
+    assert_eq!((code(&unknown), error["exit_code"].as_i64()), (2, Some(2)));
+    fs::write(folder.path().join("broken.mcap"), "no log").unwrap();
+    fs::write(folder.path().join("c.toml"), webcams(0.0, 0.0)).unwrap();
+    assert_eq!(code(&run(&["triangulate", "broken.mcap", "--cameras", "c.toml"])), 1);
 }

@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
+use crate::triangulate::{Calibrated, Cameras, Fix, Known};
 use serde::Serialize;
 use tagalong_app::format::Format;
 use tagalong_app::outcome::Failure;
 use tagalong_app::serialize::to_json;
 use tagalong_core::Stamp;
-use tagalong_triangulate::{Calibrated, Cameras, Fix, Known};
 
 /// Camera as it was calibrated.
 #[derive(Serialize)]
@@ -30,7 +30,7 @@ struct Distance {
     places: usize,
 }
 
-/// Result of `tagalong triangulate`.
+/// Result of `tagalong-papers triangulate`.
 #[derive(Serialize)]
 pub(super) struct TriangulationResult {
     cameras: Vec<CameraFound>,
@@ -55,7 +55,7 @@ impl TriangulationResult {
     ) -> Self {
         let rows = calibrated.stations.iter().zip(&calibrated.places).zip(&calibrated.misfit_rad);
         let camera = |((station, places), misfit): ((_, &usize), &f64)| {
-            let station: &tagalong_triangulate::Station = station;
+            let station: &crate::triangulate::Station = station;
             CameraFound {
                 at_m: station.at.coords.into(),
                 heading_deg: station.heading_rad.to_degrees(),

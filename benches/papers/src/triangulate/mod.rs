@@ -2,7 +2,7 @@
 //! system of P5, section 3.
 //!
 //! Each camera sees the hat in a direction ([`find_hat`], [`Station::bearing`]). Two directions or
-//! more meet in a place ([`triangulate`], [`Cameras::fix`]). Where the cameras hang and look is
+//! more meet in a place ([`Cameras::fix`]). Where the cameras hang and look is
 //! found from places that are known ([`calibrate`]).
 //!
 //! The paper takes the bearing to be linear in the image column, averages the places of all pairs
@@ -16,6 +16,6 @@ mod place;
 mod station;
 
 pub use calibration::{Calibrated, Known, calibrate};
-pub use hat::{Hat, HatColour, find_hat};
-pub use place::{Cameras, Fix, Sight, triangulate};
+pub use hat::{HatColour, find_hat};
+pub use place::{Cameras, Fix, Sight};
 pub use station::Station;

@@ -1,7 +1,7 @@
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use crate::station::wrapped;
-use crate::{Known, Station};
+use super::station::wrapped;
+use super::{Known, Station};
 
 /// A hat in the image of one camera.
 #[derive(Clone, Copy, Debug, PartialEq)]

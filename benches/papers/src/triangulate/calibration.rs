@@ -1,7 +1,7 @@
 use nalgebra::{Matrix4, Point2, Vector4};
 
-use crate::station::wrapped;
-use crate::{Sight, Station};
+use super::station::wrapped;
+use super::{Sight, Station};
 
 /// Known place, and the cameras that saw the hat there.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::triangulate::{HatColour, Sight, Station, find_hat};
 use nalgebra::{Isometry2, Point2};
 use tagalong_app::outcome::Failure;
 use tagalong_core::{Stamp, planar_pose};
@@ -11,7 +12,6 @@ use tagalong_log::images::{Pixels, decode_compressed, decode_raw};
 use tagalong_log::msgs::{CameraInfo, CompressedImage, Image, PoseStamped, decode};
 use tagalong_log::{LogFiles, LogWalker, Message};
 use tagalong_sim::WebcamSettings;
-use tagalong_triangulate::{HatColour, Sight, Station, find_hat};
 
 /// Topic of the robot's true pose in a simulated log.
 const TRUE_ROBOT_TOPIC: &str = "/truth/robot";

@@ -1,4 +1,4 @@
-//! `tagalong triangulate`: positions of a coloured hat, by fixed cameras in a log.
+//! `tagalong-papers triangulate`: positions of a coloured hat, by fixed cameras in a log.
 
 mod found;
 mod seen;
@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::triangulate::{Cameras, HatColour, Known, Sight, calibrate};
 use clap::Args;
 use nalgebra::{Point2, Point3};
 use tagalong_app::format::Format;
@@ -17,7 +18,6 @@ use tagalong_config::{FileLimit, read_text};
 use tagalong_core::Stamp;
 use tagalong_log::{Limits, read_truth};
 use tagalong_sim::WebcamSettings;
-use tagalong_triangulate::{Cameras, HatColour, Known, Sight, calibrate};
 
 use self::found::TriangulationResult;
 use self::seen::CameraSightings;
@@ -28,7 +28,7 @@ const TOGETHER_S: f64 = 0.05;
 /// Largest difference in time between a known place and an image, s.
 const KNOWN_WITHIN_S: f64 = 0.2;
 
-/// Arguments of `tagalong triangulate`.
+/// Arguments of `tagalong-papers triangulate`.
 #[derive(Args, Debug)]
 pub struct TriangulateArgs {
     /// The log.
@@ -69,13 +69,26 @@ pub struct TriangulateArgs {
     pub format: Format,
 }
 
+/// Examples of the command.
+pub const HELP: &str = "\
+Calibrates the cameras by places that are known, and says how far measured places are from known
+ones that it was not told.
+
+Examples:
+  tagalong simulate configs/scenes/omni-hat.toml -o runs/hat.mcap
+  tagalong-papers triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml -o runs/hat.csv
+  tagalong-papers triangulate lab.mcap --cameras cameras.toml --known places.csv --hue 240
+  tagalong-papers triangulate lab.mcap --cameras cameras.toml --known places.csv --robot 5,2.5,0 \
+    --truth lab.truth.jsonl    (then `tagalong bench --logs lab.mcap`)
+  tagalong-papers triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml --format json | jq .held_out";
+
 /// Guessed cameras; a scene file has them, too.
 #[derive(serde::Deserialize)]
 struct Guess {
     webcams: Vec<WebcamSettings>,
 }
 
-/// Runs `tagalong triangulate`.
+/// Runs `tagalong-papers triangulate`.
 ///
 /// # Errors
 /// Files that cannot be read, a log without webcams, too few places.
