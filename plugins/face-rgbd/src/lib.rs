@@ -46,6 +46,14 @@ pub const TRAINER: &str = "cascade";
 pub fn register(registry: &mut Registry) {
     registry.detector(NAME, "faces by a cascade, where depth allows them (P2)", FaceRgbd::new);
     #[cfg(feature = "train")]
+    registry.training(
+        TRAINER,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Faces,
+            quick_settings: "[training]\nstages = 4\nfeatures = 200",
+        },
+    );
+    #[cfg(feature = "train")]
     registry.trainer(TRAINER, |config: Config, context| {
         let begun = (!config.model.is_empty())
             .then(|| context.model(&config.model, "", Cascade::from_xml))

@@ -54,6 +54,14 @@ pub fn register(registry: &mut Registry) {
         HogUpperBody::new,
     );
     #[cfg(feature = "train")]
+    registry.training(
+        NAME,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Windows,
+            quick_settings: "[training]\nmining_rounds = 1\nepochs = 10",
+        },
+    );
+    #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {
         let layout = Layout { kind: config.machine, coverage: config.coverage };
         train::HogTrainer::new(layout, config.training, context.seed)

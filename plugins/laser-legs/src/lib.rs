@@ -36,5 +36,13 @@ pub const NAME: &str = "laser-legs";
 pub fn register(registry: &mut Registry) {
     registry.detector(NAME, "legs in a laser scan, by boosted geometric features", LaserLegs::new);
     #[cfg(feature = "train")]
+    registry.training(
+        NAME,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::LaserScans,
+            quick_settings: "[training]\ntrees = [10]\nfolds = 2\nevery_ray = []",
+        },
+    );
+    #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| train::LegTrainer::new(&config, context.seed));
 }

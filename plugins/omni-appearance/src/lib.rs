@@ -56,6 +56,14 @@ pub fn register(registry: &mut Registry) {
         OmniAppearance::new,
     );
     #[cfg(feature = "train")]
+    registry.training(
+        TRAINER,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Panoramas,
+            quick_settings: "",
+        },
+    );
+    #[cfg(feature = "train")]
     registry.trainer(TRAINER, |config: Config, context| {
         train::DistanceTrainer::new(config, context.seed)
     });

@@ -3,7 +3,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::{Context, Registry};
+use tagalong_config::{Context, Registry, TrainingData, TrainingOffer};
 use tagalong_core::Result;
 use tagalong_omni_appearance::train::DistanceTrainer;
 use tagalong_omni_appearance::{AfterMeasuring, Blob, OmniAppearance};
@@ -59,6 +59,8 @@ pub fn register(registry: &mut Registry) {
         "people in the panorama of a conical mirror, as if it ended at its seam (P5)",
         detector,
     );
+    let data = TrainingData::Panoramas;
+    registry.training(TRAINER, TrainingOffer { data, ..TrainingOffer::default() });
     registry.trainer(TRAINER, |config: Config, context| {
         DistanceTrainer::new(config.printed(), context.seed)
     });
