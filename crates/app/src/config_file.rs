@@ -65,7 +65,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "rgbd-faces"
     "rgbd-follow"
     "rgbd-kalman"
-    "rgbd-mosse"
     "rgbd-upper-bodies"
     "stereo-ekf"
     "stereo-follow"

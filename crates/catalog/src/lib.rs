@@ -32,7 +32,6 @@ pub fn register(registry: &mut Registry) {
     tagalong_last_seen::register(registry);
     tagalong_manage_m_of_n::register(registry);
     tagalong_manage_sprt::register(registry);
-    tagalong_mosse::register(registry);
     tagalong_omni_appearance::register(registry);
     tagalong_onnx::register(registry);
     tagalong_recorded_detections::register(registry);

@@ -33,8 +33,9 @@ Examples:
   tagalong demo
   tagalong run configs/depth-ekf.toml robot.mcap --overlay
 
-Results go to stdout, talk goes to stderr. Exit codes: 0 ok, 1 failed, 2 wrong usage or config, 3
-finished but part of the log was lost or the doctor found something bad, 130 and 143 stopped by a signal (the files are valid).";
+Results go to stdout, log messages to stderr. Exit codes: 0 ok; 1 failed; 2 wrong usage or config; 3
+finished, but part of the log was lost or `doctor` found a defect; 130 and 143 stopped by a signal (the
+files are valid).";
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]
@@ -183,9 +184,6 @@ Examples:
   tagalong import tum rgbd_dataset_freiburg3_walking_xyz
   tagalong import kitti training --sequence 0013 -o runs/kitti-0013.mcap
   tagalong import mot MOT17-04-FRCNN
-  tagalong import ktp KTP_dataset_images/images/Still
-  tagalong import jrdb train_dataset/images/image_0/bytes-cafe-2019-02-07_0
-  tagalong import tpt-bench TPT-Bench/panoramic_images/0015 -o runs/tpt-0015.mcap
   tagalong import leg-tracker general_tracking_moving_1.bag   (truth for that bag)
   tagalong import images photos --fps 15 --view 69 --height 1.2 --tilt 5
   tagalong import cvat annotations.xml -o robot.people.csv    (truth for robot.mcap)

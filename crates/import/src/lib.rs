@@ -5,14 +5,10 @@
 
 mod cvat;
 mod folders;
-mod jrdb;
-mod json;
 mod kitti;
-mod ktp;
 mod leg_bags;
 mod recorded;
 mod sequence;
-mod tpt;
 mod truth;
 mod tum;
 mod writer;
@@ -38,12 +34,6 @@ pub enum Kind {
     Kitti,
     /// A sequence of the MOTChallenge: seqinfo.ini and its images.
     Mot,
-    /// A folder images/NAME of the Kinect Tracking Precision dataset.
-    Ktp,
-    /// A folder images/image_N/NAME or images/image_stitched/NAME of JRDB.
-    Jrdb,
-    /// A folder panoramic_images/NAME of TPT-Bench.
-    TptBench,
     /// A folder of JPEG or PNG images, in the order of their names.
     Images,
     /// The XML file of annotations made with CVAT (for video 1.1 or for images 1.1): truth for a log
@@ -189,9 +179,6 @@ fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
         Kind::Kitti => kitti::read(args)?,
         Kind::Mot => folders::mot(args)?,
         Kind::Images => folders::images(args)?,
-        Kind::Ktp => ktp::read(args)?,
-        Kind::Jrdb => jrdb::read(args)?,
-        Kind::TptBench => tpt::read(args)?,
         Kind::Cvat | Kind::LegTracker => return Err(Failure::usage("annotations are no log")),
     };
     if sequence.moments.is_empty() {
@@ -221,12 +208,9 @@ fn beside(sequence: &Sequence, log: &Path) -> Result<(), Failure> {
 
 fn default_log(args: &ImportArgs) -> PathBuf {
     let whole = args.path.canonicalize().unwrap_or_else(|_| args.path.clone());
-    let named = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let name = match args.kind {
         Kind::Kitti => format!("kitti-{}", args.sequence),
-        // The cameras of a sequence are logs of their own.
-        Kind::Jrdb => format!("{}-{}", named(&whole), whole.parent().map_or(String::new(), named)),
-        _ => named(&whole),
+        _ => whole.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
     Path::new("runs").join(name + ".mcap")
 }

@@ -296,8 +296,13 @@ mod tests {
     }
 
     #[test]
-    fn an_image_without_pixels_is_left_alone() {
+    fn an_image_too_small_for_neighbours_is_left_alone() {
         despeckle(&mut [], 0);
         despeckle(&mut [], 4);
+        for width in [1, 2] {
+            let mut values = [500, 900, 500, 0];
+            despeckle(&mut values, width);
+            assert_eq!(values, [500, 900, 500, 0], "{width}");
+        }
     }
 }

@@ -9,7 +9,6 @@ mod new_plugin;
 mod program;
 mod record;
 mod rehearse;
-mod sbom;
 mod tidy;
 mod try_out;
 mod walk_through;
@@ -62,17 +61,6 @@ enum Command {
         #[arg(long)]
         program: Option<PathBuf>,
     },
-    /// Writes the parts list (SBOM) of a program, CycloneDX in JSON
-    Sbom {
-        /// The file to write.
-        file: PathBuf,
-        /// Folder of the workspace, for example `bridges/python`.
-        #[arg(long, default_value = ".")]
-        folder: PathBuf,
-        /// The package whose parts are listed.
-        #[arg(long, default_value = "tagalong-cli")]
-        package: String,
-    },
     /// Runs everything that the server runs (`.ci/run`)
     Ci,
 }
@@ -119,9 +107,6 @@ fn run(command: Command) -> Result<()> {
         Command::Tidy => tidy::tidy(&workspace),
         Command::Record { file, program } => record::record(&workspace, &file, program),
         Command::Rehearse => rehearse::rehearse(&workspace),
-        Command::Sbom { file, folder, package } => {
-            workspace.write(file, &sbom::sbom(&workspace, &folder, &package)?)
-        }
         Command::Ci => ci::ci(&workspace),
     }
 }

@@ -18,12 +18,9 @@ const STAGE: &str = "target/rehearsal";
 /// Lines with this in them are not run, for a reason. Tidy checks their options.
 const LEFT_OUT: &[(&str, &str)] = &[
     ("contrast", "needs the plugin of the walk-through, whose own trial runs it"),
-    ("import jrdb", "needs another data set"),
     ("import kitti", "needs another data set"),
-    ("import ktp", "needs another data set"),
     ("import leg-tracker", "needs another data set"),
     ("import mot", "needs another data set"),
-    ("import tpt-bench", "needs another data set"),
     ("import tum", "needs another data set"),
     ("run configs/onnx.toml", "needs a network of the user"),
     ("yolox_s.onnx", "needs a network of the user"),

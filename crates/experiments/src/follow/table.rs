@@ -74,24 +74,23 @@ fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
          times in a ride with the spread between rides; Student for times"
             .into(),
         format!(
-            "kept: the person was found, nobody else was followed for more than {} s in one go, and \
-             at the end the person was followed or not in view for {} s",
+            "kept: the person was found, no other person was followed for more than {} s at a time, \
+             and at the end the person was followed or out of view for {} s",
             judge.most_wrong_s, judge.refind_s
         ),
-        "wrong: part of the time with somebody that it was not the right one, or not somebody".into(),
+        "wrong: share of the time in which the robot followed another person or a thing".into(),
         format!(
-            "refound: times without the person that ended within {} s of their coming back into \
-             view (up to {} m away)",
+            "refound: losses of the person that ended within {} s of the return into view (up to {} m \
+             away)",
             judge.refind_s, judge.max_range_m
         ),
-        "after: from their coming back into view to their being followed, of those who were found".into(),
+        "after: time from the return into view until the person is followed, where that happened".into(),
         format!(
-            "distance: within {} m of the stand-off while the person walked below {} m/s, and how \
-             much farther away on the mean",
+            "distance: share of the time within {} m of the stand-off while the person walked below \
+             {} m/s, and the mean excess of the distance",
             judge.off_m, judge.slow_mps
         ),
-        "contacts: rides in which the robot touched somebody or something; beside it the least room"
-            .into(),
+        "contacts: rides in which the robot touched a person or a thing, and the least clearance".into(),
         "ms/frame: 95th percentile of the processor time of the pipeline's thread".into(),
     ]
 }

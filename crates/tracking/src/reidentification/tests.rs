@@ -89,14 +89,20 @@ fn one_who_may_be_either_of_two_gets_a_new_number() {
 
 #[test]
 fn a_person_who_is_long_gone_or_far_away_gets_a_new_number() {
-    let (mut scene, red) = (Scene::new(), frame(RED, BLUE));
+    let red = frame(RED, RED);
+    let mut scene = Scene::new();
     scene.show(30, &red, &[track(1, 0.8, 1.6)]);
     scene.show(310, &red, &[]);
-    assert_eq!(scene.show(30, &red, &[track(2, 0.8, 1.6)]), [2]);
-    scene.show(1, &red, &[]);
-    let mut far = track(3, 2.5, 1.6);
-    far.estimate.person.position.x = 5.0;
-    assert_eq!(scene.show(1, &red, &[far]), [3], "3 m in a tenth of a second");
+    assert_eq!(scene.show(30, &red, &[track(2, 0.8, 1.6)]), [2], "gone for longer than 30 s");
+    for (y_m, number) in [(0.8, 1), (-1.6, 2)] {
+        let mut scene = Scene::new();
+        scene.show(30, &red, &[track(1, 0.8, 1.6)]);
+        scene.show(1, &red, &[]);
+        let returned = track(2, y_m, 1.6);
+        let region = returned.estimate.region;
+        assert!(region.x > 0.0 && region.right() < 320.0, "the person is whole in the image");
+        assert_eq!(scene.show(1, &red, &[returned]), [number], "to {y_m} m in a fifth of a second");
+    }
 }
 
 /// Track 1 went behind track 2, and each went on with the other person.
