@@ -95,7 +95,7 @@ fn tell_panics_briefly() {
 fn dispatch(command: &Command, registry: &Registry) -> Outcome {
     match command {
         Command::Run(args) => run::run(args, registry),
-        Command::View(args) => tagalong_view::view(args),
+        Command::View(args) => tagalong_view::view(args, registry),
         Command::Annotate(args) => tagalong_annotate::annotate(args, registry),
         Command::List { format } => commands::list(registry, *format),
         Command::Config { plugin, format } => commands::config(registry, plugin, *format),

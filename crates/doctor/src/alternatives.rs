@@ -4,7 +4,7 @@ use serde::Serialize;
 use tagalong_app::choice::fitting;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::progress::Progress;
-use tagalong_app::remedies::{self, Change, is_present};
+use tagalong_app::remedies::{Change, Remedies, is_present};
 use tagalong_config::Registry;
 use tagalong_core::Inputs;
 use tagalong_log::{FrameSource, LogFrame};
@@ -82,7 +82,7 @@ impl Runner {
 /// Returns a pipeline for each change of the config, and for other configs.
 fn runners(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Runner> {
     let resolved = visit.pipeline.resolved();
-    let changes = changes(visit, &resolved);
+    let changes = changes(visit, &resolved, &Remedies::new(registry));
     let built = changes.into_iter().filter_map(|change| {
         let text = with_values(&resolved, &[(&change.key, &change.value)]).ok()?;
         let pipeline = visit.config.variant(&text, registry).ok()?;
@@ -93,14 +93,14 @@ fn runners(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Runner> {
 
 /// Returns the changes that are tried: the values of `[tune]` and those that the table of remedies
 /// offers, none of them equal to the present one.
-fn changes(visit: &Visit, resolved: &str) -> Vec<Change> {
+fn changes(visit: &Visit, resolved: &str, remedies: &Remedies) -> Vec<Change> {
     let table: Table = toml::from_str(resolved).unwrap_or_default();
     let tuned = visit.tunables.iter().flat_map(|tunable| {
         let others = tunable.values.iter().filter(|value| !is_present(value, &tunable.now));
         others.map(|value| Change::of(&table, &tunable.key, value))
     });
     let mut changes: Vec<Change> = Vec::new();
-    for change in tuned.chain(remedies::offered(&table)) {
+    for change in tuned.chain(remedies.offered(&table)) {
         if !changes.iter().any(|other| other.line == change.line) {
             changes.push(change);
         }

@@ -57,7 +57,7 @@ impl Default for Config {
 
 impl Config {
     /// Returns the part that says how well a pair fits.
-    pub(crate) fn pair_cost(&self) -> PairCost {
+    pub fn pair_cost(&self) -> PairCost {
         let Self { cost, gate, gate_m, gate_speed_mps, min_overlap, overlap, .. } = *self;
         let fusion = AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate };
         PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap, overlap, fusion }

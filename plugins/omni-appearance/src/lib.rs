@@ -40,7 +40,7 @@ pub use eyes::Eyes;
 pub use model::{Geometry, Head, Line, Model, PanoramaGeometry, Person, Ridge, Signature};
 pub use network::Network;
 pub use segment::{Counts, Segmenter};
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
 
 /// Name of this plugin in configs.
 pub const NAME: &str = "omni-appearance";
@@ -48,8 +48,23 @@ pub const NAME: &str = "omni-appearance";
 /// Name of the distance model in `tagalong train`.
 pub const TRAINER: &str = "omni-distance";
 
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[
+    Remedy {
+        test: "background is being learned",
+        settings: &["background_frames"],
+        look: "the first frames of a panorama",
+    },
+    Remedy {
+        test: "head height",
+        settings: &["head_height_m"],
+        look: "is the camera's height right?",
+    },
+];
+
 /// Registers the plugin.
 pub fn register(registry: &mut Registry) {
+    registry.remedies(NAME, REMEDIES);
     registry.detector(
         NAME,
         "people in the panorama of a conical mirror, distance by a small network (P5)",

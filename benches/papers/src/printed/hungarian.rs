@@ -5,31 +5,25 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_assignment::{
-    AppearanceFusion, Cost, Fit, Fusion, Overlap, PairCost, Pairs, assign_fits,
-};
+use tagalong_assignment::{Cost, Fit, PairCost, Pairs, assign_fits};
 use tagalong_config::{Registry, check_settings};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
-/// Settings of the associator `associate-hungarian-as-printed`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// Settings of the associator `associate-hungarian-as-printed`: those of `associate-hungarian`. The
+/// misprint is that of the cost by overlap.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Measure of the overlap.
-    pub overlap: Overlap,
-    /// Smallest overlap (R_min).
-    #[schemars(range(min = 1e-6, max = 1.0))]
-    pub min_overlap: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { overlap: Overlap::Dice, min_overlap: 0.4 }
-    }
+    /// Settings of `associate-hungarian`.
+    #[serde(flatten)]
+    pub base: tagalong_associate_hungarian::Config,
 }
 
 /// The printed associator.
-pub struct PrintedHungarian(PairCost);
+pub struct PrintedHungarian {
+    pair_cost: PairCost,
+    miss_factor: f64,
+}
 
 impl PrintedHungarian {
     /// Creates the associator.
@@ -38,27 +32,20 @@ impl PrintedHungarian {
     /// Settings outside their ranges.
     pub fn new(config: &Config) -> Result<Self> {
         check_settings(config)?;
-        Ok(Self(PairCost {
-            cost: Cost::Overlap,
-            // Of the cost by distance, which is not used.
-            gate: 11.34,
-            gate_m: 1.0,
-            gate_speed_mps: 1.5,
-            min_overlap: config.min_overlap,
-            overlap: config.overlap,
-            fusion: AppearanceFusion { fusion: Fusion::Sum, gate: 0.0 },
-        }))
+        Ok(Self { pair_cost: config.base.pair_cost(), miss_factor: config.base.miss_factor })
     }
 
-    fn fit(&self, track: &Track, detection: &Detection, gate: &Gate) -> Fit {
+    fn fit(&self, track: &Track, detection: &Detection, gate: &Gate) -> Option<Fit> {
         let outside = Fit { cost: 0.0, log_volume: 0.0 };
-        self.0.fit(track, detection, gate.dt_s).unwrap_or(outside)
+        let is_printed = self.pair_cost.cost == Cost::Overlap;
+        let fit = self.pair_cost.fit(track, detection, gate.dt_s);
+        fit.or(is_printed.then_some(outside))
     }
 }
 
 impl Associator for PrintedHungarian {
-    fn fits(&self, _: &Track, _: &Detection, _: &Gate) -> bool {
-        true
+    fn fits(&self, track: &Track, detection: &Detection, gate: &Gate) -> bool {
+        self.fit(track, detection, gate).is_some()
     }
 
     fn associate(
@@ -68,10 +55,12 @@ impl Associator for PrintedHungarian {
         gate: &Gate,
     ) -> Associations {
         let pairs = Pairs { tracks, detections, gate };
-        let fits = pairs.fits(&pairs.rows(), &pairs.columns(), &self.0, |track, found| {
-            Some(self.fit(track, found, gate))
+        let fits = pairs.fits(&pairs.rows(), &pairs.columns(), &self.pair_cost, |track, found| {
+            self.fit(track, found, gate)
         });
-        Associations::one_to_one(assign_fits(&fits, detections.len(), self.0.at_gate(), 1.0))
+        let at_gate = self.pair_cost.at_gate();
+        let given = assign_fits(&fits, detections.len(), at_gate, self.miss_factor);
+        Associations::one_to_one(given)
     }
 }
 
@@ -98,16 +87,17 @@ mod tests {
         let boxed = |x: f64| Rect::new(x, 0.0, 10.0, 10.0);
         let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(50.0))];
         let seen = [2.0, 51.0].map(|x| detection_in(boxed(x)));
-        let mut printed = PrintedHungarian::new(&Config::default()).unwrap();
-        assert_eq!(pairs(&printed.associate(&tracks, &seen, &GATE)), [(0, 1), (1, 0)]);
-        let settings =
+        let base =
             tagalong_associate_hungarian::Config { cost: Cost::Overlap, ..Default::default() };
-        let mut corrected = Hungarian::new(settings).unwrap();
+        let mut printed = PrintedHungarian::new(&Config { base: base.clone() }).unwrap();
+        assert_eq!(pairs(&printed.associate(&tracks, &seen, &GATE)), [(0, 1), (1, 0)]);
+        let mut corrected = Hungarian::new(base).unwrap();
         assert_eq!(pairs(&corrected.associate(&tracks, &seen, &GATE)), [(0, 0), (1, 1)]);
     }
 
     #[test]
     fn an_overlap_of_more_than_one_is_refused() {
-        assert!(PrintedHungarian::new(&Config { min_overlap: 1.1, ..Config::default() }).is_err());
+        let base = tagalong_associate_hungarian::Config { min_overlap: 1.1, ..Default::default() };
+        assert!(PrintedHungarian::new(&Config { base }).is_err());
     }
 }

@@ -37,7 +37,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("render", &["pipeline", "vision"]),
     ("scoring", &["app", "log", "eval"]),
     ("page", &["app", "report", "pipeline"]),
-    ("live", &["page", "render", "pipeline", "serve"]),
+    ("live", &["app", "page", "render", "pipeline", "serve"]),
     (
         "simulate",
         &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
