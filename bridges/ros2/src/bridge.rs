@@ -106,7 +106,7 @@ pub fn run_with(
 ) -> Result<Summary, BridgeError> {
     let setup = options.setup(registry)?;
     // Before the network, so that a port that is taken ends the program at once.
-    let live = options.serve.map(|at| serve(at, options, &setup, tell)).transpose()?;
+    let live = options.serve.map(|at| serve(at, options, &setup, registry, tell)).transpose()?;
     let (desk, requests) = Desk::new();
     // Before the topics are there, so that a supervisor can ask how the bridge is.
     let http = options.http.map(|address| HttpServer::start(address, desk.clone())).transpose()?;
@@ -141,12 +141,13 @@ fn serve(
     at: SocketAddr,
     options: &Options,
     setup: &Setup,
+    registry: &Registry,
     tell: &dyn Fn(&str),
 ) -> Result<Live, BridgeError> {
     let config = setup.pipeline.config().values();
     let name = options.config.file_stem().unwrap_or_default().to_string_lossy();
     let input = format!("ROS domain {}", options.domain);
-    let live = Live::start(at, &name, &input, config);
+    let live = Live::start(at, &name, &input, config, registry);
     let live = live.map_err(|error| BridgeError::Serve(at, error))?;
     tell(&format!("live: open {} in a browser; it is the key to the page", live.address()));
     Ok(live)

@@ -112,10 +112,6 @@ impl Rig {
         self.estimate(id).person.position
     }
 
-    pub fn velocity(&self, id: u32) -> Vector2<f64> {
-        self.estimate(id).person.velocity
-    }
-
     pub fn sketch(&self, likelihood: &Formula) -> Sketch {
         let frame = frame(EgoMotion::at_rest(0.1), None);
         let likelihood: Option<&dyn Likelihood> = Some(likelihood);
