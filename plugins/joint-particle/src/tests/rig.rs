@@ -1,6 +1,6 @@
 use std::sync::{Arc, Mutex};
 
-use nalgebra::{Matrix3, Point3, Vector2, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Person,
     Result, RgbImage, Stamp, TrackId, Update,
