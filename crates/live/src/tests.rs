@@ -33,7 +33,8 @@ fn moment(index: u64) -> (Frame, FrameReport) {
         unseen_s: 0.0,
         score: 3.0,
     };
-    let report = FrameReport { tracks: vec![track], ..FrameReport::new(index, stamp) };
+    let mut report = FrameReport::new(index, stamp);
+    report.tracks = vec![track];
     (Frame::new(index, stamp, camera, EgoMotion::at_rest(0.1), images), report)
 }
 

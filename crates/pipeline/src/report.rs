@@ -6,6 +6,7 @@ use crate::LockReport;
 /// Result of one frame: the [`TrackingReport`] and, where the pipeline has a controller, the target
 /// and the command.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct FrameReport {
     /// Index of the frame.
     pub index: u64,

@@ -29,15 +29,14 @@ fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> OverlayData {
     let lens = Pinhole { fx: 260.0, fy: 260.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
     let camera = Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0);
     let depth = Some(Arc::new(DepthImage::filled(320, 240, 4.0)));
+    let mut report = FrameReport::new(3, Stamp::from_nanos(1_000_000_000));
+    report.candidates = candidates;
+    report.tracks = tracks.iter().map(|id| track(*id, &camera)).collect();
     OverlayData {
         scan: Vec::new(),
         images: Images { depth, ..Images::default() },
         odom_from_robot: Isometry2::identity(),
-        report: FrameReport {
-            candidates,
-            tracks: tracks.iter().map(|id| track(*id, &camera)).collect(),
-            ..FrameReport::new(3, Stamp::from_nanos(1_000_000_000))
-        },
+        report,
         camera: Arc::new(camera),
     }
 }

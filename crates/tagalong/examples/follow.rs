@@ -5,7 +5,6 @@ use tagalong::prelude::*;
 
 fn main() -> Result<()> {
     let mut pipeline = Pipeline::builtin("follow-depth")?;
-    pipeline.enroll(&Enrollment::of(Choice::Nearest))?;
     for frame in Log::open("people.mcap")?.frames(&pipeline)? {
         let frame = frame?;
         let report = pipeline.step(&frame)?;

@@ -17,14 +17,30 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Returns the depth image of a wall at 5 m with the upper body of a person before it, at 2.5 m.
+/// Parts of a person as ellipses: centre below that of the head, half width, half height, m.
+const PARTS: [[f64; 3]; 5] = [
+    [0.0, 0.08, 0.115],
+    [0.15, 0.065, 0.13],
+    [0.4, 0.24, 0.21],
+    [0.62, 0.19, 0.38],
+    [1.2, 0.17, 0.45],
+];
+
+/// Returns the depth image of a floor, a wall at 5 m, and a person of 1.7 m before it, at 2.5 m.
 fn depth_image() -> DepthImage {
     DepthImage::from_fn(640, 480, |column, row| {
-        let x_px = column as f64 - 320.0;
-        let y_px = row as f64 - 140.0;
-        let is_head = (x_px / 19.0).hypot(y_px / 25.0) < 1.0;
-        let is_neck = x_px.abs() < 11.0 && (0.0..40.0).contains(&y_px);
-        let is_torso = (x_px / 48.0).powi(4) + ((y_px - 160.0) / 125.0).powi(4) < 1.0;
-        if is_head || is_neck || is_torso { 2.5 } else { 5.0 }
+        // Pixels of a metre at the distance of the person, and those below the horizon.
+        let scale = 525.0 / 2.5;
+        let below_px = row as f64 - 239.5;
+        let across_m = (column as f64 - 319.5) / scale;
+        let below_m = below_px / scale + 0.4;
+        let is_part = |[centre, half_width, half_height]: &[f64; 3]| {
+            (across_m / half_width).hypot((below_m - centre) / half_height) < 1.0
+        };
+        if PARTS.iter().any(is_part) {
+            return 2.5;
+        }
+        let floor_m = 1.2 * 525.0 / below_px;
+        if below_px > 0.0 { floor_m.min(5.0) as f32 } else { 5.0 }
     })
 }

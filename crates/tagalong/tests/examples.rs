@@ -79,7 +79,7 @@ fn the_input_of_the_config_reaches_the_reader() {
     assert!(shown.contains("/none") && shown.contains("present:"), "{shown}");
     let shown = frames("depth_topik = \"/none\"").unwrap_err().to_string();
     assert!(shown.contains("config.toml:3:1: ") && shown.contains("`depth_topic`"), "{shown}");
-    let shown = frames("depth_topic = \"/tf\"").unwrap_err().to_string();
+    let shown = frames("depth_topic = \"/camera/color/image_raw\"").unwrap_err().to_string();
     assert!(shown.contains("config.toml:3:15: "), "the line of a topic of a wrong kind: {shown}");
 }
 

@@ -58,6 +58,7 @@ impl Outcome {
 
 /// Results of one frame.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct TrackingReport {
     /// Index of the frame.
     pub index: u64,

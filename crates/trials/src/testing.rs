@@ -80,8 +80,7 @@ fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
             score: 1.0,
         })
     };
-    FrameReport {
-        tracks: tracks.iter().filter_map(track).collect(),
-        ..FrameReport::new(at as u64 + 1, stamp(at))
-    }
+    let mut report = FrameReport::new(at as u64 + 1, stamp(at));
+    report.tracks = tracks.iter().filter_map(track).collect();
+    report
 }

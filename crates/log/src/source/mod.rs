@@ -43,6 +43,7 @@ impl AsRef<Frame> for LogFrame {
 
 /// Facts about a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct LogFacts {
     /// Path of the file.
     pub path: PathBuf,
