@@ -69,11 +69,12 @@ impl PyPipeline {
     /// metres or uint16 in millimetres, registered to colour. camera: a Camera, of the size of the
     /// images. pose: of the robot in the odometry frame, (x, y, heading) or 4 x 4; None without
     /// odometry. stamp: capture time, ns as an int or seconds as a float. scan: float64, rows of
-    /// x, y or x, y, z of a laser scan in the robot frame. right, baseline_m: the right image of a
+    /// x, y or x, y, z of a laser scan in the robot frame. scan_stamp: time of the scan, as stamp, where
+    /// the scanner is slower than the images and its last scan is given again [default: stamp]. right, baseline_m: the right image of a
     /// rectified stereo pair. index: number of the frame [default: frames so far]. odometry_age_s: age of
     /// the reading of odometry from which the pose is, at the time of the stamp; a robot is not
     /// steered by an old one [default: 0, and infinite without a pose].
-    #[pyo3(signature = (colour, depth, camera, pose, stamp, *, scan=None, right=None,
+    #[pyo3(signature = (colour, depth, camera, pose, stamp, *, scan=None, scan_stamp=None, right=None,
         baseline_m=None, index=None, odometry_age_s=None))]
     #[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python method")]
     fn step(
@@ -85,6 +86,7 @@ impl PyPipeline {
         pose: Option<&Bound<'_, PyAny>>,
         stamp: &Bound<'_, PyAny>,
         scan: Option<&Bound<'_, PyAny>>,
+        scan_stamp: Option<&Bound<'_, PyAny>>,
         right: Option<&Bound<'_, PyAny>>,
         baseline_m: Option<f64>,
         index: Option<u64>,
@@ -95,6 +97,11 @@ impl PyPipeline {
         images.depth = depth.map(arrays::depth).transpose()?.map(Arc::new);
         images.right = right.map(|array| right_image(array, baseline_m)).transpose()?.map(Arc::new);
         let scan = scan.map(arrays::points).transpose()?.map(LaserScan::of_points);
+        let scan_stamp = scan_stamp.map(self::stamp).transpose()?;
+        let scan = match (scan, scan_stamp) {
+            (Some(scan), Some(stamp)) => Some(scan.with_stamp(stamp)),
+            (scan, _) => scan,
+        };
         let pose = pose.map(arrays::pose).transpose()?;
         let stamp = self::stamp(stamp)?;
         let data = Data { index, stamp, camera, pose, images, scan, odometry_age_s };

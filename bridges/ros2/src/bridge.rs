@@ -8,13 +8,11 @@ use std::time::{Duration, Instant};
 
 use ros2_client::Publisher;
 use tagalong::config::Registry;
-use tagalong::core::{Stamp, WheelSpeeds};
-use tagalong::log::msgs::{
-    Detection3DArray, Header, PoseStamped, StringMsg, Twist as TwistMessage, TwistStamped,
-};
+use tagalong::core::Stamp;
+use tagalong::log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg};
 use tagalong::log::write::{self, FrameRecord};
 use tagalong::log::{Input, Listening, LiveSource, LogFrame};
-use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, Sources};
+use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline};
 use tagalong_live::Live;
 
 use crate::diagnostics::{Diagnostics, Status};
@@ -22,17 +20,17 @@ use crate::http::HttpServer;
 use crate::inbox::{Arrival, Inbox, Traffic};
 use crate::messages::SpeedLimit;
 use crate::network::{Ear, Network};
-use crate::options::{CommandType, Setup};
-use crate::publishers::{Gate, Origin, Unfit};
+use crate::options::Setup;
+use crate::publishers::{Gate, Origin};
 use crate::services;
 use crate::skill::{Desk, Request, Verb};
 use crate::stamps::{StampClock, system_time};
-use crate::wheels::{CommandCounts, SwitchHandle, Wheels};
+use crate::wheels::{CommandCounts, Wheels};
 use crate::{BridgeError, Options};
 
 mod wheels;
 
-use wheels::*;
+use wheels::{drive, sources, take_enable, tell_untimely};
 
 /// Longest wait for messages before the stop flag is checked.
 const TURN: Duration = Duration::from_millis(50);
@@ -108,7 +106,7 @@ pub fn run_with(
 ) -> Result<Summary, BridgeError> {
     let setup = options.setup(registry)?;
     // Before the network, so that a port that is taken ends the program at once.
-    let live = options.serve.map(|at| serve(at, options, &setup, tell)).transpose()?;
+    let live = options.serve.map(|at| serve(at, options, &setup, registry, tell)).transpose()?;
     let (desk, requests) = Desk::new();
     // Before the topics are there, so that a supervisor can ask how the bridge is.
     let http = options.http.map(|address| HttpServer::start(address, desk.clone())).transpose()?;
@@ -143,12 +141,13 @@ fn serve(
     at: SocketAddr,
     options: &Options,
     setup: &Setup,
+    registry: &Registry,
     tell: &dyn Fn(&str),
 ) -> Result<Live, BridgeError> {
     let config = setup.pipeline.config().values();
     let name = options.config.file_stem().unwrap_or_default().to_string_lossy();
     let input = format!("ROS domain {}", options.domain);
-    let live = Live::start(at, &name, &input, config);
+    let live = Live::start(at, &name, &input, config, registry);
     let live = live.map_err(|error| BridgeError::Serve(at, error))?;
     tell(&format!("live: open {} in a browser; it is the key to the page", live.address()));
     Ok(live)

@@ -1,10 +1,14 @@
-//! Settings of each test of the funnel: data, not code.
+//! Settings of each test of the funnel: those of the pipeline, and those that plugins register.
 
 use serde::{Deserialize, Serialize};
+use tagalong_config::{Kind, Registry};
 use toml::{Table, Value};
 
-/// Text of the table.
-pub const TABLE: &str = include_str!("remedies.toml");
+use crate::outcome::Failure;
+use crate::serialize::to_toml;
+
+/// Table of the tests that are no plugin's.
+const TABLE: &str = include_str!("remedies.toml");
 
 /// Remedy for the candidates that a test drops.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -12,7 +16,8 @@ pub const TABLE: &str = include_str!("remedies.toml");
 pub struct Remedy {
     /// Name of the test; one that ends in `*` is a prefix.
     pub test: String,
-    /// Plugin that has the settings, where others have some of that name.
+    /// Plugin that has the test and the settings; none for the pipeline's.
+    #[serde(skip_serializing_if = "Option::is_none")]
     plugin: Option<String>,
     /// Keys of the settings.
     pub settings: Vec<String>,
@@ -21,13 +26,12 @@ pub struct Remedy {
 }
 
 /// Setting that is worth a trial on any log.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug)]
 struct Offer {
     /// Plugin that has the setting; none for a section of the pipeline.
-    plugin: Option<String>,
+    plugin: Option<&'static str>,
     /// Key of the setting, or name of the section.
-    setting: String,
+    setting: &'static str,
     /// Values to try.
     values: Vec<Value>,
 }
@@ -43,33 +47,112 @@ pub struct Change {
     pub line: String,
 }
 
-#[derive(Deserialize)]
+/// Remedies of the pipeline and of all plugins, and the settings that are worth a trial.
+#[derive(Clone, Debug)]
+pub struct Remedies {
+    drop: Vec<Remedy>,
+    offers: Vec<Offer>,
+}
+
+#[derive(Deserialize, Serialize)]
 struct File {
     drop: Vec<Remedy>,
-    offer: Vec<Offer>,
 }
 
 #[expect(clippy::expect_used, reason = "the table is part of the program, and a test reads it")]
-fn table() -> File {
-    toml::from_str::<File>(TABLE).expect("the built-in table is right")
+fn of_pipeline() -> Vec<Remedy> {
+    toml::from_str::<File>(TABLE).expect("the built-in table is right").drop
 }
 
-/// Returns all remedies, in the order of the stages.
-pub fn all() -> Vec<Remedy> {
-    table().drop
+impl Default for Remedies {
+    /// Returns the remedies of the pipeline alone.
+    fn default() -> Self {
+        Self { drop: of_pipeline(), offers: Vec::new() }
+    }
 }
 
-/// Returns the changes of a resolved config that the table offers for its plugins; none of them has
-/// the present value.
-pub fn offered(resolved: &Table) -> Vec<Change> {
-    table().offer.iter().flat_map(|offer| offer.changes(resolved)).collect()
+impl Remedies {
+    /// Collects the remedies of the pipeline, and what the plugins offer.
+    pub fn new(registry: &Registry) -> Self {
+        let of_plugins = registry.all_remedies().map(|(plugin, remedy)| Remedy {
+            test: remedy.test.to_owned(),
+            plugin: Some(plugin.to_owned()),
+            settings: remedy.settings.iter().map(ToString::to_string).collect(),
+            look: remedy.look.to_owned(),
+        });
+        let sections = registry.alternatives().filter_map(|plugin| {
+            let value = Table::from_iter([("plugin".to_owned(), Value::from(plugin.name))]);
+            let setting = section_of(plugin.kind)?;
+            Some(Offer { plugin: None, setting, values: vec![value.into()] })
+        });
+        let settings = registry.all_trial_values().map(|(plugin, trial)| Offer {
+            plugin: Some(plugin),
+            setting: trial.setting,
+            values: trial.values.iter().map(|value| Value::from(*value)).collect(),
+        });
+        Self {
+            drop: of_pipeline().into_iter().chain(of_plugins).collect(),
+            offers: sections.chain(settings).collect(),
+        }
+    }
+
+    /// Returns all remedies: those of the pipeline in the order of its stages, then those of each
+    /// plugin.
+    pub fn all(&self) -> &[Remedy] {
+        &self.drop
+    }
+
+    /// Returns the remedy for a test, if there is one.
+    pub fn of(&self, test: &str) -> Option<&Remedy> {
+        self.drop.iter().find(|remedy| remedy.is_for(test))
+    }
+
+    /// Returns the changes of a resolved config that are offered for its plugins; none of them has
+    /// the present value.
+    pub fn offered(&self, resolved: &Table) -> Vec<Change> {
+        self.offers.iter().flat_map(|offer| offer.changes(resolved)).collect()
+    }
+
+    /// Returns the remedies as TOML.
+    ///
+    /// # Errors
+    /// As for [`to_toml`].
+    pub fn toml(&self) -> Result<String, Failure> {
+        to_toml("the remedies", &File { drop: self.drop.clone() })
+    }
+
+    /// Returns the remedies as a table in Markdown.
+    pub fn markdown(&self) -> String {
+        let mut out = String::from("| test in the funnel | settings | look at |\n|---|---|---|\n");
+        for remedy in &self.drop {
+            let settings: Vec<String> =
+                remedy.settings.iter().map(|key| format!("`{key}`")).collect();
+            let test = remedy.test.replace('*', "...");
+            let of = remedy.plugin.as_ref().map(|plugin| format!(" of `{plugin}`"));
+            let of = of.unwrap_or_default();
+            out += &format!("| {test} | {}{of} | {} |\n", settings.join(", "), remedy.look);
+        }
+        out
+    }
+}
+
+/// Returns the section of a config that names the one plugin of a kind; `None` for kinds of which
+/// there are several.
+fn section_of(kind: Kind) -> Option<&'static str> {
+    match kind {
+        Kind::Associator => Some("associator"),
+        Kind::Filter => Some("filter"),
+        Kind::Manager => Some("manager"),
+        Kind::Controller => Some("controller"),
+        Kind::Detector | Kind::Verifier => None,
+    }
 }
 
 impl Offer {
     fn changes(&self, resolved: &Table) -> Vec<Change> {
-        let keys = match &self.plugin {
-            Some(plugin) => keys_of(resolved, plugin, &self.setting),
-            None => vec![(self.setting.clone(), resolved.get(&self.setting))],
+        let keys = match self.plugin {
+            Some(plugin) => keys_of(resolved, plugin, self.setting),
+            None => vec![(self.setting.to_owned(), resolved.get(self.setting))],
         };
         let with_values = keys.iter().filter_map(|(key, now)| Some((key, (*now)?)));
         let pairs = with_values.flat_map(|(key, now)| {
@@ -150,23 +233,6 @@ fn line(resolved: &Table, key: &str, value: &Value) -> String {
     }
 }
 
-/// Returns the table as Markdown.
-pub fn markdown() -> String {
-    let mut out = String::from("| test in the funnel | settings | look at |\n|---|---|---|\n");
-    for remedy in all() {
-        let settings: Vec<String> = remedy.settings.iter().map(|key| format!("`{key}`")).collect();
-        let test = remedy.test.replace('*', "...");
-        let of = remedy.plugin.map(|plugin| format!(" of `{plugin}`")).unwrap_or_default();
-        out += &format!("| {test} | {}{of} | {} |\n", settings.join(", "), remedy.look);
-    }
-    out
-}
-
-/// Returns the remedy for a test, if the table has one.
-pub fn of(test: &str) -> Option<Remedy> {
-    all().into_iter().find(|remedy| remedy.is_for(test))
-}
-
 impl Remedy {
     fn is_for(&self, test: &str) -> bool {
         self.test
@@ -219,43 +285,61 @@ mod tests {
     use super::*;
     use crate::config_file::OuterSettings;
 
-    #[test]
-    fn every_setting_of_the_table_exists() {
-        let mut registry = tagalong_config::Registry::default();
+    fn registry() -> Registry {
+        let mut registry = Registry::default();
         tagalong_catalog::register(&mut registry);
+        registry
+    }
+
+    fn keys(text: &str) -> impl Iterator<Item = String> {
+        let bare = |line: &str| Some(line.trim_start_matches("# ").split_once(" =")?.0.to_owned());
+        text.lines().filter_map(bare)
+    }
+
+    #[test]
+    fn every_setting_of_a_remedy_exists() {
+        let registry = registry();
         let mut known: BTreeSet<String> = BTreeSet::new();
-        let mut keys = |text: &str| {
-            let bare =
-                |line: &str| Some(line.trim_start_matches("# ").split_once(" =")?.0.to_owned());
-            known.extend(text.lines().filter_map(bare));
-        };
-        registry.plugins().for_each(|plugin| keys(&plugin.defaults()));
-        keys(&commented_defaults::<PipelineSettings>());
-        keys(&commented_defaults::<OuterSettings>());
-        for remedy in all() {
+        registry.plugins().for_each(|plugin| known.extend(keys(&plugin.defaults())));
+        known.extend(keys(&commented_defaults::<PipelineSettings>()));
+        known.extend(keys(&commented_defaults::<OuterSettings>()));
+        for remedy in Remedies::new(&registry).all() {
+            let of_plugin = remedy.plugin.as_ref().map(|plugin| registry.find(plugin).unwrap());
+            let own: BTreeSet<String> =
+                of_plugin.map_or_else(BTreeSet::new, |plugin| keys(&plugin.defaults()).collect());
             for setting in &remedy.settings {
-                assert!(known.contains(setting), "{}: there is no `{setting}`", remedy.test);
-            }
-            if let Some(plugin) = &remedy.plugin {
-                assert!(registry.find(plugin).is_ok(), "{plugin}");
+                let set = if remedy.plugin.is_some() { &own } else { &known };
+                assert!(set.contains(setting), "{}: there is no `{setting}`", remedy.test);
             }
         }
     }
 
     #[test]
     fn every_offer_fits_its_plugin() {
-        let mut registry = tagalong_config::Registry::default();
-        tagalong_catalog::register(&mut registry);
-        for offer in table().offer {
-            let plugin = offer
-                .plugin
-                .as_deref()
-                .unwrap_or_else(|| offer.values[0].get("plugin").and_then(Value::as_str).unwrap());
-            let defaults = registry.find(plugin).unwrap().defaults();
-            if offer.plugin.is_some() {
-                assert!(defaults.contains(&format!("{} =", offer.setting)), "{offer:?}");
-            }
+        let registry = registry();
+        let remedies = Remedies::new(&registry);
+        assert!(remedies.offers.len() > 2);
+        for offer in &remedies.offers {
+            let Some(plugin) = offer.plugin else { continue };
+            let defaults: BTreeSet<String> =
+                keys(&registry.find(plugin).unwrap().defaults()).collect();
+            assert!(defaults.contains(offer.setting), "{offer:?}");
         }
+    }
+
+    #[test]
+    fn a_plugin_from_outside_brings_its_remedies() {
+        let mut registry = Registry::default();
+        registry.remedies(
+            "own",
+            &[tagalong_config::Remedy { test: "too blue", settings: &["hue"], look: "the sky" }],
+        );
+        let remedies = Remedies::new(&registry);
+        let resolved: Table =
+            toml::from_str("[[detectors]]\nplugin = 'own'\nconfig = { hue = 3 }\n").unwrap();
+        let lines = remedies.of("too blue").unwrap().lines(&resolved);
+        assert_eq!(lines, ["[[detectors]] plugin = \"own\", config = { hue = 3 }"]);
+        assert!(Remedies::default().of("too blue").is_none());
     }
 
     #[test]
@@ -265,13 +349,17 @@ mod tests {
              [[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_head_height_m = 1\ndiscover_cost = 0.2\n",
         )
         .unwrap();
-        let lines: Vec<String> = offered(&resolved).into_iter().map(|change| change.line).collect();
+        let offered = Remedies::new(&registry()).offered(&resolved);
+        let lines: Vec<String> = offered.into_iter().map(|change| change.line).collect();
         assert!(!lines.iter().any(|line| line.contains("manage-sprt")), "{lines:?}");
         assert!(!lines.iter().any(|line| line.contains("min_head_height_m")), "{lines:?}");
         let costs: Vec<&String> =
             lines.iter().filter(|line| line.contains("discover_cost")).collect();
         assert!(!costs.is_empty(), "{lines:?}");
         assert!(!costs.iter().any(|line| line.contains("= 0.2 ")), "{costs:?}");
+        let other: Table = toml::from_str("[manager]\nplugin = 'm'\n").unwrap();
+        let offered = Remedies::new(&registry()).offered(&other);
+        assert_eq!(offered[0].line, "[manager] plugin = \"manage-sprt\"");
     }
 
     #[test]
@@ -295,7 +383,8 @@ mod tests {
              [verifiers.config]\nweight = 2.0\n",
         )
         .unwrap();
-        let lines = of("verifier").unwrap().lines(&resolved);
+        let remedies = Remedies::default();
+        let lines = remedies.of("verifier").unwrap().lines(&resolved);
         assert_eq!(
             lines,
             [
@@ -303,7 +392,7 @@ mod tests {
                 "[[verifiers]] plugin = \"a\", config = { weight = 2.0 }"
             ]
         );
-        assert_eq!(of("stereo pixels: speckle").unwrap().test, "stereo pixels: *");
-        assert!(of("something new").is_none());
+        assert_eq!(remedies.of("stereo pixels: speckle").unwrap().test, "stereo pixels: *");
+        assert!(remedies.of("something new").is_none());
     }
 }

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::progress::Forecast;
-use tagalong_app::remedies;
+use tagalong_app::remedies::Remedies;
 use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, Inputs};
@@ -250,7 +250,10 @@ impl Desk<'_> {
             lanes.iter_mut().for_each(|lane| lane.step(&item));
         }
         let lost = source.data_lost();
-        let finish = |(ready, lane): (&Ready, Lane)| lane.finish(&ready.task, &truth, &shots, lost);
+        let remedies = Remedies::new(self.registry);
+        let finish = |(ready, lane): (&Ready, Lane)| {
+            lane.finish(&ready.task, &truth, &shots, lost, &remedies)
+        };
         let (mut stored, timings): (Vec<_>, Vec<_>) = group.iter().zip(lanes).map(finish).unzip();
         illustrate(&group[0], &mut stored)?;
         Ok(Some(stored.into_iter().zip(timings).collect()))
@@ -299,7 +302,14 @@ impl Lane {
         }
     }
 
-    fn finish(self, task: &Task, truth: &TruthFile, shots: &Shots, lost: bool) -> Kept {
+    fn finish(
+        self,
+        task: &Task,
+        truth: &TruthFile,
+        shots: &Shots,
+        lost: bool,
+        remedies: &Remedies,
+    ) -> Kept {
         if let Err(why) = &self.pipeline {
             return failed(task, why);
         }
@@ -307,7 +317,8 @@ impl Lane {
         let blank = TaskResult { data_lost: lost, ..blank(task) };
         match self.watch.score(truth, shots, blank) {
             Ok((result, recording)) => {
-                let result = TaskResult { deciding: deciding(&self.pipeline, &result), ..result };
+                let deciding = deciding(&self.pipeline, &result, remedies);
+                let result = TaskResult { deciding, ..result };
                 let stored = Stored { result, recording: Some(recording), ..Stored::default() };
                 (stored, Some(timing))
             }
@@ -338,12 +349,13 @@ fn failed(task: &Task, why: &str) -> Kept {
 fn deciding(
     pipeline: &Result<Pipeline, String>,
     result: &TaskResult,
+    remedies: &Remedies,
 ) -> BTreeMap<String, Vec<String>> {
     let Ok(pipeline) = pipeline else { return BTreeMap::new() };
     let config = pipeline.config().values();
     let tests: BTreeSet<&String> =
         result.missed.iter().filter_map(|missed| missed.test.as_ref()).collect();
-    let lines = |test: &String| Some((test.clone(), remedies::of(test)?.lines(config)));
+    let lines = |test: &String| Some((test.clone(), remedies.of(test)?.lines(config)));
     tests.into_iter().filter_map(lines).collect()
 }
 

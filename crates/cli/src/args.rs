@@ -8,13 +8,11 @@ use tagalong_benchmark::BenchArgs;
 use tagalong_doctor::DoctorArgs;
 use tagalong_experiments::boxes::{BoxesArgs, HELP as BOXES_HELP};
 use tagalong_experiments::follow::FollowArgs;
-use tagalong_experiments::reproduce::ReproduceArgs;
 use tagalong_experiments::trials::TrialsArgs;
 use tagalong_import::ImportArgs;
 use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
 use tagalong_view::{HELP as VIEW_HELP, ViewArgs};
-use tagalong_webcams::TriangulateArgs;
 
 use crate::commands::{EvalArgs, ModelArgs};
 use crate::demo::DemoArgs;
@@ -124,15 +122,9 @@ pub enum Command {
     /// Tracks the boxes of another detector, without images, and compares associations
     #[command(after_help = BOXES_HELP)]
     Boxes(BoxesArgs),
-    /// Prints the tables of a published system beside ours
-    #[command(after_help = REPRODUCE_HELP)]
-    Reproduce(ReproduceArgs),
     /// Makes the model file of a plugin, and its card
     #[command(after_help = TRAIN_HELP)]
     Train(TrainArgs),
-    /// Measures the position of a coloured hat with fixed cameras in a log
-    #[command(after_help = TRIANGULATE_HELP)]
-    Triangulate(TriangulateArgs),
     /// Says what a neural network in an ONNX file is, and how to use it
     #[command(after_help = MODEL_HELP)]
     Model(ModelArgs),
@@ -214,21 +206,12 @@ of one of them by its seed.
 Examples:
   tagalong follow
   tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml -o rides --overlay
-  tagalong follow configs/follow-depth.toml --seeds 50 --against configs/follow-as-printed.toml
+  tagalong follow configs/follow-depth.toml --seeds 50 --against configs/follow-arc.toml
   tagalong follow configs/follow-depth.toml --latency-ms 150 --drop 0.2 --format markdown
   tagalong follow configs/follow-depth.toml configs/scenes/follow-passing.toml --inject freeze-depth@5
   tagalong follow configs/follow-depth.toml --seeds 50 --inject random
   tagalong follow configs/follow-depth.toml --approaches 1000 --faults one -o contacts
   tagalong follow configs/follow-depth.toml --replay 2000000007 --faults one";
-
-const REPRODUCE_HELP: &str = "\
-Everything is simulated with seeds of the test split. The whole of a system takes minutes to an hour.
-
-Examples:
-  tagalong reproduce
-  tagalong reproduce stereo-svm-ekf --quick
-  tagalong reproduce stereo-svm-ekf --only occlusion --format json
-  tagalong reproduce stereo-svm-ekf -o tables";
 
 const TRIALS_HELP: &str = "\
 Prints MOTA, IDF1, position errors, and how often everybody is tracked in all frames, with intervals
@@ -238,18 +221,6 @@ Examples:
   tagalong trials
   tagalong trials configs/scenes/crossing.toml --seeds 50 --configs configs/depth-ekf.toml
   tagalong trials --format json | jq .gains";
-
-const TRIANGULATE_HELP: &str = "\
-Calibrates the cameras by places that are known, and says how far measured places are from known
-ones that it was not told.
-
-Examples:
-  tagalong simulate configs/scenes/omni-hat.toml -o runs/hat.mcap
-  tagalong triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml -o runs/hat.csv
-  tagalong triangulate lab.mcap --cameras cameras.toml --known places.csv --hue 240
-  tagalong triangulate lab.mcap --cameras cameras.toml --known places.csv --robot 5,2.5,0 \
-    --truth lab.truth.jsonl    (then `tagalong bench --logs lab.mcap`)
-  tagalong triangulate runs/hat.mcap --cameras configs/scenes/omni-hat.toml --format json | jq .held_out";
 
 const RUN_HELP: &str = "\
 Files: tracks.mcap (for `tagalong view`, Foxglove and Rerun), tracks.csv (MOTChallenge columns,

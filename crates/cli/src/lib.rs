@@ -54,14 +54,20 @@ pub fn main_from(
         // Wrong usage and --help end in here, with exit codes 2 and 0.
         Err(error) => error.exit(),
     };
-    match dispatch(&cli.command, &registry) {
+    exit_code(&dispatch(&cli.command, &registry), for_programs)
+}
+
+/// Returns the exit code of a command and tells why it failed, if it did: for programs as JSON, the
+/// last line of stderr.
+pub fn exit_code(outcome: &Outcome, for_programs: bool) -> u8 {
+    match outcome {
         Ok(ended) => ended.code(),
-        Err(failure) => tell(&failure, for_programs),
+        Err(failure) => tell(failure, for_programs),
     }
 }
 
 /// Returns true where the output is asked for as JSON, even if other arguments are wrong.
-fn wants_json(arguments: &[OsString]) -> bool {
+pub fn wants_json(arguments: &[OsString]) -> bool {
     arguments.iter().any(|argument| argument == "--format=json")
         || arguments.windows(2).any(|pair| pair == ["--format", "json"])
 }
@@ -89,7 +95,7 @@ fn tell_panics_briefly() {
 fn dispatch(command: &Command, registry: &Registry) -> Outcome {
     match command {
         Command::Run(args) => run::run(args, registry),
-        Command::View(args) => tagalong_view::view(args),
+        Command::View(args) => tagalong_view::view(args, registry),
         Command::Annotate(args) => tagalong_annotate::annotate(args, registry),
         Command::List { format } => commands::list(registry, *format),
         Command::Config { plugin, format } => commands::config(registry, plugin, *format),
@@ -106,8 +112,6 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Follow(args) => tagalong_experiments::follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
-        Command::Triangulate(args) => tagalong_webcams::triangulate(args),
-        Command::Reproduce(args) => tagalong_experiments::reproduce::reproduce(args, registry),
         Command::Boxes(args) => tagalong_experiments::boxes::boxes(args, registry),
         Command::Trials(args) => tagalong_experiments::trials::trials(args, registry),
         Command::Train(args) => tagalong_training::train(args, registry),

@@ -11,6 +11,7 @@
 mod bounded;
 mod exported;
 mod names;
+mod offers;
 mod or_auto;
 mod registry;
 mod settings;
@@ -19,6 +20,7 @@ mod trainer;
 pub use bounded::{FileLimit, read_bytes, read_text};
 pub use exported::{ExportedNetwork, NamedTensor};
 pub use names::nearest;
+pub use offers::{Remedy, TrainingData, TrainingOffer, TrialValues};
 pub use or_auto::OrAuto;
 pub use registry::{Context, Kind, PluginInfo, Registry};
 pub use settings::{

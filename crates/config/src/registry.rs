@@ -1,11 +1,11 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::PathBuf;
 
 use crate::bounded::{FileLimit, read_text};
 use crate::{
-    ConfigError, ExportedNetwork, Settings, Trainer, Value, commented_defaults, nearest,
-    parse_settings,
+    ConfigError, ExportedNetwork, Remedy, Settings, Trainer, TrainingData, TrainingOffer,
+    TrialValues, Value, commented_defaults, nearest, parse_settings,
 };
 use tagalong_core::{
     Associator, Controller, Detector, DiffDrive, Error, Filter, Result, TrackManager, Verifier,
@@ -142,6 +142,10 @@ pub struct Registry {
     plugins: BTreeMap<&'static str, PluginInfo>,
     trainers: BTreeMap<&'static str, Build<Box<dyn Trainer>>>,
     exporters: BTreeMap<&'static str, Build<ExportedNetwork>>,
+    training: BTreeMap<&'static str, TrainingOffer>,
+    remedies: BTreeMap<&'static str, &'static [Remedy]>,
+    trial_values: BTreeMap<&'static str, &'static [TrialValues]>,
+    alternatives: BTreeSet<&'static str>,
 }
 
 impl Registry {
@@ -241,6 +245,57 @@ impl Registry {
     ) {
         let previous = self.trainers.insert(name, boxed(build, |trainer| Box::new(trainer)));
         assert!(previous.is_none(), "two trainers for `{name}`");
+    }
+
+    /// Registers how the model of a trainer is trained. By default that of a detector learns from
+    /// windows and others from candidates, and a quick trial has the same settings.
+    pub fn training(&mut self, name: &'static str, offer: TrainingOffer) {
+        self.training.insert(name, offer);
+    }
+
+    /// Returns how the model of a trainer is trained.
+    pub fn training_offer(&self, name: &str) -> TrainingOffer {
+        let is_detector = self.plugins.get(name).is_some_and(|info| info.kind == Kind::Detector);
+        let data = if is_detector { TrainingData::Windows } else { TrainingData::Candidates };
+        let usual = TrainingOffer { data, ..TrainingOffer::default() };
+        self.training.get(name).copied().unwrap_or(usual)
+    }
+
+    /// Registers advice on the tests of a plugin.
+    pub fn remedies(&mut self, name: &'static str, remedies: &'static [Remedy]) {
+        self.remedies.insert(name, remedies);
+    }
+
+    /// Returns the advice on the tests of all plugins, by the names of the plugins.
+    pub fn all_remedies(&self) -> impl Iterator<Item = (&'static str, &'static Remedy)> {
+        let of_plugin = |(name, remedies): (&&'static str, &&'static [Remedy])| (*name, *remedies);
+        self.remedies
+            .iter()
+            .map(of_plugin)
+            .flat_map(|(name, remedies)| remedies.iter().map(move |remedy| (name, remedy)))
+    }
+
+    /// Registers values of settings of a plugin that are worth a trial on any log.
+    pub fn trial_values(&mut self, name: &'static str, values: &'static [TrialValues]) {
+        self.trial_values.insert(name, values);
+    }
+
+    /// Returns the values of settings that are worth a trial, by the names of the plugins.
+    pub fn all_trial_values(&self) -> impl Iterator<Item = (&'static str, &'static TrialValues)> {
+        self.trial_values.iter().flat_map(|(name, values)| {
+            let name = *name;
+            values.iter().map(move |values| (name, values))
+        })
+    }
+
+    /// Registers a plugin as worth a trial in place of another one of its kind.
+    pub fn alternative(&mut self, name: &'static str) {
+        self.alternatives.insert(name);
+    }
+
+    /// Returns the plugins that are worth a trial in place of others of their kinds.
+    pub fn alternatives(&self) -> impl Iterator<Item = &PluginInfo> {
+        self.alternatives.iter().filter_map(|name| self.plugins.get(name))
     }
 
     /// Registers the export of a plugin's network as an ONNX file, under the name of the plugin; `C`

@@ -93,6 +93,7 @@ impl World {
         };
         let (rays, points): (Vec<u32>, Vec<_>) = (0..RAYS).filter_map(&mut reflection).unzip();
         LaserScan {
+            stamp: None,
             robot_from_scanner: Isometry3::from_parts(eye.into(), Default::default()),
             first_rad: -std::f64::consts::FRAC_PI_2,
             increment_rad: std::f64::consts::PI / f64::from(RAYS - 1),

@@ -90,8 +90,10 @@ pub enum Reason {
     TooClose,
     /// Stop: the sensors see too little of the region that the robot would sweep.
     Unknown,
-    /// Stop: the depth image has no readings at all, or a sensor of obstacles is missing.
+    /// Stop: the depth image has no readings at all, or there is no sensor of obstacles.
     Blind,
+    /// Stop: a sensor of obstacles has delivered no new reading for too long.
+    Silent,
     /// Stop: a sensor repeats itself, or does not change as the odometry says.
     Frozen,
     /// Stop: the odometry is missing, too old, or no number.
@@ -131,6 +133,7 @@ impl Reason {
             Self::TooClose => "too-close",
             Self::Unknown => "unknown",
             Self::Blind => "blind",
+            Self::Silent => "silent",
             Self::Frozen => "frozen",
             Self::Odometry => "odometry",
             Self::Late => "late",
@@ -167,7 +170,8 @@ impl Reason {
             Self::Odometry => "stands: the odometry is missing, too old, or no number",
             Self::Late => "stands: images or wheels respond too late",
             Self::Contact => "stands: a bumper is pressed",
-            Self::Blind => "stands: depth has no readings, or a sensor of obstacles is missing",
+            Self::Blind => "stands: depth has no readings, or there is no sensor of obstacles",
+            Self::Silent => "stands: a sensor of obstacles delivers no new readings",
             Self::NoTarget => "stands: there is no target",
             Self::Settling => "stands: too few frames since the start or a jump of the clock",
             Self::Stalled => "stands: no frame came for too long",
@@ -269,7 +273,7 @@ pub trait Controller: Send {
 mod tests {
     use super::*;
 
-    const ALL: [Reason; 23] = [
+    const ALL: [Reason; 24] = [
         Reason::Follow,
         Reason::Limited,
         Reason::Unsure,
@@ -283,6 +287,7 @@ mod tests {
         Reason::TooClose,
         Reason::Unknown,
         Reason::Blind,
+        Reason::Silent,
         Reason::Frozen,
         Reason::Odometry,
         Reason::Late,

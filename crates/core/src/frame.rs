@@ -233,6 +233,13 @@ impl Frame {
         Self { grey: self.grey.clone(), ..frame }
     }
 
+    /// Returns the same moment, seen by another camera. The data of the sensors are shared; derived
+    /// data are not copied.
+    pub fn with_camera(&self, camera: Arc<Camera>) -> Self {
+        let frame = self.of_same_moment(self.sensors.clone());
+        Self { camera, ..frame }
+    }
+
     /// Returns true if the frame holds this input.
     pub fn holds(&self, input: Input) -> bool {
         self.sensors.holds(input)
@@ -388,6 +395,20 @@ mod tests {
         assert_eq!(with_depth.laser().unwrap().points[..], [Point3::new(1.0, 0.5, 0.2)]);
         assert_eq!(with_depth.recorded().map(<[_]>::len), Some(0));
         assert!(with_depth.images().depth.is_some() && with_depth.images().colour.is_none());
+    }
+
+    #[test]
+    fn another_camera_leaves_the_rest() {
+        let depth = Some(Arc::new(DepthImage::filled(4, 4, 2.0)));
+        let frame = frame(Images { depth, ..Images::default() })
+            .with_changed_calibration(true)
+            .with_odometry_age(0.3)
+            .with_latency(Some(0.1));
+        let higher = Arc::new(Camera::clone(&frame.camera));
+        let other = frame.with_camera(Arc::clone(&higher));
+        assert!(Arc::ptr_eq(&other.camera, &higher) && other.depth().is_ok());
+        let kept = (other.calibration_changed, other.odometry_age_s, other.latency_s);
+        assert_eq!(kept, (true, 0.3, Some(0.1)));
     }
 
     #[test]

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use tagalong_geometry::Camera;
 
-use crate::{DepthImage, Input, LaserScan, Sensor};
+use crate::{DepthImage, Input, LaserScan, Sensor, Stamp};
 
 /// Newest readings of the further sources of the collision monitor: laser scanners and depth cameras
 /// beside those that make the frames, range sensors, and bumpers.
@@ -21,7 +21,10 @@ impl Sensor for ObstacleReadings {
 pub struct ObstacleReading {
     /// Name of the source in `[[collision_monitor.sources]]`.
     pub source: Arc<str>,
-    /// Time from the reading to the frame, s.
+    /// Time of the measurement, by the clock of the frames. Frames that come more often than readings
+    /// carry the same reading, with the same stamp, again.
+    pub stamp: Stamp,
+    /// Time from the reading to the frame, s; 0 for a reading of after the frame.
     pub age_s: f64,
     /// The reading.
     pub data: ObstacleData,

@@ -2,9 +2,14 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::Stamp;
+
 /// One sweep of a laser scanner, in the robot frame at the time of its frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaserScan {
+    /// Time of the measurement, by the clock of the frames; `None` for a scan of its frame's own time.
+    /// Frames that come more often than scans carry the same scan, with the same stamp, again.
+    pub stamp: Option<Stamp>,
     /// Pose of the scanner in the robot frame: x forward, y left, z up.
     pub robot_from_scanner: Isometry3<f64>,
     /// Direction of ray 0 in the frame of the scanner, rad.
@@ -74,6 +79,7 @@ impl LaserScan {
         let points = points.into();
         let rays = (0..points.len() as u32).collect();
         Self {
+            stamp: None,
             robot_from_scanner: Isometry3::identity(),
             first_rad: 0.0,
             increment_rad: 0.0,
@@ -108,6 +114,7 @@ impl LaserScan {
             }
         }
         Self {
+            stamp: None,
             robot_from_scanner,
             first_rad,
             increment_rad,
@@ -115,6 +122,11 @@ impl LaserScan {
             rays: rays.into(),
             unread: unread.into(),
         }
+    }
+
+    /// Returns the scan with [`LaserScan::stamp`] as given.
+    pub fn with_stamp(self, stamp: Stamp) -> Self {
+        Self { stamp: Some(stamp), ..self }
     }
 
     /// Returns the place in the robot frame at a distance, m, along a ray.

@@ -4,7 +4,7 @@ use serde::Serialize;
 use tagalong_app::choice::fitting;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::progress::Progress;
-use tagalong_app::remedies::{self, Change, is_present};
+use tagalong_app::remedies::{Change, Remedies, is_present};
 use tagalong_config::Registry;
 use tagalong_core::Inputs;
 use tagalong_log::{FrameSource, LogFrame};
@@ -82,7 +82,7 @@ impl Runner {
 /// Returns a pipeline for each change of the config, and for other configs.
 fn runners(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Runner> {
     let config = visit.pipeline.config();
-    let changes = changes(visit, config.values());
+    let changes = changes(visit, config.values(), &Remedies::new(registry));
     let built = changes.into_iter().filter_map(|change| {
         let text = config.with_values(&[(&change.key, &change.value)]).ok()?;
         let changed = config.source().with_text(text);
@@ -94,13 +94,13 @@ fn runners(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Runner> {
 
 /// Returns the changes that are tried: the values of `[tune]` and those that the table of remedies
 /// offers, none of them equal to the present one.
-fn changes(visit: &Visit, resolved: &Table) -> Vec<Change> {
+fn changes(visit: &Visit, resolved: &Table, remedies: &Remedies) -> Vec<Change> {
     let tuned = visit.tunables.iter().flat_map(|tunable| {
         let others = tunable.values.iter().filter(|value| !is_present(value, &tunable.now));
         others.map(|value| Change::of(resolved, &tunable.key, value))
     });
     let mut changes: Vec<Change> = Vec::new();
-    for change in tuned.chain(remedies::offered(resolved)) {
+    for change in tuned.chain(remedies.offered(resolved)) {
         if !changes.iter().any(|other| other.line == change.line) {
             changes.push(change);
         }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use tagalong_app::choice::{CHOICES, Choice, Fitting, fitting};
 use tagalong_app::outcome::Failure;
+use tagalong_app::remedies::Remedies;
 use tagalong_config::Registry;
 
 use super::alternatives::Alternative;
@@ -59,7 +60,8 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
     let shown = std::mem::take(&mut visit.evidence.alternatives);
     visit.evidence.alternatives = alternatives::ranked(rows.iter().skip(1).map(Row::alternative));
     let folder = args.output.as_ref().map(|folder| folder.join(name));
-    let first = Diagnosis::of(&visit, name.into(), args, folder.as_deref())?;
+    let first =
+        Diagnosis::of(&visit, name.into(), args, folder.as_deref(), &Remedies::new(registry))?;
     let pictures = args.output.clone();
     Ok(Diagnosis { pipelines: rows, alternatives: shown, pictures, ..first })
 }

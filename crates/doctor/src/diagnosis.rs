@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use tagalong_app::outcome::{Failure, make_folder};
-use tagalong_app::remedies;
+use tagalong_app::remedies::Remedies;
 
 use super::alternatives::Alternative;
 use super::comparison::Row;
@@ -62,6 +62,7 @@ impl Diagnosis {
         config: PathBuf,
         args: &DoctorArgs,
         folder: Option<&Path>,
+        remedies: &Remedies,
     ) -> Result<Self, Failure> {
         let evidence = &visit.evidence;
         let resolved = visit.outer.resolved_with(visit.pipeline.config())?;
@@ -80,7 +81,7 @@ impl Diagnosis {
             coverage: evidence.coverage.clone(),
             alternatives: evidence.alternatives.clone(),
             pictures: None,
-            funnel: funnel(visit, resolved, folder)?,
+            funnel: funnel(visit, resolved, folder, remedies)?,
         })
     }
 }
@@ -90,6 +91,7 @@ fn funnel(
     visit: &Visit,
     resolved: &toml::Table,
     folder: Option<&Path>,
+    remedies: &Remedies,
 ) -> Result<Vec<Drop>, Failure> {
     let trial = &visit.evidence.trial;
     let mut pictures = match folder {
@@ -102,12 +104,12 @@ fn funnel(
     let entries = trial.funnel.entries().iter();
     let mut drops: Vec<Drop> = entries
         .map(|entry| {
-            let remedy = remedies::of(entry.test);
+            let remedy = remedies.of(entry.test);
             Drop {
                 test: entry.test,
                 count: entry.count,
                 settings: remedy.as_ref().map_or_else(Vec::new, |remedy| remedy.lines(resolved)),
-                look: remedy.map(|remedy| remedy.look),
+                look: remedy.map(|remedy| remedy.look.clone()),
                 pictures: pictures.remove(entry.test),
             }
         })

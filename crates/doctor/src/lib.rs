@@ -29,6 +29,7 @@ use clap::{Args, ValueEnum};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::remedies::Remedies;
 use tagalong_app::serialize::to_json;
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
@@ -120,6 +121,7 @@ fn diagnose(
         snapshots::write(&visit, scope, folder)?;
     }
     let path = args.config.clone().unwrap_or_default();
-    let diagnosis = Diagnosis::of(&visit, path, args, args.output.as_deref())?;
+    let diagnosis =
+        Diagnosis::of(&visit, path, args, args.output.as_deref(), &Remedies::new(registry))?;
     Ok(Diagnosis { pictures, ..diagnosis })
 }

@@ -15,7 +15,7 @@ use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_eval::Tally;
 use tagalong_pipeline::{Tunable, with_values};
-use tagalong_reproduce::{Cell, Row, Table};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_trials::{Contender, GivenSequence, GivenTracks, for_given_boxes, in_order};
 use tagalong_tuning::{Choice, Figures, Objective, candidates, leave_one_out, mean};
 

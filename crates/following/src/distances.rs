@@ -23,6 +23,13 @@ pub struct SafetyDistances {
     pub followed_m: f64,
     /// Radius of the area that the footprint sweeps in a turn, m.
     pub turning_radius_m: f64,
+    /// Distance from the middle of the robot to the foremost corner of the stop polygon, m; `None`
+    /// without one.
+    pub stop_polygon_m: Option<f64>,
+    /// The same of the slowdown polygon, m.
+    pub slowdown_polygon_m: Option<f64>,
+    /// Factor of the speed while something is inside the slowdown polygon.
+    pub slowdown_ratio: f64,
 }
 
 impl SafetyDistances {
@@ -43,8 +50,16 @@ impl SafetyDistances {
             least_separation_m: comes(reaction_s) + protective_m,
             followed_m: collision_monitor.followed_stop_m,
             turning_radius_m: Footprint::new(&robot.footprint).radius_m(),
+            stop_polygon_m: foremost_m(&collision_monitor.stop),
+            slowdown_polygon_m: foremost_m(&collision_monitor.slowdown),
+            slowdown_ratio: collision_monitor.slowdown_ratio,
         }
     }
+}
+
+/// Returns the foremost corner of a polygon, m; `None` without corners.
+fn foremost_m(corners: &[[f64; 2]]) -> Option<f64> {
+    corners.iter().map(|[x, _]| *x).reduce(f64::max)
 }
 
 /// Region around the robot that its camera does not see.

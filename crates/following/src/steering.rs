@@ -183,6 +183,7 @@ impl Steering {
             stamp: frame.stamp,
             aim,
             stop: self.monitor.stop_reason(self.limiter.patience_s()),
+            slowdown: self.monitor.slowdown(),
             settled,
             pause_s: self.last.map_or(0.0, |last| frame.stamp.seconds_since(last)),
         };

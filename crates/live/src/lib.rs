@@ -16,6 +16,8 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use nalgebra::Isometry2;
+use tagalong_app::remedies::Remedies;
+use tagalong_config::Registry;
 use tagalong_core::Frame;
 use tagalong_page::html::Heading;
 use tagalong_pipeline::FrameReport;
@@ -39,11 +41,17 @@ pub struct Live {
 
 impl Live {
     /// Begins to serve. `name` is that of the pipeline, `input` that of the log or the robot, and
-    /// `config` the resolved one, whose settings the page quotes.
+    /// `config` the resolved one, whose settings the page quotes with the advice of its plugins.
     ///
     /// # Errors
     /// A port that is taken, an interface that this computer does not have.
-    pub fn start(at: SocketAddr, name: &str, input: &str, config: &Table) -> io::Result<Self> {
+    pub fn start(
+        at: SocketAddr,
+        name: &str,
+        input: &str,
+        config: &Table,
+        registry: &Registry,
+    ) -> io::Result<Self> {
         let server = Server::open(Access::at(at))?;
         let (address, bound) = (server.address(), server.bound());
         let heading = Heading {
@@ -51,7 +59,7 @@ impl Live {
             runs: vec![format!("{name}, as it happens")],
             notes: Vec::new(),
         };
-        let newest = Arc::new(Newest::new(config.clone()));
+        let newest = Arc::new(Newest::new(config.clone(), Remedies::new(registry)));
         let page = Page::new(&heading, name, Arc::clone(&newest)).map_err(io::Error::other)?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);

@@ -8,6 +8,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::{Isometry2, Point3};
 use serde::Serialize;
+use tagalong_app::remedies::Remedies;
 use tagalong_core::{Frame, Images, Stamp};
 use tagalong_geometry::Camera;
 use tagalong_page::data::{FrameData, TestData};
@@ -36,6 +37,7 @@ const IMAGE: (usize, u8) = (640, 72);
 /// Place for the newest frame.
 pub struct Newest {
     config: Table,
+    remedies: Remedies,
     state: Mutex<State>,
     changed: Condvar,
 }
@@ -105,8 +107,8 @@ pub struct Now<'a> {
 
 impl Newest {
     /// Returns an empty place. The config is the resolved one.
-    pub fn new(config: Table) -> Self {
-        Self { config, state: Mutex::default(), changed: Condvar::new() }
+    pub fn new(config: Table, remedies: Remedies) -> Self {
+        Self { config, remedies, state: Mutex::default(), changed: Condvar::new() }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -116,7 +118,7 @@ impl Newest {
     /// Puts a frame into the place of the one before. Images are shared, not copied or encoded.
     pub fn put(&self, frame: &Frame, odom_from_robot: &Isometry2<f64>, report: &FrameReport) {
         let moment = Moment::of(report, &frame.camera, odom_from_robot);
-        let tests = tests(std::iter::once(&moment.notes), &self.config);
+        let tests = tests(std::iter::once(&moment.notes), &self.config, &self.remedies);
         let data = frame_data(&moment);
         let mut state = self.lock();
         let first = *state.first.get_or_insert(report.stamp);

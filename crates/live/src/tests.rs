@@ -3,6 +3,7 @@ use std::net::TcpStream;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use serde_json::Value;
+use tagalong_config::Registry;
 use tagalong_core::{EgoMotion, Estimate, Images, Person, RgbImage, Stamp, Track, TrackId};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
@@ -38,7 +39,14 @@ fn moment(index: u64) -> (Frame, FrameReport) {
 }
 
 fn live() -> Live {
-    Live::start(parse_address("0").unwrap(), "depth-ekf", "walk.mcap", &Table::new()).unwrap()
+    Live::start(
+        parse_address("0").unwrap(),
+        "depth-ekf",
+        "walk.mcap",
+        &Table::new(),
+        &Registry::default(),
+    )
+    .unwrap()
 }
 
 fn offer(live: &Live, index: u64) {
@@ -215,5 +223,5 @@ fn addresses_have_three_forms() {
 #[test]
 fn a_port_that_is_taken_is_an_error() {
     let first = live();
-    assert!(Live::start(first.bound(), "a", "b", &Table::new()).is_err());
+    assert!(Live::start(first.bound(), "a", "b", &Table::new(), &Registry::default()).is_err());
 }

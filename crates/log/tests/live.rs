@@ -224,6 +224,7 @@ fn sources_of_obstacles_are_waited_for_and_read() {
     let names: Vec<&str> = readings.iter().map(|reading| &*reading.source).collect();
     assert_eq!(names, ["sonar", "bumper", "button"]);
     assert!((readings[0].age_s - 0.05).abs() < 1e-6, "{}", readings[0].age_s);
+    assert!((stamp.seconds_since(readings[0].stamp) - 0.05).abs() < 1e-6);
     assert!(matches!(readings[1].data, ObstacleData::Bumper(true)) && readings[1].age_s == 0.0);
     assert!(matches!(readings[2].data, ObstacleData::Bumper(true)));
     // Without a time of its arrival it has that of the image before it.

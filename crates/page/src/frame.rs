@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry2, Point2, Point3};
 use tagalong_app::frame_notes::{CandidateNote, DriveNote, DroppedNote, FateNote, FrameNotes};
-use tagalong_app::remedies;
+use tagalong_app::remedies::Remedies;
 use tagalong_geometry::Camera;
 use toml::Table;
 
@@ -18,10 +18,11 @@ const SCAN_POINTS: usize = 240;
 pub fn tests<'a>(
     notes: impl Iterator<Item = &'a FrameNotes>,
     config: &Table,
+    remedies: &Remedies,
 ) -> BTreeMap<String, TestData> {
     let names: BTreeSet<&str> = notes.flat_map(dropping_tests).collect();
-    let data = |name: &str| match remedies::of(name) {
-        Some(remedy) => TestData { settings: remedy.lines(config), look: remedy.look },
+    let data = |name: &str| match remedies.of(name) {
+        Some(remedy) => TestData { settings: remedy.lines(config), look: remedy.look.clone() },
         None => TestData::default(),
     };
     names.into_iter().map(|name| (name.to_owned(), data(name))).collect()
@@ -161,6 +162,7 @@ pub fn add_trails(
 #[cfg(test)]
 mod tests_of_data {
     use nalgebra::Vector2;
+    use tagalong_config::{Registry, Remedy};
     use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
@@ -177,10 +179,15 @@ mod tests_of_data {
         moment.notes.dropped =
             vec![DroppedNote { test: "head width".into(), count: 3, ..DroppedNote::default() }];
         let config = toml::from_str(
-            "[[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_head_width_m = 0.1\n",
+            "[[detectors]]\nplugin = 'd'\n[detectors.config]\nmin_head_width_m = 0.1\n",
         )
         .unwrap();
-        let tests = tests([&moment.notes].into_iter(), &config);
+        let mut registry = Registry::default();
+        registry.remedies(
+            "d",
+            &[Remedy { test: "head width", settings: &["min_head_width_m"], look: "hats" }],
+        );
+        let tests = tests([&moment.notes].into_iter(), &config, &Remedies::new(&registry));
         let lines = &tests["head width"].settings;
         assert!(lines.iter().any(|line| line.contains("min_head_width_m = 0.1")), "{lines:?}");
         assert!(!tests["head width"].look.is_empty());

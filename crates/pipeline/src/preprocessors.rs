@@ -4,7 +4,6 @@ use nalgebra::Point2;
 use std::sync::Arc;
 
 use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, Result};
-use tagalong_geometry::Camera;
 use tagalong_odometry::{CameraMotion, MotionSource, OdometrySettings, VisualOdometry};
 use tagalong_stereo::StereoDepth;
 use tagalong_tracking::Guarded;
@@ -59,18 +58,9 @@ impl Preprocessor for MotionOfCorners {
         funnel: &mut Funnel,
     ) -> Result<Preprocessed> {
         let moved = self.0.see(frame, motion, people, funnel);
-        let frame = moved.camera.map(|camera| seen_by(frame, camera));
+        let frame = moved.camera.map(|camera| frame.with_camera(Arc::new(camera)));
         Ok(Preprocessed { frame, motion: moved.motion })
     }
-}
-
-/// Returns the frame as another camera took it; the data of the sensors are shared.
-fn seen_by(frame: &Frame, camera: Camera) -> Frame {
-    let sensors = frame.sensors().clone();
-    Frame::of_sensors(frame.index, frame.stamp, Arc::new(camera), frame.motion, sensors)
-        .with_changed_calibration(frame.calibration_changed)
-        .with_odometry_age(frame.odometry_age_s)
-        .with_latency(frame.latency_s)
 }
 
 /// Returns the stage of `[odometry]`.

@@ -27,6 +27,7 @@ mod files;
 mod model;
 mod page;
 mod summary;
+mod table;
 mod view;
 
 pub use compare::{Difference, SAME_EVENT_S, compare};
@@ -37,3 +38,4 @@ pub use model::{
 };
 pub use page::{COLOURS, html};
 pub use summary::{Estimate, PairSummary, PipelineSummary, Summary};
+pub use table::{Cell, Row, Table};

@@ -1,7 +1,6 @@
 //! A scene in motion: the events that a robot would record, in the order in which it would.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::{
@@ -10,26 +9,23 @@ use nalgebra::{
 use tagalong_core::{Image, Images, RgbImage, RightImage, WheelSpeeds};
 use tagalong_geometry::{Camera, Distortion, Panorama, Pinhole, Rect};
 
-use crate::approach::{ApproachBy, ApproachInView, ApproachState, Approacher, Surroundings};
+use crate::approach::Approacher;
 use crate::behaviour::{Obstacle, Walker, hidden_by, lead_of, others, play_tricks};
 use crate::body::Skeleton;
 use crate::faults::ScheduledFault;
-use crate::footprint::{Gap, Outline};
 use crate::furniture::{Furniture, FurnitureKind};
 use crate::laser::LaserSettings;
 use crate::mirror::MirrorCamera;
 use crate::obstacle_sensors::SensorReading;
-use crate::person::Person;
 use crate::random::Random;
 use crate::render::{Visibility, WorldCamera};
 use crate::robot::{Encoder, Robot};
 use crate::room;
-use crate::scene::{AtEnd, CameraKind, PersonSettings, Posture, Scene};
+use crate::scene::{CameraKind, Posture, Scene};
 use crate::sensor::{DepthSensor, Exposure, Moment};
 use crate::shape::Shape;
-use crate::split::{SUBJECTS, Split};
 use crate::webcam::Webcam;
-use crate::world::{self, Hit, Object, Stage, World};
+use crate::world::{Hit, Object, Stage, World};
 
 mod injector;
 mod joints;

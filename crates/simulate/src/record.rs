@@ -34,7 +34,7 @@ const SCENE_TOPIC: &str = "/simulation/scene";
 const PURSUIT_TOPIC: &str = "/follow/frames";
 /// Topic of the robot's true pose in the room. Topics under `/truth` are not for trackers.
 const TRUE_ROBOT_TOPIC: &str = "/truth/robot";
-/// Topic of the webcams' true poses in the room; `tagalong triangulate` has to measure them.
+/// Topic of the webcams' true poses in the room; `tagalong-papers triangulate` measures them.
 const TRUE_WEBCAMS_TOPIC: &str = "/truth/tf_static";
 /// Frame of the room's coordinates.
 const WORLD_FRAME: &str = "world";

@@ -13,9 +13,6 @@ use tagalong_geometry::Rect;
 
 use super::photos::{Take, candidate, fingerprint, frame, photos, read};
 
-/// Name of the trainer of cascades.
-pub const NAME: &str = "cascade";
-
 /// Folders of the data that are read.
 pub const FOLDERS: [&str; 4] =
     ["faces/fddb", "faces/cbcl-train", "people/inria-64x128/neg", "negatives"];

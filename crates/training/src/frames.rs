@@ -21,9 +21,6 @@ use super::rooms::ImageTiming;
 use super::session::Session;
 use super::wide_rooms::wide_scene;
 
-/// Name of the detector that is trained on frames.
-pub const NAME: &str = "depth-net";
-
 /// Real rooms, and their logs.
 const ROOMS: [(&str, &str); 6] = [
     ("um and filinha", "um"),
@@ -228,7 +225,7 @@ fn card(args: &TrainArgs, scenes: u64, figures: &toml::Table) -> Result<String, 
         sources.extend(room_logs());
     }
     let mut card = toml::Table::new();
-    card.insert("plugin".into(), NAME.into());
+    card.insert("plugin".into(), args.plugin.clone().into());
     card.insert("quick".into(), args.quick.into());
     card.insert("seed".into(), (args.seed as i64).into());
     card.insert("trained_on".into(), sources.into());

@@ -1,4 +1,4 @@
-//! Training of `laser-legs` on laser scans with annotated legs, and on simulated ones.
+//! Training on laser scans with annotated legs, and on simulated ones.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,9 +14,6 @@ use super::leg_scenes::{self, frame};
 use super::photos::fingerprint;
 use crate::session::Session;
 
-/// Name of the plugin.
-pub(super) const NAME: &str = "laser-legs";
-
 /// Folder of the bags in the data.
 const FOLDER: &str = "laser/train";
 
@@ -27,7 +24,7 @@ const QUIET_SHARE: usize = 5;
 /// Card of the model.
 #[derive(Serialize)]
 struct LegCard {
-    plugin: &'static str,
+    plugin: String,
     quick: bool,
     seed: u64,
     trained_on: Vec<String>,
@@ -63,7 +60,7 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
         format!("{FOLDER}/{}", name.unwrap_or_default())
     };
     let card = LegCard {
-        plugin: NAME,
+        plugin: session.args.plugin.clone(),
         quick: session.args.quick,
         seed: session.args.seed,
         trained_on: bags.iter().map(name).collect(),
@@ -73,8 +70,9 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     };
     let text = toml::to_string(&card).map_err(Failure::failed)?;
     let text = format!(
-        "# Made by `tagalong train {NAME}`. Cross-validation is over bags: no bag is split between\n\
-         # fitted and held-out scans. Shares are of segments, at even odds.\n{text}"
+        "# Made by `tagalong train {}`. Cross-validation is over bags: no bag is split between\n\
+         # fitted and held-out scans. Shares are of segments, at even odds.\n{text}",
+        session.args.plugin
     );
     let path = session.model.with_extension("card.toml");
     write_file(&path, &text)?;
@@ -101,7 +99,7 @@ fn add_scenes(session: &Session<'_>, trainer: &mut dyn Trainer) -> Result<usize,
 fn bags(session: &Session<'_>) -> Result<Vec<PathBuf>, Failure> {
     let why = |folder: &str| {
         let text = format!("is trained on bags of laser scans: name a folder with {FOLDER}");
-        Failure::usage(format!("`{NAME}` {text} with --data{folder}"))
+        Failure::usage(format!("`{}` {text} with --data{folder}", session.args.plugin))
     };
     let data = session.args.data.as_ref().ok_or_else(|| why(""))?;
     let folder = data.join(FOLDER);

@@ -26,7 +26,7 @@ mod windows;
 
 pub use args::TrainArgs;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, write_file};
-use tagalong_config::{Kind, Registry};
+use tagalong_config::{Registry, TrainingData};
 use tagalong_core::Verifier;
 
 use self::card::Card;
@@ -40,19 +40,18 @@ use self::session::Session;
 pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     let session = Session::new(args, registry)?;
     // Its samples come from the truth and not from proposals, so it skips the rounds below.
-    if args.plugin == panorama::NAME {
+    let data = registry.training_offer(&args.plugin).data;
+    if data == TrainingData::Panoramas {
         return panorama::train(&session, args);
     }
     let mut trainer = session.trainer()?;
-    if args.plugin == legs::NAME {
-        return legs::train(&session, trainer.as_mut());
-    }
-    if args.plugin == frames::NAME {
-        return frames::train(&session, trainer.as_mut());
-    }
-    let is_detector = registry.find(&args.plugin).is_ok_and(|info| info.kind == Kind::Detector);
-    if is_detector || args.plugin == faces::NAME {
-        return windows::train(&session, trainer.as_mut());
+    match data {
+        TrainingData::LaserScans => return legs::train(&session, trainer.as_mut()),
+        TrainingData::Frames => return frames::train(&session, trainer.as_mut()),
+        TrainingData::Windows | TrainingData::Faces => {
+            return windows::train(&session, trainer.as_mut(), data);
+        }
+        TrainingData::Candidates | TrainingData::Panoramas => {}
     }
     let mut card = Card::new(args, session.plan.scenes[0], session.sources());
     let mut doubter: Option<Box<dyn Verifier>> = None;

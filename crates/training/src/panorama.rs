@@ -1,4 +1,4 @@
-//! `tagalong train omni-distance`: distances in the panorama of a conical mirror, from people in
+//! Distances in the panorama of a conical mirror, from people in
 //! simulated rooms with known positions.
 
 use nalgebra::Matrix3;
@@ -11,9 +11,6 @@ use tagalong_trials::Draw;
 
 use super::args::TrainArgs;
 use super::session::Session;
-
-/// Name of the model on the command line.
-pub const NAME: &str = "omni-distance";
 
 /// Scene with two people, one after the other: another room, other people and another mirror with
 /// every seed.
@@ -82,14 +79,15 @@ fn card(args: &TrainArgs, rooms: &[Room], figures: &toml::Table) -> String {
         toml::Value::from(format!("omni-room, split train, seed {seed}, {each_s} s of each person"))
     };
     let mut card = toml::Table::new();
-    card.insert("model".into(), NAME.into());
+    card.insert("model".into(), args.plugin.clone().into());
     card.insert("quick".into(), args.quick.into());
     card.insert("seed".into(), (args.seed as i64).into());
     card.insert("trained_on".into(), rooms.iter().map(scene).collect::<Vec<_>>().into());
     card.extend(figures.clone());
     format!(
-        "# Made by `tagalong train {NAME}` with this seed. Mean absolute errors on blocks\n\
-         # of images, and on people in other rooms, that nothing was fitted to.\n{card}"
+        "# Made by `tagalong train {}` with this seed. Mean absolute errors on blocks\n\
+         # of images, and on people in other rooms, that nothing was fitted to.\n{card}",
+        args.plugin
     )
 }
 

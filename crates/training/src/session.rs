@@ -3,7 +3,9 @@ use std::path::{Path, PathBuf};
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::outcome::Failure;
 use tagalong_app::threads::threads;
-use tagalong_config::{ConfigError, Context, Example, FileLimit, Registry, Trainer, read_text};
+use tagalong_config::{
+    ConfigError, Context, Example, FileLimit, Registry, Trainer, TrainingData, read_text,
+};
 use tagalong_core::{Detection, DiffDrive, Frame, Verifier};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{CameraKind, Scene, Split, Variant};
@@ -18,7 +20,7 @@ use super::photos::{self, fingerprint, photos};
 use super::plan::Plan;
 use super::rooms::ImageTiming;
 use super::seen::{AnnotatedFrame, Label, in_log, in_scene, label};
-use super::{faces, rooms, seen};
+use super::{rooms, seen};
 
 /// Margin below which a judgement is unsure: log-odds.
 const UNSURE: f64 = 1.0;
@@ -54,7 +56,8 @@ impl<'a> Session<'a> {
     pub fn new(args: &'a TrainArgs, registry: &'a Registry) -> Result<Self, Failure> {
         let model = args.output.clone().unwrap_or_else(|| {
             // A cascade is a file of OpenCV's kind.
-            let kind = if args.plugin == faces::NAME { "xml" } else { "toml" };
+            let is_cascade = registry.training_offer(&args.plugin).data == TrainingData::Faces;
+            let kind = if is_cascade { "xml" } else { "toml" };
             Path::new("configs/models").join(&args.plugin).with_extension(kind)
         });
         let bar = ProgressBar::new(1);
@@ -106,7 +109,7 @@ impl<'a> Session<'a> {
     pub fn trainer(&self) -> Result<Box<dyn Trainer>, Failure> {
         let mut settings = self.settings.clone();
         if self.args.quick {
-            settings.extend(quick_settings(&self.args.plugin));
+            settings.extend(quick_settings(self.registry, &self.args.plugin)?);
         }
         with_value(&settings, |value| {
             self.registry.build_trainer(&self.args.plugin, value, &self.context())
@@ -280,19 +283,12 @@ fn propose(
     Ok(())
 }
 
-/// Returns settings with fewer combinations, for a quick trial.
-fn quick_settings(plugin: &str) -> toml::Table {
-    let text = match plugin {
-        "svm-patch" => "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
-        "body-net" => "[training]\nepochs = 2",
-        "depth-net" => "[training]\nsteps = 40\nreal_steps = 10",
-        "color-texture" => "[training]\ntrees = [25, 50]",
-        "hog-upper-body" => "[training]\nmining_rounds = 1\nepochs = 10",
-        "laser-legs" => "[training]\ntrees = [10]\nfolds = 2\nevery_ray = []",
-        "cascade" => "[training]\nstages = 4\nfeatures = 200",
-        _ => "",
-    };
-    text.parse().unwrap_or_default()
+/// Returns the settings of a plugin with fewer combinations, for a quick trial.
+fn quick_settings(registry: &Registry, plugin: &str) -> Result<toml::Table, Failure> {
+    let text = registry.training_offer(plugin).quick_settings;
+    text.parse().map_err(|error: toml::de::Error| {
+        Failure::failed(format!("the quick settings that `{plugin}` offers: {error}"))
+    })
 }
 
 /// Reads a scene.

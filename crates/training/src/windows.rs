@@ -8,7 +8,7 @@ use super::photos::{Take, photos};
 use super::session::Session;
 use super::{faces, frames};
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, write_file};
-use tagalong_config::{Example, Trainer};
+use tagalong_config::{Example, Trainer, TrainingData};
 use tagalong_core::{Detection, Frame};
 
 /// Folders of the data that are read.
@@ -18,7 +18,11 @@ const FOLDERS: [&str; 3] = ["people/inria-64x128", "people/head-shoulder-50", "n
 const SCENES: [u64; 2] = [150, 12];
 
 /// Passes all photographs to the trainer, which holds out some of them by itself.
-pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome {
+pub(super) fn train(
+    session: &Session<'_>,
+    trainer: &mut dyn Trainer,
+    examples: TrainingData,
+) -> Outcome {
     let Some(data) = &session.args.data else {
         let why = "is trained on photographs: name their folder with --data";
         return Err(Failure::usage(format!("`{}` {why}", session.args.plugin)));
@@ -28,8 +32,8 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
         trainer.add(frame, candidate, example).map_err(Failure::failed)
     };
-    let (folders, shown): (&[&str], usize) = match session.args.plugin.as_str() {
-        faces::NAME => (&faces::FOLDERS[..], faces::visit(data, share, &mut show)?),
+    let (folders, shown): (&[&str], usize) = match examples {
+        TrainingData::Faces => (&faces::FOLDERS[..], faces::visit(data, share, &mut show)?),
         _ => (&FOLDERS[..], visit(data, share, &mut show)?),
     };
     let mut sources: Vec<String> = folders.iter().map(ToString::to_string).collect();

@@ -172,6 +172,7 @@ impl Draw {
             let then = self.known_pose(reading.stamp_ns).odom_from_robot;
             newest.push(ObstacleReading {
                 source: Arc::clone(name),
+                stamp: Stamp::from_nanos(reading.stamp_ns),
                 age_s: stamp_ns.saturating_sub(reading.stamp_ns) as f64 * 1e-9,
                 data: moved_along(&reading.data, &spatial(&(here.inverse() * then))),
             });
@@ -199,7 +200,7 @@ impl Draw {
         let motion = self.motion(stamp, pose);
         let camera = Arc::clone(&self.camera);
         let scan = self.simulation.laser().zip(shot.laser.as_deref());
-        let laser = scan.map(|(laser, ranges)| laser.scan(ranges));
+        let laser = scan.map(|(laser, ranges)| laser.scan(ranges).with_stamp(stamp));
         // As log readers: the first calibration stays, and a change is never taken back.
         self.calibration_changed |= *shot.camera != *self.simulation.camera();
         let readings = self.obstacle_readings(shot.stamp_ns, &pose.odom_from_robot);

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use tagalong_app::remedies::Remedies;
 use tagalong_page::data::RunData;
 use tagalong_page::events;
 use tagalong_page::frame::{frame_data, tests};
@@ -26,14 +27,14 @@ pub fn times(stamps: &[u64]) -> Vec<f64> {
 }
 
 /// Returns a run on the times of the page.
-pub fn run_data(run: &Recording, stamps: &[u64]) -> RunData {
+pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData {
     let by_stamp: BTreeMap<u64, &Moment> = run.moments.iter().map(|m| (stamp_of(m), m)).collect();
     let moments: Vec<Option<&Moment>> = stamps.iter().map(|s| by_stamp.get(s).copied()).collect();
     RunData {
         name: run.config_name(),
         frames: moments.iter().map(|moment| moment.map(frame_data)).collect(),
         events: events::of_run(&times(stamps), &moments),
-        tests: tests(moments.iter().flatten().map(|moment| &moment.notes), &run.config),
+        tests: tests(moments.iter().flatten().map(|moment| &moment.notes), &run.config, remedies),
         hits: None,
     }
 }
@@ -58,7 +59,7 @@ mod tests_of_times {
         let runs = [recording(&[1_000_000_000, 3_000_000_000]), recording(&[2_000_000_000])];
         let all = stamps(&runs);
         assert_eq!(times(&all), [0.0, 1.0, 2.0]);
-        let frames = run_data(&runs[0], &all).frames;
+        let frames = run_data(&runs[0], &all, &Remedies::default()).frames;
         let is_there: Vec<bool> = frames.iter().map(Option::is_some).collect();
         assert_eq!(is_there, [true, false, true]);
     }

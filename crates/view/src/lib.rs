@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
+use tagalong_app::remedies::Remedies;
+use tagalong_config::Registry;
 use tagalong_page::data::{PageData, RunData};
 use tagalong_page::html::{Heading, html};
 use tagalong_scoring::TruthFile;
@@ -98,7 +100,7 @@ Examples:
 /// # Errors
 /// A folder that is no run, two runs of different logs, a log or a truth that was named and cannot
 /// be used, a page that exists.
-pub fn view(args: &ViewArgs) -> Outcome {
+pub fn view(args: &ViewArgs, registry: &Registry) -> Outcome {
     if let Some(file) = &args.animation {
         return clip::write(args, file);
     }
@@ -108,7 +110,7 @@ pub fn view(args: &ViewArgs) -> Outcome {
         args.folders().map(|folder| Recording::read(folder, &window)).collect::<Result<_, _>>()?;
     check_same_log(&runs)?;
     spare(&output, args.overwrite)?;
-    let page = Page::of(&runs, args)?;
+    let page = Page::of(&runs, args, &Remedies::new(registry))?;
     write_file(&output, &page.text)?;
     let shown = output.display();
     let megabytes = page.text.len() as f64 / 1e6;
@@ -138,14 +140,14 @@ struct Page {
 }
 
 impl Page {
-    fn of(runs: &[Recording], args: &ViewArgs) -> Result<Self, Failure> {
+    fn of(runs: &[Recording], args: &ViewArgs, remedies: &Remedies) -> Result<Self, Failure> {
         let mut notes = Vec::new();
         let all = stamps(runs);
         if all.is_empty() {
             return Err(Failure::usage("no frame lies between --from and --to"));
         }
         let budget = args.max_mb as usize * 1_000_000;
-        let (stamps, run_data) = thinned(runs, all, budget / 2, &mut notes);
+        let (stamps, run_data) = thinned(runs, all, budget / 2, remedies, &mut notes);
         let mut data = PageData {
             t: times(&stamps),
             image_px: image_size(runs),
@@ -177,9 +179,10 @@ fn thinned(
     runs: &[Recording],
     all: Vec<u64>,
     bytes: usize,
+    remedies: &Remedies,
     notes: &mut Vec<String>,
 ) -> (Vec<u64>, Vec<RunData>) {
-    let whole: Vec<RunData> = runs.iter().map(|run| run_data(run, &all)).collect();
+    let whole: Vec<RunData> = runs.iter().map(|run| run_data(run, &all, remedies)).collect();
     let length: usize = whole.iter().map(length_of).sum();
     let step = length.div_ceil(bytes.max(1)).max(1);
     let every = step as u64 * runs.iter().map(|run| run.every).max().unwrap_or(1);
@@ -193,7 +196,7 @@ fn thinned(
         return (all, whole);
     }
     let kept: Vec<u64> = all.iter().copied().step_by(step).collect();
-    let data = runs.iter().map(|run| run_data(run, &kept)).collect();
+    let data = runs.iter().map(|run| run_data(run, &kept, remedies)).collect();
     (kept, data)
 }
 

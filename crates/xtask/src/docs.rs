@@ -7,7 +7,7 @@
 //! `<!-- begin: source FILE -->` repeats a file of code, such as an example, without the comment at its
 //! head, and `<!-- begin: source FILE NAME -->` one function of it.
 //! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
-//! become stale. Slow parts, the tables of `reproduce`, `follow` and `bench`, are filled only on
+//! become stale. Slow parts, the tables of `tagalong-papers`, `follow` and `bench`, are filled only on
 //! request.
 
 use std::path::PathBuf;
@@ -16,6 +16,7 @@ use std::process::Command;
 use anyhow::{Context as _, Result, bail};
 
 use crate::faults;
+use crate::program::Name;
 use crate::workspace::{Workspace, output};
 
 const BEGIN: &str = "<!-- begin: ";
@@ -31,8 +32,7 @@ const ROWS: &str = "rows ";
 const SOURCE: &str = "source ";
 
 /// Commands that take minutes to hours.
-const SLOW: &[&str] =
-    &["tagalong reproduce", "tagalong follow", "tagalong bench", "tagalong trials"];
+const SLOW: &[&str] = &["tagalong-papers", "tagalong follow", "tagalong bench", "tagalong trials"];
 
 /// A document with parts to fill.
 struct Document {
@@ -205,11 +205,12 @@ fn printed(workspace: &Workspace, command: &str) -> Result<String> {
             .with_context(|| format!("{file} has no function `{name}`"));
     }
     let mut words = command.split_whitespace();
-    if words.next() != Some("tagalong") {
-        bail!("`{command}` is no command of tagalong");
-    }
+    let first = words.next().unwrap_or_default();
+    let Some(program) = Name::ALL.into_iter().find(|name| name.as_str() == first) else {
+        bail!("`{command}` is no command of tagalong or tagalong-papers");
+    };
     let mut cargo = Command::new("cargo");
-    cargo.args(["run", "--quiet", "--package", "tagalong-cli"]);
+    cargo.args(["run", "--quiet", "--package", program.package()]);
     // Figures of slow commands take hours without optimisation.
     if is_slow(command) {
         cargo.arg("--release");
@@ -222,7 +223,7 @@ mod tests {
     use super::*;
 
     const TEXT: &str = "a\n<!-- begin: tagalong list -->\nold\n<!-- end -->\nb\n\
-                        <!-- begin: tagalong reproduce x -->\ntable\n<!-- end -->\nc\n";
+                        <!-- begin: tagalong-papers reproduce x -->\ntable\n<!-- end -->\nc\n";
 
     #[test]
     fn fast_parts_are_filled_and_slow_ones_left() {

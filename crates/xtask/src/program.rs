@@ -1,4 +1,4 @@
-//! The program `tagalong` of the workspace.
+//! The programs of the workspace: `tagalong`, and `tagalong-papers` of the laboratory.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,6 +7,36 @@ use anyhow::{Context as _, Result};
 use serde::Deserialize;
 
 use crate::workspace::{Workspace, output};
+
+/// A program of the workspace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Name {
+    /// `tagalong`.
+    Tagalong,
+    /// `tagalong-papers`.
+    Papers,
+}
+
+impl Name {
+    /// All of them, the longer names first.
+    pub const ALL: [Self; 2] = [Self::Papers, Self::Tagalong];
+
+    /// Returns the name in a command line.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Tagalong => "tagalong",
+            Self::Papers => "tagalong-papers",
+        }
+    }
+
+    /// Returns the package that builds it.
+    pub fn package(self) -> &'static str {
+        match self {
+            Self::Tagalong => "tagalong-cli",
+            Self::Papers => "tagalong-papers",
+        }
+    }
+}
 
 /// The built program.
 pub struct Program(PathBuf);
@@ -19,9 +49,9 @@ struct Built {
 
 impl Program {
     /// Builds it as the tests do, which have built it already.
-    pub fn built(workspace: &Workspace) -> Result<Self> {
+    pub fn built(workspace: &Workspace, name: Name) -> Result<Self> {
         let mut cargo = Command::new("cargo");
-        cargo.args(["build", "--quiet", "--package", "tagalong-cli", "--bin", "tagalong"]);
+        cargo.args(["build", "--quiet", "--package", name.package(), "--bin", name.as_str()]);
         cargo.args(["--message-format", "json"]);
         let said = output(cargo.current_dir(workspace.root()))?;
         let built = said.lines().filter_map(|line| serde_json::from_str::<Built>(line).ok());

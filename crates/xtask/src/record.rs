@@ -1,8 +1,8 @@
 //! A record of the results of every config, to check a refactoring against.
 //!
-//! Every config runs on every real log and on logs of some scenes, and drives through one scene if
-//! it has a controller. A line for each run holds the exit code and checksums of the tracks and the
-//! report. `cargo xtask record before.txt` before a change and `cargo xtask record after.txt` after
+//! Every config, those of the laboratory included, runs on every real log and on logs of some scenes,
+//! and drives through one scene if it has a controller. A line for each run holds the exit code and
+//! checksums of the tracks and the report. `cargo xtask record before.txt` before a change and `cargo xtask record after.txt` after
 //! it: `diff` names the runs whose bytes changed.
 
 use std::fs;
@@ -12,6 +12,7 @@ use std::process::Command;
 use anyhow::{Context as _, Result};
 use sha2::{Digest as _, Sha256};
 
+use crate::program::Name;
 use crate::workspace::{Workspace, output, succeed};
 
 /// Real logs; without the folder those of scenes are all there is.
@@ -24,34 +25,42 @@ const RIDE: &str = "configs/scenes/follow-passing.toml";
 
 /// Writes a line for each run to `file`.
 pub fn record(workspace: &Workspace, file: &Path, program: Option<PathBuf>) -> Result<()> {
-    let program = program.map_or_else(|| release_program(workspace), Ok)?;
+    let papers = match &program {
+        // A given program is the product's; the laboratory is left out then.
+        Some(_) => None,
+        None => Some(release_program(workspace, Name::Papers)?),
+    };
+    let program = program.map_or_else(|| release_program(workspace, Name::Tagalong), Ok)?;
     let work = workspace.root().join("target/record");
     fs::create_dir_all(&work)?;
     let logs = [real_logs(workspace)?, scene_logs(workspace, &program, &work)?].concat();
-    let configs = files_with(&workspace.root().join("configs"), "toml")?;
+    let folders = [(Some(program), "configs"), (papers, "benches/papers/configs")];
     let mut lines = String::new();
-    for config in &configs {
-        for log in &logs {
-            lines += &run_line(workspace, &program, config, log, &work)?;
+    for (program, folder) in folders {
+        let Some(program) = program else { continue };
+        for config in &files_with(&workspace.root().join(folder), "toml")? {
+            for log in &logs {
+                lines += &run_line(workspace, &program, config, log, &work)?;
+            }
+            if fs::read_to_string(config)?.contains("[controller]") {
+                lines += &ride_line(workspace, &program, config)?;
+            }
+            eprintln!("record: {}", stem(config));
         }
-        if fs::read_to_string(config)?.contains("[controller]") {
-            lines += &ride_line(workspace, &program, config)?;
-        }
-        eprintln!("record: {}", stem(config));
     }
     fs::write(file, lines).with_context(|| format!("cannot write {}", file.display()))
 }
 
-fn release_program(workspace: &Workspace) -> Result<PathBuf> {
+fn release_program(workspace: &Workspace, name: Name) -> Result<PathBuf> {
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--release", "--package", "tagalong-cli"]);
+    cargo.args(["build", "--quiet", "--release", "--package", name.package()]);
     succeed(cargo.current_dir(workspace.root()))?;
     let mut metadata = Command::new("cargo");
     metadata.args(["metadata", "--no-deps", "--format-version", "1"]);
     let said = output(metadata.current_dir(workspace.root()))?;
     let facts: serde_json::Value = serde_json::from_str(&said)?;
     let target = facts["target_directory"].as_str().context("cargo names no target folder")?;
-    Ok(Path::new(target).join("release/tagalong"))
+    Ok(Path::new(target).join("release").join(name.as_str()))
 }
 
 fn real_logs(workspace: &Workspace) -> Result<Vec<PathBuf>> {

@@ -9,7 +9,7 @@ use std::{env, fs};
 use anyhow::{Result, bail};
 
 use crate::markdown::{Document, documents};
-use crate::program::Program;
+use crate::program::{Name, Program};
 use crate::workspace::{Workspace, copy_file, output, remove_folder};
 
 /// Where it happens: where `cargo clean` removes it.
@@ -56,11 +56,15 @@ const PROPS: &[&str] = &[
 
 /// Runs all that can be run in a few minutes; an error if any line fails.
 pub fn rehearse(workspace: &Workspace) -> Result<()> {
-    let program = Program::built(workspace)?;
+    let program = Program::built(workspace, Name::Tagalong)?;
+    // It lies in the same folder, where the shell finds it.
+    Program::built(workspace, Name::Papers)?;
     let stage = workspace.root().join(STAGE);
     remove_folder(&stage)?;
     let props = stage.join("props");
-    workspace.copy_to(&props, |file| file.starts_with("configs"))?;
+    let is_config =
+        |file: &Path| file.starts_with("configs") || file.starts_with("benches/papers/configs");
+    workspace.copy_to(&props, is_config)?;
     for line in PROPS {
         output(program.call(&words(line)).current_dir(&props))?;
     }
@@ -96,15 +100,20 @@ fn lines(document: &Document) -> impl Iterator<Item = (usize, String)> {
     lines.filter(|(_, line)| !LEFT_OUT.iter().any(|(part, _)| line.contains(part)))
 }
 
-/// The line as `tagalong ...`, without its comment; `None` if it calls something else.
+/// The line as `tagalong ...` or `tagalong-papers ...`, without its comment; `None` if it calls
+/// something else.
 fn call(line: &str) -> Option<String> {
     let line = line.trim_start().trim_start_matches("$ ");
     // Comments behind a command belong to the reader.
     let line = line.split(" #").next().unwrap_or(line).trim_end();
-    match line.strip_prefix("cargo run --release -- ") {
-        Some(rest) => Some(format!("tagalong {rest}")),
-        None => line.starts_with("tagalong ").then(|| line.to_owned()),
+    if let Some(rest) = line.strip_prefix("cargo run --release -- ") {
+        return Some(format!("tagalong {rest}"));
     }
+    if let Some(rest) = line.strip_prefix("cargo run --release -p tagalong-papers -- ") {
+        return Some(format!("tagalong-papers {rest}"));
+    }
+    let is_call = ["tagalong ", "tagalong-papers "].iter().any(|name| line.starts_with(name));
+    is_call.then(|| line.to_owned())
 }
 
 fn words(line: &str) -> Vec<&str> {

@@ -26,10 +26,6 @@ pub struct Config {
     /// fields of view. No unit.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub path_gain: f64,
-    /// The wheel speeds exactly as the papers print them: no bound on the
-    /// curvature, no turning on the spot, no slowing down in bends. Paths A
-    /// and C only.
-    pub as_printed: bool,
     /// Distance kept from the person, m, on the floor.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub stand_off_m: f64,
@@ -79,7 +75,6 @@ impl Default for Config {
         Self {
             path: Path::C,
             path_gain: 2.0,
-            as_printed: false,
             stand_off_m: 1.4,
             range_gain_per_s: 0.8,
             max_acceleration: 0.5,
@@ -109,10 +104,6 @@ impl Config {
             if !(0.0 < off && off <= on && on < 180.0) {
                 return Err(Error::setting(key, "must be two rising angles between 0 and 180"));
             }
-        }
-        if self.as_printed && self.path == Path::B {
-            let why = "needs path A or C: no equation is printed for path B";
-            return Err(Error::setting("as_printed", why));
         }
         Ok(())
     }

@@ -69,7 +69,7 @@ impl ArcFollow {
         };
         // The slower the robot drives, the more it may turn on the spot.
         let facing = trust * (1.0 - speed_mps / max) * self.facing_rate(&towards);
-        let turn_rate = speed_mps * self.curvature(&towards, gain)? + facing;
+        let turn_rate = speed_mps * self.curvature(&towards, gain) + facing;
         let twist = self.within_limits(Twist::new(speed_mps, turn_rate), scene);
         self.speed_mps = twist.linear_mps;
         twist.angular_rps.is_finite().then_some(twist)
@@ -98,9 +98,6 @@ impl ArcFollow {
     /// Whether to turn on the spot, and which way. It goes on the way it began,
     /// so that a target right behind the robot does not make it hesitate.
     fn turn_in_place(&self, aim: &Aim) -> Option<f64> {
-        if self.config.as_printed {
-            return None;
-        }
         let [off, on] = self.config.turning_bounds();
         let bound = if self.turning.is_some() { off } else { on };
         // The direction of a turn is kept behind the robot, where the bearing jumps by a full turn.
@@ -113,9 +110,6 @@ impl ArcFollow {
         let config = &self.config;
         let excess = config.range_gain_per_s * (aim.range_m - config.stand_off_m);
         let speed = (excess + aim.receding_mps.max(0.0)).clamp(0.0, max_mps);
-        if config.as_printed {
-            return speed;
-        }
         // A robot that faces away turns first.
         let ahead = aim.bearing.cos().max(0.0);
         if self.turning.is_some() { 0.0 } else { speed * ahead * ahead }
@@ -127,25 +121,20 @@ impl ArcFollow {
         wanted.clamp(least, self.speed_mps + self.config.max_acceleration * dt)
     }
 
-    /// 1 / rho of P1, section 3, times the path's gain, 1/m. As printed there is
-    /// none at the origin.
-    fn curvature(&self, aim: &Aim, gain: f64) -> Option<f64> {
+    /// Returns 1 / rho of P1, section 3, times the path's gain, 1/m.
+    fn curvature(&self, aim: &Aim, gain: f64) -> f64 {
         let config = &self.config;
-        if config.as_printed {
-            let curvature = 2.0 * gain * aim.sine / aim.range_m;
-            return curvature.is_finite().then_some(curvature);
-        }
         let range = aim.range_m.max(config.min_range_m);
         // Near the robot the curvature is limited, because it grows without bound there.
         let curvature = 2.0 * gain * aim.sine * (aim.range_m / range) / range;
-        Some(curvature.clamp(-config.max_curvature, config.max_curvature))
+        curvature.clamp(-config.max_curvature, config.max_curvature)
     }
 
     /// Returns the turn rate of a standing robot towards the target, rad/s.
     fn facing_rate(&self, aim: &Aim) -> f64 {
         let config = &self.config;
         let is_straight = config.path == Path::B && self.turning.is_none();
-        if config.as_printed || is_straight {
+        if is_straight {
             return 0.0;
         }
         let bearing = match self.turning {
@@ -160,7 +149,7 @@ impl ArcFollow {
         let rim = twist.angular_rps.abs() * scene.wheels.half_separation_m;
         let by_speed = scene.max_speed_mps / (twist.linear_mps + rim);
         let by_turn = self.config.max_turn_rate / twist.angular_rps.abs();
-        let scale = if self.config.as_printed { by_speed } else { by_speed.min(by_turn) }.min(1.0);
+        let scale = by_speed.min(by_turn).min(1.0);
         // Both by the same factor, so that the curvature stays.
         twist.scaled(scale)
     }

@@ -111,8 +111,6 @@ fn settings_that_cannot_work_are_refused() {
         let angles = refused(Config { align_deg: bounds, ..Config::default() });
         assert!(angles.contains("`align_deg`"), "{angles}");
     }
-    let printed = refused(Config { as_printed: true, path: Path::B, ..Config::default() });
-    assert!(printed.contains("path A or C"), "{printed}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-use tagalong_assignment::{Cost, Fit, Pairs, assign_fits};
+use tagalong_assignment::{Fit, Pairs, assign_fits};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -20,10 +20,7 @@ impl Hungarian {
     }
 
     fn fit(&self, track: &Track, detection: &Detection, gate: &Gate) -> Option<Fit> {
-        // P2, eq. 10, gives pairs that overlap too little a cost of 0, and minimises.
-        let printed = self.config.compat_printed_cost && self.config.cost == Cost::Overlap;
-        let outside = printed.then_some(Fit { cost: 0.0, log_volume: 0.0 });
-        self.config.pair_cost().fit(track, detection, gate.dt_s).or(outside)
+        self.config.pair_cost().fit(track, detection, gate.dt_s)
     }
 }
 
@@ -51,7 +48,7 @@ impl Associator for Hungarian {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_assignment::Fusion;
+    use tagalong_assignment::{Cost, Fusion};
     use tagalong_config::Registry;
     use tagalong_conformance::samples::{
         GATE, detection_at, detection_in, pairs, track_at, track_in, with_variance,
@@ -138,17 +135,13 @@ mod tests {
         assert!(!hungarian.fits(&track, &detection_at(3.0, 4.0), &GATE));
     }
 
-    /// P2, eq. 10, gives pairs that overlap too little a cost of 0, and minimises.
     #[test]
-    fn who_overlaps_is_given_what_overlaps_but_in_print_whatever_does_not() {
+    fn a_track_is_given_the_detection_that_overlaps() {
         let boxed = |x: f64| Rect::new(x, 0.0, 10.0, 10.0);
         let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(50.0))];
         let seen = [2.0, 51.0].map(|x| detection_in(boxed(x)));
-        let given = |compat_printed_cost: bool| {
-            let settings = Config { cost: Cost::Overlap, compat_printed_cost, ..Config::default() };
-            pairs(&Hungarian::new(settings).unwrap().associate(&tracks, &seen, &GATE))
-        };
-        assert_eq!(given(false), [(0, 0), (1, 1)]);
-        assert_eq!(given(true), [(0, 1), (1, 0)]);
+        let settings = Config { cost: Cost::Overlap, ..Config::default() };
+        let given = Hungarian::new(settings).unwrap().associate(&tracks, &seen, &GATE);
+        assert_eq!(pairs(&given), [(0, 0), (1, 1)]);
     }
 }

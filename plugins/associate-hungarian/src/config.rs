@@ -26,9 +26,6 @@ pub struct Config {
     pub min_overlap: f64,
     /// Overlap: `iou` or `dice`.
     pub overlap: Overlap,
-    /// Overlap, as P2 prints it (eq. 10): a pair that overlaps less costs nothing, and
-    /// so comes first.
-    pub compat_printed_cost: bool,
     /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
     /// place (`sum`), or the better of both counts (`minimum`).
     pub fusion: Fusion,
@@ -53,7 +50,6 @@ impl Default for Config {
             overlap: Overlap::Iou,
             fusion: Fusion::Sum,
             fusion_gate: 0.0,
-            compat_printed_cost: false,
             miss_factor: 1.0,
         }
     }
@@ -61,7 +57,7 @@ impl Default for Config {
 
 impl Config {
     /// Returns the part that says how well a pair fits.
-    pub(crate) fn pair_cost(&self) -> PairCost {
+    pub fn pair_cost(&self) -> PairCost {
         let Self { cost, gate, gate_m, gate_speed_mps, min_overlap, overlap, .. } = *self;
         let fusion = AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate };
         PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap, overlap, fusion }

@@ -11,10 +11,18 @@ mod config;
 pub use associate::TwoStage;
 pub use config::Config;
 pub use tagalong_assignment::{Cost, Fusion, Overlap};
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
+
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[Remedy {
+    test: "associator",
+    settings: &["strong_log_odds"],
+    look: "weak detections that continue no track",
+}];
 
 /// Registers the associator `associate-two-stage`.
 pub fn register(registry: &mut Registry) {
+    registry.remedies("associate-two-stage", REMEDIES);
     registry.associator(
         "associate-two-stage",
         "strong detections first, weak ones for the tracks that are left (ByteTrack)",

@@ -31,5 +31,13 @@ pub const NAME: &str = "body-net";
 pub fn register(registry: &mut Registry) {
     registry.verifier(NAME, "a small network looks at all of a candidate", BodyNet::new);
     #[cfg(feature = "train")]
+    registry.training(
+        NAME,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Candidates,
+            quick_settings: "[training]\nepochs = 2",
+        },
+    );
+    #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| train::NetTrainer::new(config, context.seed));
 }

@@ -31,6 +31,14 @@ pub const NAME: &str = "color-texture";
 pub fn register(registry: &mut Registry) {
     registry.verifier(NAME, "colour, texture and surface of a candidate (P1)", ColorTexture::new);
     #[cfg(feature = "train")]
+    registry.training(
+        NAME,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Candidates,
+            quick_settings: "[training]\ntrees = [25, 50]",
+        },
+    );
+    #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {
         train::TreeTrainer::new(config.training, context.seed)
     });

@@ -3,6 +3,8 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::{Error, Result};
 
+use crate::learning::Learning;
+
 /// Settings of `compressive`. Distances in the image are in widths of the box:
 /// a pixel of the papers, whose boxes are some 64 pixels wide, is 0.016.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -74,13 +76,11 @@ pub struct Config {
     /// Standard deviation of a distance from the depth image, m.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub sigma_depth_m: f64,
-    /// As in the papers: learn in every frame, even if the box may show another person.
-    pub compat_always_learn: bool,
-    /// As in the public code: the model starts at mean 0 and deviation 1 and
-    /// meets its first frame with the same weight as any other.
-    pub compat_blank_start: bool,
-    /// As in the first paper: every box within the radius, pixel by pixel.
-    pub compat_full_search: bool,
+    /// Every box within the radius is compared, pixel by pixel: slow.
+    pub full_search: bool,
+    /// Rule of learning: of a program, not of a file.
+    #[serde(skip)]
+    pub learning: Learning,
 }
 
 impl Default for Config {
@@ -109,9 +109,8 @@ impl Default for Config {
             score: -0.2,
             sigma_box: 0.05,
             sigma_depth_m: 0.1,
-            compat_always_learn: false,
-            compat_blank_start: false,
-            compat_full_search: false,
+            full_search: false,
+            learning: Learning::default(),
         }
     }
 }

@@ -15,9 +15,6 @@ use crate::{Appearance, Config, Features, NAME, Scaled};
 
 /// Boxes are at least and at most so wide and high, pixels.
 const SIDES_PX: std::ops::RangeInclusive<f64> = 12.0..=1000.0;
-/// A sighting that overlaps the track's box by less was not the one that the
-/// track was given (IoU).
-const SAME_PLACE: f64 = 0.7;
 /// Another mode is at least so far from the best box, widths.
 const OTHER_MODE: f64 = 0.5;
 /// The standard deviation of a distance that is only expected, as a fraction.
@@ -150,7 +147,8 @@ impl Compressive {
         let Self { config, features, targets, scratch } = self;
         let target = targets.entry(track.id).or_insert_with(|| Target::new(features.len()));
         let found = target.found.take();
-        let Some(memory) = memory(config, track, found, !target.is_taught) else { return };
+        let rule = config.learning.rule();
+        let Some(memory) = rule.memory(config, track, found, !target.is_taught) else { return };
         let Some(of) = target.fit_to(features, view, &track.estimate.region) else { return };
         let expected_m = view.expected_m(track);
         let shown = view.depth.and_then(|depth| depth.surface_m(&of.rect()));
@@ -159,7 +157,7 @@ impl Compressive {
             (Some(_), None) => false,
             (None, _) => true,
         };
-        if config.depth_filter && !is_there && !config.compat_always_learn {
+        if config.depth_filter && !is_there && !rule.ignores_depth() {
             return;
         }
         if !sample(config, view, target, of, scratch) {
@@ -168,26 +166,6 @@ impl Compressive {
         target.appearance.learn(&scratch.person, &scratch.other, memory, config.min_sigma);
         target.is_taught = true;
         target.width_at_1m = expected_m.map(|metres| metres * track.estimate.region.width);
-    }
-}
-
-/// Returns the weight of the past against this frame; `None` where nothing is to be learned.
-fn memory(config: &Config, track: &Track, found: Option<(Rect, f32)>, is_new: bool) -> Option<f64> {
-    let is_clear = track.seen && !track.occluded;
-    if is_new && is_clear {
-        return Some(if config.compat_blank_start { config.memory } else { 0.0 });
-    }
-    if config.compat_always_learn && !is_new {
-        return Some(config.memory);
-    }
-    if !is_clear {
-        return None;
-    }
-    match found {
-        Some((region, confidence)) if region.iou(&track.estimate.region) >= SAME_PLACE => {
-            (f64::from(confidence) >= config.learn_confidence).then_some(config.memory)
-        }
-        _ => Some(config.anchored_memory),
     }
 }
 
@@ -301,7 +279,7 @@ impl Hunt<'_> {
         let x = (centre.x - 0.5 * width as f64).round() as i64;
         let y = (centre.y - 0.5 * height as f64).round() as i64;
         self.scratch.coarse.clear();
-        let full = self.config.compat_full_search;
+        let full = self.config.full_search;
         let step = if full { 1 } else { (px(self.config.coarse_step).round() as i64).max(1) };
         for (dx, dy) in disc(px(self.config.search_radius), step) {
             if let Some(scored) = self.look(x + dx, y + dy, Some(&mut *dropped)) {
@@ -490,7 +468,8 @@ mod tests {
     fn after(config: &Config, track: &Track, found: Option<(f64, f32)>) -> Option<f64> {
         let region = track.estimate.region;
         let aside = |widths: f64| Rect { x: region.x + widths * region.width, ..region };
-        memory(config, track, found.map(|(off, sure)| (aside(off), sure)), false)
+        let found = found.map(|(off, sure)| (aside(off), sure));
+        config.learning.rule().memory(config, track, found, false)
     }
 
     #[test]
@@ -502,20 +481,23 @@ mod tests {
             for found in [None, sure] {
                 assert_eq!(after(&config, &track, found), None, "{seen} {occluded}");
             }
-            assert_eq!(memory(&config, &track, None, true), None, "a model does not begin there");
+            assert_eq!(
+                config.learning.rule().memory(&config, &track, None, true),
+                None,
+                "a model does not begin there"
+            );
         }
-        let printed = Config { compat_always_learn: true, ..Config::default() };
-        assert_eq!(after(&printed, &track(false, true), None), Some(config.memory));
-        assert_eq!(memory(&printed, &track(false, true), None, true), None);
     }
 
     #[test]
     fn the_past_weighs_by_who_saw_the_person_and_how_surely() {
         let config = Config::default();
         let track = track(true, false);
-        assert_eq!(memory(&config, &track, None, true), Some(0.0), "the first frame counts fully");
-        let printed = Config { compat_blank_start: true, ..Config::default() };
-        assert_eq!(memory(&printed, &track, None, true), Some(config.memory));
+        assert_eq!(
+            config.learning.rule().memory(&config, &track, None, true),
+            Some(0.0),
+            "the first frame counts fully"
+        );
         // Another detector found the person: alone, or elsewhere.
         assert_eq!(after(&config, &track, None), Some(config.anchored_memory));
         assert_eq!(after(&config, &track, Some((0.5, 9.0))), Some(config.anchored_memory));

@@ -20,6 +20,7 @@ mod candidates;
 mod config;
 mod detect;
 mod features;
+mod learning;
 #[cfg(test)]
 mod tests;
 
@@ -27,13 +28,29 @@ pub use appearance::Appearance;
 pub use config::Config;
 pub use detect::Compressive;
 pub use features::{Features, Rectangle, Scaled};
-use tagalong_config::Registry;
+pub use learning::{Learning, LearningRule};
+use tagalong_config::{Registry, Remedy};
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "compressive";
 
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[
+    Remedy {
+        test: "box: *",
+        settings: &["search_radius", "depth_tolerance_m"],
+        look: "boxes that are not looked at: outside, or at another distance than the person",
+    },
+    Remedy {
+        test: "appearance: *",
+        settings: &["min_confidence", "min_lead", "learn_confidence"],
+        look: "why a known person is not followed: see the README of `compressive`",
+    },
+];
+
 /// Registers the plugin.
 pub fn register(registry: &mut Registry) {
+    registry.remedies(NAME, REMEDIES);
     registry.detector(
         NAME,
         "follows known people by signed rectangles and naive Bayes, with depth",

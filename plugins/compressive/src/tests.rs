@@ -11,7 +11,7 @@ use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole, Rect};
 use tagalong_vision::Integral;
 
 use crate::appearance::Samples;
-use crate::{Appearance, Compressive, Config, Features, Rectangle};
+use crate::{Appearance, Compressive, Config, Features, Learning, LearningRule, Rectangle};
 
 const SIZE: (usize, usize) = (320, 240);
 
@@ -284,7 +284,7 @@ fn a_number_that_never_changed_does_not_decide_alone() {
 }
 
 #[test]
-fn nobody_learns_from_the_board_that_hides_a_person_but_in_print() {
+fn the_board_that_hides_a_person_is_not_learned_unless_a_rule_learns_everything() {
     let head = place(3.0, 0.0);
     let hidden = World { board: Some((1.5, SIZE.0)), ..World::at(head) }.frame();
     let takes_the_board = |config: Config| {
@@ -301,12 +301,32 @@ fn nobody_learns_from_the_board_that_hides_a_person_but_in_print() {
     let (found, funnel) = near(&mut detector, &World::at(head).frame(), head);
     assert!(found.is_some(), "the person is still known: {funnel:?}");
     let printed = Config {
-        compat_always_learn: true,
+        learning: Learning::new(Everything),
         depth_filter: false,
         min_confidence: 0.5,
         ..Config::default()
     };
     assert_eq!(takes_the_board(printed), (false, true));
+}
+
+/// A rule that learns from every frame.
+#[derive(Debug)]
+struct Everything;
+
+impl LearningRule for Everything {
+    fn memory(
+        &self,
+        config: &Config,
+        _: &Track,
+        _: Option<(Rect, f32)>,
+        is_new: bool,
+    ) -> Option<f64> {
+        Some(if is_new { 0.0 } else { config.memory })
+    }
+
+    fn ignores_depth(&self) -> bool {
+        true
+    }
 }
 
 #[test]

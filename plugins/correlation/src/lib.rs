@@ -23,13 +23,21 @@ pub use config::Config;
 pub use detect::Correlation;
 pub use picture::Picture;
 pub use strip::{Fit, Strip};
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
 
 /// The name of this plugin in configs.
 pub const NAME: &str = "correlation";
 
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[Remedy {
+    test: "correlation: *",
+    settings: &["min_correlation", "min_lead", "max_known", "memory_s"],
+    look: "why a person without depth is not found by their picture; most frames need none",
+}];
+
 /// Registers the plugin.
 pub fn register(registry: &mut Registry) {
+    registry.remedies(NAME, REMEDIES);
     registry.detector(
         NAME,
         "finds known people again by correlation, where stereo has no depth",

@@ -55,6 +55,14 @@ pub fn register(registry: &mut Registry) {
     );
     registry.exporter(NAME, export::export);
     #[cfg(feature = "train")]
+    registry.training(
+        NAME,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Frames,
+            quick_settings: "[training]\nsteps = 40\nreal_steps = 10",
+        },
+    );
+    #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {
         train::DepthNetTrainer::new(config.training, context.seed)
     });

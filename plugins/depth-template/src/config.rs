@@ -14,23 +14,6 @@ pub enum Cost {
     /// Squared difference in inverse depth against one background value (the
     /// percentile of the frame), as a root mean square over the valid pixels, 1/m.
     Squared,
-    /// As `squared`, with the size of the window outside of the root as P3
-    /// prints it, so that the value shrinks with the person.
-    Printed,
-}
-
-/// Weighing of imagined scenes (role `weigh`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Weighing {
-    /// A log-likelihood ratio against a scene without people.
-    Ratio,
-    /// P3's likelihood with its printed dissimilarity: the size of the window stands
-    /// outside of the root. One person is compared with all templates, several
-    /// people with those of their directions of motion.
-    Printed,
-    /// As `printed` with the size inside of the root: the error of a pixel, m.
-    Rms,
 }
 
 /// Settings of `depth-template`.
@@ -65,10 +48,6 @@ pub struct DepthTemplateConfig {
     pub directions: Vec<Direction>,
     /// Comparison of silhouettes with the image.
     pub cost: Cost,
-    /// As P4 prints it: the plain sum of the squared differences of depth over the window,
-    /// against the depth of the face and one background depth (`background_percentile` of
-    /// the frame), m². `cost` is not asked then, and all costs are in m².
-    pub compat_printed_dissimilarity: bool,
     /// Weight of the person's pixels against those beside the person, 0 to 1.
     pub foreground_weight: f64,
     /// Depth error of the person that costs nothing, m.
@@ -101,14 +80,8 @@ pub struct DepthTemplateConfig {
     /// Followed people are searched within this radius of the prediction, m,
     /// or three standard deviations, whichever is smaller.
     pub follow_radius_m: f64,
-    /// Background of the frame as a percentile of its depths, for the costs
-    /// `squared` and `printed` and for `compat_printed_dissimilarity` (P3, P4: 90).
+    /// Background of the frame as a percentile of its depths, for the cost `squared` (P3, P4: 90).
     pub background_percentile: f64,
-    /// Weighing of imagined scenes.
-    pub weighing: Weighing,
-    /// Standard deviation of the dissimilarity of a scene that is as imagined, for the
-    /// weighings `printed` and `rms`, m. P3 sets it "experientially".
-    pub likelihood_sigma: f64,
     /// Log-likelihood of a person in an imagined scene that fits perfectly and is wholly visible
     /// (role `weigh`), nats. Neighbouring pixels err alike, so that this is far below the number of
     /// pixels.
@@ -149,7 +122,6 @@ impl Default for DepthTemplateConfig {
             min_body: 0.7,
             directions: Direction::ALL.to_vec(),
             cost: Cost::Robust,
-            compat_printed_dissimilarity: false,
             foreground_weight: 0.3,
             relief_free_m: 0.15,
             relief_full_m: 0.30,
@@ -165,8 +137,6 @@ impl Default for DepthTemplateConfig {
             min_cells: 2,
             follow_radius_m: 0.6,
             background_percentile: 90.0,
-            weighing: Weighing::Ratio,
-            likelihood_sigma: 0.005,
             likelihood_nats: 12.0,
             likelihood_tolerance_m: 0.3,
             likelihood_one_sided: 0.3,

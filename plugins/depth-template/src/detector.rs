@@ -13,7 +13,7 @@ use crate::NAME;
 use crate::bank::{Bank, Pose};
 use crate::candidates::{body_below, boundary, head_width_m, is_below_something, tests_named};
 use crate::config::{Cost, DepthTemplateConfig};
-use crate::dissimilarity::Dissimilarity;
+use crate::extension::{FrameComparison, SceneLikelihood, SilhouetteComparison};
 use crate::matching::{Match, Matcher};
 use crate::people::{Cell, group, weighted_centre};
 use crate::view::{Local, MetricImage, Working};
@@ -26,6 +26,8 @@ pub struct DepthTemplate {
     cells: Vec<Cell>,
     view: Option<Arc<MetricImage>>,
     weigher: Weigher,
+    /// Comparison of silhouettes in place of that of the matcher.
+    comparison: Option<Box<dyn SilhouetteComparison>>,
 }
 
 /// Where a silhouette fits best.
@@ -45,8 +47,8 @@ struct PreparedFrame<'a> {
     rows: &'a RowSums,
     view: Arc<MetricImage>,
     matcher: Matcher,
-    /// Comparison in place of that of the matcher, where a config asks for it.
-    printed: Option<Dissimilarity>,
+    /// Comparison in place of that of the matcher.
+    replaced: Option<Box<dyn FrameComparison>>,
 }
 
 impl DepthTemplate {
@@ -74,10 +76,23 @@ impl DepthTemplate {
         Ok(Self {
             bank: Bank::new(config.max_rows),
             weigher: Weigher::new(&config),
+            comparison: None,
             config,
             cells: Vec::new(),
             view: None,
         })
+    }
+
+    /// Compares silhouettes with the image in another way.
+    #[must_use]
+    pub fn with_comparison(self, comparison: Box<dyn SilhouetteComparison>) -> Self {
+        Self { comparison: Some(comparison), ..self }
+    }
+
+    /// Weighs imagined scenes in another way.
+    #[must_use]
+    pub fn with_likelihood(self, likelihood: Box<dyn SceneLikelihood>) -> Self {
+        Self { weigher: self.weigher.with_likelihood(likelihood), ..self }
     }
 
     /// Looks at the cells of a window and keeps those that `admit` lets through
@@ -194,8 +209,8 @@ impl DepthTemplate {
                     Pose::nearest(*direction, local.pitch_rad, local.roll_rad, local.px_per_m);
                 let template = bank.template(pose);
                 let at = (local.x, local.y);
-                let fit = match &scene.printed {
-                    Some(printed) => printed.fit(template, at, local.depth_m)?,
+                let fit = match &scene.replaced {
+                    Some(comparison) => comparison.fit(template, at, local.depth_m)?,
                     None => {
                         scene.matcher.fit_up_to(most, scene.rows, template, at, local.depth_m)?
                     }
@@ -323,22 +338,15 @@ impl Detector for DepthTemplate {
         let depth = frame.depth()?;
         let working = frame.derived::<Working>()?;
         let rows = &working.0;
-        let is_printed = self.config.compat_printed_dissimilarity;
+        let replaced = self.comparison.as_ref().map(|comparison| comparison.prepare(frame));
+        let replaced = replaced.transpose()?;
         let background = match self.config.cost {
-            Cost::Robust if !is_printed => 0.0,
-            _ => background(depth, self.config.background_percentile),
-        };
-        let printed = match is_printed {
-            true => Some(Dissimilarity {
-                metres: frame.derived()?,
-                background_m: RowSums::UNITS / background,
-                min_foreground_valid: self.config.min_foreground_valid,
-            }),
-            false => None,
+            Cost::Robust => 0.0,
+            Cost::Squared => background(depth, self.config.background_percentile),
         };
         let view = self.view(frame, rows);
         let matcher = Matcher::new(&self.config, background);
-        let scene = PreparedFrame { rows, view, matcher, printed };
+        let scene = PreparedFrame { rows, view, matcher, replaced };
         match search {
             Query::Discover { .. } => self.discover(frame, &scene, search, funnel),
             Query::Track(track) => self.follow(frame, &scene, track, funnel),
@@ -393,9 +401,9 @@ impl Tests {
     }
 }
 
-/// The inverse depth of the background: a percentile of the valid depths
-/// (P3, P4: the 90th).
-pub(crate) fn background(depth: &DepthImage, percentile: f64) -> f64 {
+/// Returns the inverse depth of the background, in units of [`RowSums`]: a percentile of the valid
+/// depths (P3, P4: the 90th).
+pub fn background(depth: &DepthImage, percentile: f64) -> f64 {
     let mut valid: Vec<f32> = depth.pixels().iter().copied().filter(|z| z.is_finite()).collect();
     if valid.is_empty() {
         return 0.0;

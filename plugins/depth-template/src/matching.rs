@@ -149,7 +149,7 @@ impl Matcher {
                 let (free, full) = (off(face.free_m).powi(2), off(face.full_m).powi(2));
                 count * ((error / count - free) / (full - free)).clamp(0.0, 1.0)
             }
-            Cost::Squared | Cost::Printed => error,
+            Cost::Squared => error,
         };
     }
 
@@ -191,7 +191,6 @@ impl Matcher {
                 self.robust_cost(tally, template, holes)
             }
             Cost::Squared => (sum / valid.max(1.0)).sqrt() / RowSums::UNITS,
-            Cost::Printed => sum.sqrt() / valid.max(1.0) / RowSums::UNITS,
         };
         Some(Match { cost, foreground_valid })
     }
@@ -342,10 +341,9 @@ mod tests {
     }
 
     #[test]
-    fn the_printed_normalisation_depends_on_the_range() {
+    fn the_squared_cost_does_not_depend_on_the_range() {
         // The same wall, so the same error in every background pixel.
         let ratio = |cost| cost_of(cost, 4.0, 6.0) / cost_of(cost, 2.0, 6.0);
         assert!((ratio(Cost::Squared) - 1.0).abs() < 0.1, "{}", ratio(Cost::Squared));
-        assert!((ratio(Cost::Printed) - 2.0).abs() < 0.2, "{}", ratio(Cost::Printed));
     }
 }

@@ -6,8 +6,8 @@ use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 use tagalong_vision::ComparedPixels;
 
 use crate::bank::{Bank, Direction, Pose, TemplateRow, with_reliefs};
-use crate::config::{DepthTemplateConfig, Weighing};
-use crate::printed::{Canvas, Printed};
+use crate::config::DepthTemplateConfig;
+use crate::extension::{FrameLikelihood, SceneLikelihood};
 use crate::scores::{Levels, ONE, Scores};
 use crate::view::{MetricImage, Working};
 
@@ -19,7 +19,7 @@ use crate::view::{MetricImage, Working};
 /// wholly visible weighs `likelihood_nats`, at any range; a hidden one weighs nothing.
 pub struct Weigher {
     nats: f64,
-    printed: Option<Printed>,
+    replaced: Option<Box<dyn SceneLikelihood>>,
     tools: Mutex<Tools>,
 }
 
@@ -27,19 +27,18 @@ pub struct Weigher {
 struct Tools {
     tolerance_m: f64,
     one_sided: f64,
-    /// Windows beside the image count: the printed form looks at all between the windows.
+    /// Windows beside the image count: a replaced likelihood may look between them.
     all_windows: bool,
     silhouettes: Silhouettes,
     view: Option<Arc<MetricImage>>,
-    canvas: Option<Arc<Canvas>>,
     scores: Scores,
-    cast: Vec<Placed>,
+    cast: Vec<PlacedPerson>,
     alone: HashMap<Spot, SilhouetteFit>,
     masks: Vec<Span>,
 }
 
 /// A run of pixels of a row: from, to.
-pub(crate) type Span = (i64, i64);
+pub type Span = (i64, i64);
 
 /// A silhouette at a place: all that matters for a person alone. Scenes that combine few people ask
 /// for the same ones again and again.
@@ -73,13 +72,15 @@ struct Silhouette {
     area: f64,
 }
 
-/// Person in a scene.
+/// Person in a scene, with the silhouette at its place in the reduced image.
 #[derive(Clone)]
-pub(crate) struct Placed {
+pub struct PlacedPerson {
     silhouette: Arc<Silhouette>,
-    pub(crate) x: i64,
+    /// Column of the head centre, reduced pixels.
+    pub x: i64,
     y: i64,
-    pub(crate) depth_m: f64,
+    /// Depth of the face, m.
+    pub depth_m: f64,
     /// Depth, m, up to which another person can cause the readings at this one's place.
     reach_m: f64,
     levels: Levels,
@@ -91,29 +92,34 @@ impl Weigher {
         let tools = Tools {
             tolerance_m: config.likelihood_tolerance_m,
             one_sided: config.likelihood_one_sided,
-            all_windows: config.weighing != Weighing::Ratio,
+            all_windows: false,
             silhouettes: Silhouettes { bank: Bank::new(usize::MAX), kept: Vec::new() },
             view: None,
-            canvas: None,
             scores: Scores::new(config),
             cast: Vec::new(),
             alone: HashMap::new(),
             masks: Vec::new(),
         };
-        let (nats, printed) = (config.likelihood_nats, Printed::new(config));
-        Self { nats, printed, tools: Mutex::new(tools) }
+        Self { nats: config.likelihood_nats, replaced: None, tools: Mutex::new(tools) }
     }
 
-    /// P3's likelihood; where a scene has one person, of the template that fits best.
-    fn printed_logs(
+    /// Weighs scenes by another likelihood. It gets silhouettes beside the image, too.
+    #[must_use]
+    pub fn with_likelihood(self, likelihood: Box<dyn SceneLikelihood>) -> Self {
+        self.tools().all_windows = true;
+        Self { replaced: Some(likelihood), ..self }
+    }
+
+    /// Returns the logarithms of a replaced likelihood; where a scene has one person, of the template
+    /// that fits best.
+    fn replaced_logs(
         &self,
-        printed: &Printed,
+        likelihood: &dyn FrameLikelihood,
         frame: &Frame,
         scenes: std::slice::Chunks<'_, Person>,
     ) -> Result<Vec<f64>> {
         let image = frame.derived::<Working>()?;
         let mut tools = self.tools();
-        let canvas = printed.canvas(frame, &mut tools.canvas)?;
         let view = tools.view_of(frame, &image);
         let log = |scene: &[Person]| {
             let mut cast = |way: Option<Direction>| {
@@ -121,9 +127,9 @@ impl Weigher {
                     let way = way.unwrap_or_else(|| direction(p, &frame.camera));
                     tools.place(p, way, &frame.camera, &view)
                 };
-                let mut cast: Vec<Placed> = scene.iter().filter_map(placed).collect();
+                let mut cast: Vec<PlacedPerson> = scene.iter().filter_map(placed).collect();
                 cast.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m).then(a.x.cmp(&b.x)));
-                printed.log(&canvas, &cast)
+                likelihood.log_likelihood(&cast)
             };
             match scene {
                 [] => 0.0,
@@ -156,9 +162,9 @@ impl Likelihood for Weigher {
         out: &mut Vec<f64>,
     ) -> Result<()> {
         out.clear();
-        if let Some(printed) = &self.printed {
+        if let Some(replaced) = &self.replaced {
             let scenes = people.chunks(people_per_scene.max(1));
-            out.extend(self.printed_logs(printed, frame, scenes)?);
+            out.extend(self.replaced_logs(&*replaced.prepare(frame)?, frame, scenes)?);
             return Ok(());
         }
         let image = frame.derived::<Working>()?;
@@ -202,11 +208,11 @@ impl Tools {
     /// the image.
     fn silhouettes(&mut self, frame: &Frame, image: &Working, scene: &[Person]) -> Vec<Vec<Rect>> {
         let view = self.view_of(frame, image);
-        let cast: Vec<Option<Placed>> = scene
+        let cast: Vec<Option<PlacedPerson>> = scene
             .iter()
             .map(|p| self.place(p, direction(p, &frame.camera), &frame.camera, &view))
             .collect();
-        let visible = |person: &Placed| -> Vec<Rect> {
+        let visible = |person: &PlacedPerson| -> Vec<Rect> {
             let rows = person.rows(image.0.height() as i64);
             let runs = rows.flat_map(|(line, row)| {
                 let nearer = cast.iter().flatten().filter(|p| p.depth_m < person.depth_m);
@@ -235,7 +241,7 @@ impl Tools {
         direction: Direction,
         camera: &Camera,
         view: &MetricImage,
-    ) -> Option<Placed> {
+    ) -> Option<PlacedPerson> {
         let depth_m = camera.depth_of(&person.position) - HEAD_RADIUS_M;
         if !(MIN_DEPTH_M..MAX_DEPTH_M).contains(&depth_m) {
             return None;
@@ -254,23 +260,23 @@ impl Tools {
         }
         let silhouette = self.silhouettes.of(pose);
         let reach_m = depth_m + self.tolerance_m;
-        Some(Placed { silhouette, x, y, depth_m, reach_m, levels: Levels::of_face(depth_m) })
+        Some(PlacedPerson { silhouette, x, y, depth_m, reach_m, levels: Levels::of_face(depth_m) })
     }
 
     /// The weight of a scene, near to far, in units of one person.
-    fn weigh(&mut self, scene: &[Placed]) -> f64 {
+    fn weigh(&mut self, scene: &[PlacedPerson]) -> f64 {
         (0..scene.len()).map(|k| self.weigh_one(scene, k)).sum()
     }
 
     /// Returns the weight that person `k` of the scene explains, as a part of the whole person.
-    fn weigh_one(&mut self, scene: &[Placed], k: usize) -> f64 {
+    fn weigh_one(&mut self, scene: &[PlacedPerson], k: usize) -> f64 {
         let alone = self.alone(&scene[k]);
         let taken = self.taken(scene, k);
         alone.without(taken).weight(self.one_sided) / (f64::from(ONE) * scene[k].silhouette.area)
     }
 
     /// Returns the fit of a person in a scene of their own.
-    fn alone(&mut self, person: &Placed) -> SilhouetteFit {
+    fn alone(&mut self, person: &PlacedPerson) -> SilhouetteFit {
         let Self { scores, alone, .. } = self;
         *alone.entry(person.spot()).or_insert_with(|| {
             let mut found = SilhouetteFit::default();
@@ -287,7 +293,7 @@ impl Tools {
     /// Returns the part of that fit which the others take: the body where nearer ones hide it, and
     /// the pixels beside it where they are theirs. A person that is clearly farther away cannot
     /// cause the readings at this person's depth.
-    fn taken(&mut self, scene: &[Placed], k: usize) -> SilhouetteFit {
+    fn taken(&mut self, scene: &[PlacedPerson], k: usize) -> SilhouetteFit {
         if scene.len() <= 2 {
             let other = rivals(scene, k).next();
             return other.map_or_else(SilhouetteFit::default, |other| {
@@ -314,7 +320,12 @@ impl Tools {
 
     /// As [`Self::taken`] with one other person, which needs no union. Most rows of most pairs do
     /// not meet, and are left before their sums are asked for.
-    fn taken_by_one(&mut self, person: &Placed, other: &Placed, is_nearer: bool) -> SilhouetteFit {
+    fn taken_by_one(
+        &mut self,
+        person: &PlacedPerson,
+        other: &PlacedPerson,
+        is_nearer: bool,
+    ) -> SilhouetteFit {
         let half = person.silhouette.half_width;
         let window = (person.x - half, person.x + half + 1);
         let mut taken = SilhouetteFit::default();
@@ -385,12 +396,12 @@ const MAX_DEPTH_M: f64 = 20.0;
 const MAX_PIXEL: f64 = 4000.0;
 
 /// Returns the people of the scene that can cause the readings at the place of person `k`.
-fn rivals(scene: &[Placed], k: usize) -> impl Iterator<Item = &Placed> {
+fn rivals(scene: &[PlacedPerson], k: usize) -> impl Iterator<Item = &PlacedPerson> {
     let reach_m = scene[k].reach_m;
     scene[..k].iter().chain(scene[k + 1..].iter().take_while(move |p| p.depth_m < reach_m))
 }
 
-impl Placed {
+impl PlacedPerson {
     /// The rows of the silhouette that are looked at, with their lines.
     fn rows(&self, height: i64) -> impl Iterator<Item = (i64, &TemplateRow)> {
         let Silhouette { rows, step, .. } = &*self.silhouette;
@@ -407,21 +418,21 @@ impl Placed {
         (self.silhouette.number, self.x, self.y, self.depth_m.to_bits())
     }
 
-    /// The columns of the window.
-    pub(crate) fn columns(&self) -> Span {
+    /// Returns the columns of the window.
+    pub fn columns(&self) -> Span {
         let half = self.silhouette.half_width;
         (self.x - half, self.x + half + 1)
     }
 
-    /// The lines of the window.
-    pub(crate) fn lines(&self) -> Span {
+    /// Returns the lines of the window.
+    pub fn lines(&self) -> Span {
         let rows = &self.silhouette.rows;
         let dy = |row: Option<&TemplateRow>| self.y + row.map_or(0, |row| row.dy);
         (dy(rows.first()), dy(rows.last()) + 1)
     }
 
     /// The row of the silhouette in a line of the image; `None` outside of the window.
-    pub(crate) fn row(&self, line: i64) -> Option<&TemplateRow> {
+    pub fn row(&self, line: i64) -> Option<&TemplateRow> {
         let index = line - self.lines().0;
         self.silhouette.rows.get(usize::try_from(index).ok()?)
     }
@@ -494,8 +505,8 @@ fn union_of(masks: &mut Vec<Span>, spans: impl Iterator<Item = Span>) {
     });
 }
 
-/// The parts of a span that no mask covers.
-pub(crate) fn outside(span: Span, mut masks: Vec<Span>) -> Vec<Span> {
+/// Returns the parts of a span that no mask covers.
+pub fn outside(span: Span, mut masks: Vec<Span>) -> Vec<Span> {
     masks.sort_unstable();
     let mut left = Vec::new();
     let mut from = span.0;

@@ -186,35 +186,6 @@ fn settings_that_hold_nothing_are_refused() {
     assert_eq!(message, "`min_depth_m` = 6 must be below `max_depth_m` = 5.5");
 }
 
-/// Thresholds in m².
-fn printed(background_percentile: f64) -> DepthTemplateConfig {
-    DepthTemplateConfig {
-        compat_printed_dissimilarity: true,
-        background_percentile,
-        discover_cost: 2000.0,
-        even_cost: 2400.0,
-        follow_cost: 3200.0,
-        refine_cost: 4000.0,
-        score_per_cost: 0.002,
-        ..Default::default()
-    }
-}
-
-#[test]
-fn the_printed_dissimilarity_finds_people_in_front_of_the_one_background_alone() {
-    let head = Point3::new(2.5, 0.0, 1.6);
-    let scene = frame(640, 4.5, &[head]);
-    let (found, funnel) = discover(printed(90.0), &scene);
-    assert_eq!(found.len(), 1, "{funnel:?}");
-    assert!((found[0].position - head).norm() < 0.12);
-    let score = found[0].score;
-    assert!(score > 0.8 && score <= 4.8, "0 m² is worth 0.002 * 2400: {score}");
-    // The nearest depths of all, those of the floor, are nowhere behind the person.
-    let (found, funnel) = discover(printed(2.0), &scene);
-    assert!(found.is_empty() && funnel.count("template cost") > 0, "{funnel:?}");
-    assert_eq!(discover(DepthTemplateConfig::default(), &scene).0.len(), 1);
-}
-
 #[test]
 fn the_papers_background_is_the_wall_where_the_percentile_is_high() {
     let head = Point3::new(2.5, 0.0, 1.6);

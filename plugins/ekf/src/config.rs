@@ -29,22 +29,6 @@ pub struct Config {
     /// long walks on for less long than that.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub velocity_decay_s: f64,
-    /// As printed: subtract the robot's speed from the person's velocity in
-    /// every frame. Biased while the robot moves.
-    pub compat_printed_velocity: bool,
-    /// As printed: process noise on the velocity only, none for height and
-    /// ego-motion, dependent on the frame rate.
-    pub compat_printed_noise: bool,
-    /// As printed: P - KHP in place of the Joseph form.
-    pub compat_printed_update: bool,
-    /// As printed: the same variance for all coordinates of all detections.
-    pub compat_printed_measurement: bool,
-    /// Standard deviation of the printed process noise, m/s².
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub printed_sigma_w: f64,
-    /// Standard deviation of the printed measurement noise, m.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub printed_sigma_v_m: f64,
 }
 
 impl Default for Config {
@@ -56,12 +40,6 @@ impl Default for Config {
             extra_sigma_m: 0.02,
             student_dof: 0.0,
             velocity_decay_s: 0.0,
-            compat_printed_velocity: false,
-            compat_printed_noise: false,
-            compat_printed_update: false,
-            compat_printed_measurement: false,
-            printed_sigma_w: 1.0,
-            printed_sigma_v_m: 0.05,
         }
     }
 }

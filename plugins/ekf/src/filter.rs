@@ -40,19 +40,12 @@ impl Ekf {
 
     /// Measurement covariance R, m².
     fn measurement(&self, detection: &Detection) -> Matrix3<f64> {
-        if self.config.compat_printed_measurement {
-            return Matrix3::identity() * self.config.printed_sigma_v_m.powi(2);
-        }
         detection.covariance + Matrix3::identity() * self.config.extra_sigma_m.powi(2)
     }
 
     /// Process noise. It is isotropic on the floor, so that it is the same in
     /// the axes before and after the robot's turn.
     fn process_noise(&self, dt: f64) -> Matrix5 {
-        if self.config.compat_printed_noise {
-            let velocity = (self.config.printed_sigma_w * dt).powi(2);
-            return Matrix5::from_diagonal(&Vector5::new(0.0, 0.0, 0.0, velocity, velocity));
-        }
         let q = self.config.acceleration_noise;
         let (position, cross, velocity) = (q * dt.powi(3) / 3.0, q * dt.powi(2) / 2.0, q * dt);
         let height = self.config.height_noise.powi(2) * dt;
@@ -65,15 +58,6 @@ impl Ekf {
         noise
     }
 
-    /// Returns J M J': the noise of the robot's own uncertain motion.
-    fn ego_noise(&self, predicted: &Vector5<f64>, motion: &EgoMotion) -> Matrix5 {
-        if self.config.compat_printed_noise {
-            return Matrix5::zeros();
-        }
-        let jacobian = motion_jacobian(predicted, motion);
-        jacobian * motion.covariance * jacobian.transpose()
-    }
-
     /// The mean after the motion.
     pub(crate) fn transition(&self, mean: &Vector5<f64>, motion: &EgoMotion) -> Vector5<f64> {
         let back = turn_back(motion);
@@ -81,10 +65,7 @@ impl Ekf {
         let (passed, kept) = decayed(self.config.velocity_decay_s, motion.dt);
         let moved = Vector2::new(mean[0], mean[1]) + velocity * passed;
         let position = back * (moved - Vector2::new(motion.forward, motion.left));
-        let mut velocity = back * velocity * kept;
-        if self.config.compat_printed_velocity && motion.dt > 0.0 {
-            velocity.x -= motion.forward.hypot(motion.left).copysign(motion.forward) / motion.dt;
-        }
+        let velocity = back * velocity * kept;
         Vector5::new(position.x, position.y, mean[2], velocity.x, velocity.y)
     }
 }
@@ -108,7 +89,7 @@ impl PersonFilter for Ekf {
         // A robot at rest, or one whose motion is certain, adds none.
         state.covariance = symmetric(match motion.covariance == Matrix3::zeros() {
             true => covariance,
-            false => covariance + self.ego_noise(&state.mean, motion),
+            false => covariance + ego_noise(&state.mean, motion),
         });
     }
 
@@ -135,7 +116,7 @@ impl PersonFilter for Ekf {
         }
         let gain: Matrix5x3 = p.fixed_columns::<3>(0) * inverted;
         state.mean += gain * innovation;
-        state.covariance = self.corrected(&p, &gain, &r);
+        state.covariance = corrected(&p, &gain, &r);
         Update { nis: Some((nis, measured)) }
     }
 
@@ -177,15 +158,18 @@ impl Ekf {
             ((dof + f64::from(measured)) / (dof + squared)).min(1.0)
         })
     }
+}
 
-    fn corrected(&self, p: &Matrix5, gain: &Matrix5x3, r: &Matrix3<f64>) -> Matrix5 {
-        let less = less_seen(gain, p);
-        if self.config.compat_printed_update {
-            return less;
-        }
-        let both = less_seen(gain, &less.transpose()).transpose();
-        symmetric(both + gain * r * gain.transpose())
-    }
+/// Returns J M J': the noise of the robot's own uncertain motion.
+fn ego_noise(predicted: &Vector5<f64>, motion: &EgoMotion) -> Matrix5 {
+    let jacobian = motion_jacobian(predicted, motion);
+    jacobian * motion.covariance * jacobian.transpose()
+}
+
+/// Returns the covariance after the update, in Joseph form.
+fn corrected(p: &Matrix5, gain: &Matrix5x3, r: &Matrix3<f64>) -> Matrix5 {
+    let both = less_seen(gain, &less_seen(gain, p).transpose()).transpose();
+    symmetric(both + gain * r * gain.transpose())
 }
 
 /// Returns the time for which a velocity that decays counts, s, and the part of it that is left.

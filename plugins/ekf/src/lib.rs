@@ -7,8 +7,7 @@
 //! state, so that the filter is exact and not only a linearisation.
 //!
 //! The papers' equations subtract the robot's velocity from the person's in
-//! every frame although the position rows already account for it. The default
-//! is the corrected form; the printed ones are behind `compat_printed_*`.
+//! every frame although the position rows already account for it; here they are corrected.
 
 mod config;
 mod filter;

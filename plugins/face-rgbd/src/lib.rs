@@ -33,7 +33,7 @@ pub use group::{Group, Grouping, Hit, grouped};
 pub use level::Level;
 pub use propose::Proposals;
 pub use scan::{PassedWindow, Scanner, scales, whole};
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
 
 /// Name of this plugin in configs.
 pub const NAME: &str = "face-rgbd";
@@ -42,9 +42,37 @@ pub const NAME: &str = "face-rgbd";
 #[cfg(feature = "train")]
 pub const TRAINER: &str = "cascade";
 
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[
+    Remedy {
+        test: "window: no face",
+        settings: &["min_side_px"],
+        look: "nearly all windows of any image; faces smaller than this are not looked for",
+    },
+    Remedy {
+        test: "face: log-odds",
+        settings: &["min_score"],
+        look: "faces in profile, in the dark, or blurred",
+    },
+    Remedy {
+        test: "point: *",
+        settings: &["max_points"],
+        look: "places where depth and height allow no face, or that are less like skin than others",
+    },
+];
+
 /// Registers the plugin, and its trainer if that is compiled in.
 pub fn register(registry: &mut Registry) {
+    registry.remedies(NAME, REMEDIES);
     registry.detector(NAME, "faces by a cascade, where depth allows them (P2)", FaceRgbd::new);
+    #[cfg(feature = "train")]
+    registry.training(
+        TRAINER,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Faces,
+            quick_settings: "[training]\nstages = 4\nfeatures = 200",
+        },
+    );
     #[cfg(feature = "train")]
     registry.trainer(TRAINER, |config: Config, context| {
         let begun = (!config.model.is_empty())

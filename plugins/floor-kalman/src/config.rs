@@ -22,7 +22,7 @@ pub enum Form {
 pub enum Measurement {
     /// By the detection's own covariance.
     Detection,
-    /// `measurement_m2` for every detection, as printed.
+    /// `measurement_m2` for every detection.
     Fixed,
     /// By `sigma_range_m`, `sigma_range_per_m` and `sigma_bearing_deg`.
     Polar,
@@ -67,8 +67,6 @@ pub struct Config {
     /// From the robot's heading at the start to the X axis of the room, degrees.
     #[schemars(range(min = -360.0, max = 1e3))]
     pub room_heading_deg: f64,
-    /// As printed (equation 6): the noise of u is left out of the prediction.
-    pub compat_printed_u: bool,
 }
 
 impl Default for Config {
@@ -86,7 +84,6 @@ impl Default for Config {
             initial_speed_mps: 1.0,
             height_noise: 0.03,
             room_heading_deg: 0.0,
-            compat_printed_u: false,
         }
     }
 }
@@ -98,7 +95,7 @@ impl Config {
     }
 
     /// R of `fixed`, m².
-    pub(crate) fn printed_measurement(&self) -> Matrix2<f64> {
+    pub(crate) fn fixed_measurement(&self) -> Matrix2<f64> {
         symmetric(self.measurement_m2)
     }
 

@@ -40,7 +40,7 @@ impl FloorKalman {
         let at = detection.position.xy();
         let in_room = self.room_from_robot * at;
         let r = match self.config.measurement {
-            Measurement::Fixed => return (in_room.coords, self.config.printed_measurement()),
+            Measurement::Fixed => return (in_room.coords, self.config.fixed_measurement()),
             Measurement::Polar => self.polar(&at.coords),
             Measurement::Detection => detection.covariance.fixed_view::<2, 2>(0, 0).into_owned(),
         };

@@ -78,10 +78,8 @@ impl State {
                 self.mean.fixed_rows_mut::<2>(2).copy_from(&(u / dt));
             }
             let (p2, c) = (before.covariance, before.cross);
-            if !config.compat_printed_u {
-                self.grow(&(3.0 * p1 + p2 - 2.0 * (c + c.transpose())));
-                cross = 2.0 * p1 - c.transpose();
-            }
+            self.grow(&(3.0 * p1 + p2 - 2.0 * (c + c.transpose())));
+            cross = 2.0 * p1 - c.transpose();
         }
         self.grow(&config.process(dt));
         self.before = Some(Before { position: here, covariance: p1, cross });

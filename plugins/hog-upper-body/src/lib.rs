@@ -40,18 +40,51 @@ pub use model::{Coverage, Field, Kind, Layout, Machine, Model, NUMBERS};
 pub use resample::resampled;
 pub use scan::{Grid, Scanner, Wanted, Window, merge, window_numbers, window_of};
 pub use spans::Spans;
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
 pub use trees::{ROUND, Tree, Trees};
 
 /// Name of this plugin in configs.
 pub const NAME: &str = "hog-upper-body";
 
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[
+    Remedy {
+        test: "window: size and depth",
+        settings: &["size_tolerance"],
+        look: "is the depth scaled right, and registered?",
+    },
+    Remedy {
+        test: "window: goes on above",
+        settings: &["above_m"],
+        look: "raised arms; a wall right behind the head",
+    },
+    Remedy {
+        test: "window: head height",
+        settings: &["min_head_height_m", "max_head_height_m"],
+        look: "is the camera's height and tilt right?",
+    },
+    Remedy {
+        test: "window: gradients",
+        settings: &["min_score"],
+        look: "nearly all windows of any image; people who bend, sit sideways, or wear bags",
+    },
+];
+
 /// Registers the plugin, and its trainer if that is compiled in.
 pub fn register(registry: &mut Registry) {
+    registry.remedies(NAME, REMEDIES);
     registry.detector(
         NAME,
         "heads and shoulders by gradients and a linear machine (P2)",
         HogUpperBody::new,
+    );
+    #[cfg(feature = "train")]
+    registry.training(
+        NAME,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Windows,
+            quick_settings: "[training]\nmining_rounds = 1\nepochs = 10",
+        },
     );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {

@@ -58,11 +58,6 @@ pub struct Config {
     /// A track with a detection is reported with the detection's box instead of the filtered one:
     /// for a detector whose boxes are better than their average over time.
     pub observed_boxes: bool,
-    /// As printed: the measurement matrix of eq. 8, which contains the time step. The estimate then
-    /// lags by the motion of one frame.
-    pub compat_printed_measurement: bool,
-    /// As printed: the robot's own motion is ignored.
-    pub compat_printed_ego_motion: bool,
 }
 
 impl Default for Config {
@@ -83,8 +78,6 @@ impl Default for Config {
             velocity_decay_s: 0.0,
             reupdate: false,
             observed_boxes: false,
-            compat_printed_measurement: false,
-            compat_printed_ego_motion: false,
         }
     }
 }

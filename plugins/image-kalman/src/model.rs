@@ -36,8 +36,6 @@ pub struct State {
     behind: Option<RobotPoint>,
     /// Camera of the frame in whose pixels the state is.
     camera: Camera,
-    /// Time since the previous frame, s.
-    step_s: f64,
     /// Box of the detection in this frame, where that is to be reported.
     observed: Option<Rect>,
 }
@@ -101,21 +99,17 @@ impl State {
             shape: Shape::of(detection, camera).unwrap_or(upper_body),
             behind: None,
             camera: camera.clone(),
-            step_s: 0.0,
             observed: config.observed_boxes.then_some(rect),
         }
     }
 
     /// Predicts forward in time (eq. 7), and into the robot's new frame.
     pub fn predict(&mut self, config: &Config, motion: &EgoMotion, camera: &Camera) {
-        self.step_s = motion.dt;
         self.observed = None;
         // The pixel velocity is that of the old frame, so the time step comes before the change
         // of frame.
         self.walk(config, motion.dt);
-        if !config.compat_printed_ego_motion {
-            self.turn_with(motion, camera);
-        }
+        self.turn_with(motion, camera);
         self.camera.clone_from(camera);
         self.stay_in_range();
     }
@@ -253,8 +247,7 @@ impl State {
     /// Returns the innovation of centre and width of a box; `None` for a covariance that is
     /// singular.
     fn innovation(&self, config: &Config, seen: &Detection, camera: &Camera) -> Option<Innovation> {
-        let dt = if config.compat_printed_measurement { self.step_s } else { 0.0 };
-        let look = measurement(dt);
+        let look = measurement();
         let noise = image_noise(config, seen, self.image[4], camera);
         let rect = seen.rect_in(camera);
         let measured = Vector3::new(rect.centre().x, rect.centre().y, rect.width);
@@ -343,12 +336,12 @@ fn decayed(time_constant_s: f64, dt: f64) -> (f64, f64) {
     (time_constant_s * (1.0 - kept), kept)
 }
 
-/// Returns H of eq. 8. In print it contains the time step, although it is applied to a state that
-/// is already predicted; correctly `dt` is 0.
-fn measurement(dt: f64) -> Matrix3x5 {
+/// Returns H of eq. 8 without the time step, because the state is already predicted.
+fn measurement() -> Matrix3x5 {
     let mut look = Matrix3x5::zeros();
-    (look[(0, 0)], look[(1, 1)], look[(2, 4)]) = (1.0, 1.0, 1.0);
-    (look[(0, 2)], look[(1, 3)]) = (dt, dt);
+    look[(0, 0)] = 1.0;
+    look[(1, 1)] = 1.0;
+    look[(2, 4)] = 1.0;
     look
 }
 

@@ -3,6 +3,8 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::Result;
 
+use crate::sampling::Sampling;
+
 /// Method by which particles of people with overlapping silhouettes are weighed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -136,19 +138,9 @@ pub struct Config {
     /// their tracks if that is more likely by this, in Bhattacharyya coefficients. 2 is never.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub swap_margin: f64,
-    /// As printed: kernels with 2 sigma in place of 2 sigma² (millimetres).
-    pub compat_printed_kernel: bool,
-    /// As printed: lateral positions along the robot's Y axis instead of across the viewing ray.
-    pub compat_printed_axes: bool,
-    /// As printed: all people of a group are moved by the same noise.
-    pub compat_shared_noise: bool,
-    /// As printed: the most likely particles are kept when groups form and part, instead of
-    /// resampling from all.
-    pub compat_top: bool,
-    /// As in OpenCV's ConDensation, which P3 used: resampling in every frame without a random
-    /// offset, uniform noise from generators with the same seeds for every track, and the
-    /// prediction reported as the estimate.
-    pub compat_condensation: bool,
+    /// Scheme of sampling: of a program, not of a file.
+    #[serde(skip)]
+    pub sampling: Sampling,
 }
 
 impl Default for Config {
@@ -185,11 +177,7 @@ impl Default for Config {
             reach_far_m: 0.9,
             step_m: 0.03,
             swap_margin: 0.3,
-            compat_printed_kernel: false,
-            compat_printed_axes: false,
-            compat_shared_noise: false,
-            compat_top: false,
-            compat_condensation: false,
+            sampling: Sampling::default(),
         }
     }
 }

@@ -28,7 +28,7 @@ pub struct JointParticle {
     wardrobe: Wardrobe,
     /// Time since a detector last found each person, s.
     unfound_s: BTreeMap<TrackId, f64>,
-    /// Time by which the reported state is predicted (ConDensation), s.
+    /// Time by which the reported state is predicted, s.
     ahead_s: f64,
     dt_s: f64,
 }
@@ -58,7 +58,7 @@ impl JointParticle {
         let config = &self.config;
         for group in &mut self.groups {
             let few = effective_size(&group.weights) < 0.5 * group.rows() as f64;
-            if few || config.compat_condensation {
+            if few || config.sampling.steps().resamples_always() {
                 let count = match config.method {
                     Method::Partitioned => {
                         let wanted =
@@ -240,7 +240,7 @@ impl Filter for JointParticle {
         for pair in self.wardrobe.look(evidence.frame, &alone, config.swap_margin) {
             self.swap(pair);
         }
-        self.ahead_s = if config.compat_condensation { self.dt_s } else { 0.0 };
+        self.ahead_s = if config.sampling.steps().reports_prediction() { self.dt_s } else { 0.0 };
         Ok(seen)
     }
 

@@ -4,7 +4,7 @@ use tagalong_core::TrackId;
 use crate::config::{Config, Method};
 use crate::particle::{Particle, Transition};
 use crate::random::Random;
-use crate::resampling::{heaviest, normalise, systematic, without_offset};
+use crate::resampling::{normalise, systematic};
 
 /// People that are weighed together, as joint particles: each row has one [`Particle`] per person.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub(crate) struct Group {
     /// Likelihood of each row in the last frame, relative to the best one.
     pub(crate) likelihoods: Vec<f64>,
     random: Random,
-    /// ConDensation: one generator for each dimension, seeded by its index.
+    /// One generator for each dimension, seeded by its index, for schemes that use them.
     dimensions: Vec<Random>,
 }
 
@@ -76,23 +76,24 @@ impl Group {
     /// Samples from the particles of one person the numbers that they hold only as a variance.
     pub(crate) fn draw(&mut self, person: usize, eye: &Point2<f64>, config: &Config) {
         let people = self.people();
+        let steps = config.sampling.steps();
         let Self { parts, random, dimensions, .. } = self;
         let column = parts.iter_mut().skip(person).step_by(people);
         for particle in column {
             if config.marginalise {
                 particle.draw_across(eye, random);
             } else {
-                particle.draw_all(&noise(random, &mut dimensions[5 * person..], config));
+                particle.draw_all(&steps.noise(random, &mut dimensions[5 * person..]));
             }
         }
     }
 
-    /// Moves all people of a row by the same noise, as printed in P3.
+    /// Moves all people of a row by the same noise.
     pub(crate) fn draw_shared(&mut self, config: &Config) {
         let people = self.people();
         let Self { parts, random, dimensions, .. } = self;
         for row in parts.chunks_mut(people) {
-            let noise = noise(random, dimensions, config);
+            let noise = config.sampling.steps().noise(random, dimensions);
             row.iter_mut().for_each(|particle| particle.draw_all(&noise));
         }
     }
@@ -122,10 +123,7 @@ impl Group {
 
     /// Samples `count` rows by their weights, and returns their indices.
     pub(crate) fn resample(&mut self, count: usize, config: &Config) -> Vec<usize> {
-        let rows = match config.compat_condensation {
-            true => without_offset(&self.weights),
-            false => systematic(&self.weights, count, &mut self.random),
-        };
+        let rows = config.sampling.steps().resample(&self.weights, count, &mut self.random);
         self.keep(&rows);
         rows
     }
@@ -206,15 +204,10 @@ impl Group {
 
     /// Combines some rows of one group with some of the other, all with all (P3: 25 x 25).
     fn combined(&mut self, other: &mut Self, config: &Config) -> Vec<(usize, usize, f64)> {
-        let few = |group: &mut Self| match config.compat_top {
-            true => heaviest(&group.weights, config.joint_side),
-            false => systematic(&group.weights, config.joint_side, &mut group.random),
-        };
-        let (mine, theirs) = (few(self), few(other));
-        let weight = |a: usize, b: usize| match config.compat_top {
-            true => self.weights[a] * other.weights[b],
-            false => 1.0,
-        };
+        let steps = config.sampling.steps();
+        let mine = steps.choose(&self.weights, config.joint_side, &mut self.random);
+        let theirs = steps.choose(&other.weights, config.joint_side, &mut other.random);
+        let weight = |a: usize, b: usize| steps.joint_weight([self.weights[a], other.weights[b]]);
         let pairs = mine.iter().flat_map(|a| theirs.iter().map(|b| (*a, *b, weight(*a, *b))));
         pairs.collect()
     }
@@ -222,10 +215,7 @@ impl Group {
     /// Returns the people at `columns` as a group of their own.
     pub(crate) fn part(&mut self, columns: &[usize], seed: u64, config: &Config) -> Self {
         let count = if columns.len() == 1 { config.particles } else { self.rows() };
-        let rows = match config.compat_top {
-            true => heaviest(&self.weights, count),
-            false => systematic(&self.weights, count, &mut self.random),
-        };
+        let rows = config.sampling.steps().choose(&self.weights, count, &mut self.random);
         let ids: Vec<TrackId> = columns.iter().map(|column| self.ids[*column]).collect();
         let stream = u64::from(ids.first().map_or(0, |id| id.0));
         Self {
@@ -247,16 +237,7 @@ impl Group {
 /// Side of the cells by which the spread of particles is measured, m.
 const CELL_M: f64 = 0.1;
 
-/// Returns noise of variance one for the five numbers of a person: normal, or, as in OpenCV's
-/// ConDensation, uniform from one generator per dimension.
-fn noise(random: &mut Random, dimensions: &mut [Random], config: &Config) -> Vector5<f64> {
-    match config.compat_condensation {
-        true => Vector5::from_fn(|i, _| dimensions[i].flat()),
-        false => Vector5::from_fn(|_, _| random.normal()),
-    }
-}
-
-/// Creates one generator for each dimension, with the same seeds in every group (OpenCV).
+/// Creates one generator for each dimension, with the same seeds in every group.
 fn dimensions(people: usize) -> Vec<Random> {
     (0..5 * people as u64).map(|dimension| Random::new(dimension, 0)).collect()
 }
@@ -299,29 +280,11 @@ mod tests {
     }
 
     #[test]
-    fn as_printed_the_likeliest_are_kept_when_groups_form_and_part() {
-        let config = Config {
-            method: Method::All,
-            joint_side: 2,
-            particles: 3,
-            compat_top: true,
-            ..Config::default()
-        };
+    fn rows_are_sampled_by_their_weights_when_groups_form() {
         let one = at_places(1, &[0.1, 0.2, 0.3], &[0.2, 0.5, 0.3]);
         let other = at_places(2, &[1.0, 2.0, 3.0], &[0.6, 0.1, 0.3]);
-        let mut merged = one.clone().merge(other.clone(), &config);
-        assert_eq!(places(&merged, 0), [0.2, 0.2, 0.3, 0.3]);
-        assert_eq!(places(&merged, 1), [1.0, 3.0, 1.0, 3.0]);
-        let expected = [0.30, 0.15, 0.18, 0.09].map(|product| product / 0.72);
-        let close = |a: &[f64]| a.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12);
-        assert!(close(&merged.weights), "{:?}", merged.weights);
-        assert!((merged.likelihoods[2] - 0.3 * 0.6).abs() < 1e-12);
-        let far = merged.part(&[1], 1, &config);
-        assert_eq!((places(&far, 0), far.ids.clone()), (vec![1.0, 1.0, 3.0], vec![TrackId(2)]));
-        assert_eq!(far.weights, [1.0 / 3.0; 3]);
-        // Otherwise rows are sampled from all, by their weights.
-        let drawn = Config { joint_side: 10, compat_top: false, ..config };
-        let merged = one.merge(other, &drawn);
+        let config = Config { method: Method::All, joint_side: 10, ..Config::default() };
+        let merged = one.merge(other, &config);
         let count = |person, y| places(&merged, person).iter().filter(|at| **at == y).count();
         assert_eq!([0.1, 0.2, 0.3].map(|y| count(0, y)), [20, 50, 30]);
         assert_eq!([1.0, 2.0, 3.0].map(|y| count(1, y)), [60, 10, 30]);
@@ -349,20 +312,16 @@ mod tests {
     }
 
     #[test]
-    fn condensation_resamples_without_an_offset_and_others_with_one() {
+    fn resampling_has_a_random_offset() {
         let weights = [0.1, 0.1, 0.4, 0.4];
-        let drawn = |compat_condensation| {
-            let mut group = at_places(1, &[0.0, 1.0, 2.0, 3.0], &weights);
-            let config = Config { compat_condensation, ..Config::default() };
-            (0..200)
-                .filter(|seed| {
-                    group.random = Random::new(*seed, 0);
-                    group.clone().resample(4, &config)[0] == 0
-                })
-                .count()
-        };
-        assert_eq!(drawn(true), 200);
-        assert!((50..110).contains(&drawn(false)), "0.4 of 200: {}", drawn(false));
+        let mut group = at_places(1, &[0.0, 1.0, 2.0, 3.0], &weights);
+        let config = Config::default();
+        let drawn = (0..200).filter(|seed| {
+            group.random = Random::new(*seed, 0);
+            group.clone().resample(4, &config)[0] == 0
+        });
+        let drawn = drawn.count();
+        assert!((50..110).contains(&drawn), "0.4 of 200: {drawn}");
     }
 
     #[test]

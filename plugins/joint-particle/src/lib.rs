@@ -11,7 +11,8 @@
 //! that is sampled; the rest of each particle is a small Kalman filter, conditioned on the sample
 //! (Rao-Blackwellisation; Schön, Gustafsson and Nordlund 2005).
 //!
-//! The forms of the paper, its likelihood maps included, are settings.
+//! The methods of the paper, its likelihood maps included, are settings; other schemes of sampling are
+//! [`SamplingSteps`].
 
 mod config;
 mod filter;
@@ -22,11 +23,15 @@ mod overlap;
 mod particle;
 mod random;
 mod resampling;
+mod sampling;
 mod weighing;
 
 pub use config::{Chosen, Config, Method};
 pub use filter::JointParticle;
 pub use maps::{LikelihoodMap, PositionPair};
+pub use random::Random;
+pub use resampling::{heaviest, systematic};
+pub use sampling::{Sampling, SamplingSteps};
 use tagalong_config::Registry;
 
 /// Registers the filter `joint-particle`.

@@ -13,14 +13,9 @@ pub type PositionPair = [f64; 2];
 pub struct Kernel([f64; 2]);
 
 impl Kernel {
-    /// Creates P3's kernel: standard deviations of 40 and 100 mm. As printed, with `2 sigma` in the
-    /// denominator, 40 and 100 act as variances in mm².
+    /// Creates P3's kernel: standard deviations of 40 and 100 mm.
     pub fn new(config: &Config) -> Self {
-        let width = |sigma_m: f64| match config.compat_printed_kernel {
-            true => (1000.0 * sigma_m).sqrt() / 1000.0,
-            false => sigma_m,
-        };
-        Self([width(config.kernel_near_m), width(config.kernel_far_m)])
+        Self([config.kernel_near_m, config.kernel_far_m])
     }
 
     fn at(&self, a: &PositionPair, b: &PositionPair) -> f64 {
@@ -264,12 +259,19 @@ mod tests {
         dot(a, ma, b, mb) / (dot(a, ma, a, ma) * dot(b, mb, b, mb)).sqrt()
     }
 
-    /// Mean correlation with the full table over ten samples of 50 places: printed kernel,
-    /// corrected kernel, Gaussian process.
+    /// Kernels of 6 and 10 mm, which is what 40 and 100 mm become where they are taken for variances
+    /// in mm².
+    fn narrow() -> Config {
+        let [kernel_near_m, kernel_far_m] = [40.0_f64, 100.0].map(|mm2| mm2.sqrt() / 1000.0);
+        Config { kernel_near_m, kernel_far_m, ..Config::default() }
+    }
+
+    /// Mean correlation with the full table over ten samples of 50 places: narrow kernel, wide
+    /// kernel, Gaussian process.
     fn correlations() -> [f64; 3] {
         let grid = Grid::new(&Config::default()).places();
         let truth: Vec<f64> = grid.iter().map(ridge).collect();
-        let printed = Kernel::new(&Config { compat_printed_kernel: true, ..Config::default() });
+        let narrow = Kernel::new(&narrow());
         let right = Kernel::new(&Config::default());
         let mut sums = [0.0; 3];
         for seed in 0..10 {
@@ -279,7 +281,7 @@ mod tests {
             let of = |map: &dyn Fn(&PositionPair) -> f64| {
                 correlation(&grid.iter().map(map).collect::<Vec<_>>(), &truth)
             };
-            sums[0] += of(&|at| parzen(&places, &known, printed, at)) / 10.0;
+            sums[0] += of(&|at| parzen(&places, &known, narrow, at)) / 10.0;
             sums[1] += of(&|at| parzen(&places, &known, right, at)) / 10.0;
             sums[2] += of(&|at| gp.at(at)) / 10.0;
         }
@@ -287,16 +289,15 @@ mod tests {
     }
 
     #[test]
-    fn kernels_fall_by_the_root_of_e_at_40_and_100_mm_and_sooner_as_printed() {
+    fn kernels_fall_by_the_root_of_e_at_40_and_100_mm() {
         let at = |config: &Config, place| Kernel::new(config).at(&[0.0, 0.0], &place);
         let right = Config::default();
         for place in [[0.04, 0.0], [0.0, 0.1]] {
             assert!((at(&right, place) - (-0.5f64).exp()).abs() < 1e-12);
         }
         // exp(-d² / (2 sigma)) in millimetres.
-        let printed = Config { compat_printed_kernel: true, ..Config::default() };
-        assert!((at(&printed, [0.008, 0.0]) - (-64.0 / 80.0f64).exp()).abs() < 1e-9);
-        assert!((at(&printed, [0.0, 0.02]) - (-400.0 / 200.0f64).exp()).abs() < 1e-9);
+        assert!((at(&narrow(), [0.008, 0.0]) - (-64.0 / 80.0f64).exp()).abs() < 1e-9);
+        assert!((at(&narrow(), [0.0, 0.02]) - (-400.0 / 200.0f64).exp()).abs() < 1e-9);
         let wider = Config { kernel_near_m: 0.08, kernel_far_m: 0.3, ..Config::default() };
         assert!((at(&wider, [0.08, 0.3]) - (-1f64).exp()).abs() < 1e-12);
     }

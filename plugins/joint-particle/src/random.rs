@@ -20,11 +20,6 @@ impl Random {
         self.0.normal()
     }
 
-    /// Returns a uniform number with mean zero and variance one.
-    pub fn flat(&mut self) -> f64 {
-        (2.0 * self.uniform() - 1.0) * 3f64.sqrt()
-    }
-
     /// Returns a whole number below `end`, which must not be 0.
     pub fn below(&mut self, end: usize) -> usize {
         // `uniform` includes 1, which would give `end` itself.
@@ -46,14 +41,10 @@ mod tests {
     #[test]
     fn numbers_have_mean_zero_and_variance_one() {
         let mut random = Random::new(1, 2);
-        let mut check = |draw: fn(&mut Random) -> f64| {
-            let drawn: Vec<f64> = (0..20_000).map(|_| draw(&mut random)).collect();
-            let mean = drawn.iter().sum::<f64>() / 20_000.0;
-            let variance = drawn.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 20_000.0;
-            assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.05, "{mean} {variance}");
-        };
-        check(Random::normal);
-        check(Random::flat);
+        let drawn: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
+        let mean = drawn.iter().sum::<f64>() / 20_000.0;
+        let variance = drawn.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 20_000.0;
+        assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.05, "{mean} {variance}");
     }
 
     #[test]

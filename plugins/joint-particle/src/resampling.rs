@@ -30,13 +30,6 @@ pub fn systematic(weights: &[f64], count: usize, random: &mut Random) -> Vec<usi
     pick(weights, (0..count).map(|i| (i as f64 + offset) / count as f64))
 }
 
-/// Resamples as OpenCV's ConDensation: as above without the random offset, which favours low
-/// indices.
-pub fn without_offset(weights: &[f64]) -> Vec<usize> {
-    let count = weights.len();
-    pick(weights, (0..count).map(|i| i as f64 / count as f64))
-}
-
 /// Returns for each of the ascending points in 0..1 the first index with a cumulated weight above
 /// it.
 fn pick(weights: &[f64], points: impl Iterator<Item = f64>) -> Vec<usize> {
@@ -101,12 +94,6 @@ mod tests {
                 prop_assert!((log.exp() / sum - weight).abs() < 1e-12);
             }
         }
-    }
-
-    #[test]
-    fn without_an_offset_the_first_particle_is_preferred() {
-        let weights = [0.1, 0.1, 0.4, 0.4];
-        assert_eq!(without_offset(&weights), [0, 2, 2, 3]);
     }
 
     #[test]

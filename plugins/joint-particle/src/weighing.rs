@@ -119,7 +119,7 @@ impl<'a> WeighingInput<'a> {
     }
 
     fn draw_everybody(&self, group: &mut Group) {
-        if self.config.compat_shared_noise {
+        if self.config.sampling.steps().shares_noise() {
             group.draw_shared(self.config);
             return;
         }
@@ -203,10 +203,7 @@ impl Lateral {
         let (near, far) = (order[0], order[1]);
         let means = [near, far].map(|person| group.mean(person));
         let origin = Point2::new(means[0][0], means[0][1]);
-        let across = match look.config.compat_printed_axes {
-            true => Vector2::y(),
-            false => across(&(origin - look.eye)),
-        };
+        let across = look.config.sampling.steps().lateral_axis(&(origin - look.eye));
         Self { near, far, origin, across, means }
     }
 

@@ -27,14 +27,30 @@ pub use detect::LaserLegs;
 pub use features::{COUNT, FEATURES, Features, features};
 pub use model::{Model, Node, Tree};
 pub use segment::{Beams, Segment};
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
 
 /// Name of this plugin in configs.
 pub const NAME: &str = "laser-legs";
 
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[Remedy {
+    test: "no leg",
+    settings: &["min_leg_log_odds"],
+    look: "nearly all segments of any scan; lower finds more legs and more table legs",
+}];
+
 /// Registers the plugin, and its trainer if that is compiled in.
 pub fn register(registry: &mut Registry) {
+    registry.remedies(NAME, REMEDIES);
     registry.detector(NAME, "legs in a laser scan, by boosted geometric features", LaserLegs::new);
+    #[cfg(feature = "train")]
+    registry.training(
+        NAME,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::LaserScans,
+            quick_settings: "[training]\ntrees = [10]\nfolds = 2\nevery_ray = []",
+        },
+    );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| train::LegTrainer::new(&config, context.seed));
 }

@@ -36,6 +36,7 @@ fn scan(rays: u32, rounds: &Rounds, pose: Isometry3<f64>) -> LaserScan {
         }
     }
     LaserScan {
+        stamp: None,
         robot_from_scanner: pose,
         first_rad: -0.5 * TAU,
         increment_rad: step,

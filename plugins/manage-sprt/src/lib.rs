@@ -22,10 +22,31 @@ mod tests;
 
 pub use config::Config;
 pub use manage::Sprt;
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
+
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[
+    Remedy {
+        test: "clutter",
+        settings: &["clutter_s", "clutter_m", "max_clutter"],
+        look: "a thing at the same place was disproved before",
+    },
+    Remedy {
+        test: "track: never moved",
+        settings: &["undecided_s", "still_log_odds", "max_still", "moved_m", "confirm_log_odds"],
+        look: "things; people who stand still and are doubtful to all verifiers",
+    },
+    Remedy {
+        test: "track: evidence",
+        settings: &["end_log_odds", "miss_log_odds", "max_look"],
+        look: "misses and doubtful detections wear a track down",
+    },
+];
 
 /// Registers the track manager `manage-sprt`.
 pub fn register(registry: &mut Registry) {
+    registry.remedies("manage-sprt", REMEDIES);
+    registry.alternative("manage-sprt");
     registry.manager(
         "manage-sprt",
         "believes a track by sequential evidence; things that never move are clutter",

@@ -3,6 +3,8 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::{Error, Result};
 
+use crate::Blob;
+
 /// Method by which the distance is computed from the features.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
@@ -19,6 +21,21 @@ pub enum Distance {
     Ridge,
     /// The range at which the ray of the lower edge meets the floor.
     Analytic,
+}
+
+/// Step after the measurement of a person.
+#[derive(Clone, Copy, Debug)]
+pub struct AfterMeasuring {
+    /// Its name, by which steps are told apart.
+    pub name: &'static str,
+    /// Changes what was measured, by the number of pixels in each column.
+    pub correct: fn(&mut Blob, &[u16]),
+}
+
+impl PartialEq for AfterMeasuring {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
 }
 
 /// Settings of `omni-appearance`.
@@ -94,8 +111,9 @@ pub struct Config {
     /// image, which is moved like the background and at least 0.2 s old; 0 asks for none.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub changed_part: f64,
-    /// As printed: columns are averaged as if the panorama ended at its seam.
-    pub compat_printed_seam: bool,
+    /// Step after the measurement of a person: of a program, not of a file.
+    #[serde(skip)]
+    pub after_measuring: Option<AfterMeasuring>,
 }
 
 impl Default for Config {
@@ -124,7 +142,7 @@ impl Default for Config {
             walls_m: vec![1.2, 2.0, 3.5, 6.0],
             slack_px: [3, 2],
             changed_part: 0.3,
-            compat_printed_seam: false,
+            after_measuring: None,
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::background::{HELD, Pace, TURNS};
 use crate::changes::Changes;
 use crate::expected::{Expected, Known, divided};
 use crate::warp::{Bounds, Sweep, Warp, is_moving};
-use crate::{Background, Blob, Config, PanoramaGeometry, Segmenter};
+use crate::{AfterMeasuring, Background, Blob, Config, PanoramaGeometry, Segmenter};
 
 /// Tracks the background over the images, and finds the blobs that differ from it.
 pub struct Eyes {
@@ -285,21 +285,8 @@ fn people(
     blobs.sort_by(|a, b| b.features.pixels.total_cmp(&a.features.pixels));
     funnel.drop_many("too many people", blobs.len().saturating_sub(config.max_people) as u64);
     blobs.truncate(config.max_people);
-    if config.compat_printed_seam {
-        blobs.iter_mut().for_each(|blob| forget_the_seam(blob, width, segmenter));
+    if let Some(AfterMeasuring { correct, .. }) = config.after_measuring {
+        blobs.iter_mut().for_each(|blob| correct(blob, &segmenter.counts().columns));
     }
     blobs
-}
-
-/// Computes mean and extent of column numbers as if the image did not close on itself (as printed).
-fn forget_the_seam(blob: &mut Blob, width: usize, segmenter: &Segmenter) {
-    if blob.run.first + blob.run.length <= width {
-        return;
-    }
-    let counts = &segmenter.counts().columns;
-    let weight = |column: usize| f64::from(counts[column]);
-    let total: f64 = blob.run.columns(width).map(weight).sum();
-    let sum: f64 = blob.run.columns(width).map(|column| column as f64 * weight(column)).sum();
-    blob.column = sum / total.max(1.0);
-    blob.features.width = width as f64;
 }

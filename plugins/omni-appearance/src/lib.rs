@@ -34,13 +34,13 @@ mod warp;
 
 pub use background::Background;
 pub use blob::{Blob, FEATURES, Features};
-pub use config::{Config, Distance};
+pub use config::{AfterMeasuring, Config, Distance};
 pub use detector::OmniAppearance;
 pub use eyes::Eyes;
 pub use model::{Geometry, Head, Line, Model, PanoramaGeometry, Person, Ridge, Signature};
 pub use network::Network;
 pub use segment::{Counts, Segmenter};
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
 
 /// Name of this plugin in configs.
 pub const NAME: &str = "omni-appearance";
@@ -48,12 +48,35 @@ pub const NAME: &str = "omni-appearance";
 /// Name of the distance model in `tagalong train`.
 pub const TRAINER: &str = "omni-distance";
 
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[
+    Remedy {
+        test: "background is being learned",
+        settings: &["background_frames"],
+        look: "the first frames of a panorama",
+    },
+    Remedy {
+        test: "head height",
+        settings: &["head_height_m"],
+        look: "is the camera's height right?",
+    },
+];
+
 /// Registers the plugin.
 pub fn register(registry: &mut Registry) {
+    registry.remedies(NAME, REMEDIES);
     registry.detector(
         NAME,
         "people in the panorama of a conical mirror, distance by a small network (P5)",
         OmniAppearance::new,
+    );
+    #[cfg(feature = "train")]
+    registry.training(
+        TRAINER,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Panoramas,
+            quick_settings: "",
+        },
     );
     #[cfg(feature = "train")]
     registry.trainer(TRAINER, |config: Config, context| {

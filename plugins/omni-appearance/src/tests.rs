@@ -9,7 +9,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
 
-use crate::{Config, Distance, Model, OmniAppearance};
+use crate::{AfterMeasuring, Config, Distance, Model, OmniAppearance};
 
 const COLUMNS: usize = 480;
 const ROWS: usize = 120;
@@ -103,12 +103,16 @@ fn people_are_found_all_around_and_across_the_seam() {
 }
 
 #[test]
-fn by_the_printed_seam_a_person_behind_the_robot_is_in_front_of_it() {
+fn a_program_may_change_what_was_measured() {
     let camera = camera(1.55);
-    let behind = around(3.0, 180.0);
+    let to_the_front = AfterMeasuring {
+        name: "to the front",
+        correct: |blob, columns| blob.column = 0.5 * columns.len() as f64,
+    };
     let mut found = Vec::new();
-    for compat_printed_seam in [false, true] {
-        let mut detector = ready(Config { compat_printed_seam, ..analytic() }, &camera);
+    for after_measuring in [None, Some(to_the_front)] {
+        let mut detector = ready(Config { after_measuring, ..analytic() }, &camera);
+        let behind = around(3.0, 180.0);
         found.push(see(&mut detector, &frame(20, &camera, &[behind]))[0].position.x);
     }
     assert!(found[0] < -2.5 && found[1] > 2.5, "{found:?}");

@@ -11,12 +11,32 @@ mod tests;
 
 pub use config::Config;
 pub use detect::Onnx;
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
 
 /// Name of this plugin in configs.
 pub const NAME: &str = "onnx";
 
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[
+    Remedy {
+        test: "no model",
+        settings: &["model"],
+        look: "an ONNX file is needed; `tagalong model FILE.onnx` says whether it fits",
+    },
+    Remedy {
+        test: "network: late",
+        settings: &["deadline_s", "threads"],
+        look: "the network takes longer than its deadline: a smaller one, or `every = 3` beside `plugin`",
+    },
+    Remedy {
+        test: "network: score",
+        settings: &["discover_score", "track_score"],
+        look: "boxes that the network doubts; colours in the wrong order or scale lower all scores",
+    },
+];
+
 /// Registers the plugin.
 pub fn register(registry: &mut Registry) {
+    registry.remedies(NAME, REMEDIES);
     registry.detector(NAME, "people by a neural network from an ONNX file", Onnx::new);
 }

@@ -14,13 +14,28 @@ mod tests;
 
 pub use config::{Config, ScoreScale};
 pub use detect::RecordedDetections;
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
 
 /// Name of this plugin in configs.
 pub const NAME: &str = "recorded-detections";
 
+/// Settings of each test of its funnel.
+const REMEDIES: &[Remedy] = &[
+    Remedy {
+        test: "nothing recorded",
+        settings: &["path", "detections_topic"],
+        look: "does the log, or the file, have detections of these frames?",
+    },
+    Remedy {
+        test: "recorded score",
+        settings: &["min_score"],
+        look: "recorded detections that their detector doubts",
+    },
+];
+
 /// Registers the plugin.
 pub fn register(registry: &mut Registry) {
+    registry.remedies(NAME, REMEDIES);
     registry.detector(
         NAME,
         "boxes that another detector recorded, in a file or in the log",

@@ -35,6 +35,14 @@ pub const NAME: &str = "svm-patch";
 pub fn register(registry: &mut Registry) {
     registry.verifier(NAME, "a support vector machine on 20x20 grey patches (P4)", SvmPatch::new);
     #[cfg(feature = "train")]
+    registry.training(
+        NAME,
+        tagalong_config::TrainingOffer {
+            data: tagalong_config::TrainingData::Candidates,
+            quick_settings: "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
+        },
+    );
+    #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {
         train::PatchTrainer::new(config.training, context.seed)
     });

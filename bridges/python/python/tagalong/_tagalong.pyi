@@ -154,6 +154,7 @@ class Pipeline:
         stamp: _Stamp,
         *,
         scan: Optional[NDArray[np.float64]] = None,
+        scan_stamp: Optional[_Stamp] = None,
         right: Optional[NDArray[np.uint8]] = None,
         baseline_m: Optional[float] = None,
         index: Optional[int] = None,

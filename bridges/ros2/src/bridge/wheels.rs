@@ -1,6 +1,21 @@
 //! Enables that arrive, and commands that go out to the wheels.
 
-use super::*;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use ros2_client::Publisher;
+use tagalong::core::WheelSpeeds;
+use tagalong::log::LiveSource;
+use tagalong::log::msgs::{Header, Twist as TwistMessage, TwistStamped};
+use tagalong::pipeline::{Enable, EnableSwitch, Sources};
+
+use super::CONTESTED;
+use crate::network::Network;
+use crate::options::{CommandType, Setup};
+use crate::publishers::{Gate, Origin, Unfit};
+use crate::stamps::{StampClock, system_time};
+use crate::wheels::{SwitchHandle, Wheels};
+use crate::{BridgeError, Options};
 
 /// Takes a message of the enable topic to the switch: `origin` is that of a true, `None` is a false.
 pub(super) fn take_enable(switch: &SwitchHandle, gate: &Gate, origin: Option<Origin>) {

@@ -1,7 +1,7 @@
 //! Pipelines beside the last one that was named, in rooms that had no say in their settings.
 
 use serde::Serialize;
-use tagalong_reproduce::{Cell, Row, Table};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_stats::{Gain, paired_gain};
 use tagalong_tuning::Figures;
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tagalong_app::outcome::Failure;
 use tagalong_app::serialize::to_json;
-use tagalong_reproduce::{Cell, Row, Table};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_tuning::{Choice, Figures, Objective, leave_one_out, mean};
 
 use super::RoomsArgs;

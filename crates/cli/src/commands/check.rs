@@ -76,8 +76,11 @@ fn told(distances: &SafetyDistances) -> String {
         least_separation_m,
         followed_m,
         turning_radius_m,
+        stop_polygon_m,
+        slowdown_polygon_m,
+        slowdown_ratio,
     } = distances;
-    format!(
+    let mut lines = format!(
         "  at {speed_mps} m/s it stops within {stopping_m:.2} m, and brakes for things from \
          {before_things_m:.2} m on\n  \
          people who come need {separation_m:.2} m at that speed; nearer than {least_separation_m:.2} m \
@@ -85,7 +88,22 @@ fn told(distances: &SafetyDistances) -> String {
          it stops {followed_m:.2} m before the followed person; a turn sweeps a radius of \
          {turning_radius_m:.2} m\n  \
          (all but the radius from the footprint; see docs/safety.md)\n"
-    )
+    );
+    if let Some(ahead_m) = stop_polygon_m {
+        let _ = writeln!(
+            lines,
+            "  it neither drives nor turns while something is in the stop polygon, which reaches \
+             {ahead_m:.2} m ahead"
+        );
+    }
+    if let Some(ahead_m) = slowdown_polygon_m {
+        let _ = writeln!(
+            lines,
+            "  it drives at {slowdown_ratio} of its speed while something is in the slowdown polygon, \
+             which reaches {ahead_m:.2} m ahead"
+        );
+    }
+    lines
 }
 
 /// Returns what the camera does not see in a line.

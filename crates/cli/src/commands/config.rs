@@ -1,7 +1,7 @@
 use tagalong_app::config_file::OuterSettings;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
-use tagalong_app::remedies;
+use tagalong_app::remedies::Remedies;
 use tagalong_app::serialize::to_json;
 use tagalong_config::{PluginInfo, Registry, commented_defaults};
 use tagalong_pipeline::PipelineSettings;
@@ -52,7 +52,7 @@ pub fn config(registry: &Registry, plugin: &str, format: TableFormat) -> Outcome
     let text = match plugin {
         PIPELINE => around(format)?,
         ALL => all(registry, format)?,
-        FUNNEL => funnel(format)?,
+        FUNNEL => funnel(registry, format)?,
         name => one(find(registry, name)?, format)?,
     };
     print(&text)?;
@@ -102,10 +102,11 @@ fn all(registry: &Registry, format: TableFormat) -> Result<String, Failure> {
     })
 }
 
-fn funnel(format: TableFormat) -> Result<String, Failure> {
+fn funnel(registry: &Registry, format: TableFormat) -> Result<String, Failure> {
+    let remedies = Remedies::new(registry);
     Ok(match format {
-        TableFormat::Text => remedies::TABLE.to_owned(),
-        TableFormat::Markdown => remedies::markdown(),
-        TableFormat::Json => to_json("the remedies", &serde_json::json!(remedies::all()))?,
+        TableFormat::Text => remedies.toml()?,
+        TableFormat::Markdown => remedies.markdown(),
+        TableFormat::Json => to_json("the remedies", &serde_json::json!(remedies.all()))?,
     })
 }

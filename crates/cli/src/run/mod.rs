@@ -26,7 +26,7 @@ use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, say};
 use tagalong_app::progress::Progress;
-use tagalong_app::remedies;
+use tagalong_app::remedies::Remedies;
 use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
@@ -82,7 +82,8 @@ pub fn run_until(
     let mut frames = Frames::new(job.source, threads);
     let mut pipeline = job.pipeline;
     pipeline.visualise(args.overlay);
-    let live = args.serve.map(|at| serve(at, args, &job.resolved, &job.report)).transpose()?;
+    let live =
+        args.serve.map(|at| serve(at, args, registry, &job.resolved, &job.report)).transpose()?;
     let mut pace = Pace::new(args.realtime);
     let stopped = {
         let stage = Stage { desk: &mut desk, pictures: &mut pictures, live: live.as_ref() };
@@ -105,6 +106,7 @@ struct Job {
     resolved: ResolvedConfig,
     folder: PathBuf,
     report: RunReport,
+    remedies: Remedies,
 }
 
 impl Job {
@@ -139,7 +141,8 @@ impl Job {
         if settings.suits.odometry && !source.has_odometry() {
             report.notes.push(without_odometry(&config));
         }
-        Ok(Self { pipeline, outer, source, resolved, folder, report })
+        let remedies = Remedies::new(registry);
+        Ok(Self { pipeline, outer, source, resolved, folder, report, remedies })
     }
 }
 
@@ -184,11 +187,13 @@ fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
 fn serve(
     at: SocketAddr,
     args: &RunArgs,
+    registry: &Registry,
     resolved: &ResolvedConfig,
     report: &RunReport,
 ) -> Result<Live, Failure> {
     let name = report.config.name.trim_end_matches(".toml");
-    let live = Live::start(at, name, &log_name(args), resolved.values()).map_err(|error| {
+    let live = Live::start(at, name, &log_name(args), resolved.values(), registry);
+    let live = live.map_err(|error| {
         Failure::usage(format!(
             "cannot serve on {at}: {error}; name another port with --serve=PORT"
         ))
@@ -255,6 +260,7 @@ struct Desk {
     tally: Tally,
     timings: Timings,
     with_images: bool,
+    remedies: Remedies,
 }
 
 impl Desk {
@@ -272,7 +278,8 @@ impl Desk {
         let log = TrackLog::create(dir, names, job.outer.output.clone(), job.resolved.to_toml())
             .map_err(refused)?;
         let (tally, timings) = (Tally::default(), Timings::default());
-        Ok(Self { log, overlay, tally, timings, with_images: args.with_images })
+        let remedies = job.remedies.clone();
+        Ok(Self { log, overlay, tally, timings, with_images: args.with_images, remedies })
     }
 
     /// Adds the report of a frame.
@@ -327,7 +334,7 @@ impl Desk {
         let is_empty = report.frames.read == 0 && signals.received().is_none();
         if report.frames.processed == 0 && (stopped.is_some() || is_empty) {
             self.log.discard()?;
-            return verdict(args, &report, stopped, signals);
+            return verdict(args, &report, stopped, signals, &self.remedies);
         }
         let times = to_json("timings.json", &self.timings.summary())?;
         let json = to_json("report.json", &report)?;
@@ -339,7 +346,7 @@ impl Desk {
             Format::Json => print(&json)?,
             Format::Text => print(&summary::text(&report, &self.timings, &folder, args.overlay))?,
         }
-        verdict(args, &report, stopped, signals)
+        verdict(args, &report, stopped, signals, &self.remedies)
     }
 }
 
@@ -397,9 +404,9 @@ fn no_frame(report: &RunReport) -> String {
 }
 
 /// Returns the message about a run that could detect nobody, because a detector has no model.
-fn without_model(report: &RunReport) -> Option<String> {
+fn without_model(report: &RunReport, remedies: &Remedies) -> Option<String> {
     let lacks = report.funnel.iter().any(|line| line.test == NO_MODEL);
-    let remedy = remedies::of(NO_MODEL).filter(|_| lacks && report.persons.is_empty())?;
+    let remedy = remedies.of(NO_MODEL).filter(|_| lacks && report.persons.is_empty())?;
     let (name, key) = (&report.config.name, remedy.settings.join(", "));
     Some(format!(
         "{name}: a detector has no model (`{key}`), so no person was detected: {}",
@@ -416,6 +423,7 @@ fn verdict(
     report: &RunReport,
     stopped: Option<StepError>,
     signals: &Signals,
+    remedies: &Remedies,
 ) -> Outcome {
     for note in &report.notes {
         say(&format!("note: {note}"));
@@ -434,7 +442,7 @@ fn verdict(
     if report.frames.read == 0 {
         return Err(Failure::failed(no_frame(report)));
     }
-    if let Some(why) = without_model(report) {
+    if let Some(why) = without_model(report, remedies) {
         return Err(Failure::failed(why));
     }
     match (report.data_lost, args.strict) {

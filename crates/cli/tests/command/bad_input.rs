@@ -19,7 +19,7 @@ const BAD_FILES: [(&str, &str); 6] = [
 ];
 
 /// Commands with a place for a file, its extension, and the exit code where the file is bad.
-const FILES: [(&str, &str, i32); 16] = [
+const FILES: [(&str, &str, i32); 15] = [
     ("run nearest.toml FILE -o out", "mcap", 1),
     ("run FILE good.mcap -o out", "toml", 2),
     ("check nearest.toml FILE", "mcap", 1),
@@ -35,7 +35,6 @@ const FILES: [(&str, &str, i32); 16] = [
     ("simulate FILE -o out.mcap", "toml", 2),
     ("follow steered.toml FILE", "toml", 2),
     ("trials FILE --seeds 1 --configs nearest.toml", "toml", 2),
-    ("triangulate FILE --cameras hat.toml", "mcap", 1),
 ];
 
 /// Empty files that are valid: settings without keys are defaults, and tracks may be empty.
@@ -49,7 +48,7 @@ const FINE: [&str; 6] = [
 ];
 
 /// Other mistakes: description, command, exit code, and part of the message.
-const OTHERS: [(&str, &str, i32, &str); 31] = [
+const OTHERS: [(&str, &str, i32, &str); 30] = [
     ("no depth", "run nearest.toml no-depth.mcap -o out", 1, "depth"),
     ("no depth", "check nearest.toml no-depth.mcap", 1, "depth"),
     ("an unknown key", "run typo.toml good.mcap -o out", 2, "typo.toml:4"),
@@ -81,7 +80,6 @@ const OTHERS: [(&str, &str, i32, &str); 31] = [
     ("an existing output", "import images photos -o good.mcap", 2, "--overwrite"),
     ("an unknown plugin", "config nearest-thin", 2, "nearest-thing"),
     ("an unknown plugin", "train svm-pitch", 2, "svm-patch"),
-    ("an unknown system", "reproduce stereo-smv-ekf", 2, "stereo-svm-ekf"),
     ("an unknown layout", "import tmu folder.csv", 2, "tum"),
     (
         "no odometry for a controller",
@@ -125,7 +123,6 @@ fn lay_out(home: &Path) {
     write("fast.toml", &format!("robot.max_speed_mps = 50.0\n{steered}"));
     write("typo.toml", &fine.replace("roles = ", "rolls = "));
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
-    write("hat.toml", &fs::read_to_string(scenes.join("omni-hat.toml")).unwrap());
     let scene = fs::read_to_string(scenes.join("sample.toml")).unwrap();
     write("scene.toml", &scene);
     write("scene-typo.toml", &scene.replace("duration_s", "durations"));
@@ -218,7 +215,6 @@ fn a_closed_pipe_is_a_quiet_end_for_every_command_that_prints() {
         "inspect good.mcap",
         "check nearest.toml",
         "doctor nearest.toml good.mcap",
-        "reproduce",
         "eval --truth good.people.csv --tracks good.people.csv",
         "--help",
     ];
@@ -242,7 +238,6 @@ fn json_is_printed_by_every_command_that_prints_data() {
         "config ekf",
         "doctor nearest.toml good.mcap",
         "run nearest.toml good.mcap -o json-out",
-        "reproduce",
         "simulate scene.toml -o json.mcap",
     ];
     for line in lines {

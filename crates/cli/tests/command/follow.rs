@@ -89,11 +89,11 @@ fn a_sweep_rides_each_scene_with_each_value_as_a_row_of_its_own() {
 #[test]
 fn the_log_of_a_ride_has_commands_and_their_reasons() {
     let folder = tempfile::tempdir().unwrap();
-    let output = follow(folder.path(), "follow-as-printed.toml", &["-o", "rides"]);
+    let output = follow(folder.path(), "follow-arc.toml", &["-o", "rides"]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let told = text(&output.stdout);
     assert!(told.contains("(locked: chosen)"), "{told}");
-    let log = folder.path().join("rides/walk-follow-as-printed-2000000000.mcap");
+    let log = folder.path().join("rides/walk-follow-arc-2000000000.mcap");
     let inspected = tagalong().arg("inspect").arg(log).output().unwrap();
     let topics = text(&inspected.stdout);
     for topic in ["/cmd_vel", "/follow/frames", "/truth/people", "/odom"] {

@@ -30,5 +30,4 @@ mod shell;
 mod signals;
 mod simulate;
 mod train;
-mod triangulate;
 mod view;

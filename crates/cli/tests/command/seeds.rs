@@ -60,11 +60,10 @@ fn one_draw_is_printed_without_an_interval_and_two_are_never_clear() {
 #[test]
 fn seeds_that_the_split_does_not_have_are_refused() {
     let scene = configs().join("scenes/follow-swap.toml");
-    let beyond: [&[&str]; 4] = [
+    let beyond: [&[&str]; 3] = [
         &["trials", "--seeds", "2", "--first-seed", "999999999"],
         &["trials", "--split", "train", "--first-seed", "1000000000"],
         &["follow", "--seeds", "2", "--split", "validation", "--first-seed", "1999999999"],
-        &["reproduce", "stereo-ekf", "--seeds", "2", "--first-seed", "999999999"],
     ];
     for arguments in beyond {
         let mut command = tagalong();

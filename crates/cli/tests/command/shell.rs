@@ -9,7 +9,7 @@ fn every_shell_learns_the_commands() {
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let output = tagalong().args(["completions", shell]).output().unwrap();
         assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-        for command in ["doctor", "follow", "reproduce"] {
+        for command in ["doctor", "follow", "trials"] {
             assert!(text(&output.stdout).contains(command), "{shell}: {command}");
         }
     }

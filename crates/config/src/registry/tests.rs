@@ -55,6 +55,31 @@ fn a_trainer_is_found_under_the_name_of_its_plugin() {
 }
 
 #[test]
+fn a_model_is_trained_as_its_plugin_says_and_else_as_is_usual_for_its_kind() {
+    let mut registry = registry();
+    let usual = registry.training_offer("counting");
+    assert_eq!((usual.data, usual.quick_settings), (TrainingData::Candidates, ""));
+    let offer = TrainingOffer { data: TrainingData::LaserScans, quick_settings: "trees = 1" };
+    registry.training("counting", offer);
+    assert_eq!(registry.training_offer("counting"), offer);
+}
+
+#[test]
+fn what_plugins_offer_is_listed_with_their_names() {
+    let mut registry = registry();
+    registry.remedies("fixed", &[Remedy { test: "odd", settings: &["least"], look: "noise" }]);
+    registry.trial_values("counting", &[TrialValues { setting: "least", values: &[1.0] }]);
+    registry.alternative("fixed");
+    registry.alternative("not registered");
+    let remedies: Vec<_> = registry.all_remedies().map(|(name, of)| (name, of.test)).collect();
+    assert_eq!(remedies, [("fixed", "odd")]);
+    let values: Vec<_> = registry.all_trial_values().map(|(name, of)| (name, of.setting)).collect();
+    assert_eq!(values, [("counting", "least")]);
+    let alternatives: Vec<_> = registry.alternatives().map(|plugin| plugin.name).collect();
+    assert_eq!(alternatives, ["fixed"]);
+}
+
+#[test]
 fn who_cannot_be_trained_is_answered_with_who_can() {
     let fixed = "the verifier `fixed` cannot be trained; available: counting";
     assert_eq!(refusal("fixed"), fixed);

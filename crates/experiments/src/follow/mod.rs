@@ -22,7 +22,7 @@ use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_pipeline::LooksSettings;
-use tagalong_reproduce::Table;
+use tagalong_report::Table;
 use tagalong_sim::{InjectedFault, Scene, ScheduledFault, Seeds, Split, Variant};
 use tagalong_simulate::scenes;
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};

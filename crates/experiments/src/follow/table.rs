@@ -1,5 +1,5 @@
 use tagalong_eval::{draws_interval, percentile};
-use tagalong_reproduce::{Cell, Row, Table};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Seeds;
 use tagalong_trials::{Ridden, RideJudge};
 

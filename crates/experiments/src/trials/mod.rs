@@ -30,7 +30,7 @@ const HARD: [&str; 6] = [
 ];
 
 /// Pipelines that are compared where none are named.
-const PIPELINES: [&str; 3] = ["depth-ekf", "depth-ekf-as-printed", "naive"];
+const PIPELINES: [&str; 2] = ["depth-ekf", "naive"];
 
 /// Arguments of `tagalong trials`.
 #[derive(Args, Debug)]
@@ -38,7 +38,7 @@ pub struct TrialsArgs {
     /// The scenes [default: the hard ones of configs/scenes].
     pub scenes: Vec<PathBuf>,
     /// The pipelines; the last one is the baseline of the others [default:
-    /// depth-ekf, depth-ekf-as-printed, naive].
+    /// depth-ekf, naive].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
     /// The split that the seeds belong to; settings are chosen on `validation`.

@@ -5,7 +5,7 @@ use tagalong_eval::{
     CONFIDENCE, Clear, Gain, Identity, Interval, PositionError, draws_interval, holm,
     is_significant, paired_gain, wilson,
 };
-use tagalong_reproduce::{self as reproduce, Cell};
+use tagalong_report::{self as report, Cell};
 use tagalong_sim::Seeds;
 use tagalong_trials::Contender;
 
@@ -161,7 +161,7 @@ impl Table {
     }
 
     /// Returns the table for a page, with the gains as its last column.
-    pub fn page(&self) -> reproduce::Table {
+    pub fn page(&self) -> report::Table {
         let columns = ["MOTA", "IDF1", "error m", "all frames right", "IDSW", "IDF1 gained"]
             .map(str::to_owned);
         let seeds = format!("each scene with {}", self.seeds);
@@ -175,7 +175,7 @@ impl Table {
             )
         });
         let notes = [seeds, intervals.into(), self.perfection()].into_iter().chain(gains);
-        reproduce::Table {
+        report::Table {
             title: "Simulated scenes".into(),
             columns: columns.to_vec(),
             rows: self.rows.iter().map(|row| self.page_row(row)).collect(),
@@ -183,7 +183,7 @@ impl Table {
         }
     }
 
-    fn page_row(&self, row: &Row) -> reproduce::Row {
+    fn page_row(&self, row: &Row) -> report::Row {
         let of_row = |gain: &&GainRow| gain.suite == row.suite && gain.pipeline == row.pipeline;
         let gain = self.gains.iter().find(of_row).map(|gain| gain.idf1.difference);
         let cells = vec![
@@ -194,7 +194,7 @@ impl Table {
             Cell::number(row.switches as f64, 0),
             Cell::estimate(gain, 3),
         ];
-        reproduce::Row::ours(format!("{}: {}", row.suite, row.pipeline), cells)
+        report::Row::ours(format!("{}: {}", row.suite, row.pipeline), cells)
     }
 
     /// Returns a note on suites that a pipeline solves, which are too easy.

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{LaserScan, RayReading};
+use tagalong_core::{EgoMotion, LaserScan, RayReading};
 
 use super::CollisionMonitorSettings;
 use super::footprint::{Footprint, Path};
@@ -62,6 +62,14 @@ impl Coverage {
             looks.push((direction(&eye, &scan.place(unread.ray, 1.0).xy()), look));
         }
         Self { eye, looks, min_share }
+    }
+
+    /// Moves the directions of an earlier frame into the robot's new frame.
+    pub(super) fn advance(&mut self, motion: &EgoMotion) {
+        self.eye = motion.apply_to_point(self.eye);
+        for (direction, _) in &mut self.looks {
+            *direction -= motion.turn;
+        }
     }
 
     /// Returns the coverage with another least share.

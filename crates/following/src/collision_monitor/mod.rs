@@ -7,15 +7,22 @@
 //! | module | content |
 //! |---|---|
 //! | `footprint` | outline of the robot, and the paths that it takes |
+//! | `depth_state`, `source_state` | state of a depth camera, of a scanner and of a range sensor |
+//! | `further_source` | a source of the settings, by its kind |
+//! | `freshness` | which reading is new, and how old the newest one is |
 //! | `obstacle_memory` | things in the depth image, and those that left it |
 //! | `space` | places that were seen free: a thing that appears there moves |
 //! | `sweep` | speed on a path before things and beside people |
 //! | `coverage` | share of valid readings in the swept region: unknown is not free |
+//! | `zones` | stop and slowdown polygons |
 //! | `watchdog` | sensors that repeat themselves or contradict the odometry |
 
 mod binned;
 mod coverage;
+mod depth_state;
 mod footprint;
+mod freshness;
+mod further_source;
 mod ground;
 mod obstacle_memory;
 mod settings;
@@ -24,25 +31,26 @@ mod sources;
 mod space;
 mod sweep;
 mod watchdog;
-
-use std::collections::BTreeMap;
-use std::sync::Arc;
+mod zones;
 
 use binned::BinnedHazards;
 use coverage::Coverage;
+use depth_state::DepthState;
 pub(crate) use footprint::{Footprint, Path};
-use nalgebra::{Point2, Point3};
-use obstacle_memory::{CARRIED_M, ObstacleMemory};
+use freshness::Freshness;
+use further_source::FurtherSource;
+use nalgebra::Point2;
+use obstacle_memory::CARRIED_M;
 pub use settings::{CollisionMonitorSettings, NoReturn, ObstacleSource};
-use source_state::{RangeState, ScanState, Silence};
+use source_state::ScanState;
 pub use sources::{SourceKind, SourceSettings};
-use space::{Presence, SpaceGrid};
+use space::Presence;
 pub(crate) use sweep::{Allowance, Braking, reach_m};
 use sweep::{Hazard, HazardKind, allowance};
 use tagalong_core::{
-    EgoMotion, Frame, ObstacleData, ObstacleReading, ObstacleReadings, Reason, Track, TrackId,
+    CameraImage, DepthImage, EgoMotion, Frame, ObstacleReadings, Reason, Track, TrackId,
 };
-use watchdog::{DepthReference, Watch};
+use zones::Zones;
 
 use crate::RobotSettings;
 
@@ -64,68 +72,54 @@ const UNSURE_MPS: f64 = 0.2;
 pub(crate) struct CollisionMonitor {
     settings: CollisionMonitorSettings,
     footprint: Footprint,
-    memory: ObstacleMemory,
-    depth_space: SpaceGrid,
-    depth_watch: Watch<DepthReference>,
-    depth_silence: Silence,
+    /// Camera of the frames.
+    depth: DepthState,
+    depth_age: Freshness,
+    /// Scanner of the frames.
     laser: ScanState,
-    /// Further sources, by name.
-    scans: BTreeMap<Arc<str>, ScanState>,
-    depths: BTreeMap<Arc<str>, FurtherDepth>,
-    ranges: BTreeMap<Arc<str>, RangeState>,
-    /// Age of the newest reading of each further source, s.
-    ages_s: BTreeMap<Arc<str>, f64>,
-    is_touched: bool,
+    laser_age: Freshness,
+    sources: Vec<FurtherSource>,
     hazards: BinnedHazards,
+    zones: Zones,
     coverages: Vec<Coverage>,
-}
-
-/// Depth camera beside that of the frames.
-struct FurtherDepth {
-    memory: ObstacleMemory,
-    space: SpaceGrid,
-    watch: Watch<DepthReference>,
 }
 
 impl CollisionMonitor {
     pub(crate) fn new(settings: CollisionMonitorSettings, robot: &RobotSettings) -> Self {
         let footprint = Footprint::new(&robot.footprint);
+        let sources = settings.sources.iter().cloned();
         Self {
-            memory: ObstacleMemory::new(footprint.clone()),
-            footprint,
-            depth_space: SpaceGrid::default(),
-            depth_watch: Watch::default(),
-            depth_silence: Silence::default(),
+            depth: DepthState::new(footprint.clone()),
+            depth_age: Freshness::default(),
             laser: ScanState::default(),
-            scans: BTreeMap::new(),
-            depths: BTreeMap::new(),
-            ranges: BTreeMap::new(),
-            ages_s: BTreeMap::new(),
-            is_touched: false,
+            laser_age: Freshness::default(),
+            sources: sources.map(|source| FurtherSource::new(source, &footprint)).collect(),
             hazards: BinnedHazards::default(),
+            zones: Zones::new(&settings),
             coverages: Vec::new(),
+            footprint,
             settings,
         }
     }
 
-    /// Forgets all places, after a jump of the clock, but not which sensors there are.
+    /// Forgets all places, after a jump of the clock, but neither which sensors there are nor that one
+    /// was frozen.
     pub(crate) fn clear(&mut self) {
-        self.memory.clear();
-        self.depth_space = SpaceGrid::default();
-        self.depth_watch = Watch::default();
+        self.depth.clear();
         self.laser.clear();
-        self.scans.values_mut().for_each(ScanState::clear);
-        self.depths.clear();
-        self.ranges.clear();
+        for source in &mut self.sources {
+            source.clear();
+        }
         self.hazards.clear();
     }
 
     /// Forgets that a sensor was frozen, after a person has checked the robot.
     pub(crate) fn arm(&mut self) {
-        self.depth_watch = Watch::default();
+        self.depth.arm();
         self.laser.arm();
-        self.scans.values_mut().for_each(ScanState::arm);
-        self.depths.values_mut().for_each(|depth| depth.watch = Watch::default());
+        for source in &mut self.sources {
+            source.arm();
+        }
     }
 
     /// Takes in a frame, `motion` after the one before, in which `followed` is the target.
@@ -137,22 +131,27 @@ impl CollisionMonitor {
         followed: Option<TrackId>,
     ) {
         let target = tracks.iter().find(|track| Some(track.id) == followed);
-        self.hazards.begin(&self.settings, &self.footprint);
-        self.coverages.clear();
         self.update_depth(frame, motion, tracks, target);
+        self.update_laser(frame, motion, tracks);
+        let readings = frame.sensor::<ObstacleReadings>();
+        let readings = readings.map_or(&[][..], |readings| &readings.0);
+        for source in &mut self.sources {
+            source.update(&self.settings, readings, motion, tracks, target);
+        }
         let people = People { settings: &self.settings, tracks, target };
         let hazards = &mut self.hazards;
-        add_depth_hazards(&self.settings, &self.memory, &self.depth_space, &people, hazards);
-        if frame.depth().is_ok() {
-            self.coverages.push(self.memory.coverage(self.settings.min_share));
-        }
-        self.laser.update(&self.settings, frame.laser(), motion, tracks);
+        hazards.begin(&self.settings, &self.footprint);
+        self.coverages.clear();
+        self.depth.add_to(&self.settings, &people, hazards);
+        self.coverages.extend(self.depth.coverage(self.settings.min_share));
         self.laser.add_to(&self.settings, &people, hazards);
         self.coverages.extend(self.laser.coverage(self.settings.min_share));
-        let further = frame.sensor::<ObstacleReadings>().ok();
-        self.update_sources(further, motion, tracks, target);
-        let people = People { settings: &self.settings, tracks, target };
-        people.add_to(&mut self.hazards);
+        for source in &self.sources {
+            source.add_to(&self.settings, &people, hazards);
+            self.coverages.extend(source.coverage());
+        }
+        people.add_to(hazards);
+        self.zones.update(hazards.all());
     }
 
     fn update_depth(
@@ -162,129 +161,81 @@ impl CollisionMonitor {
         tracks: &[Track],
         target: Option<&Track>,
     ) {
-        let depth = frame.depth().ok();
-        let camera = &frame.camera;
-        let person = target.map(|track| &track.estimate.person);
-        self.depth_silence.update(depth.is_some(), motion.dt);
-        self.memory.update(&self.settings, camera, depth, motion, person);
-        if let (Ok(left), true) = (frame.grey(), frame.right().is_ok()) {
-            self.memory.excuse_smooth(left);
+        let taken = frame.sensor::<CameraImage<DepthImage>>().ok();
+        // A frame is made of its images, so that each of them is new with it.
+        self.depth_age.update(taken.map(|_| (frame.stamp, 0.0)), motion.dt);
+        let image = taken.map(|taken| (&*frame.camera, &taken.image));
+        self.depth.update(&self.settings, image, motion, tracks, target);
+        if taken.is_some() && frame.right().is_ok() {
+            if let Ok(left) = frame.grey() {
+                self.depth.excuse_smooth(left);
+            }
         }
-        self.depth_space.advance(motion);
-        if let Some(depth) = depth {
-            add_free_space(&self.memory, &mut self.depth_space);
-            self.depth_watch.add_depth(camera, depth, motion, tracks);
-        }
-        self.memory.add_tracks(tracks, target.map(|track| track.id));
+        self.depth.add_tracks(tracks, target.map(|track| track.id));
     }
 
-    /// Takes in the further sources. One that delivers nothing with this frame keeps its last reading.
-    fn update_sources(
-        &mut self,
-        readings: Option<&ObstacleReadings>,
-        motion: &EgoMotion,
-        tracks: &[Track],
-        target: Option<&Track>,
-    ) {
-        for age_s in self.ages_s.values_mut() {
-            *age_s += motion.dt.max(0.0);
-        }
-        let readings = readings.map_or(&[][..], |readings| &readings.0);
-        let find = |name: &str| readings.iter().find(|reading| &*reading.source == name);
-        let people = People { settings: &self.settings, tracks, target };
-        let person = target.map(|track| &track.estimate.person);
-        self.is_touched = false;
-        for source in &self.settings.sources {
-            let reading = find(&source.name);
-            let name: Arc<str> = source.name.as_str().into();
-            if let Some(ObstacleReading { age_s, .. }) = reading {
-                self.ages_s.insert(Arc::clone(&name), *age_s);
-            }
-            let data = reading.map(|reading| &reading.data);
-            match source.kind {
-                SourceKind::Scan => {
-                    let scan = match data {
-                        Some(ObstacleData::Scan(scan)) => Some(scan),
-                        _ => None,
-                    };
-                    let state = self.scans.entry(name).or_default();
-                    state.update(&self.settings, scan, motion, tracks);
-                    state.add_to(&self.settings, &people, &mut self.hazards);
-                    self.coverages.extend(state.coverage(source.min_share));
-                }
-                SourceKind::Depth => {
-                    let footprint = &self.footprint;
-                    let state = self.depths.entry(name).or_insert_with(|| FurtherDepth {
-                        memory: ObstacleMemory::new(footprint.clone()),
-                        space: SpaceGrid::default(),
-                        watch: Watch::default(),
-                    });
-                    state.space.advance(motion);
-                    if let Some(ObstacleData::Depth { image, camera }) = data {
-                        state.memory.update(&self.settings, camera, Some(image), motion, person);
-                        add_free_space(&state.memory, &mut state.space);
-                        state.watch.add_depth(camera, image, motion, tracks);
-                        self.coverages.push(state.memory.coverage(source.min_share));
-                    }
-                    let hazards = &mut self.hazards;
-                    let FurtherDepth { memory, space, .. } = state;
-                    add_depth_hazards(&self.settings, memory, space, &people, hazards);
-                }
-                SourceKind::Range => {
-                    let reading = match data {
-                        Some(ObstacleData::Range(reading)) => Some(reading),
-                        _ => None,
-                    };
-                    let state = self.ranges.entry(name).or_default();
-                    state.update(reading, motion);
-                    state.add_to(&self.settings, &mut self.hazards);
-                    self.coverages.extend(state.coverage(source.min_share));
-                }
-                SourceKind::Bumper => {
-                    self.is_touched |= matches!(data, Some(ObstacleData::Bumper(true)));
-                }
-            }
-        }
+    fn update_laser(&mut self, frame: &Frame, motion: &EgoMotion, tracks: &[Track]) {
+        let scan = frame.laser();
+        let stamp = scan.map(|scan| scan.stamp.unwrap_or(frame.stamp));
+        // A scan of after its frame is as new as it can be.
+        let stamped = stamp.map(|stamp| (stamp, frame.stamp.seconds_since(stamp).max(0.0)));
+        let is_new = self.laser_age.update(stamped, motion.dt);
+        self.laser.update(&self.settings, scan.filter(|_| is_new), motion, tracks);
     }
 
     /// Returns the reason for which the robot must stand, if there is one; no sensor may be silent for
     /// longer than `patience_s`.
     pub(crate) fn stop_reason(&self, patience_s: f64) -> Option<Reason> {
-        if self.is_touched {
+        if self.sources.iter().any(FurtherSource::is_touched) {
             return Some(Reason::Contact);
         }
         if self.settings.obstacles == ObstacleSource::None {
             return None;
         }
-        if !self.is_sighted(patience_s) || self.memory.is_blind(&self.settings) {
+        if self.is_silent(patience_s) {
+            return Some(Reason::Silent);
+        }
+        if !self.has_eyes() || self.is_blind() {
             return Some(Reason::Blind);
         }
-        let most = if self.settings.noiseless { 0 } else { self.settings.identical_frames };
-        let depth_watches = self.depths.values().map(|depth| &depth.watch);
-        let scans = self.scans.values().chain([&self.laser]);
-        let is_frozen = self.depth_watch.is_frozen(most)
-            || depth_watches.into_iter().any(|watch| watch.is_frozen(most))
-            || scans.into_iter().any(|scan| scan.is_frozen(most));
-        is_frozen.then_some(Reason::Frozen)
+        if self.is_frozen() {
+            return Some(Reason::Frozen);
+        }
+        self.zones.stop_reason()
     }
 
-    /// Returns true if one of the sensors delivered with this frame, none that ever did has been
-    /// silent for too long, and each configured source delivers.
-    fn is_sighted(&self, patience_s: f64) -> bool {
-        let silences = [self.depth_silence, self.laser.silence()];
-        let depth_or_laser = silences.iter().any(|silence| silence.delivers());
-        let in_time = silences.iter().all(|silence| silence.is_within(patience_s));
-        let mut eyes = depth_or_laser;
-        for source in &self.settings.sources {
-            let age_s = self.ages_s.get(source.name.as_str()).copied().unwrap_or(f64::INFINITY);
-            // Positive comparison, so that an age that is no number counts as silence.
-            let delivers = age_s <= source.source_timeout_s;
-            if !delivers {
-                return false;
-            }
-            eyes |= matches!(source.kind, SourceKind::Scan | SourceKind::Depth);
+    /// Returns the factor of the speed, and its reason, if something is in the slowdown polygon.
+    pub(crate) fn slowdown(&self) -> Option<(f64, Reason)> {
+        if self.settings.obstacles == ObstacleSource::None {
+            return None;
         }
-        eyes && in_time
+        Some((self.settings.slowdown_ratio, self.zones.slowdown_reason()?))
+    }
+
+    /// Returns true if a sensor that once delivered, or a configured source, is silent.
+    fn is_silent(&self, patience_s: f64) -> bool {
+        self.depth_age.is_silent(patience_s)
+            || self.laser_age.is_silent(patience_s)
+            || self.sources.iter().any(FurtherSource::is_silent)
+    }
+
+    /// Returns true if the frame has depth or a scan, or a source sees obstacles.
+    fn has_eyes(&self) -> bool {
+        self.depth_age.delivers()
+            || self.laser_age.delivers()
+            || self.sources.iter().any(FurtherSource::is_eye)
+    }
+
+    fn is_blind(&self) -> bool {
+        self.depth.is_blind(&self.settings)
+            || self.sources.iter().any(|source| source.is_blind(&self.settings))
+    }
+
+    fn is_frozen(&self) -> bool {
+        let most = if self.settings.noiseless { 0 } else { self.settings.identical_frames };
+        self.depth.is_frozen(most)
+            || self.laser.is_frozen(most)
+            || self.sources.iter().any(|source| source.is_frozen(most))
     }
 
     /// Returns the largest speeds, up to `speed`, on a path.
@@ -309,37 +260,6 @@ impl CollisionMonitor {
         }
         let most = part * speed;
         Allowance { gentle: most, most, slower: Reason::Unclear, stops: Reason::Unknown }
-    }
-}
-
-/// Adds the places that a depth image shows to be free.
-fn add_free_space(memory: &ObstacleMemory, space: &mut SpaceGrid) {
-    let (eye, free_to) = memory.free_to();
-    let near = memory.seen().iter().filter(|point| point.z > 0.0).map(Point3::xy);
-    space.add(eye, near.chain(memory.nearest()), free_to);
-}
-
-/// Adds the things in a depth image, those that are remembered, and those that hide a part of it.
-fn add_depth_hazards(
-    settings: &CollisionMonitorSettings,
-    memory: &ObstacleMemory,
-    space: &SpaceGrid,
-    people: &People<'_>,
-    hazards: &mut BinnedHazards,
-) {
-    let first = hazards.len();
-    for point in memory.seen() {
-        hazards.add(point.xy(), 1, point.z <= 0.0);
-    }
-    // Judged by cell, because an image has thousands of points in a few hundred cells.
-    hazards.judge_since(first, |at| people.kind(at, space.presence(at)));
-    for thing in memory.remembered() {
-        // A remembered obstacle was confirmed by many points, so alone it is enough to stop.
-        let kind = if thing.is_person { HazardKind::Moves(0.0) } else { HazardKind::Still };
-        hazards.push(Hazard { at: thing.at, points: settings.min_points, kind }, thing.is_drop);
-    }
-    for at in memory.hidden() {
-        hazards.push(Hazard { at, points: 1, kind: HazardKind::Still }, false);
     }
 }
 

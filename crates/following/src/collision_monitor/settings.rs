@@ -20,6 +20,15 @@ pub struct CollisionMonitorSettings {
     /// Distance of the footprint from an obstacle at which the robot stops before it, m.
     #[schemars(range(min = 0.15, max = 2.0))]
     pub stop_m: f64,
+    /// Stop polygon: corners `[x, y]` in the robot frame, m. While `min_points` readings are inside,
+    /// the robot neither drives nor turns. Left out, there is none.
+    pub stop: Vec<[f64; 2]>,
+    /// Slowdown polygon, in the same form: while `min_points` readings are inside, the robot drives and
+    /// turns at `slowdown_ratio` of its speed.
+    pub slowdown: Vec<[f64; 2]>,
+    /// Factor of the speed while something is inside `slowdown`.
+    #[schemars(range(min = 0.05, max = 1.0))]
+    pub slowdown_ratio: f64,
     /// Keeps away from people, and from things that move, so far that the robot stands before they
     /// can reach it; see `people_mps`.
     pub separation: bool,
@@ -69,8 +78,8 @@ pub struct CollisionMonitorSettings {
     /// region, or "free" for a scanner that misses nothing within its range, alone in rooms that are
     /// larger than that.
     pub no_return: NoReturn,
-    /// Number of frames in a row with the very same depth image, or the same scan, after which the
-    /// sensor counts as frozen: real ones have noise.
+    /// Number of new depth images or scans in a row that repeat the one before, after which the sensor
+    /// counts as frozen: real ones have noise. One that comes with several frames is new once.
     #[schemars(range(min = 2, max = 100))]
     pub identical_frames: u32,
     /// The sensors are simulated without noise: equal images are not taken to be frozen.
@@ -111,6 +120,9 @@ impl Default for CollisionMonitorSettings {
             obstacles: ObstacleSource::Sensed,
             side_m: 0.09,
             stop_m: 0.35,
+            stop: Vec::new(),
+            slowdown: Vec::new(),
+            slowdown_ratio: 0.5,
             separation: true,
             people_mps: 1.6,
             people_accel_mps2: 2.0,
@@ -142,6 +154,8 @@ impl CollisionMonitorSettings {
     /// [`Error::Settings`] names the key and the remedy.
     pub fn check(&self, robot: &RobotSettings, limiter: &CommandLimiterSettings) -> Result<()> {
         SourceSettings::check_all(&self.sources)?;
+        self.check_polygon("stop", &self.stop)?;
+        self.check_polygon("slowdown", &self.slowdown)?;
         at_least("top_m", self.top_m, "height_m", robot.height_m)?;
         at_least("stop_m", self.stop_m, "side_m", self.side_m)?;
         let stopping_m = limiter.stopping_m(robot.max_speed_mps) - limiter.margin_m + self.stop_m;
@@ -155,6 +169,27 @@ impl CollisionMonitorSettings {
             self.stop_m, self.range_m
         );
         Err(Error::setting("range_m", why))
+    }
+
+    fn check_polygon(&self, key: &'static str, corners: &[[f64; 2]]) -> Result<()> {
+        let count = corners.len();
+        if count > 0 && !(3..=64).contains(&count) {
+            let why = format!("must have 3 to 64 corners [x, y], or none, not {count}");
+            return Err(Error::setting(key, why));
+        }
+        let range_m = self.range_m;
+        for [x, y] in corners {
+            // Positive comparison, so that NaN is refused.
+            let is_seen = x.hypot(*y) <= range_m;
+            if !is_seen {
+                let why = format!(
+                    "has a corner at [{x}, {y}], beyond `range_m` ({range_m} m), where obstacles are \
+                     ignored: move it or raise `range_m`"
+                );
+                return Err(Error::setting(key, why));
+            }
+        }
+        Ok(())
     }
 
     /// Returns the number of image points that one ray of a laser scanner counts for: two rays make

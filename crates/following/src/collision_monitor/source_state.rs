@@ -20,34 +20,6 @@ const ON_ARC: usize = 9;
 /// Length of the way that a ray without a reflection keeps free, m, where that means free.
 const FREE_M: f64 = 6.0;
 
-/// Time for which a sensor has been silent.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Silence {
-    /// Time since its last reading, s; `None` before the first one.
-    silent_s: Option<f64>,
-}
-
-impl Silence {
-    /// Takes in that the sensor delivered or did not, `dt_s` after the frame before.
-    pub(super) fn update(&mut self, delivers: bool, dt_s: f64) {
-        self.silent_s = if delivers {
-            Some(0.0)
-        } else {
-            self.silent_s.map(|silent_s| silent_s + dt_s.max(0.0))
-        };
-    }
-
-    /// Returns true if the sensor delivered with this frame.
-    pub(super) fn delivers(self) -> bool {
-        self.silent_s == Some(0.0)
-    }
-
-    /// Returns true if the sensor never delivered, or not so long ago.
-    pub(super) fn is_within(self, patience_s: f64) -> bool {
-        self.silent_s.is_none_or(|silent_s| silent_s <= patience_s)
-    }
-}
-
 /// Laser scanner: between two scans the last one holds.
 #[derive(Default)]
 pub(super) struct ScanState {
@@ -56,13 +28,15 @@ pub(super) struct ScanState {
     coverage: Option<Coverage>,
     space: SpaceGrid,
     watch: Watch<ScanReference>,
-    silence: Silence,
 }
 
 impl ScanState {
-    /// Forgets all places.
+    /// Forgets all places, but not that the scanner was frozen.
     pub(super) fn clear(&mut self) {
-        *self = Self { silence: self.silence, ..Self::default() };
+        self.points.clear();
+        self.coverage = None;
+        self.space = SpaceGrid::default();
+        self.watch.clear();
     }
 
     /// Forgets that the scanner was frozen.
@@ -70,15 +44,12 @@ impl ScanState {
         self.watch = Watch::default();
     }
 
-    pub(super) fn silence(&self) -> Silence {
-        self.silence
+    /// Returns true if the scanner repeats itself, or contradicted the odometry.
+    pub(super) fn is_frozen(&self, identical_readings: u32) -> bool {
+        self.watch.is_frozen(identical_readings)
     }
 
-    pub(super) fn is_frozen(&self, identical_frames: u32) -> bool {
-        self.watch.is_frozen(identical_frames)
-    }
-
-    /// Takes in the scan of a frame, if there is one, `motion` after the frame before.
+    /// Takes in a new scan, if there is one, `motion` after the frame before.
     pub(super) fn update(
         &mut self,
         settings: &CollisionMonitorSettings,
@@ -86,11 +57,14 @@ impl ScanState {
         motion: &EgoMotion,
         tracks: &[Track],
     ) {
-        self.silence.update(scan.is_some(), motion.dt);
         self.space.advance(motion);
+        self.watch.advance(motion);
         let Some(scan) = scan else {
             for at in &mut self.points {
                 *at = motion.apply_to_point(*at);
+            }
+            if let Some(coverage) = &mut self.coverage {
+                coverage.advance(motion);
             }
             return;
         };
@@ -108,7 +82,7 @@ impl ScanState {
         let passed = silent.map(|unread| scan.place(unread.ray, FREE_M).xy());
         let ends = self.points.iter().copied().chain(passed);
         self.space.add(eye, self.points.iter().copied(), ends);
-        self.watch.add_scan(scan, motion, tracks);
+        self.watch.add_scan(scan, tracks);
         self.coverage = Some(Coverage::of_scan(settings, scan, settings.min_share));
     }
 
@@ -141,11 +115,14 @@ pub(super) struct RangeState {
 }
 
 impl RangeState {
-    /// Takes in the reading of a frame, if there is one, `motion` after the frame before.
+    /// Takes in a new reading, if there is one, `motion` after the frame before.
     pub(super) fn update(&mut self, reading: Option<&RangeReading>, motion: &EgoMotion) {
         let Some(reading) = reading else {
             for at in &mut self.arc {
                 *at = motion.apply_to_point(*at);
+            }
+            if let Some(coverage) = &mut self.coverage {
+                coverage.advance(motion);
             }
             return;
         };

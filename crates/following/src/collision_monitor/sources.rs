@@ -73,9 +73,8 @@ impl SourceSettings {
                 let why = format!("has two sources called `{}`: rename one", source.name);
                 return Err(Error::setting("sources", why));
             }
-            // Positive comparison, so that NaN is refused.
-            let is_finite = |mount: &[f64; 6]| mount.iter().all(|value| value.is_finite());
-            if !source.mount.as_ref().is_none_or(is_finite) {
+            let mut mount = source.mount.iter().flatten();
+            if !mount.all(|value| value.is_finite()) {
                 let why = format!("`{}` has a mount that is no number", source.name);
                 return Err(Error::setting("sources", why));
             }

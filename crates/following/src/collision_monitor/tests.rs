@@ -3,7 +3,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Vector2};
 use tagalong_conformance::target;
 use tagalong_core::{DepthImage, LaserScan};
-use tagalong_core::{Images, RangeReading, RayReading, Stamp};
+use tagalong_core::{Images, ObstacleData, ObstacleReading, RangeReading, RayReading, Stamp};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use super::*;
@@ -359,6 +359,11 @@ fn with_source(kind: SourceKind) -> CollisionMonitorSettings {
     CollisionMonitorSettings { sources: vec![source], ..CollisionMonitorSettings::default() }
 }
 
+/// Returns a reading of the source `eye` with a stamp.
+fn reading(stamp: Stamp, data: ObstacleData) -> ObstacleReading {
+    ObstacleReading { source: "eye".into(), stamp, age_s: 0.02, data }
+}
+
 /// Returns a monitor after two seconds with depth, and a source that delivers until frame `until`.
 fn with_readings(
     kind: SourceKind,
@@ -369,7 +374,7 @@ fn with_readings(
     for index in 0..20 {
         let frame = frame(index, EgoMotion::at_rest(0.1), Some(depth_at(index, 0.0, 0.0)), None);
         let frame = if index < until {
-            let reading = ObstacleReading { source: "eye".into(), age_s: 0.02, data: data(index) };
+            let reading = reading(frame.stamp, data(index));
             frame.with_sensor(ObstacleReadings(Arc::new([reading])))
         } else {
             frame
@@ -427,7 +432,7 @@ fn a_second_scanner_and_a_second_camera_see_obstacles() {
 fn a_source_that_never_delivered_or_falls_silent_stops_the_robot() {
     for until in [0, 14] {
         let silent = with_readings(SourceKind::Range, until, |_| sonar(f64::INFINITY));
-        assert_eq!(silent.stop_reason(0.5), Some(Reason::Blind), "{until}");
+        assert_eq!(silent.stop_reason(0.5), Some(Reason::Silent), "{until}");
     }
     let late = with_readings(SourceKind::Range, 16, |_| sonar(f64::INFINITY));
     assert_eq!(late.stop_reason(0.5), None, "within its timeout");
@@ -472,5 +477,36 @@ fn a_jump_of_the_clock_does_not_forget_which_sensors_there_were() {
         let frame = frame(index, EgoMotion::at_rest(0.3), Some(depth_at(index, 0.0, 0.0)), None);
         monitor.update(&frame, &frame.motion, &[], None);
     }
-    assert_eq!(monitor.stop_reason(0.5), Some(Reason::Blind));
+    assert_eq!(monitor.stop_reason(0.5), Some(Reason::Silent));
 }
+
+/// A wall is 4 m away; a scan meets something at 0.9 m.
+#[test]
+fn something_in_a_polygon_stops_or_slows_the_robot() {
+    let square = |side_m: f64| {
+        vec![[side_m, side_m], [side_m, -side_m], [-side_m, -side_m], [-side_m, side_m]]
+    };
+    let settings = CollisionMonitorSettings {
+        stop: square(0.5),
+        slowdown: square(1.0),
+        ..CollisionMonitorSettings::default()
+    };
+    for (met_m, stop, slowdown) in [
+        (None, None, None),
+        (Some(0.9), None, Some((0.5, Reason::Obstacle))),
+        (Some(0.4), Some(Reason::Blocked), Some((0.5, Reason::Obstacle))),
+    ] {
+        let mut monitor = monitor_of(settings.clone());
+        for index in 0..20 {
+            // Beside the robot.
+            let thing = |deg: i32| met_m.filter(|_| (86..95).contains(&deg));
+            let scan = scan_at(index, 0.0, 0.0, thing);
+            let frame = frame(index, EgoMotion::at_rest(0.1), None, Some(scan));
+            monitor.update(&frame, &frame.motion, &[], None);
+        }
+        assert_eq!(monitor.stop_reason(0.5), stop, "{met_m:?}");
+        assert_eq!(monitor.slowdown(), slowdown, "{met_m:?}");
+    }
+}
+
+mod slow_sensors;

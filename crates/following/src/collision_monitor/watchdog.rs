@@ -1,5 +1,7 @@
 //! Watchdog for sensors that repeat themselves, or that do not change as the odometry says.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry2, Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use tagalong_core::{DepthImage, EgoMotion, LaserScan, Track};
 use tagalong_geometry::Camera;
@@ -30,26 +32,46 @@ const FAR_M: f64 = 6.0;
 pub(super) struct Watch<R> {
     /// Previous readings, bit for bit.
     previous: Vec<u32>,
-    /// Number of frames in a row with the same readings.
+    /// Number of new readings in a row that were the same.
     repeated: u32,
     /// Readings and pose of an earlier frame, with which the picture is compared.
     reference: Option<(R, Isometry2<f64>)>,
     /// Comparisons in a row that contradicted the odometry.
     contradictions: u32,
+    /// True once enough of them did: a robot that stands cannot be contradicted, so this holds until
+    /// the watch is set up anew.
+    is_contradicted: bool,
 }
 
 impl<R> Default for Watch<R> {
     fn default() -> Self {
-        Self { previous: Vec::new(), repeated: 0, reference: None, contradictions: 0 }
+        Self {
+            previous: Vec::new(),
+            repeated: 0,
+            reference: None,
+            contradictions: 0,
+            is_contradicted: false,
+        }
     }
 }
 
 impl<R> Watch<R> {
-    /// Returns true if the sensor has repeated itself for so many frames, or contradicts the
-    /// odometry.
-    pub(super) fn is_frozen(&self, identical_frames: u32) -> bool {
-        // A robot that stands cannot be contradicted: until it is armed again it stays so.
-        self.contradictions >= IN_A_ROW || identical_frames > 0 && self.repeated >= identical_frames
+    /// Returns true if the sensor has repeated itself so many times, or contradicted the odometry.
+    pub(super) fn is_frozen(&self, identical_readings: u32) -> bool {
+        self.is_contradicted || identical_readings > 0 && self.repeated >= identical_readings
+    }
+
+    /// Forgets the pose of the reference, after a jump of the clock, but not what was found.
+    pub(super) fn clear(&mut self) {
+        self.reference = None;
+        self.contradictions = 0;
+    }
+
+    /// Moves the reference by the motion since the last frame.
+    pub(super) fn advance(&mut self, motion: &EgoMotion) {
+        if let Some((_, since)) = &mut self.reference {
+            *since *= motion.isometry();
+        }
     }
 
     /// Takes in the result of a comparison, if it had one.
@@ -59,6 +81,7 @@ impl<R> Watch<R> {
             Some(false) => 0,
             None => self.contradictions,
         };
+        self.is_contradicted |= self.contradictions >= IN_A_ROW;
     }
 
     /// Takes in readings, bit for bit: real ones have noise.
@@ -86,11 +109,9 @@ impl<R> Watch<R> {
         self.repeated = if is_same && count > 0 { self.repeated.saturating_add(1) } else { 0 };
     }
 
-    /// Moves the reference by the motion since the last frame; returns the motion since it, if that
-    /// is enough to compare.
-    fn moved(&mut self, motion: &EgoMotion) -> Option<Isometry2<f64>> {
-        let (_, since) = self.reference.as_mut()?;
-        *since *= motion.isometry();
+    /// Returns the motion since the reference, if that is enough to compare.
+    fn moved(&self) -> Option<Isometry2<f64>> {
+        let (_, since) = self.reference.as_ref()?;
         let is_far =
             since.translation.vector.norm() > MOVED_M || since.rotation.angle().abs() > TURNED_RAD;
         is_far.then_some(*since)
@@ -99,27 +120,21 @@ impl<R> Watch<R> {
 
 /// Depth image of a reference.
 pub(super) struct DepthReference {
-    depth: DepthImage,
+    depth: Arc<DepthImage>,
     /// Places of the people in it, robot frame, m.
     people: Vec<Point2<f64>>,
 }
 
 impl Watch<DepthReference> {
-    /// Takes in a depth image, `motion` after the one before.
-    pub(super) fn add_depth(
-        &mut self,
-        camera: &Camera,
-        depth: &DepthImage,
-        motion: &EgoMotion,
-        tracks: &[Track],
-    ) {
+    /// Takes in a new depth image.
+    pub(super) fn add_depth(&mut self, camera: &Camera, depth: &Arc<DepthImage>, tracks: &[Track]) {
         let step_x = depth.width().div_ceil(GRID).max(1);
         let step_y = depth.height().div_ceil(GRID).max(1);
         let sampled = (0..depth.height())
             .step_by(step_y)
             .flat_map(|y| depth.row(y).iter().step_by(step_x).map(|z| z.to_bits()));
         self.compare_bits(sampled);
-        let moved = self.moved(motion);
+        let moved = self.moved();
         if self.reference.is_some() && moved.is_none() {
             return;
         }
@@ -128,8 +143,8 @@ impl Watch<DepthReference> {
             let found = contradicts_depth(camera, then, depth, &people, &moved, [step_x, step_y]);
             self.judge(found);
         }
-        self.reference =
-            Some((DepthReference { depth: depth.clone(), people }, Isometry2::identity()));
+        let reference = DepthReference { depth: Arc::clone(depth), people };
+        self.reference = Some((reference, Isometry2::identity()));
     }
 }
 
@@ -198,8 +213,9 @@ fn flat(depth: &DepthImage, [x, y]: [i64; 2]) -> Option<f64> {
 }
 
 /// Scan of a reference: ranges by the number of the ray.
-#[derive(Default)]
 pub(super) struct ScanReference {
+    /// Pose of the scanner in the robot frame of its frame: a scan may be older than that.
+    robot_from_scanner: Isometry3<f64>,
     ranges: Vec<f32>,
     left_out: Vec<bool>,
 }
@@ -219,8 +235,8 @@ impl ScanReference {
 }
 
 impl Watch<ScanReference> {
-    /// Takes in a scan, `motion` after the one before.
-    pub(super) fn add_scan(&mut self, scan: &LaserScan, motion: &EgoMotion, tracks: &[Track]) {
+    /// Takes in a new scan.
+    pub(super) fn add_scan(&mut self, scan: &LaserScan, tracks: &[Track]) {
         let origin = scan.robot_from_scanner.translation.vector;
         let ranges: Vec<f32> =
             scan.points.iter().map(|point| (point.coords - origin).norm() as f32).collect();
@@ -232,12 +248,16 @@ impl Watch<ScanReference> {
                 .zip(scan.rays.iter())
                 .map(|(range, ray)| (range * 2e4).round().to_bits().rotate_left(7) ^ ray),
         );
-        let moved = self.moved(motion);
+        let moved = self.moved();
         if self.reference.is_some() && moved.is_none() || scan.increment_rad == 0.0 {
             return;
         }
         let people = places(tracks);
-        let mut now = ScanReference::default();
+        let mut now = ScanReference {
+            robot_from_scanner: scan.robot_from_scanner,
+            ranges: Vec::new(),
+            left_out: Vec::new(),
+        };
         for ((point, ray), range) in scan.points.iter().zip(scan.rays.iter()).zip(&ranges) {
             let ray = *ray as usize;
             if ray >= now.ranges.len() {
@@ -269,7 +289,8 @@ fn contradicts_scan(
         if then.left_out[ray] || !(0.0 < range && range < FAR_M) {
             continue;
         }
-        let point: Point3<f64> = now_from_then * scan.place(ray as u32, range);
+        let met = scanner_from_robot * scan.place(ray as u32, range);
+        let point: Point3<f64> = now_from_then * (then.robot_from_scanner * met);
         let seen = scanner_from_robot * point;
         let turns = std::f64::consts::TAU / scan.increment_rad.abs();
         let place = (seen.y.atan2(seen.x) - scan.first_rad) / scan.increment_rad;

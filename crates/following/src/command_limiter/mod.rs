@@ -46,6 +46,8 @@ pub(crate) struct Wish {
     pub(crate) aim: Aim,
     /// Reason for which the sensors do not let the robot move, if there is one.
     pub(crate) stop: Option<Reason>,
+    /// Factor of the speed that the sensors allow, with its reason, if it is limited.
+    pub(crate) slowdown: Option<(f64, Reason)>,
     /// True if enough frames came since the start or a jump.
     pub(crate) settled: bool,
     /// Time since the previous frame, s.
@@ -259,6 +261,9 @@ impl CommandLimiter {
                 }
             }
             Response::NotObeyed => self.latch("the base does not move as it is commanded"),
+            Response::Still => {
+                self.latch("the odometry stands still while the robot is commanded to move");
+            }
         }
     }
 
@@ -435,6 +440,10 @@ impl CommandLimiter {
         }
         let (wanted, as_wished) = self.within_drive(wish.wheels);
         let reason = if as_wished { wish.aim.reason() } else { Reason::Limited };
+        let (wanted, reason) = match wish.slowdown {
+            Some((ratio, why)) => (wanted.scaled(ratio), why),
+            None => (wanted, reason),
+        };
         let is_late = wish.pause_s > self.settings.slow_after_s
             || self.is_odometry_old
             || self.reaction_s > self.settings.reaction_s;
@@ -444,12 +453,14 @@ impl CommandLimiter {
         let cap = cap * (self.settings.reaction_s / self.reaction_s).min(1.0);
         let speed = wanted.linear_mps.abs();
         if speed <= cap.min(self.allowed_mps) {
-            return (wanted, reason, false);
+            return (wanted, reason, wish.slowdown.is_some());
         }
-        let why = match () {
-            () if self.allowed_mps < cap => Reason::Limited,
-            () if is_late => Reason::Slow,
-            () => wish.aim.reason(),
+        let why = if self.allowed_mps < cap {
+            Reason::Limited
+        } else if is_late {
+            Reason::Slow
+        } else {
+            wish.aim.reason()
         };
         let cap = cap.min(self.allowed_mps);
         (wanted.scaled(cap / speed), why, true)
@@ -464,10 +475,8 @@ impl CommandLimiter {
             .wheels
             .twist(WheelSpeeds { left: wheels.left * scale, right: wheels.right * scale });
         let twist = self.wheels.twist(self.in_reach(twist));
-        let twist = match self.settings.reverse {
-            false if twist.linear_mps < 0.0 => Twist { linear_mps: 0.0, ..twist },
-            _ => twist,
-        };
+        let is_refused = twist.linear_mps < 0.0 && !self.settings.reverse;
+        let twist = if is_refused { Twist { linear_mps: 0.0, ..twist } } else { twist };
         let limit = self.settings.max_turn_radps;
         // Forward speed and turn rate shrink by the same factor, which keeps the curvature.
         let mut slower = twist.scaled(limit / twist.angular_rps.abs().max(limit));
@@ -505,9 +514,10 @@ impl CommandLimiter {
         let forward = before.forward.track(target, dt, &self.forward_limits(), target.abs());
         // A robot that stops stays on the arc that it drives.
         let arc = if wanted == Twist::STOP { before.twist() } else { wanted };
-        let turn = match arc.linear_mps.abs() > STILL_MPS {
-            true => arc.angular_rps * (forward.speed / arc.linear_mps).clamp(0.0, 1.0),
-            false => wanted.angular_rps,
+        let turn = if arc.linear_mps.abs() > STILL_MPS {
+            arc.angular_rps * (forward.speed / arc.linear_mps).clamp(0.0, 1.0)
+        } else {
+            wanted.angular_rps
         };
         Motion { forward, turn: self.turned(before, turn, &forward, dt) }
     }
@@ -522,9 +532,10 @@ impl CommandLimiter {
         }
         // Steered wheels turn no faster than they roll, however suddenly they slow down.
         let most = self.robot.turn_at(forward.speed);
-        match turn.speed.abs() <= most {
-            true => turn,
-            false => Axis { speed: most.copysign(turn.speed), accel: 0.0 },
+        if turn.speed.abs() <= most {
+            turn
+        } else {
+            Axis { speed: most.copysign(turn.speed), accel: 0.0 }
         }
     }
 

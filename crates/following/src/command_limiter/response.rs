@@ -4,6 +4,9 @@
 //! most, as far as they changed. A motion that lies between the slowest and the fastest command that
 //! were in force within the longest delay is explained; one that is not for some time is not the one
 //! that was commanded: wheels that are stuck or slip, a base that does not stop, or another driver.
+//!
+//! Slow commands are within the tolerance of that comparison. Odometry that stands still altogether
+//! through commands to move, however slow, is a fault, too: it repeats itself, or the wheels are stuck.
 
 use std::collections::VecDeque;
 
@@ -28,6 +31,15 @@ const BETTER: f64 = 0.5;
 const SPEED_MPS: f64 = 0.12;
 const TURN_RPS: f64 = 0.35;
 const FRACTION: f64 = 0.2;
+/// Speed, m/s, and turn rate, rad/s, of a command from which on each base moves: less may not overcome
+/// its friction.
+const MOVES_MPS: f64 = 0.03;
+const MOVES_RPS: f64 = 0.1;
+/// Speed, m/s, and turn rate, rad/s, of the odometry up to which it stands still.
+const STILL_MPS: f64 = 0.005;
+const STILL_RPS: f64 = 0.01;
+/// Time of commands to move through which the odometry may stand still, s.
+const STILL_S: f64 = 2.0;
 /// Shortest time over which a speed is measured, s.
 const SHORTEST_S: f64 = 0.01;
 
@@ -38,6 +50,8 @@ pub(super) enum Response {
     Within(f64),
     /// It does something else.
     NotObeyed,
+    /// The odometry stands still through commands to move.
+    Still,
 }
 
 /// Commands of the last seconds beside the motion of the robot.
@@ -51,6 +65,8 @@ pub(super) struct ResponseCheck {
     /// Delays that were measured, with their stamps.
     delays: VecDeque<(Stamp, f64)>,
     unexplained_s: f64,
+    /// Time of commands to move through which the odometry has stood still, s.
+    still_s: f64,
 }
 
 impl ResponseCheck {
@@ -105,10 +121,36 @@ impl ResponseCheck {
         if self.unexplained_s > PATIENCE_S {
             return Response::NotObeyed;
         }
+        self.add_standing(now, motion.dt, measured);
+        if self.still_s > STILL_S {
+            return Response::Still;
+        }
         if let Some(delay_s) = self.likeliest_delay_s() {
             self.delays.push_back((now, delay_s));
         }
         Response::Within(self.largest_delay_s(now))
+    }
+
+    /// Adds a step in which the odometry moved or stood still.
+    fn add_standing(&mut self, now: Stamp, dt_s: f64, measured: Twist) {
+        let stands =
+            measured.linear_mps.abs() <= STILL_MPS && measured.angular_rps.abs() <= STILL_RPS;
+        if !stands {
+            self.still_s = 0.0;
+            return;
+        }
+        // Even a base with the longest delay has executed this command by now.
+        let wanted = self.twist_at(now.plus_seconds(-LONGEST_S));
+        if wanted.linear_mps.abs() >= MOVES_MPS || wanted.angular_rps.abs() >= MOVES_RPS {
+            self.still_s += dt_s;
+        }
+    }
+
+    /// Returns the command that was in force at a time; a stop without one.
+    fn twist_at(&self, then: Stamp) -> Twist {
+        let last = self.commands.iter().rev().find(|command| command.stamp <= then);
+        let in_force = last.filter(|command| then <= command.valid_until);
+        in_force.map_or(Twist::STOP, |command| command.twist)
     }
 
     /// Returns true if the motion lies between the commands within the longest delay.
@@ -286,6 +328,20 @@ mod tests {
         let runaway = judged(150, |_| 0.0, |frame| if frame > 60 { 0.5 } else { 0.0 });
         let first = runaway.iter().position(|response| *response == Response::NotObeyed);
         assert!(first.is_some_and(|frame| (60..75).contains(&frame)), "{first:?}");
+    }
+
+    #[test]
+    fn odometry_that_stands_still_while_the_robot_creeps_is_told() {
+        let creeping = judged(150, |_| 0.06, |_| 0.0);
+        let first = creeping.iter().position(|response| *response == Response::Still);
+        let first_s = first.map(|frame| frame as f64 * DT_S);
+        assert!(first_s.is_some_and(|at_s| (3.5..3.8).contains(&at_s)), "{first_s:?}");
+        let short_stops = judged(150, |frame| if frame % 8 < 6 { 0.06 } else { 0.0 }, |_| 0.0);
+        assert!(short_stops.contains(&Response::Still));
+        for (told_mps, drove_mps) in [(0.06, 0.06), (0.0, 0.0), (0.01, 0.0), (0.06, 0.02)] {
+            let all = judged(150, |_| told_mps, |_| drove_mps);
+            assert!(!all.contains(&Response::Still), "{told_mps} {drove_mps}");
+        }
     }
 
     #[test]

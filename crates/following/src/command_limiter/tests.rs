@@ -42,6 +42,7 @@ fn wish(frame: u64, left: f64, right: f64) -> Wish {
         stamp: Stamp::from_nanos(frame * 100_000_000),
         aim: Aim::Person,
         stop: None,
+        slowdown: None,
         settled: true,
         pause_s: PERIOD_S,
     }
@@ -525,4 +526,16 @@ fn stopping_takes_reaction_braking_and_a_margin() {
         ..CommandLimiterSettings::default()
     };
     assert!((settings.stopping_m(2.0) - (0.8 + 0.2 + 1.0 + 0.25)).abs() < 1e-12);
+}
+
+#[test]
+fn in_the_slowdown_polygon_the_robot_drives_and_turns_at_a_part_of_its_speed() {
+    let mut limiter = limiter();
+    let slower = Wish { slowdown: Some((0.5, Reason::Obstacle)), ..wish(0, 0.8, 0.6) };
+    let commands = go_on(&mut limiter, &slower, 30);
+    let Command { twist, reason, .. } = commands[29];
+    let wished = DRIVE.twist(WheelSpeeds { left: 0.8, right: 0.6 });
+    assert!((twist.linear_mps - 0.5 * wished.linear_mps).abs() < 1e-6, "{twist:?}");
+    assert!((twist.angular_rps - 0.5 * wished.angular_rps).abs() < 1e-6, "{twist:?}");
+    assert_eq!(reason, Reason::Obstacle);
 }

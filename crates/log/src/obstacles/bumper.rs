@@ -76,8 +76,7 @@ pub(super) struct Bumper {
 
 impl Bumper {
     pub(super) fn new(contact: Contact) -> Self {
-        let (pressed, readings) = Default::default();
-        Self { contact, pressed, readings, delivered: 0 }
+        Self { contact, pressed: BTreeSet::new(), readings: Readings::default(), delivered: 0 }
     }
 
     /// Takes in a message, which has the stamp of its arrival if it has none of its own.
@@ -87,8 +86,8 @@ impl Bumper {
             Contact::Event => (arrival, self.after(decode(data)?)),
             Contact::Hazards => {
                 let HazardDetectionVector { header, detections } = decode(data)?;
-                let bump = |hazard: &HazardDetection| hazard.kind == HazardDetection::BUMP;
-                (header.stamp(), detections.iter().any(bump))
+                let is_bump = detections.iter().any(|hazard| hazard.kind == HazardDetection::BUMP);
+                (header.stamp(), is_bump)
             }
             Contact::State => {
                 let BumperState { header, bumper } = decode(data)?;
@@ -128,11 +127,10 @@ impl Bumper {
         if !self.contact.may_be_silent() {
             return found;
         }
-        let is_over = |stamp: Stamp| {
-            self.contact == Contact::Fleeting && frame.seconds_since(stamp) > FLEETING_S
-        };
+        let Some((stamp, is_pressed)) = found else { return Some((frame, false)) };
+        let is_over = self.contact == Contact::Fleeting && frame.seconds_since(stamp) > FLEETING_S;
         // The state holds until the next message.
-        Some((frame, found.is_some_and(|(stamp, is_pressed)| is_pressed && !is_over(stamp))))
+        Some((frame, is_pressed && !is_over))
     }
 
     /// Returns the stamp of the first reading.

@@ -86,9 +86,6 @@ fn planned_source(scan: &Scan, source: &ObstacleTopic) -> Result<Planned, LogErr
         let why = format!("{topic}, which is {}; it has to be one of: {wanted}", kind_of(other));
         return Err(LogError::Source { path: scan.path.clone(), name: name.clone(), why });
     }
-    // Of some bumpers, silence says that they are not pressed.
-    let may_be_silent =
-        |found: &Topic| Contact::of(&found.schema).is_some_and(Contact::may_be_silent);
     let Some(found) = found.filter(|found| found.count > 0 || may_be_silent(found)) else {
         let wanted = format!("message of source `{name}` on {topic}");
         return Ok(Planned::Lacks { wanted, remedy: alternatives(scan, *kind) });
@@ -106,21 +103,29 @@ fn planned_source(scan: &Scan, source: &ObstacleTopic) -> Result<Planned, LogErr
     Ok(Planned::Found(Box::new(PlannedSource { topic: source.clone(), schema, lens })))
 }
 
+/// Returns true for a bumper of which silence says that it is not pressed.
+fn may_be_silent(topic: &Topic) -> bool {
+    Contact::of(&topic.schema).is_some_and(Contact::may_be_silent)
+}
+
 /// Returns the topics that a source of this kind could have, as text.
 fn alternatives(scan: &Scan, kind: ObstacleKind) -> String {
     let fitting = scan.topics.iter().filter(|(_, topic)| kind.reads(topic));
     let names: Vec<String> =
         fitting.map(|(name, topic)| format!("{name} ({} messages)", topic.count)).collect();
-    match names.is_empty() {
-        true => format!("no topic has {}", kind.type_names()),
-        false => format!("of {} there are {}", kind.type_names(), names.join(", ")),
+    if names.is_empty() {
+        format!("no topic has {}", kind.type_names())
+    } else {
+        format!("of {} there are {}", kind.type_names(), names.join(", "))
     }
 }
 
 /// Returns the lens of a depth camera; `None` without a calibration.
 fn lens_of(scan: &Scan, source: &ObstacleTopic) -> Result<Option<Intrinsics>, LogError> {
-    let found = || info_of(scan, &source.topic, false);
-    let Some(topic) = source.info_topic.clone().or_else(found) else { return Ok(None) };
+    let named = source.info_topic.clone();
+    let Some(topic) = named.or_else(|| info_of(scan, &source.topic, false)) else {
+        return Ok(None);
+    };
     let Some(info) = scan.infos.get(&topic) else { return Ok(None) };
     // The name of the topic is the only sign that images are rectified.
     intrinsics(info, source.topic.contains("rect"))

@@ -166,7 +166,7 @@ impl ObstacleReader {
         };
         // A reading of after the frame is as new as it can be.
         let age_s = moment.stamp.seconds_since(stamp).max(0.0);
-        Some(ObstacleReading { source: Arc::clone(&self.name), age_s, data })
+        Some(ObstacleReading { source: Arc::clone(&self.name), stamp, age_s, data })
     }
 
     /// Counts a frame for which the source has readings of far later times alone.
@@ -227,11 +227,10 @@ fn depth_of(
     image: &Payload,
     format: DepthFormat<'_>,
 ) -> Result<DepthImage, ImageError> {
-    let garbled = |error: CdrError| ImageError::Codec(error.to_string());
     let DepthFormat { unit_m, limits } = format;
     let pixels = match kind {
-        Type::Image => decode_raw(&decode(&image.data).map_err(garbled)?, unit_m, limits),
-        _ => decode_compressed(&decode(&image.data).map_err(garbled)?, unit_m, limits),
+        Type::Image => decode_raw(&decode(&image.data).map_err(undecodable)?, unit_m, limits),
+        _ => decode_compressed(&decode(&image.data).map_err(undecodable)?, unit_m, limits),
     };
     match pixels? {
         Pixels::Depth(depth) => Ok(depth),
@@ -239,6 +238,10 @@ fn depth_of(
             Err(ImageError::Codec("the pixels are a picture and no depth".to_owned()))
         }
     }
+}
+
+fn undecodable(error: CdrError) -> ImageError {
+    ImageError::Codec(error.to_string())
 }
 
 /// Returns the pose of a sensor on the robot: that of the settings, else that of tf at the time of the

@@ -103,6 +103,7 @@ pub(crate) fn seen_from(
     let (rays, points): (Vec<u32>, Vec<Point3<f64>>) =
         points(scan).map(|(ray, point)| (ray, moved_point(point))).unzip();
     Scan {
+        stamp: Some(scan.header.stamp()),
         robot_from_scanner: on_floor(robot_from_then) * robot_from_laser,
         first_rad: f64::from(scan.angle_min),
         increment_rad: f64::from(scan.angle_increment),

@@ -219,9 +219,10 @@ fn what_a_laser_met_is_where_it_is_at_the_time_of_the_image() {
     assert_eq!(found.len(), 20);
     for found in &found {
         let t = found.frame.stamp.seconds_since(at(0.0));
-        let [wall] = found.frame.laser().unwrap().points[..] else {
-            panic!("one ray met something")
-        };
+        let scan = found.frame.laser().unwrap();
+        let [wall] = scan.points[..] else { panic!("one ray met something") };
+        let off_s = found.frame.stamp.seconds_since(scan.stamp.unwrap());
+        assert!((off_s - 0.05).abs() < 1e-6, "the stamp is that of the scan: {off_s}");
         assert!((wall.x - (5.0 - 0.4 * t)).abs() < 1e-5 && (wall.z - 0.15).abs() < 1e-6, "{wall}");
     }
     assert_eq!(count(&source, "frames_without_laser"), 0);

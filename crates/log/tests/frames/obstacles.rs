@@ -117,6 +117,7 @@ fn a_range_that_falls_silent_stays_with_its_age() {
         let [reading] = &readings[..] else { panic!("a reading at {tick}") };
         let expected_s = 0.1 * tick as f64 - 0.9;
         assert!((reading.age_s - expected_s).abs() < 1e-6, "{} at {tick}", reading.age_s);
+        assert_eq!(reading.stamp, all[9][0].stamp, "it is the same reading at {tick}");
     }
 }
 

@@ -17,7 +17,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "depth-alone"
     "depth-color-ekf"
     "depth-ekf"
-    "depth-ekf-as-printed"
     "depth-ekf-follow"
     "depth-jpda"
     "depth-laser"
@@ -26,7 +25,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "depth-svm-ekf"
     "depth-two-stage"
     "depth-verified"
-    "follow-as-printed"
     "follow-arc"
     "follow-depth"
     "follow-depth-near"
@@ -34,7 +32,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "follow-sonar"
     "joint-particle"
     "joint-particle-all"
-    "joint-particle-as-printed"
     "joint-particle-kde30"
     "joint-particle-kde50"
     "joint-particle-table"
@@ -49,7 +46,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "recorded"
     "recorded-observation-centric"
     "rgbd-compressive"
-    "rgbd-compressive-as-printed"
     "rgbd-detector"
     "rgbd-ekf"
     "rgbd-faces"
@@ -57,7 +53,6 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "rgbd-kalman"
     "rgbd-upper-bodies"
     "stereo-ekf"
-    "stereo-ekf-as-printed"
     "stereo-follow"
     "stereo-particle"
     "stereo-street"
@@ -108,6 +103,6 @@ mod tests {
             }
         }
         left_out.sort();
-        assert_eq!(left_out, ["omni-appearance-as-printed", "onnx", "stereo-svm-ekf-as-printed"]);
+        assert_eq!(left_out, ["onnx"]);
     }
 }

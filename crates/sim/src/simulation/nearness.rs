@@ -1,6 +1,14 @@
 //! Free distance around the robot, and the approacher of a scene.
 
-use super::*;
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
+
+use super::{BODY_M, Clearance, FEELERS, FEELERS_M, LEAST_SPOTS, Simulation};
+use crate::approach::{ApproachBy, ApproachInView, ApproachState, Approacher, Surroundings};
+use crate::footprint::{Gap, Outline};
+use crate::shape::Shape;
+use crate::world::{self, Object};
 
 impl Simulation {
     /// Returns the free distance around the robot at its present place: around its footprint, or

@@ -2,6 +2,7 @@ use super::*;
 use crate::obstacle_sensors::SensorData;
 use crate::ramp::Ramp;
 use crate::scene::RoomSettings;
+use crate::world;
 
 const SMALL: &str = "seed = 4\nduration_s = 1.0\n[camera]\nwidth = 96\nheight = 72\n\
     [room]\nclutter = 3\n[[people]]\npath = [[4.0, 3.0]]\nheight_m = 1.7\n\

@@ -1,6 +1,13 @@
 //! The people of a scene, before the first image.
 
-use super::*;
+use nalgebra::{Point2, Vector2};
+
+use crate::approach::ApproachBy;
+use crate::behaviour::{Obstacle, Walker};
+use crate::person::Person;
+use crate::random::Random;
+use crate::scene::{AtEnd, PersonSettings, Posture, Scene};
+use crate::split::{SUBJECTS, Split};
 
 /// So many of a crowd come as two.
 const CROWD_PAIRS: f64 = 0.3;

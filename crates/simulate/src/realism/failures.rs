@@ -1,31 +1,27 @@
 //! Known failures that must occur in simulation, too: the detector without a verifier takes
-//! furniture for people, and the printed filter gives wrong velocities to a person before a moving
-//! robot.
+//! furniture for people.
 
 use nalgebra::Point2;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_pipeline::{Candidate, Fate};
 use tagalong_sim::Scene;
-use tagalong_trials::{Contender, Run, Trial, TrialError, each};
+use tagalong_trials::{Contender, Trial, TrialError, each};
 
 use super::{Check, mean, scene, scenes};
 
 const GROUP: &str = "failures that must show";
 const EMPTY: &str = include_str!("../../configs/scenes/empty-clutter.toml");
 const EKF: &str = include_str!("../../configs/depth-ekf.toml");
-const AS_PRINTED: &str = include_str!("../../configs/depth-ekf-as-printed.toml");
 
 pub fn checks(registry: &Registry, seeds: u64) -> Result<Vec<Check>, TrialError> {
     let alarms = false_alarms(registry, seeds)?;
     let stands = coat_stands(registry, seeds)?;
     let what = "false alarms per image in empty rooms, no verifier";
-    let mut checks = vec![
+    Ok(vec![
         Check::between(GROUP, what, alarms, "", [0.1, 1.0]),
         Check::between(GROUP, "coat stands taken for people", 100.0 * stands, "%", [5.0, 100.0]),
-    ];
-    checks.extend(printed_filter(registry, seeds)?);
-    Ok(checks)
+    ])
 }
 
 fn ekf() -> Contender {
@@ -66,48 +62,6 @@ fn coat_stands(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
         Ok(f64::from(u8::from(all.filter(near).any(is_believed))))
     };
     Ok(mean(&each(&scenes, &[ekf()], registry, threads(None), taken, |_| ())?))
-}
-
-/// Checks the mean error of the forward velocity of a standing person, m/s, by the corrected and by
-/// the printed filter, before a robot at rest and a moving one.
-fn printed_filter(registry: &Registry, seeds: u64) -> Result<Vec<Check>, TrialError> {
-    let contenders = [ekf(), Contender::new("depth-ekf-as-printed", AS_PRINTED)];
-    let standing = |path: &str| {
-        format!(
-            "duration_s = 5.0\n[room]\nsize_m = [10.0, 6.0]\n[camera]\nwidth = 320\nheight = 240\n\
-             [robot]\nstart = [1.0, 3.0]\npath = {path}\nspeed_mps = 0.5\n\
-             [[people]]\npath = [[6.0, 3.2]]\nheading_deg = 180.0\n"
-        )
-    };
-    let mut checks = Vec::new();
-    for (robot, path) in [("a robot at rest", "[]"), ("a moving robot", "[[8.0, 3.0]]")] {
-        let scenes = scenes(&standing(path), seeds.min(5));
-        let keep = |trial: Trial| Ok([velocity_bias(&trial, 0), velocity_bias(&trial, 1)]);
-        let all = each(&scenes, &contenders, registry, threads(None), keep, |_| ())?;
-        let bias = |at: usize| mean(&all.iter().map(|both| both[at]).collect::<Vec<f64>>()).abs();
-        // The printed filter must fail before a moving robot, and only there.
-        let limits = [[0.0, 0.15], if path == "[]" { [0.0, 0.15] } else { [0.4, f64::INFINITY] }];
-        for ((name, at), limits) in [("corrected", 0), ("printed", 1)].into_iter().zip(limits) {
-            let what = format!("velocity bias, {name} filter, {robot}");
-            checks.push(Check::between(GROUP, what, bias(at), "m/s", limits));
-        }
-    }
-    Ok(checks)
-}
-
-/// Returns the mean forward velocity of the tracks near the only person, once they have settled.
-fn velocity_bias(trial: &Trial, at: usize) -> f64 {
-    let Run { reports, .. } = &trial.runs[at];
-    let mut speeds = Vec::new();
-    for (moment, report) in trial.moments.iter().zip(reports) {
-        let Some(person) = moment.truth.first() else { continue };
-        let near = report.tracks.iter().filter(|track| {
-            let off = track.estimate.person.position - person.head_in_robot;
-            track.confirmed && track.age > 10 && off.xy().norm() < 1.0
-        });
-        speeds.extend(near.map(|track| track.estimate.person.velocity.x));
-    }
-    mean(&speeds)
 }
 
 #[cfg(test)]

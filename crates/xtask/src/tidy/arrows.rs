@@ -29,36 +29,17 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("tagalong", &["pipeline", "log", "tracking"]),
     ("sim", &[]),
     ("serve", &[]),
-    ("triangulate", &[]),
     ("eval", &["matching"]),
     ("report", &["eval"]),
     ("trials", &["vision", "stereo", "pipeline", "sim", "eval"]),
     ("tuning", &["pipeline", "eval"]),
-    // A reproduced result may be the training of a plugin.
-    (
-        "reproduce",
-        &[
-            "vision",
-            "stereo",
-            "pipeline",
-            "log",
-            "sim",
-            "eval",
-            "report",
-            "trials",
-            "triangulate",
-            "plugins",
-            "learn",
-            "tracking",
-        ],
-    ),
     ("conformance", &[]),
     ("catalog", &["plugins"]),
     ("app", &["tagalong", "pipeline", "log"]),
     ("render", &["pipeline", "vision"]),
     ("scoring", &["app", "log", "eval"]),
     ("page", &["app", "report", "pipeline"]),
-    ("live", &["page", "render", "pipeline", "serve"]),
+    ("live", &["app", "page", "render", "pipeline", "serve"]),
     (
         "simulate",
         &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
@@ -67,26 +48,13 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("annotate", &["app", "render", "log", "eval", "pipeline", "serve"]),
     ("view", &["app", "scoring", "page", "render", "log", "eval", "pipeline"]),
     ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
-    (
-        "benchmark",
-        &["app", "scoring", "render", "pipeline", "log", "eval", "report", "reproduce", "tuning"],
-    ),
+    ("benchmark", &["app", "scoring", "render", "pipeline", "log", "eval", "report", "tuning"]),
     ("import", &["app", "log", "eval"]),
-    ("webcams", &["app", "scoring", "log", "sim", "triangulate"]),
     (
         "experiments",
         &[
-            "app",
-            "simulate",
-            "pipeline",
-            "render",
-            "log",
-            "sim",
-            "eval",
-            "trials",
-            "reproduce",
-            "learn",
-            "tuning",
+            "app", "simulate", "pipeline", "render", "log", "sim", "eval", "trials", "report",
+            "learn", "tuning",
         ],
     ),
     (
@@ -111,7 +79,6 @@ const ARROWS: &[(&str, &[&str])] = &[
             "tagalong",
             "training",
             "view",
-            "webcams",
         ],
     ),
     ("testdata", &[]),
@@ -161,7 +128,7 @@ fn allowed(folder: &str) -> Option<Option<&'static [&'static str]>> {
         Some(("crates", room)) => {
             ARROWS.iter().find(|(name, _)| *name == room).map(|(_, allowed)| Some(*allowed))
         }
-        _ => matches!(folder, "tests" | "benches").then_some(None),
+        _ => matches!(folder, "tests" | "benches" | "benches/papers").then_some(None),
     }
 }
 
@@ -217,6 +184,7 @@ mod tests {
         assert!(!wrong("plugins/ekf", "crates/conformance", true));
         assert!(!wrong("crates/catalog", "plugins/ekf", false));
         assert!(!wrong("tests", "plugins/ekf", false));
+        assert!(!wrong("benches/papers", "crates/cli", false));
         assert!(wrong("plugins/ekf", "crates/conformance", false));
         assert!(wrong("plugins/ekf", "plugins/depth-template", true));
         assert!(wrong("plugins/ekf", "crates/pipeline", true));

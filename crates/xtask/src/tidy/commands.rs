@@ -5,7 +5,7 @@ use anyhow::Result;
 
 use crate::markdown::Document;
 use crate::metadata::Metadata;
-use crate::program::Program;
+use crate::program::{Name, Program};
 use crate::workspace::{Workspace, output};
 
 /// Complains about command lines in documents that the program does not understand.
@@ -28,12 +28,12 @@ pub fn check(
     Ok(complaints)
 }
 
-/// A documented call: of `cargo`, of `cargo xtask`, or of `tagalong`.
+/// A documented call: of `cargo`, of `cargo xtask`, or of a program.
 #[derive(Debug, PartialEq)]
 enum Call<'a> {
     Cargo(&'a str),
     Xtask(&'a str),
-    Tagalong(Vec<&'a str>),
+    Program(Name, Vec<&'a str>),
 }
 
 /// The calls of a line; comments are dropped, `&&` and `;` separate.
@@ -49,16 +49,21 @@ fn calls_of_part(part: &str) -> Vec<Call<'_>> {
     // Redirections and pipes belong to the shell, not to the program.
     let words = all.split(|word| matches!(*word, ">" | "|")).next().unwrap_or_default();
     match words {
-        ["tagalong", rest @ ..] => vec![Call::Tagalong(rest.to_vec())],
+        ["tagalong", rest @ ..] => vec![Call::Program(Name::Tagalong, rest.to_vec())],
+        ["tagalong-papers", rest @ ..] => vec![Call::Program(Name::Papers, rest.to_vec())],
         ["cargo", "xtask", command, ..] => vec![Call::Xtask(command)],
         ["cargo", "run", rest @ ..] => {
             let other = ["-p", "--package", "--example", "--manifest-path"];
             let own = rest.iter().any(|word| other.contains(word));
             let after = rest.iter().position(|word| *word == "--").map(|at| &rest[at + 1..]);
-            match after {
-                Some(words) if !own => vec![Call::Cargo("run"), Call::Tagalong(words.to_vec())],
-                _ => vec![Call::Cargo("run")],
-            }
+            let of_papers = rest.windows(2).any(|pair| pair == ["-p", Name::Papers.package()]);
+            let program = match own {
+                false => Some(Name::Tagalong),
+                true => of_papers.then_some(Name::Papers),
+            };
+            let call = program.zip(after);
+            let call = call.map(|(program, words)| Call::Program(program, words.to_vec()));
+            std::iter::once(Call::Cargo("run")).chain(call).collect()
         }
         ["cargo", command, ..] if !command.starts_with('-') => vec![Call::Cargo(command)],
         _ => Vec::new(),
@@ -71,7 +76,8 @@ const INSTALLED: &[&str] = &["deny", "install"];
 /// Commands and files that documents may call.
 struct Known {
     cargo: BTreeSet<String>,
-    program: Option<Program>,
+    /// The built programs, where the workspace has them.
+    programs: Vec<(Name, Program)>,
 }
 
 impl Known {
@@ -79,32 +85,40 @@ impl Known {
         let list = output(Command::new("cargo").arg("--list"))?;
         let cargo = list.lines().skip(1).filter_map(|line| line.split_whitespace().next());
         let members = metadata.members(workspace.root());
-        let has_program = members.get("crates/cli").is_some_and(|package| package.is_program());
+        let has_program = |name: &Name| {
+            members.values().any(|package| package.name == name.package() && package.is_program())
+        };
         let cargo = cargo.chain(INSTALLED.iter().copied()).map(str::to_owned).collect();
-        let program = has_program.then(|| Program::built(workspace)).transpose()?;
-        Ok(Self { cargo, program })
+        let programs = Name::ALL.into_iter().filter(has_program);
+        let programs = programs.map(|name| Ok((name, Program::built(workspace, name)?)));
+        Ok(Self { cargo, programs: programs.collect::<Result<_>>()? })
     }
 
     fn complaint(&self, call: &Call<'_>) -> Result<Option<String>> {
-        Ok(match (call, &self.program) {
-            (Call::Cargo(command), _) => {
+        Ok(match call {
+            Call::Cargo(command) => {
                 (!self.cargo.contains(*command)).then(|| format!("there is no `cargo {command}`"))
             }
-            (Call::Xtask(command), _) => (!crate::subcommands().iter().any(|name| name == command))
+            Call::Xtask(command) => (!crate::subcommands().iter().any(|name| name == command))
                 .then(|| format!("there is no `cargo xtask {command}`")),
-            (Call::Tagalong(words), Some(program)) => misunderstood(program, words)?,
-            (Call::Tagalong(_), None) => None,
+            Call::Program(name, words) => {
+                match self.programs.iter().find(|(known, _)| known == name) {
+                    Some((name, program)) => misunderstood(*name, program, words)?,
+                    None => None,
+                }
+            }
         })
     }
 }
 
 /// Returns the error of the program about words that it does not understand; asked for help, it
 /// reads them all and does nothing.
-fn misunderstood(program: &Program, words: &[&str]) -> Result<Option<String>> {
+fn misunderstood(name: Name, program: &Program, words: &[&str]) -> Result<Option<String>> {
     let said = program.call(&[]).args(words.iter().map(plain)).arg("--help").output()?;
     let error = String::from_utf8_lossy(&said.stderr);
     let first = error.lines().next().unwrap_or_default();
-    Ok((!said.status.success()).then(|| format!("`tagalong {}`: {first}", words.join(" "))))
+    let line = format!("{} {}", name.as_str(), words.join(" "));
+    Ok((!said.status.success()).then(|| format!("`{line}`: {first}")))
 }
 
 /// A word as the shell hands it on; any number for each variable.
@@ -122,7 +136,11 @@ mod tests {
     fn calls_are_found_in_command_lines() {
         let line = "$ cargo xtask tidy && cargo run --release -- run a.toml --overlay  # why; not";
         let run = vec!["run", "a.toml", "--overlay"];
-        assert_eq!(calls(line), [Call::Xtask("tidy"), Call::Cargo("run"), Call::Tagalong(run)]);
+        let run = Call::Program(Name::Tagalong, run);
+        assert_eq!(calls(line), [Call::Xtask("tidy"), Call::Cargo("run"), run]);
+        let tables = Call::Program(Name::Papers, vec!["reproduce", "laser"]);
+        let line = "cargo run --release -p tagalong-papers -- reproduce laser";
+        assert_eq!(calls(line), [Call::Cargo("run"), tables]);
         assert_eq!(calls("RUSTFLAGS=-g cargo test -p x"), [Call::Cargo("test")]);
         assert_eq!(calls("cargo run -p x -- go"), [Call::Cargo("run")]);
         assert!(calls("ls cargo").is_empty());
@@ -130,7 +148,7 @@ mod tests {
 
     #[test]
     fn what_the_shell_does_is_left_out_and_settings_are_kept() {
-        let set = Call::Tagalong(vec!["simulate", "--set", "a.b=1"]);
+        let set = Call::Program(Name::Tagalong, vec!["simulate", "--set", "a.b=1"]);
         assert_eq!(calls("tagalong simulate --set a.b=1 > x"), [set]);
         assert_eq!(plain(&"'HOTA<-0.01'"), "HOTA<-0.01");
         assert_eq!(plain(&"\"$TASK\""), "1");

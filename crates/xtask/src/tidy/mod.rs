@@ -5,6 +5,7 @@ mod arrows;
 mod commands;
 mod files;
 mod licences;
+mod names;
 mod paths;
 mod plugins;
 mod words;
@@ -22,6 +23,7 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     complaints.extend(plugins::check(workspace, &metadata)?);
     complaints.extend(licences::check(workspace, &metadata)?);
     complaints.extend(files::check(workspace)?);
+    complaints.extend(names::check(workspace)?);
     complaints.extend(words::check(workspace)?);
     complaints.extend(crate::faults::check(workspace)?);
     let documents = markdown::documents(workspace)?;

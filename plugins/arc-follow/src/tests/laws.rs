@@ -37,14 +37,12 @@ fn approach(config: Config) -> Vec<(f64, f64)> {
 #[test]
 fn a_target_at_rest_keeps_sine_of_bearing_over_a_power_of_range() {
     for (path, gain) in [(Path::A, 1.0), (Path::C, 1.5), (Path::C, 2.0), (Path::C, 2.5)] {
-        for as_printed in [false, true] {
-            let way = approach(Config { as_printed, ..bare(path, gain) });
-            let (range, bearing) = way[0];
-            for (r, b) in &way {
-                let expected = bearing.sin() * (r / range).powf(2.0 * gain - 1.0);
-                let error = (b - expected.asin()).to_degrees().abs();
-                assert!(error < 0.01, "gain {gain}: {error} degrees off at {r} m");
-            }
+        let way = approach(bare(path, gain));
+        let (range, bearing) = way[0];
+        for (r, b) in &way {
+            let expected = bearing.sin() * (r / range).powf(2.0 * gain - 1.0);
+            let error = (b - expected.asin()).to_degrees().abs();
+            assert!(error < 0.01, "gain {gain}: {error} degrees off at {r} m");
         }
     }
 }
@@ -87,74 +85,38 @@ fn path_b_turns_first_and_then_drives_straight() {
 }
 
 #[test]
-fn wheels_are_those_of_the_paper() {
-    let (x, y, k, d) = (2.0, -0.7, 2.0, WHEELS.half_separation_m);
-    let wheels = settled(
-        Config { as_printed: true, latency_s: 0.0, ..Config::default() },
-        &target(x, y, Vector2::zeros()),
-    );
-    let v = 0.8 * (x.hypot(y) - 1.4);
-    let bend = k * 2.0 * d * y / (x * x + y * y);
-    assert!((wheels.left - v * (1.0 - bend)).abs() < 1e-12);
-    assert!((wheels.right - v * (1.0 + bend)).abs() < 1e-12);
-}
-
-#[test]
-fn the_inner_wheel_reverses_in_bends_narrower_than_the_robot() {
-    let config = Config { stand_off_m: 0.0, ..Config::default() };
-    let config = Config { as_printed: true, latency_s: 0.0, ..config };
-    let bound = 2.0 * config.path_gain * WHEELS.half_separation_m;
-    for (range, reverses) in [(0.98 * bound, true), (1.02 * bound, false)] {
-        let wheels = settled(config.clone(), &target(0.0, range, Vector2::zeros()));
-        assert!(wheels.right > 0.0 && (wheels.left < 0.0) == reverses, "{wheels:?}");
-    }
-}
-
-#[test]
-fn the_curvature_is_bounded_where_the_printed_one_is_not() {
+fn the_curvature_is_bounded() {
     let near = target(0.25, 0.1, Vector2::new(0.5, 0.0));
-    let curvature = |as_printed| {
-        let config = Config {
-            bearing_gain_per_s: 0.0,
-            max_turn_rate: 10.0,
-            latency_s: 0.0,
-            as_printed,
-            ..Config::default()
-        };
-        let config = Config { stand_off_m: 0.2, ..config };
-        let wheels = settled(config, &near);
-        turn_rate(wheels) / speed(wheels)
+    let config = Config {
+        bearing_gain_per_s: 0.0,
+        max_turn_rate: 10.0,
+        latency_s: 0.0,
+        stand_off_m: 0.2,
+        ..Config::default()
     };
-    assert!((curvature(true) - 4.0 * 0.1 / 0.0725).abs() < 1e-9);
-    assert!((curvature(false) - 4.0 * 0.1 / 0.25).abs() < 1e-9);
+    let wheels = settled(config, &near);
+    let curvature = turn_rate(wheels) / speed(wheels);
+    assert!((curvature - 4.0 * 0.1 / 0.25).abs() < 1e-9, "{curvature}");
 }
 
 #[test]
 fn a_target_at_the_origin_stops_the_robot() {
-    for as_printed in [false, true] {
-        let config = Config { as_printed, stand_off_m: 0.0, latency_s: 0.0, ..Config::default() };
-        let here = target(0.0, 0.0, Vector2::new(0.5, 0.0));
-        let wheels = settled(config, &here);
-        assert!(wheels.left == wheels.right, "{wheels:?}");
-        assert!(!as_printed || wheels == WheelSpeeds::STOP, "{wheels:?}");
-    }
+    let config = Config { stand_off_m: 0.0, latency_s: 0.0, ..Config::default() };
+    let wheels = settled(config, &target(0.0, 0.0, Vector2::new(0.5, 0.0)));
+    assert!(wheels.left == wheels.right, "{wheels:?}");
     let wheels = settled(Config::default(), &target(0.0, 0.0, Vector2::zeros()));
     assert_eq!(wheels, WheelSpeeds::STOP);
 }
 
 #[test]
-fn it_turns_to_whoever_is_behind_where_the_printed_law_drives_away() {
+fn it_turns_to_a_person_behind_it() {
     let place = Point2::new(-2.0, 0.01);
-    let end = |as_printed| {
-        let mut drive = Drive::new(Config { as_printed, ..Config::default() }, 0.1, 0);
-        for _ in 0..150 {
-            drive.step(place, Vector2::zeros());
-        }
-        drive.polar(place)
-    };
-    let (range, bearing) = end(false);
+    let mut drive = Drive::new(Config::default(), 0.1, 0);
+    for _ in 0..150 {
+        drive.step(place, Vector2::zeros());
+    }
+    let (range, bearing) = drive.polar(place);
     assert!((range - 1.4).abs() < 0.05 && bearing.abs() < 0.05, "{range} {bearing}");
-    assert!(end(true).0 > 3.0);
 }
 
 #[test]
@@ -215,17 +177,14 @@ fn turning_in_place_ends_later_than_it_begins() {
 
 #[test]
 fn at_the_stand_off_it_turns_with_a_person_who_walks_around_it() {
-    let worst = |as_printed| {
-        let mut drive = Drive::new(Config { as_printed, ..Config::default() }, 0.1, 0);
-        let bearings = (0..200).map(|i| {
-            let (sin, cos) = (0.03 * f64::from(i)).sin_cos();
-            drive.step(Point2::new(1.4 * cos, 1.4 * sin), Vector2::new(-sin, cos) * 0.42);
-            drive.polar(Point2::new(1.4 * cos, 1.4 * sin)).1.abs()
-        });
-        bearings.fold(0.0, f64::max).to_degrees()
-    };
-    assert!(worst(false) < 25.0, "{}", worst(false));
-    assert!(worst(true) > 90.0, "{}", worst(true));
+    let mut drive = Drive::new(Config::default(), 0.1, 0);
+    let bearings = (0..200).map(|i| {
+        let (sin, cos) = (0.03 * f64::from(i)).sin_cos();
+        drive.step(Point2::new(1.4 * cos, 1.4 * sin), Vector2::new(-sin, cos) * 0.42);
+        drive.polar(Point2::new(1.4 * cos, 1.4 * sin)).1.abs()
+    });
+    let worst_deg = bearings.fold(0.0, f64::max).to_degrees();
+    assert!(worst_deg < 25.0, "{worst_deg}");
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
     let image = frame.derived::<Working>().unwrap();
     let mut tools = weigher.tools();
     let view = tools.view_of(frame, &image);
-    let mut cast: Vec<Placed> = scene
+    let mut cast: Vec<PlacedPerson> = scene
         .iter()
         .filter_map(|p| tools.place(p, direction(p, &frame.camera), &frame.camera, &view))
         .collect();
@@ -45,8 +45,9 @@ fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
                     let hidden = cast[..k].iter().any(|p| inside(p.body(line), x));
                     sum += if hidden { 0 } else { pixel.covered };
                 } else if x < edge || end <= x {
-                    let is_rival =
-                        |p: &&Placed| p.depth_m < person.depth_m + config.likelihood_tolerance_m;
+                    let is_rival = |p: &&PlacedPerson| {
+                        p.depth_m < person.depth_m + config.likelihood_tolerance_m
+                    };
                     let others = cast.iter().enumerate().filter(|(i, _)| *i != k);
                     let mut rivals = others.map(|(_, p)| p).filter(is_rival);
                     let taken = rivals.any(|p| inside(p.body(line), x));
@@ -125,14 +126,14 @@ fn painted(people: &[Person]) -> Frame {
     let image = empty.derived::<Working>().unwrap();
     let mut tools = weigher.tools();
     let view = tools.view_of(&empty, &image);
-    let cast: Vec<Placed> = people
+    let cast: Vec<PlacedPerson> = people
         .iter()
         .filter_map(|p| tools.place(p, direction(p, &empty.camera), &empty.camera, &view))
         .collect();
     let depth = DepthImage::from_fn(80, 60, |x, y| {
         let (x, y) = (x as i64, y as i64);
-        let here = |p: &&Placed| p.body(y).is_some_and(|(a, b)| a <= x && x < b);
-        let relief = |p: &Placed| {
+        let here = |p: &&PlacedPerson| p.body(y).is_some_and(|(a, b)| a <= x && x < b);
+        let relief = |p: &PlacedPerson| {
             let row = p.silhouette.rows.iter().find(|row| p.y + row.dy == y);
             row.map_or(0.0, |row| with_reliefs(p.silhouette.pose, std::iter::once(row))[0].relief_m)
         };

@@ -1,6 +1,6 @@
 //! The equations, one by one.
 
-use nalgebra::{Isometry2, Matrix3, Point2, Point3, SMatrix, Vector2, Vector3, Vector5};
+use nalgebra::{Matrix3, Point3, SMatrix, Vector3, Vector5};
 use proptest::prelude::*;
 use tagalong_config::{Context, Registry};
 use tagalong_core::{DiffDrive, EgoMotion};
@@ -41,10 +41,9 @@ fn with(motion: &EgoMotion, index: usize, by: f64) -> EgoMotion {
 proptest! {
     #[test]
     fn the_state_jacobian_is_that_of_the_transition(
-        state in states(), motion in motions(), printed in any::<bool>(), decay_s in 0.0..3.0f64,
+        state in states(), motion in motions(), decay_s in 0.0..3.0f64,
     ) {
-        let config = Config { velocity_decay_s: decay_s, ..Config::default() };
-        let filter = filter(Config { compat_printed_velocity: printed, ..config });
+        let filter = filter(Config { velocity_decay_s: decay_s, ..Config::default() });
         let f = state_jacobian(&motion, decay_s);
         for i in 0..5 {
             let mut step = Vector5::zeros();
@@ -184,14 +183,11 @@ fn velocity_variance_after_1s(config: &Config, steps: u32) -> f64 {
 }
 
 #[test]
-fn the_process_noise_does_not_depend_on_the_frame_rate_as_the_printed_one_does() {
+fn the_process_noise_does_not_depend_on_the_frame_rate() {
     let config = Config::default();
     let (slow, fast) =
         (velocity_variance_after_1s(&config, 5), velocity_variance_after_1s(&config, 50));
     assert!((slow - 0.5).abs() < 1e-9 && (fast - 0.5).abs() < 1e-9);
-    let printed = Config { compat_printed_noise: true, ..config };
-    let ratio = velocity_variance_after_1s(&printed, 5) / velocity_variance_after_1s(&printed, 50);
-    assert!((ratio - 10.0).abs() < 1e-6);
 }
 
 /// Returns x and the velocity along it, predicted from 3 m and 1 m/s over two seconds.
@@ -229,10 +225,8 @@ fn height_after_sitting_down(config: Config) -> f64 {
 }
 
 #[test]
-fn the_height_follows_a_person_who_sits_down_the_printed_one_freezes() {
+fn the_height_follows_a_person_who_sits_down() {
     assert!(height_after_sitting_down(Config::default()) < 1.25);
-    let printed = Config { compat_printed_noise: true, ..Config::default() };
-    assert!(height_after_sitting_down(printed) > 1.5);
 }
 
 #[test]
@@ -249,24 +243,18 @@ fn a_heading_error_moves_far_people_sideways() {
 }
 
 #[test]
-fn the_printed_update_loses_symmetry_the_joseph_form_does_not() {
-    let asymmetry = |printed: bool| {
-        let filter = filter(Config { compat_printed_update: printed, ..Config::default() });
-        let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
-        let mut world = World::new(1);
-        let mut worst: f64 = 0.0;
-        for _ in 0..50 {
-            filter.predict(&mut state, &world.drive(0.5, 0.7));
-            let mut seen = world.look();
-            seen.covariance[(0, 1)] = 1e-3;
-            seen.covariance[(1, 0)] = 1e-3;
-            filter.correct(&mut state, &seen, &camera());
-            worst = worst.max((state.covariance - state.covariance.transpose()).norm());
-        }
-        worst
-    };
-    assert_eq!(asymmetry(false), 0.0);
-    assert!(asymmetry(true) > 0.0);
+fn the_update_keeps_the_covariance_symmetric() {
+    let filter = filter(Config::default());
+    let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
+    let mut world = World::new(1);
+    for _ in 0..50 {
+        filter.predict(&mut state, &world.drive(0.5, 0.7));
+        let mut seen = world.look();
+        seen.covariance[(0, 1)] = 1e-3;
+        seen.covariance[(1, 0)] = 1e-3;
+        filter.correct(&mut state, &seen, &camera());
+        assert_eq!(state.covariance, state.covariance.transpose());
+    }
 }
 
 #[test]
@@ -279,8 +267,6 @@ fn a_detections_own_covariance_decides_how_far_it_is_believed() {
         state.mean[0] - 3.0
     };
     assert!(move_by(Config::default(), 0.5) < 0.1 * move_by(Config::default(), 0.01));
-    let printed = || Config { compat_printed_measurement: true, ..Config::default() };
-    assert_eq!(move_by(printed(), 0.5), move_by(printed(), 0.01));
 }
 
 #[test]
@@ -314,18 +300,6 @@ fn the_region_is_that_of_the_estimated_place() {
 }
 
 #[test]
-fn the_printed_velocity_is_that_of_the_paper() {
-    let filter = filter(Config { compat_printed_velocity: true, ..Config::default() });
-    let wheels = DiffDrive { half_separation_m: 0.167, slip: 0.0 };
-    let motion = EgoMotion::from_wheels(0.4, 0.6, &wheels, DT_S);
-    let got = filter.transition(&Vector5::new(3.0, 1.0, 1.6, 0.2, -0.1), &motion);
-    let turned = Isometry2::rotation(-motion.turn) * Vector2::new(0.2, -0.1);
-    assert!((got[3] - (turned.x - 0.5)).abs() < 1e-3 && (got[4] - turned.y).abs() < 1e-12);
-    let place = motion.apply_to_point(Point2::new(3.0 + 0.2 * DT_S, 1.0 - 0.1 * DT_S));
-    assert!((Point2::new(got[0], got[1]) - place).norm() < 1e-12);
-}
-
-#[test]
 fn settings_that_cannot_work_are_refused() {
     let mut registry = Registry::default();
     crate::register(&mut registry);
@@ -335,7 +309,7 @@ fn settings_that_cannot_work_are_refused() {
         wheels: DiffDrive { half_separation_m: 0.2, slip: 0.0 },
     };
     assert!(registry.build_filter("ekf", None, &context).is_ok());
-    for line in ["acceleration_noise = 0.0", "height_noise = -1.0", "printed_sigma_v_m = nan"] {
+    for line in ["acceleration_noise = 0.0", "height_noise = -1.0", "extra_sigma_m = nan"] {
         let text = format!("{{ {line} }}");
         let value = toml::de::DeValue::parse(&text).unwrap();
         let error = registry.build_filter("ekf", Some(value), &context).err().unwrap();
@@ -375,66 +349,30 @@ fn a_newcomer_is_where_the_detection_is_and_may_go_anywhere() {
     assert!((state.covariance - expected).norm() < 1e-12, "{}", state.covariance);
 }
 
-#[test]
-fn who_backs_up_is_subtracted_the_other_way_and_who_waits_not_at_all() {
-    let filter = filter(Config { compat_printed_velocity: true, ..Config::default() });
-    let still = Vector5::new(3.0, 0.0, 1.6, 0.0, 0.0);
-    let of =
-        |forward: f64| filter.transition(&still, &EgoMotion { forward, ..EgoMotion::at_rest(0.1) });
-    assert!((of(-0.05)[3] - 0.5).abs() < 1e-12 && (of(0.05)[3] + 0.5).abs() < 1e-12);
-    let no_time = EgoMotion { forward: 0.05, ..EgoMotion::at_rest(0.0) };
-    assert_eq!(filter.transition(&still, &no_time)[3], 0.0);
-}
-
-#[test]
-fn the_printed_noise_knows_neither_height_nor_ego_motion() {
-    let filter =
-        filter(Config { compat_printed_noise: true, printed_sigma_w: 4.0, ..Config::default() });
-    let mut state = belief_at(Point3::new(5.0, 0.0, 1.6));
-    let before = state.covariance;
-    let mut motion = EgoMotion::at_rest(0.1);
-    motion.covariance = Matrix3::identity() * 0.01;
-    filter.predict(&mut state, &motion);
-    let added = state.covariance - before;
-    assert!((added[(3, 3)] - 0.16).abs() < 1e-12 && (added[(4, 4)] - 0.16).abs() < 1e-12);
-    assert_eq!(added[(2, 2)], 0.0);
-    let moved = before[(3, 3)] * 0.01;
-    assert!((added[(0, 0)] - moved).abs() < 1e-12 && (added[(1, 1)] - moved).abs() < 1e-12);
-}
-
 /// The state after a sighting half a metre away, by hand where all is diagonal.
 #[test]
-fn both_updates_are_those_of_the_textbook() {
-    for printed in [false, true] {
-        let filter = filter(Config {
-            compat_printed_update: printed,
-            compat_printed_measurement: true,
-            printed_sigma_v_m: 0.3,
-            ..Config::default()
-        });
-        let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
-        let p = state.covariance[(0, 0)];
-        let seen = detection(Point3::new(3.5, 0.0, 1.6), 0.01);
-        let support = filter.correct(&mut state, &seen, &camera());
-        let gain = p / (p + 0.09);
-        assert!((state.mean[0] - 3.0 - 0.5 * gain).abs() < 1e-12, "{printed}");
-        assert!((state.covariance[(0, 0)] - (1.0 - gain) * p).abs() < 1e-12, "{printed}");
-        let (nis, measured) = support.nis.unwrap();
-        assert!((nis - 0.25 / (p + 0.09)).abs() < 1e-12 && measured == 3);
-    }
+fn the_update_is_that_of_the_textbook() {
+    let filter = filter(Config { extra_sigma_m: 0.0, ..Config::default() });
+    let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
+    let p = state.covariance[(0, 0)];
+    let seen = detection(Point3::new(3.5, 0.0, 1.6), 0.3);
+    let support = filter.correct(&mut state, &seen, &camera());
+    let gain = p / (p + 0.09);
+    assert!((state.mean[0] - 3.0 - 0.5 * gain).abs() < 1e-12);
+    assert!((state.covariance[(0, 0)] - (1.0 - gain) * p).abs() < 1e-12);
+    let (nis, measured) = support.nis.unwrap();
+    assert!((nis - 0.25 / (p + 0.09)).abs() < 1e-12 && measured == 3);
 }
 
 #[test]
 fn every_number_has_its_bound_and_zero_is_allowed_where_it_means_none() {
     type Key = (&'static str, fn(&mut Config) -> &mut f64, bool);
-    let keys: [Key; 7] = [
+    let keys: [Key; 5] = [
         ("acceleration_noise", |c| &mut c.acceleration_noise, false),
         ("height_noise", |c| &mut c.height_noise, true),
         ("initial_velocity_variance", |c| &mut c.initial_velocity_variance, false),
         ("extra_sigma_m", |c| &mut c.extra_sigma_m, true),
         ("student_dof", |c| &mut c.student_dof, true),
-        ("printed_sigma_w", |c| &mut c.printed_sigma_w, false),
-        ("printed_sigma_v_m", |c| &mut c.printed_sigma_v_m, false),
     ];
     for (key, of, may_be_zero) in keys {
         let refusal = |value: f64| {

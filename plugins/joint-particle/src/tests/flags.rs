@@ -1,11 +1,11 @@
 //! Tests of each setting by its effect.
 
-use nalgebra::{Point3, Vector2};
+use nalgebra::{Point3, Vector2, Vector5};
 use proptest::prelude::*;
 use tagalong_core::{EgoMotion, Person, RgbImage};
 
 use super::rig::{EXACT, Formula, Rig, sighting};
-use crate::{Chosen, Config, Method};
+use crate::{Chosen, Config, Method, Random, Sampling, SamplingSteps};
 
 /// Two people one behind the other, with uncertain positions across the view.
 fn pair(config: Config) -> Rig {
@@ -264,41 +264,52 @@ fn largest(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn people_are_moved_by_the_same_noise_where_it_is_shared_and_else_by_their_own() {
-    let moved = |compat_shared_noise, compat_condensation| {
-        displacements(Config { compat_shared_noise, compat_condensation, ..drawn() }, 1)
-    };
-    for condensation in [false, true] {
-        let [one, other] = moved(false, condensation);
-        assert!(correlation(&one, &other).abs() < 0.2, "{}", correlation(&one, &other));
-        let [one, other] = moved(true, condensation);
-        assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-3));
+fn people_are_moved_by_noise_of_their_own() {
+    let [one, other] = displacements(drawn(), 1);
+    assert!(correlation(&one, &other).abs() < 0.2, "{}", correlation(&one, &other));
+    assert!(largest(&one) > 2.2, "normal: {}", largest(&one));
+    assert_ne!([one, other], displacements(drawn(), 2));
+}
+
+/// A scheme that replaces every step.
+#[derive(Debug)]
+struct Other;
+
+impl SamplingSteps for Other {
+    fn noise(&self, _: &mut Random, dimensions: &mut [Random]) -> Vector5<f64> {
+        Vector5::from_fn(|i, _| dimensions[i].uniform())
+    }
+
+    fn shares_noise(&self) -> bool {
+        true
+    }
+
+    fn lateral_axis(&self, _: &Vector2<f64>) -> Vector2<f64> {
+        Vector2::y()
+    }
+
+    fn reports_prediction(&self) -> bool {
+        true
     }
 }
 
-#[test]
-fn condensation_draws_uniform_noise_shared_or_not_and_the_same_for_everybody() {
-    for shared in [false, true] {
-        let moved = |compat_condensation, seed| {
-            let config = Config { compat_shared_noise: shared, compat_condensation, ..drawn() };
-            displacements(config, seed)
-        };
-        let [one, other] = moved(true, 1);
-        let end = 3f64.sqrt() + 1e-3;
-        assert!((0.95 * end..end).contains(&largest(&one)), "{}", largest(&one));
-        assert!(largest(&other) < end);
-        let normal = moved(false, 1);
-        assert!(largest(&normal[0]) > 2.2, "{}", largest(&normal[0]));
-        let again = moved(true, 2);
-        assert!(one.iter().zip(&again[0]).all(|(a, b)| (a - b).abs() < 1e-3), "seeded alike");
-        assert_ne!(normal, moved(false, 2));
-    }
+fn other() -> Config {
+    Config { sampling: Sampling::new(Other), ..drawn() }
 }
 
 #[test]
-fn condensation_reports_the_prediction() {
-    let of = |compat_condensation| {
-        let mut rig = Rig::new(Config { compat_condensation, ..drawn() }, 1);
+fn a_scheme_may_share_noise_from_generators_of_the_dimensions() {
+    let [one, other_one] = displacements(other(), 1);
+    assert!(one.iter().zip(&other_one).all(|(a, b)| (a - b).abs() < 1e-3), "shared");
+    assert!(one.iter().all(|noise| *noise > -1e-3), "uniform in 0..1");
+    let again = displacements(other(), 2);
+    assert!(one.iter().zip(&again[0]).all(|(a, b)| (a - b).abs() < 1e-3), "seeded alike");
+}
+
+#[test]
+fn a_scheme_may_report_the_prediction() {
+    let of = |config| {
+        let mut rig = Rig::new(config, 1);
         rig.start(1, [2.0, 0.0, 1.6], [EXACT; 3]);
         for frame in 1..12 {
             let at = Point3::new(2.0, 0.1 * f64::from(frame), 1.6);
@@ -307,16 +318,25 @@ fn condensation_reports_the_prediction() {
             };
             rig.look(&Formula::new(log));
         }
-        (rig.place(1).y - 1.1, 0.1 * rig.velocity(1).y)
+        rig.place(1).y - 1.1
     };
-    let ((here, _), (ahead, step)) = (of(false), of(true));
-    assert!(here.abs() < 0.05, "{here}");
-    assert!(step > 0.04 && (ahead - step).abs() < 0.05, "{ahead} {step}");
+    let ahead = Config { sampling: Sampling::new(Ahead), ..drawn() };
+    assert!(of(drawn()).abs() < 0.05 && of(ahead.clone()) > 0.04, "{}", of(ahead));
+}
+
+/// A scheme that differs in what it reports alone.
+#[derive(Debug)]
+struct Ahead;
+
+impl SamplingSteps for Ahead {
+    fn reports_prediction(&self) -> bool {
+        true
+    }
 }
 
 /// Returns the places that a table compares for a person at 45 degrees to the side.
-fn table_places(compat_printed_axes: bool) -> Vec<Point3<f64>> {
-    let config = Config { method: Method::Table, compat_printed_axes, ..drawn() };
+fn table_places(config: Config) -> Vec<Point3<f64>> {
+    let config = Config { method: Method::Table, ..config };
     let mut rig = Rig::new(config, 1);
     rig.start(1, [1.5, 1.5, 1.6], [EXACT; 3]);
     rig.start(2, [2.5, 2.5, 1.6], [EXACT; 3]);
@@ -327,15 +347,16 @@ fn table_places(compat_printed_axes: bool) -> Vec<Point3<f64>> {
 }
 
 #[test]
-fn places_lie_across_the_viewing_ray_or_along_the_printed_axis() {
-    let ends = |printed| {
-        let places = table_places(printed);
+fn places_lie_across_the_viewing_ray_or_along_the_axis_of_a_scheme() {
+    let ends = |config| {
+        let places = table_places(config);
         places[1280] - places[0]
     };
-    let (across, printed) = (ends(false), ends(true));
+    let across = ends(drawn());
+    let along = ends(other());
     let half = 0.6 / 2f64.sqrt();
     assert!((across.xy() - Vector2::new(-half, half)).norm() < 0.02, "{across}");
-    assert!((printed.xy() - Vector2::new(0.0, 0.6)).norm() < 1e-9, "{printed}");
+    assert!((along.xy() - Vector2::new(0.0, 0.6)).norm() < 1e-9, "{along}");
 }
 
 #[test]

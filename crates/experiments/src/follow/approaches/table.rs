@@ -1,4 +1,4 @@
-use tagalong_reproduce::{Cell, Row, Table};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::{ApproachBy, Seeds};
 use tagalong_stats::{CONFIDENCE, exact_upper_bound, percentile};
 use tagalong_trials::{ApproachJudge, Approached, Contact, Side, Touched};

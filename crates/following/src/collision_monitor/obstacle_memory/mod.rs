@@ -63,6 +63,8 @@ pub(crate) struct ObstacleMemory {
     columns: Vec<Column>,
     eye: Point2<f64>,
     things: Vec<Obstacle>,
+    /// Time since the last image, up to the last frame, s.
+    held_s: f64,
     grid: Grid,
 }
 
@@ -91,6 +93,9 @@ struct Column {
     nearest: Option<Point2<f64>>,
     /// Farthest reading in it, robot frame, m.
     farthest: Option<Point2<f64>>,
+    /// Squares of their distances from the camera, m².
+    nearest_square: f64,
+    farthest_square: f64,
     /// Time for which it has been dark, s; infinite if it always was: the images of some cameras
     /// have an empty border.
     dark_s: f64,
@@ -128,26 +133,55 @@ impl ObstacleMemory {
             columns: Vec::new(),
             eye: Point2::origin(),
             things: Vec::new(),
+            held_s: 0.0,
             grid: Grid::default(),
         }
     }
 
-    /// Takes in an image; the robot moved by `motion` since the last one. Points near the followed
-    /// person are remembered only if they stay when the person goes, and moving ones are not.
+    /// Takes in an image, `motion` after the frame before. Points near the followed person are
+    /// remembered only if they stay when the person goes, and moving ones are not.
     pub(crate) fn update(
         &mut self,
         settings: &CollisionMonitorSettings,
         camera: &Camera,
-        depth: Option<&DepthImage>,
+        depth: &DepthImage,
         motion: &EgoMotion,
         target: Option<&Person>,
     ) {
-        self.add_depth(settings, camera, depth, motion.dt);
+        let dt_s = motion.dt + std::mem::take(&mut self.held_s);
+        self.add_depth(settings, camera, depth, dt_s);
         // The order matters: old obstacles are matched with the new points before the rest of these
         // become new obstacles.
         self.grid.count(reach_m(settings, &self.footprint), &self.seen);
-        self.propagate(settings, camera, depth, motion, target);
+        self.propagate(settings, camera, depth, motion, dt_s, target);
         self.remember(settings, target);
+    }
+
+    /// Takes in that no new image came with a frame, `motion` after the frame before: the last one
+    /// holds, in the robot's new frame.
+    pub(crate) fn hold(&mut self, settings: &CollisionMonitorSettings, motion: &EgoMotion) {
+        self.held_s += motion.dt;
+        self.eye = motion.apply_to_point(self.eye);
+        for point in &mut self.seen {
+            let at = motion.apply_to_point(point.xy());
+            *point = Point3::new(at.x, at.y, point.z);
+        }
+        for column in &mut self.columns {
+            column.advance(motion);
+        }
+        let footprint = &self.footprint;
+        let reach_m = reach_m(settings, footprint);
+        self.things.retain_mut(|thing| {
+            thing.at = motion.apply_to_point(thing.at);
+            // What is in the last image needs no memory, and is not forgotten with the frames
+            // between two images. People may be known without an image.
+            if thing.unseen_s > 0.0 || thing.who.is_some() {
+                thing.unseen_s += motion.dt;
+            }
+            let is_kept =
+                thing.unseen_s == 0.0 || thing.unseen_s <= thing.kept_s(settings, footprint);
+            is_kept && thing.at.coords.norm() < reach_m
+        });
     }
 
     /// Takes in the left image of a stereo pair, whose depth this is. A column without texture is
@@ -169,7 +203,8 @@ impl ObstacleMemory {
             self.things.retain(|thing| thing.who != Some(track.id));
             if Some(track.id) != followed {
                 let Point3 { coords: torso } = track.estimate.person.position - TORSO;
-                let (at, heights) = (torso.xy().into(), Heights::of(torso.z));
+                let at = torso.xy().into();
+                let heights = Heights::of(torso.z);
                 let who = Some(track.id);
                 // `STANDS_S` at once: the tracker vouches for a person, so no second of standing is
                 // needed.
@@ -184,7 +219,7 @@ impl ObstacleMemory {
         *self = Self::new(self.footprint.clone());
     }
 
-    /// Returns true if there is a depth image with too few readings.
+    /// Returns true if the last depth image has too few readings.
     pub(super) fn is_blind(&self, settings: &CollisionMonitorSettings) -> bool {
         self.with_depth.is_some_and(|part| part < settings.min_seen)
     }
@@ -220,8 +255,9 @@ impl ObstacleMemory {
         self.columns.iter().filter_map(|column| column.nearest)
     }
 
-    /// Returns the directions in which the image has depth.
-    pub(super) fn coverage(&self, min_share: f64) -> Coverage {
+    /// Returns the directions in which the last image has depth, if there was one.
+    pub(super) fn coverage(&self, min_share: f64) -> Option<Coverage> {
+        self.with_depth?;
         let border = BORDER * self.columns.len() as f64;
         let mut looks = Vec::with_capacity(self.columns.len());
         for (at, column) in self.columns.iter().enumerate() {
@@ -233,7 +269,7 @@ impl ObstacleMemory {
                 looks.push((way.y.atan2(way.x), look));
             }
         }
-        Coverage::new(self.eye, looks, min_share)
+        Some(Coverage::new(self.eye, looks, min_share))
     }
 
     /// Moves the obstacles into the robot's new frame. Forgets those that the camera sees past,
@@ -242,8 +278,9 @@ impl ObstacleMemory {
         &mut self,
         settings: &CollisionMonitorSettings,
         camera: &Camera,
-        depth: Option<&DepthImage>,
+        depth: &DepthImage,
         motion: &EgoMotion,
+        dt_s: f64,
         target: Option<&Person>,
     ) {
         let grid = &self.grid;
@@ -257,14 +294,15 @@ impl ObstacleMemory {
             }
             if grid.is_something(at) {
                 thing.heights.0 |= grid.heights_around(at).0;
-                thing.see(settings, motion.dt, target);
+                thing.see(settings, dt_s, target);
                 return true;
             }
             thing.unseen_s += motion.dt;
-            let is_gone = depth.is_some_and(|depth| match thing.is_drop {
-                true => shows_floor(settings, camera, depth, at),
-                false => shows_past(camera, depth, at, thing.heights),
-            });
+            let is_gone = if thing.is_drop {
+                shows_floor(settings, camera, depth, at)
+            } else {
+                shows_past(camera, depth, at, thing.heights)
+            };
             !is_gone && thing.unseen_s <= thing.kept_s(settings, footprint)
         });
     }
@@ -273,43 +311,41 @@ impl ObstacleMemory {
         &mut self,
         settings: &CollisionMonitorSettings,
         camera: &Camera,
-        depth: Option<&DepthImage>,
+        depth: &DepthImage,
         dt_s: f64,
     ) {
         self.seen.clear();
         let reach_m = reach_m(settings, &self.footprint);
         let eye: Point3<f64> = camera.robot_from_camera.translation.vector.into();
         self.eye = eye.xy();
-        self.with_depth = depth.map(|depth| {
-            // Large images are sampled, so that `min_points` does not depend on their resolution.
-            let step = depth.width().div_ceil(COLUMNS).max(1);
-            let rows = depth.height().div_ceil(step);
-            self.columns.resize(depth.width().div_ceil(step), Column::NEVER_SEEN);
-            self.columns.iter_mut().for_each(Column::begin);
-            for y in (0..depth.height()).step_by(step) {
-                let row = depth.row(y).iter().step_by(step);
-                for (at, (z, column)) in row.zip(&mut self.columns).enumerate() {
-                    let z = f64::from(*z);
-                    if !is_reading(z) {
-                        continue;
-                    }
-                    let pixel = Point2::new((at * step) as f64, y as f64);
-                    let point = camera.back_project(pixel, z);
-                    let is_thing = is_thing(settings, &point);
-                    column.take(&eye, &point, is_thing);
-                    let place = if is_thing { Some(point) } else { fall(settings, &eye, &point) };
-                    self.seen.extend(place.filter(|place| place.xy().coords.norm() < reach_m));
+        // Large images are sampled, so that `min_points` does not depend on their resolution.
+        let step = depth.width().div_ceil(COLUMNS).max(1);
+        let rows = depth.height().div_ceil(step);
+        self.columns.resize(depth.width().div_ceil(step), Column::NEVER_SEEN);
+        self.columns.iter_mut().for_each(Column::begin);
+        for y in (0..depth.height()).step_by(step) {
+            let row = depth.row(y).iter().step_by(step);
+            for (at, (z, column)) in row.zip(&mut self.columns).enumerate() {
+                let z = f64::from(*z);
+                if !is_reading(z) {
+                    continue;
                 }
+                let pixel = Point2::new((at * step) as f64, y as f64);
+                let point = camera.back_project(pixel, z);
+                let is_thing = is_thing(settings, &point);
+                column.take(&eye, &point, is_thing);
+                let place = if is_thing { Some(point) } else { fall(settings, &eye, &point) };
+                self.seen.extend(place.filter(|place| place.xy().coords.norm() < reach_m));
             }
-            let read: u32 = self.columns.iter().map(|column| column.read).sum();
-            let middle = 0.5 * depth.height() as f64;
-            for (at, column) in self.columns.iter_mut().enumerate() {
-                let pixel = Point2::new((at * step) as f64, middle);
-                column.at = camera.back_project(pixel, HIDES_M).xy();
-                column.end(rows, dt_s);
-            }
-            f64::from(read) / (rows * self.columns.len()).max(1) as f64
-        });
+        }
+        let read: u32 = self.columns.iter().map(|column| column.read).sum();
+        let middle = 0.5 * depth.height() as f64;
+        for (at, column) in self.columns.iter_mut().enumerate() {
+            let pixel = Point2::new((at * step) as f64, middle);
+            column.at = camera.back_project(pixel, HIDES_M).xy();
+            column.end(rows, dt_s);
+        }
+        self.with_depth = Some(f64::from(read) / (rows * self.columns.len()).max(1) as f64);
     }
 
     fn remember(&mut self, settings: &CollisionMonitorSettings, target: Option<&Person>) {
@@ -334,13 +370,16 @@ impl ObstacleMemory {
 
     /// Lets low things that are seen beside standing ones stand, too.
     fn join_low_parts(&mut self) {
-        let stand = |thing: &&Obstacle| thing.is_static() && !thing.is_drop && thing.who.is_none();
-        let standing: Vec<_> = self.things.iter().filter(stand).map(|thing| thing.at).collect();
-        let is_part = |thing: &&mut Obstacle| {
-            thing.unseen_s == 0.0 && !thing.of_target && !thing.is_drop && thing.heights.are_low()
-        };
-        for thing in self.things.iter_mut().filter(is_part) {
-            if standing.iter().any(|at| nalgebra::distance(at, &thing.at) < BESIDE_M) {
+        let mut standing = Vec::new();
+        for thing in &self.things {
+            if thing.is_static() && !thing.is_drop && thing.who.is_none() {
+                standing.push(thing.at);
+            }
+        }
+        for thing in &mut self.things {
+            if thing.may_be_low_part()
+                && standing.iter().any(|at| nalgebra::distance(at, &thing.at) < BESIDE_M)
+            {
                 thing.seen_s = thing.seen_s.max(STANDS_S);
             }
         }
@@ -349,13 +388,12 @@ impl ObstacleMemory {
 
 impl Obstacle {
     fn new(at: Point2<f64>, heights: Heights) -> Self {
-        let (seen_s, beside_s, unseen_s) = (0.0, 0.0, 0.0);
         Self {
             at,
             heights,
-            seen_s,
-            beside_s,
-            unseen_s,
+            seen_s: 0.0,
+            beside_s: 0.0,
+            unseen_s: 0.0,
             of_target: false,
             who: None,
             is_drop: false,
@@ -376,6 +414,11 @@ impl Obstacle {
         if target.is_some_and(|person| far_m(person, &self.at) > CARRIED_M) {
             self.seen_s += std::mem::take(&mut self.beside_s);
         }
+    }
+
+    /// Returns true for a low thing in view, which may be a part of a standing one.
+    fn may_be_low_part(&self) -> bool {
+        self.unseen_s == 0.0 && !self.of_target && !self.is_drop && self.heights.are_low()
     }
 
     /// Returns true if it was seen for long enough to be remembered.
@@ -419,6 +462,8 @@ impl Column {
         read: 0,
         nearest: None,
         farthest: None,
+        nearest_square: f64::INFINITY,
+        farthest_square: f64::NEG_INFINITY,
         dark_s: f64::INFINITY,
     };
 
@@ -429,21 +474,32 @@ impl Column {
         0.0 < self.dark_s && self.dark_s.is_finite()
     }
 
+    /// Moves its places into the robot's new frame.
+    fn advance(&mut self, motion: &EgoMotion) {
+        self.at = motion.apply_to_point(self.at);
+        self.nearest = self.nearest.map(|at| motion.apply_to_point(at));
+        self.farthest = self.farthest.map(|at| motion.apply_to_point(at));
+    }
+
     /// Begins an image.
     fn begin(&mut self) {
         self.nearest = None;
         self.farthest = None;
+        self.nearest_square = f64::INFINITY;
+        self.farthest_square = f64::NEG_INFINITY;
     }
 
     /// Takes in a reading.
     fn take(&mut self, eye: &Point3<f64>, point: &Point3<f64>, is_thing: bool) {
         self.read += 1;
-        let far = |at: &Point2<f64>| (at - eye.xy()).norm_squared();
         let at = point.xy();
-        if is_thing && self.nearest.is_none_or(|nearest| far(&at) < far(&nearest)) {
+        let square = (at - eye.xy()).norm_squared();
+        if is_thing && square < self.nearest_square {
+            self.nearest_square = square;
             self.nearest = Some(at);
         }
-        if self.farthest.is_none_or(|farthest| far(&at) > far(&farthest)) {
+        if square > self.farthest_square {
+            self.farthest_square = square;
             self.farthest = Some(at);
         }
     }
@@ -482,15 +538,18 @@ impl Grid {
 
     /// Returns the cell of a place within reach.
     fn cell(&self, at: &Point2<f64>) -> usize {
-        let of = |metres: f64| {
-            let cell = (metres / CELL_M + self.side as f64 / 2.0) as usize;
-            cell.clamp(1, self.side - 2)
-        };
-        of(at.x) * self.side + of(at.y)
+        self.line(at.x) * self.side + self.line(at.y)
+    }
+
+    /// Returns the row or the column of cells at a coordinate, m.
+    fn line(&self, metres: f64) -> usize {
+        let line = (metres / CELL_M + self.side as f64 / 2.0) as usize;
+        line.clamp(1, self.side - 2)
     }
 
     fn around(&self, at: &Point2<f64>) -> [usize; 9] {
-        let (cell, side) = (self.cell(at), self.side);
+        let cell = self.cell(at);
+        let side = self.side;
         std::array::from_fn(|i| cell + (i / 3) * side + i % 3 - side - 1)
     }
 

@@ -2,11 +2,12 @@ use nalgebra::Vector2;
 use tagalong_conformance::target;
 use tagalong_geometry::{Distortion, Pinhole};
 
+use super::super::People;
 use super::super::binned::BinnedHazards;
+use super::super::depth_state::add_hazards;
 use super::super::footprint::Path;
 use super::super::space::SpaceGrid;
 use super::super::sweep::{Braking, HazardKind, allowance};
-use super::super::{People, add_depth_hazards};
 use super::*;
 
 /// Result of a look along an arc.
@@ -42,7 +43,7 @@ impl ObstacleMemory {
         let people = People { settings, tracks: track.as_slice(), target: track.as_ref() };
         let mut hazards = BinnedHazards::default();
         hazards.begin(settings, &self.footprint);
-        add_depth_hazards(settings, self, &SpaceGrid::default(), &people, &mut hazards);
+        add_hazards(settings, self, &SpaceGrid::default(), &people, &mut hazards);
         let all: Vec<_> = hazards
             .all()
             .iter()
@@ -98,7 +99,7 @@ fn approach(y: f64, from_m: f64, to_m: f64, memory_s: f64, someone: bool) -> Opt
         let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
         let people = someone.then(|| person(x, y, 0.0));
         let depth = with_box(x, y);
-        surroundings.update(&settings, &camera(), Some(&depth), &motion, people.as_ref());
+        surroundings.update(&settings, &camera(), &depth, &motion, people.as_ref());
     }
     surroundings.ahead(&settings, 0.0, None)
 }
@@ -123,10 +124,10 @@ fn a_thing_beside_the_robot_is_in_the_way_of_a_bend() {
     let depth = with_box(1.0, 0.7);
     let still = EgoMotion::at_rest(0.1);
     for _ in 0..WAIT {
-        surroundings.update(&settings, &camera(), Some(&depth), &still, None);
+        surroundings.update(&settings, &camera(), &depth, &still, None);
     }
     let on = EgoMotion { forward: 0.6, ..still };
-    surroundings.update(&settings, &camera(), Some(&with_box(9.0, 0.0)), &on, None);
+    surroundings.update(&settings, &camera(), &with_box(9.0, 0.0), &on, None);
     assert_eq!(surroundings.ahead(&settings, 0.0, None), Some(Ahead::Free));
     let bend = surroundings.ahead(&settings, 1.2, None);
     assert!(matches!(bend, Some(Ahead::Something(at)) if at < 0.7), "{bend:?}");
@@ -139,7 +140,7 @@ fn people_are_not_remembered_and_what_is_gone_is_forgotten() {
     let mut surroundings = memory();
     let mut look = |x| {
         let (depth, still) = (with_box(x, 0.0), EgoMotion::at_rest(0.1));
-        surroundings.update(&settings, &camera(), Some(&depth), &still, None);
+        surroundings.update(&settings, &camera(), &depth, &still, None);
         surroundings.ahead(&settings, 0.0, None)
     };
     assert!(is_at(look(1.5), 1.3));
@@ -154,7 +155,7 @@ fn what_the_person_sat_on_is_remembered_when_they_have_gone() {
     let mut look = |x: f64, forward: f64, person: &Person| {
         let (depth, still) = (with_box(x, 0.0), EgoMotion::at_rest(0.1));
         let motion = EgoMotion { forward, ..still };
-        surroundings.update(&settings, &camera(), Some(&depth), &motion, Some(person));
+        surroundings.update(&settings, &camera(), &depth, &motion, Some(person));
         surroundings.ahead(&settings, 0.0, Some(person.position.xy()))
     };
     for _ in 0..WAIT {
@@ -177,7 +178,7 @@ fn a_low_part_of_what_stands_is_remembered_though_it_was_seen_briefly() {
         let mut surroundings = memory();
         let mut look = |depth: &DepthImage, forward: f64| {
             let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
-            surroundings.update(&settings, &camera(), Some(depth), &motion, None);
+            surroundings.update(&settings, &camera(), depth, &motion, None);
             surroundings.ahead(&settings, 0.0, None) != Some(Ahead::Free)
         };
         let back = with_box(if with_back { 1.4 } else { 9.0 }, 0.6);
@@ -205,7 +206,7 @@ fn who_walks_by_is_not_remembered() {
         let depth = if step < 15 { with_box(1.2, y) } else { with_box(9.0, 0.0) };
         let forward = if step < 15 { 0.0 } else { 0.05 };
         let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
-        surroundings.update(&settings, &camera(), Some(&depth), &motion, None);
+        surroundings.update(&settings, &camera(), &depth, &motion, None);
         let ahead = surroundings.ahead(&settings, 0.0, None);
         seen += u32::from(matches!(ahead, Some(Ahead::Something(_))));
     }
@@ -220,7 +221,7 @@ fn what_left_the_image_close_before_the_robot_is_there_until_it_is_seen_to_be_go
     let mut surroundings = memory();
     let mut look = |x, y, forward| {
         let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
-        surroundings.update(&settings, &camera(), Some(&with_box(x, y)), &motion, None);
+        surroundings.update(&settings, &camera(), &with_box(x, y), &motion, None);
         surroundings.ahead(&settings, 0.0, None)
     };
     look(0.75, 0.3, 0.0);
@@ -242,7 +243,7 @@ fn what_stands_beside_whoever_stands_may_be_carried_away() {
         let mut look = |x: f64, forward, target: Option<&Person>| {
             let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
             let depth = with_box_of(x, 0.0, 0.2);
-            surroundings.update(&settings, &camera(), Some(&depth), &motion, target);
+            surroundings.update(&settings, &camera(), &depth, &motion, target);
             surroundings.ahead(&settings, 0.0, None)
         };
         (0..WAIT).for_each(|_| _ = look(1.2, 0.0, Some(&person)));
@@ -273,7 +274,7 @@ fn who_stood_and_left_is_gone_down_to_the_feet() {
         let mut look = |x, forward, stands| {
             let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
             let depth = seen(x, stands);
-            surroundings.update(&settings, &camera, Some(&depth), &motion, None);
+            surroundings.update(&settings, &camera, &depth, &motion, None);
             surroundings.ahead(&settings, 0.0, None)
         };
         (0..WAIT).for_each(|_| _ = look(1.6, 0.0, true));
@@ -294,7 +295,7 @@ fn whoever_stepped_before_the_robot_is_there_until_they_are_seen_elsewhere() {
     let mut look = |forward, seen: Option<Track>, followed| {
         let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
         let depth = with_box(9.0, 0.0);
-        surroundings.update(&settings, &camera(), Some(&depth), &motion, None);
+        surroundings.update(&settings, &camera(), &depth, &motion, None);
         surroundings.add_tracks(seen.as_slice(), followed);
         surroundings.ahead(&settings, 0.0, None)
     };
@@ -318,7 +319,7 @@ fn where_the_image_went_dark_from_top_to_bottom_somebody_stands() {
                 if dark.contains(&u) { f32::NAN } else { seen.row(v)[u] }
             });
             let motion = EgoMotion::at_rest(0.1);
-            surroundings.update(&settings, &camera(), Some(&depth), &motion, None);
+            surroundings.update(&settings, &camera(), &depth, &motion, None);
             surroundings.ahead(&settings, 0.0, None)
         };
     assert_eq!(look(0..20), Some(Ahead::Free), "a border that was always empty");
@@ -347,7 +348,7 @@ fn what_a_stereo_pair_cannot_match_for_want_of_texture_is_no_object() {
         let image =
             GreyImage::from_fn(80, 60, |u, v| noisy(u, v) + if u % 4 < 2 { stripes } else { 0 });
         for depth in [&seen, &dark, &dark] {
-            surroundings.update(&settings, &camera(), Some(depth), &EgoMotion::at_rest(0.1), None);
+            surroundings.update(&settings, &camera(), depth, &EgoMotion::at_rest(0.1), None);
             surroundings.excuse_smooth(&image);
         }
         let found = surroundings.ahead(&settings, 0.0, None);
@@ -380,7 +381,7 @@ fn before_edge(edge_m: f64, drop_m: f64, target: Option<Point2<f64>>) -> Option<
     let settings = settings();
     let mut surroundings = memory();
     let (depth, still) = (with_edge(edge_m, drop_m), EgoMotion::at_rest(0.1));
-    surroundings.update(&settings, &fine_camera(), Some(&depth), &still, None);
+    surroundings.update(&settings, &fine_camera(), &depth, &still, None);
     surroundings.ahead(&settings, 0.0, target)
 }
 
@@ -410,7 +411,7 @@ fn a_fall_below_the_image_is_remembered() {
         let forward = if step > 20 { 0.05 } else { 0.0 };
         let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
         let depth = with_edge(1.8 - driven_m, 0.17);
-        surroundings.update(&settings, &fine_camera(), Some(&depth), &motion, None);
+        surroundings.update(&settings, &fine_camera(), &depth, &motion, None);
     }
     let found = surroundings.ahead(&settings, 0.0, None);
     assert!(is_at(found, 1.8 - 0.95 - 0.2), "{found:?}");
@@ -429,7 +430,7 @@ fn a_fall_that_was_seen_too_briefly_is_not_remembered() {
         let mut surroundings = memory();
         let mut look = |depth: &DepthImage| {
             let still = EgoMotion::at_rest(0.1);
-            surroundings.update(&settings, &fine_camera(), Some(depth), &still, None);
+            surroundings.update(&settings, &fine_camera(), depth, &still, None);
             surroundings.ahead(&settings, 0.0, None)
         };
         for _ in 0..images {

@@ -1,0 +1,43 @@
+//! Tables of the published systems, beside the results of Tagalong.
+//!
+//! A [`System`] is a published tracker; each of its [`Experiment`]s reproduces one table or figure
+//! of its paper and returns [`Findings`]: tables with rows of published numbers and rows of
+//! measured ones, and charts. The [`Lab`] provides the simulated scenes, the configs, and runs of
+//! pipelines over many seeds.
+//!
+//! Scenes are simulated from the split `test`: settings and models are chosen on others. The same
+//! seeds give the same tables on any number of threads, apart from times.
+//!
+//! To add a table, write a function `fn(&Lab) -> Result<Findings, ReproduceError>` in the file of
+//! its system and name it in the system's list.
+
+pub mod command;
+mod draws;
+mod findings;
+mod forms;
+mod given;
+mod joint_particle;
+mod lab;
+mod laser;
+mod omni_appearance;
+mod printed;
+mod real;
+mod recorded;
+mod rgbd_compressive;
+mod scatter;
+mod stereo;
+mod triangulate;
+mod variant;
+pub mod webcams;
+
+use tagalong_config::Registry;
+
+/// Registers all plugins of the workspace, and those of the printed equations.
+pub fn register(registry: &mut Registry) {
+    tagalong_catalog::register(registry);
+    printed::register(registry);
+}
+
+pub use findings::{Experiment, ExperimentFindings, Findings, Picture, SYSTEMS, System, system};
+pub use lab::{Lab, Progress, ReproduceError, SimulatedScene, SimulatedScenes};
+pub use tagalong_report::{Cell, Row, Table};

@@ -1,0 +1,44 @@
+//! Plugins of the equations as the papers print them, misprints included. Each is registered beside
+//! the plugins of the workspace, as one of a crate outside of it would be.
+//!
+//! A switch of a plugin corrects one misprint, so that the tables can tell what each of them costs.
+
+mod arc_follow;
+mod compressive;
+mod depth_template;
+mod dissimilarity;
+mod ekf;
+mod floor_kalman;
+mod hungarian;
+mod image_kalman;
+mod joint_particle;
+pub(crate) mod omni_appearance;
+mod scene_likelihood;
+
+use tagalong_config::Registry;
+
+/// Registers the plugins of the printed equations.
+pub fn register(registry: &mut Registry) {
+    arc_follow::register(registry);
+    compressive::register(registry);
+    depth_template::register(registry);
+    ekf::register(registry);
+    floor_kalman::register(registry);
+    hungarian::register(registry);
+    image_kalman::register(registry);
+    joint_particle::register(registry);
+    omni_appearance::register(registry);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_plugins_keep_the_promises_of_their_kinds() {
+        let mut registry = Registry::default();
+        register(&mut registry);
+        let failures = tagalong_conformance::check_all(&registry);
+        assert!(failures.is_empty(), "{failures:#?}");
+    }
+}

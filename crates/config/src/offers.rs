@@ -1,0 +1,49 @@
+//! What a plugin offers to the applications, beside itself: advice on its tests, settings that are
+//! worth a trial, and how its model is trained.
+
+/// Advice on a test of the funnel that drops candidates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Remedy {
+    /// Name of the test; one that ends in `*` is a prefix.
+    pub test: &'static str,
+    /// Keys of the settings that decide it.
+    pub settings: &'static [&'static str],
+    /// Advice on the test.
+    pub look: &'static str,
+}
+
+/// Values of a setting that are worth a trial on any log.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrialValues {
+    /// Key of the setting.
+    pub setting: &'static str,
+    /// The values.
+    pub values: &'static [f64],
+}
+
+/// Examples from which a model is trained.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TrainingData {
+    /// Candidates that detectors propose in simulated rooms, annotated logs and photographs.
+    #[default]
+    Candidates,
+    /// Windows of labelled photographs.
+    Windows,
+    /// Faces, and photographs without any.
+    Faces,
+    /// Whole frames of simulated and real rooms.
+    Frames,
+    /// Panoramas of simulated rooms.
+    Panoramas,
+    /// Laser scans.
+    LaserScans,
+}
+
+/// How the model of a plugin is trained.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TrainingOffer {
+    /// Examples that the trainer learns from.
+    pub data: TrainingData,
+    /// Settings of a quick trial, as TOML: fewer combinations.
+    pub quick_settings: &'static str,
+}
