@@ -1,6 +1,6 @@
 use std::sync::{Arc, Mutex};
 
-use nalgebra::{Matrix3, Point3, Vector2, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Person,
     Result, RgbImage, Stamp, TrackId, Update,
@@ -110,10 +110,6 @@ impl Rig {
 
     pub fn place(&self, id: u32) -> Point3<f64> {
         self.estimate(id).person.position
-    }
-
-    pub fn velocity(&self, id: u32) -> Vector2<f64> {
-        self.estimate(id).person.velocity
     }
 
     pub fn sketch(&self, likelihood: &Formula) -> Sketch {
