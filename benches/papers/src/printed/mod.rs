@@ -41,7 +41,7 @@ mod tests {
         register(&mut registry);
         let failures = tagalong_conformance::check_all(&registry);
         let found: Vec<(String, String)> =
-            failures.iter().map(|f| (f.plugin.to_string(), f.check.to_string())).collect();
+            failures.iter().map(|f| (f.plugin.clone(), f.check.to_owned())).collect();
         let expected = ["ekf-as-printed", "image-kalman-as-printed"].map(|plugin| {
             (plugin.to_owned(), "a standing person stands still in the world".to_owned())
         });
