@@ -125,7 +125,7 @@ fn error_m(run: &Run, frame: usize, truth: &Truth) -> Option<f64> {
 
 fn config(detector: &str, filter: &str) -> String {
     format!(
-        "extends = \"omni-appearance.toml\"\n[[detectors]]\nplugin = \"omni-appearance\"\n\
+        "extends = \"../../../configs/omni-appearance.toml\"\n[[detectors]]\nplugin = \"omni-appearance\"\n\
          [detectors.config]\n{detector}\n[filter]\n{filter}\n"
     )
 }
