@@ -168,10 +168,11 @@ impl CollisionMonitor {
         self.depth_age.update(taken.map(|_| (frame.stamp, 0.0)), motion.dt);
         let image = taken.map(|taken| (&*frame.camera, &taken.image));
         self.depth.update(&self.settings, image, motion, tracks, target);
-        if taken.is_some() && frame.right().is_ok() {
-            if let Ok(left) = frame.grey() {
-                self.depth.excuse_smooth(left);
-            }
+        if taken.is_some()
+            && frame.right().is_ok()
+            && let Ok(left) = frame.grey()
+        {
+            self.depth.excuse_smooth(left);
         }
         self.depth.add_tracks(tracks, target.map(|track| track.id));
     }
