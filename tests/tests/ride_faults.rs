@@ -88,7 +88,7 @@ fn t7_odometry_that_is_silent_broken_or_stands_still_stops_the_robot() {
 /// Values that stand still are those of a base that does not obey, at any speed.
 #[test]
 fn t7_odometry_whose_values_stand_still_is_a_fault() {
-    assert_stands(FaultKind::OdometryFrozen, 5.0, &[Reason::Fault]);
+    assert_stands(FaultKind::OdometryFrozen, 4.6, &[Reason::Fault]);
 }
 
 #[test]

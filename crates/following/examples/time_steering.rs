@@ -1,5 +1,5 @@
-//! Drives along a simulated room, and prints the time of `Steering::steer` for a frame, ms: the median
-//! and the longest of a thousand. That is the collision monitor with its watchdogs, the target lock
+//! Drives along a simulated room, and prints the processor time of `Steering::steer` for a frame, ms: the
+//! median and the longest of three hundred. That is the collision monitor with its watchdogs, the target lock
 //! without appearance, and the limiter of the commands.
 //!
 //! `cargo run --release -p tagalong-following --example time_steering`
@@ -21,7 +21,7 @@ use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 use tagalong_vision::Describer;
 
 /// Frames that are timed.
-const FRAMES: usize = 1000;
+const FRAMES: usize = 300;
 /// Time between them, s.
 const PERIOD_S: f64 = 1.0 / 30.0;
 /// Distance of each wall from the middle of the room, m.

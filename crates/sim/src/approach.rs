@@ -160,8 +160,12 @@ pub struct Surroundings<'a> {
 impl Approacher {
     /// Creates an approacher that waits for its time.
     pub fn new(settings: &ApproachSettings) -> Self {
-        let (phase, place) = (Phase::Waits, Point2::origin());
-        Self { settings: settings.clone(), phase, place, heading_rad: 0.0 }
+        Self {
+            settings: settings.clone(),
+            phase: Phase::Waits,
+            place: Point2::origin(),
+            heading_rad: 0.0,
+        }
     }
 
     /// Returns its kind.
@@ -291,9 +295,12 @@ impl Approacher {
 
 /// Returns the place in a room that is nearest to a point, some way off the walls.
 fn within(point: Point2<f64>, room_m: [f64; 2]) -> Point2<f64> {
-    let clamp =
-        |at: f64, side: f64| at.clamp(WALL_M.min(0.5 * side), (side - WALL_M).max(0.5 * side));
-    Point2::new(clamp(point.x, room_m[0]), clamp(point.y, room_m[1]))
+    Point2::new(off_walls(point.x, room_m[0]), off_walls(point.y, room_m[1]))
+}
+
+/// Returns the coordinate nearest to one that is some way off the walls of a side of a room, m.
+fn off_walls(at_m: f64, side_m: f64) -> f64 {
+    at_m.clamp(WALL_M.min(0.5 * side_m), (side_m - WALL_M).max(0.5 * side_m))
 }
 
 #[cfg(test)]

@@ -10,9 +10,14 @@ const FLOOR_SLOPE: f64 = 0.03;
 /// Returns true for a point of an obstacle: above the floor, and low enough for the robot to hit
 /// it.
 pub(super) fn is_thing(settings: &CollisionMonitorSettings, point: &Point3<f64>) -> bool {
+    // Most points of an image are of the floor, at any distance.
+    let may_be = settings.floor_m < point.z && point.z < settings.top_m;
+    if !may_be {
+        return false;
+    }
     // Depth noise and errors of the mount's pitch lift far floor points.
     let floor = settings.floor_m + FLOOR_SLOPE * point.xy().coords.norm();
-    floor < point.z && point.z < settings.top_m
+    floor < point.z
 }
 
 /// Returns the place in which the floor is missing, on the ray from the camera to a point below the
@@ -25,6 +30,9 @@ pub(super) fn fall(
     eye: &Point3<f64>,
     point: &Point3<f64>,
 ) -> Option<Point3<f64>> {
+    if point.z >= -settings.drop_m {
+        return None;
+    }
     let depth = settings.drop_m + FLOOR_SLOPE * point.xy().coords.norm();
     // A camera below the floor has a wrong mount; it sees no falls.
     if !(point.z < -depth && eye.z > 0.0) {

@@ -11,6 +11,7 @@
 //! | `further_source` | a source of the settings, by its kind |
 //! | `freshness` | which reading is new, and how old the newest one is |
 //! | `obstacle_memory` | things in the depth image, and those that left it |
+//! | `pixel_rays` | viewing rays of the pixels of a depth camera |
 //! | `space` | places that were seen free: a thing that appears there moves |
 //! | `sweep` | speed on a path before things and beside people |
 //! | `coverage` | share of valid readings in the swept region: unknown is not free |
@@ -25,6 +26,7 @@ mod freshness;
 mod further_source;
 mod ground;
 mod obstacle_memory;
+mod pixel_rays;
 mod settings;
 mod source_state;
 mod sources;
@@ -166,10 +168,11 @@ impl CollisionMonitor {
         self.depth_age.update(taken.map(|_| (frame.stamp, 0.0)), motion.dt);
         let image = taken.map(|taken| (&*frame.camera, &taken.image));
         self.depth.update(&self.settings, image, motion, tracks, target);
-        if taken.is_some() && frame.right().is_ok() {
-            if let Ok(left) = frame.grey() {
-                self.depth.excuse_smooth(left);
-            }
+        if taken.is_some()
+            && frame.right().is_ok()
+            && let Ok(left) = frame.grey()
+        {
+            self.depth.excuse_smooth(left);
         }
         self.depth.add_tracks(tracks, target.map(|track| track.id));
     }

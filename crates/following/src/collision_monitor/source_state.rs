@@ -131,18 +131,14 @@ impl RangeState {
         let is_too_near = range_m < reading.min_m;
         let met_m = if is_too_near { reading.min_m } else { range_m };
         let half_rad = 0.5 * reading.field_of_view_rad;
-        let along = |angle: f64, range_m: f64| {
-            let ahead = Vector3::new(angle.cos(), angle.sin(), 0.0) * range_m;
-            (reading.robot_from_sensor * Point3::from(ahead)).xy()
-        };
         if met_m <= reading.max_m.min(RANGE_M) {
             for at in 0..ON_ARC {
                 let angle = half_rad * (2.0 * at as f64 / (ON_ARC - 1) as f64 - 1.0);
-                self.arc.push(along(angle, met_m));
+                self.arc.push(place_along(reading, angle, met_m));
                 // A sensor may sit within the footprint, where places do not count: what is nearer than
                 // it measures is before the footprint.
                 for beyond_m in BEFORE_FOOTPRINT_M.into_iter().filter(|_| is_too_near) {
-                    self.arc.push(along(angle, met_m + beyond_m));
+                    self.arc.push(place_along(reading, angle, met_m + beyond_m));
                 }
             }
         }
@@ -151,7 +147,7 @@ impl RangeState {
         let eye: Point2<f64> = reading.robot_from_sensor.translation.vector.xy().into();
         let mut looks = Vec::with_capacity(3);
         for angle in [-half_rad, 0.0, half_rad] {
-            let way = along(angle, 1.0) - eye;
+            let way = place_along(reading, angle, 1.0) - eye;
             looks.push((way.y.atan2(way.x), look));
         }
         self.coverage = Some(Coverage::new(eye, looks, 0.0));
@@ -169,4 +165,11 @@ impl RangeState {
     pub(super) fn coverage(&self, min_share: f64) -> Option<Coverage> {
         self.coverage.clone().map(|coverage| coverage.with_min_share(min_share))
     }
+}
+
+/// Returns the place at a distance, m, in a direction in the frame of a range sensor, rad; robot frame,
+/// m.
+fn place_along(reading: &RangeReading, angle_rad: f64, range_m: f64) -> Point2<f64> {
+    let ahead = Vector3::new(angle_rad.cos(), angle_rad.sin(), 0.0) * range_m;
+    (reading.robot_from_sensor * Point3::from(ahead)).xy()
 }

@@ -87,6 +87,7 @@ impl SpaceGrid {
         for at in met {
             self.hit(&at);
         }
+        let now_ms = self.now_ms;
         let from = self.grid_from_robot * eye;
         for end in free_to {
             let to = self.grid_from_robot * end;
@@ -98,9 +99,15 @@ impl SpaceGrid {
             let reach_m = length_m.min(0.5 * CELL_M * f64::from(SIDE));
             let steps = ((reach_m - CELL_M) / STEP_M).max(0.0) as usize;
             let step = way * (STEP_M / length_m.max(STEP_M));
+            let mut last = None;
             for at in 0..steps {
-                let now_ms = self.now_ms;
-                let cell = self.cell_mut(&(from + step * at as f64));
+                let place = coordinates(&(from + step * at as f64));
+                // Steps are shorter than cells.
+                if last == Some(place) {
+                    continue;
+                }
+                last = Some(place);
+                let cell = self.cell_of(place);
                 if cell.hit_ms != now_ms {
                     cell.free_ms = now_ms;
                 }
@@ -172,7 +179,10 @@ impl SpaceGrid {
     }
 
     fn cell_mut(&mut self, at: &Point2<f64>) -> &mut Cell {
-        let place = coordinates(at);
+        self.cell_of(coordinates(at))
+    }
+
+    fn cell_of(&mut self, place: (i32, i32)) -> &mut Cell {
         let cell = &mut self.cells[slot(place)];
         if cell.tag != place {
             *cell = Cell { tag: place, ..Cell::default() };
@@ -182,7 +192,15 @@ impl SpaceGrid {
 }
 
 fn coordinates(at: &Point2<f64>) -> (i32, i32) {
-    ((at.x / CELL_M).floor() as i32, (at.y / CELL_M).floor() as i32)
+    (line(at.x), line(at.y))
+}
+
+/// Returns the row or the column of cells at a coordinate, m.
+fn line(metres: f64) -> i32 {
+    let cells = metres / CELL_M;
+    let towards_zero = cells as i32;
+    // Rounds down, as `floor`, which is a call of a library on most targets.
+    towards_zero.saturating_sub(i32::from(f64::from(towards_zero) > cells))
 }
 
 fn slot((x, y): (i32, i32)) -> usize {

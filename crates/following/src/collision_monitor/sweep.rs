@@ -313,28 +313,31 @@ impl<'a> Sweep<'a> {
     /// Returns the largest speed, up to that of the sweep, at which a hazard that may come nearer by
     /// `margin_m` in a time is not reached before the robot stands.
     fn speed_beside(&self, delay_s: f64, margin_m: impl Fn(f64) -> f64) -> f64 {
-        let is_free = |speed: f64| {
-            let nearest_m = self.nearest_within(self.braking.way(speed, delay_s));
-            let time_s = self.braking.between_s + self.braking.time_s(speed, delay_s);
-            nearest_m >= margin_m(time_s)
-        };
-        if is_free(self.speed) {
+        if self.is_free_at(self.speed, delay_s, &margin_m) {
             return f64::INFINITY;
         }
-        if !is_free(0.0) {
+        if !self.is_free_at(0.0, delay_s, &margin_m) {
             return 0.0;
         }
         let mut free = 0.0;
         let mut taken = self.speed;
         for _ in 0..HALVINGS {
             let middle = 0.5 * (free + taken);
-            if is_free(middle) {
+            if self.is_free_at(middle, delay_s, &margin_m) {
                 free = middle;
             } else {
                 taken = middle;
             }
         }
         free
+    }
+
+    /// Returns true if a hazard that may come nearer by `margin_m` in a time is not reached from this
+    /// speed.
+    fn is_free_at(&self, speed: f64, delay_s: f64, margin_m: impl Fn(f64) -> f64) -> bool {
+        let nearest_m = self.nearest_within(self.braking.way(speed, delay_s));
+        let time_s = self.braking.between_s + self.braking.time_s(speed, delay_s);
+        nearest_m >= margin_m(time_s)
     }
 }
 

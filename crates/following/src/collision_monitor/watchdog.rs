@@ -224,13 +224,16 @@ impl ScanReference {
     /// Returns true if the neighbours of a ray are about as far: along a slanted wall a part of a ray
     /// makes another range.
     fn is_flat(&self, ray: usize) -> bool {
+        let before = ray.checked_sub(1);
+        self.is_alike(ray, before) && self.is_alike(ray, Some(ray + 1))
+    }
+
+    /// Returns true if another ray is about as far as this one.
+    fn is_alike(&self, ray: usize, other: Option<usize>) -> bool {
         let range = f64::from(self.ranges[ray]);
         let noise_m = SCAN_NOISE[0] + SCAN_NOISE[1] * range;
-        let near = |other: Option<usize>| {
-            let beside = other.and_then(|other| self.ranges.get(other));
-            beside.is_some_and(|beside| (f64::from(*beside) - range).abs() < noise_m)
-        };
-        near(ray.checked_sub(1)) && near(Some(ray + 1))
+        let beside = other.and_then(|other| self.ranges.get(other));
+        beside.is_some_and(|beside| (f64::from(*beside) - range).abs() < noise_m)
     }
 }
 

@@ -159,8 +159,12 @@ impl ObstacleReader {
                 let mount = mount_at(source, moment, &frame_id, stamp, tally)?;
                 let pose = on_floor(&moment.robot_from(stamp)) * mount;
                 let lens = Lens::Pinhole(depth.lens.lens);
-                let (width, height) = (image.width(), image.height());
-                let camera = Camera { lens, width, height, robot_from_camera: pose };
+                let camera = Camera {
+                    lens,
+                    width: image.width(),
+                    height: image.height(),
+                    robot_from_camera: pose,
+                };
                 (stamp, ObstacleData::Depth { image, camera: Arc::new(camera) })
             }
         };
@@ -179,7 +183,8 @@ impl ObstacleReader {
         };
         let ahead_s = first.map_or(0.0, |first| first.seconds_since(moment.stamp));
         if ahead_s > AHEAD_S {
-            let (name, stamp) = (&self.source.name, moment.stamp);
+            let name = &self.source.name;
+            let stamp = moment.stamp;
             tally.remark("source_readings_ahead", || {
                 format!(
                     "source `{name}` is stamped {ahead_s:.1} s after the frame at {stamp} and is \
@@ -208,7 +213,8 @@ impl DepthMessages {
                 size.map_err(|misfit| ImageError::Codec(misfit.to_string()))?;
                 Ok(image)
             });
-            let (name, topic) = (&source.name, &source.topic);
+            let name = &source.name;
+            let topic = &source.topic;
             let image = image.map_err(|error| {
                 tally.lose("source_images_unusable", || {
                     format!("source `{name}`: {topic} at {}: {error}", newest.stamp)

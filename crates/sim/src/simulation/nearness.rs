@@ -15,12 +15,9 @@ impl Simulation {
     /// around a disc of this radius if the scene has none.
     pub fn clearance(&self, radius_m: f64) -> Clearance {
         let outline = self.outline(radius_m);
-        let least = |gaps: &mut dyn Iterator<Item = Gap>| {
-            gaps.fold(f64::INFINITY, |least, gap| least.min(gap.distance_m))
-        };
         Clearance {
-            people_m: least(&mut self.gaps_to_people(&outline)),
-            things_m: least(&mut self.gaps_to_things(&outline)),
+            people_m: least_m(self.gaps_to_people(&outline)),
+            things_m: least_m(self.gaps_to_things(&outline)),
         }
     }
 
@@ -119,8 +116,8 @@ impl Simulation {
 
     /// Returns the approacher if it is a trolley that is there.
     pub(super) fn trolleys(&self) -> impl Iterator<Item = &Approacher> {
-        let trolley = |one: &&Approacher| one.is_there() && one.by() == ApproachBy::Trolley;
-        self.approacher.iter().filter(trolley)
+        let there = self.approacher.iter().filter(|one| one.is_there());
+        there.filter(|one| one.by() == ApproachBy::Trolley)
     }
 
     /// Lets the approacher appear, if it is time.
@@ -161,4 +158,9 @@ impl Simulation {
     pub fn turn_rate(&self) -> f64 {
         self.robot.turn_rate()
     }
+}
+
+/// Returns the least of the distances, m; infinite without any.
+fn least_m(gaps: impl Iterator<Item = Gap>) -> f64 {
+    gaps.map(|gap| gap.distance_m).fold(f64::INFINITY, f64::min)
 }

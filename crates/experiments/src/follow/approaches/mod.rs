@@ -247,28 +247,33 @@ fn log_file(folder: &Path, job: &Job<'_>) -> PathBuf {
     folder.join(format!("{suite}-{}-{}.mcap", job.contender.name, job.seed))
 }
 
+/// Returns all tables in one text.
+fn joined(tables: &[Table], show: fn(&Table) -> String) -> String {
+    let shown: Vec<String> = tables.iter().map(show).collect();
+    shown.join("\n")
+}
+
 fn report(args: &FollowArgs, seeds: Seeds, results: &[Outlived]) -> Result<(), Failure> {
     let tables = table::tables(results, seeds);
     let findings = Findings { seeds, tables: &tables, approaches: results };
     let json = to_json("the results of the approaches", &findings)?;
-    let joined = |show: fn(&Table) -> String| -> String {
-        tables.iter().map(show).collect::<Vec<_>>().join("\n")
-    };
     match args.format {
         TableFormat::Json => print(&json)?,
-        TableFormat::Markdown => print(&joined(Table::markdown))?,
+        TableFormat::Markdown => print(&joined(&tables, Table::markdown))?,
         TableFormat::Text => {
             if args.replay.is_some() {
                 for result in results {
                     print(&format!("{}\n{}\n\n", result.pipeline, result.story.join("\n")))?;
                 }
             } else {
-                print(&joined(Table::text))?;
+                print(&joined(&tables, Table::text))?;
             }
         }
     }
     let Some(folder) = &args.output else { return Ok(()) };
-    for (name, text) in [("approaches.json", &json), ("approaches.md", &joined(Table::markdown))] {
+    for (name, text) in
+        [("approaches.json", &json), ("approaches.md", &joined(&tables, Table::markdown))]
+    {
         write_file(&folder.join(name), text)?;
     }
     let contacts = results.iter().filter(|one| one.approached.contact.is_some()).count();

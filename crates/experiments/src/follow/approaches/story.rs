@@ -86,27 +86,32 @@ fn motion(tick: &Tick, moves: bool) -> String {
 
 /// Returns the result in words.
 fn ending(approached: &Approached) -> String {
-    let seen = |contact: &Contact| match (contact.camera_saw, contact.laser_saw) {
+    match (&approached.contact, &approached.touched) {
+        (Some(moving), _) => contact_in_words("CONTACT WHILE THE ROBOT MOVED", moving),
+        (None, Some(standing)) => contact_in_words("contact of a standing robot", standing),
+        (None, None) => "no contact".to_owned(),
+    }
+}
+
+fn contact_in_words(kind: &str, contact: &Contact) -> String {
+    format!(
+        "{kind} at {:.2} s: {}, {:.2} m/s, {:.2} rad/s, reason {}; the approacher was {} in the \
+         last second",
+        contact.at_s,
+        contact.with.name(),
+        contact.speed_mps,
+        contact.turn_rate,
+        contact.reason.unwrap_or("-"),
+        view_in_words(contact),
+    )
+}
+
+/// Returns which sensors had the approacher in view.
+fn view_in_words(contact: &Contact) -> &'static str {
+    match (contact.camera_saw, contact.laser_saw) {
         (true, true) => "in view of the camera and the laser",
         (true, false) => "in view of the camera",
         (false, true) => "in view of the laser",
         (false, false) => "in view of no sensor",
-    };
-    let contact = |kind: &str, contact: &Contact| {
-        format!(
-            "{kind} at {:.2} s: {}, {:.2} m/s, {:.2} rad/s, reason {}; the approacher was {} in the \
-             last second",
-            contact.at_s,
-            contact.with.name(),
-            contact.speed_mps,
-            contact.turn_rate,
-            contact.reason.unwrap_or("-"),
-            seen(contact),
-        )
-    };
-    match (&approached.contact, &approached.touched) {
-        (Some(moving), _) => contact("CONTACT WHILE THE ROBOT MOVED", moving),
-        (None, Some(standing)) => contact("contact of a standing robot", standing),
-        (None, None) => "no contact".to_owned(),
     }
 }

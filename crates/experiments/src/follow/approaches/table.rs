@@ -14,17 +14,18 @@ pub fn tables(results: &[Outlived], seeds: Seeds) -> Vec<Table> {
             names.push(name);
         }
     }
-    let table = |(pipeline, suite): &(&str, &str)| {
-        let of = results.iter().filter(|one| one.pipeline == *pipeline && one.suite == *suite);
+    let mut tables = Vec::new();
+    for (pipeline, suite) in names {
+        let of = results.iter().filter(|one| one.pipeline == pipeline && one.suite == suite);
         let all: Vec<&Approached> = of.map(|one| &one.approached).collect();
-        Table {
+        tables.push(Table {
             title: format!("Approaches to {pipeline} in {suite}"),
             columns: COLUMNS.map(str::to_owned).to_vec(),
             rows: rows(&all),
             notes: notes(seeds),
-        }
-    };
-    names.iter().map(table).collect()
+        });
+    }
+    tables
 }
 
 const COLUMNS: [&str; 15] = [
@@ -78,10 +79,13 @@ fn strata<'a>(all: &[&'a Approached]) -> Vec<(String, Vec<&'a Approached>)> {
         add(format!("begun at {reason}"), &|one| one.reason == Some(reason));
     }
     for kind in names(all, |one| one.faults.iter().map(|fault| fault.kind.name()).collect()) {
-        let has = |one: &Approached| one.faults.iter().any(|fault| fault.kind.name() == kind);
-        add(format!("fault {kind}"), &has);
+        add(format!("fault {kind}"), &|one| has_fault(one, kind));
     }
     strata
+}
+
+fn has_fault(approached: &Approached, kind: &str) -> bool {
+    approached.faults.iter().any(|fault| fault.kind.name() == kind)
 }
 
 /// Returns the different values of a setting, in rising order.
@@ -105,8 +109,8 @@ fn rows(all: &[&Approached]) -> Vec<Row> {
 }
 
 fn cells(all: &[&Approached]) -> Vec<Cell> {
-    let number = |count: usize| Cell::number(count as f64, 0);
-    let count = |is: fn(&&&Approached) -> bool| number(all.iter().filter(is).count());
+    let moved = all.iter().filter(|one| one.moved).count();
+    let standing = all.iter().filter(|one| one.contact.is_none() && one.touched.is_some()).count();
     let contacts: Vec<&Contact> = all.iter().filter_map(|one| one.contact.as_ref()).collect();
     let came = contacts.iter().filter(|contact| contact.with == Touched::Approacher);
     let [seen, unseen] = [true, false]
@@ -120,10 +124,9 @@ fn cells(all: &[&Approached]) -> Vec<Cell> {
     let room = all.iter().filter_map(|one| one.room_m).min_by(f64::total_cmp);
     let speeds = contacts.iter().map(|contact| contact.speed_mps.abs());
     let fastest = speeds.max_by(f64::total_cmp);
-    let optional = |value: Option<f64>| value.map_or_else(Cell::default, |v| Cell::number(v, 2));
     vec![
         number(all.len()),
-        count(|one| one.moved),
+        number(moved),
         number(contacts.len()),
         Cell::number(share, 2),
         optional(bound.map(|bound| 100.0 * bound)),
@@ -131,13 +134,22 @@ fn cells(all: &[&Approached]) -> Vec<Cell> {
         number(seen),
         number(unseen),
         number(turning),
-        count(|one| one.contact.is_none() && one.touched.is_some()),
+        number(standing),
         optional(room),
         Cell::number(100.0 * stops.len() as f64 / near as f64, 0),
         optional(percentile(&stops, 0.5)),
         optional(percentile(&stops, 0.95)),
         optional(fastest),
     ]
+}
+
+fn number(count: usize) -> Cell {
+    Cell::number(count as f64, 0)
+}
+
+/// Returns a cell with two decimals; an empty one without a value.
+fn optional(value: Option<f64>) -> Cell {
+    value.map_or_else(Cell::default, |value| Cell::number(value, 2))
 }
 
 fn notes(seeds: Seeds) -> Vec<String> {

@@ -6,6 +6,7 @@ use super::CollisionMonitorSettings;
 use super::coverage::{Coverage, Look};
 use super::footprint::Footprint;
 use super::ground::{fall, is_thing};
+use super::pixel_rays::PixelRays;
 
 /// Sampled columns of the image.
 const COLUMNS: usize = 160;
@@ -66,6 +67,7 @@ pub(crate) struct ObstacleMemory {
     /// Time since the last image, up to the last frame, s.
     held_s: f64,
     grid: Grid,
+    rays: PixelRays,
 }
 
 /// Thing that is not in view and believed to be there.
@@ -135,6 +137,7 @@ impl ObstacleMemory {
             things: Vec::new(),
             held_s: 0.0,
             grid: Grid::default(),
+            rays: PixelRays::default(),
         }
     }
 
@@ -323,19 +326,22 @@ impl ObstacleMemory {
         let rows = depth.height().div_ceil(step);
         self.columns.resize(depth.width().div_ceil(step), Column::NEVER_SEEN);
         self.columns.iter_mut().for_each(Column::begin);
-        for y in (0..depth.height()).step_by(step) {
+        let rays = self.rays.of(camera, [depth.width(), depth.height()], step);
+        let reach_square = reach_m * reach_m;
+        for (sampled, y) in (0..depth.height()).step_by(step).enumerate() {
+            let first = sampled * self.columns.len();
             let row = depth.row(y).iter().step_by(step);
             for (at, (z, column)) in row.zip(&mut self.columns).enumerate() {
                 let z = f64::from(*z);
                 if !is_reading(z) {
                     continue;
                 }
-                let pixel = Point2::new((at * step) as f64, y as f64);
-                let point = camera.back_project(pixel, z);
+                let point = rays.point(first + at, z);
                 let is_thing = is_thing(settings, &point);
                 column.take(&eye, &point, is_thing);
                 let place = if is_thing { Some(point) } else { fall(settings, &eye, &point) };
-                self.seen.extend(place.filter(|place| place.xy().coords.norm() < reach_m));
+                self.seen
+                    .extend(place.filter(|place| place.xy().coords.norm_squared() < reach_square));
             }
         }
         let read: u32 = self.columns.iter().map(|column| column.read).sum();
@@ -574,18 +580,26 @@ impl Grid {
 
 /// Returns true if a column of an image has nearly no texture, by the pixels of every so many rows.
 fn is_smooth(image: &GreyImage, x: usize, step: usize) -> bool {
-    let at = |dx: i64, y: i64| image.get(x as i64 + dx, y).map_or(0, i32::from);
-    let slope = |y: i64| {
-        let across = |y: i64| at(1, y) - at(-1, y);
-        ((across(y - 1) + 2 * across(y) + across(y + 1)) / 4).abs()
-    };
     // The border has no slope: it has no neighbours.
     if x == 0 || x + 1 >= image.width() || image.height() < 3 {
         return true;
     }
     let rows = (1..image.height() - 1).step_by(step);
-    let textured = rows.clone().filter(|y| slope(*y as i64) >= TEXTURED).count();
+    let textured =
+        rows.clone().filter(|y| slope_at(image, x as i64, *y as i64) >= TEXTURED).count();
     (textured as f64) < SMOOTH * rows.len() as f64
+}
+
+/// Returns the slope of the brightness across a pixel, smoothed over its rows.
+fn slope_at(image: &GreyImage, x: i64, y: i64) -> i32 {
+    let sum = across_at(image, x, y - 1) + 2 * across_at(image, x, y) + across_at(image, x, y + 1);
+    (sum / 4).abs()
+}
+
+/// Returns the difference of the brightness to the right and to the left of a pixel.
+fn across_at(image: &GreyImage, x: i64, y: i64) -> i32 {
+    let right = image.get(x + 1, y).map_or(0, i32::from);
+    right - image.get(x - 1, y).map_or(0, i32::from)
 }
 
 /// Returns true for a depth that was measured, m.
@@ -599,8 +613,7 @@ fn shows_past(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, heights: He
     heights.metres().any(|height_m| {
         let place = Point3::new(at.x, at.y, height_m);
         let seen_m = camera.project(&place).and_then(|pixel| {
-            let (x, y) = (pixel.x.round(), pixel.y.round());
-            depth.get(x as i64, y as i64).map(f64::from)
+            depth.get(pixel.x.round() as i64, pixel.y.round() as i64).map(f64::from)
         });
         seen_m.is_some_and(|z| is_reading(z) && z > camera.depth_of(&place) - BEFORE_M)
     })
