@@ -10,7 +10,7 @@ const MAY_NAME: &[(&str, &str)] = &[
     ("crates/pipeline/src/config.rs", "associate-hungarian"), // the default associator
     ("crates/pipeline/src/config.rs", "manage-m-of-n"),       // the default track manager
     ("crates/trials/src/given.rs", "recorded-detections"),    // replaces the detectors of a config
-    ("crates/doctor/src/preparations.rs", "onnx"), // tries preparations of its images
+    ("crates/doctor/src/preparations.rs", "onnx"),            // tries preparations of its images
     // Names of configs.
     ("crates/app/src/choice.rs", "laser-legs"),
     ("crates/app/src/config_file.rs", "joint-particle"),
