@@ -12,7 +12,9 @@
 //!
 //! /// Brightness of a wall with a random pattern.
 //! fn wall(column: usize, row: usize) -> u8 {
-//!     ((column * 7919 + row * 104_729).wrapping_mul(2_654_435_761) >> 16) as u8
+//!     let mut mixed = ((column as u64) << 32 | row as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+//!     mixed = (mixed ^ mixed >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+//!     (mixed >> 40) as u8
 //! }
 //!
 //! // The right camera, 0.1 m beside the left one, sees the wall 10 pixels farther to the left.
