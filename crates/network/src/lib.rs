@@ -22,7 +22,7 @@
 //! // A bright person in front of a dark wall, as this test network knows them.
 //! let image = RgbImage::from_fn(64, 64, |x, y| {
 //!     let is_person = (32..48).contains(&x) && (16..48).contains(&y);
-//!     let wall = |channel| (x + 2 * y + 7 * channel) % 40;
+//!     let wall = |channel: usize| (x + 2 * y + 7 * channel) % 40;
 //!     [0, 1, 2].map(|channel| if is_person { 230 + 10 * channel } else { wall(channel) } as u8)
 //! });
 //! let found = network.find(&image, &preparation, 0.5, 0.5)?.expect("within the deadline");
