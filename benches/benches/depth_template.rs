@@ -82,7 +82,7 @@ fn frames(c: &mut Criterion) {
     c.bench_function("depth-ekf, whole frame, 640x480, 4 people", |b| {
         b.iter(|| {
             index += 1;
-            pipeline.step(&frame(&camera, &depth, index)).expect("a frame with depth").tracks.len()
+            pipeline.step(frame(&camera, &depth, index)).expect("a frame with depth").tracks.len()
         });
     });
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use tagalong_config::Registry;
 use tagalong_log::{InputSettings, Limits};
-use tagalong_pipeline::{BuildError, Pipeline};
+use tagalong_pipeline::{BuildError, ConfigSource, Pipeline};
 
 const GOOD: &str = r#"seed = 3
 
@@ -37,7 +37,8 @@ fn build(text: &str) -> Result<Pipeline, BuildError> {
 fn build_in(folder: &Path, text: &str) -> Result<Pipeline, BuildError> {
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    Pipeline::builder(&registry).folder(folder).from_toml(text)
+    let source = ConfigSource::from_text(text, folder).with_name("my.toml");
+    Pipeline::builder(&registry).build(&source)
 }
 
 /// Returns the message for `GOOD` with `from` replaced by `to`.

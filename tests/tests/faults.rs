@@ -287,7 +287,7 @@ fn recall(config: &str, camera: &Arc<Camera>, shots: &[Shot], spoilt: &Spoilt) -
     let mut found = 0;
     for (index, shot) in shots.iter().enumerate() {
         let images = (spoilt.spoil)(&shot.images, &mut random);
-        let report = pipeline.step(&frame(camera, index, images)).unwrap();
+        let report = pipeline.step(frame(camera, index, images)).unwrap();
         let head = shot.truth[0].head_in_robot;
         let confirmed = report.tracks.iter().filter(|track| track.confirmed && track.seen);
         let mut places = confirmed.map(|track| track.estimate.person.position);

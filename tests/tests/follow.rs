@@ -72,7 +72,7 @@ fn follow() -> Vec<Step> {
             Event::Odometry(reading) => recorder.odometry = reading.odom_from_robot,
             Event::NoOdometry { .. } | Event::Sensor(_) | Event::Webcam(_) => {}
             Event::Shot(shot) => {
-                let report = pipeline.step(&recorder.frame(&shot)).unwrap();
+                let report = pipeline.step(recorder.frame(&shot)).unwrap();
                 simulation.steer(report.command.unwrap().wheels);
                 steps.push(Step {
                     at_s: shot.captured_ns as f64 * 1e-9,

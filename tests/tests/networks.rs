@@ -73,7 +73,7 @@ fn run(follower: bool) -> Vec<FrameReport> {
     let text = config(follower);
     let built = Pipeline::builder(&registry).folder(&models).from_toml(&text);
     let mut pipeline = built.unwrap();
-    (0..FRAMES).map(|index| pipeline.step(&frame(index)).unwrap()).collect()
+    (0..FRAMES).map(|index| pipeline.step(frame(index)).unwrap()).collect()
 }
 
 /// The mean error of the middle of the tracked box over the frames in which the network does not

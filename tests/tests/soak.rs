@@ -92,7 +92,7 @@ fn s4_a_hundred_thousand_boxes_in_a_frame_are_bounded_in_time() {
         let stamp = Stamp::default().plus_seconds(index as f64 * 0.1);
         let motion = EgoMotion::at_rest(0.1);
         let frame = Frame::new(index, stamp, Arc::clone(&camera), motion, Images::default());
-        let report = pipeline.step(&frame.with_recorded(Some(boxes(100_000)))).unwrap();
+        let report = pipeline.step(frame.with_recorded(Some(boxes(100_000)))).unwrap();
         assert!(report.tracks.len() <= 256, "{}", report.tracks.len());
         assert!(report.funnel.entries().iter().map(|entry| entry.count).sum::<u64>() > 90_000);
     }

@@ -1,5 +1,6 @@
 //! Steers a robot after the person in front of it. The frames come from a log here, `people.mcap`; on
 //! a robot they come from its sensors, and a control loop asks `command_at` between them.
+#![allow(clippy::print_stdout, reason = "an example prints what it finds")]
 
 use tagalong::prelude::*;
 

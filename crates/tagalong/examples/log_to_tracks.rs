@@ -1,4 +1,5 @@
 //! Prints the people of a log: `people.mcap` in the current folder.
+#![allow(clippy::print_stdout, reason = "an example prints what it finds")]
 
 use tagalong::prelude::*;
 

@@ -1,4 +1,5 @@
 //! Tracks a person in depth images that the program has in memory, with the camera that took them.
+#![allow(clippy::print_stdout, reason = "an example prints what it finds")]
 
 use tagalong::prelude::*;
 

@@ -159,8 +159,7 @@ fn code(file: &str, text: &str, function: &str) -> Option<String> {
         "py" => "python",
         other => other,
     };
-    let is_comment = |line: &&str| line.starts_with("//! ") || line.starts_with("# ");
-    let body = text.lines().skip_while(is_comment);
+    let body = text.lines().skip_while(|line| is_head(line));
     let lines: Vec<&str> = if function.is_empty() {
         body.collect()
     } else {
@@ -181,6 +180,12 @@ fn code(file: &str, text: &str, function: &str) -> Option<String> {
         lines
     };
     Some(format!("```{language}\n{}\n```", lines.join("\n").trim()))
+}
+
+/// Returns true for a line of the comment or of the lint attributes at the head of a file.
+fn is_head(line: &str) -> bool {
+    let is_attribute = line.starts_with("#![") || line.is_empty();
+    is_attribute || line.starts_with("//! ") || line.starts_with("# ")
 }
 
 /// Returns the output of the command, with the program of this workspace; the table of faults is
@@ -238,7 +243,7 @@ mod tests {
 
     #[test]
     fn code_is_repeated_without_the_comment_at_its_head() {
-        let text = "//! An example.\n\nuse a::b;\n\nfn main() {\n    f();\n}\n\nfn f() {\n}\n";
+        let text = "//! An example.\n#![allow(x)]\n\nuse a::b;\n\nfn main() {\n    f();\n}\n\nfn f() {\n}\n";
         let whole = code("x/y.rs", text, "").unwrap();
         assert!(whole.starts_with("```rust,no_run\nuse a::b;\n\nfn main() {"), "{whole}");
         assert!(whole.ends_with("fn f() {\n}\n```"), "{whole}");

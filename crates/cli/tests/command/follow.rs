@@ -92,7 +92,7 @@ fn the_log_of_a_ride_has_commands_and_their_reasons() {
     let output = follow(folder.path(), "follow-arc.toml", &["-o", "rides"]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let told = text(&output.stdout);
-    assert!(told.contains("(locked: chosen)"), "{told}");
+    assert!(told.contains("(locked: known well)"), "{told}");
     let log = folder.path().join("rides/walk-follow-arc-2000000000.mcap");
     let inspected = tagalong().arg("inspect").arg(log).output().unwrap();
     let topics = text(&inspected.stdout);

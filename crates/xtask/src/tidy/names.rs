@@ -59,7 +59,7 @@ fn names(line: &str, plugin: &str) -> bool {
 }
 
 fn may_name(file: &str, plugin: &str) -> bool {
-    MAY_NAME.iter().any(|allowed| *allowed == (file, plugin))
+    MAY_NAME.contains(&(file, plugin))
 }
 
 #[cfg(test)]
