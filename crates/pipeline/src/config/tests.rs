@@ -206,7 +206,7 @@ fn the_defaults_are_printed_under_their_documentation_and_parse() {
 #[test]
 fn a_pipeline_built_from_text_tracks() {
     let world = World::of([vec![person(2.0, 0.0)]]);
-    let report = world.pipeline(PLAIN).step(&frame(1, 0.0)).unwrap();
+    let report = world.pipeline(PLAIN).step(frame(1, 0.0)).unwrap();
     assert_eq!(report.tracks.len(), 1);
 }
 

@@ -44,7 +44,7 @@ fn vectors_say_whose_detection_it_is_where_places_do_not() {
         let mut pipeline = world.pipeline(&config);
         let reports = (1..=9).map(|index| {
             let right = if index == 9 { RED } else { BLUE };
-            pipeline.step(&coloured(index, RED, right)).unwrap()
+            pipeline.step(coloured(index, RED, right)).unwrap()
         });
         let last = reports.last().unwrap();
         let is_seen = last.tracks.iter().filter(|track| track.seen);
@@ -66,7 +66,7 @@ fn returned(colour: [u8; 3]) -> Vec<u32> {
     let mut pipeline = World::of((0..60).map(people)).pipeline(&config);
     let reports = (1..=60).map(|index| {
         let colour = if index <= 20 { RED } else { colour };
-        pipeline.step(&coloured(index, colour, colour)).unwrap()
+        pipeline.step(coloured(index, colour, colour)).unwrap()
     });
     reports.last().unwrap().tracks.iter().map(|track| track.id.0).collect()
 }
@@ -81,7 +81,7 @@ fn ride(appearance: &str) -> Vec<FrameReport> {
     let world = World::of((0..30).map(|_| vec![Detection { score: 5.0, ..person(3.0, 0.0) }]));
     let config = config(appearance, "[controller]\nplugin = 'drive'");
     let mut pipeline = world.pipeline(&config);
-    (1..=30).map(|index| pipeline.step(&coloured(index, RED, RED)).unwrap()).collect()
+    (1..=30).map(|index| pipeline.step(coloured(index, RED, RED)).unwrap()).collect()
 }
 
 #[test]

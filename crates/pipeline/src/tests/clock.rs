@@ -74,9 +74,9 @@ fn t2_a_gap_ends_tracks_that_are_not_confirmed() {
     world.show(0, 5, vec![person(3.0, 0.0)]);
     let mut pipeline = world.pipeline(PLAIN);
     for (index, t_s) in [(1, 0.1), (2, 0.2), (3, 0.3), (4, 0.4), (5, 0.5)] {
-        pipeline.step(&frame(index, t_s)).unwrap();
+        pipeline.step(frame(index, t_s)).unwrap();
     }
-    let report = pipeline.step(&frame(6, 1.3)).unwrap();
+    let report = pipeline.step(frame(6, 1.3)).unwrap();
     assert_eq!(report.funnel.count("track: gap in the log"), 1);
 }
 
@@ -122,12 +122,12 @@ fn the_motion_over_a_skipped_frame_is_not_lost() {
         Frame::new(index, still.stamp, still.camera.clone(), motion, still.images())
     };
     for (index, t_s, forward) in [(1, 0.0, 0.0), (2, 0.0, 0.03), (3, 0.1, 0.04)] {
-        pipeline.step(&moving(index, t_s, forward)).unwrap();
+        pipeline.step(moving(index, t_s, forward)).unwrap();
     }
     let motion = world.predicted.lock().unwrap()[0];
     assert!((motion.forward - 0.07).abs() < 1e-12, "{motion:?}");
     assert!((motion.dt - 0.1).abs() < 1e-9);
-    let report = pipeline.step(&moving(4, 0.2, f64::NAN)).unwrap();
+    let report = pipeline.step(moving(4, 0.2, f64::NAN)).unwrap();
     assert_eq!(report.funnel.count("motion not finite"), 1);
     assert_eq!(report.tracks.len(), 1);
 }

@@ -13,7 +13,7 @@ fn driving(how: &str) -> (World, Pipeline) {
     let config = format!("{PLAIN}\n[controller]\nplugin = 'drive'\nconfig = {{ how = '{how}' }}\n");
     let mut pipeline = world.pipeline(&config);
     for index in 1..=20 {
-        pipeline.step(&frame(index, index as f64 * 0.1)).unwrap();
+        pipeline.step(frame(index, index as f64 * 0.1)).unwrap();
     }
     assert!(is_moving(&pipeline.command_at(frame(20, 2.0).stamp).unwrap()));
     (world, pipeline)
@@ -31,7 +31,7 @@ fn after(index: u64, t_s: f64, motion: EgoMotion) -> Frame {
 /// The command for a frame that comes that much later.
 fn paused(pause_s: f64) -> (Pipeline, Command) {
     let (_, mut pipeline) = driving("");
-    let report = pipeline.step(&after(21, 2.0 + pause_s, EgoMotion::at_rest(pause_s))).unwrap();
+    let report = pipeline.step(after(21, 2.0 + pause_s, EgoMotion::at_rest(pause_s))).unwrap();
     (pipeline, report.command.unwrap())
 }
 
@@ -39,13 +39,13 @@ fn paused(pause_s: f64) -> (Pipeline, Command) {
 fn t7_a_gap_of_the_odometry_stops_and_a_jump_is_a_fault_at_once() {
     let (_, mut pipeline) = driving("");
     let jump = EgoMotion { forward: 2.0, ..EgoMotion::at_rest(0.1) };
-    let command = pipeline.step(&after(21, 2.1, jump)).unwrap().command.unwrap();
+    let command = pipeline.step(after(21, 2.1, jump)).unwrap().command.unwrap();
     assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
     assert_eq!(pipeline.fault(), Some("odometry jumped"));
-    let later = pipeline.step(&frame(22, 2.2)).unwrap().command.unwrap();
+    let later = pipeline.step(frame(22, 2.2)).unwrap().command.unwrap();
     assert_eq!(later.reason, Reason::Fault, "it lasts");
     pipeline.arm();
-    assert!(is_moving(&pipeline.step(&frame(23, 2.3)).unwrap().command.unwrap()));
+    assert!(is_moving(&pipeline.step(frame(23, 2.3)).unwrap().command.unwrap()));
     assert!(!is_moving(&paused(1.0).1));
 }
 
@@ -61,12 +61,12 @@ fn t7_a_jump_that_the_frame_source_has_seen_is_a_fault_at_this_very_frame() {
 #[test]
 fn c1_another_calibration_freezes_the_tracks_and_holds_the_robot() {
     let (world, mut pipeline) = driving("");
-    let before = pipeline.step(&frame(21, 2.1)).unwrap().tracks;
+    let before = pipeline.step(frame(21, 2.1)).unwrap().tracks;
     let asked = world.asked.lock().unwrap().len();
     // The robot was moving: 0.2 m ahead, and a quarter of a turn to the left.
     let turn = std::f64::consts::FRAC_PI_2;
     let motion = EgoMotion { forward: 0.2, turn, ..EgoMotion::at_rest(0.1) };
-    let report = pipeline.step(&after(22, 2.2, motion).with_changed_calibration(true)).unwrap();
+    let report = pipeline.step(after(22, 2.2, motion).with_changed_calibration(true)).unwrap();
     let place = |track: &Track| track.estimate.person.position;
     let (held, was) = (&report.tracks[0], &before[0]);
     assert_eq!((held.id, held.seen, held.confirmed), (was.id, false, true));
@@ -79,13 +79,13 @@ fn c1_another_calibration_freezes_the_tracks_and_holds_the_robot() {
     // Neither arming nor frames that say nothing of it let go.
     pipeline.arm();
     for index in 23..40 {
-        let report = pipeline.step(&frame(index, index as f64 * 0.1)).unwrap();
+        let report = pipeline.step(frame(index, index as f64 * 0.1)).unwrap();
         assert!((place(&report.tracks[0]) - place(held)).norm() < 1e-9);
         assert_eq!(report.command.unwrap().reason, Reason::Fault, "{index}");
         assert_eq!(report.funnel.count("frame: calibration changed"), 1);
     }
     assert_eq!(world.asked.lock().unwrap().len(), asked, "no plugin gets such a frame");
-    let reset = pipeline.step(&frame(40, 99.0)).unwrap();
+    let reset = pipeline.step(frame(40, 99.0)).unwrap();
     assert_eq!((reset.tracks.len(), reset.ended), (0, vec![held.id]), "nothing lasts over a jump");
 }
 
@@ -113,7 +113,7 @@ fn t8_a_stall_halves_the_speed_then_stops_then_loses_the_person() {
     assert_eq!((stopped.wheels, stopped.reason), (WheelSpeeds::STOP, Reason::Stalled));
     let (world, mut pipeline) = driving("");
     world.show(0, 21, vec![]);
-    let lost = pipeline.step(&after(21, 4.2, EgoMotion::at_rest(2.2))).unwrap();
+    let lost = pipeline.step(after(21, 4.2, EgoMotion::at_rest(2.2))).unwrap();
     assert_eq!(lost.lock.unwrap().state, LockState::Lost);
 }
 
@@ -138,7 +138,7 @@ fn s5_a_person_who_is_replaced_while_hidden_is_not_silently_swapped() {
         world.show(0, index, vec![other.clone()]);
     }
     for index in 21..=60 {
-        let report = pipeline.step(&frame(index, index as f64 * 0.1)).unwrap();
+        let report = pipeline.step(frame(index, index as f64 * 0.1)).unwrap();
         if index > 45 {
             assert_eq!((report.target, report.lock.unwrap().state), (None, LockState::Lost));
         }
@@ -151,8 +151,7 @@ fn s6_whoever_jumps_or_stands_anywhere_gets_commands_within_the_limits() {
         let (world, mut pipeline) = driving("");
         for index in 21..=40 {
             world.show(0, index, vec![scored(5.0, person(x, y))]);
-            let command =
-                pipeline.step(&frame(index, index as f64 * 0.1)).unwrap().command.unwrap();
+            let command = pipeline.step(frame(index, index as f64 * 0.1)).unwrap().command.unwrap();
             let WheelSpeeds { left, right } = command.wheels;
             assert!(left.abs() <= 0.9 && right.abs() <= 0.9, "{x} {y} {command:?}");
             assert!(left + right >= -1e-9, "backwards: {x} {y} {command:?}");
@@ -166,7 +165,7 @@ fn a_robot_that_is_disarmed_stands_until_it_is_armed() {
     let config = format!("{PLAIN}\n[controller]\nplugin = 'drive'\n");
     let mut pipeline = world.pipeline(&config);
     let moves_at = |pipeline: &mut Pipeline, i: u64| {
-        is_moving(&pipeline.step(&frame(i, i as f64 * 0.1)).unwrap().command.unwrap())
+        is_moving(&pipeline.step(frame(i, i as f64 * 0.1)).unwrap().command.unwrap())
     };
     // Each frame is shown: a pause would reset the clock.
     let moves = |pipeline: &mut Pipeline, frames: std::ops::RangeInclusive<u64>| {
@@ -191,10 +190,10 @@ fn p1_a_plugin_that_panics_stops_the_robot_in_the_same_tick() {
         ),
     ] {
         let mut pipeline = world.pipeline(&format!("{PLAIN}\n{config}\n"));
-        (1..=20).for_each(|i| drop(pipeline.step(&frame(i, i as f64 * 0.1)).unwrap()));
+        (1..=20).for_each(|i| drop(pipeline.step(frame(i, i as f64 * 0.1)).unwrap()));
         let now: Stamp = frame(21, 2.1).stamp;
         assert!(is_moving(&pipeline.command_at(now).unwrap()));
-        let error = pipeline.step(&frame(21, 2.1)).unwrap_err().to_string();
+        let error = pipeline.step(frame(21, 2.1)).unwrap_err().to_string();
         assert!(error.starts_with(&format!("frame 21: `{of}` panicked")), "{error}");
         let command = pipeline.command_at(now).unwrap();
         assert_eq!((command.wheels, command.reason), (WheelSpeeds::STOP, Reason::Fault));
@@ -210,7 +209,7 @@ fn s3_without_people_there_is_no_track_and_every_command_is_zero() {
     let config = format!("{PLAIN}\n[controller]\nplugin = 'drive'\n");
     let mut pipeline = world.pipeline(&config);
     for index in 1..=9000 {
-        let report = pipeline.step(&frame(index, index as f64 / 15.0)).unwrap();
+        let report = pipeline.step(frame(index, index as f64 / 15.0)).unwrap();
         assert!(report.tracks.is_empty(), "{index}");
         assert_eq!(report.command.unwrap().wheels, WheelSpeeds::STOP, "{index}");
     }
@@ -219,13 +218,13 @@ fn s3_without_people_there_is_no_track_and_every_command_is_zero() {
 #[test]
 fn s4_of_a_crowd_so_many_are_tracked_as_the_limit_says_and_the_target_stays_or_is_lost() {
     let (world, mut pipeline) = driving("");
-    let target = pipeline.step(&frame(21, 2.1)).unwrap().target.unwrap();
+    let target = pipeline.step(frame(21, 2.1)).unwrap().target.unwrap();
     let place = |i: u32| person(1.5 + 0.8 * f64::from(i / 20), -8.0 + 0.8 * f64::from(i % 20));
     let crowd = (0..300).map(|i| scored(4.0, place(i)));
     let all: Vec<_> = std::iter::once(scored(5.0, person(3.0, 0.0))).chain(crowd).collect();
     for index in 22..=40 {
         world.show(0, index, all.clone());
-        let report = pipeline.step(&frame(index, index as f64 * 0.1)).unwrap();
+        let report = pipeline.step(frame(index, index as f64 * 0.1)).unwrap();
         assert!(report.tracks.len() <= 256, "{}", report.tracks.len());
         let is_lost = report.lock.unwrap().state == LockState::Lost;
         assert!(report.target == Some(target) || is_lost, "{index}: {:?}", report.target);

@@ -123,7 +123,7 @@ impl World {
     /// Runs `frames` frames at intervals of `dt_s`.
     pub fn run(&self, config: &str, frames: u64, dt_s: f64) -> Vec<FrameReport> {
         let mut pipeline = self.pipeline(config);
-        (1..=frames).map(|i| pipeline.step(&frame(i, i as f64 * dt_s)).unwrap()).collect()
+        (1..=frames).map(|i| pipeline.step(frame(i, i as f64 * dt_s)).unwrap()).collect()
     }
 }
 

@@ -11,7 +11,7 @@ fn one_person() -> World {
 }
 
 fn failure(config: &str) -> StepError {
-    one_person().pipeline(config).step(&frame(1, 0.1)).unwrap_err()
+    one_person().pipeline(config).step(frame(1, 0.1)).unwrap_err()
 }
 
 fn with(how: &str, of: &str) -> String {
@@ -43,8 +43,8 @@ fn a_panic_names_the_plugin_and_the_frame() {
 #[test]
 fn a_failed_pipeline_stays_stopped() {
     let mut pipeline = one_person().pipeline(&with("panic", "script"));
-    assert_eq!(pipeline.step(&frame(1, 0.1)).unwrap_err().frame(), 1);
-    let again = pipeline.step(&frame(2, 0.2)).unwrap_err();
+    assert_eq!(pipeline.step(frame(1, 0.1)).unwrap_err().frame(), 1);
+    let again = pipeline.step(frame(2, 0.2)).unwrap_err();
     assert_eq!(again, StepError::Stopped { frame: 1 });
 }
 
@@ -170,7 +170,7 @@ proptest! {
         for (index, (detections, step_s)) in (1..).zip(frames.into_iter().zip(steps_s)) {
             world.show(0, index, detections);
             t_s += step_s;
-            let report = pipeline.step(&frame(index, t_s)).unwrap();
+            let report = pipeline.step(frame(index, t_s)).unwrap();
             prop_assert!(report.tracks.iter().all(|t| t.estimate.is_sane() && t.score.is_finite()));
             prop_assert!(report.tracks.iter().all(|t| !ended.contains(&t.id)), "a number again");
             let alive: BTreeSet<_> = report.tracks.iter().map(|t| t.id).collect();

@@ -27,7 +27,7 @@ fn with_depth(index: u64) -> Frame {
 fn tracks(config: &str, frame: impl Fn(u64) -> Frame) -> String {
     let mut pipeline = world().pipeline(config);
     let reports: Vec<FrameReport> =
-        (1..=6).map(|index| pipeline.step(&frame(index)).unwrap()).collect();
+        (1..=6).map(|index| pipeline.step(frame(index)).unwrap()).collect();
     format!("{:?}", reports.iter().map(|report| &report.tracks).collect::<Vec<_>>())
 }
 
@@ -129,9 +129,9 @@ fn a_sensor_that_another_crate_defines_reaches_the_plugins_that_declare_it() {
     let mut pipeline = Pipeline::builder(&registry).from_toml(&config).unwrap();
     assert_eq!(pipeline.inputs(), Inputs::NONE.require(Radar::INPUT));
     let seen = |index| frame(index, index as f64 * 0.1).with_sensor(Radar(vec![2.5]));
-    let report = pipeline.step(&seen(1)).unwrap();
+    let report = pipeline.step(seen(1)).unwrap();
     assert_eq!(report.tracks[0].estimate.person.position.x, 2.5);
-    let lacking = pipeline.step(&frame(2, 0.2)).unwrap_err().to_string();
+    let lacking = pipeline.step(frame(2, 0.2)).unwrap_err().to_string();
     assert!(lacking.contains("radar, which this log does not carry"), "{lacking}");
     assert!(seen(3).restricted_to(&inputs(PLAIN)).unwrap().sensor::<Radar>().is_err());
 }

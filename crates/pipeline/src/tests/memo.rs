@@ -86,7 +86,7 @@ fn another_frame_is_looked_at_anew() {
     let mut pair = [world.pipeline(&texts()[0]), world.pipeline(&texts()[0])];
     pair.iter_mut().for_each(Pipeline::share_findings);
     for pipeline in &mut pair {
-        pipeline.step(&bare_frame(1, 0.1)).unwrap();
+        pipeline.step(bare_frame(1, 0.1)).unwrap();
     }
     assert_eq!(world.asked.lock().unwrap().len(), 2);
 }

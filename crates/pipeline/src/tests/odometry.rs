@@ -30,9 +30,9 @@ fn wall(index: u64, motion: EgoMotion) -> Frame {
 /// Estimated turn when the wheels report one while the robot stands, rad.
 fn believed(config: &str) -> f64 {
     let mut pipeline = World::default().pipeline(config);
-    pipeline.step(&wall(1, EgoMotion::at_rest(0.0))).unwrap();
+    pipeline.step(wall(1, EgoMotion::at_rest(0.0))).unwrap();
     let report =
-        pipeline.step(&wall(2, EgoMotion { turn: 0.01, forward: 0.01, ..EgoMotion::at_rest(0.1) }));
+        pipeline.step(wall(2, EgoMotion { turn: 0.01, forward: 0.01, ..EgoMotion::at_rest(0.1) }));
     report.unwrap().motion.turn
 }
 
@@ -47,7 +47,7 @@ fn the_motion_is_that_of_the_wheels_unless_the_config_asks_for_more() {
 fn without_depth_the_wheels_are_believed() {
     let mut pipeline = World::default().pipeline(&format!("odometry = {{}}\n{BY_WHEELS}"));
     for index in 1..=2 {
-        let report = pipeline.step(&frame(index, 0.1 * index as f64)).unwrap();
+        let report = pipeline.step(frame(index, 0.1 * index as f64)).unwrap();
         assert!(report.funnel.entries().is_empty(), "{:?}", report.funnel);
     }
 }

@@ -31,7 +31,7 @@ impl Ride {
     fn go_on(&mut self, frames: u64) -> FollowStatus {
         for _ in 0..frames {
             self.frames += 1;
-            self.pipeline.step(&frame(self.frames, self.frames as f64 * 0.1)).unwrap();
+            self.pipeline.step(frame(self.frames, self.frames as f64 * 0.1)).unwrap();
         }
         self.pipeline.status().unwrap()
     }

@@ -33,7 +33,7 @@ fn pair() -> Images {
 #[test]
 fn a_pair_gives_the_detectors_depth() {
     let mut pipeline = World::default().pipeline(CONFIG);
-    let report = pipeline.step(&with_images(pair())).unwrap();
+    let report = pipeline.step(with_images(pair())).unwrap();
     assert_eq!(report.plugin_timings[0].0, "stereo");
     assert!(report.funnel.entries().iter().any(|e| e.test.starts_with("stereo pixels: ")));
 }
@@ -42,14 +42,14 @@ fn a_pair_gives_the_detectors_depth() {
 fn depth_of_the_log_is_left_alone() {
     let depth = Some(Arc::new(DepthImage::filled(640, 480, 2.0)));
     let mut pipeline = World::default().pipeline(CONFIG);
-    let report = pipeline.step(&with_images(Images { depth, ..pair() })).unwrap();
+    let report = pipeline.step(with_images(Images { depth, ..pair() })).unwrap();
     assert!(report.funnel.entries().is_empty(), "{:?}", report.funnel);
 }
 
 #[test]
 fn without_a_right_image_the_frame_is_refused() {
     let mut pipeline = World::default().pipeline(CONFIG);
-    let error = pipeline.step(&with_images(Images { right: None, ..pair() })).unwrap_err();
+    let error = pipeline.step(with_images(Images { right: None, ..pair() })).unwrap_err();
     assert_eq!(
         error.to_string(),
         "frame 1: `stereo` needs right images of a stereo pair, which this log does not carry"

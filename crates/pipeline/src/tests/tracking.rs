@@ -456,7 +456,7 @@ fn the_same_run_gives_the_same_reports() {
 fn all_stages_are_timed() {
     let world = World::of([vec![]]);
     let mut pipeline = world.pipeline(PLAIN);
-    let report = pipeline.step(&frame(1, 0.0)).unwrap();
+    let report = pipeline.step(frame(1, 0.0)).unwrap();
     let timed: Vec<&str> = report.timings.iter().map(|t| t.0).collect();
     assert_eq!(timed, pipeline.stage_names());
 }
