@@ -1,5 +1,5 @@
-//! What a plugin offers to the applications, beside itself: advice on its tests, settings that are
-//! worth a trial, and how its model is trained.
+//! Offers of a plugin to the applications: advice on its tests, settings that are worth a trial, and
+//! the training of its model.
 
 /// Advice on a test of the funnel that drops candidates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ pub enum TrainingData {
     LaserScans,
 }
 
-/// How the model of a plugin is trained.
+/// Training of the model of a plugin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TrainingOffer {
     /// Examples that the trainer learns from.

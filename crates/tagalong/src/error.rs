@@ -26,7 +26,7 @@ pub enum Error {
     Damaged {
         /// The log.
         log: std::path::PathBuf,
-        /// What was lost, and where.
+        /// Lost part of the log, and its place.
         notes: String,
     },
     /// A controller is to drive without a source of data that it needs.

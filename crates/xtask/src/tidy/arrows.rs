@@ -153,7 +153,8 @@ fn may(folder: &str, allowed: Option<&[&str]>, target: &str, dev: bool) -> bool 
     };
     // Plugins stand alone, in their tests, too.
     let other_plugin = room == "plugins" && folder.starts_with("plugins/");
-    let free_tests = dev && !other_plugin && (FOR_TESTS.contains(&room) || folder == "crates/cli");
+    let is_whole = matches!(folder, "crates/cli" | "crates/tagalong");
+    let free_tests = dev && !other_plugin && (FOR_TESTS.contains(&room) || is_whole);
     target == folder || is_word(folder, room) || allowed.contains(&room) || free_tests
 }
 
@@ -165,7 +166,8 @@ fn is_word(folder: &str, target: &str) -> bool {
 }
 
 fn misnamed(folder: &str, package: &Package) -> Option<String> {
-    let expected = format!("tagalong-{}", folder.rsplit('/').next().unwrap_or(folder));
+    let name = folder.rsplit('/').next().unwrap_or(folder);
+    let expected = if name == "tagalong" { name.to_owned() } else { format!("tagalong-{name}") };
     (package.name != expected)
         .then(|| format!("{folder}: the package is called `{}`, not `{expected}`", package.name))
 }

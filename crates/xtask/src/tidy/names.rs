@@ -13,9 +13,9 @@ const MAY_NAME: &[(&str, &str)] = &[
     ("crates/doctor/src/preparations.rs", "onnx"),            // tries preparations of its images
     // Names of configs.
     ("crates/app/src/choice.rs", "laser-legs"),
-    ("crates/app/src/config_file.rs", "joint-particle"),
-    ("crates/app/src/config_file.rs", "laser-legs"),
-    ("crates/app/src/config_file.rs", "omni-appearance"),
+    ("crates/pipeline/src/config/builtin.rs", "joint-particle"),
+    ("crates/pipeline/src/config/builtin.rs", "laser-legs"),
+    ("crates/pipeline/src/config/builtin.rs", "omni-appearance"),
 ];
 
 /// Complains about code of `crates/` that knows a plugin by its name: what a plugin offers is
