@@ -70,7 +70,9 @@ def test_the_program_ends_with_its_exit_codes(program, tmp_path):
 
 
 INTERRUPTED = """
-import sys, tagalong
+import signal, sys, tagalong
+# A shell starts background jobs with this signal ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 try:
     print("begins", flush=True)
     while True:
