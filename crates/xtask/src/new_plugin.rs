@@ -142,8 +142,8 @@ fn lists_with(workspace: &Workspace, name: &str) -> Result<[(&'static str, Strin
     let package = format!("tagalong-{name}");
     let register = format!("    {}::register(registry);", package.replace('-', "_"));
     Ok([
-        list("Cargo.toml", format!("{package} = {{ path = \"plugins/{name}\" }}"), |line| {
-            line.starts_with("tagalong-") && line.contains("{ path = \"plugins/")
+        list("Cargo.toml", dependency(name), |line| {
+            line.starts_with("tagalong-") && line.contains("path = \"plugins/")
         })?,
         list("crates/catalog/Cargo.toml", format!("{package}.workspace = true"), |line| {
             line.starts_with("tagalong-")
@@ -152,6 +152,12 @@ fn lists_with(workspace: &Workspace, name: &str) -> Result<[(&'static str, Strin
             line.starts_with("    tagalong_") && line.ends_with("::register(registry);")
         })?,
     ])
+}
+
+/// Returns the line of a plugin in the dependencies of the workspace, whose crates share a version.
+fn dependency(name: &str) -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    format!("tagalong-{name} = {{ version = \"{version}\", path = \"plugins/{name}\" }}")
 }
 
 /// `text` with `line` before the first sibling that sorts after it, else after
@@ -188,8 +194,8 @@ mod tests {
     fn workspace() -> (tempfile::TempDir, Workspace) {
         let folder = tempfile::tempdir().unwrap();
         let workspace = Workspace::at(folder.path());
-        let lines = "tagalong-b = { path = \"plugins/b\" }\n\n[profile]\n";
-        workspace.write("Cargo.toml", lines).unwrap();
+        let lines = format!("{}\n\n[profile]\n", dependency("b"));
+        workspace.write("Cargo.toml", &lines).unwrap();
         workspace.write("plugins/b/Cargo.toml", "").unwrap();
         workspace.write("crates/catalog/Cargo.toml", "tagalong-b.workspace = true\n").unwrap();
         let register = "fn f() {\n    tagalong_b::register(registry);\n}\n";
@@ -207,10 +213,7 @@ mod tests {
                         tagalong_b::register(registry);\n    tagalong_c::register(registry);\n}\n";
         assert_eq!(catalog, expected);
         let root = workspace.read("Cargo.toml").unwrap();
-        assert!(
-            root.starts_with("tagalong-a-filter = { path = \"plugins/a-filter\" }\n"),
-            "{root}"
-        );
+        assert!(root.starts_with(&(dependency("a-filter") + "\n")), "{root}");
         assert!(workspace.read("plugins/a-filter/src/filter.rs").unwrap().contains("AFilter"));
     }
 
