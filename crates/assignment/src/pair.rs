@@ -164,6 +164,21 @@ impl Pairs<'_> {
         };
         rows.iter().map(fits_of).collect()
     }
+
+    /// Assigns these detections to these tracks, by their numbers, with the least sum of costs:
+    /// [`assign_fits`] of their [`Pairs::fits`]. Returns the number of the detection of each track.
+    pub fn assigned(
+        &self,
+        rows: &[usize],
+        columns: &[usize],
+        pair_cost: &PairCost,
+        miss_factor: f64,
+        fit: impl Fn(&Track, &Detection) -> Option<Fit>,
+    ) -> Vec<Option<usize>> {
+        let fits = self.fits(rows, columns, pair_cost, fit);
+        let given = assign_fits(&fits, columns.len(), pair_cost.at_gate(), miss_factor);
+        given.into_iter().map(|column| column.map(|column| columns[column])).collect()
+    }
 }
 
 /// Assigns detections to tracks so that the sum of the negative log-likelihoods d² + ln |S| is

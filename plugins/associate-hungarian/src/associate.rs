@@ -1,4 +1,4 @@
-use tagalong_assignment::{Fit, Pairs, assign_fits};
+use tagalong_assignment::{Fit, Pairs};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -37,11 +37,12 @@ impl Associator for Hungarian {
     ) -> Associations {
         let pair_cost = self.config.pair_cost();
         let pairs = Pairs { tracks, detections, gate };
-        let fits = pairs.fits(&pairs.rows(), &pairs.columns(), &pair_cost, |track, found| {
-            self.fit(track, found, gate)
-        });
-        let at_gate = pair_cost.at_gate();
-        let given = assign_fits(&fits, detections.len(), at_gate, self.config.miss_factor);
+        let rows = pairs.rows();
+        let columns = pairs.columns();
+        let given =
+            pairs.assigned(&rows, &columns, &pair_cost, self.config.miss_factor, |track, found| {
+                self.fit(track, found, gate)
+            });
         Associations::one_to_one(given)
     }
 }

@@ -1,4 +1,4 @@
-use tagalong_assignment::{Fit, Pairs, assign_fits};
+use tagalong_assignment::{Fit, Pairs};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::Config;
@@ -44,12 +44,12 @@ impl TwoStage {
             (0..detections.len()).filter(|i| self.is_strong(&detections[*i]) == strong).collect();
         let pair_cost = self.config.pair_cost();
         let pairs = Pairs { tracks, detections, gate };
-        let fits =
-            pairs.fits(&rows, &columns, &pair_cost, |track, found| self.fit(track, found, gate));
-        let at_gate = pair_cost.at_gate();
-        let assigned = assign_fits(&fits, columns.len(), at_gate, self.config.miss_factor);
-        for (row, column) in rows.into_iter().zip(assigned) {
-            given[row] = column.map(|column| columns[column]);
+        let miss_factor = self.config.miss_factor;
+        let assigned = pairs.assigned(&rows, &columns, &pair_cost, miss_factor, |track, found| {
+            self.fit(track, found, gate)
+        });
+        for (row, detection) in rows.into_iter().zip(assigned) {
+            given[row] = detection;
         }
     }
 }

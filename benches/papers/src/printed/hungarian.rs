@@ -5,7 +5,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_assignment::{Cost, Fit, PairCost, Pairs, assign_fits};
+use tagalong_assignment::{Cost, Fit, PairCost, Pairs};
 use tagalong_config::{Registry, check_settings};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
@@ -55,11 +55,12 @@ impl Associator for PrintedHungarian {
         gate: &Gate,
     ) -> Associations {
         let pairs = Pairs { tracks, detections, gate };
-        let fits = pairs.fits(&pairs.rows(), &pairs.columns(), &self.pair_cost, |track, found| {
-            self.fit(track, found, gate)
-        });
-        let at_gate = self.pair_cost.at_gate();
-        let given = assign_fits(&fits, detections.len(), at_gate, self.miss_factor);
+        let rows = pairs.rows();
+        let columns = pairs.columns();
+        let given =
+            pairs.assigned(&rows, &columns, &self.pair_cost, self.miss_factor, |track, found| {
+                self.fit(track, found, gate)
+            });
         Associations::one_to_one(given)
     }
 }
