@@ -85,12 +85,12 @@ impl PersonFilter for Ekf {
     fn predict(&self, state: &mut State, motion: &EgoMotion) {
         state.mean = self.transition(&state.mean, motion);
         let moved = moved(&state.covariance, motion, self.config.velocity_decay_s);
-        let covariance = moved + self.process_noise(motion.dt);
+        let mut covariance = moved + self.process_noise(motion.dt);
         // A robot at rest, or one whose motion is certain, adds none.
-        state.covariance = symmetric(match motion.covariance == Matrix3::zeros() {
-            true => covariance,
-            false => covariance + ego_noise(&state.mean, motion),
-        });
+        if motion.covariance != Matrix3::zeros() {
+            covariance += ego_noise(&state.mean, motion);
+        }
+        state.covariance = symmetric(covariance);
     }
 
     /// The update in Joseph form. S = P + R is positive definite as long as P

@@ -57,10 +57,8 @@ fn calls_of_part(part: &str) -> Vec<Call<'_>> {
             let own = rest.iter().any(|word| other.contains(word));
             let after = rest.iter().position(|word| *word == "--").map(|at| &rest[at + 1..]);
             let of_papers = rest.windows(2).any(|pair| pair == ["-p", Name::Papers.package()]);
-            let program = match own {
-                false => Some(Name::Tagalong),
-                true => of_papers.then_some(Name::Papers),
-            };
+            let program =
+                if of_papers { Some(Name::Papers) } else { (!own).then_some(Name::Tagalong) };
             let call = program.zip(after);
             let call = call.map(|(program, words)| Call::Program(program, words.to_vec()));
             std::iter::once(Call::Cargo("run")).chain(call).collect()

@@ -176,7 +176,7 @@ impl ObstacleMemory {
         let reach_m = reach_m(settings, footprint);
         self.things.retain_mut(|thing| {
             thing.at = motion.apply_to_point(thing.at);
-            // What is in the last image needs no memory, and is not forgotten with the frames
+            // An obstacle in the last image needs no memory, and is not forgotten with the frames
             // between two images. People may be known without an image.
             if thing.unseen_s > 0.0 || thing.who.is_some() {
                 thing.unseen_s += motion.dt;
