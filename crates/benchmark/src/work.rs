@@ -1,6 +1,6 @@
 //! Runs tasks. Those that see the same frames share one pass over their log.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
@@ -251,10 +251,13 @@ impl Desk<'_> {
         }
         let lost = source.data_lost();
         let remedies = Remedies::new(self.registry);
-        let finish = |(ready, lane): (&Ready, Lane)| {
-            lane.finish(&ready.task, &truth, &shots, lost, &remedies)
-        };
-        let (mut stored, timings): (Vec<_>, Vec<_>) = group.iter().zip(lanes).map(finish).unzip();
+        let mut stored = Vec::new();
+        let mut timings = Vec::new();
+        for (ready, lane) in group.iter().zip(lanes) {
+            let (result, timing) = lane.finish(&ready.task, &truth, &shots, lost, &remedies);
+            stored.push(result);
+            timings.push(timing);
+        }
         illustrate(&group[0], &mut stored)?;
         Ok(Some(stored.into_iter().zip(timings).collect()))
     }
@@ -353,10 +356,13 @@ fn deciding(
 ) -> BTreeMap<String, Vec<String>> {
     let Ok(pipeline) = pipeline else { return BTreeMap::new() };
     let config = pipeline.config().values();
-    let tests: BTreeSet<&String> =
-        result.missed.iter().filter_map(|missed| missed.test.as_ref()).collect();
-    let lines = |test: &String| Some((test.clone(), remedies.of(test)?.lines(config)));
-    tests.into_iter().filter_map(lines).collect()
+    let mut deciding = BTreeMap::new();
+    for test in result.missed.iter().filter_map(|missed| missed.test.as_ref()) {
+        if let Some(remedy) = remedies.of(test) {
+            deciding.entry(test.clone()).or_insert_with(|| remedy.lines(config));
+        }
+    }
+    deciding
 }
 
 /// Goes through the log once more for the pictures of the events.

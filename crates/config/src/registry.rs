@@ -268,11 +268,10 @@ impl Registry {
 
     /// Returns the advice on the tests of all plugins, by the names of the plugins.
     pub fn all_remedies(&self) -> impl Iterator<Item = (&'static str, &'static Remedy)> {
-        let of_plugin = |(name, remedies): (&&'static str, &&'static [Remedy])| (*name, *remedies);
-        self.remedies
-            .iter()
-            .map(of_plugin)
-            .flat_map(|(name, remedies)| remedies.iter().map(move |remedy| (name, remedy)))
+        self.remedies.iter().flat_map(|(name, remedies)| {
+            let name = *name;
+            remedies.iter().map(move |remedy| (name, remedy))
+        })
     }
 
     /// Registers values of settings of a plugin that are worth a trial on any log.
