@@ -60,24 +60,12 @@ pub fn register(registry: &mut Registry) {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Point3, SMatrix, Vector2};
-    use tagalong_core::{Estimate, Person, TrackId};
+    use tagalong_conformance::samples::track_in;
 
     use super::*;
 
     fn track(seen: bool, occluded: bool) -> Track {
-        let person = Person { position: Point3::new(3.0, 0.0, 1.35), velocity: Vector2::zeros() };
-        let region = Rect::new(100.0, 80.0, 60.0, 60.0);
-        Track {
-            id: TrackId(1),
-            estimate: Estimate { person, covariance: SMatrix::identity(), region },
-            seen,
-            occluded,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 1.0,
-        }
+        Track { seen, occluded, ..track_in(1, Rect::new(100.0, 80.0, 60.0, 60.0)) }
     }
 
     #[test]
