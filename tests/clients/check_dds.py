@@ -506,6 +506,14 @@ class Http:
             text = error.read().decode()
             return error.code, json.loads(text) if text.startswith("{") else text
 
+    def is_open(self):
+        """Says whether the server takes connections; it opens after the first messages are found."""
+        try:
+            self.send("status")
+        except urllib.error.URLError:
+            return False
+        return True
+
 
 def moves(commands):
     return any(c.twist.linear.x != 0.0 or c.twist.angular.z != 0.0 for c in commands)
@@ -538,7 +546,7 @@ def run(checks, path, domain, port, command):
         time.sleep(0.3)
         last = commands.since(0)[-1]
         check(not moves([last]), "the last command is zero")
-    except Failed:
+    except Exception:
         print("the bridge said:\n" + "".join(said), file=sys.stderr)
         raise
     finally:
@@ -574,6 +582,7 @@ def reset_until(hand, http, wanted, text):
 
 
 def start_moving(hand, http, commands):
+    wait_for(http.is_open, 30, "the HTTP server answers")
     wait_for(lambda: http.send("status")[1]["frames"] > 5, 30, "frames come")
     reset_until(hand, http, "not enabled", "reset, the robot waits for the switch")
     hand.holds = True
