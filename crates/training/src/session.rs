@@ -109,7 +109,7 @@ impl<'a> Session<'a> {
     pub fn trainer(&self) -> Result<Box<dyn Trainer>, Failure> {
         let mut settings = self.settings.clone();
         if self.args.quick {
-            settings.extend(quick_settings(self.registry, &self.args.plugin)?);
+            fill_in(&mut settings, quick_settings(self.registry, &self.args.plugin)?);
         }
         with_value(&settings, |value| {
             self.registry.build_trainer(&self.args.plugin, value, &self.context())
@@ -291,6 +291,21 @@ fn quick_settings(registry: &Registry, plugin: &str) -> Result<toml::Table, Fail
     })
 }
 
+/// Adds the values that the settings of the user leave open, in tables of tables too.
+fn fill_in(settings: &mut toml::Table, offered: toml::Table) {
+    for (key, value) in offered {
+        match (settings.get_mut(&key), value) {
+            (None, value) => {
+                settings.insert(key, value);
+            }
+            (Some(toml::Value::Table(inner)), toml::Value::Table(offered)) => {
+                fill_in(inner, offered);
+            }
+            (Some(_), _) => {}
+        }
+    }
+}
+
 /// Reads a scene.
 fn scene_text(path: &Path) -> Result<String, Failure> {
     read_text(path, FileLimit::Config)
@@ -315,4 +330,18 @@ fn with_value<T>(
     let span = table.span();
     let value = Spanned::new(span, toml::de::DeValue::Table(table.into_inner()));
     build(Some(value)).map_err(|error| Failure::usage(error.message))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offered_settings_fill_gaps_and_replace_nothing() {
+        let mut settings: toml::Table = "[training]\nfolds = 3\n".parse().unwrap();
+        let offered = "weight = 2.0\n[training]\nfolds = 2\ngammas = [2.0]\n".parse().unwrap();
+        fill_in(&mut settings, offered);
+        let expected = "weight = 2.0\n[training]\nfolds = 3\ngammas = [2.0]\n".parse().unwrap();
+        assert_eq!(settings, expected);
+    }
 }

@@ -94,3 +94,17 @@ pub fn register(registry: &mut Registry) {
         |config: DepthTemplateConfig, _| DepthTemplate::new(config),
     );
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_keeps_the_promises_of_its_kinds() {
+        let mut registry = Registry::default();
+        register(&mut registry);
+        let suite = tagalong_conformance::Suite::new(&registry);
+        let failures = suite.must_discover(NAME).must_follow(NAME).check_all();
+        assert!(failures.is_empty(), "{failures:#?}");
+    }
+}

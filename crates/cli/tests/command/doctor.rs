@@ -309,11 +309,12 @@ fn each_test_of_the_funnel_has_its_settings_and_its_pictures() {
 #[test]
 fn real_logs_are_registered_and_moved_ones_are_not() {
     let Some(um) = tagalong_testdata::find("logs/um.mcap") else { return };
-    let (_, said) = doctor(&config(), &um, &[]);
-    assert_eq!(finding(&said, "registration")["severity"], "ok", "{said:#}");
     let home = tempfile::tempdir().unwrap();
-    let moved = home.path().join("moved.mcap");
-    broken::write(&um, &moved, &shifted(-9, -3));
+    let [start, moved] = ["start.mcap", "moved.mcap"].map(|name| home.path().join(name));
+    broken::write(&um, &start, &Changes { first_s: Some(4.0), ..Changes::default() });
+    let (_, said) = doctor(&config(), &start, &[]);
+    assert_eq!(finding(&said, "registration")["severity"], "ok", "{said:#}");
+    broken::write(&start, &moved, &shifted(-9, -3));
     let (code, said) = doctor(&config(), &moved, &[]);
     let found = finding(&said, "registration");
     assert_eq!((code, found["severity"].as_str()), (3, Some("bad")), "{said:#}");

@@ -15,6 +15,9 @@ const PLACEHOLDERS: &[&str] = &[
     "| what it says | what is done instead",
 ];
 
+/// The call that checks a plugin against the promises of its kind.
+const CONFORMANCE: &str = "check_all(";
+
 /// Plugins that a config has without naming them.
 const DEFAULTS: &[&str] = &["associate-hungarian", "manage-m-of-n"];
 
@@ -38,9 +41,26 @@ pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> 
         if !used.contains(&name) && !DEFAULTS.contains(&name.as_str()) {
             complaints.push(format!("no config in configs/ uses the plugin `{name}`"));
         }
+        if !tests_conformance(workspace, &folder)? {
+            complaints.push(format!("no test of {folder} calls {CONFORMANCE}"));
+        }
         complaints.extend(readme_gaps(workspace, &folder));
     }
     Ok(complaints)
+}
+
+/// Says whether a file of the plugin runs the checks of its kind.
+fn tests_conformance(workspace: &Workspace, folder: &str) -> Result<bool> {
+    for file in workspace.files()? {
+        let is_source = file.starts_with(folder) && file.extension().is_some_and(|e| e == "rs");
+        if is_source {
+            let text = workspace.read(&file)?;
+            if text.contains("tagalong_conformance::") && text.contains(CONFORMANCE) {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
 }
 
 fn readme_gaps(workspace: &Workspace, folder: &str) -> Vec<String> {

@@ -32,6 +32,8 @@ pub struct Changes {
     pub without: &'static [&'static str],
     /// Topic that keeps only some of its images, and the interval.
     pub thinned: Option<(&'static str, u64)>,
+    /// Seconds of the log that are kept, from its first message on.
+    pub first_s: Option<f64>,
 }
 
 /// Writes the log `from` with the changes to `to`.
@@ -40,8 +42,13 @@ pub fn write(from: &Path, to: &Path, changes: &Changes) {
     let file = BufWriter::new(File::create(to).unwrap());
     let mut writer = WriteOptions::new().profile("ros2").create(file).unwrap();
     let (mut channels, mut counts) = (BTreeMap::new(), BTreeMap::new());
+    let mut end_ns = None;
     for message in MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
+        let length_ns = changes.first_s.map_or(u64::MAX, |seconds| (1e9 * seconds) as u64);
+        if message.log_time > *end_ns.get_or_insert(message.log_time.saturating_add(length_ns)) {
+            continue;
+        }
         let topic = message.channel.topic.clone();
         let count = counts.entry(topic.clone()).or_insert(0u64);
         *count += 1;
