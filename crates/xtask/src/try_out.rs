@@ -8,7 +8,6 @@ use std::{fs, io};
 use anyhow::{Context as _, Result};
 use clap::ValueEnum as _;
 
-use crate::metadata::Metadata;
 use crate::new_plugin::{Kind, create, format};
 use crate::walk_through::GUIDES;
 use crate::workspace::{Workspace, remove_folder, succeed};
@@ -23,6 +22,19 @@ const BUILD: &str = "target/try-new-plugin-build";
 
 /// Folder of the workspace's own build, whose outside crates are as good for the copy.
 const BUILT: &str = "debug";
+
+/// Builds pipelines from config files, which follow.
+const EXAMPLE: &[&str] = &[
+    "run",
+    "--quiet",
+    "-p",
+    "tagalong-pipeline",
+    "--features",
+    "plugins",
+    "--example",
+    "build_configs",
+    "--",
+];
 
 /// Runs the whole trial.
 pub fn try_out(workspace: &Workspace) -> Result<()> {
@@ -58,13 +70,11 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
     let clippy = ["clippy", "--quiet", "--all-targets", "--", "-D", "warnings"];
     cargo("they build without warnings", &clippy, &packages)?;
     cargo("they conform, as their own tests say", &["test", "--quiet"], &packages)?;
-    if has_program(&copy)? {
-        for name in &names {
-            let config = format!("configs/{name}.toml");
-            let run = ["run", "--quiet", "-p", "tagalong-cli", "--", "check", &config];
-            cargo(&format!("{config} is a valid config"), &run, &[])?;
-        }
-    }
+    // The program would be built for this alone; an example of the pipeline has the same plugins.
+    let mut build_configs = EXAMPLE.to_vec();
+    let configs: Vec<String> = names.iter().map(|name| format!("configs/{name}.toml")).collect();
+    build_configs.extend(configs.iter().map(String::as_str));
+    cargo("their configs build pipelines", &build_configs, &[])?;
     eprintln!("new-plugin --try: all six kinds work, and so do the walk-throughs");
     Ok(())
 }
@@ -111,12 +121,6 @@ fn copy_outside(from: &Path, to: &Path) -> io::Result<()> {
         }
     }
     Ok(())
-}
-
-fn has_program(copy: &Workspace) -> Result<bool> {
-    let metadata = Metadata::of(copy)?;
-    let members = metadata.members(copy.root());
-    Ok(members.get("crates/cli").is_some_and(|package| package.is_program()))
 }
 
 /// A fresh copy of all files that git knows or would know.
