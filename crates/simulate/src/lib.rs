@@ -19,7 +19,7 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
-use tagalong_config::{FileLimit, Registry, nearest, read_text};
+use tagalong_config::{FileLimit, PathText, Registry, nearest, read_text};
 use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
@@ -97,7 +97,7 @@ fn write(simulation: Simulation, scene: &Scene, log: &Path, format: Format) -> O
     match format {
         Format::Text => say(&format!("{images} images and the truth are in {}", log.display())),
         Format::Json => {
-            let told = serde_json::json!({ "log": log, "images": images });
+            let told = serde_json::json!({ "log": PathText(log), "images": images });
             print(&format!("{told:#}\n"))?;
         }
     }
