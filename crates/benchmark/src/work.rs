@@ -195,7 +195,8 @@ fn run_all(groups: VecDeque<Group>, jobs: usize, desk: &Desk<'_>) -> Result<(), 
     };
     std::thread::scope(|scope| {
         for _ in 1..jobs {
-            scope.spawn(work);
+            // Without another thread, those that run do its work.
+            let _ = std::thread::Builder::new().spawn_scoped(scope, work);
         }
         work();
     });

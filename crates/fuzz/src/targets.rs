@@ -26,6 +26,11 @@ pub struct Target {
 const MCAP: &[u8] = include_bytes!("../seeds/tiny.mcap");
 const BAG: &[u8] = include_bytes!("../seeds/tiny.bag");
 const DATABASE: &[u8] = include_bytes!("../seeds/tiny.db3");
+/// Databases of which a transaction was under way, and the files beside them.
+const UNCOMMITTED: &[u8] = include_bytes!("../seeds/tiny-journal.db3");
+const JOURNAL: &[u8] = include_bytes!("../seeds/tiny-journal.db3-journal");
+const LOGGED_AHEAD: &[u8] = include_bytes!("../seeds/tiny-wal.db3");
+const WRITE_AHEAD_LOG: &[u8] = include_bytes!("../seeds/tiny-wal.db3-wal");
 const CASCADE: &str = include_str!("../seeds/tiny-cascade.xml");
 const COLOR_TEXTURE: &str = include_str!("../../../configs/models/color-texture.toml");
 const BODY_NET: &str = include_str!("../../../configs/models/body-net.toml");
@@ -84,6 +89,18 @@ pub fn targets() -> Vec<Target> {
                     walk(LogWalker::open(path, &small()).ok());
                 }
             },
+        },
+        Target {
+            name: "journal",
+            about: "a rollback journal beside a rosbag2 database",
+            seeds: vec![JOURNAL.to_vec()],
+            parse: |bytes, path| walk_unfinished(UNCOMMITTED, bytes, path, "-journal"),
+        },
+        Target {
+            name: "write-ahead-log",
+            about: "a write-ahead log beside a rosbag2 database",
+            seeds: vec![WRITE_AHEAD_LOG.to_vec()],
+            parse: |bytes, path| walk_unfinished(LOGGED_AHEAD, bytes, path, "-wal"),
         },
         Target {
             name: "frames",
@@ -229,6 +246,17 @@ fn walk<R: std::io::Read>(walker: Option<LogWalker<R>>) {
     while walker.next().is_some() {}
 }
 
+/// Walks through a database with a file of this ending beside it.
+fn walk_unfinished(database: &[u8], bytes: &[u8], path: &Path, ending: &str) {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(ending);
+    if std::fs::write(path, database).is_ok() && std::fs::write(&beside, bytes).is_ok() {
+        walk(LogWalker::open(path, &small()).ok());
+    }
+    // Other parsers have the same path.
+    let _ = std::fs::remove_file(beside);
+}
+
 fn frames(path: &Path) {
     let inputs = Inputs::ANY;
     let Ok(mut source) = FrameSource::open(path, &InputSettings::default(), &small(), inputs)
@@ -299,6 +327,24 @@ fn config(bytes: &[u8], _: &Path) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn unfinished_databases_are_read_up_to_their_last_commit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.db3");
+        let seeds = [(UNCOMMITTED, JOURNAL, "-journal", 6), (LOGGED_AHEAD, WRITE_AHEAD_LOG, "-wal", 7)];
+        for (database, beside, ending, count) in seeds {
+            std::fs::write(&path, database).unwrap();
+            std::fs::write(folder.path().join(format!("log.db3{ending}")), beside).unwrap();
+            let mut walker = LogWalker::open(&path, &small()).unwrap();
+            let mut read = 0;
+            while walker.next().is_some() {
+                read += 1;
+            }
+            assert_eq!((read, walker.data_lost()), (count, true), "{ending}");
+            std::fs::remove_file(folder.path().join(format!("log.db3{ending}"))).unwrap();
+        }
+    }
 
     #[test]
     fn first_parts_of_models_are_models() {

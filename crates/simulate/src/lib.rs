@@ -153,10 +153,13 @@ pub fn record(
     let (events, recorded) = mpsc::sync_channel(EVENTS_AHEAD);
     thread::scope(|scope| {
         // Images are encoded while the next ones are rendered.
-        let writing = scope.spawn(move || {
+        let write_all = move || {
             recorded.into_iter().try_for_each(|event| recorder.write(&event))?;
             recorder.finish()
-        });
+        };
+        let writing = thread::Builder::new().spawn_scoped(scope, write_all);
+        let writing =
+            writing.map_err(|source| WriteError::Io { path: path.to_owned(), source })?;
         let mut images = 0;
         while let Some(event) = simulation.next_event().filter(|_| goes_on()) {
             if let Event::Shot(shot) = &event {

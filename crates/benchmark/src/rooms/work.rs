@@ -204,7 +204,8 @@ impl Shift<'_> {
         std::thread::scope(|scope| {
             // One job fewer: the calling thread works, too.
             for _ in 1..jobs {
-                scope.spawn(work);
+                // Without another thread, those that run do its work.
+            let _ = std::thread::Builder::new().spawn_scoped(scope, work);
             }
             work();
         });
