@@ -48,9 +48,10 @@ impl HttpServer {
         let server = Server::open(access).map_err(|error| failed(error.to_string()))?;
         let (address, stop) = (server.address(), Arc::new(AtomicBool::new(false)));
         let theirs = Arc::clone(&stop);
-        let thread = thread::spawn(move || {
-            server.serve(&Arc::new(Skill(desk)), || theirs.load(Ordering::Relaxed));
-        });
+        let serve = move || server.serve(&Arc::new(Skill(desk)), || theirs.load(Ordering::Relaxed));
+        let thread = thread::Builder::new().name("http".into()).spawn(serve);
+        let thread = thread
+            .map_err(|error| failed(format!("no thread for it can be started: {error}")))?;
         Ok(Self { address, stop, thread: Some(thread) })
     }
 

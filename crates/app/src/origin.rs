@@ -3,14 +3,17 @@
 use std::path::{Path, PathBuf, absolute};
 
 use serde::{Deserialize, Serialize};
+use tagalong_config::path_text;
 
 /// Contents of `origin.json`: the only file of a run that depends on the place of its log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Origin {
     /// Path of the log.
+    #[serde(with = "path_text")]
     pub log: PathBuf,
     /// Path of the config, or the name of a built-in one; none if the program chose it.
+    #[serde(with = "path_text::optional")]
     pub config: Option<PathBuf>,
 }
 

@@ -40,7 +40,7 @@ type Recordings = Vec<(SequenceInfo, Sequence)>;
 fn trackers(store: &Store) -> Result<BTreeMap<String, Recordings>, Failure> {
     let mut trackers: BTreeMap<String, Recordings> = BTreeMap::new();
     for task in store.plan()? {
-        let Some(recording) = store.result(&task.hash).and_then(|stored| stored.recording) else {
+        let Some(recording) = store.result(&task).and_then(|stored| stored.recording) else {
             continue;
         };
         // TrackEval has no seeds: each one becomes a tracker.

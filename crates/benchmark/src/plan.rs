@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::suggest::{self, check_log_path, toml_files};
-use tagalong_config::Registry;
+use tagalong_config::{Registry, path_text};
 use tagalong_log::{FrameSource, Inputs, LogError};
 use tagalong_pipeline::Tunable;
 use tagalong_scoring::TruthFile;
@@ -30,12 +30,15 @@ pub struct Task {
     /// Name of the pipeline.
     pub pipeline: String,
     /// Path of its config.
+    #[serde(with = "path_text")]
     pub config: PathBuf,
     /// Name of the log.
     pub log_name: String,
     /// Path of the log.
+    #[serde(with = "path_text")]
     pub log: PathBuf,
     /// Path of its truth.
+    #[serde(with = "path_text")]
     pub truth: PathBuf,
     /// True if the boxes of the truth are whole bodies.
     pub whole_bodies: bool,

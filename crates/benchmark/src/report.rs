@@ -40,7 +40,7 @@ pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
 }
 
 fn result(store: &Store, task: &Task) -> Option<Stored> {
-    let Some(why) = &task.skip else { return store.result(&task.hash) };
+    let Some(why) = &task.skip else { return store.result(task) };
     let outcome = Outcome::Skipped { why: why.clone() };
     Some(Stored { result: TaskResult { outcome, ..blank(task) }, ..Stored::default() })
 }

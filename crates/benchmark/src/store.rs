@@ -47,6 +47,9 @@ pub struct Recording {
 /// One file of times.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct StoredTiming {
+    /// Hash of its task.
+    #[serde(default)]
+    pub hash: String,
     /// Description of the machine.
     pub machine: String,
     /// Its times.
@@ -90,14 +93,13 @@ impl Store {
         text.lines().enumerate().map(line).collect()
     }
 
-    /// Returns the result of a task, if it exists and is whole.
-    pub fn result(&self, hash: &str) -> Option<Stored> {
-        self.get(&result_name(hash))
-    }
-
-    /// Returns true if there is a result.
-    pub fn has_result(&self, hash: &str) -> bool {
-        self.path(&result_name(hash)).is_file()
+    /// Returns the result of a task, if it exists, is whole, and says itself that it is of this task:
+    /// a file that was copied or renamed is of another one.
+    pub fn result(&self, task: &Task) -> Option<Stored> {
+        let stored: Stored = self.get(&result_name(&task.hash))?;
+        let TaskResult { hash, inputs, seed, .. } = &stored.result;
+        let is_own = *hash == task.hash && *inputs == task.inputs && *seed == task.seed;
+        is_own.then_some(stored)
     }
 
     /// Stores a result.
@@ -109,9 +111,9 @@ impl Store {
         self.put(&result_name(hash), &json)
     }
 
-    /// Returns the times of a task, if they were taken.
+    /// Returns the times of a task, if they were taken and say themselves that they are of this task.
     pub fn timing(&self, hash: &str) -> Option<StoredTiming> {
-        self.get(&timing_name(hash))
+        self.get(&timing_name(hash)).filter(|timing: &StoredTiming| timing.hash == hash)
     }
 
     /// Stores times.

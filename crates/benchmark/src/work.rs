@@ -67,7 +67,7 @@ pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally,
     bar.finish_and_clear();
     let mut tally =
         Tally { asked: asked.len(), ran, signal: signals.received(), ..Tally::default() };
-    for stored in asked.iter().filter_map(|task| store.result(&task.hash)) {
+    for stored in asked.iter().filter_map(|task| store.result(task)) {
         tally.failed += usize::from(matches!(stored.result.outcome, Outcome::Failed { .. }));
         tally.lost |= stored.result.data_lost;
     }
@@ -118,9 +118,8 @@ fn keep_shard(tasks: &mut Vec<Task>, shard: Shard) {
 }
 
 fn is_due(args: &RunArgs, store: &Store, task: &Task) -> bool {
-    let failed = |stored: Stored| matches!(stored.result.outcome, Outcome::Failed { .. });
-    !store.has_result(&task.hash)
-        || args.retry_failed && store.result(&task.hash).is_none_or(failed)
+    let Some(Stored { result, .. }) = store.result(task) else { return true };
+    args.retry_failed && matches!(result.outcome, Outcome::Failed { .. })
         || args.timing && store.timing(&task.hash).is_none()
 }
 
@@ -196,7 +195,8 @@ fn run_all(groups: VecDeque<Group>, jobs: usize, desk: &Desk<'_>) -> Result<(), 
     };
     std::thread::scope(|scope| {
         for _ in 1..jobs {
-            scope.spawn(work);
+            // Without another thread, those that run do its work.
+            let _ = std::thread::Builder::new().spawn_scoped(scope, work);
         }
         work();
     });
@@ -316,7 +316,8 @@ impl Lane {
         if let Err(why) = &self.pipeline {
             return failed(task, why);
         }
-        let timing = StoredTiming { machine: machine(), timing: self.watch.timing() };
+        let (hash, timing) = (task.hash.clone(), self.watch.timing());
+        let timing = StoredTiming { hash, machine: machine(), timing };
         let blank = TaskResult { data_lost: lost, ..blank(task) };
         match self.watch.score(truth, shots, blank) {
             Ok((result, recording)) => {

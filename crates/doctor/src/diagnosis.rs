@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use tagalong_app::outcome::{Failure, make_folder};
 use tagalong_app::remedies::Remedies;
+use tagalong_config::path_text;
 
 use super::alternatives::Alternative;
 use super::comparison::Row;
@@ -17,8 +18,10 @@ use super::{DoctorArgs, checks, present, sheets};
 #[derive(Debug, Serialize)]
 pub struct Diagnosis {
     /// The config, or its name.
+    #[serde(serialize_with = "path_text::serialize")]
     pub config: PathBuf,
     /// The log.
+    #[serde(serialize_with = "path_text::serialize")]
     pub log: PathBuf,
     /// Number of examined frames.
     pub frames: u64,
@@ -32,6 +35,7 @@ pub struct Diagnosis {
     /// Other settings, tried on the log.
     pub alternatives: Vec<Alternative>,
     /// Folder of the pictures of frames, or of a folder for each pipeline.
+    #[serde(serialize_with = "path_text::optional::serialize")]
     pub pictures: Option<PathBuf>,
     /// Tests of the rejection funnel.
     pub funnel: Vec<Drop>,

@@ -6,7 +6,7 @@ use std::fs;
 
 use proptest::prelude::*;
 use tagalong_eval::formats::{
-    FormatError, OddLines, Timeline, kitti, metres, mot, people, trackeval,
+    FormatError, MOST_FRAMES, OddLines, Timeline, floor, kitti, metres, mot, people, trackeval,
 };
 use tagalong_eval::{
     Comparison, Frame, Region, Report, Role, Sequence, SetDistance, Similarity, Tally, Truth,
@@ -42,6 +42,48 @@ fn a_bad_line_is_named_with_what_was_expected() {
     assert!(parse("1,1,1,inf,1,1").contains("finite"));
     assert!(parse("0,1,1,1,1,1").contains("numbered from 1"));
     assert!(parse("1,1.5,1,1,1,1").contains("`id` is `1.5`, expected a whole number"));
+}
+
+/// Returns the answers of all readers to a row of this frame, or scan.
+fn readers_of(frame: &str) -> [Result<usize, FormatError>; 5] {
+    let floor_header = "scan,id,x_laser_m,y_laser_m,ignore,source";
+    let metres_header =
+        "stamp_ns,frame,id,x_robot_m,y_robot_m,z_robot_m,x_odom_m,y_odom_m,z_odom_m,seen";
+    let kitti_row = format!("{frame} 1 Pedestrian 0 0 0 0 0 9 9 1 1 1 1 1 1 0");
+    [
+        mot::parse(&format!("{frame},1,0,0,9,9\n"), "rows").map(|rows| rows.len()),
+        kitti::parse(&kitti_row, "rows").map(|rows| rows.len()),
+        people::parse(&format!("frame,id,ub_x,ub_y,ub_w,ub_h\n{frame},1,0,0,9,9\n"), "rows")
+            .map(|rows| rows.len()),
+        floor::parse(&format!("{floor_header}\n{frame},1,1,1,0,annotated\n"), "rows")
+            .map(|rows| rows.len()),
+        metres::parse(&format!("{metres_header}\n5,{frame},1,1,1,1,1,1,1,1\n"), "rows")
+            .map(|rows| rows.len()),
+    ]
+}
+
+#[test]
+fn a_frame_number_that_is_a_stamp_is_refused_by_every_reader() {
+    for frame in ["1700000000", "4294967295", "1000001"] {
+        for refused in readers_of(frame) {
+            let refused = why(refused);
+            assert!(refused.starts_with("rows, line "), "{refused}");
+            assert!(refused.contains(&format!("frame {frame};")), "{refused}");
+            assert!(refused.contains("plausible up to 1000000"), "{refused}");
+        }
+    }
+    assert!(readers_of("1000000").iter().all(|read| *read == Ok(1)));
+}
+
+#[test]
+fn a_long_file_may_have_more_frames_than_a_short_one() {
+    let rows = "1,1,0,0,9,9\n".repeat(200_000);
+    assert!(mot::parse(&format!("{rows}1900000,1,0,0,9,9"), "gt.txt").is_ok());
+    let refused = why(mot::parse(&format!("{rows}2100000,1,0,0,9,9"), "gt.txt"));
+    assert!(
+        refused.contains("line 200001: frame 2100000") && refused.contains("2000010"),
+        "{refused}"
+    );
 }
 
 /// Two lines of truth, the second with this class.
@@ -433,6 +475,16 @@ proptest! {
             Tally::measure(s, &Comparison::from(Similarity::Iou), &SetDistance::default()).unwrap()
         };
         prop_assert_eq!(tally(&read[0].1), tally(&sequence));
+    }
+
+    #[test]
+    fn no_frame_number_asks_for_more_memory_than_its_file_is_worth(
+        frame in prop_oneof![any::<u64>().prop_map(|n| n.to_string()), "[0-9]{1,12}(\\.0|e[0-9]{1,3})?"],
+    ) {
+        for read in readers_of(&frame) {
+            let number = frame.parse::<f64>().unwrap();
+            prop_assert!(read.is_err() || number <= f64::from(MOST_FRAMES), "{}", frame);
+        }
     }
 
     #[test]

@@ -16,12 +16,14 @@ const ODD: [u64; 10] = [
     0xffff_ffff_ffff_ffff,
 ];
 /// Words at which text formats go wrong.
-const WORDS: [&str; 12] = [
+const WORDS: [&str; 14] = [
     "nan",
     "inf",
     "-1",
     "1e999",
     "18446744073709551616",
+    "9223372036854775807",
+    "1700000000",
     "\"",
     "[[",
     "]",

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tagalong_config::Registry;
-use tagalong_eval::formats::{floor, kitti, metres, mot, people};
+use tagalong_eval::formats::{Timeline, floor, kitti, metres, mot, people};
 use tagalong_log::images::{decode_compressed, decode_raw};
 use tagalong_log::msgs::{self, decode};
 use tagalong_log::{FrameSource, InputSettings, Inputs, Limits, LogWalker};
@@ -26,12 +26,32 @@ pub struct Target {
 const MCAP: &[u8] = include_bytes!("../seeds/tiny.mcap");
 const BAG: &[u8] = include_bytes!("../seeds/tiny.bag");
 const DATABASE: &[u8] = include_bytes!("../seeds/tiny.db3");
+/// Databases of which a transaction was under way, and the files beside them.
+const UNCOMMITTED: &[u8] = include_bytes!("../seeds/tiny-journal.db3");
+const JOURNAL: &[u8] = include_bytes!("../seeds/tiny-journal.db3-journal");
+const LOGGED_AHEAD: &[u8] = include_bytes!("../seeds/tiny-wal.db3");
+const WRITE_AHEAD_LOG: &[u8] = include_bytes!("../seeds/tiny-wal.db3-wal");
 const CASCADE: &str = include_str!("../seeds/tiny-cascade.xml");
 const COLOR_TEXTURE: &str = include_str!("../../../configs/models/color-texture.toml");
 const BODY_NET: &str = include_str!("../../../configs/models/body-net.toml");
 const DEPTH_NET: &str = include_str!("../../../configs/models/depth-net.toml");
 const OMNI_DISTANCE: &str = include_str!("../../../configs/models/omni-distance.toml");
 const SVM_PATCH: &str = include_str!("../../../configs/models/svm-patch.toml");
+
+/// Tables of people, in images and on the floor, and of tracks.
+const TABLES: [&str; 3] = [
+    "frame,id,ub_x,ub_y,ub_w,ub_h\n1,1,10,20,30,40\n2,1,11,20,30,40\n",
+    "stamp_s,scan,id,x_laser_m,y_laser_m,ignore,source\n0.1,0,1,2.5,-1,0,annotated\n",
+    "stamp_ns,frame,id,x_robot_m,y_robot_m,z_robot_m,x_odom_m,y_odom_m,z_odom_m,seen\n\
+     100,1,1,2.5,0,1.6,2.5,0,1.6,1\n",
+];
+/// Annotations of a video and of images.
+const CVAT: [&str; 2] = [
+    "<annotations><track id=\"0\" label=\"person\"><box frame=\"0\" keyframe=\"1\" outside=\"0\" \
+     occluded=\"0\" xtl=\"10\" ytl=\"20\" xbr=\"60\" ybr=\"90\"/></track></annotations>",
+    "<annotations><image id=\"7\"><box label=\"person\" xtl=\"1\" ytl=\"2\" xbr=\"31\" ybr=\"32\">\
+     <attribute name=\"id\">3</attribute></box></image></annotations>",
+];
 
 /// Returns all parsers.
 pub fn targets() -> Vec<Target> {
@@ -69,6 +89,18 @@ pub fn targets() -> Vec<Target> {
                     walk(LogWalker::open(path, &small()).ok());
                 }
             },
+        },
+        Target {
+            name: "journal",
+            about: "a rollback journal beside a rosbag2 database",
+            seeds: vec![JOURNAL.to_vec()],
+            parse: |bytes, path| walk_unfinished(UNCOMMITTED, bytes, path, "-journal"),
+        },
+        Target {
+            name: "write-ahead-log",
+            about: "a write-ahead log beside a rosbag2 database",
+            seeds: vec![WRITE_AHEAD_LOG.to_vec()],
+            parse: |bytes, path| walk_unfinished(LOGGED_AHEAD, bytes, path, "-wal"),
         },
         Target {
             name: "frames",
@@ -132,23 +164,47 @@ pub fn targets() -> Vec<Target> {
         }),
         text("mot", "1,1,10,20,30,40,1,1,0.5\n2,-1,1e1,2.5,3,4,0.9,-1,-1,-1\n", |bytes, _| {
             as_text(bytes, |text| {
-                drop(mot::parse(text, "x"));
+                let rows = mot::parse(text, "x").unwrap_or_default();
+                let mut timeline = Timeline::new();
+                timeline.add_reports(rows.iter().map(mot::Row::report));
+                whole(timeline);
                 drop(mot::parse_truth(text, "x", mot::Rules::Mot17));
                 drop(mot::parse_tracks(text, "x"));
                 drop(mot::parse_info(text, "x"));
             });
         }),
         text("kitti", "0 1 Pedestrian 0 0 -1.5 10 20 30 40 1.7 0.6 0.8 1 2 9 0.1\n", |bytes, _| {
-            as_text(bytes, |text| drop(kitti::parse(text, "x")));
-        }),
-        text("people", "frame,id,x,y,w,h\n1,1,10,20,30,40\n2,1,11,20,30,40\n", |bytes, _| {
             as_text(bytes, |text| {
-                drop(people::parse(text, "x"));
-                drop(metres::parse(text, "x"));
-                drop(floor::parse(text, "x"));
+                let mut timeline = Timeline::new();
+                kitti::add_truths(&mut timeline, &kitti::parse(text, "x").unwrap_or_default());
+                whole(timeline);
             });
         }),
+        Target {
+            name: "people",
+            about: "tables of people, on the floor and in images",
+            seeds: TABLES.map(|table| table.as_bytes().to_vec()).to_vec(),
+            parse: |bytes, _| {
+                as_text(bytes, |text| {
+                    drop(people::parse(text, "x"));
+                    drop(metres::parse(text, "x"));
+                    drop(floor::parse(text, "x"));
+                });
+            },
+        },
+        Target {
+            name: "cvat",
+            about: "annotations of CVAT",
+            seeds: CVAT.map(|file| file.as_bytes().to_vec()).to_vec(),
+            parse: |bytes, _| as_text(bytes, |text| drop(tagalong_import::people_of_cvat(text))),
+        },
     ]
+}
+
+/// Makes the sequence of a timeline as scoring does, with all frames between those that have rows.
+fn whole(timeline: Timeline) {
+    let last = timeline.last().unwrap_or(0);
+    drop(timeline.into_sequence("x", 1, last, 30.0));
 }
 
 /// Returns a model of the first trees of one, which has a tree in each line.
@@ -188,6 +244,17 @@ fn as_text(bytes: &[u8], parse: impl FnOnce(&str)) {
 fn walk<R: std::io::Read>(walker: Option<LogWalker<R>>) {
     let Some(mut walker) = walker else { return };
     while walker.next().is_some() {}
+}
+
+/// Walks through a database with a file of this ending beside it.
+fn walk_unfinished(database: &[u8], bytes: &[u8], path: &Path, ending: &str) {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(ending);
+    if std::fs::write(path, database).is_ok() && std::fs::write(&beside, bytes).is_ok() {
+        walk(LogWalker::open(path, &small()).ok());
+    }
+    // Other parsers have the same path.
+    let _ = std::fs::remove_file(beside);
 }
 
 fn frames(path: &Path) {
@@ -260,6 +327,24 @@ fn config(bytes: &[u8], _: &Path) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn unfinished_databases_are_read_up_to_their_last_commit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.db3");
+        let seeds = [(UNCOMMITTED, JOURNAL, "-journal", 6), (LOGGED_AHEAD, WRITE_AHEAD_LOG, "-wal", 7)];
+        for (database, beside, ending, count) in seeds {
+            std::fs::write(&path, database).unwrap();
+            std::fs::write(folder.path().join(format!("log.db3{ending}")), beside).unwrap();
+            let mut walker = LogWalker::open(&path, &small()).unwrap();
+            let mut read = 0;
+            while walker.next().is_some() {
+                read += 1;
+            }
+            assert_eq!((read, walker.data_lost()), (count, true), "{ending}");
+            std::fs::remove_file(folder.path().join(format!("log.db3{ending}"))).unwrap();
+        }
+    }
 
     #[test]
     fn first_parts_of_models_are_models() {

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use roxmltree::{Document, Node, TextPos};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, spare, write_file};
-use tagalong_config::{FileLimit, read_text};
+use tagalong_config::{FileLimit, PathText, check_xml, read_text};
 use tagalong_eval::Region;
 use tagalong_eval::formats::people::Row;
+use tagalong_eval::formats::{MOST_FRAMES, MOST_ID};
 
 use super::ImportArgs;
 use super::truth::{WholeBody, boxes_csv, people_csv};
@@ -34,7 +35,9 @@ pub fn import(args: &ImportArgs) -> Outcome {
     let shown = output.display();
     let count = rows.len();
     print(&match args.format {
-        Format::Json => format!("{:#}\n", serde_json::json!({ "truth": output, "boxes": count })),
+        Format::Json => {
+            format!("{:#}\n", serde_json::json!({ "truth": PathText(&output), "boxes": count }))
+        }
         Format::Text => format!(
             "{count} boxes are in {shown}; beside LOG.mcap `eval` and `bench` look for LOG.{ending}\n"
         ),
@@ -44,6 +47,14 @@ pub fn import(args: &ImportArgs) -> Outcome {
 
 fn default_output(path: &Path, ending: &str) -> PathBuf {
     path.with_extension(ending)
+}
+
+/// Reads the people of an XML file, by frame and number.
+///
+/// # Errors
+/// A sentence with the line.
+pub fn people_of_cvat(text: &str) -> Result<Vec<Row>, String> {
+    parse(text).map(|read| read.rows)
 }
 
 /// Boxes of a file, and a note on shapes that are none.
@@ -64,6 +75,7 @@ fn read(path: &Path) -> Result<Read, Failure> {
 
 /// Reads the boxes; an error begins with the line.
 fn parse(text: &str) -> Result<Read, String> {
+    check_xml(text).map_err(|why| format!(", {why}"))?;
     let document = Document::parse(text).map_err(|error| format!(": {error}"))?;
     let root = document.root_element();
     if !root.has_tag_name("annotations") {
@@ -124,18 +136,19 @@ fn boxes<'a, 'b>(node: &Node<'a, 'b>) -> impl Iterator<Item = Node<'a, 'b>> {
 /// Adds the boxes of a person in a video. CVAT exports those between key frames, too.
 fn track(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
     // CVAT counts tracks from 0, and 0 is no number of a person.
-    let id = number(node, "id")? as i64 + 1;
+    let id = whole_number(node, "id", MOST_ID - 1)? + 1;
     for shape in boxes(node).filter(|shape| !is_set(shape, "outside")) {
         let key = shape.attribute("keyframe") != Some("0");
         let id = id_of(&shape)?.unwrap_or(id);
-        rows.push(row(node, &shape, number(&shape, "frame")?, id, key)?);
+        let frame = frame_of(&shape, "frame")?;
+        rows.push(row(node, &shape, frame, id, key)?);
     }
     Ok(())
 }
 
 /// Adds the boxes of an image, which need numbers of their own.
 fn image(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
-    let frame = number(node, "id")?;
+    let frame = frame_of(node, "id")?;
     for shape in boxes(node) {
         let none = || {
             let why = "a box without a number: give it an attribute `id`, or a group";
@@ -152,8 +165,14 @@ fn id_of(shape: &Node<'_, '_>) -> Result<Option<i64>, String> {
     let own = attribute(shape, "id").or_else(|| attribute(shape, "track_id"));
     let group = shape.attribute("group_id").filter(|group| *group != "0");
     let Some(text) = own.or(group) else { return Ok(None) };
-    let wrong = || at(shape, &format!("the number of a person is `{text}`, expected 1 or more"));
-    text.trim().parse().ok().filter(|id| *id > 0).map(Some).ok_or_else(wrong)
+    let wrong = || {
+        at(
+            shape,
+            &format!("the number of a person is `{text}`, expected 1 or more, up to {MOST_ID}"),
+        )
+    };
+    let id = text.trim().parse().ok().filter(|id| (1..=MOST_ID).contains(id));
+    id.map(Some).ok_or_else(wrong)
 }
 
 /// Returns an attribute that the annotator gave a box.
@@ -169,23 +188,20 @@ fn is_set(node: &Node<'_, '_>, name: &str) -> bool {
 fn row(
     labelled: &Node<'_, '_>,
     shape: &Node<'_, '_>,
-    frame: f64,
+    frame: u32,
     id: i64,
     key: bool,
 ) -> Result<Row, String> {
     let [x, y] = [number(shape, "xtl")?, number(shape, "ytl")?];
     let [width, height] = [number(shape, "xbr")? - x, number(shape, "ybr")? - y];
-    if width <= 0.0 || height <= 0.0 {
+    // Corners far apart have no finite distance.
+    let is_size = |size: f64| size > 0.0 && size.is_finite();
+    if !is_size(width) || !is_size(height) {
         return Err(at(shape, "a box without an area"));
-    }
-    let is_frame = frame.fract() == 0.0 && (0.0..4e9).contains(&frame);
-    if !is_frame {
-        return Err(at(shape, &format!("`{frame}` is no number of a frame")));
     }
     let ignored = attribute(shape, "ignore").is_some_and(|text| text.trim() == "true");
     Ok(Row {
-        // CVAT counts frames from 0.
-        frame: frame as u32 + 1,
+        frame,
         id,
         upper_body: Some(Region { x, y, width, height }),
         visible_body: None,
@@ -202,6 +218,21 @@ fn number(node: &Node<'_, '_>, name: &str) -> Result<f64, String> {
     let text = node.attribute(name).unwrap_or_default();
     let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
     value.ok_or_else(|| at(node, &format!("`{name}` is `{text}`, expected a number")))
+}
+
+/// Returns an attribute that is a whole number from 0 to `most`.
+fn whole_number(node: &Node<'_, '_>, name: &str, most: i64) -> Result<i64, String> {
+    let value = number(node, name)?;
+    if value.fract() == 0.0 && (0.0..=most as f64).contains(&value) {
+        return Ok(value as i64);
+    }
+    Err(at(node, &format!("`{name}` is `{value}`, expected a whole number from 0 to {most}")))
+}
+
+/// Returns the number of a frame, from 1. CVAT counts from 0.
+fn frame_of(node: &Node<'_, '_>, name: &str) -> Result<u32, String> {
+    let number = whole_number(node, name, i64::from(MOST_FRAMES) - 1)?;
+    Ok(u32::try_from(number).unwrap_or(MOST_FRAMES - 1) + 1)
 }
 
 fn at(node: &Node<'_, '_>, why: &str) -> String {
@@ -275,15 +306,29 @@ mod tests {
 
     #[test]
     fn files_that_are_something_else_are_refused_with_line_and_reason() {
+        let many_attributes: String = (0..2000).map(|n| format!("a{n}=\"\" ")).collect();
         for (text, cause) in [
             ("no xml", ": "),
             ("<a/>", "holds `a` and not `annotations`"),
             (&VIDEO.replace("xtl=\"12.5\"", "xtl=\"wide\""), ", line 5: `xtl` is `wide`"),
             (&VIDEO.replace("xbr=\"62.5\"", "xbr=\"2\""), ", line 5: a box without an area"),
-            (&VIDEO.replace("frame=\"1\" keyframe=\"0\"", "frame=\"-1\""), "`-1` is no number"),
+            (&VIDEO.replace("frame=\"1\" keyframe=\"0\"", "frame=\"-1\""), "`frame` is `-1`"),
+            (&VIDEO.replace("frame=\"0\"", "frame=\"1700000000\""), "line 4: `frame` is `17"),
+            (&VIDEO.replace("id=\"4\"", "id=\"9223372036854775807\""), ", line 8: `id` is `92"),
+            (&VIDEO.replace("id=\"4\"", "id=\"1e400\""), ", line 8: `id` is `1e400`"),
+            (&VIDEO.replace("id=\"4\"", "id=\"0.5\""), ", line 8: `id` is `0.5`"),
+            (
+                &VIDEO
+                    .replace("xtl=\"1\"", "xtl=\"-1e308\"")
+                    .replace("xbr=\"31\"", "xbr=\"1e308\""),
+                "a box without an area",
+            ),
+            (&IMAGES.replace(">3<", ">9223372036854775807<"), "the number of a person is `92"),
+            (&IMAGES.replace("id=\"7\"", "id=\"4294967295\""), ", line 1: `id` is `4294967295`"),
             (&VIDEO.replace("id=\"4\"", "id=\"0\""), "person 1 is in CVAT's frame 1 twice"),
             (&IMAGES.replace(">3<", ">me<"), ", line 2: the number of a person is `me`"),
             (&IMAGES.replace(" group_id=\"5\"", ""), ", line 3: a box without a number"),
+            (&IMAGES.replace("id=\"7\"", &many_attributes), ", line 1: an element with more than"),
             (&format!("<!DOCTYPE a [<!ENTITY b \"c\">]>{IMAGES}"), "DTD"),
         ] {
             let error = parse(text).unwrap_err();

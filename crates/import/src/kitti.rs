@@ -7,6 +7,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use tagalong_app::outcome::Failure;
+use tagalong_eval::formats::MOST_FRAMES;
 
 use super::ImportArgs;
 use super::folders::level;
@@ -88,7 +89,10 @@ fn boxes(path: &Path) -> Result<String, Failure> {
         };
         let wrong =
             || Failure::failed(format!("{}:{number}: not a label of KITTI", path.display()));
-        let frame: u64 = words[0].parse().map_err(|_| wrong())?;
+        let frame: u32 = words[0].parse().map_err(|_| wrong())?;
+        if frame >= MOST_FRAMES {
+            return Err(wrong());
+        }
         let corners = words.get(BOX).ok_or_else(wrong)?;
         let &[left, top, right, bottom] = &numbers(corners.iter().copied(), path, number)?[..]
         else {
@@ -101,7 +105,7 @@ fn boxes(path: &Path) -> Result<String, Failure> {
             out,
             "{},{id},{left},{top},{width:.3},{height:.3},{counts},{class},-1",
             // KITTI counts frames from 0, MOTChallenge from 1.
-            frame.saturating_add(1)
+            frame + 1
         );
     }
     Ok(out)

@@ -13,6 +13,7 @@ use std::path::Path;
 use serde::Deserialize;
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
+use tagalong_config::PathText;
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{LaserScan, Pose, decode};
 use tagalong_log::{Limits, LogWalker, Message};
@@ -67,7 +68,9 @@ pub fn import(args: &ImportArgs) -> Outcome {
     write_file(&output, text)?;
     let shown = output.display();
     print(&match args.format {
-        Format::Json => format!("{:#}\n", serde_json::json!({ "truth": output, "people": count })),
+        Format::Json => {
+            format!("{:#}\n", serde_json::json!({ "truth": PathText(&output), "people": count }))
+        }
         Format::Text => format!("{count} annotated people are in {shown}\n"),
     })?;
     Ok(Ended::Well)

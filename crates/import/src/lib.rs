@@ -21,7 +21,9 @@ use tagalong_app::outcome::{
     CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare, write_file,
 };
 use tagalong_app::signals::Signals;
+use tagalong_config::PathText;
 
+pub use self::cvat::people_of_cvat;
 use self::sequence::Sequence;
 
 /// Layout of the imported data.
@@ -168,7 +170,9 @@ pub fn import(args: &ImportArgs) -> Outcome {
     let images = sequence.moments.len();
     print(&match args.format {
         Format::Text => format!("{images} images are in {}\n", log.display()),
-        Format::Json => format!("{:#}\n", serde_json::json!({ "log": log, "images": images })),
+        Format::Json => {
+            format!("{:#}\n", serde_json::json!({ "log": PathText(&log), "images": images }))
+        }
     })?;
     Ok(Ended::Well)
 }

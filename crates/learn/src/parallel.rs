@@ -1,3 +1,4 @@
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::thread::available_parallelism;
 
 use tagalong_core::{Error, Result};
@@ -25,11 +26,20 @@ fn at_once<S: Sync, T: Send>(
     work: &(impl Fn(&S) -> Result<T> + Sync),
 ) -> Result<Vec<T>> {
     let died = |_| Err(Error::Other("the solver panicked".into()));
+    let guarded =
+        |thing: &S| catch_unwind(AssertUnwindSafe(|| work(thing))).unwrap_or_else(died);
     // All threads are joined before the first failure counts: a thread that panics and is not
     // joined makes the scope panic.
     let results: Vec<Result<T>> = std::thread::scope(|scope| {
-        let running: Vec<_> = things.iter().map(|thing| scope.spawn(move || work(thing))).collect();
-        running.into_iter().map(|thread| thread.join().unwrap_or_else(died)).collect()
+        let start =
+            |thing| std::thread::Builder::new().spawn_scoped(scope, move || guarded(thing)).ok();
+        let running: Vec<_> = things.iter().map(start).collect();
+        let results = running.into_iter().zip(things).map(|(thread, thing)| match thread {
+            Some(thread) => thread.join().unwrap_or_else(died),
+            // No thread could be started for it.
+            None => guarded(thing),
+        });
+        results.collect()
     });
     results.into_iter().collect()
 }

@@ -6,11 +6,15 @@
 //!
 //! Source: `rosbag2_storage_sqlite3`, schema versions 1 to 4.
 
+mod unfinished;
+
 use std::io::Read;
 use std::path::Path;
 
-use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Row};
+use rusqlite::{OptionalExtension as _, Row};
 
+use self::unfinished::Opened;
+use crate::Limits;
 use crate::mcap::NotMcap;
 use crate::walk::{Channel, Located, Walk};
 
@@ -27,7 +31,7 @@ const TABLES: &str = "SELECT count(*) FROM sqlite_master WHERE type = 'table' \
 
 /// Memory of the reader of a database.
 pub(crate) struct Database {
-    connection: Connection,
+    opened: Opened,
     /// Id of the last message.
     last: i64,
     /// Id of the last message of the file.
@@ -52,28 +56,31 @@ impl Database {
     ///
     /// # Errors
     /// A file that is no database of messages.
-    pub(crate) fn open(path: &Path) -> Result<Self, NotMcap> {
-        let failed = |why: rusqlite::Error| NotMcap(format!("as a rosbag2 database: {why}"));
-        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let connection = Connection::open_with_flags(path, flags).map_err(failed)?;
+    pub(crate) fn open(path: &Path, limits: &Limits) -> Result<Self, NotMcap> {
+        let failed = |why: rusqlite::Error| NotMcap(format!("not a rosbag2 database: {why}"));
+        let opened = unfinished::open(path, limits)?;
+        let connection = &opened.connection;
         connection.pragma_update(None, "trusted_schema", false).map_err(failed)?;
         let tables: i64 = connection.query_row(TABLES, [], |row| row.get(0)).map_err(failed)?;
         if tables != 2 {
-            let why = "a database without the tables `topics` and `messages` of rosbag2";
+            let why = "not a rosbag2 database: a database without the tables `topics` and `messages` of rosbag2";
             return Err(NotMcap(why.to_owned()));
         }
         let end = connection
             .query_row("SELECT max(id) FROM messages", [], |row| row.get::<_, Option<i64>>(0))
             // Damage is met again, and counted, when the messages are read.
             .unwrap_or_default();
-        let bytes = std::fs::metadata(path).map_or(0, |about| about.len());
-        let claimed = claimed_size(path).unwrap_or(0);
-        Ok(Self { connection, last: i64::MIN, end: end.unwrap_or(0), bytes, claimed })
+        let bytes = std::fs::metadata(&opened.path).map_or(0, |about| about.len());
+        let claimed = if opened.tells_size { claimed_size(&opened.path).unwrap_or(0) } else { 0 };
+        Ok(Self { opened, last: i64::MIN, end: end.unwrap_or(0), bytes, claimed })
     }
 
     /// Adds the channels.
     pub(crate) fn learn_topics<R: Read>(&self, walk: &mut Walk<R>) {
-        let Self { bytes, claimed, .. } = self;
+        let Self { opened, bytes, claimed, .. } = self;
+        if let Some(left_out) = &opened.left_out {
+            walk.fault("uncommitted_transactions", || left_out.clone());
+        }
         // SQLite reads zeros behind the end of a file, so this is not met later on.
         if bytes < claimed {
             walk.fault("truncated", || {
@@ -94,7 +101,7 @@ impl Database {
     }
 
     fn topics(&self, longest: u64) -> rusqlite::Result<Vec<Option<Channel>>> {
-        let mut statement = self.connection.prepare(TOPICS)?;
+        let mut statement = self.opened.connection.prepare(TOPICS)?;
         let rows = statement.query_map([], |row| Ok(channel(row, longest).ok()))?;
         rows.collect()
     }
@@ -134,7 +141,7 @@ impl Database {
 
     /// Returns the next message by its id, without contents if these are of wrong types.
     fn next(&self, longest: u64) -> rusqlite::Result<Option<(i64, Option<Stored>)>> {
-        let mut statement = self.connection.prepare_cached(NEXT)?;
+        let mut statement = self.opened.connection.prepare_cached(NEXT)?;
         let longest = i64::try_from(longest).unwrap_or(i64::MAX);
         let row = |row: &Row<'_>| Ok((row.get(0)?, stored(row).ok()));
         statement.query_row((self.last, longest), row).optional()

@@ -78,7 +78,7 @@ impl<R: Read> LogWalker<R> {
             Container::Bag(Bag::default())
         } else if is(database::MAGIC) {
             let path = path.ok_or_else(|| NotMcap("a database is read by its path".into()))?;
-            Container::Database(Box::new(Database::open(path)?))
+            Container::Database(Box::new(Database::open(path, limits)?))
         } else {
             Container::Mcap(Mcap::behind(&magic[..got])?)
         };

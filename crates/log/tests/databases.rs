@@ -332,8 +332,154 @@ fn a_file_cut_anywhere_is_said_to_be_cut() {
     }
 }
 
+/// Database that its recorder has not finished, copied as it is on the disk: with the file of this
+/// ending beside it.
+struct Unfinished {
+    folder: tempfile::TempDir,
+    path: PathBuf,
+    ending: &'static str,
+    messages: Vec<Told>,
+}
+
+impl Unfinished {
+    /// Stores the messages, does some SQL and does not end the connection before all is copied.
+    fn after(ending: &'static str, sql: &[&str]) -> Self {
+        let (home, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let (from, path) = (home.path().join("walk.db3"), folder.path().join("walk.db3"));
+        let messages = in_mcap(&log());
+        let recorder = store(&messages, &from);
+        sql.iter().for_each(|sql| recorder.execute_batch(sql).unwrap());
+        let unfinished = Self { folder, path, ending, messages };
+        std::fs::copy(&from, &unfinished.path).unwrap();
+        std::fs::copy(home.path().join(format!("walk.db3{ending}")), unfinished.beside()).unwrap();
+        unfinished
+    }
+
+    fn journal() -> Self {
+        Self::after(
+            "-journal",
+            &[
+                "PRAGMA cache_size=2",
+                "BEGIN",
+                "UPDATE messages SET data = zeroblob(901)",
+                "INSERT INTO messages SELECT id + 1000, 1, 5, zeroblob(5000) FROM messages",
+            ],
+        )
+    }
+
+    fn write_ahead(last: &str) -> Self {
+        Self::after(
+            "-wal",
+            &[
+                "PRAGMA journal_mode=WAL; PRAGMA wal_autocheckpoint=0; PRAGMA cache_size=2",
+                "INSERT INTO messages SELECT id + 1000, topic_id, timestamp, data FROM messages",
+                last,
+            ],
+        )
+    }
+
+    fn beside(&self) -> PathBuf {
+        self.folder.path().join(format!("walk.db3{}", self.ending))
+    }
+
+    fn files(&self) -> Vec<(PathBuf, Vec<u8>)> {
+        let mut files: Vec<PathBuf> = std::fs::read_dir(self.folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect();
+        files.sort();
+        files.into_iter().map(|file| (file.clone(), std::fs::read(&file).unwrap())).collect()
+    }
+
+    /// Reads all messages; the folder must be as before.
+    fn walk(&self) -> Result<(Vec<Told>, Vec<&'static str>, bool), String> {
+        let before = self.files();
+        let result = LogWalker::open(&self.path, &Limits::default()).map(told);
+        assert!(self.files() == before, "the folder of the log has changed");
+        result.map_err(|error| error.to_string())
+    }
+}
+
+#[test]
+fn a_transaction_that_was_not_committed_is_left_out_and_counted() {
+    let (messages, counters, lost) = Unfinished::journal().walk().unwrap();
+    assert_eq!(messages, in_mcap(&log()));
+    assert!(lost && counters.contains(&"uncommitted_transactions"), "{counters:?}");
+}
+
+#[test]
+fn a_write_ahead_log_is_read_up_to_its_last_commit() {
+    let stored = Unfinished::write_ahead("");
+    let (messages, counters, lost) = stored.walk().unwrap();
+    assert_eq!(messages, [&stored.messages[..], &stored.messages].concat());
+    assert!(!lost, "{counters:?}");
+    let cut = Unfinished::write_ahead("BEGIN; UPDATE messages SET data = zeroblob(9000)");
+    let (messages, counters, lost) = cut.walk().unwrap();
+    assert_eq!(messages.len(), 2 * stored.messages.len());
+    assert!(messages.iter().all(|message| message.3 != vec![0; 9000]));
+    assert!(lost && counters.contains(&"uncommitted_transactions"), "{counters:?}");
+}
+
+#[test]
+fn no_file_appears_beside_a_database_without_its_write_ahead_log() {
+    let stored = Unfinished::write_ahead("PRAGMA wal_checkpoint(TRUNCATE)");
+    let (messages, _, lost) = stored.walk().unwrap();
+    assert_eq!((messages.len(), lost), (2 * stored.messages.len(), false));
+    std::fs::remove_file(stored.beside()).unwrap();
+    assert_eq!(stored.walk().unwrap().0.len(), 2 * stored.messages.len());
+    let odd = stored.folder.path().join("100% a?b#ü.db3");
+    std::fs::rename(&stored.path, &odd).unwrap();
+    let renamed = Unfinished { path: odd, ..stored };
+    assert_eq!(renamed.walk().unwrap().0.len(), 2 * renamed.messages.len());
+}
+
+#[test]
+fn a_journal_that_names_another_file_is_refused_and_the_file_stays() {
+    let stored = Unfinished::journal();
+    let victim = stored.folder.path().join("precious.txt");
+    std::fs::write(&victim, "not a journal").unwrap();
+    // As SQLite writes it: page number, name, length, checksum, magic.
+    let name = victim.to_str().unwrap().as_bytes();
+    let checksum: u32 = name.iter().map(|byte| u32::from(*byte)).sum();
+    let mut journal = std::fs::read(stored.beside()).unwrap();
+    journal.extend(0_u32.to_be_bytes());
+    journal.extend(name);
+    journal.extend((name.len() as u32).to_be_bytes());
+    journal.extend(checksum.to_be_bytes());
+    journal.extend([0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7]);
+    std::fs::write(stored.beside(), journal).unwrap();
+    let error = stored.walk().unwrap_err();
+    assert!(error.contains("several databases") && error.contains("sqlite3"), "{error}");
+    assert!(victim.exists());
+}
+
+#[test]
+fn a_copy_beyond_the_limit_is_refused_with_the_remedy() {
+    let stored = Unfinished::journal();
+    let limits = Limits { file_bytes: 10_000, ..Limits::default() };
+    let error = LogWalker::open(&stored.path, &limits).err().unwrap().to_string();
+    assert!(error.contains("file_bytes") && error.contains("sqlite3 FILE"), "{error}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn a_damaged_file_beside_a_database_is_survived(
+        is_journal in any::<bool>(),
+        hits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..12),
+        kept in any::<prop::sample::Index>(),
+    ) {
+        let stored = if is_journal { Unfinished::journal() } else { Unfinished::write_ahead("") };
+        let mut bytes = std::fs::read(stored.beside()).unwrap();
+        for (at, value) in hits {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        bytes.truncate(kept.index(bytes.len() + 1));
+        std::fs::write(stored.beside(), bytes).unwrap();
+        let _ = stored.walk();
+    }
 
     #[test]
     fn damaged_bytes_are_survived(

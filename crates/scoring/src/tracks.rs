@@ -70,9 +70,9 @@ impl Tracks {
         let labels = kitti::parse(text, name).map_err(Failure::failed)?;
         let mut timeline = Timeline::new();
         kitti::add_reports(&mut timeline, &labels);
-        let numbers = 0..=timeline.last().unwrap_or(0);
-        let frames = numbers.map(|number| (number + 1, timeline.frame(number).reports.clone()));
-        let (reports, notes) = (frames.collect(), odd_labels(name, &labels));
+        let frames = timeline.into_frames().into_iter();
+        let reports = frames.map(|(number, frame)| (number + 1, frame.reports)).collect();
+        let notes = odd_labels(name, &labels);
         Ok(Self { reports, notes, ..Self::default() })
     }
 

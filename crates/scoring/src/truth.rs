@@ -135,7 +135,10 @@ impl TruthFile {
         let (text, name) = (read_text(path)?, path.display().to_string());
         let rules = match rules {
             RulesChoice::Auto => mot::Rules::of_truth(&text, &name).map_err(|error| {
-                Failure::failed(format!("{error} (--rules mot15, mot17 or mot20)"))
+                // Rows that no rules can read are refused by the same function.
+                let is_of_rules = error.why.contains("rules");
+                let hint = if is_of_rules { " (--rules mot15, mot17 or mot20)" } else { "" };
+                Failure::failed(format!("{error}{hint}"))
             })?,
             RulesChoice::Mot15 => mot::Rules::Mot15,
             RulesChoice::Mot17 => mot::Rules::Mot17,
@@ -191,8 +194,7 @@ impl TruthFile {
         kitti::add_truths(&mut timeline, &labels);
         let mut file = Self::empty(Kind::Kitti);
         file.notes = odd_labels(&name, &labels);
-        for number in 0..=timeline.last().unwrap_or(0) {
-            let frame = timeline.frame(number).clone();
+        for (number, frame) in timeline.into_frames() {
             let annotated = file.frames.entry(u64::from(number) + 1).or_default();
             annotated.ignore_regions = frame.ignore_regions;
             annotated.people = frame

@@ -1,19 +1,16 @@
 //! As much of HTTP/1.1 as a page on this computer needs: requests with bounds on everything, and
 //! an answer per connection.
 
-use std::io::{self, Read, Write};
-use std::time::{Duration, Instant};
-
 use serde::Serialize;
 
 /// Longest request line with all headers, bytes.
 const HEAD_BYTES: usize = 16 << 10;
 
+/// End of the headers.
+const HEAD_END: &[u8] = b"\r\n\r\n";
+
 /// Most header lines.
 const HEADERS: usize = 100;
-
-/// Time for a whole request: a slower one keeps a thread for nothing.
-const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Request of a browser or a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -74,12 +71,10 @@ impl Response {
         Self { status, kind: "text/plain; charset=utf-8", body: why.into().into_bytes() }
     }
 
-    /// Writes the answer, and says that the connection ends.
-    ///
-    /// # Errors
-    /// Those of the connection.
-    pub fn send(&self, out: &mut impl Write, head_only: bool) -> io::Result<()> {
-        let reason = match self.status {
+    /// Returns the bytes of the answer, which says that the connection ends.
+    pub(crate) fn into_bytes(self, head_only: bool) -> Vec<u8> {
+        let Self { status, kind, body } = self;
+        let reason = match status {
             200 => "OK",
             400 => "Bad Request",
             403 => "Forbidden",
@@ -94,76 +89,59 @@ impl Response {
             503 => "Service Unavailable",
             _ => "Internal Server Error",
         };
-        let (status, kind, length) = (self.status, self.kind, self.body.len());
+        let length = body.len();
         // Nothing but the files of this server runs in the page, and no other page may frame it.
-        write!(
-            out,
+        let head = format!(
             "HTTP/1.1 {status} {reason}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n\
              Connection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n\
              Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\
              Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; \
              img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
              frame-ancestors 'none'\r\n\r\n"
-        )?;
+        );
+        let mut bytes = head.into_bytes();
         if !head_only {
-            out.write_all(&self.body)?;
+            bytes.extend(body);
         }
-        out.flush()
+        bytes
     }
 }
 
-/// Reads a request with a body of at most `body_bytes`.
-///
-/// # Errors
-/// The refusal to answer with; `None` inside for a connection that is gone or sent nothing.
-pub fn read(from: &mut impl Read, body_bytes: usize) -> Result<Request, Option<Response>> {
-    let deadline = Instant::now() + PATIENCE;
-    let mut bytes = Vec::new();
-    let head_end = loop {
-        if let Some(end) = find(&bytes, b"\r\n\r\n") {
-            break end;
-        }
-        if bytes.len() > HEAD_BYTES {
-            return Err(Some(Response::refusal(431, "the headers are too long")));
-        }
-        more(from, &mut bytes, deadline)?;
-    };
-    if head_end > HEAD_BYTES {
-        return Err(Some(Response::refusal(431, "the headers are too long")));
-    }
-    let mut request = parse_head(&bytes[..head_end]).map_err(Some)?;
-    let length = body_length(&request, body_bytes).map_err(Some)?;
-    let mut body = bytes.split_off(head_end + 4);
-    while body.len() < length {
-        more(from, &mut body, deadline)?;
-    }
-    body.truncate(length);
-    request.body = body;
-    Ok(request)
+/// Request that arrives in parts.
+#[derive(Debug, Default)]
+pub struct Incoming {
+    /// Bytes that are not parsed yet.
+    bytes: Vec<u8>,
+    /// Request without its body, and the length of that.
+    head: Option<(Request, usize)>,
 }
 
-/// Reads what is there.
-fn more(
-    from: &mut impl Read,
-    into: &mut Vec<u8>,
-    deadline: Instant,
-) -> Result<(), Option<Response>> {
-    let late = || Some(Response::refusal(408, "the request came too slowly"));
-    if Instant::now() > deadline {
-        return Err(late());
-    }
-    let mut part = [0; 4096];
-    match from.read(&mut part) {
-        Ok(0) => Err(None),
-        Ok(count) => {
-            into.extend(&part[..count]);
-            Ok(())
+impl Incoming {
+    /// Takes the next bytes, and returns the request once it is whole. Its body has at most
+    /// `body_bytes`.
+    ///
+    /// # Errors
+    /// The refusal to answer with.
+    pub fn take(&mut self, part: &[u8], body_bytes: usize) -> Result<Option<Request>, Response> {
+        // The end of the head may lie across the seam.
+        let searched = self.bytes.len().saturating_sub(HEAD_END.len() - 1);
+        self.bytes.extend_from_slice(part);
+        if self.head.is_none() {
+            let end = find(&self.bytes[searched..], HEAD_END).map(|at| searched + at);
+            if end.unwrap_or(self.bytes.len()) > HEAD_BYTES {
+                return Err(Response::refusal(431, "the headers are too long"));
+            }
+            let Some(end) = end else { return Ok(None) };
+            let request = parse_head(&self.bytes[..end])?;
+            let length = body_length(&request, body_bytes)?;
+            self.bytes.drain(..end + HEAD_END.len());
+            self.head = Some((request, length));
         }
-        Err(error) => match error.kind() {
-            io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => Err(late()),
-            io::ErrorKind::Interrupted => Ok(()),
-            _ => Err(None),
-        },
+        let is_whole = self.head.as_ref().is_some_and(|(_, length)| self.bytes.len() >= *length);
+        let Some((mut request, length)) = self.head.take_if(|_| is_whole) else { return Ok(None) };
+        self.bytes.truncate(length);
+        request.body = std::mem::take(&mut self.bytes);
+        Ok(Some(request))
     }
 }
 
@@ -228,18 +206,62 @@ fn body_length(request: &Request, most: usize) -> Result<usize, Response> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
+    /// Longest body in these tests, bytes.
+    const BODY_BYTES: usize = 16 << 10;
+
+    /// Returns the status of a refusal, and 0 for a request that is cut off.
     fn status(bytes: &[u8]) -> Option<u16> {
-        read(&mut &bytes[..], 16 << 10)
-            .err()
-            .map(|refusal| refusal.map_or(0, |refusal| refusal.status))
+        match Incoming::default().take(bytes, BODY_BYTES) {
+            Ok(Some(_)) => None,
+            Ok(None) => Some(0),
+            Err(refusal) => Some(refusal.status),
+        }
+    }
+
+    /// Returns the result of a request that arrives in parts of these lengths, and then the rest.
+    fn taken_in_parts(bytes: &[u8], lengths: &[usize]) -> Result<Option<Request>, Response> {
+        let mut incoming = Incoming::default();
+        let mut rest = bytes;
+        for length in lengths {
+            let (part, behind) = rest.split_at((*length).min(rest.len()));
+            if let Some(request) = incoming.take(part, BODY_BYTES)? {
+                return Ok(Some(request));
+            }
+            rest = behind;
+        }
+        incoming.take(rest, BODY_BYTES)
+    }
+
+    proptest! {
+        #[test]
+        fn a_request_is_the_same_however_it_is_cut(
+            head in "(GET|POST) /[a-z]{0,9} HTTP/1.1\r\n(A: [a-z\r\n]{0,9}\r\n){0,3}",
+            length in 0..40_usize,
+            body in prop::collection::vec(any::<u8>(), 0..50),
+            cuts in prop::collection::vec(0..30_usize, 0..12),
+        ) {
+            let mut bytes = format!("{head}Content-Length: {length}\r\n\r\n").into_bytes();
+            bytes.extend(body);
+            prop_assert_eq!(taken_in_parts(&bytes, &cuts), taken_in_parts(&bytes, &[]));
+        }
+
+        #[test]
+        fn no_bytes_make_the_parser_panic(
+            bytes in prop::collection::vec(any::<u8>(), 0..200),
+            cuts in prop::collection::vec(0..30_usize, 0..12),
+        ) {
+            let _ = taken_in_parts(&bytes, &cuts);
+        }
     }
 
     #[test]
     fn a_request_is_read_with_its_headers_and_its_body() {
         let text = b"POST /a?b HTTP/1.1\r\nHost: x:1\r\nCONTENT-length: 3\r\n\r\nabcdef";
-        let request = read(&mut &text[..], 16 << 10).unwrap();
+        let request = Incoming::default().take(text, BODY_BYTES).unwrap().unwrap();
         assert_eq!((request.method.as_str(), request.path.as_str()), ("POST", "/a?b"));
         assert_eq!(request.header("host"), Some("x:1"));
         assert_eq!(request.body, b"abc");

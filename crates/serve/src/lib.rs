@@ -3,7 +3,10 @@
 //! A [`Site`] turns a [`Request`] into a [`Response`]; [`Server`] does the rest: it listens on the
 //! loopback interface unless told otherwise, checks where a request comes from ([`Access`]), bounds
 //! the length of requests, the time that they take and the number of connections, and ends when it
-//! is told to. Each request has a thread; a site that is slow holds up that request alone.
+//! is told to. A request that is whole has a thread; a site that is slow holds up that request
+//! alone. Clients that are slow to send or to read hold up no other: one thread looks after all of
+//! them, and where there are too many, the one that has waited longest is closed. Where the system
+//! starts no more threads, requests are answered one after the other.
 //!
 //! ```
 //! use std::sync::Arc;

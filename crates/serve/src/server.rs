@@ -1,23 +1,19 @@
+mod connections;
+
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use crate::http::{self, Request, Response};
+use self::connections::{Connections, StartThread};
+use crate::http::{Request, Response};
 
-/// Connections at once; browsers open about six.
-const CONNECTIONS: usize = 32;
+/// Pause between two looks for a connection, for bytes or for a reason to stop.
+const PAUSE: Duration = Duration::from_millis(5);
 
-/// Pause between two looks for a connection or a reason to stop.
-const PAUSE: Duration = Duration::from_millis(20);
-
-/// Longest wait for the next bytes of a connection.
-const SILENCE: Duration = Duration::from_secs(5);
-
-/// Turns of [`PAUSE`] to wait at the end for answers that are under way.
-const LAST_TURNS: usize = 50;
+/// Longest wait at the end for answers that are under way.
+const FAREWELL: Duration = Duration::from_secs(1);
 
 /// Changes that a server takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,64 +128,30 @@ impl Server {
     /// Answers requests until `stop` returns true, which is asked at least 50 times a second; then
     /// waits up to a second for answers that are under way.
     pub fn serve<S: Site>(&self, site: &Arc<S>, stop: impl Fn() -> bool) {
-        let open = Arc::new(AtomicUsize::new(0));
+        self.serve_with(site, start_thread, stop);
+    }
+
+    fn serve_with<S: Site>(&self, site: &Arc<S>, start: StartThread, stop: impl Fn() -> bool) {
+        let mut connections = Connections::new(&self.guard, site, start);
         while !stop() {
-            match self.listener.accept() {
-                Ok((stream, _)) => self.take(stream, site, &open),
-                // An attempt that failed is not the end of the server.
-                Err(_) => thread::sleep(PAUSE),
+            let has_new = connections.accept(&self.listener);
+            if !connections.turn() && !has_new {
+                thread::sleep(PAUSE);
             }
         }
-        for _ in 0..LAST_TURNS {
-            if open.load(Ordering::Relaxed) == 0 {
-                break;
+        connections.close_unread();
+        let end = Instant::now();
+        while !connections.is_empty() && end.elapsed() < FAREWELL {
+            if !connections.turn() {
+                thread::sleep(PAUSE);
             }
-            thread::sleep(PAUSE);
         }
-    }
-
-    /// Answers one connection in a thread.
-    fn take<S: Site>(&self, mut stream: TcpStream, site: &Arc<S>, open: &Arc<AtomicUsize>) {
-        let prepared = stream
-            .set_nonblocking(false)
-            .and_then(|()| stream.set_read_timeout(Some(SILENCE)))
-            .and_then(|()| stream.set_write_timeout(Some(SILENCE)));
-        if prepared.is_err() {
-            return;
-        }
-        if open.load(Ordering::Relaxed) >= CONNECTIONS {
-            let _ = Response::refusal(503, "too many connections").send(&mut stream, false);
-            return;
-        }
-        let seat = Seat::take(open);
-        let (guard, site) = (Arc::clone(&self.guard), Arc::clone(site));
-        thread::spawn(move || {
-            let _seat = seat;
-            let (answer, head_only) = match http::read(&mut stream, guard.body_bytes) {
-                Ok(request) => (guard.answer(&request, &*site), request.method == "HEAD"),
-                Err(Some(refusal)) => (refusal, false),
-                Err(None) => (Response::refusal(400, "the request is cut off"), false),
-            };
-            // A browser that is gone needs no answer.
-            let _ = answer.send(&mut stream, head_only);
-        });
     }
 }
 
-/// Place of one connection, given back also by a thread that panics.
-struct Seat(Arc<AtomicUsize>);
-
-impl Seat {
-    fn take(open: &Arc<AtomicUsize>) -> Self {
-        open.fetch_add(1, Ordering::Relaxed);
-        Self(Arc::clone(open))
-    }
-}
-
-impl Drop for Seat {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
-    }
+/// Starts a thread for an answer.
+fn start_thread(work: Box<dyn FnOnce() + Send>) -> io::Result<()> {
+    thread::Builder::new().name("answer".into()).spawn(work).map(drop)
 }
 
 impl Guard {

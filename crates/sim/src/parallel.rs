@@ -20,7 +20,8 @@ pub fn in_pieces<T: Send>(
     };
     thread::scope(|scope| {
         for _ in 1..threads {
-            scope.spawn(labour);
+            // Without another thread, those that run do its work.
+            let _ = thread::Builder::new().spawn_scoped(scope, labour);
         }
         labour();
     });

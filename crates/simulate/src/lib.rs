@@ -19,7 +19,7 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
-use tagalong_config::{FileLimit, Registry, nearest, read_text};
+use tagalong_config::{FileLimit, PathText, Registry, nearest, read_text};
 use tagalong_log::write::WriteError;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
@@ -97,7 +97,7 @@ fn write(simulation: Simulation, scene: &Scene, log: &Path, format: Format) -> O
     match format {
         Format::Text => say(&format!("{images} images and the truth are in {}", log.display())),
         Format::Json => {
-            let told = serde_json::json!({ "log": log, "images": images });
+            let told = serde_json::json!({ "log": PathText(log), "images": images });
             print(&format!("{told:#}\n"))?;
         }
     }
@@ -153,10 +153,13 @@ pub fn record(
     let (events, recorded) = mpsc::sync_channel(EVENTS_AHEAD);
     thread::scope(|scope| {
         // Images are encoded while the next ones are rendered.
-        let writing = scope.spawn(move || {
+        let write_all = move || {
             recorded.into_iter().try_for_each(|event| recorder.write(&event))?;
             recorder.finish()
-        });
+        };
+        let writing = thread::Builder::new().spawn_scoped(scope, write_all);
+        let writing =
+            writing.map_err(|source| WriteError::Io { path: path.to_owned(), source })?;
         let mut images = 0;
         while let Some(event) = simulation.next_event().filter(|_| goes_on()) {
             if let Event::Shot(shot) = &event {

@@ -1,5 +1,6 @@
 //! Work of several threads.
 
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 /// Returns the rows of a band of an image, of which there is one for each thread.
@@ -7,14 +8,26 @@ pub fn band_rows(height: usize, threads: usize) -> usize {
     height.div_ceil(threads).max(1)
 }
 
-/// Does all jobs at once, each on its own thread; the first on this one.
+/// Does all jobs at once, each on its own thread, one on this. Where the system starts no more threads,
+/// those that run do the jobs of the others.
 pub fn share<J: Send>(jobs: impl IntoIterator<Item = J>, work: impl Fn(J) + Sync) {
-    thread::scope(|scope| {
-        let (mut jobs, work) = (jobs.into_iter(), &work);
-        let own = jobs.next();
-        for job in jobs {
-            scope.spawn(move || work(job));
+    let jobs: Vec<J> = jobs.into_iter().collect();
+    let count = jobs.len();
+    let queue = Mutex::new(jobs.into_iter());
+    let labour = || {
+        while let Some(job) = next(&queue) {
+            work(job);
         }
-        own.map(work);
+    };
+    thread::scope(|scope| {
+        for _ in 1..count {
+            let _ = thread::Builder::new().spawn_scoped(scope, labour);
+        }
+        labour();
     });
+}
+
+/// Takes the next job; the lock is held no longer than that.
+fn next<J>(queue: &Mutex<impl Iterator<Item = J>>) -> Option<J> {
+    queue.lock().unwrap_or_else(PoisonError::into_inner).next()
 }

@@ -48,7 +48,9 @@ pub fn in_order<S: Sync, T: Send>(
         kept
     };
     let mut all = std::thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(worker)).collect();
+        // Without another thread, those that run do its work.
+        let start = |_| std::thread::Builder::new().spawn_scoped(scope, worker).ok();
+        let others: Vec<_> = (1..threads).filter_map(start).collect();
         let mut all = worker();
         for other in others {
             all.extend(other.join().map_err(|_| TrialError::Panicked)?);

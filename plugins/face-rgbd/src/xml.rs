@@ -8,6 +8,7 @@
 use std::fmt::Write as _;
 
 use roxmltree::{Document, Node as Element, ParsingOptions};
+use tagalong_config::check_xml;
 
 use crate::cascade::{Cascade, Feature, Next, Node, Part, Split, Stage, Tree};
 
@@ -22,6 +23,7 @@ impl Cascade {
     /// Text that is not XML, not a cascade, has unknown features, or is inconsistent; the
     /// message is one sentence.
     pub fn from_xml(text: &str) -> XmlResult<Self> {
+        check_xml(text)?;
         let options =
             ParsingOptions { allow_dtd: false, nodes_limit: 2_000_000, ..Default::default() };
         let document = Document::parse_with_options(text, options).map_err(|e| e.to_string())?;

@@ -264,7 +264,9 @@ impl Model {
     /// # Errors
     /// Text that is not a model; the message is one sentence.
     pub fn from_text(text: &str) -> Result<Self, String> {
-        let kept: ModelFile = toml::from_str(text).map_err(|error| error.to_string())?;
+        // Without the line itself, which may be of any file that a config names.
+        let kept: ModelFile =
+            toml::from_str(text).map_err(|e| e.message().trim_end().to_owned())?;
         if kept.format != FORMAT {
             return Err(format!("its format is `{}`, expected `{FORMAT}`", kept.format));
         }

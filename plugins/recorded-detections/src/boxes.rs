@@ -10,6 +10,13 @@ use tagalong_geometry::Rect;
 /// Boxes by frame number, from 1.
 pub(crate) type Boxes = BTreeMap<u64, Vec<ExternalDetection>>;
 
+/// Last number of a frame that is plausible: a year at 30 frames a second. A stamp in place of a
+/// number would match no frame, and the run would detect nobody.
+const LAST_FRAME: f64 = 1e9;
+
+/// Most characters of a word that is no number in a message.
+const SHOWN_CHARACTERS: usize = 16;
+
 /// Reads a file of boxes.
 ///
 /// # Errors
@@ -34,11 +41,13 @@ fn parse(line: &str) -> std::result::Result<(u64, ExternalDetection), String> {
             format!("{} fields; expected frame, -1, x, y, width, height, score", fields.len())
         })?;
         let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        value.ok_or_else(|| format!("`{name}` is `{text}`, expected a number"))
+        // A config may name any file, so no more than the start of a word is shown.
+        let shown: String = text.chars().take(SHOWN_CHARACTERS).collect();
+        value.ok_or_else(|| format!("`{name}` is `{shown}`, expected a number"))
     };
     let frame = number(0, "frame")?;
-    if frame < 1.0 || frame.fract() != 0.0 {
-        return Err(format!("frame {frame}; frames are numbered from 1"));
+    if !(1.0..=LAST_FRAME).contains(&frame) || frame.fract() != 0.0 {
+        return Err(format!("frame {frame}; frames are numbered from 1, up to {LAST_FRAME}"));
     }
     let region =
         Rect::new(number(2, "x")?, number(3, "y")?, number(4, "width")?, number(5, "height")?);

@@ -174,6 +174,7 @@ fn mistakes_are_named_by_file_and_line() {
     let message = |text: &str| of_file(text, Config::default()).err().unwrap().to_string();
     assert!(message("1,-1,5,5,9,9,1\n2,-1,5,5\n").contains("det.txt`, line 2: 4 fields"));
     assert!(message("0,-1,5,5,9,9,1\n").contains("numbered from 1"));
+    assert!(message("1700000000,-1,5,5,9,9,1\n").contains("up to 1000000000"));
     assert!(message("1,-1,5,x,9,9,1\n").contains("`y` is `x`"));
     assert!(message("1,-1,5,5,0,9,1\n").contains("without area"));
     let config = Config { path: "none.txt".into(), ..Config::default() };

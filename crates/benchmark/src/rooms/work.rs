@@ -41,6 +41,15 @@ pub struct RoomResult {
     pub data_lost: bool,
 }
 
+/// File of a result.
+#[derive(Serialize, Deserialize)]
+struct StoredRoom {
+    /// Hash of the run, as in the name of the file.
+    hash: String,
+    #[serde(flatten)]
+    result: RoomResult,
+}
+
 /// Summary of the runs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RunSummary {
@@ -101,13 +110,15 @@ impl<'a> Desk<'a> {
         setting.variant(self.logs[run.log].0, run.unseen)
     }
 
-    /// Returns the result of a run, if it exists.
+    /// Returns the result of a run, if it exists and says itself that it is of this run.
     pub fn result(&self, run: Run) -> Option<RoomResult> {
-        self.store.get(&self.name(run))
+        let hash = self.hash(run);
+        let stored: StoredRoom = self.store.get(&room_name(&hash))?;
+        (stored.hash == hash).then_some(stored.result)
     }
 
-    fn name(&self, run: Run) -> String {
-        format!("rooms/{}.json", self.variant(run).run_hash(self.logs[run.log].1, &self.version))
+    fn hash(&self, run: Run) -> String {
+        self.variant(run).run_hash(self.logs[run.log].1, &self.version)
     }
 
     /// Does the runs that have no result yet.
@@ -193,7 +204,8 @@ impl Shift<'_> {
         std::thread::scope(|scope| {
             // One job fewer: the calling thread works, too.
             for _ in 1..jobs {
-                scope.spawn(work);
+                // Without another thread, those that run do its work.
+            let _ = std::thread::Builder::new().spawn_scoped(scope, work);
             }
             work();
         });
@@ -231,7 +243,7 @@ impl Shift<'_> {
         let data_lost = source.data_lost();
         for (run, lane) in pass.iter().zip(lanes) {
             match figures(lane, log, &truth, &shots) {
-                Ok(figures) => self.keep(*run, &RoomResult { figures, data_lost })?,
+                Ok(figures) => self.keep(*run, RoomResult { figures, data_lost })?,
                 Err(why) => self.fail(*run, why),
             }
             self.bar.inc(1);
@@ -248,9 +260,10 @@ impl Shift<'_> {
     }
 
     /// Stores a result. A disk that fails stops all jobs, as it would fail for every run.
-    fn keep(&self, run: Run, result: &RoomResult) -> Result<(), Failure> {
-        let json = serde_json::to_vec(result).map_err(Failure::failed)?;
-        let kept = self.desk.store.put(&self.desk.name(run), &json);
+    fn keep(&self, run: Run, result: RoomResult) -> Result<(), Failure> {
+        let stored = StoredRoom { hash: self.desk.hash(run), result };
+        let json = serde_json::to_vec(&stored).map_err(Failure::failed)?;
+        let kept = self.desk.store.put(&room_name(&stored.hash), &json);
         kept.inspect_err(|_| self.stop.store(true, Ordering::Relaxed))
     }
 
@@ -267,6 +280,10 @@ impl Shift<'_> {
             contestant.words(run.setting)
         )))
     }
+}
+
+fn room_name(hash: &str) -> String {
+    format!("rooms/{hash}.json")
 }
 
 /// Returns the figures of boxes where the truth has them, otherwise of positions.

@@ -6,7 +6,7 @@ use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
-use tagalong_config::Registry;
+use tagalong_config::{PathText, Registry};
 use tagalong_log::{FrameSource, Inputs, Usage};
 use tagalong_pipeline::{BlindZone, Pipeline, SafetyDistances};
 
@@ -47,7 +47,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
         Format::Json => {
             let (needs, uses) = (names(inputs, Usage::Required), names(inputs, Usage::Optional));
             let answer = serde_json::json!({
-                "config": config.to_string(), "needs": needs, "uses": uses, "log": log,
+                "config": config.to_string(), "needs": needs, "uses": uses, "log": log.map(PathText),
                 "notes": notes, "distances": distances, "blind_zone": blind_zone,
             });
             format!("{answer:#}\n")

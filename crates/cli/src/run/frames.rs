@@ -1,4 +1,4 @@
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -25,18 +25,27 @@ pub enum Frames {
     /// One after the other.
     Here(Box<FrameSource>),
     /// Ahead of the pipeline.
-    Ahead(Receiver<Item>, JoinHandle<FrameSource>),
+    Ahead(Receiver<Item>, JoinHandle<Option<FrameSource>>),
 }
 
 impl Frames {
-    /// Reads ahead if there is more than one thread.
+    /// Reads ahead if there is more than one thread, and the system starts another.
     pub fn new(source: FrameSource, threads: usize) -> Self {
         if threads < 2 {
             return Self::Here(Box::new(source));
         }
         // Bounded, because each waiting frame holds its images.
         let (sender, receiver) = sync_channel(AHEAD);
-        Self::Ahead(receiver, thread::spawn(move || read_all(source, &sender)))
+        // The source stays here until the thread runs: one that cannot start would drop it.
+        let (hand_over, sources) = channel();
+        let read = move || sources.recv().ok().map(|source| read_all(source, &sender));
+        let Ok(reader) = thread::Builder::new().name("reader".into()).spawn(read) else {
+            return Self::Here(Box::new(source));
+        };
+        match hand_over.send(source) {
+            Ok(()) => Self::Ahead(receiver, reader),
+            Err(unsent) => Self::Here(Box::new(unsent.0)),
+        }
     }
 
     /// Returns the next frame; `None` at the end, or after a stop signal.
@@ -75,7 +84,7 @@ impl Frames {
             return Ok(None);
         }
         let broken = |_| Failure::failed("the log reader failed; please report this with the log");
-        reader.join().map(Some).map_err(broken)
+        reader.join().map_err(broken)
     }
 }
 

@@ -1,4 +1,4 @@
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use tagalong_app::outcome::Failure;
@@ -18,16 +18,27 @@ pub enum Pictures {
 }
 
 impl Pictures {
-    /// Renders in a separate thread if there are three threads or more.
+    /// Renders in a separate thread if there are three threads or more, and the system starts one.
     pub fn new(overlay: Option<Overlay>, threads: usize) -> Self {
-        let Some(mut overlay) = overlay else { return Self::None };
+        let Some(overlay) = overlay else { return Self::None };
         if threads < 3 {
             return Self::Here(overlay);
         }
         // Bounded: slow rendering holds the pipeline back instead of filling the memory.
         let (sender, scenes) = sync_channel::<OverlayData>(WAITING);
-        let draw_all = move || scenes.iter().try_for_each(|scene| overlay.draw(&scene));
-        Self::Aside(sender, thread::spawn(draw_all))
+        // The renderer stays here until the thread runs: one that cannot start would drop it.
+        let (hand_over, overlays) = channel::<Overlay>();
+        let draw_all = move || {
+            let Ok(mut overlay) = overlays.recv() else { return Ok(()) };
+            scenes.iter().try_for_each(|scene| overlay.draw(&scene))
+        };
+        let Ok(drawer) = thread::Builder::new().name("pictures".into()).spawn(draw_all) else {
+            return Self::Here(overlay);
+        };
+        match hand_over.send(overlay) {
+            Ok(()) => Self::Aside(sender, drawer),
+            Err(unsent) => Self::Here(unsent.0),
+        }
     }
 
     /// Renders the scene that `scene` makes.

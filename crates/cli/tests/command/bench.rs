@@ -95,6 +95,31 @@ fn one_command_ends_in_a_report_and_a_second_one_computes_nothing() {
     assert!(printed.stdout == before["report.json"], "{}", text(&printed.stdout));
 }
 
+#[test]
+fn results_and_times_of_another_task_are_not_taken() {
+    let home = Home::new();
+    let arguments = ["--logs", "logs/short.mcap", "-o", "out", "--timing"];
+    ok(home.bench(&arguments));
+    let before = files(&home.path("out"));
+    let hashes = home.plan("out");
+    let hash = |at: usize| hashes[at]["hash"].as_str().unwrap();
+    for folder in ["results", "timings"] {
+        let file = |at| home.path("out").join(folder).join(format!("{}.json", hash(at)));
+        fs::copy(file(0), file(1)).unwrap();
+    }
+    let refused = home.bench(&["report", "-o", "out"]);
+    assert_eq!(code(&refused), 1, "{}", text(&refused.stdout));
+    assert!(text(&refused.stderr).contains("the first is 2"), "{}", text(&refused.stderr));
+    let told = ok(home.bench(&arguments));
+    assert!(told.contains("1 tasks run, 1 had their results"), "{told}");
+    assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
+    // A damaged result is computed again, too.
+    fs::write(home.path("out/results").join(format!("{}.json", hash(0))), "{").unwrap();
+    let told = ok(home.bench(&arguments[..4]));
+    assert!(told.contains("1 tasks run, 1 had their results"), "{told}");
+    assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
+}
+
 fn before_result(home: &Home) -> String {
     format!("{}.json", home.plan("out")[0]["hash"].as_str().unwrap())
 }

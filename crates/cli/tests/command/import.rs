@@ -269,6 +269,19 @@ fn annotations_of_cvat_become_truth_that_eval_reads() {
 }
 
 #[test]
+fn a_number_of_a_track_beyond_all_is_refused_with_its_line() {
+    let home = tempfile::tempdir().unwrap();
+    let box_ = r#"<box frame="0" xtl="1" ytl="2" xbr="31" ybr="32"/>"#;
+    let text = format!(
+        "<annotations>\n<track id=\"{}\" label=\"person\">{box_}</track></annotations>",
+        i64::MAX
+    );
+    fs::write(home.path().join("a.xml"), text).unwrap();
+    let (code, told) = import(home.path(), &["cvat", "a.xml"]);
+    assert!(code == 1 && told.contains("a.xml, line 2: `id` is "), "{code} {told}");
+}
+
+#[test]
 fn numbered_images_are_in_the_order_of_their_numbers() {
     let home = tempfile::tempdir().unwrap();
     for number in [1, 2, 9, 10, 11] {

@@ -33,6 +33,9 @@ fn lay_out(home: &Path) {
     write("input.toml", &format!("{fine}\n[input]\ndepth_tropic = \"/d\"\n"));
     write("output.toml", &format!("{fine}\n[output]\nreport_unseen_s = -1.0\n"));
     write("deep.toml", &format!("{fine}config = {{ max_depth_m = \"far\" }}\n"));
+    write("extends.toml", "extends = 'secret.env'\n");
+    write("secret.env", "SEED = 'abc'\n");
+    write("stamps.txt", "1,1,0,0,9,9,1,1,1\n1700000000,1,0,0,9,9,1,1,1\n");
     write("empty.mcap", "");
     write("words.mcap", "these are only words, and a lot of them, but no log\n");
     write("old.bag", "#ROSBAG V1.2\n");
@@ -61,6 +64,18 @@ fn mistakes() -> Vec<Mistake> {
             "run typo.toml good.mcap",
             2,
             &["typo.toml:3:1", "did you mean `roles`"],
+        ),
+        m(
+            "a config that extends another file",
+            "run extends.toml good.mcap",
+            2,
+            &["extends.toml:1:11", "secret.env", "ends in .toml"],
+        ),
+        m(
+            "a frame that is a stamp",
+            "eval --truth stamps.txt --tracks stamps.txt",
+            1,
+            &["stamps.txt, line 2: frame 1700000000", "up to 1000000"],
         ),
         m("an unknown plugin", "run plugin.toml good.mcap", 2, &["plugin.toml:2", "nearest-thing"]),
         m("a wrong type", "check deep.toml", 2, &["deep.toml:"]),

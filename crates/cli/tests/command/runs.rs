@@ -203,6 +203,42 @@ fn results_are_replaced_only_when_asked() {
 }
 
 #[test]
+fn what_a_killed_run_left_is_replaced_without_being_asked() {
+    let home = Home::new(&Drawn::of(5), "");
+    fs::create_dir(home.path("out")).unwrap();
+    for name in ["tracks.mcap.partial", "tracks.csv.partial", "tracks-metres.csv.partial"] {
+        fs::write(home.path("out").join(name), "cut").unwrap();
+    }
+    let output = home.run("out", &[]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert!(home.path("out/tracks.csv").exists() && !home.path("out/tracks.csv.partial").exists());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_log_whose_name_is_no_text_is_run_checked_and_compared() {
+    use std::os::unix::ffi::OsStrExt;
+    let home = Home::new(&Drawn::of(5), "");
+    let odd = home.path("").join(std::ffi::OsStr::from_bytes(b"n\xff.mcap"));
+    fs::rename(home.path("walk.mcap"), &odd).unwrap();
+    let people = odd.with_extension("people.csv");
+    fs::write(people, crate::common::people(5)).unwrap();
+    let command = |words: &[&str]| {
+        let mut command = own_plugin();
+        let output = command.current_dir(home.folder.path()).args(words).arg(&odd).output().unwrap();
+        assert_eq!(code(&output), 0, "{words:?} {}", text(&output.stderr));
+        output
+    };
+    command(&["run", "-o", "out", "nearest.toml"]);
+    let log = json(&home.path("out/origin.json"))["log"]["escaped"].as_str().unwrap().to_owned();
+    assert!(log.ends_with("/n\\xff.mcap"), "{log}");
+    command(&["view", "out", "-o", "page.html", "--log"]);
+    command(&["inspect", "--format", "json"]);
+    command(&["check", "--format", "json", "nearest.toml"]);
+    command(&["bench", "--configs", "nearest.toml", "-o", "bench", "--logs"]);
+}
+
+#[test]
 fn results_go_to_a_folder_named_after_log_and_config() {
     let home = Home::new(&Drawn::of(3), "");
     let mut command = own_plugin();

@@ -105,6 +105,11 @@ impl Timeline {
         }
     }
 
+    /// Returns the frames that were made, by number.
+    pub fn into_frames(self) -> BTreeMap<u32, Frame> {
+        self.frames
+    }
+
     /// The number of the last frame with anybody in it.
     pub fn last(&self) -> Option<u32> {
         self.frames.last_key_value().map(|(&number, _)| number)
@@ -130,11 +135,24 @@ impl Timeline {
     }
 }
 
+/// Last frame that is plausible in any file; nine hours at 30 frames a second.
+pub const MOST_FRAMES: u32 = 1_000_000;
+
+/// Frames for each row of a file that are plausible beyond [`MOST_FRAMES`]: a day with few people in
+/// it. Scores need memory for every frame, also for those without a row, and a stamp in place of a
+/// number must not ask for gigabytes.
+const FRAMES_OF_A_ROW: usize = 10;
+
+/// Largest number of a person or a track: all whole numbers up to it are told apart as `f64`.
+pub const MOST_ID: i64 = 9_000_000_000_000_000;
+
 /// One line cut into fields, with its place for error messages.
 struct Line<'a> {
     file: &'a str,
     number: usize,
     fields: Vec<&'a str>,
+    /// Last frame that is plausible in a file of this length.
+    last_frame: u32,
 }
 
 impl<'a> Line<'a> {
@@ -163,7 +181,7 @@ impl<'a> Line<'a> {
     /// A whole number; some programs write it as `12.0`.
     fn whole(&self, index: usize, name: &str) -> Result<i64, FormatError> {
         let value = self.number(index, name)?;
-        let whole = value.fract() == 0.0 && value.abs() < 9e15;
+        let whole = value.fract() == 0.0 && value.abs() <= MOST_ID as f64;
         let wrong = || self.error(format!("`{name}` is `{value}`, expected a whole number"));
         if whole { Ok(value as i64) } else { Err(wrong()) }
     }
@@ -171,8 +189,12 @@ impl<'a> Line<'a> {
     fn frame(&self, index: usize, first: u32) -> Result<u32, FormatError> {
         let value = self.whole(index, "frame")?;
         match u32::try_from(value) {
-            Ok(frame) if frame >= first => Ok(frame),
-            _ => Err(self.error(format!("frame {value}; frames are numbered from {first}"))),
+            Ok(frame) if (first..=self.last_frame).contains(&frame) => Ok(frame),
+            _ => Err(self.error(format!(
+                "frame {value}; frames are numbered from {first}, and those of a file of this length \
+                 are plausible up to {}",
+                self.last_frame
+            ))),
         }
     }
 }
@@ -203,6 +225,7 @@ fn plain(text: &str) -> Option<f64> {
 /// The lines that are not empty, cut at commas if there are any, else at blanks.
 fn lines<'a>(text: &'a str, file: &'a str) -> impl Iterator<Item = Line<'a>> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let last_frame = last_plausible_frame(text);
     text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(
         move |(index, line)| {
             // Room for the fields of most formats, which are not known before the end of the line.
@@ -211,9 +234,16 @@ fn lines<'a>(text: &'a str, file: &'a str) -> impl Iterator<Item = Line<'a>> {
                 true => fields.extend(line.split(',').map(str::trim)),
                 false => fields.extend(line.split_whitespace()),
             }
-            Line { file, number: index + 1, fields }
+            Line { file, number: index + 1, fields, last_frame }
         },
     )
+}
+
+/// Returns the last frame that is plausible in a text of so many lines.
+fn last_plausible_frame(text: &str) -> u32 {
+    let rows = text.bytes().filter(|byte| *byte == b'\n').count() + 1;
+    let by_rows = u32::try_from(rows.saturating_mul(FRAMES_OF_A_ROW)).unwrap_or(u32::MAX);
+    by_rows.max(MOST_FRAMES)
 }
 
 /// A table with a header line: columns are found by name.

@@ -4,7 +4,7 @@
 
 use std::io::{self, Write};
 
-use super::{FormatError, Line, lines};
+use super::{FormatError, Line, MOST_FRAMES, lines};
 use crate::types::{Region, Report, Role, Truth};
 
 /// One line of a MOTChallenge file.
@@ -246,9 +246,6 @@ fn write_box(out: &mut impl Write, frame: u32, id: i64, region: &Region) -> io::
     write!(out, "{frame},{id},{x},{y},{width},{height}")
 }
 
-/// The longest sequence that is believed; nine hours at 30 frames a second.
-const MOST_FRAMES: f64 = 1e6;
-
 /// The part of `seqinfo.ini` that scoring and exporting need.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct SequenceInfo {
@@ -290,7 +287,7 @@ pub fn parse_info(text: &str, file: &str) -> Result<SequenceInfo, FormatError> {
         return Err(error("`frameRate` is 0, expected frames per second".to_owned()));
     }
     let length = number("seqLength")?;
-    if length > MOST_FRAMES {
+    if length > f64::from(MOST_FRAMES) {
         return Err(error(format!("`seqLength` is {length}, more than {MOST_FRAMES} frames")));
     }
     Ok(SequenceInfo {

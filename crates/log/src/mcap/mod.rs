@@ -19,9 +19,9 @@ use crate::bag;
 use crate::msgs::ROS1_MARK;
 use crate::walk::{Channel, Located, Walk};
 
-/// Error for a file that is not MCAP at all.
+/// Error for a file that is no container of messages: a sentence without its name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("not an MCAP file: {0}")]
+#[error("{0}")]
 pub struct NotMcap(pub String);
 
 /// Findings in an MCAP file that other containers do not have.
@@ -40,7 +40,7 @@ impl Mcap {
         if magic == record::MAGIC {
             return Ok(Self::default());
         }
-        Err(NotMcap(describe_start(magic)))
+        Err(NotMcap(format!("not an MCAP file: {}", describe_start(magic))))
     }
 
     /// Reads one record from the file.

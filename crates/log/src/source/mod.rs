@@ -19,6 +19,7 @@ use nalgebra::Isometry2;
 use parts::PartsWalker;
 use plan::{plan, tally_of};
 use serde::Serialize;
+use tagalong_config::path_text;
 use tagalong_core::Frame;
 
 use crate::scan::Scan;
@@ -46,6 +47,7 @@ impl AsRef<Frame> for LogFrame {
 #[non_exhaustive]
 pub struct LogFacts {
     /// Path of the file.
+    #[serde(serialize_with = "path_text::serialize")]
     pub path: PathBuf,
     /// Size of the file, bytes; of a compressed one unpacked, as the hash.
     pub bytes: u64,

@@ -60,6 +60,7 @@ pub const LOSSES: &[&str] = &[
     "oversized_records",
     "statistics_disagree",
     "truncated",
+    "uncommitted_transactions",
     "unknown_channel_messages",
     "unknown_compression_chunks",
 ];

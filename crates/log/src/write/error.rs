@@ -32,6 +32,12 @@ pub enum WriteError {
         /// Output directory.
         output: PathBuf,
     },
+    /// Another run, or another program of this kind, is writing there.
+    #[error("another run is writing {}; wait for its end, or give another name", path.display())]
+    Busy {
+        /// Output directory, or file.
+        path: PathBuf,
+    },
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Io {
@@ -53,7 +59,13 @@ pub enum WriteError {
 impl WriteError {
     /// Returns true if the request is not allowed, as opposed to a disk that failed.
     pub fn is_refusal(&self) -> bool {
-        matches!(self, Self::Exists { .. } | Self::NotADirectory { .. } | Self::InputInside { .. })
+        matches!(
+            self,
+            Self::Exists { .. }
+                | Self::NotADirectory { .. }
+                | Self::InputInside { .. }
+                | Self::Busy { .. }
+        )
     }
 
     /// Returns true if the disk has no room.

@@ -1,4 +1,5 @@
-use std::fs::{self, File};
+use std::ffi::OsStr;
+use std::fs::{self, File, TryLockError};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -12,6 +13,8 @@ use super::WriteError;
 pub struct RunDir {
     path: PathBuf,
     pending: Vec<String>,
+    /// Lock of the directory, which ends with the process; `None` where the file system has none.
+    _lock: Option<File>,
 }
 
 /// Names of the files of a run; only these are ever removed.
@@ -32,8 +35,15 @@ impl RunDir {
     ///
     /// # Errors
     /// [`WriteError::Exists`] if the directory is not empty and `overwrite` is not set,
-    /// [`WriteError::InputInside`] if `input` lies in it, [`WriteError::NotADirectory`].
+    /// [`WriteError::InputInside`] if `input` lies in it, [`WriteError::NotADirectory`],
+    /// [`WriteError::Busy`] if another run is writing into it. The partial files that a killed run
+    /// left are no contents.
     pub fn check(path: &Path, overwrite: bool, input: &Path) -> Result<(), WriteError> {
+        Self::check_contents(path, overwrite, input)?;
+        if path.exists() { lock(path).map(drop) } else { Ok(()) }
+    }
+
+    fn check_contents(path: &Path, overwrite: bool, input: &Path) -> Result<(), WriteError> {
         if path.exists() && !path.is_dir() {
             return Err(WriteError::NotADirectory { path: path.to_owned() });
         }
@@ -46,9 +56,8 @@ impl RunDir {
                 output: path.to_owned(),
             });
         }
-        let empty =
-            !path.exists() || fs::read_dir(path).map_err(WriteError::io(path))?.next().is_none();
-        if empty || overwrite {
+        let is_free = !path.exists() || holds_no_results(path).map_err(WriteError::io(path))?;
+        if is_free || overwrite {
             return Ok(());
         }
         Err(WriteError::Exists { path: path.to_owned() })
@@ -59,14 +68,17 @@ impl RunDir {
     /// # Errors
     /// As [`RunDir::check`], and [`WriteError::Io`].
     pub fn create(path: &Path, overwrite: bool, input: &Path) -> Result<Self, WriteError> {
-        Self::check(path, overwrite, input)?;
+        Self::check_contents(path, overwrite, input)?;
         fs::create_dir_all(path).map_err(WriteError::io(path))?;
+        let lock = lock(path)?;
+        // Another run may have ended there meanwhile.
+        Self::check_contents(path, overwrite, input)?;
         for name in OWN_FILES {
             remove(&path.join(name))?;
             remove(&path.join(partial(name)))?;
         }
         clear_overlay(&path.join(OVERLAY))?;
-        Ok(Self { path: path.to_owned(), pending: Vec::new() })
+        Ok(Self { path: path.to_owned(), pending: Vec::new(), _lock: lock })
     }
 
     /// Returns the directory.
@@ -132,6 +144,50 @@ impl RunDir {
     }
 }
 
+/// Locks a directory against other runs, as long as the result lives.
+fn lock(path: &Path) -> Result<Option<File>, WriteError> {
+    // Some systems do not open directories, and some file systems have no locks.
+    let Ok(folder) = File::open(path) else { return Ok(None) };
+    match folder.try_lock() {
+        Ok(()) => Ok(Some(folder)),
+        Err(TryLockError::WouldBlock) => Err(WriteError::Busy { path: path.to_owned() }),
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
+}
+
+/// Returns true for a directory that is empty or holds nothing but what a killed run left.
+fn holds_no_results(path: &Path) -> std::io::Result<bool> {
+    let mut has_partial = false;
+    let mut has_pictures = false;
+    for entry in fs::read_dir(path)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        if OWN_FILES.iter().any(|own| name == partial(own).as_str()) {
+            has_partial = true;
+        } else if name == OVERLAY && holds_only_pictures(&entry.path())? {
+            has_pictures = true;
+        } else {
+            return Ok(false);
+        }
+    }
+    Ok(has_partial || !has_pictures)
+}
+
+fn holds_only_pictures(folder: &Path) -> std::io::Result<bool> {
+    for entry in fs::read_dir(folder)? {
+        if !is_picture(&entry?.file_name()) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Returns true for the name of a numbered picture.
+fn is_picture(name: &OsStr) -> bool {
+    let number = name.to_str().and_then(|name| name.strip_suffix(".png"));
+    number.is_some_and(|number| number.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
 pub(super) fn partial(name: &str) -> String {
     format!("{name}.partial")
 }
@@ -149,9 +205,7 @@ fn remove(path: &Path) -> Result<(), WriteError> {
 fn clear_overlay(folder: &Path) -> Result<(), WriteError> {
     let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
     for entry in entries.flatten() {
-        let name = entry.file_name();
-        let numbered = name.to_str().and_then(|n| n.strip_suffix(".png"));
-        if numbered.is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit())) {
+        if is_picture(&entry.file_name()) {
             remove(&entry.path())?;
         }
     }
@@ -193,6 +247,51 @@ mod tests {
         RunDir::create(&out, true, &log).unwrap();
         assert!(!out.join("tracks.csv").exists() && !out.join("overlay/000001.png").exists());
         assert!(out.join("notes.txt").exists() && out.join("overlay/mine.png").exists());
+    }
+
+    #[test]
+    fn what_a_killed_run_left_does_not_stop_the_next_one() {
+        let home = tempfile::tempdir().unwrap();
+        let log = home.path().join("elsewhere.mcap");
+        let out = home.path().join("out");
+        let run = RunDir::create(&out, false, &log).unwrap();
+        write(&out, "tracks.mcap.partial");
+        write(&run.overlay().unwrap(), "000001.png");
+        // A killed process publishes and discards nothing.
+        drop(run);
+        RunDir::check(&out, false, &log).unwrap();
+        RunDir::create(&out, false, &log).unwrap();
+        assert!(!out.join("tracks.mcap.partial").exists());
+        assert!(!out.join("overlay/000001.png").exists());
+        for name in ["notes.txt.partial", "notes.txt", "overlay/mine.png"] {
+            write(&out, "tracks.mcap.partial");
+            write(&out, name);
+            let error = RunDir::check(&out, false, &log).unwrap_err();
+            assert!(matches!(error, WriteError::Exists { .. }), "{error}");
+            fs::remove_file(out.join(name)).unwrap();
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn two_runs_do_not_write_into_one_directory() {
+        let home = tempfile::tempdir().unwrap();
+        let log = home.path().join("elsewhere.mcap");
+        let out = home.path().join("out");
+        let mut first = RunDir::create(&out, true, &log).unwrap();
+        first.put("report.json", b"{}").unwrap();
+        for error in [
+            RunDir::check(&out, true, &log).unwrap_err(),
+            RunDir::create(&out, true, &log).unwrap_err(),
+            RunDir::create(&out, false, &log).unwrap_err(),
+        ] {
+            assert!(matches!(error, WriteError::Busy { .. }) && error.is_refusal(), "{error}");
+        }
+        first.publish().unwrap();
+        assert_eq!(fs::read(out.join("report.json")).unwrap(), b"{}");
+        let error = RunDir::check(&out, false, &log).unwrap_err();
+        assert!(matches!(error, WriteError::Exists { .. }), "{error}");
+        RunDir::create(&out, true, &log).unwrap();
     }
 
     #[test]

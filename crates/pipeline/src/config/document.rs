@@ -21,6 +21,9 @@ const MAX_BASES: usize = 8;
 /// The key that names the config to extend.
 pub(super) const EXTENDS: &str = "extends";
 
+/// Ending of the name of a config.
+const ENDING: &str = "toml";
+
 /// Returns the text of the config at a path.
 pub type ReadBase<'a> = dyn Fn(&Path) -> io::Result<String> + 'a;
 
@@ -202,9 +205,23 @@ fn base_at(
             "`{EXTENDS}` goes on in a circle, or through more than {MAX_BASES} configs"
         ));
     }
+    if !is_config(&path) {
+        return Err(format!(
+            "cannot extend {}: a config is a file whose name ends in .{ENDING}",
+            path.display()
+        ));
+    }
     let text =
         read_base(&path).map_err(|error| format!("cannot extend {}: {error}", path.display()))?;
     Ok(Base { path, padded: "\n".repeat(start) + &text, start })
+}
+
+/// Returns true for a file that is a config by its name. The mistakes of a base are shown with their
+/// lines, and a config may come from anywhere: it must not show those of other files.
+fn is_config(path: &Path) -> bool {
+    // A link does not lend its name to another file.
+    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    [path, &real].iter().all(|path| path.extension().is_some_and(|ending| ending == ENDING))
 }
 
 /// Adds the keys that a table lacks. Lists are not joined, and the settings of another plugin are
@@ -318,6 +335,33 @@ mod tests {
         for words in ["own.toml: it extends ", "base.toml:2:5: ", "b = "] {
             assert!(shown.contains(words), "{shown}");
         }
+    }
+
+    #[test]
+    fn no_line_of_a_file_that_is_no_config_is_shown() {
+        let secret = "root:$6$salt$hash:19000:0:99999:7:::\nSEED = 'abc'\n";
+        for name in ["shadow", "secret.env", "sub/secret.txt"] {
+            let own = format!("a = 1\nextends = '{name}'\n");
+            let shown = table(&own, &[(name, secret)]).unwrap_err();
+            assert!(shown.contains("own.toml:2:11: cannot extend "), "{shown}");
+            assert!(shown.contains("ends in .toml"), "{shown}");
+            assert!(!shown.contains("salt") && !shown.contains("abc"), "{shown}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_with_the_name_of_a_config_shows_no_line_either() {
+        let folder = folder(&[("shadow", "root:$6$salt$hash\n"), ("real.toml", "a = \n")]);
+        for name in ["shadow", "real.toml"] {
+            let link = folder.path().join(format!("to-{}.toml", name.len()));
+            std::os::unix::fs::symlink(folder.path().join(name), &link).unwrap();
+        }
+        let shown = |own: &str| Document::read(own, folder.path()).unwrap_err().render("own", own);
+        let secret = shown("extends = 'to-6.toml'\n");
+        assert!(secret.contains("ends in .toml") && !secret.contains("salt"), "{secret}");
+        let config = shown("extends = 'to-9.toml'\n");
+        assert!(config.contains("to-9.toml:1:5: "), "{config}");
     }
 
     #[test]

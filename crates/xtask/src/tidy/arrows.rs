@@ -82,7 +82,7 @@ const ARROWS: &[(&str, &[&str])] = &[
         ],
     ),
     ("testdata", &[]),
-    ("fuzz", &["log", "eval", "pipeline", "sim", "catalog", "plugins"]),
+    ("fuzz", &["log", "eval", "import", "pipeline", "sim", "catalog", "plugins"]),
     ("xtask", &[]),
 ];
 
