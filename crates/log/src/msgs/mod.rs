@@ -15,7 +15,7 @@ mod scene;
 mod sensor;
 mod vision;
 
-pub use common::{BoolMsg, Header, StringMsg, Time};
+pub use common::{BoolMsg, Float32Msg, Header, StringMsg, Time};
 pub use contact::{BumperEvent, BumperState, ContactCount, HazardDetection, HazardDetectionVector};
 pub use geometry::{
     Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage,

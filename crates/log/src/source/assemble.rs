@@ -266,9 +266,22 @@ impl Assembler {
             }
             _ => {
                 tally.lose("depth_not_registrable", || {
-                    "depth has another size than colour, and there is no transform or no \
-                     calibration to register it with"
-                        .into()
+                    let topic = plan.chosen.depth.as_deref().unwrap_or_default();
+                    let problem = plan.chosen.depth_problem.as_ref();
+                    let why = problem.map_or_else(
+                        || {
+                            format!(
+                                "its images are {}x{}, those of colour {}x{}, and no transform is \
+                                 known at that time",
+                                seen.width(),
+                                seen.height(),
+                                camera.width,
+                                camera.height
+                            )
+                        },
+                        |problem| problem.why.clone(),
+                    );
+                    format!("{topic} cannot be used: {why}")
                 });
                 None
             }
@@ -527,7 +540,9 @@ fn pixels(plan: &Plan, topic: &str, image: &Payload, tally: &mut Tally) -> Optio
     if is_disparity(plan, topic) {
         return depth_of_disparity(plan, topic, image, tally).map(Pixels::Depth);
     }
-    let (unit, limits) = (plan.input.depth_unit_m, &plan.limits);
+    let is_depth = plan.chosen.depth.as_deref() == Some(topic);
+    let unit = if is_depth { plan.depth_unit_m } else { plan.input.depth_unit_m };
+    let limits = &plan.limits;
     let of = |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => decode_raw(&image, unit, limits),
         AnyImage::Compressed(image) => decode_compressed(&image, unit, limits),

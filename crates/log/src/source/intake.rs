@@ -4,6 +4,7 @@ use tagalong_core::{Stamp, planar_pose};
 
 use super::changes::CameraWatch;
 use super::plan::Plan;
+use super::restamp::restamp;
 use crate::msgs::{CdrError, CompressedImage, DisparityImage, Image, Odometry, TFMessage, decode};
 use crate::obstacles::ObstacleReader;
 use crate::odometry::PoseBuffer;
@@ -39,6 +40,8 @@ pub(super) struct Intake {
     heard: Option<(Stamp, u64)>,
     pub(super) tf: TfBuffer,
     pub(super) poses: PoseBuffer,
+    /// True if messages have the times of their recording in place of their stamps.
+    has_recording_times: bool,
 }
 
 impl Intake {
@@ -62,11 +65,21 @@ impl Intake {
             heard: None,
             tf,
             poses: PoseBuffer::default(),
+            has_recording_times: plan.has_recording_times,
         }
     }
 
     /// Takes in a message. One that cannot be decoded is counted as lost.
     pub(super) fn take(&mut self, message: &Message<'_>, tally: &mut Tally) {
+        if !self.has_recording_times {
+            return self.take_stamped(message, tally);
+        }
+        let restamped = restamp(message);
+        let data = restamped.as_deref().unwrap_or(message.data);
+        self.take_stamped(&Message { data, ..message.clone() }, tally);
+    }
+
+    fn take_stamped(&mut self, message: &Message<'_>, tally: &mut Tally) {
         self.take_obstacles(message, tally);
         let topic = Some(&message.channel.topic);
         let outcome = if *message.channel.topic == self.primary {
@@ -86,7 +99,13 @@ impl Intake {
             let topic = &message.channel.topic;
             decode(message.data).map(|info| self.watch.watch_info(topic, &info, tally))
         } else if Type::of(&message.channel.schema_name) == Type::Tf {
-            decode(message.data).map(|tf| self.take_tf(&tf, &message.channel.topic, tally))
+            decode(message.data).map(|mut tf: TFMessage| {
+                if self.has_recording_times {
+                    let stamp = Stamp::from_nanos(message.log_time).into();
+                    tf.transforms.iter_mut().for_each(|link| link.header.stamp = stamp);
+                }
+                self.take_tf(&tf, &message.channel.topic, tally);
+            })
         } else {
             Ok(())
         };

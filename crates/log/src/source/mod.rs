@@ -8,6 +8,7 @@ mod live;
 mod mount;
 mod parts;
 mod plan;
+mod restamp;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,7 +23,7 @@ use serde::Serialize;
 use tagalong_core::Frame;
 
 use crate::scan::Scan;
-use crate::{InputSettings, Inputs, Limits, LogError};
+use crate::{InputAccount, InputSettings, Inputs, Limits, LogError};
 
 /// Frame with the pose of the robot.
 pub struct LogFrame {
@@ -194,6 +195,11 @@ impl FrameSource {
     /// Returns true if there is odometry: a topic, or transforms.
     pub fn has_odometry(&self) -> bool {
         self.assembly.plan.odom_frames.is_some()
+    }
+
+    /// Returns the use of each topic, with the reasons for those that are not used.
+    pub fn account(&self) -> &InputAccount {
+        &self.assembly.plan.account
     }
 
     /// Returns the facts about the log.

@@ -29,7 +29,7 @@ impl Mount {
         input: &InputSettings,
         mirror: bool,
     ) -> Option<Self> {
-        let Some(mount) = &input.camera else {
+        let Some(mount) = input.mount() else {
             let base = robot_frame(scan, input);
             let camera = camera.filter(|camera| scan.tf.connects(base, camera))?;
             return Some(Self::Tf { base: base.to_owned(), camera: camera.to_owned() });
