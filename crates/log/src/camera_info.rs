@@ -463,7 +463,7 @@ mod tests {
         let double = half.scaled_to(640, 480).unwrap();
         assert!((double.lens.cx - calibrated.lens.cx).abs() < 1e-9);
         for (width, height) in [(640, 480), (640, 360), (960, 720), (320, 480), (0, 0)] {
-            assert_eq!(calibrated.scaled_to(width, height), Option::None, "{width}x{height}");
+            assert_eq!(calibrated.scaled_to(width, height), None, "{width}x{height}");
         }
     }
 

@@ -8,6 +8,7 @@
 
 use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
 
 use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Row};
 
@@ -189,5 +190,6 @@ fn channel(row: &Row<'_>, longest: u64) -> rusqlite::Result<Channel> {
         schema_name: text(2)?,
         schema_encoding: "ros2msg".into(),
         encoding: text(3)?,
+        definition: Arc::default(),
     })
 }

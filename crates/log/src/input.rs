@@ -30,6 +30,10 @@ pub struct InputSettings {
     /// Topic of detections that another program recorded (`vision_msgs` Detection2DArray or
     /// Detection3DArray), for `recorded-detections`.
     pub detections_topic: Option<String>,
+    /// Classes of recorded detections that are people, by name or number; by default those with a
+    /// usual name (`person`, `pedestrian`, ...), the number 0, and detections without a class.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub detection_classes: Vec<String>,
     /// Topics of further sensors, by the names of their inputs.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub topics: BTreeMap<String, String>,
@@ -87,6 +91,7 @@ impl Default for InputSettings {
             odometry_topic: None,
             laser_topic: None,
             detections_topic: None,
+            detection_classes: Vec::new(),
             topics: BTreeMap::new(),
             right_topic: None,
             right_info_topic: None,

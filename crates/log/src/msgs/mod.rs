@@ -9,6 +9,7 @@
 
 mod common;
 mod contact;
+mod definition;
 mod geometry;
 mod ros1;
 mod scene;
@@ -17,6 +18,7 @@ mod vision;
 
 pub use common::{BoolMsg, Float32Msg, Header, StringMsg, Time};
 pub use contact::{BumperEvent, BumperState, ContactCount, HazardDetection, HazardDetectionVector};
+pub(crate) use definition::{Definition, Value};
 pub use geometry::{
     Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage,
     Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,

@@ -26,7 +26,7 @@ use crate::pairing::Payload;
 use crate::register::Registration;
 use crate::scan::Type;
 use crate::sensors::Moment;
-use crate::sensors::laser::{is_sane, lose_scan, seen_from};
+use crate::sensors::laser::{lose_scan, scan_fault, seen_from};
 use crate::tally::Tally;
 
 /// State that is carried from frame to frame.
@@ -120,10 +120,17 @@ impl Assembler {
         intake: &mut Intake,
         tally: &mut Tally,
     ) -> Option<LogFrame> {
-        let Some(sweep) = decode::<LaserScan>(&scan.data).ok().filter(is_sane) else {
-            lose_scan(tally);
-            return None;
+        let sweep = match decode::<LaserScan>(&scan.data) {
+            Ok(sweep) => sweep,
+            Err(error) => {
+                lose_scan(plan.primary(), &error.to_string(), tally);
+                return None;
+            }
         };
+        if let Some(why) = scan_fault(&sweep) {
+            lose_scan(plan.primary(), &why, tally);
+            return None;
+        }
         let Some(pose) = plan.mount.at(&intake.tf, scan.stamp) else {
             tally.count("laser_scans_without_pose");
             return None;

@@ -9,7 +9,8 @@ use crate::msgs::{CdrError, CompressedImage, DisparityImage, Image, Odometry, TF
 use crate::obstacles::ObstacleReader;
 use crate::odometry::PoseBuffer;
 use crate::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
-use crate::scan::{Scan, Type, is_static};
+use crate::scan::{Type, is_static};
+use crate::sensors::laser::Scans;
 use crate::sensors::{SENSORS, SensorReader};
 use crate::tally::Tally;
 use crate::tf::TfBuffer;
@@ -60,7 +61,7 @@ impl Intake {
             frames: Reorder::new(input.reorder_frames),
             depth: Waiting::default(),
             right: Waiting::default(),
-            sensors: readers(scan, chosen, primary),
+            sensors: readers(plan, primary),
             obstacles: sources.filter_map(|it| ObstacleReader::new(it, scan.is_live())).collect(),
             heard: None,
             tf,
@@ -142,6 +143,15 @@ impl Intake {
         match self.frames.push(image) {
             Arrival::Queued | Arrival::Suspect => {}
             Arrival::Duplicate => tally.count("duplicate_frames"),
+            Arrival::SameStamp => {
+                let topic = self.primary.clone();
+                tally.lose("frames_of_same_stamp", || {
+                    format!(
+                        "{topic}: different images have the same stamp, and only the first of them \
+                         makes a frame: `--stamps recording` takes the times of recording"
+                    )
+                });
+            }
             Arrival::LateBefore => tally.count("late_frames"),
             Arrival::Jumped => {
                 tally.count("time_jumps_back");
@@ -234,11 +244,18 @@ impl Intake {
 }
 
 /// Creates the readers of the chosen topics; the topic that makes the frames has none.
-fn readers(scan: &Scan, chosen: &Chosen, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
+fn readers(plan: &Plan, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
+    let Plan { scan, chosen, input, .. } = plan;
     let topics = SENSORS.iter().filter_map(|sensor| Some((sensor, chosen.sensor(sensor.input)?)));
     let others = topics.filter(|(_, topic)| *topic != primary);
     let schema = |topic: &str| scan.topics.get(topic).map_or("", |topic| &topic.schema);
-    others.map(|(sensor, topic)| (topic.to_owned(), (sensor.reader)(schema(topic)))).collect()
+    let mut readers: Vec<(String, Box<dyn SensorReader>)> = others
+        .map(|(sensor, topic)| (topic.to_owned(), (sensor.reader)(schema(topic), input)))
+        .collect();
+    for topic in &chosen.further_scans {
+        readers.push((topic.clone(), Box::new(Scans::further())));
+    }
+    readers
 }
 
 /// Returns the stamp, the frame and the bytes of an image or a scan.

@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 use assembly::{Assembly, Messages};
 pub use live::{Listening, LiveSource};
+pub(crate) use mount::robot_frame;
 use nalgebra::Isometry2;
 use parts::PartsWalker;
 use plan::{plan, tally_of};

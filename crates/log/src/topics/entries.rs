@@ -2,7 +2,7 @@
 
 use super::account::{InputAccount, TopicUse};
 use super::kinds::{is_image, is_odometry, is_of, kind_of, unreadable};
-use super::problems::depth_problem;
+use super::problems::{depth_problem, scanner_problem};
 use super::rigs::{Rig, rigs};
 use super::{Chosen, Relation, Stream, TopicName, named_topic};
 use crate::images::Content;
@@ -112,6 +112,9 @@ impl Judge<'_> {
         if let Some((input, _)) = sensors.iter().find(|(_, topic)| *topic == name) {
             return Some(input.name().to_owned());
         }
+        if self.chosen.further_scans.iter().any(|topic| topic == name) {
+            return Some("laser".to_owned());
+        }
         let source = self.input.sources.iter().find(|source| source.topic == name)?;
         Some(format!("source of obstacles `{}`", source.name))
     }
@@ -211,6 +214,12 @@ impl Judge<'_> {
         let key = sensor.key();
         let takes = format!("`{key} = \"{name}\"` under [input] takes this one");
         if let Some(other) = self.chosen.sensor(sensor.input) {
+            let is_scan = sensor.input == Input::Laser && self.input.laser_topic.is_none();
+            let problem = scanner_problem(self.scan, self.input, other, name);
+            if let Some(problem) = problem.filter(|_| is_scan) {
+                let remedy = Some(problem.remedy).filter(|remedy| !remedy.is_empty());
+                return (problem.why, remedy);
+            }
             return (format!("{other} is used"), Some(takes));
         }
         let is_named = named_topic(sensor, self.input).is_some();

@@ -23,7 +23,7 @@ use kinds::{
 pub(crate) use kinds::{kind_of, unreadable};
 pub(crate) use name::{Stream, TopicName};
 pub(crate) use problems::Problem;
-use problems::odometry_problem;
+use problems::{odometry_problem, scanner_problem};
 use rigs::{Pick, Rig, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
@@ -53,6 +53,8 @@ pub(crate) struct Chosen {
     pub(crate) unused_odometry: Option<(String, Problem)>,
     /// Topics of the sensors beside the images.
     pub(crate) sensors: BTreeMap<Input, String>,
+    /// Topics of further laser scanners on the robot.
+    pub(crate) further_scans: Vec<String>,
 }
 
 impl Chosen {
@@ -64,6 +66,7 @@ impl Chosen {
             .chain([&self.odometry])
             .flatten()
             .chain(self.sensors.values())
+            .chain(&self.further_scans)
             .any(|chosen| chosen == topic)
     }
 
@@ -162,6 +165,7 @@ pub(crate) fn choose(
         camera,
         depth_problem,
         unused_odometry: None,
+        further_scans: further_scans(scan, input, sensors.get(&Input::Laser)),
         sensors,
     };
     let primary = chosen.primary().to_owned();
@@ -253,6 +257,18 @@ fn wanted_rigs<'a>(
         }
     }
     Ok(all.iter().collect())
+}
+
+/// Returns the topics of the scanners beside the first one, unless the settings name one.
+fn further_scans(scan: &Scan, input: &InputSettings, first: Option<&String>) -> Vec<String> {
+    let Some(first) = first.filter(|_| input.laser_topic.is_none()) else { return Vec::new() };
+    let further = scan.topics.iter().filter(|(name, topic)| {
+        let is_scan =
+            SENSORS.iter().any(|sensor| sensor.input == Input::Laser && is_of(sensor, topic))
+                && *name != first;
+        is_scan && topic.count > 0 && scanner_problem(scan, input, first, name).is_none()
+    });
+    further.map(|(name, _)| name.clone()).collect()
 }
 
 /// Returns the topic of a sensor: the one that the settings name, else that of the highest rank.

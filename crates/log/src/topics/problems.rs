@@ -4,6 +4,7 @@ use super::calibration::{calibration_of, calibrations, intrinsics_of, misfit};
 use crate::InputSettings;
 use crate::camera_info::Intrinsics;
 use crate::scan::{Scan, Topic};
+use crate::source::robot_frame;
 use crate::timing::Skew;
 
 /// Reason, with the setting or the action that cures it.
@@ -132,6 +133,30 @@ fn depth_lens(
     };
     let lens = intrinsics_of(scan, depth, &topic, is_disparity);
     lens.map(|lens| (topic.clone(), lens)).map_err(|why| format!("its calibration {topic}: {why}"))
+}
+
+/// Returns the reason for which the scans of a topic cannot be used beside those of the first one.
+pub(super) fn scanner_problem(
+    scan: &Scan,
+    input: &InputSettings,
+    first: &str,
+    topic: &str,
+) -> Option<Problem> {
+    if let Some(source) = input.sources.iter().find(|source| source.topic == topic) {
+        return Problem::new(format!("it is the source of obstacles `{}`", source.name), "");
+    }
+    let named =
+        format!("`laser_topic = \"{topic}\"` under [input] takes this one in place of {first}");
+    let frame = scan.frame_of(topic).unwrap_or_default();
+    if scan.frame_of(first) == Some(frame) {
+        return Problem::new(format!("it has the frame `{frame}` of {first}: one scanner"), named);
+    }
+    let robot = robot_frame(scan, input);
+    if !scan.tf.connects(robot, frame) {
+        let why = format!("tf does not connect its frame `{frame}` with `{robot}`");
+        return Problem::new(why, "record /tf_static with its mount");
+    }
+    None
 }
 
 /// Returns the reason for which odometry cannot give the poses of the frames.
