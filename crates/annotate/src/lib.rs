@@ -19,6 +19,7 @@ use std::sync::{Arc, Mutex};
 use clap::Args;
 use tagalong_app::choice::fitting;
 use tagalong_app::config_file::ConfigFile;
+use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, say};
 use tagalong_app::progress::Progress;
 use tagalong_app::signals::Signals;
@@ -187,7 +188,8 @@ impl Material {
             (None, true) => None,
             // Without a pipeline that fits, the people are set by hand.
             (None, false) => {
-                fitting(&args.log, registry, 1).fitting.pop().map(|found| found.config)
+                let found = fitting(&args.log, registry, &InputArgs::default(), 1);
+                found.fitting.into_iter().next().map(|found| found.config)
             }
         };
         let outer = config.as_ref().map(ConfigFile::outer).transpose()?.unwrap_or_default();

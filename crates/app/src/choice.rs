@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use tagalong_config::Registry;
-use tagalong_log::{FrameSource, InputSettings, Limits};
+use tagalong_log::{FrameSource, InputAccount, InputSettings, Limits};
 
-use crate::config_file::ConfigFile;
+use crate::config_file::{ConfigFile, OuterSettings};
+use crate::input_args::InputArgs;
 use crate::outcome::Failure;
 
 /// The config for a camera below a conical mirror.
@@ -16,8 +17,6 @@ const PANORAMIC: &str = "omni-rich";
 pub struct Choice {
     /// Name of the built-in config.
     pub config: &'static str,
-    /// Data by which such a log is known, in words.
-    pub has: &'static str,
     /// Reason for the choice.
     pub reason: &'static str,
 }
@@ -27,50 +26,35 @@ pub struct Choice {
 pub const CHOICES: [Choice; 9] = [
     Choice {
         config: "depth-verified",
-        has: "colour and depth",
         reason: "it has the best HOTA in rooms that no setting was chosen on",
     },
     Choice {
         config: "depth-alone",
-        has: "depth without colour",
         reason: "of those that need no colour it has the best HOTA in rooms that no setting was \
                  chosen on; one verifier judges what it finds, so expect some furniture",
     },
     Choice {
         config: "depth-net-ekf",
-        has: "depth of a camera at an unusual height",
         reason: "it needs no heads, and no settings for the height of the camera",
     },
-    Choice {
-        config: "stereo-verified",
-        has: "a stereo pair",
-        reason: "verifiers judge what it finds",
-    },
+    Choice { config: "stereo-verified", reason: "verifiers judge what it finds" },
     Choice {
         config: "stereo-street",
-        has: "a stereo pair with a long base",
         reason: "stereo-verified looks for smaller disparities than such a pair has",
     },
     Choice {
         config: PANORAMIC,
-        has: "panoramic images",
         reason: "it is the one for several people before a conical mirror",
     },
     Choice {
         config: "mono",
-        has: "colour or grey images alone",
         reason: "nothing else works without depth; places in metres are rough",
     },
     Choice {
         config: "laser-legs",
-        has: "laser scans and odometry",
         reason: "it believes in what moves where nothing was; people who stand may be missed",
     },
-    Choice {
-        config: "laser-follow",
-        has: "laser scans without odometry",
-        reason: "nothing can be concluded from motion over ground",
-    },
+    Choice { config: "laser-follow", reason: "nothing can be concluded from motion over ground" },
 ];
 
 /// A pipeline that fits a log.
@@ -86,6 +70,8 @@ pub struct Fitting {
 pub struct Fittings {
     /// Those that fit, the best first.
     pub fitting: Vec<Fitting>,
+    /// Use of the topics of the log by a pipeline that takes all inputs.
+    pub account: InputAccount,
     /// A line for each of the others.
     pub refusals: String,
 }
@@ -94,9 +80,49 @@ impl Fittings {
     /// Returns the failure of a log that no pipeline fits.
     pub fn none_fits(&self, log: &Path) -> Failure {
         let damage = damage(log);
+        let account: String =
+            self.account.lines().iter().map(|line| format!("\n  {line}")).collect();
+        let account = if account.is_empty() { account } else { format!("\nits topics:{account}") };
         let (log, refusals) = (log.display(), &self.refusals);
         let hint = format!("`tagalong inspect {log}` lists its topics");
-        Failure::failed(format!("{log}: no built-in pipeline fits:{refusals}\n{damage}{hint}"))
+        Failure::failed(format!(
+            "{log}: no built-in pipeline fits:{refusals}{account}\n{damage}{hint}"
+        ))
+    }
+
+    /// Returns what the log has, in words: the inputs that can be used, and how many topics cannot.
+    pub fn contents(&self) -> String {
+        let usable = self.account.usable();
+        let usable = if usable.is_empty() { "nothing usable".into() } else { usable.join(", ") };
+        let mut unusable: Vec<&str> =
+            self.account.curable().filter_map(|topic| topic.could_be).collect();
+        unusable.dedup();
+        match unusable.is_empty() {
+            true => usable,
+            false => format!("{usable}, and {} that cannot be used", unusable.join(", ")),
+        }
+    }
+
+    /// Returns the pipeline that would be taken if a topic could be used, with the reason why it
+    /// cannot and the remedy; `None` if nothing in the log stands in the way of a better one.
+    pub fn better(&self) -> Option<String> {
+        let place = |name: &str| CHOICES.iter().position(|choice| choice.config == name);
+        let taken = place(self.fitting.first()?.choice.config)?;
+        let topic = self.account.curable().find(|topic| {
+            // These two are what the first of all needs.
+            matches!(topic.could_be, Some("depth" | "colour"))
+        })?;
+        let best = CHOICES[0].config;
+        if taken == 0 {
+            return None;
+        }
+        let could_be = topic.could_be.unwrap_or_default();
+        let why = topic.problem.as_deref().unwrap_or_default();
+        let remedy = topic.remedy.as_ref().map(|it| format!("; {it}")).unwrap_or_default();
+        Some(format!(
+            "{best} would do better and needs {could_be}, but {} ({}) cannot be used: {why}{remedy}",
+            topic.topic, topic.kind
+        ))
     }
 }
 
@@ -109,19 +135,27 @@ fn damage(log: &Path) -> String {
 }
 
 /// Returns the first pipelines that fit a log, at most `most`, by trying each on its first frame.
-pub fn fitting(log: &Path, registry: &Registry, most: usize) -> Fittings {
-    let mut found = Fittings::default();
+pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -> Fittings {
+    let mut found = Fittings { account: account(log, args), ..Fittings::default() };
     for choice in CHOICES {
         let Some(config) = ConfigFile::named(choice.config) else { continue };
         if found.fitting.len() == most {
             break;
         }
-        match try_config(&config, log, registry) {
+        match try_config(&config, log, registry, args) {
             Ok(()) => found.fitting.push(Fitting { choice, config }),
             Err(why) => found.refusals += &refusal(choice.config, log, &why),
         }
     }
     found
+}
+
+/// Returns the use of the topics by a pipeline that takes all inputs; nothing for a log that cannot be
+/// read, of which the trials tell why.
+fn account(log: &Path, args: &InputArgs) -> InputAccount {
+    let input = args.applied(OuterSettings::default()).input;
+    let found = tagalong_log::inspect(log, &input, &Limits::default());
+    found.map(|found| found.inputs).unwrap_or_default()
 }
 
 /// Returns a line that says why a config does not fit: without the path of the log and the list of
@@ -133,12 +167,20 @@ fn refusal(config: &str, log: &Path, why: &Failure) -> String {
 }
 
 /// Takes the first frame of a log through a pipeline.
-fn try_config(config: &ConfigFile, log: &Path, registry: &Registry) -> Result<(), Failure> {
+fn try_config(
+    config: &ConfigFile,
+    log: &Path,
+    registry: &Registry,
+    args: &InputArgs,
+) -> Result<(), Failure> {
     let (mut pipeline, settings) = config.pipeline(registry, None)?;
-    let outer = config.outer_for(&pipeline)?;
+    let outer = args.applied(config.outer_for(&pipeline)?);
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
     let Some(item) = source.next_frame() else {
-        return Err(Failure::failed("no frame that can be used"));
+        let account = source.account();
+        let failing = account.topics.iter().find(|it| it.used_as.is_some() && it.problem.is_some());
+        let why = failing.map(|topic| format!(": {topic}")).unwrap_or_default();
+        return Err(Failure::failed(format!("no frame that can be used{why}")));
     };
     // Any colour image passes for a panorama, and a panorama for any image.
     if item.frame.camera.panorama().is_some() != (config.stem() == PANORAMIC) {

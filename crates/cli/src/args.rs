@@ -4,6 +4,7 @@ use clap::{Parser, Subcommand};
 use clap_complete::Shell;
 use tagalong_annotate::{AnnotateArgs, HELP as ANNOTATE_HELP};
 use tagalong_app::format::{Format, TableFormat};
+use tagalong_app::input_args::InputArgs;
 use tagalong_benchmark::BenchArgs;
 use tagalong_doctor::DoctorArgs;
 use tagalong_experiments::boxes::{BoxesArgs, HELP as BOXES_HELP};
@@ -136,6 +137,9 @@ pub enum Command {
         /// Take the `[input]` and `[limits]` sections of this config.
         #[arg(long)]
         config: Option<PathBuf>,
+        /// Way in which the log is read.
+        #[command(flatten)]
+        input: InputArgs,
         /// Output format.
         #[arg(long, value_enum, default_value_t)]
         format: Format,

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tagalong_app::format::Format;
+use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
@@ -97,6 +98,7 @@ fn run_args(folder: &Path, name: &str, config: PathBuf, log: &Path) -> RunArgs {
         threads: None,
         seed: None,
         format: Format::Text,
+        input: InputArgs::default(),
         quiet: true,
     }
 }

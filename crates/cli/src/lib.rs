@@ -116,8 +116,8 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Trials(args) => tagalong_experiments::trials::trials(args, registry),
         Command::Train(args) => tagalong_training::train(args, registry),
         Command::Model(args) => commands::model(args, registry),
-        Command::Inspect { log, config, format } => {
-            commands::inspect(log, config.as_deref(), *format)
+        Command::Inspect { log, config, input, format } => {
+            commands::inspect(log, config.as_deref(), input, *format)
         }
     }
 }

@@ -6,8 +6,8 @@ use nalgebra::Translation3;
 use tagalong_geometry::Camera;
 
 use crate::{
-    CameraImage, DepthImage, EgoMotion, Error, ExternalDetection, ExternalDetections, GreyImage,
-    Input, Inputs, LaserScan, Result, RgbImage, RightImage, Sensor, Sensors, Stamp,
+    CameraImage, DepthImage, EgoMotion, Error, ExternalDetection, ExternalDetections, FurtherScans,
+    GreyImage, Input, Inputs, LaserScan, Result, RgbImage, RightImage, Sensor, Sensors, Stamp,
 };
 
 /// Images of one moment and one camera. All have the size of the camera's image, and show the same view unless the
@@ -215,6 +215,17 @@ impl Frame {
     /// scanner, or if it delivered no scan.
     pub fn laser(&self) -> Option<&LaserScan> {
         self.sensors.get()
+    }
+
+    /// Yields the scans of all laser scanners: [`Frame::laser`] and those of further ones.
+    pub fn scans(&self) -> impl Iterator<Item = &LaserScan> {
+        self.laser().into_iter().chain(self.further_scans().iter().flatten())
+    }
+
+    /// Returns the scans of further laser scanners, each in a place of its own; `None` where a scanner
+    /// is silent.
+    pub fn further_scans(&self) -> &[Option<LaserScan>] {
+        self.sensors.get::<FurtherScans>().map_or(&[], |further| &further.0)
     }
 
     /// Returns the laser scan, for plugins that require one.

@@ -60,7 +60,7 @@ pub use manager::{
 };
 pub use motion::{DiffDrive, EgoMotion, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, planar_pose};
 pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReading};
-pub use scan::{LaserScan, RayReading, UnreadRay};
+pub use scan::{FurtherScans, LaserScan, RayReading, UnreadRay};
 pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};
 pub use time::Stamp;
 pub use track::{Track, TrackId};

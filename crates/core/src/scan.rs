@@ -24,6 +24,11 @@ pub struct LaserScan {
     pub unread: Arc<[UnreadRay]>,
 }
 
+/// Scans of further laser scanners at the moment of a frame, each in a place of its own; `None` where
+/// a scanner is silent.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FurtherScans(pub Arc<[Option<LaserScan>]>);
+
 /// Ray of a laser scanner without a usable distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnreadRay {

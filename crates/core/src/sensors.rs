@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use tagalong_geometry::Camera;
 
-use crate::{DepthImage, ExternalDetection, GreyImage, Input, Inputs, LaserScan, RgbImage};
+use crate::{
+    DepthImage, ExternalDetection, FurtherScans, GreyImage, Input, Inputs, LaserScan, RgbImage,
+};
 
 /// Data of one sensor in a frame.
 ///
@@ -62,6 +64,10 @@ impl Sensor for CameraImage<RightImage> {
 }
 
 impl Sensor for LaserScan {
+    const INPUT: Input = Input::Laser;
+}
+
+impl Sensor for FurtherScans {
     const INPUT: Input = Input::Laser;
 }
 

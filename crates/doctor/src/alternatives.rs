@@ -115,7 +115,7 @@ pub fn another(config: &str) -> String {
 
 /// Returns the built-in configs that fit the log.
 fn others(config: &ConfigFile, scope: Scope, registry: &Registry) -> Vec<Runner> {
-    let found = fitting(scope.log, registry, MOST_CONFIGS).fitting;
+    let found = fitting(scope.log, registry, scope.input, MOST_CONFIGS).fitting;
     let others = found.into_iter().filter(|other| other.config.stem() != config.stem());
     others
         .filter_map(|other| {

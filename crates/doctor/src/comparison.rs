@@ -36,10 +36,11 @@ pub struct Row {
 /// # Errors
 /// A log that no pipeline fits; a folder that cannot be written.
 pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<Diagnosis, Failure> {
-    let found = fitting(scope.log, registry, CHOICES.len());
+    let found = fitting(scope.log, registry, scope.input, CHOICES.len());
     if found.fitting.is_empty() {
         return Err(found.none_fits(scope.log));
     }
+    let (contents, better) = (found.contents(), found.better());
     let (mut rows, mut first) = (Vec::new(), None);
     for Fitting { choice, config } in found.fitting {
         let visit = Visit::make(config, scope, registry)?;
@@ -63,7 +64,7 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
     let first =
         Diagnosis::of(&visit, name.into(), args, folder.as_deref(), &Remedies::new(registry))?;
     let pictures = args.output.clone();
-    Ok(Diagnosis { pipelines: rows, alternatives: shown, pictures, ..first })
+    Ok(Diagnosis { pipelines: rows, contents, better, alternatives: shown, pictures, ..first })
 }
 
 impl Row {

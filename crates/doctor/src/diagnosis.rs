@@ -6,6 +6,7 @@ use serde::Serialize;
 use tagalong_app::outcome::{Failure, make_folder};
 use tagalong_app::remedies::Remedies;
 use tagalong_config::path_text;
+use tagalong_log::InputAccount;
 
 use super::alternatives::Alternative;
 use super::comparison::Row;
@@ -28,6 +29,14 @@ pub struct Diagnosis {
     /// All pipelines that fit the log, where no config was given.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pipelines: Vec<Row>,
+    /// Inputs that the log has, in words.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub contents: String,
+    /// Better pipeline that a topic would make possible, with the remedy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub better: Option<String>,
+    /// Use of each image, scan, detection and odometry topic, with the reasons for those not used.
+    pub inputs: InputAccount,
     /// Results of the checks.
     pub findings: Vec<Finding>,
     /// Figures of the pipeline.
@@ -81,6 +90,9 @@ impl Diagnosis {
             log: args.log.clone(),
             frames: evidence.trial.frames,
             pipelines: Vec::new(),
+            contents: String::new(),
+            better: None,
+            inputs: evidence.inspection.inputs.clone(),
             findings: findings.collect(),
             coverage: evidence.coverage.clone(),
             alternatives: evidence.alternatives.clone(),

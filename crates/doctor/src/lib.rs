@@ -28,6 +28,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::Format;
+use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::remedies::Remedies;
 use tagalong_app::serialize::to_json;
@@ -65,6 +66,9 @@ pub struct DoctorArgs {
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
+    /// Way in which the log is read.
+    #[command(flatten)]
+    pub input: InputArgs,
 }
 
 /// Occasion for trying other settings.
@@ -94,7 +98,12 @@ pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
     if let Some(folder) = &args.output {
         RunDir::check(folder, args.overwrite, &args.log).map_err(Failure::usage)?;
     }
-    let scope = Scope { log: &args.log, frames: args.frames, with_pictures: args.output.is_some() };
+    let scope = Scope {
+        log: &args.log,
+        input: &args.input,
+        frames: args.frames,
+        with_pictures: args.output.is_some(),
+    };
     let diagnosis = match config {
         Some(config) => diagnose(config, args, scope, registry)?,
         None => comparison::compare(args, scope, registry)?,

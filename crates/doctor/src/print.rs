@@ -19,6 +19,12 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     pipelines(&mut out, diagnosis);
     let _ = writeln!(out, "{log} through {config}, {} frames", diagnosis.frames);
     out.push('\n');
+    for line in diagnosis.inputs.lines() {
+        let _ = writeln!(out, "{line}");
+    }
+    if !diagnosis.inputs.topics.is_empty() {
+        out.push('\n');
+    }
     diagnosis.findings.iter().for_each(|found| finding(&mut out, found));
     settings(&mut out, diagnosis);
     if let Some(folder) = &diagnosis.pictures {
@@ -48,7 +54,12 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
     }
     let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
     if let Some(taken) = diagnosis.pipelines.iter().find(|row| row.taken) {
-        let _ = writeln!(out, "\n`tagalong run` takes {}, because {}", taken.config, taken.reason);
+        let (contents, name, why) = (&diagnosis.contents, taken.config, taken.reason);
+        let _ =
+            writeln!(out, "\nthe log has {contents}: `tagalong run` takes {name}, because {why}");
+        if let Some(better) = &diagnosis.better {
+            let _ = writeln!(out, "{better}");
+        }
         better(out, taken, &diagnosis.pipelines);
         out.push('\n');
     }

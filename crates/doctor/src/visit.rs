@@ -5,6 +5,7 @@ use std::path::Path;
 use tagalong::logs::sources_of;
 use tagalong_app::choice::{CHOICES, fitting};
 use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
+use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::Failure;
 use tagalong_app::progress::Progress;
 use tagalong_config::Registry;
@@ -38,6 +39,8 @@ pub struct Visit {
 pub struct Scope<'a> {
     /// The log.
     pub log: &'a Path,
+    /// Way in which it is read.
+    pub input: &'a InputArgs,
     /// Number of frames.
     pub frames: u64,
     /// True if pictures are wanted.
@@ -51,7 +54,7 @@ impl Visit {
     /// A config or a log that cannot be read.
     pub fn make(config: ConfigFile, scope: Scope, registry: &Registry) -> Result<Self, Failure> {
         let (mut pipeline, settings) = config.pipeline(registry, None)?;
-        let outer = config.outer_for(&pipeline)?;
+        let outer = scope.input.applied(config.outer_for(&pipeline)?);
         let inputs = pipeline.inputs();
         // Light and coverage are judged, and pictures are rendered, also where the pipeline does
         // not use colour or depth.
@@ -97,7 +100,7 @@ impl Visit {
     /// Looks for other settings and other configs where the findings ask for them.
     pub fn ask_further(&mut self, when: Trying, scope: Scope, registry: &Registry) {
         if self.evidence.refusal.is_some() {
-            let found = fitting(scope.log, registry, CHOICES.len()).fitting;
+            let found = fitting(scope.log, registry, scope.input, CHOICES.len()).fitting;
             self.evidence.fitting = found.iter().map(|other| other.choice.config).collect();
             return;
         }

@@ -19,6 +19,32 @@ pub struct Intrinsics {
     pub mirror: Option<Mirrored>,
 }
 
+impl Intrinsics {
+    /// Returns the lens for images that are smaller or larger by a whole number in both directions;
+    /// `None` for other sizes, equal ones included.
+    pub fn scaled_to(&self, width: usize, height: usize) -> Option<Self> {
+        let is_known = self.width > 0 && self.height > 0 && width > 0 && height > 0;
+        if !is_known || self.mirror.is_some() || (width, height) == (self.width, self.height) {
+            return None;
+        }
+        let is_multiple = |large: (usize, usize), small: (usize, usize)| {
+            let times = large.0 / small.0;
+            times > 1 && (times * small.0, times * small.1) == large
+        };
+        let (ours, theirs) = ((self.width, self.height), (width, height));
+        if !is_multiple(ours, theirs) && !is_multiple(theirs, ours) {
+            return None;
+        }
+        let scale = width as f64 / self.width as f64;
+        // Pixel centres have whole coordinates, hence the half pixels.
+        let centre = |c: f64| (c + 0.5) * scale - 0.5;
+        let Pinhole { fx, fy, cx, cy, distortion } = self.lens;
+        let lens =
+            Pinhole { fx: fx * scale, fy: fy * scale, cx: centre(cx), cy: centre(cy), distortion };
+        Some(Self { lens, width, height, ..*self })
+    }
+}
+
 /// Image of a camera with a conical mirror.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mirrored {
@@ -135,8 +161,11 @@ pub fn intrinsics(info: &CameraInfo, rectified: bool) -> Result<Intrinsics, Cali
     check_finite(info)?;
     check_rotation(&info.r)?;
     let (k, p) = (&info.k, &info.p);
+    let is_k_blank = k.iter().all(|v| *v == 0.0);
+    // P holds for rectified images; where K is left out, it is all there is.
+    let rectified = rectified || is_k_blank && p[0] != 0.0;
     let use_p = rectified && p[0] != 0.0;
-    if !use_p && k.iter().all(|v| *v == 0.0) {
+    if !use_p && is_k_blank {
         return Err(CalibrationError::Uncalibrated);
     }
     let full = if use_p {
@@ -378,7 +407,11 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_refused_by_name() {
-        assert!(broken(|i| i.k = [0.0; 9]).contains("uncalibrated"));
+        let blank = |i: &mut CameraInfo| {
+            i.k = [0.0; 9];
+            i.p = [0.0; 12];
+        };
+        assert!(broken(blank).contains("uncalibrated"));
         assert!(broken(|i| i.k[0] = f64::NAN).starts_with("K = NaN"));
         assert!(broken(|i| i.k[4] = -1.0).starts_with("K[4] = -1"));
         assert!(broken(|i| i.k[2] = 900.0).starts_with("K[2] = 900"));
@@ -413,6 +446,25 @@ mod tests {
         let mut all = [0.0; 14];
         all[..first.len()].copy_from_slice(first);
         Distortion::Rational(all)
+    }
+
+    #[test]
+    fn p_stands_in_for_a_k_that_is_left_out() {
+        let seen = intrinsics(&CameraInfo { k: [0.0; 9], ..info() }, false).unwrap();
+        assert_eq!((seen.lens.fx, seen.lens.cx), (480.0, 321.0));
+        assert_eq!(seen.lens.distortion, Distortion::None);
+    }
+
+    #[test]
+    fn a_whole_number_of_sizes_scales_the_lens_and_no_other_does() {
+        let calibrated = intrinsics(&info(), false).unwrap();
+        let half = calibrated.scaled_to(320, 240).unwrap();
+        assert_eq!((half.lens.fx, half.lens.cx, half.width), (250.0, 159.75, 320));
+        let double = half.scaled_to(640, 480).unwrap();
+        assert!((double.lens.cx - calibrated.lens.cx).abs() < 1e-9);
+        for (width, height) in [(640, 480), (640, 360), (960, 720), (320, 480), (0, 0)] {
+            assert_eq!(calibrated.scaled_to(width, height), None, "{width}x{height}");
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod unfinished;
 
 use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
 
 use rusqlite::{OptionalExtension as _, Row};
 
@@ -196,5 +197,6 @@ fn channel(row: &Row<'_>, longest: u64) -> rusqlite::Result<Channel> {
         schema_name: text(2)?,
         schema_encoding: "ros2msg".into(),
         encoding: text(3)?,
+        definition: Arc::default(),
     })
 }

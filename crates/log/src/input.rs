@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 
 use crate::LogError;
+use crate::camera_settings::CameraSettings;
 use crate::obstacles::ObstacleTopic;
 use crate::sensors::{SENSORS, SensorType};
 
@@ -29,6 +30,10 @@ pub struct InputSettings {
     /// Topic of detections that another program recorded (`vision_msgs` Detection2DArray or
     /// Detection3DArray), for `recorded-detections`.
     pub detections_topic: Option<String>,
+    /// Classes of recorded detections that are people, by name or number; by default those with a
+    /// usual name (`person`, `pedestrian`, ...), the number 0, and detections without a class.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub detection_classes: Vec<String>,
     /// Topics of further sensors, by the names of their inputs.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub topics: BTreeMap<String, String>,
@@ -55,8 +60,11 @@ pub struct InputSettings {
     /// not registered well (`tagalong doctor` measures it).
     #[schemars(inner(range(min = -1000, max = 1000)))]
     pub depth_offset_px: [i32; 2],
-    /// Pose of the camera, for logs without it in tf, or with a wrong one.
-    pub camera: Option<MountSettings>,
+    /// Camera whose images are used, of several: the folder that its topics share. Or, as a table, the
+    /// pose of the camera, for logs without it in tf, or with a wrong one.
+    pub camera: Option<CameraSettings>,
+    /// Source of the times of messages.
+    pub stamps: StampSource,
     /// Columns and rows to which the circular image of a conical mirror is unwrapped.
     #[schemars(inner(range(min = 8, max = 8192)))]
     pub panorama: [usize; 2],
@@ -83,6 +91,7 @@ impl Default for InputSettings {
             odometry_topic: None,
             laser_topic: None,
             detections_topic: None,
+            detection_classes: Vec::new(),
             topics: BTreeMap::new(),
             right_topic: None,
             right_info_topic: None,
@@ -93,6 +102,7 @@ impl Default for InputSettings {
             disparity: None,
             depth_offset_px: [0, 0],
             camera: None,
+            stamps: StampSource::default(),
             panorama: [480, 120],
             reorder_frames: 3,
             odometry_sigma: 0.02,
@@ -102,6 +112,22 @@ impl Default for InputSettings {
 }
 
 impl InputSettings {
+    /// Returns the name of the camera whose images are wanted.
+    pub(crate) fn camera_name(&self) -> Option<&str> {
+        match self.camera.as_ref()? {
+            CameraSettings::Named(name) => Some(name),
+            CameraSettings::Mounted(mount) => mount.name.as_deref(),
+        }
+    }
+
+    /// Returns the pose of the camera, if the settings give one.
+    pub fn mount(&self) -> Option<&MountSettings> {
+        match self.camera.as_ref()? {
+            CameraSettings::Named(_) => None,
+            CameraSettings::Mounted(mount) => Some(mount),
+        }
+    }
+
     /// Checks the values.
     ///
     /// # Errors
@@ -137,10 +163,26 @@ pub struct DisparitySettings {
     pub baseline_m: Option<f64>,
 }
 
+/// Source of the times of messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum StampSource {
+    /// Their stamps, unless these are never set: then the times of recording.
+    #[default]
+    Auto,
+    /// Their stamps.
+    Header,
+    /// The times at which they were recorded.
+    Recording,
+}
+
 /// Pose of the camera: above the robot's origin, looking forward.
-#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MountSettings {
+    /// Camera whose images are used, of several: the folder that its topics share.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Height above the floor, m.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 100))]
     pub height_m: f64,
@@ -150,6 +192,13 @@ pub struct MountSettings {
     /// Roll, degrees; positive if its right side is raised.
     #[schemars(range(min = -180.0, max = 180.0))]
     pub roll_deg: f64,
+}
+
+impl MountSettings {
+    /// Returns the pose as that of the camera of this name.
+    pub fn with_name(self, name: &str) -> Self {
+        Self { name: Some(name.to_owned()), ..self }
+    }
 }
 
 #[cfg(test)]

@@ -10,7 +10,8 @@ use serde::Serialize;
 use crate::images::Content;
 use crate::scan::{Scan, Topic};
 use crate::timing::{Skew, Timing};
-use crate::{FrameSource, InputSettings, Inputs, Limits, LogError, LogFacts};
+use crate::topics::account_of;
+use crate::{FrameSource, InputAccount, InputSettings, Inputs, Limits, LogError, LogFacts};
 
 /// Description of one topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -60,6 +61,8 @@ pub struct Inspection {
     pub skew: Option<Skew>,
     /// Transforms: each frame with its parent.
     pub transforms: BTreeMap<String, String>,
+    /// Use of each image, scan, detection and odometry topic, with reasons.
+    pub inputs: InputAccount,
     /// Inputs that a pipeline could use: `colour`, `depth`, `right`, `odometry`, `laser`, and
     /// the names of further sensors.
     pub usable: Vec<&'static str>,
@@ -114,7 +117,10 @@ pub fn examine(
     let mut inspection = Inspection::of_scan(&scan);
     match &everything {
         Ok(frames) => inspection.describe(&scan, frames, input.pair_tolerance_s),
-        Err(refusal) => inspection.unusable = Some(refusal.to_string()),
+        Err(refusal) => {
+            inspection.unusable = Some(refusal.to_string());
+            inspection.inputs = account_of(&scan, input);
+        }
     }
     let (frames, refusal) = match open(inputs) {
         Ok(frames) => (Some(frames), None),
@@ -139,6 +145,7 @@ impl Inspection {
             topics: scan.topics.iter().map(|(name, topic)| topic_facts(name, topic)).collect(),
             skew: None,
             transforms: scan.tf.parents(),
+            inputs: InputAccount::default(),
             usable: Vec::new(),
             unusable: None,
             counters: scan.counters.clone(),
@@ -158,7 +165,9 @@ impl Inspection {
             ("odometry", &facts.odometry_topic),
             ("laser", &facts.laser_topic),
         ];
-        let found = usable.iter().filter(|(_, t)| t.is_some()).map(|(name, _)| *name);
+        self.inputs = source.account().clone();
+        let fails = |name: &str| self.inputs.used_as(name).is_some_and(|it| it.problem.is_some());
+        let found = usable.iter().filter(|(name, t)| t.is_some() && !fails(name)).map(|(n, _)| *n);
         self.usable = found.chain(facts.sensor_topics.keys().copied()).collect();
         let stamps = |topic: &Option<String>| {
             topic.as_ref().and_then(|topic| scan.topics.get(topic)).map(|topic| &topic.stamps[..])
@@ -205,6 +214,10 @@ impl fmt::Display for Inspection {
         match &self.unusable {
             Some(why) => writeln!(f, "\nno frames can be made: {why}")?,
             None => self.write_camera(f)?,
+        }
+        if !self.inputs.topics.is_empty() {
+            writeln!(f, "\ninputs")?;
+            self.inputs.lines().iter().try_for_each(|line| writeln!(f, "  {line}"))?;
         }
         if !self.notes.is_empty() {
             writeln!(f, "\nnotes")?;

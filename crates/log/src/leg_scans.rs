@@ -7,7 +7,7 @@ use tagalong_core::LaserScan as CoreScan;
 
 use crate::msgs::{LaserScan, PoseArray, decode};
 use crate::packed::LogFile;
-use crate::sensors::laser::{is_sane, seen_from};
+use crate::sensors::laser::{scan_fault, seen_from};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
@@ -41,7 +41,7 @@ pub fn read_leg_scans(path: &Path, limits: &Limits) -> Result<Vec<LegScan>, LogE
         let channel = message.channel;
         let is_scan = channel.schema_name.ends_with("/LaserScan");
         if is_scan {
-            match decode::<LaserScan>(message.data).ok().filter(is_sane) {
+            match decode::<LaserScan>(message.data).ok().filter(|scan| scan_fault(scan).is_none()) {
                 Some(scan) => scans.push((channel.topic.clone(), core_scan(&scan))),
                 None => unreadable += 1,
             }

@@ -16,6 +16,7 @@
 mod attachment;
 mod bag;
 pub mod camera_info;
+mod camera_settings;
 mod database;
 mod error;
 pub mod images;
@@ -44,8 +45,9 @@ mod walker;
 pub mod write;
 
 pub use attachment::read_attachment;
+pub use camera_settings::CameraSettings;
 pub use error::LogError;
-pub use input::{DisparitySettings, InputSettings, MountSettings};
+pub use input::{DisparitySettings, InputSettings, MountSettings, StampSource};
 pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};
 pub use leg_scans::{LegScan, read_leg_scans};
 pub use limits::Limits;
@@ -56,6 +58,7 @@ pub use packed::LogFile;
 pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
 pub use tagalong_core::{Input, Inputs, Usage};
 pub use timing::{Skew, Timing};
+pub use topics::{InputAccount, TopicUse};
 pub use truth::{
     TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthJoint, TruthPerson, read_truth, read_truth_lines,
 };

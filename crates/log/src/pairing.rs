@@ -129,8 +129,10 @@ pub(crate) type Popped = (Payload, Option<Stamp>);
 pub(crate) enum Arrival {
     /// The image waits for its turn.
     Queued,
-    /// The stamp is that of another image.
+    /// The image is another one again: the same stamp and the same bytes.
     Duplicate,
+    /// Another image with the same stamp, which is lost.
+    SameStamp,
     /// The image is older than the last one delivered; the next image will show if it is late or if
     /// the clock has jumped.
     Suspect,
@@ -141,6 +143,14 @@ pub(crate) enum Arrival {
     Jumped,
 }
 
+/// Returns a hash of the bytes of an image (FNV-1a over words of 8 bytes).
+fn hash_of(data: &[u8]) -> u64 {
+    let (words, rest) = data.as_chunks::<8>();
+    let words = words.iter().map(|word| u64::from_le_bytes(*word));
+    let all = words.chain(rest.iter().map(|byte| u64::from(*byte)));
+    all.fold(0xcbf2_9ce4_8422_2325, |hash, word| (hash ^ word).wrapping_mul(0x0100_0000_01b3))
+}
+
 /// Queue that orders a stream of images by stamp.
 #[derive(Debug)]
 pub(crate) struct Reorder {
@@ -149,21 +159,25 @@ pub(crate) struct Reorder {
     ready: VecDeque<Payload>,
     suspect: Option<Payload>,
     last: Option<Stamp>,
+    /// Hash of the image that was delivered last.
+    last_hash: u64,
 }
 
 impl Reorder {
     pub(crate) fn new(window: usize) -> Self {
-        Self { window, queue: VecDeque::new(), ready: VecDeque::new(), suspect: None, last: None }
+        Self {
+            window,
+            queue: VecDeque::new(),
+            ready: VecDeque::new(),
+            suspect: None,
+            last: None,
+            last_hash: 0,
+        }
     }
 
     pub(crate) fn push(&mut self, payload: Payload) -> Arrival {
-        let taken = |stamp: Stamp| {
-            self.last == Some(stamp)
-                || self.queue.iter().any(|queued| queued.stamp == stamp)
-                || self.suspect.as_ref().is_some_and(|suspect| suspect.stamp == stamp)
-        };
-        if taken(payload.stamp) {
-            return Arrival::Duplicate;
+        if let Some(is_same) = self.meets_again(&payload) {
+            return if is_same { Arrival::Duplicate } else { Arrival::SameStamp };
         }
         let is_old = self.last.is_some_and(|last| payload.stamp < last);
         match (self.suspect.take(), is_old) {
@@ -190,6 +204,16 @@ impl Reorder {
         }
     }
 
+    /// Returns true if an image with the same stamp has the same bytes, false if it has others; `None`
+    /// if there is none with that stamp.
+    fn meets_again(&self, payload: &Payload) -> Option<bool> {
+        let waiting = self.queue.iter().chain(&self.suspect);
+        if let Some(other) = waiting.into_iter().find(|other| other.stamp == payload.stamp) {
+            return Some(other.data == payload.data);
+        }
+        (self.last == Some(payload.stamp)).then(|| self.last_hash == hash_of(&payload.data))
+    }
+
     fn enqueue(&mut self, payload: Payload) {
         let place = self.queue.partition_point(|queued| queued.stamp < payload.stamp);
         self.queue.insert(place, payload);
@@ -206,6 +230,7 @@ impl Reorder {
         }
         let payload = self.queue.pop_front()?;
         self.last = Some(payload.stamp);
+        self.last_hash = hash_of(&payload.data);
         Some((payload, self.queue.front().map(|next| next.stamp)))
     }
 

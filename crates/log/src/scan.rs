@@ -9,16 +9,17 @@ use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
 use crate::images::{
-    Content, content_of_encoding, content_of_format, is_coded_picture, may_be_disparity,
+    Codec, Content, content_of_encoding, content_of_format, may_be_disparity, size_of_compressed,
 };
 use crate::log_files::LogFiles;
 use crate::msgs::{
-    CameraInfo, CompressedImage, DisparityImage, Header, Image, Odometry, TFMessage,
+    CameraInfo, CompressedImage, DisparityImage, Float32Msg, Header, Image, Odometry, TFMessage,
     TransformStamped, decode,
 };
 use crate::packed::LogFile;
 use crate::sensors::SensorType;
 use crate::tf::TfBuffer;
+use crate::topics::{Stream, TopicName};
 use crate::walk::{Channel, Counters, Message};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
@@ -37,6 +38,8 @@ pub(crate) enum Type {
     Odometry,
     /// Messages of an entry in [`crate::sensors::SENSORS`].
     Sensor,
+    /// A number, which may be the unit of a depth camera.
+    Number,
     Other,
 }
 
@@ -51,6 +54,7 @@ impl Type {
             ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
             ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Self::Tf,
             ("nav_msgs", "Odometry") => Self::Odometry,
+            ("std_msgs", "Float32") => Self::Number,
             _ if SensorType::of_message(schema).is_some() => Self::Sensor,
             _ => Self::Other,
         }
@@ -70,10 +74,16 @@ pub(crate) struct Topic {
     /// `encoding` or `format` of the first image.
     pub(crate) pixels: Option<String>,
     pub(crate) content: Content,
-    /// Columns and rows of the first uncompressed image.
+    /// True for grey images of 16 bits whose encoding leaves open whether they are depth.
+    pub(crate) is_deep_grey: bool,
+    /// True for depth that was compressed as JPEG, which keeps 8 bits.
+    pub(crate) is_jpeg_depth: bool,
+    /// Columns and rows of the first image.
     pub(crate) size: Option<(u32, u32)>,
     pub(crate) frame_id: Option<String>,
     pub(crate) stamps: Vec<Stamp>,
+    /// Times at which the messages with these stamps were recorded.
+    pub(crate) recorded: Vec<Stamp>,
 }
 
 /// Contents of a log.
@@ -85,8 +95,10 @@ pub(crate) struct Scan {
     /// Files of the log; none for a source that is no file.
     pub(crate) parts: Vec<LogPart>,
     pub(crate) topics: BTreeMap<String, Topic>,
-    /// First calibration of each topic.
+    /// First calibration of each topic that is not all zero.
     pub(crate) infos: BTreeMap<String, CameraInfo>,
+    /// Metres per unit of depth, by the topics on which depth cameras say so.
+    pub(crate) depth_units: BTreeMap<String, f64>,
     /// All static transforms, and of the moving ones the frames that they connect.
     pub(crate) tf: TfBuffer,
     pub(crate) counters: Counters,
@@ -178,12 +190,12 @@ impl Scan {
             (scan.bytes, hash) = (scan.bytes + bytes, so_far);
         }
         let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-        let Gathering { topics, infos, mut tf, replaced, .. } = gathering;
+        let Gathering { topics, infos, depth_units, mut tf, replaced, .. } = gathering;
         // The frames begin with the first ones, and meet the others on the way.
         for first in replaced.values() {
             tf.insert(first, true);
         }
-        Ok(Self { path: path.to_owned(), sha256, topics, infos, tf, ..scan })
+        Ok(Self { path: path.to_owned(), sha256, topics, infos, depth_units, tf, ..scan })
     }
 
     /// Adds the walk through one file.
@@ -225,6 +237,20 @@ impl Scan {
         self.parts.is_empty()
     }
 
+    /// Yields the names of all topics, in order.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.topics.keys().map(String::as_str)
+    }
+
+    /// Returns the contents with the times of recording in place of all stamps.
+    pub(crate) fn with_recording_times(&self) -> Self {
+        let mut scan = self.clone();
+        for topic in scan.topics.values_mut() {
+            topic.stamps = topic.recorded.clone();
+        }
+        scan
+    }
+
     /// Returns the frame of the images of a topic.
     pub(crate) fn frame_of(&self, topic: &str) -> Option<&str> {
         self.topics.get(topic)?.frame_id.as_deref()
@@ -253,6 +279,7 @@ fn unread(files: &LogFiles) -> Vec<LogPart> {
 pub(crate) struct Gathering {
     topics: BTreeMap<String, Topic>,
     infos: BTreeMap<String, CameraInfo>,
+    depth_units: BTreeMap<String, f64>,
     tf: TfBuffer,
     linked: BTreeSet<(String, String)>,
     /// First static transform of each frame that has several.
@@ -274,6 +301,7 @@ impl Gathering {
             parts: Vec::new(),
             topics: self.topics.clone(),
             infos: self.infos.clone(),
+            depth_units: self.depth_units.clone(),
             tf: self.tf.clone(),
             counters: Counters::new(),
             notes: Vec::new(),
@@ -298,9 +326,12 @@ impl Gathering {
             last_log_time: 0,
             pixels: None,
             content: Content::Unknown,
+            is_deep_grey: false,
+            is_jpeg_depth: false,
             size: None,
             frame_id: None,
             stamps: Vec::new(),
+            recorded: Vec::new(),
         })
     }
 
@@ -312,28 +343,44 @@ impl Gathering {
         topic.first_log_time = topic.first_log_time.min(message.log_time);
         topic.last_log_time = topic.last_log_time.max(message.log_time);
         let done = match topic.kind {
-            Type::Image => topic.take_image(message.data, unit),
-            Type::CompressedImage => topic.take_compressed(message.data),
+            Type::Image => topic.take_image(&channel.topic, message.data, unit),
+            Type::CompressedImage => topic.take_compressed(&channel.topic, message.data),
             Type::DisparityImage => topic.take_disparity(message.data),
             Type::Odometry => topic.take_odometry(message.data),
             Type::Sensor => topic.take_sensor(message.data),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
+            Type::Number => self.take_number(&channel.topic, message.data),
             Type::Tf => self.take_tf(&channel.topic, message.data),
             Type::Other => Some(()),
         };
+        let topic = self.topic(&channel.topic, "", "");
+        if topic.recorded.len() < topic.stamps.len() {
+            topic.recorded.push(Stamp::from_nanos(message.log_time));
+        }
         if done.is_none() {
             self.topic(&channel.topic, "", "").undecodable += 1;
         }
     }
 
     fn take_info(&mut self, topic: &str, data: &[u8]) -> Option<()> {
-        // Only the first calibration is used.
-        if self.infos.contains_key(topic) {
+        // Only the first calibration is used; a driver may say nothing until it has one.
+        if self.infos.get(topic).is_some_and(|known| !is_blank(known)) {
             return Some(());
         }
         let info: CameraInfo = decode(data).ok()?;
         self.topic(topic, "", "").frame_id = Some(info.header.frame_id.clone());
         self.infos.insert(topic.to_owned(), info);
+        Some(())
+    }
+
+    /// Takes in the unit of a depth camera, as the recordings of some cameras have it.
+    fn take_number(&mut self, topic: &str, data: &[u8]) -> Option<()> {
+        let number: Float32Msg = decode(data).ok()?;
+        let unit_m = short(number.data);
+        let is_unit = topic.to_lowercase().contains("depth_unit") && DEPTH_UNITS.contains(&unit_m);
+        if is_unit {
+            self.depth_units.entry(topic.to_owned()).or_insert(unit_m);
+        }
         Some(())
     }
 
@@ -366,16 +413,45 @@ impl Gathering {
     }
 }
 
+/// Units of depth that a camera can have, m.
+const DEPTH_UNITS: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
+
+/// Returns the number that the shortest text of a single-precision number stands for: 0.001, and not
+/// 0.0010000000474974513.
+fn short(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or_else(|_| f64::from(number))
+}
+
+/// Returns true for a calibration without numbers, which by REP 104 means uncalibrated.
+pub(crate) fn is_blank(info: &CameraInfo) -> bool {
+    info.k.iter().chain(&info.p).all(|value| *value == 0.0)
+}
+
 /// Returns true for static transforms, which have a topic of their own.
 pub(crate) fn is_static(tf_topic: &str) -> bool {
     tf_topic.ends_with("tf_static")
 }
 
 impl Topic {
-    fn take_image(&mut self, data: &[u8], depth_unit_m: Option<f64>) -> Option<()> {
+    /// Returns true if all messages have one stamp and were recorded at different times.
+    pub(crate) fn has_constant_stamps(&self) -> bool {
+        let is_one = |stamps: &[Stamp]| stamps.windows(2).all(|pair| pair[0] == pair[1]);
+        self.stamps.len() > 1 && is_one(&self.stamps) && !is_one(&self.recorded)
+    }
+
+    /// Returns the first and the last stamp in time.
+    pub(crate) fn stamp_range(&self) -> Option<(Stamp, Stamp)> {
+        Some((*self.stamps.iter().min()?, *self.stamps.iter().max()?))
+    }
+
+    fn take_image(&mut self, name: &str, data: &[u8], depth_unit_m: Option<f64>) -> Option<()> {
         let image: Image<'_> = decode(data).ok()?;
         if self.pixels.is_none() {
             self.content = content_of_encoding(&image.encoding, depth_unit_m);
+            self.is_deep_grey = image.encoding == "mono16";
+            if self.is_deep_grey && is_named_depth(name) {
+                self.content = Content::Depth;
+            }
             self.size = Some((image.width, image.height));
             self.pixels = Some(image.encoding);
         }
@@ -383,12 +459,25 @@ impl Topic {
         Some(())
     }
 
-    fn take_compressed(&mut self, data: &[u8]) -> Option<()> {
+    fn take_compressed(&mut self, name: &str, data: &[u8]) -> Option<()> {
         let image: CompressedImage<'_> = decode(data).ok()?;
         if self.pixels.is_none() {
-            self.content = match content_of_format(&image.format) {
+            let size = size_of_compressed(&image, &Limits::default());
+            self.size = size.ok().map(|(width, height)| (width as u32, height as u32));
+            let codec = Codec::of(&image);
+            let declared = content_of_format(&image.format);
+            self.is_deep_grey = codec == Codec::DeepPng && declared != Content::Depth;
+            let is_named_depth = is_named_depth(name);
+            // Three channels may be depth that was coloured for people to look at.
+            self.is_jpeg_depth = codec.is_jpeg()
+                && (declared == Content::Depth || codec == Codec::GreyJpeg && is_named_depth);
+            self.content = match declared {
+                _ if self.is_jpeg_depth => Content::Unknown,
+                _ if self.is_deep_grey && is_named_depth => Content::Depth,
+                // Not a picture, because the decoder makes depth of it.
+                _ if self.is_deep_grey => Content::Unknown,
                 // The format is any text, and the codec is told by the first bytes.
-                Content::Unknown if is_coded_picture(image.data) => Content::Picture,
+                Content::Unknown if codec != Codec::Unknown => Content::Picture,
                 content => content,
             };
             self.pixels = Some(image.format);
@@ -430,4 +519,9 @@ impl Topic {
         }
         self.frame_id.get_or_insert(header.frame_id);
     }
+}
+
+/// Returns true if the name of a topic says that its images are depth.
+fn is_named_depth(topic: &str) -> bool {
+    TopicName::of(topic).stream == Stream::Depth
 }

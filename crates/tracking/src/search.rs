@@ -1,7 +1,7 @@
 //! Detection in a frame, and verification of the detections.
 
 use crate::{Guarded, StepError};
-use tagalong_core::{Detector, Frame, Funnel, Likelihood, Query, Track, Verifier};
+use tagalong_core::{Detector, Frame, Funnel, Input, Likelihood, Query, Track, Usage, Verifier};
 
 use crate::detections::PendingDetection;
 use crate::memo::{self, Identities};
@@ -9,6 +9,9 @@ use crate::{DetectorSettings, Fate, Role};
 
 /// Log-odds that stand for certainty. Larger ones would outweigh all other evidence.
 const CERTAIN: f64 = 100.0;
+
+/// Inputs that make the frames, so that each frame has its own.
+const IMAGES: [Input; 3] = [Input::Colour, Input::Depth, Input::Right];
 
 /// A detector and its settings.
 pub struct DetectorSlot {
@@ -24,9 +27,14 @@ impl DetectorSlot {
         self.settings.roles.contains(&role)
     }
 
-    /// Returns true if the detector runs on the frame with this count from 0.
-    pub(crate) fn is_due(&self, frame: u64) -> bool {
-        frame % u64::from(self.settings.every.max(1)) == u64::from(self.settings.offset)
+    /// Returns true if the detector runs on the frame with this count from 0. A frame without a
+    /// message of a sensor that it requires is no frame on which it looked: detections and scans come
+    /// more seldom than images.
+    pub(crate) fn is_due(&self, frame: &Frame, count: u64) -> bool {
+        let every = u64::from(self.settings.every.max(1));
+        let inputs = self.plugin.plugin().capabilities().inputs;
+        let mut messages = inputs.of(Usage::Required).filter(|input| !IMAGES.contains(input));
+        count % every == u64::from(self.settings.offset) && messages.all(|input| frame.holds(input))
     }
 }
 
@@ -42,8 +50,8 @@ pub(crate) struct SearchStage {
 
 impl SearchStage {
     /// Returns the detectors that run on the frame with this count from 0.
-    pub(crate) fn due(&self, frame: u64) -> Vec<usize> {
-        (0..self.detectors.len()).filter(|i| self.detectors[*i].is_due(frame)).collect()
+    pub(crate) fn due(&self, frame: &Frame, count: u64) -> Vec<usize> {
+        (0..self.detectors.len()).filter(|i| self.detectors[*i].is_due(frame, count)).collect()
     }
 
     /// Returns those of `due` with a role.

@@ -136,7 +136,7 @@ impl Tracker {
         self.reset_after(outcome, frame, &mut log)?;
         let predicted = self.predict(frame, motion, &mut log)?;
         let predicted = log.timed(STAGES[1], predicted);
-        let due = self.search.due(self.frames);
+        let due = self.search.due(frame, self.frames);
         let gate = self.gate(motion);
         let mut detections = self.search_tracks(frame, &due, &predicted, &gate, &mut log)?;
         log.timed(STAGES[2], ());

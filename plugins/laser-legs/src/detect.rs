@@ -122,17 +122,25 @@ impl Detector for LaserLegs {
         if matches!(query, Query::Track(_)) {
             return Ok(Vec::new());
         }
-        let scan = frame.scan()?;
-        let beams = Beams::new(scan, 1);
         let is_needed = self.config.free_log_odds > 0.0;
         if is_needed {
             self.past.predict(&frame.motion);
         }
-        let legs = self.legs(&beams, funnel);
-        let people = self.people(&legs);
-        let found = people.iter().map(|legs| self.detection(legs, scan)).collect();
-        if is_needed {
-            self.past.add(&beams, scan.robot_from_scanner.translation.vector.xy());
+        // Each scanner is judged alone, because neighbouring rays make a segment; detections of one
+        // person by two scanners are merged like those of two detectors.
+        let mut found = Vec::new();
+        let mut seen = Vec::new();
+        for scan in frame.scans() {
+            let beams = Beams::new(scan, 1);
+            let legs = self.legs(&beams, funnel);
+            found.extend(self.people(&legs).iter().map(|legs| self.detection(legs, scan)));
+            seen.push((beams, scan.robot_from_scanner.translation.vector.xy()));
+        }
+        if seen.is_empty() {
+            frame.scan()?;
+        }
+        for (beams, scanner) in seen.iter().filter(|_| is_needed) {
+            self.past.add(beams, *scanner);
         }
         Ok(found)
     }

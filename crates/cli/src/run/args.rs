@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tagalong_app::format::Format;
+use tagalong_app::input_args::InputArgs;
 
 /// Arguments of `tagalong run`.
 #[derive(Args, Debug)]
@@ -54,6 +55,9 @@ pub struct RunArgs {
     /// Output format of the results.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
+    /// Way in which the log is read.
+    #[command(flatten)]
+    pub input: InputArgs,
     /// Suppresses all output; for commands that consist of runs.
     #[arg(skip)]
     pub quiet: bool,

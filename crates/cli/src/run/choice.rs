@@ -2,6 +2,7 @@ use std::path::Path;
 
 use tagalong_app::choice::{Choice, Fitting, fitting};
 use tagalong_app::config_file::ConfigFile;
+use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Failure, say};
 use tagalong_config::Registry;
 
@@ -9,12 +10,20 @@ use tagalong_config::Registry;
 ///
 /// # Errors
 /// A log that cannot be read, or that no pipeline fits: the reasons of each.
-pub(super) fn choose(log: &Path, registry: &Registry) -> Result<ConfigFile, Failure> {
-    let mut found = fitting(log, registry, 1);
+pub(super) fn choose(
+    log: &Path,
+    registry: &Registry,
+    args: &InputArgs,
+) -> Result<ConfigFile, Failure> {
+    let mut found = fitting(log, registry, args, 1);
+    let (contents, better) = (found.contents(), found.better());
     let Some(Fitting { choice, config }) = found.fitting.pop() else {
         return Err(found.none_fits(log));
     };
-    let Choice { config: name, has, reason } = choice;
-    say(&format!("the log has {has}: taking {name}, because {reason}"));
+    let Choice { config: name, reason } = choice;
+    say(&format!("the log has {contents}: taking {name}, because {reason}"));
+    if let Some(better) = better {
+        say(&better);
+    }
     Ok(config)
 }

@@ -35,7 +35,7 @@ use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
 use tagalong_live::Live;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
-use tagalong_log::{FrameSource, Input};
+use tagalong_log::{FrameSource, Input, InputAccount};
 use tagalong_pipeline::{FrameReport, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
@@ -117,11 +117,11 @@ impl Job {
         let config = match named {
             Some(config) => config,
             None if !args.has_log() => ConfigFile::built_in()?,
-            None => choice::choose(args.log(), registry)?,
+            None => choice::choose(args.log(), registry, &args.input)?,
         };
         let threads = args.threads.map(usize::from);
         let (pipeline, settings) = config.pipeline_on(registry, args.seed, threads)?;
-        let outer = config.outer_for(&pipeline)?;
+        let outer = args.input.applied(config.outer_for(&pipeline)?);
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();
@@ -138,6 +138,10 @@ impl Job {
         let resolved = outer.resolved_with(pipeline.config())?;
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let mut report = blank_report(&config, settings.seed, log);
+        report.inputs = source.account().clone();
+        if !args.quiet {
+            report.inputs.lines().iter().for_each(|line| say(line));
+        }
         if settings.suits.odometry && !source.has_odometry() {
             report.notes.push(without_odometry(&config));
         }
@@ -178,6 +182,7 @@ fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
         candidates: report::Candidates::default(),
         funnel: Vec::new(),
         counters: BTreeMap::new(),
+        inputs: InputAccount::default(),
         notes: Vec::new(),
         nis: None,
     }

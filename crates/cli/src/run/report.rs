@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tagalong_core::Funnel;
+use tagalong_log::InputAccount;
 use tagalong_pipeline::{Fate, FrameReport, Outcome};
 
 /// `report.json`: results of a run, and its dropped candidates with the reasons. Two runs of the
@@ -30,6 +31,8 @@ pub struct RunReport {
     pub funnel: Vec<FunnelLine>,
     /// Number of lost or skipped items of the reader, by name.
     pub counters: BTreeMap<String, u64>,
+    /// Use of each image, scan, detection and odometry topic, with the reasons for those not used.
+    pub inputs: InputAccount,
     /// Notes for the user.
     pub notes: Vec<String>,
     /// Consistency of the filter, if it has an innovation.

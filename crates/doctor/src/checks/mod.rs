@@ -24,6 +24,7 @@ mod skipped;
 mod stamps;
 mod still;
 mod suits;
+mod topics;
 
 use super::alternatives::Alternative;
 use super::coverage::Coverage;
@@ -36,6 +37,7 @@ pub type Check = fn(&Evidence) -> Option<Finding>;
 /// All checks, causes before their consequences.
 pub const ALL: &[Check] = &[
     needs::needs,
+    topics::topics,
     damage::damage,
     reading::reading,
     skipped::skipped,

@@ -80,6 +80,8 @@ pub(crate) struct CollisionMonitor {
     /// Scanner of the frames.
     laser: ScanState,
     laser_age: Freshness,
+    /// Further scanners of the frames, in the order of the frames.
+    further_lasers: Vec<(ScanState, Freshness)>,
     sources: Vec<FurtherSource>,
     hazards: BinnedHazards,
     zones: Zones,
@@ -95,6 +97,7 @@ impl CollisionMonitor {
             depth_age: Freshness::default(),
             laser: ScanState::default(),
             laser_age: Freshness::default(),
+            further_lasers: Vec::new(),
             sources: sources.map(|source| FurtherSource::new(source, &footprint)).collect(),
             hazards: BinnedHazards::default(),
             zones: Zones::new(&settings),
@@ -109,6 +112,9 @@ impl CollisionMonitor {
     pub(crate) fn clear(&mut self) {
         self.depth.clear();
         self.laser.clear();
+        for (laser, _) in &mut self.further_lasers {
+            laser.clear();
+        }
         for source in &mut self.sources {
             source.clear();
         }
@@ -119,6 +125,9 @@ impl CollisionMonitor {
     pub(crate) fn arm(&mut self) {
         self.depth.arm();
         self.laser.arm();
+        for (laser, _) in &mut self.further_lasers {
+            laser.arm();
+        }
         for source in &mut self.sources {
             source.arm();
         }
@@ -148,6 +157,10 @@ impl CollisionMonitor {
         self.coverages.extend(self.depth.coverage(self.settings.min_share));
         self.laser.add_to(&self.settings, &people, hazards);
         self.coverages.extend(self.laser.coverage(self.settings.min_share));
+        for (laser, _) in &self.further_lasers {
+            laser.add_to(&self.settings, &people, hazards);
+            self.coverages.extend(laser.coverage(self.settings.min_share));
+        }
         for source in &self.sources {
             source.add_to(&self.settings, &people, hazards);
             self.coverages.extend(source.coverage());
@@ -184,6 +197,22 @@ impl CollisionMonitor {
         let stamped = stamp.map(|stamp| (stamp, frame.stamp.seconds_since(stamp).max(0.0)));
         let is_new = self.laser_age.update(stamped, motion.dt);
         self.laser.update(&self.settings, scan.filter(|_| is_new), motion, tracks);
+        self.update_further_lasers(frame, motion, tracks);
+    }
+
+    /// Takes in the scans of further scanners, each of which has a memory of its own. One that no
+    /// frame mentions any more grows old like one that is silent.
+    fn update_further_lasers(&mut self, frame: &Frame, motion: &EgoMotion, tracks: &[Track]) {
+        let scans = frame.further_scans();
+        let known = self.further_lasers.len().max(scans.len());
+        self.further_lasers.resize_with(known, Default::default);
+        for (place, (laser, age)) in self.further_lasers.iter_mut().enumerate() {
+            let scan = scans.get(place).and_then(Option::as_ref);
+            let stamp = scan.map(|scan| scan.stamp.unwrap_or(frame.stamp));
+            let stamped = stamp.map(|stamp| (stamp, frame.stamp.seconds_since(stamp).max(0.0)));
+            let is_new = age.update(stamped, motion.dt);
+            laser.update(&self.settings, scan.filter(|_| is_new), motion, tracks);
+        }
     }
 
     /// Returns the reason for which the robot must stand, if there is one; no sensor may be silent for
@@ -219,6 +248,7 @@ impl CollisionMonitor {
     fn is_silent(&self, patience_s: f64) -> bool {
         self.depth_age.is_silent(patience_s)
             || self.laser_age.is_silent(patience_s)
+            || self.further_lasers.iter().any(|(_, age)| age.is_silent(patience_s))
             || self.sources.iter().any(FurtherSource::is_silent)
     }
 
@@ -226,6 +256,7 @@ impl CollisionMonitor {
     fn has_eyes(&self) -> bool {
         self.depth_age.delivers()
             || self.laser_age.delivers()
+            || self.further_lasers.iter().any(|(_, age)| age.delivers())
             || self.sources.iter().any(FurtherSource::is_eye)
     }
 
@@ -238,6 +269,7 @@ impl CollisionMonitor {
         let most = if self.settings.noiseless { 0 } else { self.settings.identical_frames };
         self.depth.is_frozen(most)
             || self.laser.is_frozen(most)
+            || self.further_lasers.iter().any(|(laser, _)| laser.is_frozen(most))
             || self.sources.iter().any(|source| source.is_frozen(most))
     }
 

@@ -173,6 +173,7 @@ fn learn<R: Read>(walk: &mut Walk<R>, parts: &Parts) -> Option<()> {
         schema_name: inner.text("type")?.to_owned(),
         schema_encoding: "ros1msg".into(),
         encoding: ENCODING.into(),
+        definition: inner.text("message_definition").unwrap_or_default().into(),
     };
     walk.learn(channel);
     Some(())

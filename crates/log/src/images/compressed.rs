@@ -40,9 +40,55 @@ pub fn decode_compressed(
     }
 }
 
-/// Returns true for the first bytes of a JPEG or a PNG.
-pub(crate) fn is_coded_picture(data: &[u8]) -> bool {
-    matches!(data, [0xff, 0xd8, ..] | [0x89, b'P', b'N', b'G', ..])
+/// Codec of a compressed image, by its first bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Codec {
+    /// JPEG with one channel.
+    GreyJpeg,
+    /// JPEG with three channels, or with a header that cannot be read.
+    Jpeg,
+    /// PNG with one channel of 16 bits.
+    DeepPng,
+    /// Any other PNG.
+    Png,
+    /// None of them.
+    Unknown,
+}
+
+impl Codec {
+    /// Returns the codec of an image, also behind the header of `compressedDepth`.
+    pub(crate) fn of(image: &CompressedImage<'_>) -> Self {
+        let data = image.data;
+        let starts = |data: &[u8]| {
+            data.starts_with(&[0xff, 0xd8]) || data.starts_with(&[0x89, b'P', b'N', b'G'])
+        };
+        let body = match data.get(DEPTH_HEADER..) {
+            Some(body) if !starts(data) && is_compressed_depth(image) => body,
+            _ => data,
+        };
+        match body {
+            [0xff, 0xd8, ..] => {
+                let mut decoder = JpegDecoder::new(ZCursor::new(body));
+                let is_read = decoder.decode_headers().is_ok();
+                match decoder.input_colorspace() {
+                    Some(ColorSpace::Luma) if is_read => Self::GreyJpeg,
+                    _ => Self::Jpeg,
+                }
+            }
+            // Bits and channels stand at a fixed place of the first chunk.
+            [0x89, b'P', b'N', b'G', ..] if body.get(24..26) == Some(&[16, 0]) => Self::DeepPng,
+            [0x89, b'P', b'N', b'G', ..] => Self::Png,
+            _ => Self::Unknown,
+        }
+    }
+
+    pub(crate) fn is_jpeg(self) -> bool {
+        matches!(self, Self::GreyJpeg | Self::Jpeg)
+    }
+}
+
+fn is_compressed_depth(image: &CompressedImage<'_>) -> bool {
+    image.format.to_ascii_lowercase().contains("compresseddepth")
 }
 
 /// Returns the columns and rows of a compressed image, from its header.

@@ -12,7 +12,7 @@ mod raw;
 mod rvl;
 mod yuv;
 
-pub(crate) use compressed::is_coded_picture;
+pub(crate) use compressed::Codec;
 pub use compressed::{decode_compressed, encode_rvl, size_of_compressed};
 pub(crate) use disparity::may_be_disparity;
 pub use disparity::{
@@ -170,7 +170,8 @@ fn is_deep(encoding: &str) -> bool {
 /// Returns the content of images of a `sensor_msgs/CompressedImage` format.
 pub fn content_of_format(format: &str) -> Content {
     let lower = format.to_ascii_lowercase();
-    let depth = lower.contains("compresseddepth") || lower.starts_with("16uc1");
+    let starts = ["16uc1", "32fc1"].iter().any(|start| lower.starts_with(start));
+    let depth = lower.contains("compresseddepth") || starts;
     match (depth, lower.contains("jpeg") || lower.contains("jpg") || lower.contains("png")) {
         (true, _) => Content::Depth,
         (false, true) => Content::Picture,

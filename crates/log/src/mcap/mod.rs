@@ -11,6 +11,7 @@ pub(crate) mod record;
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::ops::Range;
+use std::sync::Arc;
 
 use chunk::ChunkFault;
 use record::Opcode;
@@ -27,7 +28,7 @@ pub struct NotMcap(pub String);
 /// Findings in an MCAP file that other containers do not have.
 #[derive(Default)]
 pub(crate) struct Mcap {
-    schemas: BTreeMap<u16, (String, String)>,
+    schemas: BTreeMap<u16, (String, String, Arc<str>)>,
     claimed_messages: Option<u64>,
 }
 
@@ -148,7 +149,9 @@ impl Mcap {
             return None;
         }
         // The first definition is kept; later ones repeat it.
-        self.schemas.entry(schema.id).or_insert((schema.name, schema.encoding));
+        let definition = Arc::from(schema.definition);
+        let known = (schema.name, schema.encoding, definition);
+        self.schemas.entry(schema.id).or_insert(known);
         Some(())
     }
 
@@ -158,13 +161,14 @@ impl Mcap {
         if schema.is_none() && read.schema_id != 0 {
             walk.count("channels_without_schema");
         }
-        let (schema_name, schema_encoding) = schema.unwrap_or_default();
+        let (schema_name, schema_encoding, definition) = schema.unwrap_or_default();
         let channel = Channel {
             id: read.id,
             topic: read.topic,
             schema_name,
             schema_encoding,
             encoding: read.encoding,
+            definition,
         };
         walk.learn(channel);
         Some(())

@@ -80,13 +80,16 @@ pub(super) struct Schema {
     pub(super) id: u16,
     pub(super) name: String,
     pub(super) encoding: String,
+    pub(super) definition: String,
 }
 
 pub(super) fn schema(body: &[u8]) -> Option<Schema> {
     let mut fields = Fields(body);
-    let schema = Schema { id: fields.u16()?, name: fields.string()?, encoding: fields.string()? };
-    let definition = fields.u32()? as usize;
-    fields.bytes(definition)?;
+    let (id, name, encoding) = (fields.u16()?, fields.string()?, fields.string()?);
+    let length = fields.u32()? as usize;
+    // Those of other languages are no text.
+    let definition = std::str::from_utf8(fields.bytes(length)?).unwrap_or_default().to_owned();
+    let schema = Schema { id, name, encoding, definition };
     (schema.id != 0).then_some(schema)
 }
 

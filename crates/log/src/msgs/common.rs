@@ -66,3 +66,12 @@ pub struct BoolMsg {
 }
 
 message!(BoolMsg, "std_msgs/msg/Bool", "Bool.msg");
+
+/// `std_msgs/Float32`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Float32Msg {
+    /// The value.
+    pub data: f32,
+}
+
+message!(Float32Msg, "std_msgs/msg/Float32", "Float32.msg");

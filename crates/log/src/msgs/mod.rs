@@ -9,14 +9,16 @@
 
 mod common;
 mod contact;
+mod definition;
 mod geometry;
 mod ros1;
 mod scene;
 mod sensor;
 mod vision;
 
-pub use common::{BoolMsg, Header, StringMsg, Time};
+pub use common::{BoolMsg, Float32Msg, Header, StringMsg, Time};
 pub use contact::{BumperEvent, BumperState, ContactCount, HazardDetection, HazardDetectionVector};
+pub(crate) use definition::{Definition, Value};
 pub use geometry::{
     Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage,
     Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,

@@ -6,7 +6,7 @@ use crate::camera_info::{Intrinsics, intrinsics};
 use crate::scan::{Scan, Topic, Type};
 use crate::sensors::is_type;
 use crate::tally::Tally;
-use crate::topics::{info_of, kind_of, missing};
+use crate::topics::{calibration_of, kind_of, missing};
 use crate::{InputSettings, LogError};
 
 /// Source whose topic is there.
@@ -123,7 +123,9 @@ fn alternatives(scan: &Scan, kind: ObstacleKind) -> String {
 /// Returns the lens of a depth camera; `None` without a calibration.
 fn lens_of(scan: &Scan, source: &ObstacleTopic) -> Result<Option<Intrinsics>, LogError> {
     let named = source.info_topic.clone();
-    let Some(topic) = named.or_else(|| info_of(scan, &source.topic, false)) else {
+    let Some(topic) =
+        named.or_else(|| calibration_of(scan, &source.topic, false).map(|it| it.topic))
+    else {
         return Ok(None);
     };
     let Some(info) = scan.infos.get(&topic) else { return Ok(None) };

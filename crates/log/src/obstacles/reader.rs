@@ -18,7 +18,7 @@ use crate::odometry::AHEAD_S;
 use crate::pairing::Payload;
 use crate::scan::Type;
 use crate::sensors::Moment;
-use crate::sensors::laser::{is_sane, lose_scan, on_floor, seen_from};
+use crate::sensors::laser::{lose_scan, on_floor, scan_fault, seen_from};
 use crate::tally::Tally;
 
 /// Reader of one source.
@@ -97,10 +97,9 @@ impl ObstacleReader {
         match &mut self.messages {
             Messages::Scan(scans) => {
                 let scan: LaserScan = decode(data)?;
-                if is_sane(&scan) {
-                    scans.push(scan.header.stamp(), data.len(), scan);
-                } else {
-                    lose_scan(tally);
+                match scan_fault(&scan) {
+                    None => scans.push(scan.header.stamp(), data.len(), scan),
+                    Some(why) => lose_scan(&self.source.topic, &why, tally),
                 }
             }
             Messages::Range(ranges) => {

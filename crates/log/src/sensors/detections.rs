@@ -2,44 +2,81 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 use tagalong_core::{ExternalDetection, ExternalDetections, Input, Sensors, Stamp};
 use tagalong_geometry::Rect;
 
 use super::{Moment, SensorReader, SensorType, is_type};
-use crate::msgs::{CdrError, Detection2DArray, Detection3DArray, ObjectHypothesisWithPose, decode};
+use crate::InputSettings;
+use crate::msgs::{CdrError, Definition, Detection2DArray, Detection3DArray, Value};
 use crate::pairing::{Payload, Waiting};
 use crate::tally::Tally;
-use crate::walk::Message;
+use crate::walk::{Channel, Message};
 
 const BOXES: &str = "vision_msgs/Detection2DArray";
 const SPACE: &str = "vision_msgs/Detection3DArray";
+const YOLO: [&str; 2] = ["yolo_msgs/DetectionArray", "yolov8_msgs/DetectionArray"];
 
 /// Entry of recorded detections. They are read only if the settings name their topic, because
 /// Tagalong's own output has the same type.
 pub(super) const ENTRY: SensorType = SensorType {
     input: Input::Detections,
-    messages: &[BOXES, SPACE],
+    messages: &[BOXES, SPACE, YOLO[0], YOLO[1]],
     wanted: "recorded detections that `detections_topic` under [input] names",
     rank: None,
     header: |_| Ok(None),
-    reader: |schema| Box::new(Recorded { in_space: is_type(schema, SPACE), ..Recorded::default() }),
+    reader: |schema, input| Box::new(Recorded::new(schema, input)),
 };
 
 /// Height of the crown above the centre of the head, m.
 const CROWN_ABOVE_HEAD_M: f64 = 0.115;
 
+/// Names of classes that are people.
+const PEOPLE: [&str; 12] = [
+    "person",
+    "persons",
+    "people",
+    "pedestrian",
+    "pedestrians",
+    "human",
+    "humans",
+    "man",
+    "woman",
+    "child",
+    "upper-body",
+    "0",
+];
+/// Largest number of other classes that are named.
+const NAMED_CLASSES: usize = 12;
+
 /// Messages that wait for their frame.
-#[derive(Default)]
 struct Recorded {
     in_space: bool,
+    /// Classes that are people; empty: [`PEOPLE`].
+    classes: Vec<String>,
+    layouts: Vec<Definition>,
     waiting: Waiting,
     /// Message of the frame that is being made.
     paired: Option<Payload>,
 }
 
+impl Recorded {
+    fn new(schema: &str, input: &InputSettings) -> Self {
+        Self {
+            in_space: is_type(schema, SPACE),
+            classes: input.detection_classes.clone(),
+            layouts: Vec::new(),
+            waiting: Waiting::default(),
+            paired: None,
+        }
+    }
+}
+
 impl SensorReader for Recorded {
     fn take(&mut self, message: &Message<'_>, _: &mut Tally) -> Result<(), CdrError> {
+        if self.layouts.is_empty() {
+            self.layouts = layouts(message.channel);
+        }
         self.waiting.push(Payload::of_headed(message)?);
         Ok(())
     }
@@ -49,7 +86,12 @@ impl SensorReader for Recorded {
     }
 
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
-        let detections = self.detections(moment, tally);
+        // No message says nothing, as opposed to one without detections.
+        let Some(message) = &self.paired else {
+            tally.count("frames_without_detections");
+            return sensors;
+        };
+        let Some(detections) = self.detections(message, moment, tally) else { return sensors };
         sensors.with(ExternalDetections { detections, camera: Arc::clone(moment.camera) })
     }
 
@@ -66,68 +108,192 @@ impl SensorReader for Recorded {
     }
 }
 
+/// Returns the layouts that the messages of a channel may have: that which the log defines, else all
+/// that are known, the newest first.
+fn layouts(channel: &Channel) -> Vec<Definition> {
+    let name = &channel.schema_name;
+    let told = Definition::parse(name, &channel.definition);
+    if let (Ok(told), false) = (told, channel.definition.is_empty()) {
+        return vec![told];
+    }
+    let texts: &[&str] = if is_type(name, BOXES) {
+        use crate::msgs::Message as _;
+        &[Detection2DArray::DEFINITION, FOXY_BOXES, NOETIC_BOXES]
+    } else if is_type(name, SPACE) {
+        use crate::msgs::Message as _;
+        &[Detection3DArray::DEFINITION, FOXY_SPACE]
+    } else {
+        &[]
+    };
+    texts.iter().filter_map(|text| Definition::parse(name, text).ok()).collect()
+}
+
 impl Recorded {
-    /// Returns the detections of the paired message; none without a message, which is counted.
-    fn detections(&self, moment: &Moment<'_>, tally: &mut Tally) -> Vec<ExternalDetection> {
-        let Some(message) = &self.paired else {
-            tally.count("frames_without_detections");
-            return Vec::new();
+    /// Returns the people in a message; `None`, counted, if it cannot be read.
+    fn detections(
+        &self,
+        message: &Payload,
+        moment: &Moment<'_>,
+        tally: &mut Tally,
+    ) -> Option<Vec<ExternalDetection>> {
+        let value = match self.read(&message.data) {
+            Ok(value) => value,
+            Err(why) => {
+                let topic = moment.topic;
+                tally.lose("messages_undecodable", || {
+                    format!("{topic}: a message of detections is not as its type says: {why}")
+                });
+                return None;
+            }
         };
-        let read = if self.in_space { space(message, moment, tally) } else { boxes(message) };
-        read.unwrap_or_else(|| {
-            let topic = moment.topic;
-            tally.lose("messages_undecodable", || format!("{topic}: not as its type says"));
-            Vec::new()
-        })
+        let people = self.people(value.list("detections"), moment.topic, tally);
+        match self.in_space {
+            false => Some(people.iter().filter_map(|(it, score)| in_image(it, *score)).collect()),
+            true => Some(in_space(&people, message, moment, tally)),
+        }
+    }
+
+    fn read(&self, data: &[u8]) -> Result<Value, String> {
+        let mut first = None;
+        for layout in &self.layouts {
+            match layout.read(data) {
+                Ok(value) => return Ok(value),
+                Err(why) => first = first.or(Some(why)),
+            }
+        }
+        Err(first.unwrap_or_else(|| "the log does not define it".to_owned()))
+    }
+
+    /// Returns the detections of people with their scores; the others are counted, and their classes
+    /// named.
+    fn people<'a>(
+        &self,
+        all: &'a [Value],
+        topic: &str,
+        tally: &mut Tally,
+    ) -> Vec<(&'a Value, f64)> {
+        let mut people = Vec::new();
+        for detection in all {
+            let (class, score) = best_hypothesis(detection);
+            if self.is_person(&class) {
+                people.push((detection, score));
+                continue;
+            }
+            tally.count("detections_of_other_classes");
+            let names: Vec<String> = if self.classes.is_empty() {
+                vec!["people by the usual names".into()]
+            } else {
+                self.classes.clone()
+            };
+            if tally.notes.iter().filter(|note| note.contains(OTHER_CLASS)).count() < NAMED_CLASSES
+            {
+                tally.note(format!(
+                    "{topic}: {OTHER_CLASS} `{class}` are left out; taken are {}: \
+                     `detection_classes` under [input] names others",
+                    names.join(", ")
+                ));
+            }
+        }
+        people
+    }
+
+    /// Returns true for the class of people. A detection without a class is of a detector of people.
+    fn is_person(&self, class: &str) -> bool {
+        let class = class.trim().to_lowercase().replace(['_', ' '], "-");
+        if self.classes.is_empty() {
+            return class.is_empty() || PEOPLE.contains(&class.as_str());
+        }
+        self.classes
+            .iter()
+            .any(|wanted| wanted.trim().to_lowercase().replace(['_', ' '], "-") == class)
     }
 }
 
-fn boxes(message: &Payload) -> Option<Vec<ExternalDetection>> {
-    let array: Detection2DArray = decode(&message.data).ok()?;
-    let all = array.detections.iter().map(|detection| {
-        let (centre, size) = (&detection.bbox.center.position, &detection.bbox);
-        let (width, height) = (size.size_x, size.size_y);
-        let (x, y) = (centre.x - 0.5 * width, centre.y - 0.5 * height);
-        let region = Some(Rect { x, y, width, height });
-        ExternalDetection { region, head: None, score: score(&detection.results) }
-    });
-    Some(all.filter(|recorded| recorded.region.is_some_and(|region| region.is_sane())).collect())
+/// Words of the note about other classes.
+const OTHER_CLASS: &str = "detections of the class";
+
+/// Returns class and score of the best hypothesis: an empty class and 1 for a detection without one.
+fn best_hypothesis(detection: &Value) -> (String, f64) {
+    let mut best: Option<(String, f64)> = None;
+    let own = std::slice::from_ref(detection);
+    let hypotheses = match detection.list("results") {
+        [] if detection.get("score").is_some() => own,
+        results => results,
+    };
+    for hypothesis in hypotheses {
+        let score = hypothesis.number(&["hypothesis.score", "score"]);
+        let score = score.filter(|score| score.is_finite()).unwrap_or(1.0);
+        let class = hypothesis.text(&[
+            "hypothesis.class_id",
+            "hypothesis.id",
+            "class_name",
+            "class_id",
+            "id",
+        ]);
+        if best.as_ref().is_none_or(|(_, highest)| score > *highest) {
+            best = Some((class.unwrap_or_default(), score));
+        }
+    }
+    best.unwrap_or_else(|| (String::new(), 1.0))
 }
 
-fn space(
+fn in_image(detection: &Value, score: f64) -> Option<ExternalDetection> {
+    let number = |paths: &[&str]| detection.number(paths);
+    let width = number(&["bbox.size_x", "bbox.size.x"])?;
+    let height = number(&["bbox.size_y", "bbox.size.y"])?;
+    let x = number(&["bbox.center.position.x", "bbox.center.x"])? - 0.5 * width;
+    let y = number(&["bbox.center.position.y", "bbox.center.y"])? - 0.5 * height;
+    let region = Rect { x, y, width, height };
+    region.is_sane().then_some(ExternalDetection { region: Some(region), head: None, score })
+}
+
+fn in_space(
+    people: &[(&Value, f64)],
     message: &Payload,
     moment: &Moment<'_>,
     tally: &mut Tally,
-) -> Option<Vec<ExternalDetection>> {
-    let array: Detection3DArray = decode(&message.data).ok()?;
+) -> Vec<ExternalDetection> {
     let robot = moment.robot_frame;
-    let pose = match message.frame_id == robot {
-        true => Some(Isometry3::identity()),
-        false => moment.tf.lookup(robot, &message.frame_id, message.stamp),
+    let pose = if message.frame_id == robot {
+        Some(Isometry3::identity())
+    } else {
+        moment.tf.lookup(robot, &message.frame_id, message.stamp)
     };
     let Some(robot_from_message) = pose else {
         tally.count("detections_without_transform");
-        return Some(Vec::new());
+        return Vec::new();
     };
-    let head = |detection: &crate::msgs::Detection3D| {
-        let pose = robot_from_message * detection.bbox.center.isometry()?;
-        let size = detection.bbox.size;
-        // Vertical extent of the rotated box.
-        let up = pose.rotation.to_rotation_matrix().matrix().row(2).abs();
-        let height = up[0] * size.x + up[1] * size.y + up[2] * size.z;
-        let at = pose.translation.vector;
-        let head = Point3::new(at.x, at.y, at.z + 0.5 * height - CROWN_ABOVE_HEAD_M);
-        head.iter().all(|v| v.is_finite()).then_some(head)
-    };
-    let all = array.detections.iter().filter_map(|detection| {
-        let score = score(&detection.results);
-        Some(ExternalDetection { region: None, head: Some(head(detection)?), score })
+    let each = people.iter().filter_map(|(detection, score)| {
+        let head = head_of(detection, &robot_from_message)?;
+        Some(ExternalDetection { region: None, head: Some(head), score: *score })
     });
-    Some(all.collect())
+    each.collect()
 }
 
-/// Returns the best score; 1 for a detection without a hypothesis.
-fn score(results: &[ObjectHypothesisWithPose]) -> f64 {
-    let best = results.iter().map(|result| result.hypothesis.score).max_by(f64::total_cmp);
-    best.filter(|score| score.is_finite()).unwrap_or(1.0)
+/// Returns the centre of the head of a person in a box: below the upper end of the box.
+fn head_of(detection: &Value, robot_from_message: &Isometry3<f64>) -> Option<Point3<f64>> {
+    let vector = |path: &str, names: [&str; 3]| -> Option<Vector3<f64>> {
+        let value = detection.get(path)?;
+        let [x, y, z] = names.map(|name| value.number(&[name]));
+        Some(Vector3::new(x?, y?, z?))
+    };
+    let position = vector("bbox.center.position", ["x", "y", "z"])?;
+    let turn = vector("bbox.center.orientation", ["x", "y", "z"])?;
+    let w = detection.number(&["bbox.center.orientation.w"])?;
+    let size = vector("bbox.size", ["x", "y", "z"])?;
+    let turn = UnitQuaternion::try_new(Quaternion::new(w, turn.x, turn.y, turn.z), 1e-9)?;
+    let pose = robot_from_message * Isometry3::from_parts(position.into(), turn);
+    // Vertical extent of the rotated box.
+    let up = pose.rotation.to_rotation_matrix().matrix().row(2).abs();
+    let height = up[0] * size.x + up[1] * size.y + up[2] * size.z;
+    let at = pose.translation.vector;
+    let head = Point3::new(at.x, at.y, at.z + 0.5 * height - CROWN_ABOVE_HEAD_M);
+    head.iter().all(|v| v.is_finite()).then_some(head)
 }
+
+/// Definition of boxes in ROS 2 Foxy and Galactic.
+const FOXY_BOXES: &str = include_str!("../../msgs/Detection2DArray-foxy.msg");
+/// Definition of boxes in ROS 1 Noetic.
+const NOETIC_BOXES: &str = include_str!("../../msgs/Detection2DArray-noetic.msg");
+/// Definition of detections in space in ROS 2 Foxy and Galactic.
+const FOXY_SPACE: &str = include_str!("../../msgs/Detection3DArray-foxy.msg");

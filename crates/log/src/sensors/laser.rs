@@ -4,7 +4,9 @@ use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
 use nalgebra::{Isometry2, Isometry3, Point3, UnitQuaternion, Vector3};
-use tagalong_core::{Input, LaserScan as Scan, RayReading, Sensors, Stamp, UnreadRay};
+use tagalong_core::{
+    FurtherScans, Input, LaserScan as Scan, RayReading, Sensors, Stamp, UnreadRay,
+};
 
 use super::{Moment, SensorReader, SensorType};
 use crate::msgs::{CdrError, LaserScan, decode};
@@ -18,7 +20,7 @@ pub(super) const ENTRY: SensorType = SensorType {
     wanted: "laser scans",
     rank: Some(rank),
     header: |data| decode::<LaserScan>(data).map(|scan| Some(scan.header)),
-    reader: |_| Box::<Scans>::default(),
+    reader: |_, _| Box::<Scans>::default(),
 };
 
 fn rank(topic: &str) -> i32 {
@@ -35,49 +37,72 @@ const MAX_RAYS: usize = 65_536;
 
 /// Scans of the last seconds, in the order of arrival.
 #[derive(Default)]
-struct Scans {
+pub(crate) struct Scans {
     scans: VecDeque<LaserScan>,
+    /// True for a further scanner of the robot.
+    is_further: bool,
 }
 
 impl SensorReader for Scans {
     fn take(&mut self, message: &Message<'_>, tally: &mut Tally) -> Result<(), CdrError> {
-        if !self.push(decode(message.data)?) {
-            lose_scan(tally);
+        let scan = decode(message.data)?;
+        match scan_fault(&scan) {
+            Some(why) => lose_scan(&message.channel.topic, &why, tally),
+            None => self.push(scan),
         }
         Ok(())
     }
 
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
+        let seen = self.seen(moment, tally);
+        if self.is_further {
+            let known = sensors.get::<FurtherScans>().map_or(&[][..], |further| &further.0);
+            // Each scanner has its place, also while it is silent.
+            let all: Vec<Option<Scan>> = known.iter().cloned().chain([seen]).collect();
+            return sensors.with(FurtherScans(all.into()));
+        }
+        match seen {
+            Some(seen) => sensors.with(seen),
+            None => sensors,
+        }
+    }
+}
+
+/// Counts a scan whose header cannot be as lost.
+pub(crate) fn lose_scan(topic: &str, why: &str, tally: &mut Tally) {
+    tally.lose("laser_scans_invalid", || format!("{topic}: a laser scan cannot be used: {why}"));
+}
+
+impl Scans {
+    /// Creates the reader of a further scanner.
+    pub(crate) fn further() -> Self {
+        Self { is_further: true, ..Self::default() }
+    }
+
+    /// Returns the scan of a moment in the frame of the robot; `None`, counted, without one.
+    fn seen(&self, moment: &Moment<'_>, tally: &mut Tally) -> Option<Scan> {
         let Some(scan) = self.near(moment.stamp) else {
             tally.count("frames_without_laser");
-            return sensors;
+            return None;
         };
         let then = scan.header.stamp();
         let Some(mount) = moment.tf.lookup(moment.robot_frame, &scan.header.frame_id, then) else {
             tally.count("laser_scans_without_pose");
-            tally.note("tf does not connect the laser scanner with the robot: it is not used");
-            return sensors;
+            let topic = moment.topic;
+            tally.note(format!(
+                "tf does not connect the scanner of {topic} with the robot: it is not used"
+            ));
+            return None;
         };
-        sensors.with(seen_from(scan, &mount, &moment.robot_from(then)))
+        Some(seen_from(scan, &mount, &moment.robot_from(then)))
     }
-}
 
-/// Counts a scan without angles or ranges as lost.
-pub(crate) fn lose_scan(tally: &mut Tally) {
-    tally.lose("laser_scans_invalid", || "a laser scan has no angles or ranges".into());
-}
-
-impl Scans {
-    /// Adds a scan; returns false if its angles or ranges are invalid.
-    fn push(&mut self, scan: LaserScan) -> bool {
-        if !is_sane(&scan) {
-            return false;
-        }
+    /// Adds a scan.
+    fn push(&mut self, scan: LaserScan) {
         self.scans.push_back(scan);
         if self.scans.len() > KEPT {
             self.scans.pop_front();
         }
-        true
     }
 
     /// Returns the scan nearest to an image in time, if it is near enough.
@@ -120,11 +145,72 @@ pub(crate) fn on_floor(motion: &Isometry2<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Vector3::new(x, y, 0.0).into(), turn)
 }
 
-/// Returns false for a scan with invalid angles or ranges.
-pub(crate) fn is_sane(scan: &LaserScan) -> bool {
-    let angles = [scan.angle_min, scan.angle_increment];
-    let is_known = angles.into_iter().all(f32::is_finite) && !limits(scan).is_empty();
-    is_known && scan.ranges.len() <= MAX_RAYS
+/// Rounding of the angles by drivers, in rays and as a share of the view.
+const ROUNDED_RAYS: f64 = 2.0;
+const ROUNDED_SHARE: f64 = 0.02;
+/// Largest view of a scanner, rad: one turn, and a little for rays that overlap.
+const WIDEST_RAD: f64 = 1.1 * std::f64::consts::TAU;
+
+/// Returns the field of a scan that cannot be, with its value; `None` for a scan that can be used.
+pub(crate) fn scan_fault(scan: &LaserScan) -> Option<String> {
+    let fields = [
+        ("angle_min", scan.angle_min),
+        ("angle_increment", scan.angle_increment),
+        ("range_min", scan.range_min),
+    ];
+    if let Some((name, value)) = fields.iter().find(|(_, value)| !value.is_finite()) {
+        return Some(format!("{name} is {value}"));
+    }
+    if limits(scan).is_empty() || scan.range_max.is_nan() {
+        let (min, max) = (scan.range_min, scan.range_max);
+        return Some(format!("range_max is {max} and range_min {min}"));
+    }
+    let rays = scan.ranges.len();
+    if rays == 0 {
+        return Some("ranges is empty".into());
+    }
+    if rays > MAX_RAYS {
+        return Some(format!("ranges has {rays} values, more than {MAX_RAYS}"));
+    }
+    let increment = f64::from(scan.angle_increment);
+    if rays > 1 && increment == 0.0 {
+        return Some(format!("angle_increment is 0 with {rays} ranges: all lie in one direction"));
+    }
+    let view_rad = increment.abs() * (rays - 1) as f64;
+    if view_rad > WIDEST_RAD {
+        return Some(format!(
+            "angle_increment is {increment} with {rays} ranges, a view of {view_rad:.1} rad"
+        ));
+    }
+    told_view_fault(scan, view_rad)
+}
+
+/// Returns the contradiction between the last angle of a scan and the number of its rays.
+fn told_view_fault(scan: &LaserScan, view_rad: f64) -> Option<String> {
+    let told_rad = f64::from(scan.angle_max) - f64::from(scan.angle_min);
+    // Some drivers leave it out, and some turn it by whole turns.
+    if !told_rad.is_finite() || told_rad == 0.0 {
+        return None;
+    }
+    let step_rad = f64::from(scan.angle_increment).abs();
+    let slack_rad = ROUNDED_RAYS * step_rad + ROUNDED_SHARE * view_rad;
+    let turned_rad = std::f64::consts::TAU - told_rad.abs();
+    let off_rad = (told_rad.abs() - view_rad).abs();
+    if off_rad <= slack_rad || (turned_rad.abs() - view_rad).abs() <= slack_rad {
+        return None;
+    }
+    // A tenth is beyond all rounding; less is told by the ranges as they are.
+    (off_rad > 0.1 * view_rad.max(told_rad.abs())).then(|| {
+        format!(
+            "angle_min {:.3} to angle_max {:.3} is {:.3} rad, and {} ranges with angle_increment {} \
+             are {view_rad:.3} rad",
+            scan.angle_min,
+            scan.angle_max,
+            told_rad.abs(),
+            scan.ranges.len(),
+            scan.angle_increment
+        )
+    })
 }
 
 /// Returns the valid ranges of the scanner, m.
@@ -191,19 +277,58 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_without_angles_or_with_turned_limits_is_none() {
-        let mut scans = Scans::default();
-        assert!(!scans.push(LaserScan { angle_min: f32::NAN, ..scan(1.0, &[1.0]) }));
-        assert!(!scans.push(LaserScan { range_max: f32::NAN, ..scan(1.0, &[1.0]) }));
-        assert!(!scans.push(LaserScan { range_max: 0.01, ..scan(1.0, &[1.0]) }));
-        assert!(!scans.push(scan(1.0, &vec![1.0; MAX_RAYS + 1])));
-        assert!(scans.near(Stamp::default().plus_seconds(1.0)).is_none());
+    fn a_header_that_cannot_be_is_refused_with_its_field() {
+        let base = || LaserScan {
+            angle_increment: 0.01,
+            angle_min: -0.5,
+            angle_max: 0.5,
+            ..scan(1.0, &[1.0; 101])
+        };
+        assert_eq!(scan_fault(&base()), None);
+        let nan = f32::NAN;
+        for (field, broken) in [
+            ("angle_min is NaN", LaserScan { angle_min: nan, ..base() }),
+            ("angle_increment is inf", LaserScan { angle_increment: f32::INFINITY, ..base() }),
+            ("angle_increment is 0", LaserScan { angle_increment: 0.0, ..base() }),
+            ("angle_increment is 0.1", LaserScan { angle_increment: 0.1, ..base() }),
+            ("angle_max 3.000", LaserScan { angle_max: 3.0, ..base() }),
+            ("range_max is NaN", LaserScan { range_max: nan, ..base() }),
+            ("range_max is 0.01", LaserScan { range_max: 0.01, ..base() }),
+            ("range_min is NaN", LaserScan { range_min: nan, ..base() }),
+            ("ranges is empty", LaserScan { ranges: vec![], ..base() }),
+            ("ranges has 65537", LaserScan { ranges: vec![1.0; MAX_RAYS + 1], ..base() }),
+        ] {
+            let why = scan_fault(&broken).unwrap_or_default();
+            assert!(why.contains(field), "{field}: {why}");
+        }
+    }
+
+    #[test]
+    fn headers_of_real_drivers_are_taken() {
+        let base = || LaserScan {
+            angle_increment: 0.01,
+            angle_min: -0.5,
+            angle_max: 0.5,
+            ..scan(1.0, &[1.0; 101])
+        };
+        for fine in [
+            // One ray more or less than the angles say, both ends of a turn, a turn the other way,
+            // no last angle, no largest range.
+            LaserScan { ranges: vec![1.0; 102], ..base() },
+            LaserScan { ranges: vec![1.0; 100], ..base() },
+            LaserScan { angle_min: 0.5, angle_max: -0.5, angle_increment: -0.01, ..base() },
+            LaserScan { angle_min: 0.0, angle_max: 0.0, ..base() },
+            LaserScan { range_max: f32::INFINITY, ..base() },
+            LaserScan { ranges: vec![1.0], angle_increment: 0.0, ..base() },
+        ] {
+            assert_eq!(scan_fault(&fine), None, "{fine:?}");
+        }
     }
 
     #[test]
     fn the_nearest_scan_counts_and_one_of_long_ago_does_not() {
         let mut scans = Scans::default();
-        (0..100).for_each(|i| assert!(scans.push(scan(0.1 * f64::from(i), &[1.0]))));
+        (0..100).for_each(|i| scans.push(scan(0.1 * f64::from(i), &[1.0])));
         let near = |seconds| {
             let found = scans.near(Stamp::default().plus_seconds(seconds));
             found.map(|scan| {

@@ -21,6 +21,7 @@ use nalgebra::Isometry2;
 use tagalong_core::{Input, Sensors, Stamp};
 use tagalong_geometry::Camera;
 
+use crate::InputSettings;
 use crate::msgs::{CdrError, Header};
 use crate::tally::Tally;
 use crate::tf::TfBuffer;
@@ -44,7 +45,7 @@ pub(crate) struct SensorType {
     /// Reads the header of a message in the first pass; `None` if the message is only counted.
     pub(crate) header: fn(&[u8]) -> Result<Option<Header>, CdrError>,
     /// Creates the reader of a topic from the type of its messages.
-    pub(crate) reader: fn(&str) -> Box<dyn SensorReader>,
+    pub(crate) reader: fn(&str, &InputSettings) -> Box<dyn SensorReader>,
 }
 
 /// Reader of the messages of one topic.

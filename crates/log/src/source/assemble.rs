@@ -26,7 +26,7 @@ use crate::pairing::Payload;
 use crate::register::Registration;
 use crate::scan::Type;
 use crate::sensors::Moment;
-use crate::sensors::laser::{is_sane, lose_scan, seen_from};
+use crate::sensors::laser::{lose_scan, scan_fault, seen_from};
 use crate::tally::Tally;
 
 /// State that is carried from frame to frame.
@@ -120,10 +120,17 @@ impl Assembler {
         intake: &mut Intake,
         tally: &mut Tally,
     ) -> Option<LogFrame> {
-        let Some(sweep) = decode::<LaserScan>(&scan.data).ok().filter(is_sane) else {
-            lose_scan(tally);
-            return None;
+        let sweep = match decode::<LaserScan>(&scan.data) {
+            Ok(sweep) => sweep,
+            Err(error) => {
+                lose_scan(plan.primary(), &error.to_string(), tally);
+                return None;
+            }
         };
+        if let Some(why) = scan_fault(&sweep) {
+            lose_scan(plan.primary(), &why, tally);
+            return None;
+        }
         let Some(pose) = plan.mount.at(&intake.tf, scan.stamp) else {
             tally.count("laser_scans_without_pose");
             return None;
@@ -266,9 +273,22 @@ impl Assembler {
             }
             _ => {
                 tally.lose("depth_not_registrable", || {
-                    "depth has another size than colour, and there is no transform or no \
-                     calibration to register it with"
-                        .into()
+                    let topic = plan.chosen.depth.as_deref().unwrap_or_default();
+                    let problem = plan.chosen.depth_problem.as_ref();
+                    let why = problem.map_or_else(
+                        || {
+                            format!(
+                                "its images are {}x{}, those of colour {}x{}, and no transform is \
+                                 known at that time",
+                                seen.width(),
+                                seen.height(),
+                                camera.width,
+                                camera.height
+                            )
+                        },
+                        |problem| problem.why.clone(),
+                    );
+                    format!("{topic} cannot be used: {why}")
                 });
                 None
             }
@@ -527,7 +547,9 @@ fn pixels(plan: &Plan, topic: &str, image: &Payload, tally: &mut Tally) -> Optio
     if is_disparity(plan, topic) {
         return depth_of_disparity(plan, topic, image, tally).map(Pixels::Depth);
     }
-    let (unit, limits) = (plan.input.depth_unit_m, &plan.limits);
+    let is_depth = plan.chosen.depth.as_deref() == Some(topic);
+    let unit = if is_depth { plan.depth_unit_m } else { plan.input.depth_unit_m };
+    let limits = &plan.limits;
     let of = |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => decode_raw(&image, unit, limits),
         AnyImage::Compressed(image) => decode_compressed(&image, unit, limits),

@@ -4,11 +4,13 @@ use tagalong_core::{Stamp, planar_pose};
 
 use super::changes::CameraWatch;
 use super::plan::Plan;
+use super::restamp::restamp;
 use crate::msgs::{CdrError, CompressedImage, DisparityImage, Image, Odometry, TFMessage, decode};
 use crate::obstacles::ObstacleReader;
 use crate::odometry::PoseBuffer;
 use crate::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
-use crate::scan::{Scan, Type, is_static};
+use crate::scan::{Type, is_static};
+use crate::sensors::laser::Scans;
 use crate::sensors::{SENSORS, SensorReader};
 use crate::tally::Tally;
 use crate::tf::TfBuffer;
@@ -39,6 +41,8 @@ pub(super) struct Intake {
     heard: Option<(Stamp, u64)>,
     pub(super) tf: TfBuffer,
     pub(super) poses: PoseBuffer,
+    /// True if messages have the times of their recording in place of their stamps.
+    has_recording_times: bool,
 }
 
 impl Intake {
@@ -57,16 +61,26 @@ impl Intake {
             frames: Reorder::new(input.reorder_frames),
             depth: Waiting::default(),
             right: Waiting::default(),
-            sensors: readers(scan, chosen, primary),
+            sensors: readers(plan, primary),
             obstacles: sources.filter_map(|it| ObstacleReader::new(it, scan.is_live())).collect(),
             heard: None,
             tf,
             poses: PoseBuffer::default(),
+            has_recording_times: plan.has_recording_times,
         }
     }
 
     /// Takes in a message. One that cannot be decoded is counted as lost.
     pub(super) fn take(&mut self, message: &Message<'_>, tally: &mut Tally) {
+        if !self.has_recording_times {
+            return self.take_stamped(message, tally);
+        }
+        let restamped = restamp(message);
+        let data = restamped.as_deref().unwrap_or(message.data);
+        self.take_stamped(&Message { data, ..message.clone() }, tally);
+    }
+
+    fn take_stamped(&mut self, message: &Message<'_>, tally: &mut Tally) {
         self.take_obstacles(message, tally);
         let topic = Some(&message.channel.topic);
         let outcome = if *message.channel.topic == self.primary {
@@ -86,7 +100,13 @@ impl Intake {
             let topic = &message.channel.topic;
             decode(message.data).map(|info| self.watch.watch_info(topic, &info, tally))
         } else if Type::of(&message.channel.schema_name) == Type::Tf {
-            decode(message.data).map(|tf| self.take_tf(&tf, &message.channel.topic, tally))
+            decode(message.data).map(|mut tf: TFMessage| {
+                if self.has_recording_times {
+                    let stamp = Stamp::from_nanos(message.log_time).into();
+                    tf.transforms.iter_mut().for_each(|link| link.header.stamp = stamp);
+                }
+                self.take_tf(&tf, &message.channel.topic, tally);
+            })
         } else {
             Ok(())
         };
@@ -123,6 +143,15 @@ impl Intake {
         match self.frames.push(image) {
             Arrival::Queued | Arrival::Suspect => {}
             Arrival::Duplicate => tally.count("duplicate_frames"),
+            Arrival::SameStamp => {
+                let topic = self.primary.clone();
+                tally.lose("frames_of_same_stamp", || {
+                    format!(
+                        "{topic}: different images have the same stamp, and only the first of them \
+                         makes a frame: `--stamps recording` takes the times of recording"
+                    )
+                });
+            }
             Arrival::LateBefore => tally.count("late_frames"),
             Arrival::Jumped => {
                 tally.count("time_jumps_back");
@@ -215,11 +244,18 @@ impl Intake {
 }
 
 /// Creates the readers of the chosen topics; the topic that makes the frames has none.
-fn readers(scan: &Scan, chosen: &Chosen, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
+fn readers(plan: &Plan, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
+    let Plan { scan, chosen, input, .. } = plan;
     let topics = SENSORS.iter().filter_map(|sensor| Some((sensor, chosen.sensor(sensor.input)?)));
     let others = topics.filter(|(_, topic)| *topic != primary);
     let schema = |topic: &str| scan.topics.get(topic).map_or("", |topic| &topic.schema);
-    others.map(|(sensor, topic)| (topic.to_owned(), (sensor.reader)(schema(topic)))).collect()
+    let mut readers: Vec<(String, Box<dyn SensorReader>)> = others
+        .map(|(sensor, topic)| (topic.to_owned(), (sensor.reader)(schema(topic), input)))
+        .collect();
+    for topic in &chosen.further_scans {
+        readers.push((topic.clone(), Box::new(Scans::further())));
+    }
+    readers
 }
 
 /// Returns the stamp, the frame and the bytes of an image or a scan.

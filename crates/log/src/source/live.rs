@@ -75,6 +75,7 @@ impl Listening {
             schema_name: message_type.to_owned(),
             schema_encoding: "ros2msg".into(),
             encoding: "cdr".into(),
+            definition: Arc::default(),
         };
         self.channels.insert(topic.to_owned(), Arc::new(channel));
         self.gathering.topic(topic, message_type, "cdr");

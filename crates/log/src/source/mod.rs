@@ -8,6 +8,7 @@ mod live;
 mod mount;
 mod parts;
 mod plan;
+mod restamp;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,7 @@ use std::sync::Arc;
 
 use assembly::{Assembly, Messages};
 pub use live::{Listening, LiveSource};
+pub(crate) use mount::robot_frame;
 use nalgebra::Isometry2;
 use parts::PartsWalker;
 use plan::{plan, tally_of};
@@ -23,7 +25,7 @@ use tagalong_config::path_text;
 use tagalong_core::Frame;
 
 use crate::scan::Scan;
-use crate::{InputSettings, Inputs, Limits, LogError};
+use crate::{InputAccount, InputSettings, Inputs, Limits, LogError};
 
 /// Frame with the pose of the robot.
 pub struct LogFrame {
@@ -196,6 +198,11 @@ impl FrameSource {
     /// Returns true if there is odometry: a topic, or transforms.
     pub fn has_odometry(&self) -> bool {
         self.assembly.plan.odom_frames.is_some()
+    }
+
+    /// Returns the use of each topic, with the reasons for those that are not used.
+    pub fn account(&self) -> &InputAccount {
+        &self.assembly.plan.account
     }
 
     /// Returns the facts about the log.

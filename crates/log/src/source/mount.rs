@@ -29,7 +29,7 @@ impl Mount {
         input: &InputSettings,
         mirror: bool,
     ) -> Option<Self> {
-        let Some(mount) = &input.camera else {
+        let Some(mount) = input.mount() else {
             let base = robot_frame(scan, input);
             let camera = camera.filter(|camera| scan.tf.connects(base, camera))?;
             return Some(Self::Tf { base: base.to_owned(), camera: camera.to_owned() });
@@ -76,7 +76,7 @@ impl Mount {
 
 /// Returns the robot frame on the floor: `base_footprint` if tf has it and the settings do not name
 /// another frame.
-pub(super) fn robot_frame<'a>(scan: &Scan, input: &'a InputSettings) -> &'a str {
+pub(crate) fn robot_frame<'a>(scan: &Scan, input: &'a InputSettings) -> &'a str {
     if input.base_frame == "base_link" && scan.tf.knows("base_footprint") {
         return "base_footprint";
     }

@@ -11,10 +11,13 @@ use super::assembly::{Assembly, Messages};
 use super::mount::{Mount, robot_frame};
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::images::StereoGeometry;
+use crate::input::StampSource;
 use crate::obstacles::{PlannedSource, planned_sources};
 use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
-use crate::topics::{Chosen, choose, missing, unreadable};
+use crate::topics::{
+    Chosen, InputAccount, TopicUse, choose, decide, intrinsics_of, kind_of, missing, unreadable,
+};
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
 /// Function that starts another pass over the same messages.
@@ -24,6 +27,12 @@ pub(super) type Reread<'a> = &'a dyn Fn() -> Result<Box<dyn Messages + 'a>, LogE
 pub(super) struct Plan {
     pub(super) scan: Arc<Scan>,
     pub(super) chosen: Chosen,
+    /// Use of each topic, with reasons.
+    pub(super) account: InputAccount,
+    /// True if messages have the times of their recording in place of their stamps.
+    pub(super) has_recording_times: bool,
+    /// Metres per unit of the depth images, where it is not that of the convention.
+    pub(super) depth_unit_m: Option<f64>,
     pub(super) input: InputSettings,
     pub(super) limits: Limits,
     pub(super) inputs: Inputs,
@@ -43,7 +52,7 @@ pub(super) struct Plan {
 impl Plan {
     /// Returns the topic of the images that make the frames.
     pub(super) fn primary(&self) -> &str {
-        primary(&self.chosen)
+        self.chosen.primary()
     }
 
     /// Returns true for a topic whose messages are used.
@@ -134,11 +143,6 @@ impl Plan {
     }
 }
 
-fn primary(chosen: &Chosen) -> &str {
-    let images = chosen.colour.as_ref().or(chosen.depth.as_ref());
-    images.map(String::as_str).or(chosen.sensor(Input::Laser)).unwrap_or_default()
-}
-
 /// Returns the counters and remarks of the first pass.
 pub(super) fn tally_of(scan: &Scan) -> Tally {
     let mut tally =
@@ -163,13 +167,22 @@ pub(super) fn plan(
     tally: &mut Tally,
     reread: Reread<'_>,
 ) -> Result<Plan, LogError> {
-    let chosen = choose(&scan, input, inputs)?;
-    let depth_lens = lens_of(
+    let (scan, has_recording_times) = timed(scan, input, inputs, tally)?;
+    let decision = decide(&scan, input, inputs)?;
+    let (chosen, account) = (decision.chosen, decision.account);
+    let depth_lens = match lens_of(
         &scan,
         chosen.depth.as_deref(),
         chosen.depth_info.as_deref(),
         input.disparity.is_some(),
-    )?;
+    ) {
+        // Depth that is registered to colour needs no calibration of its own.
+        Err(why) if chosen.colour.is_some() && !inputs.requires(Input::Depth) => {
+            tally.note(format!("the calibration of the depth images is not used: {why}"));
+            None
+        }
+        found => found?,
+    };
     let lens = match chosen.colour {
         Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref(), false)?,
         None => depth_lens,
@@ -186,8 +199,11 @@ pub(super) fn plan(
         baseline_m: right.and_then(|right| right.baseline_m),
         disparity: None,
         odom_frames: odom_frames(&scan, &chosen, input),
+        depth_unit_m: depth_unit_m(&scan, &chosen, input, tally),
+        has_recording_times,
         scan,
         chosen,
+        account,
         input: input.clone(),
         limits: limits.clone(),
         inputs,
@@ -198,10 +214,101 @@ pub(super) fn plan(
     plan.mount = find_mount(&plan, reread)?;
     tally.note(format!("the pose of the camera comes from {}", plan.mount.source()));
     note_unread_images(&plan, tally);
+    note_choices(&plan, tally);
     if plan.odom_frames.is_none() {
         tally.note("no odometry: the robot is taken to be at rest");
     }
     Ok(plan)
+}
+
+/// Returns the contents with the times that are used, and true if these are the times of recording:
+/// those that the settings ask for, and where the stamps of the frames never change.
+fn timed(
+    scan: Arc<Scan>,
+    input: &InputSettings,
+    inputs: Inputs,
+    tally: &mut Tally,
+) -> Result<(Arc<Scan>, bool), LogError> {
+    // Messages that arrive live have no times of recording.
+    if input.stamps == StampSource::Header || scan.is_live() {
+        return Ok((scan, false));
+    }
+    if input.stamps == StampSource::Auto {
+        let primary = choose(&scan, input, inputs)?.primary().to_owned();
+        let topic = scan.topics.get(&primary);
+        let Some(topic) = topic.filter(|topic| topic.has_constant_stamps()) else {
+            return Ok((scan, false));
+        };
+        let stamp = topic.stamps.first().copied().unwrap_or_default();
+        tally.count("logs_without_stamps");
+        tally.note(format!(
+            "the stamps of {primary} are not set: all are {stamp}; the times of recording are \
+             taken in place of all stamps (`stamps = \"recording\"` under [input])"
+        ));
+    } else {
+        tally.note("the times of recording are taken in place of all stamps");
+    }
+    Ok((Arc::new(scan.with_recording_times()), true))
+}
+
+/// Returns the unit of depth, where it is not that of the convention: that of the settings, else that
+/// which the camera tells in the log, else millimetres for grey images of 16 bits.
+fn depth_unit_m(
+    scan: &Scan,
+    chosen: &Chosen,
+    input: &InputSettings,
+    tally: &mut Tally,
+) -> Option<f64> {
+    let name = chosen.depth.as_ref()?;
+    let topic = scan.topics.get(name)?;
+    let is_float = topic.pixels.as_deref().is_some_and(|pixels| pixels.starts_with("32FC1"));
+    if input.depth_unit_m.is_some() || is_float || is_disparity_image(topic) {
+        return input.depth_unit_m;
+    }
+    let told = scan.depth_units.iter().next();
+    if topic.is_deep_grey {
+        let kind = kind_of(topic);
+        let unit = match told {
+            Some((from, unit_m)) => format!("{unit_m} m by {from}"),
+            None => "a millimetre, which no message tells: `depth_unit_m` under [input]".to_owned(),
+        };
+        tally.note(format!("{name} ({kind}) is taken for depth, in units of {unit}"));
+    }
+    told.map(|(_, unit_m)| *unit_m).or(topic.is_deep_grey.then_some(MILLIMETRE))
+}
+
+/// Unit of depth by convention, m.
+const MILLIMETRE: f64 = 0.001;
+
+/// Tells which images could not be used and why, and which calibrations were found elsewhere.
+fn note_choices(plan: &Plan, tally: &mut Tally) {
+    for entry in &plan.account.topics {
+        if entry.used_as.is_some() && (entry.problem.is_some() || has_far_calibration(plan, entry))
+        {
+            tally.note(entry.to_string());
+        }
+    }
+    let other = plan.account.topics.iter().find(|entry| {
+        entry.used_as.is_none() && entry.camera.is_some() && entry.camera != plan.chosen.camera
+    });
+    if let (Some(other), Some(used)) = (other, &plan.chosen.camera) {
+        let camera = other.camera.as_deref().unwrap_or_default();
+        tally.note(format!(
+            "the images of the camera {used} are used, those of {camera} are not: \
+             `camera = \"{camera}\"` under [input] takes them"
+        ));
+    }
+    if let Some((odometry, problem)) = &plan.chosen.unused_odometry {
+        tally.count("odometry_not_used");
+        tally.note(format!("{odometry} is not used: {}; {}", problem.why, problem.remedy));
+    }
+}
+
+/// Returns true if the calibration of a topic stands in another place than usual, or is of another
+/// size.
+fn has_far_calibration(plan: &Plan, entry: &TopicUse) -> bool {
+    let found = plan.chosen.calibrations.get(&entry.topic).map(|found| &found.topic);
+    entry.calibration.as_ref() != found
 }
 
 /// Counts the images that cannot be read, if the log has no others of their kind.
@@ -230,11 +337,11 @@ fn lens_of(
     is_disparity: bool,
 ) -> Result<Option<Intrinsics>, LogError> {
     let (Some(image), Some(topic)) = (image, info) else { return Ok(None) };
-    let Some(info) = scan.infos.get(topic) else { return Ok(None) };
-    // Of other images, the name of the topic is the only sign that they are rectified.
-    let is_disparity = is_disparity || scan.topics.get(image).is_some_and(is_disparity_image);
-    let is_rectified = image.contains("rect") || is_disparity;
-    intrinsics(info, is_rectified).map(Some).map_err(|source| LogError::Calibration {
+    if !scan.infos.contains_key(topic) {
+        return Ok(None);
+    }
+    let lens = intrinsics_of(scan, image, topic, is_disparity);
+    lens.map(Some).map_err(|source| LogError::Calibration {
         path: scan.path.clone(),
         topic: topic.to_owned(),
         source,
@@ -348,6 +455,7 @@ fn floor(plan: &Plan, reread: Reread<'_>) -> Result<Option<Mount>, LogError> {
     let probe = Plan {
         scan: Arc::clone(&plan.scan),
         chosen: plan.chosen.clone(),
+        account: InputAccount::default(),
         input: plan.input.clone(),
         limits: plan.limits.clone(),
         // No other input than depth, so that nothing else is decoded.
@@ -368,6 +476,7 @@ fn floor(plan: &Plan, reread: Reread<'_>) -> Result<Option<Mount>, LogError> {
     floors.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
     Ok(floors.get(floors.len() / 2).map(|ground| {
         let mount = MountSettings {
+            name: None,
             height_m: ground.height_m,
             pitch_down_deg: ground.pitch_down_rad().to_degrees(),
             roll_deg: ground.roll_rad().to_degrees(),

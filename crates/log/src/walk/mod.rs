@@ -26,6 +26,8 @@ pub struct Channel {
     pub schema_encoding: String,
     /// Encoding of the messages, for example `cdr`.
     pub encoding: String,
+    /// Definition of the message type, with those that it contains; empty if the file has none.
+    pub definition: Arc<str>,
 }
 
 /// One message, borrowed from the walker's buffer.

@@ -17,8 +17,8 @@ use tagalong_log::msgs::{
     CameraInfo, DisparityImage, Header, Image, LaserScan, Message, encode_big_endian,
 };
 use tagalong_log::{
-    DisparitySettings, FrameSource, Input, InputSettings, Inputs, Limits, LogError, LogFrame,
-    MountSettings,
+    CameraSettings, DisparitySettings, FrameSource, Input, InputSettings, Inputs, Limits, LogError,
+    LogFrame, MountSettings,
 };
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
@@ -390,8 +390,9 @@ fn the_pose_of_the_camera_can_be_given() {
     log.colour(at(0.1));
     log.depth(at(0.1), "colour", 2.0);
     let saved = log.save();
-    let mount = MountSettings { height_m: 1.5, pitch_down_deg: 10.0, roll_deg: -3.0 };
-    let input = InputSettings { camera: Some(mount), ..InputSettings::default() };
+    let mount = MountSettings { height_m: 1.5, pitch_down_deg: 10.0, roll_deg: -3.0, name: None };
+    let input =
+        InputSettings { camera: Some(CameraSettings::Mounted(mount)), ..InputSettings::default() };
     let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), DEPTH).unwrap();
     let camera = source.next_frame().unwrap().frame.camera.clone();
     assert!((camera.height_m() - 1.5).abs() < 1e-12);
@@ -420,7 +421,7 @@ fn the_given_pose_of_the_camera_goes_before_that_of_tf() {
             FrameSource::open(&saved.path, &input, &Limits::default(), inputs).unwrap();
         source.next_frame().unwrap().frame.camera.height_m()
     };
-    assert!((height(Some(mount)) - 0.7).abs() < 1e-12);
+    assert!((height(Some(CameraSettings::Mounted(mount))) - 0.7).abs() < 1e-12);
     assert!((height(None) - 1.2).abs() < 1e-12);
 }
 

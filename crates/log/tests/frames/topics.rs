@@ -139,7 +139,6 @@ fn a_named_topic_of_a_wrong_kind_is_an_error_of_the_settings() {
     };
     for (encoding, remedy) in [
         ("rgb8", "/camera/depth/image_raw (sensor_msgs/msg/Image, 32FC1) would fit"),
-        ("mono16", "set `depth_unit_m` under [input]"),
         ("mono8", "add [input.disparity]"),
         ("rgb16", "let the driver publish 8 bits"),
     ] {

@@ -1,0 +1,172 @@
+//! Search for the calibrations of images, wherever in the log they are.
+
+use super::name::TopicName;
+use crate::camera_info::{CalibrationError, Intrinsics, intrinsics};
+use crate::scan::{Scan, Type};
+
+/// Relation of a calibration to the images that it was taken for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Relation {
+    /// It stands where drivers publish it, or the settings name it.
+    Own,
+    /// It stands nearby, for the same stream of the same device.
+    SameStream,
+    /// It has the frame of the images.
+    SameFrame,
+    /// It is the only one for images of that size.
+    SameSize,
+}
+
+impl Relation {
+    /// Returns the relation as the end of a sentence; `None` where nothing needs to be said.
+    pub(crate) fn words(self) -> Option<&'static str> {
+        match self {
+            Self::Own => None,
+            Self::SameStream => Some("of the same stream, in another folder"),
+            Self::SameFrame => Some("of the same frame"),
+            Self::SameSize => Some("the only one for images of that size"),
+        }
+    }
+}
+
+/// Calibration that was found for images.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct FoundCalibration {
+    pub(crate) topic: String,
+    pub(crate) relation: Relation,
+}
+
+/// Returns the calibration of an image topic: the nearest one that can be used for its images, else
+/// the nearest one.
+pub(crate) fn calibration_of(
+    scan: &Scan,
+    image: &str,
+    is_disparity: bool,
+) -> Option<FoundCalibration> {
+    let mut found = candidates(scan, image, is_disparity);
+    let fitting = found.iter().position(|candidate| {
+        let lens = intrinsics_of(scan, image, &candidate.topic, is_disparity);
+        lens.is_ok_and(|lens| misfit(scan, image, &lens).is_none())
+    });
+    let first = fitting.unwrap_or(0);
+    (first < found.len()).then(|| found.swap_remove(first))
+}
+
+/// Returns the calibrations that may be those of an image topic, the nearest first.
+fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibration> {
+    let mut found: Vec<FoundCalibration> = Vec::new();
+    let mut add = |topic: &str, relation| {
+        let is_new = !found.iter().any(|known| known.topic == topic);
+        if is_new && scan.infos.contains_key(topic) {
+            found.push(FoundCalibration { topic: topic.to_owned(), relation });
+        }
+    };
+    let folder = folder_of(image);
+    add(&format!("{folder}/camera_info"), Relation::Own);
+    let kind = scan.topics.get(image).map(|topic| topic.kind);
+    // Disparities are those of the left camera, and its calibration stands beside its images.
+    if is_disparity || kind == Some(Type::DisparityImage) {
+        add(&format!("{folder}/left/camera_info"), Relation::Own);
+    }
+    let name = TopicName::of(image);
+    let mut others: Vec<(usize, &String)> =
+        scan.infos.keys().map(|info| (common_folders(image, info), info)).collect();
+    // The nearest folder first; of equal ones the first by name.
+    others.sort_by_key(|(common, info)| (std::cmp::Reverse(*common), *info));
+    for (_, info) in others.iter().filter(|(common, _)| *common > 0) {
+        let other = TopicName::of(info);
+        if (&other.device, other.stream, other.side) == (&name.device, name.stream, name.side) {
+            add(info, Relation::SameStream);
+        }
+    }
+    let frame = scan.frame_of(image).filter(|frame| !frame.is_empty());
+    for (_, info) in &others {
+        let is_same = frame.is_some_and(|frame| scan.infos[*info].header.frame_id == frame);
+        // Recordings of some cameras have one frame for all streams.
+        if is_same && !name.contradicts(&TopicName::of(info)) {
+            add(info, Relation::SameFrame);
+        }
+    }
+    if found.is_empty()
+        && let Some(only) = only_of_size(scan, image)
+    {
+        found.push(FoundCalibration { topic: only, relation: Relation::SameSize });
+    }
+    found
+}
+
+/// Returns the only calibration for images of this size that stands beside no images of its own.
+fn only_of_size(scan: &Scan, image: &str) -> Option<String> {
+    let size = scan.topics.get(image)?.size?;
+    let name = TopicName::of(image);
+    let has_images = |info: &str| {
+        scan.topics.iter().any(|(other, topic)| {
+            let is_image = topic.pixels.is_some() && other != image;
+            is_image && format!("{}/camera_info", folder_of(other)) == info
+        })
+    };
+    let fitting = scan.infos.iter().filter(|(info, message)| {
+        (message.width, message.height) == size
+            && !has_images(info)
+            && !name.contradicts(&TopicName::of(info))
+    });
+    let mut names = fitting.map(|(info, _)| info.clone());
+    let only = names.next()?;
+    names.next().is_none().then_some(only)
+}
+
+/// Returns the folder of an image topic, without the endings of transports.
+fn folder_of(image: &str) -> &str {
+    let base = image.trim_end_matches("/compressedDepth").trim_end_matches("/compressed");
+    base.rsplit_once('/').map_or("", |(folder, _)| folder)
+}
+
+/// Returns the number of folders at the start that two topics share.
+fn common_folders(a: &str, b: &str) -> usize {
+    let folders = |topic: &str| -> Vec<String> {
+        let mut parts: Vec<String> =
+            topic.trim_matches('/').split('/').map(str::to_owned).collect();
+        parts.pop();
+        parts
+    };
+    folders(a).iter().zip(&folders(b)).take_while(|(a, b)| a == b).count()
+}
+
+/// Returns the lens of an image topic by a calibration, scaled to the size of the images where a
+/// whole number explains the difference.
+///
+/// # Errors
+/// A calibration that cannot be used. A wrong size is no error here.
+pub(crate) fn intrinsics_of(
+    scan: &Scan,
+    image: &str,
+    info: &str,
+    is_disparity: bool,
+) -> Result<Intrinsics, CalibrationError> {
+    let Some(message) = scan.infos.get(info) else { return Err(CalibrationError::Uncalibrated) };
+    let topic = scan.topics.get(image);
+    let is_disparity =
+        is_disparity || topic.is_some_and(|topic| topic.kind == Type::DisparityImage);
+    // Of other images, the name of the topic is the only sign that they are rectified.
+    let lens = intrinsics(message, image.contains("rect") || is_disparity)?;
+    let size = topic.and_then(|topic| topic.size);
+    Ok(match size {
+        Some((width, height)) => lens.scaled_to(width as usize, height as usize).unwrap_or(lens),
+        None => lens,
+    })
+}
+
+/// Returns the sizes of a calibration and of the images that it does not fit.
+pub(crate) fn misfit(scan: &Scan, image: &str, lens: &Intrinsics) -> Option<CalibrationError> {
+    let (width, height) = scan.topics.get(image)?.size?;
+    crate::camera_info::check_size(lens, width as usize, height as usize).err()
+}
+
+/// Returns the calibrations of a log with their sizes, as text.
+pub(crate) fn calibrations(scan: &Scan) -> String {
+    let each = scan.infos.iter().map(|(topic, info)| {
+        format!("{topic} ({}x{}, frame `{}`)", info.width, info.height, info.header.frame_id)
+    });
+    let all: Vec<String> = each.collect();
+    if all.is_empty() { "there are none in the log".into() } else { all.join(", ") }
+}

@@ -1,0 +1,251 @@
+//! Reasons for which topics are used or not.
+
+use super::account::{InputAccount, TopicUse};
+use super::kinds::{is_image, is_odometry, is_of, kind_of, unreadable};
+use super::problems::{depth_problem, scanner_problem};
+use super::rigs::{Rig, rigs};
+use super::{Chosen, Relation, Stream, TopicName, named_topic};
+use crate::images::Content;
+use crate::scan::{Scan, Topic};
+use crate::sensors::{SENSORS, SensorType};
+use crate::{Input, InputSettings, Inputs};
+
+/// Reason for images of a rig that is not chosen.
+pub(super) const OTHER_CAMERA: &str = "it is of another camera";
+
+/// Returns the account of all images, scans, detections and odometry.
+pub(super) fn account(
+    scan: &Scan,
+    input: &InputSettings,
+    inputs: Inputs,
+    chosen: &Chosen,
+) -> InputAccount {
+    let judge = Judge { scan, input, inputs, chosen, rigs: rigs(scan) };
+    let topics = scan.topics.iter().filter_map(|(name, topic)| judge.entry(name, topic));
+    let mut account = InputAccount { topics: topics.collect() };
+    account.sort();
+    account
+}
+
+/// Everything that the reasons depend on.
+struct Judge<'a> {
+    scan: &'a Scan,
+    input: &'a InputSettings,
+    inputs: Inputs,
+    chosen: &'a Chosen,
+    rigs: Vec<Rig>,
+}
+
+/// Reason with a remedy, which may be missing.
+type Reason = (String, Option<String>);
+
+impl Judge<'_> {
+    /// Returns the entry of a topic; `None` for those that are no sensors.
+    fn entry(&self, name: &str, topic: &Topic) -> Option<TopicUse> {
+        let sensor = SENSORS.iter().find(|sensor| is_of(sensor, topic));
+        let is_known = is_image(topic) || is_odometry(topic) || sensor.is_some();
+        if !is_known && unreadable(topic).is_none() {
+            return None;
+        }
+        let used_as = self.use_of(name);
+        let reason = match &used_as {
+            Some(_) => self.failure(name),
+            None => Some(match sensor {
+                Some(sensor) => self.unused_sensor(name, topic, sensor),
+                None if is_odometry(topic) => self.unused_odometry(name, topic),
+                None => self.unused_image(name, topic),
+            }),
+        };
+        let (problem, remedy) = match reason {
+            Some((problem, remedy)) => (Some(problem), remedy),
+            None => (None, None),
+        };
+        Some(TopicUse {
+            topic: name.to_owned(),
+            kind: self.kind(topic),
+            camera: self.rig_of(name).map(|rig| rig.label.clone()),
+            used_as,
+            calibration: self.calibration(name),
+            could_be: problem.as_ref().and_then(|_| self.could_be(name, topic)),
+            problem,
+            remedy,
+        })
+    }
+
+    /// Returns the input that a topic could serve as, if its problem were cured and no other topic
+    /// does so.
+    fn could_be(&self, name: &str, topic: &Topic) -> Option<&'static str> {
+        let Chosen { colour, depth, depth_problem, unused_odometry, .. } = self.chosen;
+        let has_depth = depth.is_some() && depth_problem.is_none();
+        let is_empty = topic.count == 0 || topic.undecodable == topic.count;
+        if is_empty {
+            return None;
+        }
+        if unused_odometry.as_ref().is_some_and(|(unused, _)| unused == name) {
+            return Some("odometry");
+        }
+        let parts = TopicName::of(name);
+        let is_depth = topic.content == Content::Depth || topic.is_jpeg_depth || topic.is_deep_grey;
+        let is_depth = is_depth || parts.stream == Stream::Depth;
+        if is_depth {
+            let is_free = self.inputs.uses(Input::Depth) && !has_depth;
+            return (is_image(topic) && is_free).then_some("depth");
+        }
+        let is_free = self.inputs.uses(Input::Colour) && colour.is_none();
+        (unreadable(topic).is_some() && is_free).then_some("colour")
+    }
+
+    fn kind(&self, topic: &Topic) -> String {
+        let size = topic.size.map(|(width, height)| format!(", {width}x{height}"));
+        format!("{}{}", kind_of(topic), size.unwrap_or_default())
+    }
+
+    /// Returns the input that a topic is used as.
+    fn use_of(&self, name: &str) -> Option<String> {
+        let Chosen { colour, depth, right, odometry, sensors, .. } = self.chosen;
+        let images =
+            [("colour", colour), ("depth", depth), ("right", right), ("odometry", odometry)];
+        let of_image = images.iter().find(|(_, topic)| topic.as_deref() == Some(name));
+        if let Some((input, _)) = of_image {
+            return Some((*input).to_owned());
+        }
+        if let Some((input, _)) = sensors.iter().find(|(_, topic)| *topic == name) {
+            return Some(input.name().to_owned());
+        }
+        if self.chosen.further_scans.iter().any(|topic| topic == name) {
+            return Some("laser".to_owned());
+        }
+        let source = self.input.sources.iter().find(|source| source.topic == name)?;
+        Some(format!("source of obstacles `{}`", source.name))
+    }
+
+    /// Returns the reason for which a topic that is chosen gives nothing.
+    fn failure(&self, name: &str) -> Option<Reason> {
+        let is_depth = self.chosen.depth.as_deref() == Some(name);
+        let problem = self.chosen.depth_problem.as_ref().filter(|_| is_depth)?;
+        Some((problem.why.clone(), Some(problem.remedy.clone())))
+    }
+
+    fn calibration(&self, name: &str) -> Option<String> {
+        let found = self.chosen.calibrations.get(name)?;
+        let words = found.relation.words().map(|words| format!(", {words}")).unwrap_or_default();
+        let info = self.scan.infos.get(&found.topic);
+        let size = self.scan.topics.get(name).and_then(|topic| topic.size);
+        let scaled = match (info, size) {
+            (Some(info), Some(size))
+                if found.relation != Relation::Own || is_scaled(info, size) =>
+            {
+                format!(", {}x{}", info.width, info.height)
+            }
+            _ => String::new(),
+        };
+        Some(format!("{}{scaled}{words}", found.topic))
+    }
+
+    fn rig_of(&self, name: &str) -> Option<&Rig> {
+        self.rigs.iter().find(|rig| rig.has(name))
+    }
+
+    fn unused_image(&self, name: &str, topic: &Topic) -> Reason {
+        if let Some(reason) = empty(topic) {
+            return reason;
+        }
+        if let Some(why) = unreadable(topic) {
+            return match why.split_once(": ") {
+                Some((why, remedy)) => (why.to_owned(), Some(remedy.to_owned())),
+                None => (why, None),
+            };
+        }
+        let rig = self.rig_of(name);
+        let other_rig = rig.filter(|rig| Some(&rig.label) != self.chosen.camera.as_ref());
+        if let (Some(rig), Some(_)) = (other_rig, &self.chosen.camera) {
+            let remedy = format!("`camera = \"{}\"` under [input] takes that one", rig.label);
+            return (OTHER_CAMERA.to_owned(), Some(remedy));
+        }
+        let (kind, key, used) = match topic.content {
+            Content::Depth => ("depth", "depth_topic", &self.chosen.depth),
+            _ => ("colour", "colour_topic", &self.chosen.colour),
+        };
+        if topic.content == Content::Depth && used.is_none() {
+            return self.unused_depth(name);
+        }
+        let Some(used) = used else {
+            return (format!("no {kind} images are used"), None);
+        };
+        if topic.is_deep_grey {
+            let remedy = "if they are depth, name the topic as `depth_topic` under [input], with \
+                          its unit as `depth_unit_m`";
+            return (
+                "its grey images of 16 bits could be depth".to_owned(),
+                Some(remedy.to_owned()),
+            );
+        }
+        let remedy = format!("`{key} = \"{name}\"` under [input] takes this one");
+        (format!("{used} is used"), Some(remedy))
+    }
+
+    /// Returns the reason for which depth is left out.
+    fn unused_depth(&self, name: &str) -> Reason {
+        let colour = self.chosen.colour.as_deref().unwrap_or_default();
+        match depth_problem(self.scan, self.input, colour, name) {
+            Some(problem) => (problem.why, Some(problem.remedy)),
+            None => ("the pipeline uses no depth".to_owned(), None),
+        }
+    }
+
+    fn unused_odometry(&self, name: &str, topic: &Topic) -> Reason {
+        if let Some((unused, problem)) = &self.chosen.unused_odometry
+            && unused == name
+        {
+            return (problem.why.clone(), Some(problem.remedy.clone()));
+        }
+        if let Some(reason) = empty(topic) {
+            return reason;
+        }
+        let used = self.chosen.odometry.as_deref().unwrap_or("another topic");
+        let remedy = format!("`odometry_topic = \"{name}\"` under [input] takes this one");
+        (format!("{used} is used"), Some(remedy))
+    }
+
+    fn unused_sensor(&self, name: &str, topic: &Topic, sensor: &SensorType) -> Reason {
+        if topic.count == 0 {
+            return ("no message was recorded".to_owned(), None);
+        }
+        let key = sensor.key();
+        let takes = format!("`{key} = \"{name}\"` under [input] takes this one");
+        if let Some(other) = self.chosen.sensor(sensor.input) {
+            let is_scan = sensor.input == Input::Laser && self.input.laser_topic.is_none();
+            let problem = scanner_problem(self.scan, self.input, other, name);
+            if let Some(problem) = problem.filter(|_| is_scan) {
+                let remedy = Some(problem.remedy).filter(|remedy| !remedy.is_empty());
+                return (problem.why, remedy);
+            }
+            return (format!("{other} is used"), Some(takes));
+        }
+        let is_named = named_topic(sensor, self.input).is_some();
+        if sensor.rank.is_none() && !is_named {
+            let remedy =
+                format!("`tagalong run recorded LOG` uses them, with `{key} = \"{name}\"`");
+            return ("recorded detections are read if they are named".to_owned(), Some(remedy));
+        }
+        if !self.inputs.uses(sensor.input) {
+            return (format!("the pipeline uses no {}", sensor.wanted), None);
+        }
+        (format!("no {} are used", sensor.wanted), Some(takes))
+    }
+}
+
+fn is_scaled(info: &crate::msgs::CameraInfo, size: (u32, u32)) -> bool {
+    // Binning and regions explain other sizes.
+    let is_plain = info.binning_x <= 1 && info.binning_y <= 1 && info.roi.width == 0;
+    is_plain && (info.width, info.height) != size
+}
+
+/// Returns the reason of a topic without one message that can be read.
+fn empty(topic: &Topic) -> Option<Reason> {
+    if topic.count == 0 {
+        return Some(("no message was recorded".to_owned(), None));
+    }
+    let is_lost = topic.undecodable == topic.count;
+    is_lost.then(|| (format!("its {} messages are not as their type says", topic.count), None))
+}

@@ -1,0 +1,155 @@
+//! Kinds of topics, as far as types, encodings and first messages tell them, and their ranks by name.
+
+use crate::InputSettings;
+use crate::images::{Content, VIDEO_REMEDY, may_be_disparity, refusal_of};
+use crate::scan::{Topic, Type};
+use crate::sensors::SensorType;
+
+pub(super) fn is_picture(topic: &Topic) -> bool {
+    matches!(topic.kind, Type::Image | Type::CompressedImage)
+}
+
+/// Returns true for images, of disparity included.
+pub(super) fn is_image(topic: &Topic) -> bool {
+    is_picture(topic) || topic.kind == Type::DisparityImage
+}
+
+/// Returns true for pictures that can be read, as far as that is known before the first one.
+pub(super) fn is_usable_picture(topic: &Topic) -> bool {
+    is_picture(topic) && (topic.content == Content::Picture || topic.pixels.is_none())
+}
+
+/// Returns true for images that can be read as depth if the settings name them. Grey images of 16
+/// bits are among them: what the user names is obeyed.
+pub(super) fn is_usable_depth(topic: &Topic, input: &InputSettings) -> bool {
+    let is_disparity = input.disparity.is_some() && disparity_rank("disparity", topic).is_some();
+    let is_depth = topic.content == Content::Depth || topic.pixels.is_none() || topic.is_deep_grey;
+    is_image(topic) && (is_depth || is_disparity)
+}
+
+/// Returns true for images whose pixels may be depth or disparities, by a setting at most.
+pub(super) fn could_be_depth(topic: &Topic) -> bool {
+    is_image(topic) && (topic.content != Content::Picture || remedy_as_depth(topic).is_some())
+}
+
+/// Returns the setting that makes depth of images that look like others.
+pub(super) fn remedy_as_depth(topic: &Topic) -> Option<&'static str> {
+    match topic.pixels.as_deref()? {
+        _ if topic.is_deep_grey => Some("name it as `depth_topic` under [input]"),
+        "mono8" | "8UC1" | "16SC1" => Some("and its pixels are disparities, add [input.disparity]"),
+        _ => None,
+    }
+}
+
+/// Returns type and encoding of the messages of a topic.
+pub(crate) fn kind_of(topic: &Topic) -> String {
+    match (&topic.pixels, topic.encoding.as_str()) {
+        (Some(pixels), _) => format!("{}, {pixels}", topic.schema),
+        (None, "cdr" | "ros1" | "") => topic.schema.clone(),
+        (None, encoding) => format!("{}, {encoding}", topic.schema),
+    }
+}
+
+/// Names of messages with images or scans, whatever their package and encoding.
+const SENSOR_MESSAGES: [&str; 5] =
+    ["Image", "RawImage", "CompressedImage", "DisparityImage", "LaserScan"];
+/// Names of messages with video.
+const VIDEO_MESSAGES: [&str; 3] = ["CompressedVideo", "FFMPEGPacket", "H264Packet"];
+
+/// Remedy for depth as JPEG.
+const JPEG_REMEDY: &str = "JPEG keeps 8 of the 16 bits of depth, so that no distances are left: \
+                           record the raw topic, or its compressedDepth";
+/// Remedy for grey images of 16 bits in a codec that is used for depth.
+const DEEP_REMEDY: &str = "grey images of 16 bits are no colour images; they could be depth: if \
+                           they are, name the topic as `depth_topic` under [input], with its unit \
+                           as `depth_unit_m`";
+
+/// Returns the reason for which images or scans of a topic cannot be read, with the remedy; `None`
+/// for those that can, and for all other topics.
+pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
+    let name = topic.schema.rsplit(['/', '.']).next().unwrap_or_default();
+    if VIDEO_MESSAGES.contains(&name) {
+        return Some(VIDEO_REMEDY.to_owned());
+    }
+    match (&topic.pixels, topic.kind) {
+        (Some(_), _) if topic.is_jpeg_depth => Some(JPEG_REMEDY.to_owned()),
+        (Some(_), _) if topic.is_deep_grey && topic.content == Content::Unknown => {
+            Some(DEEP_REMEDY.to_owned())
+        }
+        (Some(pixels), _) if topic.content == Content::Unknown => Some(refusal_of(pixels)),
+        (None, Type::Other) if SENSOR_MESSAGES.contains(&name) => Some(match &*topic.encoding {
+            "cdr" | "ros1" => format!("its type is not read; {name} of sensor_msgs is"),
+            other => format!(
+                "its messages are in `{other}`, and those of ROS 2 (`cdr`) and ROS 1 (`ros1`) are \
+                 read: record with `ros2 bag record`, or convert the log"
+            ),
+        }),
+        _ => None,
+    }
+}
+
+pub(super) fn is_info(topic: &Topic) -> bool {
+    topic.kind == Type::CameraInfo
+}
+
+pub(super) fn is_odometry(topic: &Topic) -> bool {
+    topic.kind == Type::Odometry
+}
+
+/// Returns true for a topic with messages of this sensor, in an encoding that can be read.
+pub(super) fn is_of(sensor: &SensorType, topic: &Topic) -> bool {
+    topic.kind == Type::Sensor && sensor.reads(&topic.schema)
+}
+
+pub(super) fn has(name: &str, words: &[&str]) -> bool {
+    words.iter().any(|word| name.contains(word))
+}
+
+/// Returns the rank of pictures by their name; `None` for other images.
+pub(super) fn colour_rank(name: &str, topic: &Topic) -> Option<i32> {
+    if !is_picture(topic) || topic.content != Content::Picture {
+        return None;
+    }
+    let name = &name.to_lowercase();
+    // A name for colour decides before one for a side, and before an uncompressed image.
+    let mut rank = -2 * i32::from(has(name, &["rear", "back"]));
+    rank += 8 * i32::from(has(name, &["color", "colour", "rgb"]));
+    rank += 4 * i32::from(has(name, &["left", "front", "rect"]));
+    rank -= 6 * i32::from(has(
+        name,
+        &["infra", "/ir", "depth", "disparity", "fisheye", "mono", "debug"],
+    ));
+    rank += i32::from(topic.kind == Type::Image);
+    Some(rank)
+}
+
+/// Returns the rank of depth images by their name; `None` for other images.
+pub(super) fn depth_rank(name: &str, topic: &Topic) -> Option<i32> {
+    if !is_image(topic) || topic.content != Content::Depth {
+        return None;
+    }
+    let name = &name.to_lowercase();
+    let mut rank = 0;
+    rank += 8 * i32::from(has(name, &["aligned", "registered"]));
+    rank += 4 * i32::from(name.contains("depth"));
+    rank -= 6 * i32::from(has(name, &["infra", "/ir", "confidence", "debug", "disparity"]));
+    rank += i32::from(topic.kind == Type::Image);
+    Some(rank)
+}
+
+/// Returns the rank of images that the settings declare to be disparities, by their name.
+pub(super) fn disparity_rank(name: &str, topic: &Topic) -> Option<i32> {
+    let pixels = topic.pixels.as_deref().unwrap_or_default();
+    let may_be = match topic.kind {
+        Type::Image => may_be_disparity(pixels),
+        Type::CompressedImage => pixels.contains("png"),
+        _ => false,
+    };
+    (may_be && name.to_lowercase().contains("disp")).then(|| i32::from(topic.kind == Type::Image))
+}
+
+pub(super) fn odometry_rank(name: &str, topic: &Topic) -> Option<i32> {
+    let name = &name.to_lowercase();
+    let filtered = has(name, &["filtered", "fused"]);
+    (topic.kind == Type::Odometry).then(|| i32::from(!has(name, &["visual"])) + i32::from(filtered))
+}

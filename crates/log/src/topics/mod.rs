@@ -1,0 +1,461 @@
+//! Choice of the topics of a log: one decision, with a reason for each topic.
+//!
+//! Images are grouped into rigs, the streams of one device, before anything is ranked; a pipeline gets
+//! the images of one rig unless the settings name others. The [account](InputAccount) says of each
+//! image, scan, detection and odometry topic what it is used for, or why it is not.
+
+mod account;
+mod calibration;
+mod entries;
+mod kinds;
+mod name;
+mod problems;
+mod rigs;
+
+use std::collections::BTreeMap;
+
+pub use account::{InputAccount, TopicUse};
+pub(crate) use calibration::{FoundCalibration, Relation, calibration_of, intrinsics_of};
+use kinds::{
+    could_be_depth, disparity_rank, is_info, is_odometry, is_of, is_usable_depth,
+    is_usable_picture, odometry_rank, remedy_as_depth,
+};
+pub(crate) use kinds::{kind_of, unreadable};
+pub(crate) use name::{Stream, TopicName};
+pub(crate) use problems::Problem;
+use problems::{odometry_problem, scanner_problem};
+use rigs::{Pick, Rig, rigs};
+use tagalong_config::nearest;
+use tagalong_core::{Input, Inputs, Usage};
+
+use crate::obstacles::ObstacleTopic;
+use crate::scan::{Scan, Topic};
+use crate::sensors::{SENSORS, SensorType};
+use crate::{InputSettings, LogError};
+
+/// Topics that are read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Chosen {
+    pub(crate) colour: Option<String>,
+    pub(crate) depth: Option<String>,
+    pub(crate) right: Option<String>,
+    pub(crate) colour_info: Option<String>,
+    pub(crate) depth_info: Option<String>,
+    pub(crate) right_info: Option<String>,
+    pub(crate) odometry: Option<String>,
+    /// Relation of each calibration to its images, by the topic of the images.
+    pub(crate) calibrations: BTreeMap<String, FoundCalibration>,
+    /// Camera that the images belong to.
+    pub(crate) camera: Option<String>,
+    /// Reason for which the depth images cannot be used.
+    pub(crate) depth_problem: Option<Problem>,
+    /// Odometry that cannot be used, with the reason.
+    pub(crate) unused_odometry: Option<(String, Problem)>,
+    /// Topics of the sensors beside the images.
+    pub(crate) sensors: BTreeMap<Input, String>,
+    /// Topics of further laser scanners on the robot.
+    pub(crate) further_scans: Vec<String>,
+}
+
+impl Chosen {
+    /// Returns true for a topic that is read.
+    pub(crate) fn has(&self, topic: &str) -> bool {
+        let Self { colour, depth, right, colour_info, depth_info, right_info, .. } = self;
+        [colour, depth, right, colour_info, depth_info, right_info]
+            .into_iter()
+            .chain([&self.odometry])
+            .flatten()
+            .chain(self.sensors.values())
+            .chain(&self.further_scans)
+            .any(|chosen| chosen == topic)
+    }
+
+    /// Returns the topic whose messages make the frames; empty without any.
+    pub(crate) fn primary(&self) -> &str {
+        let images = self.colour.as_ref().or(self.depth.as_ref());
+        images.map(String::as_str).or(self.sensor(Input::Laser)).unwrap_or_default()
+    }
+
+    /// Returns the topic of a sensor beside the images.
+    pub(crate) fn sensor(&self, input: Input) -> Option<&str> {
+        self.sensors.get(&input).map(String::as_str)
+    }
+
+    /// Returns the topics of the inputs that core does not define, by name.
+    pub(crate) fn named_sensors(&self) -> BTreeMap<&'static str, String> {
+        let named = self.sensors.iter().filter(|(input, _)| is_named(input));
+        named.map(|(input, topic)| (input.name(), topic.clone())).collect()
+    }
+}
+
+/// Topics that are read, and the account of all.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Decision {
+    pub(crate) chosen: Chosen,
+    pub(crate) account: InputAccount,
+}
+
+/// Chooses topics as named in the settings, else by device, type, encoding and name. A topic of an
+/// unused input is not chosen, as if the log did not have it, with one exception: frames are numbered
+/// and timed by the images of the colour topic, and without it by those of the depth topic. In a log
+/// without images they are laser scans.
+///
+/// # Errors
+/// [`LogError::Missing`] for a named topic or camera that is not there, and for required inputs that
+/// are not found.
+pub(crate) fn decide(
+    scan: &Scan,
+    input: &InputSettings,
+    inputs: Inputs,
+) -> Result<Decision, LogError> {
+    let chosen = choose(scan, input, inputs)?;
+    let account = entries::account(scan, input, inputs, &chosen);
+    check(scan, &chosen, inputs, &account)?;
+    Ok(Decision { chosen, account })
+}
+
+/// Returns the account of a log of which no frames can be made.
+pub(crate) fn account_of(scan: &Scan, input: &InputSettings) -> InputAccount {
+    let chosen = choose(scan, input, Inputs::ANY).unwrap_or_default();
+    entries::account(scan, input, Inputs::ANY, &chosen)
+}
+
+/// Chooses topics without a check that all required ones are there.
+///
+/// # Errors
+/// A named topic or camera that is not there.
+pub(crate) fn choose(
+    scan: &Scan,
+    input: &InputSettings,
+    inputs: Inputs,
+) -> Result<Chosen, LogError> {
+    let images = choose_images(scan, input, inputs)?;
+    let (Pick { colour, depth, right, depth_problem }, camera) = images;
+    let mut sensors = BTreeMap::new();
+    for sensor in SENSORS.iter().filter(|sensor| inputs.uses(sensor.input)) {
+        let topic = choose_sensor(scan, sensor, input)?;
+        sensors.extend(topic.map(|topic| (sensor.input, topic)));
+    }
+    let odometry = named(scan, "odometry_topic", input.odometry_topic.as_deref(), is_odometry)?
+        .or_else(|| best_of(scan, &input.sources, scan.names(), odometry_rank));
+    let mut calibrations = BTreeMap::new();
+    let mut info = |key, wanted: &Option<String>, image: &Option<String>| {
+        let is_disparity = key == "depth_info_topic" && input.disparity.is_some();
+        let named = named(scan, key, wanted.as_deref(), is_info)?;
+        let Some(image) = image else { return Ok::<_, LogError>(named) };
+        let own = named.map(|topic| FoundCalibration { topic, relation: Relation::Own });
+        let Some(found) = own.or_else(|| calibration_of(scan, image, is_disparity)) else {
+            return Ok(None);
+        };
+        calibrations.insert(image.clone(), found.clone());
+        Ok(Some(found.topic))
+    };
+    let colour_info = info("colour_info_topic", &input.colour_info_topic, &colour)?;
+    let depth_info = info("depth_info_topic", &input.depth_info_topic, &depth)?;
+    let right_info = info("right_info_topic", &input.right_info_topic, &right)?;
+    let mut chosen = Chosen {
+        colour,
+        depth,
+        right,
+        colour_info,
+        depth_info,
+        right_info,
+        odometry,
+        calibrations,
+        camera,
+        depth_problem,
+        unused_odometry: None,
+        further_scans: further_scans(scan, input, sensors.get(&Input::Laser)),
+        sensors,
+    };
+    let primary = chosen.primary().to_owned();
+    if let Some(odometry) = chosen.odometry.take() {
+        match odometry_problem(scan, &primary, &odometry) {
+            Some(problem) => chosen.unused_odometry = Some((odometry, problem)),
+            None => chosen.odometry = Some(odometry),
+        }
+    }
+    Ok(chosen)
+}
+
+/// Chooses the images, all of one rig unless the settings name others; returns them with the name of
+/// the rig.
+fn choose_images(
+    scan: &Scan,
+    input: &InputSettings,
+    inputs: Inputs,
+) -> Result<(Pick, Option<String>), LogError> {
+    let is_depth = |topic: &Topic| is_usable_depth(topic, input);
+    let is_disparity = input.disparity.is_some();
+    // Chosen first, because such images look like those of a grey camera.
+    let disparity = match (&input.depth_topic, is_disparity) {
+        (None, true) => best_of(scan, &input.sources, scan.names(), disparity_rank),
+        _ => None,
+    };
+    let colour_topic = input.colour_topic.as_deref();
+    let depth = named(scan, "depth_topic", input.depth_topic.as_deref(), is_depth);
+    // A mistake in a topic that is not used is none.
+    let depth = if inputs.uses(Input::Depth) { depth? } else { depth.unwrap_or(None) };
+    let named = Pick {
+        colour: named(scan, "colour_topic", colour_topic, is_usable_picture)?,
+        depth: depth.or(disparity),
+        right: match inputs.uses(Input::Right) {
+            true => named(scan, "right_topic", input.right_topic.as_deref(), is_usable_picture)?,
+            false => None,
+        },
+        depth_problem: None,
+    };
+    let all = rigs(scan);
+    let wanted = wanted_rigs(scan, input, &named, &all)?;
+    let mut best: Option<(&Rig, Pick, [i64; 4])> = None;
+    for rig in wanted {
+        let pick = rig.pick(scan, input, &named);
+        if pick.colour.is_none() && pick.depth.is_none() {
+            continue;
+        }
+        let worth = rig.worth(scan, &pick, inputs);
+        // Of equal ones the first by name.
+        if best.as_ref().is_none_or(|(.., most)| worth > *most) {
+            best = Some((rig, pick, worth));
+        }
+    }
+    let Some((rig, mut pick, _)) = best else { return Ok((named, None)) };
+    // Without colour, depth makes the frames whether or not it is used.
+    if !inputs.uses(Input::Depth) && pick.colour.is_some() {
+        pick.depth = None;
+        pick.depth_problem = None;
+    }
+    if !inputs.uses(Input::Right) {
+        pick.right = None;
+    }
+    Ok((pick, Some(rig.label.clone())))
+}
+
+/// Returns the rigs that the settings allow.
+///
+/// # Errors
+/// A camera that the settings name and the log lacks.
+fn wanted_rigs<'a>(
+    scan: &Scan,
+    input: &InputSettings,
+    named: &Pick,
+    all: &'a [Rig],
+) -> Result<Vec<&'a Rig>, LogError> {
+    if let Some(camera) = input.camera_name() {
+        let called: Vec<&Rig> = all.iter().filter(|rig| rig.is_called(camera)).collect();
+        if called.is_empty() {
+            let names: Vec<&str> = all.iter().map(|rig| rig.label.as_str()).collect();
+            let hint = format!("; `camera` under [input] can be one of: {}", names.join(", "));
+            return Err(missing(scan, format!("camera `{camera}`"), hint));
+        }
+        return Ok(called);
+    }
+    for topic in [&named.colour, &named.depth, &named.right].into_iter().flatten() {
+        let of_topic: Vec<&Rig> = all.iter().filter(|rig| rig.has(topic)).collect();
+        if !of_topic.is_empty() {
+            return Ok(of_topic);
+        }
+    }
+    Ok(all.iter().collect())
+}
+
+/// Returns the topics of the scanners beside the first one, unless the settings name one.
+fn further_scans(scan: &Scan, input: &InputSettings, first: Option<&String>) -> Vec<String> {
+    let Some(first) = first.filter(|_| input.laser_topic.is_none()) else { return Vec::new() };
+    let further = scan.topics.iter().filter(|(name, topic)| {
+        let is_scan =
+            SENSORS.iter().any(|sensor| sensor.input == Input::Laser && is_of(sensor, topic))
+                && *name != first;
+        is_scan && topic.count > 0 && scanner_problem(scan, input, first, name).is_none()
+    });
+    further.map(|(name, _)| name.clone()).collect()
+}
+
+/// Returns the topic of a sensor: the one that the settings name, else that of the highest rank.
+fn choose_sensor(
+    scan: &Scan,
+    sensor: &SensorType,
+    input: &InputSettings,
+) -> Result<Option<String>, LogError> {
+    let fits = |topic: &Topic| is_of(sensor, topic);
+    let named = named(scan, &sensor.key(), named_topic(sensor, input), fits)?;
+    let rank = |name: &str, topic: &Topic| {
+        sensor.rank.filter(|_| is_of(sensor, topic)).map(|rank| rank(name))
+    };
+    Ok(named.or_else(|| best_of(scan, &input.sources, scan.names(), rank)))
+}
+
+/// Returns the topic that the settings name for a sensor.
+pub(crate) fn named_topic<'a>(sensor: &SensorType, input: &'a InputSettings) -> Option<&'a str> {
+    match sensor.input {
+        Input::Laser => input.laser_topic.as_deref(),
+        Input::Detections => input.detections_topic.as_deref(),
+        other => input.topics.get(other.name()).map(String::as_str),
+    }
+}
+
+/// Requirement of a pipeline or of the frames, with the topics that could meet it.
+struct Requirement<'a> {
+    lacks: bool,
+    wanted: &'a str,
+    key: String,
+    /// Message types in words.
+    types: String,
+    fits: Box<dyn Fn(&Topic) -> bool + 'a>,
+    /// Topic that another input has, so that it cannot be meant.
+    taken: Option<&'a str>,
+}
+
+/// Checks that there is a topic for each required input, and one that makes the frames.
+fn check(
+    scan: &Scan,
+    chosen: &Chosen,
+    inputs: Inputs,
+    account: &InputAccount,
+) -> Result<(), LogError> {
+    let is_unknown = |input: &Input| !SENSORS.iter().any(|sensor| sensor.input == *input);
+    let mut unknown = inputs.of(Usage::Required).filter(is_named).filter(is_unknown);
+    if let Some(input) = unknown.next() {
+        let name = input.name();
+        return Err(missing(scan, format!("input `{name}`"), UNREADABLE.to_owned()));
+    }
+    let is_blind = chosen.colour.is_none() && chosen.depth.is_none();
+    let lacks = |input, topic: &Option<String>| inputs.requires(input) && topic.is_none();
+    let image = |lacks, wanted, key: &str, types: &str| Requirement {
+        lacks,
+        wanted,
+        key: key.to_owned(),
+        types: types.to_owned(),
+        fits: Box::new(if key == "depth_topic" { could_be_depth } else { is_usable_picture }),
+        taken: chosen.colour.as_deref().filter(|_| key == "right_topic"),
+    };
+    let lacks_right = lacks(Input::Right, &chosen.right);
+    let images = [
+        image(lacks(Input::Colour, &chosen.colour), "colour images", "colour_topic", COLOUR),
+        image(lacks(Input::Depth, &chosen.depth), "depth images", "depth_topic", DEPTH),
+        image(lacks_right, "right images of a stereo pair", "right_topic", COLOUR),
+    ];
+    let sensors = SENSORS.iter().map(|sensor| Requirement {
+        lacks: inputs.requires(sensor.input) && chosen.sensor(sensor.input).is_none(),
+        wanted: sensor.wanted,
+        key: sensor.key(),
+        types: sensor.messages.join(" or "),
+        fits: Box::new(|topic| is_of(sensor, topic)),
+        taken: None,
+    });
+    let has_no_clock = is_blind && chosen.sensor(Input::Laser).is_none();
+    let any = image(has_no_clock, "images at all", "colour_topic", COLOUR);
+    match images.into_iter().chain(sensors).chain([any]).find(|required| required.lacks) {
+        None => Ok(()),
+        Some(required) => Err(required.error(scan, account)),
+    }
+}
+
+impl Requirement<'_> {
+    /// Returns the error of a log that lacks the topic, with the reason of the topic that comes
+    /// nearest, and its remedy.
+    fn error(&self, scan: &Scan, account: &InputAccount) -> LogError {
+        let Self { wanted, key, types, fits, taken, .. } = self;
+        let is_image = key.ends_with("_topic") && types.contains("Image");
+        let unreadable = scan.topics.iter().find_map(|(name, topic)| {
+            let why = unreadable(topic).filter(|_| is_image)?;
+            Some(format!("; {name} ({}) cannot be read: {why}", kind_of(topic)))
+        });
+        let is_free = |name: &str| *taken != Some(name);
+        let mut free = scan.topics.iter().filter(|(name, _)| is_free(name));
+        let meant = free.find(|(_, topic)| fits(topic)).map(|(name, topic)| {
+            let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
+            let of_camera = account.topics.iter().find(|entry| {
+                let is_other = entry.problem.as_deref() == Some(entries::OTHER_CAMERA);
+                entry.topic == *name && is_other
+            });
+            if let Some(remedy) = of_camera.and_then(|entry| entry.remedy.as_ref()) {
+                return format!("; {name} ({kind}) is of another camera: {remedy}");
+            }
+            match remedy_as_depth(topic).filter(|_| key == "depth_topic") {
+                Some(remedy) => format!("; if {name} ({kind}) is meant, {remedy}"),
+                None => format!("; if {name} ({kind}) is meant, name it as `{key}` under [input]"),
+            }
+        });
+        let depth = (key == "depth_topic").then(|| DEPTH_REMEDY.to_owned());
+        let other = (key == "right_topic").then(|| RIGHT_REMEDY.to_owned());
+        let hint = unreadable.or(meant).or(depth).or(other).unwrap_or_default();
+        missing(scan, format!("{wanted} ({types})"), hint)
+    }
+}
+
+fn is_named(input: &Input) -> bool {
+    matches!(input, Input::Named(_))
+}
+
+/// Remedy for an input of a sensor that another crate defines.
+const UNREADABLE: &str = ", because no topic is read for it: a program that adds it to each frame \
+                          with `Frame::with_sensor` opens the log with `inputs.relax(..)`; \
+                          otherwise leave out the plugin that requires it";
+const COLOUR: &str = "sensor_msgs/Image with colour, mono, bayer or yuv pixels of 8 bits, or \
+                      sensor_msgs/CompressedImage with jpeg or png";
+const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, sensor_msgs/CompressedImage with \
+                     compressedDepth, or stereo_msgs/DisparityImage";
+
+const DEPTH_REMEDY: &str = "; name a topic that has them as `depth_topic` under [input], or take \
+                            a config without depth";
+
+const RIGHT_REMEDY: &str = ": this is no log of a stereo pair; take a config for what it has, which \
+                            `tagalong run LOG` chooses by itself and `tagalong doctor LOG` lists";
+
+pub(crate) fn missing(scan: &Scan, wanted: String, hint: String) -> LogError {
+    LogError::Missing { path: scan.path.clone(), wanted, hint, present: scan.listing() }
+}
+
+/// Returns a topic that the settings name.
+fn named(
+    scan: &Scan,
+    key: &str,
+    name: Option<&str>,
+    fits: impl Fn(&Topic) -> bool,
+) -> Result<Option<String>, LogError> {
+    let Some(name) = name else { return Ok(None) };
+    if scan.topics.get(name).is_some_and(&fits) {
+        return Ok(Some(name.to_owned()));
+    }
+    let mut fitting = scan.topics.iter().filter(|(_, topic)| fits(topic));
+    if let Some(topic) = scan.topics.get(name) {
+        let other = fitting.next().map(|(name, topic)| format!("{name} ({})", kind_of(topic)));
+        let as_depth = remedy_as_depth(topic).filter(|_| key == "depth_topic");
+        let remedy = unreadable(topic)
+            .or_else(|| as_depth.map(|remedy| format!("if it is meant, {remedy}")))
+            .or_else(|| other.map(|other| format!("{other} would fit")))
+            .unwrap_or_else(|| "no topic of the log would fit: leave the key out".to_owned());
+        let (path, kind) = (scan.path.clone(), kind_of(topic));
+        let (key, topic) = (key.to_owned(), name.to_owned());
+        return Err(LogError::WrongTopic { path, key, topic, kind, remedy });
+    }
+    let near = nearest(name, fitting.map(|(name, _)| name.as_str()));
+    let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+    Err(missing(scan, format!("topic `{name}` fit for `{key}` of [input]"), hint))
+}
+
+/// Returns the topic with the highest rank of those in `names` that are no further sources of
+/// obstacles; of equal ones that with the most messages, then the first by name.
+pub(super) fn best_of<'a>(
+    scan: &Scan,
+    sources: &[ObstacleTopic],
+    names: impl Iterator<Item = &'a str>,
+    rank: impl Fn(&str, &Topic) -> Option<i32>,
+) -> Option<String> {
+    let is_source = |name: &str| sources.iter().any(|source| source.topic == name);
+    let mut best: Option<(i32, u32, &str)> = None;
+    for name in names.filter(|name| !is_source(name)) {
+        let Some(topic) = scan.topics.get(name).filter(|topic| topic.count > 0) else { continue };
+        let Some(rank) = rank(name, topic) else { continue };
+        // By powers of two: a lost message or two is no reason for another choice.
+        let count = topic.count.ilog2();
+        let is_better = best.is_none_or(|(most, of_best, first)| {
+            (rank, count) > (most, of_best) || (rank, count) == (most, of_best) && name < first
+        });
+        if is_better {
+            best = Some((rank, count, name));
+        }
+    }
+    best.map(|(.., name)| name.to_owned())
+}

@@ -1,0 +1,263 @@
+//! Groups of topics that belong to one device: a camera with its streams.
+
+use std::collections::BTreeMap;
+
+use super::kinds::{colour_rank, depth_rank, is_image, is_usable_picture};
+use super::name::{Side, Stream, TopicName};
+use super::problems::{Problem, depth_problem};
+use crate::images::Content;
+use crate::scan::{Scan, Topic};
+use crate::{Input, InputSettings, Inputs};
+
+/// Images of one device.
+#[derive(Clone, Debug)]
+pub(super) struct Rig {
+    /// Name for the user: the folder that the topics share.
+    pub(super) label: String,
+    pub(super) topics: Vec<String>,
+}
+
+/// Images that are chosen of a rig.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pick {
+    pub(super) colour: Option<String>,
+    pub(super) depth: Option<String>,
+    pub(super) right: Option<String>,
+    pub(super) depth_problem: Option<Problem>,
+}
+
+/// Largest distance of two cameras of one device, m.
+const ONE_MOUNT_M: f64 = 0.5;
+/// Largest angle between the views of two cameras of one device, rad.
+const ONE_MOUNT_RAD: f64 = std::f64::consts::FRAC_PI_4;
+
+/// Groups the images of a log by their devices.
+pub(super) fn rigs(scan: &Scan) -> Vec<Rig> {
+    let images: Vec<&String> =
+        scan.topics.iter().filter(|(_, topic)| is_image(topic)).map(|(name, _)| name).collect();
+    let mut groups: BTreeMap<Vec<String>, Vec<String>> = BTreeMap::new();
+    for image in images {
+        groups.entry(TopicName::of(image).device).or_default().push(image.clone());
+    }
+    let mut found: Vec<Rig> = groups.into_values().flat_map(|group| by_side(scan, group)).collect();
+    join_streams(scan, &mut found);
+    for rig in &mut found {
+        rig.label = label_of(&rig.topics);
+    }
+    found
+}
+
+/// Splits a group at left and right if each side has depth of its own, which are two devices and no
+/// stereo pair.
+fn by_side(scan: &Scan, group: Vec<String>) -> Vec<Rig> {
+    let has_depth = |side| {
+        group.iter().any(|name| {
+            TopicName::of(name).side == side && scan.topics[name].content == Content::Depth
+        })
+    };
+    let rig = |topics| Rig { label: String::new(), topics };
+    if !(has_depth(Side::Left) && has_depth(Side::Right)) {
+        return vec![rig(group)];
+    }
+    let mut sides: BTreeMap<Side, Vec<String>> = BTreeMap::new();
+    for name in group {
+        sides.entry(TopicName::of(&name).side).or_default().push(name);
+    }
+    sides.into_values().map(rig).collect()
+}
+
+/// Joins a rig that has depth alone with the only one that has colour alone and may be of the same
+/// device: names of drivers do not always have a word in common.
+fn join_streams(scan: &Scan, rigs: &mut Vec<Rig>) {
+    loop {
+        let mut pairs = Vec::new();
+        for (d, depth) in rigs.iter().enumerate().filter(|(_, rig)| has_depth_alone(scan, rig)) {
+            for (c, colour) in rigs.iter().enumerate() {
+                if c != d && has_colour_alone(scan, colour) && may_be_one(scan, colour, depth) {
+                    pairs.push((c, d));
+                }
+            }
+        }
+        let is_only = |(c, d): &(usize, usize)| {
+            pairs.iter().filter(|(other, _)| other == c).count() == 1
+                && pairs.iter().filter(|(_, other)| other == d).count() == 1
+        };
+        let Some((colour, depth)) = pairs.iter().copied().find(is_only) else { return };
+        let topics = std::mem::take(&mut rigs[depth].topics);
+        rigs[colour].topics.extend(topics);
+        rigs.remove(depth);
+    }
+}
+
+fn has_depth_alone(scan: &Scan, rig: &Rig) -> bool {
+    has_content(scan, rig, Content::Depth) && !has_content(scan, rig, Content::Picture)
+}
+
+fn has_colour_alone(scan: &Scan, rig: &Rig) -> bool {
+    has_content(scan, rig, Content::Picture) && !has_content(scan, rig, Content::Depth)
+}
+
+fn has_content(scan: &Scan, rig: &Rig, content: Content) -> bool {
+    rig.topics.iter().any(|name| scan.topics[name].content == content)
+}
+
+/// Returns true if two groups may be streams of one device: by frame, by the mounts in tf, and
+/// without both if their names do not speak of different places.
+fn may_be_one(scan: &Scan, colour: &Rig, depth: &Rig) -> bool {
+    let mut may_be = false;
+    for (a, b) in colour.topics.iter().flat_map(|a| depth.topics.iter().map(move |b| (a, b))) {
+        match is_one_mount(scan, a, b) {
+            Some(true) => return !TopicName::of(a).contradicts(&TopicName::of(b)),
+            Some(false) => return false,
+            None => may_be = !TopicName::of(a).contradicts(&TopicName::of(b)),
+        }
+    }
+    may_be
+}
+
+/// Returns true if two cameras sit together and look the same way, by their frames and tf; `None` if
+/// these do not tell.
+fn is_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
+    let (a, b) = (scan.frame_of(a)?, scan.frame_of(b)?);
+    if a == b {
+        return (!a.is_empty()).then_some(true);
+    }
+    if !scan.tf.connects(a, b) {
+        return None;
+    }
+    let pose = scan.tf.static_pose(a, b)?;
+    let is_near = pose.translation.vector.norm() <= ONE_MOUNT_M;
+    Some(is_near && pose.rotation.angle() <= ONE_MOUNT_RAD)
+}
+
+/// Returns the folder that the topics of a rig share, else the folder of the first one.
+fn label_of(topics: &[String]) -> String {
+    let folders = |topic: &String| -> Vec<String> {
+        let mut parts: Vec<String> = topic.split('/').map(str::to_owned).collect();
+        parts.pop();
+        parts
+    };
+    let mut shared: Option<Vec<String>> = None;
+    for topic in topics {
+        let own = folders(topic);
+        shared = Some(match shared {
+            None => own,
+            Some(shared) => {
+                let same = shared.iter().zip(&own).take_while(|(a, b)| a == b).count();
+                shared[..same].to_vec()
+            }
+        });
+    }
+    let label = shared.unwrap_or_default().join("/");
+    if !label.trim_matches('/').is_empty() {
+        return label;
+    }
+    let device = topics.first().map(|topic| TopicName::of(topic).device).unwrap_or_default();
+    match (device.is_empty(), topics.first()) {
+        (false, _) => device.join("_"),
+        (true, Some(first)) => first.clone(),
+        (true, None) => String::new(),
+    }
+}
+
+impl Rig {
+    pub(super) fn has(&self, topic: &str) -> bool {
+        self.topics.iter().any(|own| own == topic)
+    }
+
+    /// Returns true if the user may mean this rig by a name: its folder, a part of it, or the words
+    /// of the device.
+    pub(super) fn is_called(&self, name: &str) -> bool {
+        let wanted = name.trim_matches('/');
+        let is_below = |topic: &String| {
+            let topic = topic.trim_matches('/');
+            topic == wanted || topic.starts_with(&format!("{wanted}/"))
+        };
+        let words = TopicName::of(name).device;
+        let is_device = |topic: &String| !words.is_empty() && TopicName::of(topic).device == words;
+        self.label.trim_matches('/') == wanted
+            || self.topics.iter().any(is_below)
+            || self.topics.iter().any(is_device)
+    }
+
+    /// Chooses the images of the rig. Those that are `taken` already have another use.
+    pub(super) fn pick(&self, scan: &Scan, input: &InputSettings, named: &Pick) -> Pick {
+        let is_pair = self.is_pair(scan);
+        let colour = named.colour.clone().or_else(|| {
+            self.best(scan, input, |name, topic| {
+                let is_right = is_pair && TopicName::of(name).side == Side::Right;
+                let is_free = named.depth.as_deref() != Some(name);
+                if is_right || !is_free { None } else { colour_rank(name, topic) }
+            })
+        });
+        let right = named.right.clone().or_else(|| {
+            self.best(scan, input, |name, topic| {
+                let is_right = is_pair && TopicName::of(name).side == Side::Right;
+                if is_right { colour_rank(name, topic) } else { None }
+            })
+        });
+        let problem = |depth: &str| {
+            let colour = colour.as_deref()?;
+            depth_problem(scan, input, colour, depth)
+        };
+        let depth = named.depth.clone().or_else(|| {
+            self.best(scan, input, |name, topic| {
+                let rank = depth_rank(name, topic)?;
+                // Any depth that can be used is better than one that cannot.
+                Some(if problem(name).is_some() { rank - 100 } else { rank })
+            })
+        });
+        let depth_problem = depth.as_deref().and_then(problem);
+        // The settings may name the right images as the colour topic.
+        let right = right.filter(|topic| Some(topic) != colour.as_ref());
+        Pick { colour, depth, right, depth_problem }
+    }
+
+    /// Returns true if the rig has pictures of both sides, so that those of the right are not the
+    /// images of the frames.
+    fn is_pair(&self, scan: &Scan) -> bool {
+        let mut pictures = self.topics.iter().filter(|name| is_usable_picture(&scan.topics[*name]));
+        pictures.any(|name| {
+            let parts = TopicName::of(name);
+            parts.side != Side::Right && parts.stream != Stream::Depth
+        })
+    }
+
+    /// Returns the topic with the highest rank that is no further source of obstacles; of equal ones
+    /// that with the most messages, then the first by name.
+    fn best(
+        &self,
+        scan: &Scan,
+        input: &InputSettings,
+        rank: impl Fn(&str, &Topic) -> Option<i32>,
+    ) -> Option<String> {
+        let names = self.topics.iter().map(String::as_str);
+        super::best_of(scan, &input.sources, names, rank)
+    }
+
+    /// Returns the worth of the rig for a pipeline: first that nothing which is required is missing,
+    /// then what it has beyond that, then names and rates.
+    pub(super) fn worth(&self, scan: &Scan, pick: &Pick, inputs: Inputs) -> [i64; 4] {
+        let has_depth = pick.depth.is_some() && pick.depth_problem.is_none();
+        let has = [
+            (Input::Colour, pick.colour.is_some(), 2),
+            (Input::Depth, has_depth, 3),
+            (Input::Right, pick.right.is_some(), 1),
+        ];
+        let lacking = has.iter().filter(|(input, has, _)| inputs.requires(*input) && !has).count();
+        let extra: i64 = has
+            .iter()
+            .filter(|(input, has, _)| inputs.uses(*input) && *has)
+            .map(|(.., w)| *w)
+            .sum();
+        let first = pick.colour.as_ref().or(pick.depth.as_ref());
+        let topic = first.and_then(|name| Some((name, scan.topics.get(name)?)));
+        let rank = topic.map_or(0, |(name, topic)| {
+            let lower = name.to_lowercase();
+            colour_rank(&lower, topic).or(depth_rank(&lower, topic)).unwrap_or(0)
+        });
+        // A lost message or two is no reason to prefer another camera.
+        let count = topic.map_or(0, |(_, topic)| topic.count.max(1).ilog2());
+        [-(lacking as i64), extra, i64::from(rank), i64::from(count)]
+    }
+}
