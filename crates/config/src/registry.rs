@@ -72,12 +72,12 @@ impl Context {
         built_in: &str,
         parse: impl FnOnce(&str) -> std::result::Result<M, String>,
     ) -> Result<M> {
-        let broken = |why: String| Error::Model { path: file.into(), why };
         if file.is_empty() {
-            return parse(built_in).map_err(broken);
+            return parse(built_in).map_err(|why| Error::Model { path: String::new(), why });
         }
-        let text = read_text(&self.base_dir.join(file), FileLimit::Model)
-            .map_err(|error| broken(error.to_string()))?;
+        let path = self.base_dir.join(file);
+        let broken = |why: String| Error::Model { path: path.display().to_string(), why };
+        let text = read_text(&path, FileLimit::Model).map_err(|error| broken(error.to_string()))?;
         parse(&text).map_err(broken)
     }
 }

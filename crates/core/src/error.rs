@@ -23,7 +23,7 @@ pub enum Error {
     /// A model file could not be used.
     #[error("model file `{path}`: {why}")]
     Model {
-        /// The file as named in the config.
+        /// The file, as it was looked for.
         path: String,
         /// The cause.
         why: String,

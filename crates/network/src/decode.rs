@@ -2,13 +2,12 @@
 
 use tagalong_geometry::Rect;
 
-use crate::family::NANODET_BINS;
+use crate::family::{NANODET_BINS, NANODET_M_BINS, NANODET_STRIDES, STRIDES, count_cells};
+use crate::values::{bins_of, is_score, is_transposed};
 use crate::{Family, InputSize, Tensor};
 
-/// Strides of the grids of most families.
-const STRIDES: [usize; 3] = [8, 16, 32];
-/// Strides of NanoDet-Plus.
-const NANODET_STRIDES: [usize; 4] = [8, 16, 32, 64];
+/// Largest offset from a cell, in cells.
+const MAX_OFFSET: f32 = 16.0;
 /// Joints of a person in MoveNet.
 const JOINTS: usize = 17;
 /// Part of the height between the highest and the lowest joint by which a person is higher than
@@ -67,9 +66,16 @@ pub(crate) fn decode(
     let first = outputs.first().map(|(_, output)| *output);
     let found = match family {
         Family::Yolox => first.map(|output| yolox(output, input, wanted)),
-        Family::YoloV8 => first.map(|output| yolo_v8(output, wanted)),
+        Family::YoloV8 => first.map(|output| {
+            if is_transposed(output, input) {
+                yolo_v8_rows(output, wanted)
+            } else {
+                yolo_v8(output, wanted)
+            }
+        }),
         Family::YoloV10 => first.map(|output| yolo_v10(output, wanted)),
         Family::NanoDet => first.map(|output| nanodet(output, input, wanted)),
+        Family::NanoDetM => nanodet_m(outputs, input, wanted),
         Family::MoveNet => first.map(|output| movenet(output, input, wanted)),
         Family::RtDetr => {
             (|| Some(rt_detr(named("labels")?, named("boxes")?, named("scores")?, wanted)))()
@@ -81,7 +87,7 @@ pub(crate) fn decode(
 }
 
 /// Returns column, row and stride of each grid cell, in the order of the outputs.
-fn cells(input: InputSize, strides: &[usize]) -> impl Iterator<Item = [f64; 3]> {
+fn cells(input: InputSize, strides: &[usize]) -> impl Iterator<Item = [f64; 3]> + '_ {
     strides.iter().flat_map(move |&stride| {
         let columns = input.width.div_ceil(stride);
         let rows = input.height.div_ceil(stride);
@@ -94,12 +100,41 @@ fn around(x: f64, y: f64, width: f64, height: f64) -> Rect {
     Rect::new(x - 0.5 * width, y - 0.5 * height, width, height)
 }
 
+/// Returns the box of a row that begins with its middle and its size.
+fn around_row(row: &[f32]) -> Rect {
+    let [x, y, width, height] = [0, 1, 2, 3].map(|k| f64::from(row[k]));
+    around(x, y, width, height)
+}
+
 fn between(corners: &[f32]) -> Rect {
     let [left, top, right, bottom] = [0, 1, 2, 3].map(|k| f64::from(corners[k]));
     Rect::new(left, top, right - left, bottom - top)
 }
 
+/// Returns true if the boxes of a grid are middles and sizes in pixels rather than in its cells:
+/// their places exceed those of offsets, and near the far end of the image a middle exceeds the
+/// size of its box, as it never does where corners are meant.
+pub(crate) fn is_pixel_grid(output: &Tensor) -> bool {
+    let mut is_beyond = false;
+    let mut is_middle = false;
+    for row in output.rows() {
+        if row[2] < 0.0 || row[3] < 0.0 {
+            return false;
+        }
+        is_beyond |= row[0].max(row[1]) > MAX_OFFSET;
+        is_middle |= row[2] < row[0] || row[3] < row[1];
+    }
+    is_beyond && is_middle
+}
+
 fn yolox(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredBox> {
+    if is_pixel_grid(output) {
+        let found = output.rows().filter_map(|row| {
+            let score = row[4] * wanted.best(|class| row.get(5 + class).copied());
+            wanted.take(score, || around_row(row))
+        });
+        return found.collect();
+    }
     let found =
         output.rows().zip(cells(input, &STRIDES)).filter_map(|(row, [column, line, stride])| {
             let [x, y, width, height] = [0, 1, 2, 3].map(|k| f64::from(row[k]));
@@ -123,9 +158,41 @@ fn yolo_v8(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
     found.collect()
 }
 
+fn yolo_v8_rows(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
+    let found = output.rows().filter_map(|row| {
+        let score = wanted.best(|class| row.get(4 + class).copied());
+        wanted.take(score, || around_row(row))
+    });
+    found.collect()
+}
+
+/// Columns of a list of boxes.
+pub(crate) struct Columns {
+    /// The first corner: 1 after the number of an image, otherwise 0.
+    pub first: usize,
+    pub score: usize,
+    pub label: usize,
+}
+
+/// Returns the columns of a list. Most have the score before the class, some after it: then one
+/// column has whole numbers alone, and the other has not.
+pub(crate) fn columns_of(output: &Tensor) -> Columns {
+    let first = usize::from(output.shape().last() == Some(&7));
+    let [before, after] = [first + 4, first + 5];
+    let is_whole = |column: usize| output.rows().all(|row| row[column].fract() == 0.0);
+    // Lists with the number of the image have the class first (YOLOv7), unless it is no class.
+    let is_last = if first == 1 { is_whole(before) } else { is_whole(before) && !is_whole(after) };
+    if is_last {
+        Columns { first, score: after, label: before }
+    } else {
+        Columns { first, score: before, label: after }
+    }
+}
+
 fn yolo_v10(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
-    let people = output.rows().filter(|row| wanted.has_label(row[5]));
-    people.filter_map(|row| wanted.take(row[4], || between(row))).collect()
+    let Columns { first, score, label } = columns_of(output);
+    let people = output.rows().filter(|row| wanted.has_label(row[label]));
+    people.filter_map(|row| wanted.take(row[score], || between(&row[first..]))).collect()
 }
 
 fn nanodet(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredBox> {
@@ -141,6 +208,81 @@ fn nanodet(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredB
         })
     });
     found.collect()
+}
+
+/// Outputs of NanoDet before Plus for one stride.
+pub(crate) struct StrideOutputs<'a> {
+    stride: usize,
+    scores: Vec<&'a [f32]>,
+    sides: Vec<&'a [f32]>,
+}
+
+/// Returns the scores and the distributions for each stride; `None` if numbers do not tell which
+/// are which.
+pub(crate) fn scores_and_sides<'a>(
+    outputs: &[(&str, &'a Tensor)],
+    input: InputSize,
+) -> Option<Vec<StrideOutputs<'a>>> {
+    if let [(_, output)] = outputs {
+        let bins = bins_of(output)?;
+        let mut rows = output.rows();
+        let by_stride = STRIDES.map(|stride| {
+            let of_stride = rows.by_ref().take(count_cells(input, &[stride]));
+            let (scores, sides) = of_stride.map(|row| row.split_at(row.len() - 4 * bins)).unzip();
+            StrideOutputs { stride, scores, sides }
+        });
+        return Some(by_stride.into());
+    }
+    let are_scores = |tensor: &Tensor| tensor.values().iter().copied().all(is_score);
+    let mut by_stride = Vec::new();
+    for stride in STRIDES {
+        let cells = count_cells(input, &[stride]);
+        let of_stride = outputs.iter().map(|(_, tensor)| *tensor);
+        let pair: Vec<&Tensor> =
+            of_stride.filter(|tensor| tensor.shape().get(1) == Some(&cells)).collect();
+        let [a, b] = pair[..] else { return None };
+        let (scores, sides) = match (are_scores(a), are_scores(b)) {
+            (true, false) => (a, b),
+            (false, true) => (b, a),
+            _ => return None,
+        };
+        let width = sides.shape().last().copied().unwrap_or(0);
+        if !NANODET_M_BINS.iter().any(|bins| 4 * bins == width) {
+            return None;
+        }
+        by_stride.push(StrideOutputs {
+            stride,
+            scores: scores.rows().collect(),
+            sides: sides.rows().collect(),
+        });
+    }
+    Some(by_stride)
+}
+
+/// Returns nothing for numbers that are not those of the family.
+fn nanodet_m(
+    outputs: &[(&str, &Tensor)],
+    input: InputSize,
+    wanted: Wanted<'_>,
+) -> Option<Vec<ScoredBox>> {
+    let mut found = Vec::new();
+    for StrideOutputs { stride, scores, sides } in scores_and_sides(outputs, input)? {
+        for ((scores, sides), [column, line, _]) in
+            scores.into_iter().zip(sides).zip(cells(input, &[stride]))
+        {
+            let score = wanted.best(|class| scores.get(class).copied());
+            found.extend(wanted.take(score, || {
+                let bins = sides.len() / 4;
+                let stride = stride as f64;
+                // Sides are counted from the middle of a cell, other than in NanoDet-Plus.
+                let [x, y] = [column, line].map(|cell| (cell + 0.5) * stride);
+                let [left, top, right, bottom] =
+                    [0, 1, 2, 3].map(|k| stride * expectation(&sides[k * bins..][..bins]));
+                Rect::new(x - left, y - top, left + right, top + bottom)
+            }));
+        }
+    }
+    Some(found)
 }
 
 /// Returns the mean index of a distribution with these logits.

@@ -7,7 +7,7 @@ use tagalong_config::{FileLimit, read_bytes};
 use tagalong_core::RgbImage;
 
 use crate::decode::{Wanted, decode, suppress};
-use crate::family::{OutputShape, recognise};
+use crate::family::{OutputShape, recognise, shapes_of};
 use crate::network::rten;
 use crate::worker::Worker;
 use crate::{
@@ -16,6 +16,9 @@ use crate::{
 
 /// Columns and rows of an input that the file leaves open.
 pub(crate) const USUAL_SIZE: [usize; 2] = [640, 640];
+/// The same of integers with the channels last, which MoveNet has: its authors take them for six
+/// people.
+const MOVENET_SIZE: [usize; 2] = [256, 256];
 /// Most columns and rows of an input.
 const MAX_SIDE: usize = 4096;
 /// Name of the input for the size of the image.
@@ -52,6 +55,8 @@ pub struct About {
     pub input: Result<InputSize, String>,
     /// Outputs of a first call; an error is a sentence.
     pub run: Result<Vec<OutputShape>, String>,
+    /// Family by those outputs.
+    family: Result<Family, String>,
 }
 
 impl About {
@@ -59,8 +64,17 @@ impl About {
     fn of(network: &mut impl Network, size: OpenSize) -> Self {
         let (inputs, outputs) = (network.inputs().to_vec(), network.outputs().to_vec());
         let image = image_port(&inputs).and_then(|image| input_size(&inputs[image], size));
-        let run = image.clone().and_then(|input| first_run(network, input));
-        Self { inputs, outputs, input: image, run }
+        let run = image.clone().and_then(|input| {
+            let found = first_run(network, input)?;
+            let named = outputs.iter().map(|port| port.name.as_str()).zip(&found);
+            let named: Vec<(&str, &Tensor)> = named.collect();
+            Ok((shapes_of(&named), recognise(&named, input)))
+        });
+        let (run, family) = match run {
+            Ok((shapes, family)) => (Ok(shapes), family),
+            Err(why) => (Err(why.clone()), Err(why)),
+        };
+        Self { inputs, outputs, input: image, run, family }
     }
 
     /// Returns the family of the network.
@@ -68,7 +82,7 @@ impl About {
     /// # Errors
     /// A sentence with the reason why there is none.
     pub fn family(&self) -> Result<Family, String> {
-        let family = recognise(&self.run.clone()?, self.input.clone()?)?;
+        let family = self.family.clone()?;
         let has_sizes = self.inputs.iter().any(|port| port.name == SIZES);
         if family == Family::RtDetr && !has_sizes {
             return Err(format!(
@@ -137,13 +151,18 @@ fn input_size(port: &Port, size: OpenSize) -> Result<InputSize, String> {
     if port.element == Element::Other {
         return Err(format!("its input {port} must be f32, integers or bytes: export it so"));
     }
+    let usual = if channels_last && port.element == Element::Integer && size.usual == USUAL_SIZE {
+        MOVENET_SIZE
+    } else {
+        size.usual
+    };
     let side = |fixed: Option<usize>, axis: usize| {
         let chosen = size.chosen.map(|size| size[axis]);
         match fixed.zip(chosen) {
             Some((fixed, chosen)) if fixed != chosen => {
                 Err(format!("its input {port} has a fixed size: remove `size`"))
             }
-            _ => Ok(fixed.or(chosen).unwrap_or(size.usual[axis])),
+            _ => Ok(fixed.or(chosen).unwrap_or(usual[axis])),
         }
     };
     let (width, height) = (side(width, 0)?, side(height, 1)?);
@@ -162,15 +181,13 @@ fn with_sizes(inputs: &[Port], input: InputSize, image: Tensor) -> Vec<Tensor> {
     inputs.iter().map(tensor).collect()
 }
 
-fn first_run(network: &mut impl Network, input: InputSize) -> Result<Vec<OutputShape>, String> {
+/// Returns the outputs for an image without anything in it.
+fn first_run(network: &mut impl Network, input: InputSize) -> Result<Vec<Tensor>, String> {
     let shape = input.shape();
     let values = vec![0.0; shape.iter().product()];
     let image = Tensor::new(shape, values).unwrap_or_default();
     let inputs = with_sizes(network.inputs(), input, image);
-    let outputs = network.run(&inputs)?;
-    let names = network.outputs().iter().map(|port| port.name.clone());
-    let shapes = outputs.iter().map(|output| output.shape().to_vec());
-    Ok(names.zip(shapes).map(|(name, shape)| OutputShape { name, shape }).collect())
+    network.run(&inputs)
 }
 
 /// Network that finds people in images.
@@ -257,18 +274,14 @@ impl PersonNetwork {
         };
         let names = self.about.outputs.iter().map(|port| port.name.as_str());
         let outputs: Vec<(&str, &Tensor)> = names.zip(&outputs).collect();
-        let shape = |(name, tensor): &(&str, &Tensor)| OutputShape {
-            name: (*name).to_owned(),
-            shape: tensor.shape().to_vec(),
-        };
-        let shapes: Vec<OutputShape> = outputs.iter().map(shape).collect();
+        let shapes = shapes_of(&outputs);
         if self.family.classes(&shapes, self.input).is_none() {
             return Err("its outputs change their shape from call to call".into());
         }
         let wanted = Wanted { classes: &self.classes, min_score };
         let found = decode(self.family, &outputs, self.input, wanted);
         // Lists without doubles are sorted all the same.
-        let iou = if self.family.needs_suppression() { iou } else { 1.0 };
+        let iou = if self.family.needs_suppression(&shapes) { iou } else { 1.0 };
         let mut people = suppress(found, iou);
         people.iter_mut().for_each(|person| person.rect = place.rect_to_image(&person.rect));
         Ok(Some(people))

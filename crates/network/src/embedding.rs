@@ -11,7 +11,7 @@ use crate::detector::{OpenSize, start};
 use crate::family::OutputShape;
 use crate::network::rten;
 use crate::worker::Worker;
-use crate::{About, Colours, Fit, IMAGENET, InputSize, Limits, Preparation};
+use crate::{About, Colours, Family, Fit, IMAGENET, InputSize, Limits, Preparation};
 
 /// Columns and rows of an input that the file leaves open: those of the data sets of the field.
 const USUAL_SIZE: [usize; 2] = [128, 256];
@@ -75,7 +75,9 @@ impl About {
     /// A sentence with the reason why it is none.
     pub fn embedding(&self) -> Result<(usize, Convention), String> {
         let shapes = self.run.clone()?;
-        if let ([output], [_]) = (&shapes[..], &self.inputs[..])
+        // A vector of six or seven numbers has the shape of a list with one box.
+        let is_list = self.family() == Ok(Family::YoloV10);
+        if let ([output], [_], false) = (&shapes[..], &self.inputs[..], is_list)
             && let Some(numbers) = vector_of(&output.shape)
         {
             let is_omz = numbers == OMZ_NUMBERS;

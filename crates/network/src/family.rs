@@ -5,13 +5,24 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Colours, Fit, InputSize, Preparation};
+use crate::values::fits;
+use crate::{Colours, Fit, InputSize, Preparation, Tensor};
 
 /// Mean and deviation of ImageNet in red, green, blue, 0 to 255.
 pub const IMAGENET: [[f32; 3]; 2] = [[123.675, 116.28, 103.53], [58.395, 57.12, 57.375]];
 
-/// Values of a distribution for one side of a box of NanoDet.
+/// Values of a distribution for one side of a box of NanoDet-Plus.
 pub(crate) const NANODET_BINS: usize = 8;
+/// Values of a distribution for one side of a box of NanoDet before Plus: of its networks with 320
+/// and with 416 pixels.
+pub(crate) const NANODET_M_BINS: [usize; 2] = [8, 11];
+/// Strides of the grids of most families.
+pub(crate) const STRIDES: [usize; 3] = [8, 16, 32];
+/// Strides of NanoDet-Plus.
+pub(crate) const NANODET_STRIDES: [usize; 4] = [8, 16, 32, 64];
+
+/// Most boxes of a list without doubles: more are cells of a grid.
+const FINAL_BOXES: usize = 300;
 
 /// Name and shape of an output.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,12 +43,13 @@ impl fmt::Display for OutputShape {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Family {
-    /// YOLOX: offsets in grid cells, objectness and classes.
+    /// YOLOX: offsets in grid cells, or boxes in pixels, objectness and classes.
     Yolox,
-    /// YOLOv8, 9, 11 and 12: boxes in pixels, a row for each coordinate and class.
+    /// YOLOv8, 9, 11 and 12: boxes in pixels and classes, a row or a column for each.
     #[serde(rename = "yolov8")]
     YoloV8,
-    /// YOLOv10 and 26: final boxes in pixels.
+    /// YOLOv10 and 26, exports of others with suppression or for DeepStream, and CenterNet: final
+    /// boxes in pixels.
     #[serde(rename = "yolov10")]
     YoloV10,
     /// RT-DETR, D-FINE and DEIM: final boxes by name, and a second input for the size.
@@ -47,6 +59,9 @@ pub enum Family {
     /// NanoDet-Plus: a distribution for each side of a box.
     #[serde(rename = "nanodet")]
     NanoDet,
+    /// NanoDet before Plus: scores and distributions for each of three strides.
+    #[serde(rename = "nanodet-m")]
+    NanoDetM,
     /// RTMDet of MMDeploy: final boxes with scores, and labels.
     #[serde(rename = "rtmdet")]
     RtmDet,
@@ -73,11 +88,37 @@ impl<'a> Outputs<'a> {
         let [output] = self.0 else { return None };
         Some(&output.shape)
     }
+
+    /// Returns the number of classes, zero for one that is not known, of outputs that are scores
+    /// and distributions for each stride; `None` if they are others.
+    fn classes_by_stride(&self, input: InputSize) -> Option<usize> {
+        let mut widths = None;
+        for stride in STRIDES {
+            let cells = count_cells(input, &[stride]);
+            let of_stride = self.0.iter().filter_map(|output| match output.shape[..] {
+                [1, n, width] if n == cells => Some(width),
+                _ => None,
+            });
+            let mut pair: Vec<usize> = of_stride.collect();
+            pair.sort_unstable();
+            if pair.len() != 2 || *widths.get_or_insert_with(|| pair.clone()) != pair {
+                return None;
+            }
+        }
+        let widths = widths.filter(|_| self.0.len() == 2 * STRIDES.len())?;
+        let are_bins = |width: usize| NANODET_M_BINS.contains(&(width / 4)) && width % 4 == 0;
+        match (are_bins(widths[0]), are_bins(widths[1])) {
+            (true, false) => Some(widths[1]),
+            (false, true) => Some(widths[0]),
+            (true, true) => Some(0),
+            (false, false) => None,
+        }
+    }
 }
 
 impl Family {
     /// All families, in the order in which they are tried on a file.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::MoveNet,
         Self::RtDetr,
         Self::RfDetr,
@@ -85,6 +126,7 @@ impl Family {
         Self::Yolox,
         Self::YoloV8,
         Self::NanoDet,
+        Self::NanoDetM,
         Self::YoloV10,
     ];
 
@@ -97,6 +139,7 @@ impl Family {
             Self::RtDetr => "rt-detr",
             Self::RfDetr => "rf-detr",
             Self::NanoDet => "nanodet",
+            Self::NanoDetM => "nanodet-m",
             Self::RtmDet => "rtmdet",
             Self::MoveNet => "movenet",
         }
@@ -107,10 +150,11 @@ impl Family {
         match self {
             Self::Yolox => "YOLOX",
             Self::YoloV8 => "YOLOv8, v9, 11, 12",
-            Self::YoloV10 => "YOLOv10, 26",
+            Self::YoloV10 => "YOLOv10, 26, DeepStream, CenterNet",
             Self::RtDetr => "RT-DETR, D-FINE, DEIM",
             Self::RfDetr => "RF-DETR",
             Self::NanoDet => "NanoDet-Plus",
+            Self::NanoDetM => "NanoDet before Plus",
             Self::RtmDet => "RTMDet",
             Self::MoveNet => "MoveNet",
         }
@@ -120,14 +164,24 @@ impl Family {
     pub const fn outputs(self) -> &'static str {
         match self {
             Self::Yolox => "one output [1, cells of strides 8, 16, 32; 5 + classes]",
-            Self::YoloV8 => "one output [1; 4 + classes; cells of strides 8, 16, 32]",
-            Self::YoloV10 => "one output [1, boxes, 6]",
+            Self::YoloV8 => {
+                "one output [1; 4 + classes; cells of strides 8, 16, 32], or with the last two \
+                 changed over"
+            }
+            Self::YoloV10 => {
+                "one output [1, boxes, 6] or [boxes, 6] with corners, score and class, or \
+                 [boxes, 7] with the number of the image before them"
+            }
             Self::RtDetr => {
                 "outputs `labels` [1, n], `boxes` [1, n, 4], `scores` [1, n], and an input \
                  `orig_target_sizes` [1, 2]"
             }
             Self::RfDetr => "outputs `dets` [1, n, 4] and `labels` [1, n, classes]",
             Self::NanoDet => "one output [1, cells of strides 8, 16, 32, 64; classes + 32]",
+            Self::NanoDetM => {
+                "for each of the strides 8, 16, 32 outputs [1, cells, classes] and [1, cells, 32 \
+                 or 44], or one output with all of them side by side"
+            }
             Self::RtmDet => "outputs `dets` [1, n, 5] and `labels` [1, n]",
             Self::MoveNet => "one output [1, 1, 17, 3] or [1, 6, 56]",
         }
@@ -159,7 +213,7 @@ impl Family {
             Self::YoloV8 | Self::YoloV10 => Preparation { fit: Fit::Centre, ..plain },
             Self::RtDetr => plain,
             Self::RfDetr => Preparation { mean, deviation, ..plain },
-            Self::NanoDet => reversed,
+            Self::NanoDet | Self::NanoDetM => reversed,
             Self::RtmDet => Preparation { fit: Fit::TopLeft, ..reversed },
             Self::MoveNet => {
                 Preparation { fit: Fit::Centre, padding: 0.0, deviation: [1.0; 3], ..plain }
@@ -176,26 +230,45 @@ impl Family {
         }
     }
 
-    /// Returns true if several boxes of one person are left to the caller.
-    pub const fn needs_suppression(self) -> bool {
-        matches!(self, Self::Yolox | Self::YoloV8 | Self::NanoDet)
+    /// Returns the probability from which a box is usually taken for an object: that of the
+    /// examples of its authors where networks of the family are never sure, and otherwise a half.
+    pub const fn usual_score(self) -> f64 {
+        match self {
+            Self::MoveNet => 0.2,
+            _ => 0.5,
+        }
+    }
+
+    /// Returns true if several boxes of one person are left to the caller. Lists of final boxes
+    /// are without doubles, but for those with a box for each cell of a grid.
+    pub fn needs_suppression(self, outputs: &[OutputShape]) -> bool {
+        match self {
+            Self::Yolox | Self::YoloV8 | Self::NanoDet | Self::NanoDetM => true,
+            Self::YoloV10 => {
+                matches!(Outputs(outputs).only(), Some(&[1, boxes, _]) if boxes > FINAL_BOXES)
+            }
+            _ => false,
+        }
     }
 
     /// Returns the number of classes of a network with these outputs; `None` if they are not of
     /// this family. Zero stands for classes that are not known: labels of a list of boxes.
     pub fn classes(self, outputs: &[OutputShape], input: InputSize) -> Option<usize> {
         let outputs = Outputs(outputs);
-        let cells = |strides: &[usize]| count_cells(input, strides);
+        let cells = count_cells(input, &STRIDES);
         match (self, outputs.only()) {
-            (Self::Yolox, Some(&[1, n, width])) if n == cells(&[8, 16, 32]) => width.checked_sub(5),
-            (Self::YoloV8, Some(&[1, height, n])) if n == cells(&[8, 16, 32]) => {
-                height.checked_sub(4)
-            }
-            (Self::NanoDet, Some(&[1, n, width])) if n == cells(&[8, 16, 32, 64]) => {
+            (Self::Yolox, Some(&[1, n, width])) if n == cells => width.checked_sub(5),
+            (Self::YoloV8, Some(&[1, height, n])) if n == cells => height.checked_sub(4),
+            (Self::YoloV8, Some(&[1, n, width])) if n == cells => width.checked_sub(4),
+            (Self::NanoDet, Some(&[1, n, width])) if n == count_cells(input, &NANODET_STRIDES) => {
                 width.checked_sub(4 * NANODET_BINS)
             }
-            // More boxes than this are cells of a grid.
-            (Self::YoloV10, Some(&[1, 0..=1000, 6])) => return Some(0),
+            (Self::NanoDetM, Some(&[1, n, width])) if n == cells => {
+                // Which of the numbers of bins it is, values tell.
+                return (width > 4 * NANODET_M_BINS[0]).then_some(0);
+            }
+            (Self::NanoDetM, None) => return outputs.classes_by_stride(input),
+            (Self::YoloV10, Some(&[1, _, 6] | &[_, 6 | 7])) => return Some(0),
             (Self::MoveNet, Some(&[1, 1, 17, 3] | &[1, _, 56])) if input.channels_last => {
                 return Some(1);
             }
@@ -223,30 +296,63 @@ impl Family {
 }
 
 /// Returns the number of grid cells of an input over all strides.
-fn count_cells(input: InputSize, strides: &[usize]) -> usize {
+pub(crate) fn count_cells(input: InputSize, strides: &[usize]) -> usize {
     strides
         .iter()
         .map(|stride| input.width.div_ceil(*stride) * input.height.div_ceil(*stride))
         .sum()
 }
 
-/// Returns the family of a network by its outputs.
+/// Returns the shapes of named outputs.
+pub(crate) fn shapes_of(outputs: &[(&str, &Tensor)]) -> Vec<OutputShape> {
+    let shape = |(name, tensor): &(&str, &Tensor)| OutputShape {
+        name: (*name).to_owned(),
+        shape: tensor.shape().to_vec(),
+    };
+    outputs.iter().map(shape).collect()
+}
+
+/// Returns the family of a network by the shapes and the numbers of its outputs.
 ///
 /// # Errors
-/// Outputs of no family: a sentence with the families and their outputs.
-pub fn recognise(outputs: &[OutputShape], input: InputSize) -> Result<Family, String> {
-    let fits = |family: &Family| family.classes(outputs, input).is_some();
-    Family::ALL.into_iter().find(fits).ok_or_else(|| {
-        let shown: Vec<String> = outputs.iter().map(OutputShape::to_string).collect();
+/// Outputs of no family: a sentence with the families and their outputs. Outputs of several: a
+/// sentence with those.
+pub(crate) fn recognise(outputs: &[(&str, &Tensor)], input: InputSize) -> Result<Family, String> {
+    let shapes = shapes_of(outputs);
+    let shown: Vec<String> = shapes.iter().map(OutputShape::to_string).collect();
+    let shown = shown.join(", ");
+    let by_shape: Vec<Family> =
+        Family::ALL.into_iter().filter(|family| family.classes(&shapes, input).is_some()).collect();
+    if by_shape.is_empty() {
         let known = Family::ALL.map(|family| format!("\n  {family}: {}", family.outputs()));
-        let (width, height) = (input.width, input.height);
-        format!(
-            "no decoder fits the outputs {} for an input of {width} x {height} pixels; known \
+        let InputSize { width, height, .. } = input;
+        return Err(format!(
+            "no decoder fits the outputs {shown} for an input of {width} x {height} pixels; known \
              are{}",
-            shown.join(", "),
             known.concat()
-        )
-    })
+        ));
+    }
+    let by_value: Vec<Family> =
+        by_shape.iter().copied().filter(|family| fits(*family, outputs, input)).collect();
+    match by_value[..] {
+        [family] => Ok(family),
+        [] => Err(format!(
+            "the outputs {shown} have the shape of {}, but not its numbers: set `family` if you \
+             know that it is one of them, or export it as its authors do",
+            any_of(&by_shape)
+        )),
+        _ => Err(format!(
+            "the outputs {shown} may be those of {}: set `family` to the one that it is",
+            any_of(&by_value)
+        )),
+    }
+}
+
+/// Returns families as a text: `yolox (YOLOX) or yolov8 (YOLOv8, v9, 11, 12)`.
+fn any_of(families: &[Family]) -> String {
+    let shown: Vec<String> =
+        families.iter().map(|family| format!("`{family}` ({})", family.networks())).collect();
+    shown.join(" or ")
 }
 
 #[cfg(test)]
@@ -255,45 +361,56 @@ mod tests {
 
     const INPUT: InputSize = InputSize { width: 640, height: 640, channels_last: false };
 
-    fn outputs(shapes: &[(&str, &[usize])]) -> Vec<OutputShape> {
-        let output = |(name, shape): &(&str, &[usize])| OutputShape {
-            name: (*name).to_owned(),
-            shape: shape.to_vec(),
+    /// Returns the family of outputs of zeros.
+    fn of_shapes(shapes: &[(&str, &[usize])], input: InputSize) -> Result<Family, String> {
+        let zeros = |(_, shape): &(&str, &[usize])| {
+            Tensor::new(shape.to_vec(), vec![0.0; shape.iter().product()]).unwrap()
         };
-        shapes.iter().map(output).collect()
+        let tensors: Vec<Tensor> = shapes.iter().map(zeros).collect();
+        let named: Vec<(&str, &Tensor)> =
+            shapes.iter().map(|(name, _)| *name).zip(&tensors).collect();
+        recognise(&named, input)
     }
 
     #[test]
     fn published_networks_are_recognised() {
-        let only = |shape: &[usize]| recognise(&outputs(&[("output", shape)]), INPUT).unwrap();
+        let only = |shape: &[usize]| of_shapes(&[("output", shape)], INPUT).unwrap();
         assert_eq!(only(&[1, 8400, 85]), Family::Yolox);
-        assert_eq!(only(&[1, 8400, 6]), Family::Yolox, "a single class");
         assert_eq!(only(&[1, 84, 8400]), Family::YoloV8);
         assert_eq!(only(&[1, 5, 8400]), Family::YoloV8, "a single class");
         assert_eq!(only(&[1, 300, 6]), Family::YoloV10);
+        assert_eq!(only(&[0, 6]), Family::YoloV10, "nothing found");
+        assert_eq!(only(&[0, 7]), Family::YoloV10);
         assert_eq!(only(&[1, 8500, 112]), Family::NanoDet);
         let detr: [(&str, &[usize]); 3] =
             [("scores", &[1, 300]), ("labels", &[1, 300]), ("boxes", &[1, 300, 4])];
-        assert_eq!(recognise(&outputs(&detr), INPUT), Ok(Family::RtDetr));
+        assert_eq!(of_shapes(&detr, INPUT), Ok(Family::RtDetr));
         let rf: [(&str, &[usize]); 2] = [("dets", &[1, 300, 4]), ("labels", &[1, 300, 91])];
-        assert_eq!(recognise(&outputs(&rf), INPUT), Ok(Family::RfDetr));
+        assert_eq!(of_shapes(&rf, INPUT), Ok(Family::RfDetr));
         let rtm: [(&str, &[usize]); 2] = [("dets", &[1, 100, 5]), ("labels", &[1, 100])];
-        assert_eq!(recognise(&outputs(&rtm), INPUT), Ok(Family::RtmDet));
+        assert_eq!(of_shapes(&rtm, INPUT), Ok(Family::RtmDet));
         let last = InputSize { width: 192, height: 192, channels_last: true };
         for shape in [&[1, 1, 17, 3][..], &[1, 6, 56]] {
-            assert_eq!(recognise(&outputs(&[("output_0", shape)]), last), Ok(Family::MoveNet));
+            assert_eq!(of_shapes(&[("output_0", shape)], last), Ok(Family::MoveNet));
         }
     }
 
     #[test]
     fn other_shapes_are_refused_with_those_that_are_known() {
-        let why = recognise(&outputs(&[("logits", &[1, 1000])]), INPUT).unwrap_err();
+        let why = of_shapes(&[("logits", &[1, 1000])], INPUT).unwrap_err();
         assert!(why.contains("`logits` [1, 1000]") && why.contains("640 x 640"), "{why}");
         assert!(Family::ALL.iter().all(|family| why.contains(family.name())), "{why}");
-        let wrong = |shape: &[usize]| recognise(&outputs(&[("output", shape)]), INPUT).is_err();
-        assert!(wrong(&[1, 8400, 5]) && wrong(&[1, 4, 8400]) && wrong(&[1, 8500, 32]));
+        let wrong = |shape: &[usize]| of_shapes(&[("output", shape)], INPUT).is_err();
+        assert!(wrong(&[1, 4, 8400]) && wrong(&[1, 8500, 32]));
         assert!(wrong(&[2, 8400, 85]) && wrong(&[]));
         assert!(wrong(&[1, 6, 56]), "MoveNet has its channels last");
+    }
+
+    #[test]
+    fn shapes_of_several_families_are_refused_with_their_names_where_numbers_do_not_decide() {
+        let why = of_shapes(&[("output", &[1, 8400, 6])], INPUT).unwrap_err();
+        assert!(why.contains("`yolox` (YOLOX) or `yolov10`"), "{why}");
+        assert!(why.contains("set `family`") && !why.contains("rf-detr"), "{why}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use rten::{
 };
 use rten_tensor::prelude::*;
 
+use crate::rewriting::without_scalar_division;
 use crate::survey::Survey;
 use crate::tensor::count;
 use crate::{Element, Limits, Network, Port, Tensor};
@@ -28,6 +29,7 @@ impl RtenNetwork {
     /// another file, and tensors that are too large; the message is a sentence.
     pub fn from_onnx(bytes: Vec<u8>, limits: &Limits) -> Result<Self, String> {
         let survey = Survey::of(&bytes, limits)?;
+        let bytes = without_scalar_division(bytes);
         let model = ModelOptions::with_all_ops().load(bytes).map_err(|why| load_error(&why))?;
         check_tensors(&model, &survey, limits)?;
         let ports = |ids: &[NodeId]| ids.iter().map(|id| port(&model, *id)).collect::<Vec<_>>();

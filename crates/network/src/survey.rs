@@ -300,13 +300,13 @@ fn truncated() -> String {
 
 /// Content of a field of a message.
 #[derive(Clone, Copy)]
-enum Content<'a> {
+pub(crate) enum Content<'a> {
     Number(u64),
     Bytes(&'a [u8]),
 }
 
 /// Fields of a message, by number. After an error there are no more.
-struct Fields<'a>(&'a [u8]);
+pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Fields<'a> {
     fn read(&mut self) -> Option<(u64, Content<'a>)> {

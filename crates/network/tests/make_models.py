@@ -135,6 +135,25 @@ def nanodet(graph):
     return {"output": [1, 85, 34]}
 
 
+def nanodet_m(graph):
+    """Scores and distributions for each stride; boxes are counted from the middle of a cell."""
+    mean, deviation = IMAGENET[:, ::-1]
+    sides = np.zeros((1, 64, 4, 8), np.float32)
+    # Half a cell to the left, above and to the right, and one and a half below.
+    for side, bins in enumerate([(0, 1), (0, 1), (0, 1), (1, 2)]):
+        sides[:, :, side, bins] = 20
+    sides = sides.reshape(1, 64, 32)
+    scores = graph.reshape(graph.scores(mean, deviation), [1, 16, 1])
+    graph.add("Concat", scores, graph.zeros(1, 16, 1), axis=2, outputs=["scores_16"])
+    shapes = {}
+    for stride, cells in ((8, 64), (16, 16), (32, 4)):
+        if stride != 16:
+            graph.add("Identity", graph.zeros(1, cells, 2), outputs=[f"scores_{stride}"])
+        graph.add("Identity", graph.constant(sides[:, :cells]), outputs=[f"sides_{stride}"])
+        shapes |= {f"scores_{stride}": [1, cells, 2], f"sides_{stride}": [1, cells, 32]}
+    return shapes
+
+
 def rtmdet(graph):
     mean, deviation = IMAGENET[:, ::-1]
     scores, boxes = best(graph, graph.scores(mean, deviation), graph.constant(CORNERS))
@@ -170,7 +189,77 @@ def movenet(graph):
 
 FAMILIES = {
     "yolox": yolox, "yolov8": yolov8, "yolov10": yolov10, "rt-detr": rt_detr, "rf-detr": rf_detr,
-    "nanodet": nanodet, "rtmdet": rtmdet, "movenet": movenet,
+    "nanodet": nanodet, "nanodet-m": nanodet_m, "rtmdet": rtmdet, "movenet": movenet,
+}
+
+
+def pixel_rows(graph, scores, objectness=False):
+    """Rows of a grid with middles and sizes in pixels, as networks write them: [1, 84, ...]."""
+    grids = []
+    for stride in (8, 16, 32):
+        places = (np.arange(SIDE // stride, dtype=np.float32) + 0.5) * stride
+        x, y = [grid.ravel() for grid in np.meshgrid(places, places)]
+        grids.append(np.stack([x, y, np.full_like(x, stride), np.full_like(x, stride)], 1))
+    # The blob is that of the second grid.
+    grids[1] = CENTRES
+    boxes = graph.constant(np.concatenate(grids)[None])
+    person = graph.add("Concat", graph.zeros(1, 64, 1), graph.reshape(scores, [1, 16, 1]),
+                       graph.zeros(1, 4, 1), axis=1)
+    parts = [boxes, graph.constant(np.ones((1, 84, 1)))] if objectness else [boxes]
+    return parts + [person]
+
+
+def yolox_decoded(graph):
+    """YOLOX with `decode_in_inference`, and the 80 classes of COCO."""
+    rows = pixel_rows(graph, graph.scores([0] * 3, [1] * 3), objectness=True)
+    graph.add("Concat", *rows, graph.zeros(1, 84, 79), axis=2, outputs=["output"])
+    return {"output": [1, 84, 85]}
+
+
+def yolov8_rows(graph):
+    rows = pixel_rows(graph, graph.scores([0] * 3, [255] * 3))
+    graph.add("Concat", *rows, axis=2, outputs=["output0"])
+    return {"output0": [1, 84, 5]}
+
+
+def nanodet_m_concat(graph):
+    """NanoDet before Plus with its outputs side by side, and 80 classes."""
+    nanodet_m(graph)
+    rows = []
+    for stride, cells in ((8, 64), (16, 16), (32, 4)):
+        rows.append(graph.add("Concat", f"scores_{stride}", graph.zeros(1, cells, 78),
+                              f"sides_{stride}", axis=2))
+    graph.add("Concat", *rows, axis=1, outputs=["output"])
+    return {"output": [1, 84, 112]}
+
+
+def final(graph, columns, boxes=3, batch=True):
+    """The three best regions as a list of boxes with these columns, and rows of zeros."""
+    scores, corners = best(graph, graph.scores([0] * 3, [255] * 3), graph.constant(CORNERS))
+    parts = {"box": corners, "score": graph.reshape(scores, [1, 3, 1]),
+             "label": graph.zeros(1, 3, 1), "image": graph.zeros(1, 3, 1)}
+    rows = graph.add("Concat", *[parts[column] for column in columns], axis=2)
+    width = len(columns) + 3
+    if boxes > 3:
+        rows = graph.add("Concat", rows, graph.zeros(1, boxes - 3, width), axis=1)
+    shape = [1, boxes, width] if batch else [boxes, width]
+    graph.reshape(rows, shape, outputs=["output0"])
+    return {"output0": shape}
+
+
+# Files as tools write them: the family, the network, and what differs in its input.
+LAYOUTS = {
+    "yolox-decoded": ("yolox", yolox_decoded, {}),
+    "yolov8-rows": ("yolov8", yolov8_rows, {}),
+    "yolov8-last": ("yolov8", yolov8, {"last": True}),
+    "yolov8-open": ("yolov8", yolov8, {"open": True}),
+    "yolov8-half": ("yolov8", yolov8, {"half": True}),
+    "nanodet-m-concat": ("nanodet-m", nanodet_m_concat, {}),
+    "score-last": ("yolov10", lambda graph: final(graph, ["box", "label", "score"]), {}),
+    "deepstream": ("yolov10", lambda graph: final(graph, ["box", "score", "label"], 84), {}),
+    "no-batch": ("yolov10", lambda graph: final(graph, ["box", "score", "label"], batch=False), {}),
+    "yolov7": ("yolov10", lambda graph: final(graph, ["image", "box", "label", "score"],
+                                              batch=False), {}),
 }
 
 
@@ -189,7 +278,7 @@ def prepared(family):
         image = image / 255
     elif family == "rf-detr":
         image = (image - mean) / deviation
-    elif family in ("nanodet", "rtmdet"):
+    elif family in ("nanodet", "nanodet-m", "rtmdet"):
         image = ((image - mean) / deviation)[:, :, ::-1]
     elif family == "yolox":
         image = image[:, :, ::-1]
@@ -211,6 +300,54 @@ def write(family, build):
         inputs += [helper.make_tensor_value_info("orig_target_sizes", TensorProto.INT64, [1, 2])]
         feeds["orig_target_sizes"] = np.array([[SIDE, SIDE]], np.int64)
     save(family, graph, inputs, outputs, feeds)
+
+
+def write_layout(name, family, build, last=False, open=False, half=False):
+    """Writes a network of a family in the layout of a tool."""
+    graph = Graph()
+    image = prepared(family)
+    shape = [1, 3, "height", "width"] if open else [1, 3, SIDE, SIDE]
+    if last:
+        # The image comes with the channels of a pixel side by side.
+        shape, image = [1, SIDE, SIDE, 3], np.ascontiguousarray(image.transpose(0, 2, 3, 1))
+        graph.add("Transpose", "pixels", perm=[0, 3, 1, 2], outputs=["images"])
+    shapes = build(graph)
+    name_of_input = "pixels" if last else "images"
+    kind = TensorProto.FLOAT16 if half else TensorProto.FLOAT
+    if half:
+        image = image.astype(np.float16)
+        graph.constants = [halved(constant) for constant in graph.constants]
+        for node in graph.nodes:
+            if node.op_type == "ConstantOfShape":
+                zero = helper.make_tensor("zero", TensorProto.FLOAT16, [1], [0])
+                node.attribute.append(helper.make_attribute("value", zero))
+    inputs = [helper.make_tensor_value_info(name_of_input, kind, shape)]
+    outputs = [helper.make_tensor_value_info(output, kind, size) for output, size in shapes.items()]
+    save(name, graph, inputs, outputs, {name_of_input: image})
+
+
+def halved(constant):
+    values = numpy_helper.to_array(constant)
+    if values.dtype != np.float32:
+        return constant
+    return numpy_helper.from_array(values.astype(np.float16), constant.name)
+
+
+def write_own_size():
+    """Writes MoveNet with its joints scaled by way of its own size, as tf2onnx writes it: a
+    constant is divided by a tensor with one number, whose dimension has to stay."""
+    graph = Graph()
+    size = graph.add("Cast", graph.add("Shape", "images"), to=TensorProto.FLOAT)
+    height = graph.add("Slice", size, graph.constant([1], np.int64), graph.constant([2], np.int64))
+    inverse = graph.add("Div", graph.constant(4), height)
+    scale = graph.add("Unsqueeze", inverse, graph.constant([1], np.int64))
+    movenet(graph)
+    graph.nodes[-1].output[0] = "joints"
+    rows = graph.add("Div", scale, scale)
+    graph.add("Mul", "joints", graph.reshape(rows, [1, 1, 1, 1]), outputs=["output_0"])
+    inputs = [helper.make_tensor_value_info("images", TensorProto.INT32, [1, SIDE, SIDE, 3])]
+    outputs = [helper.make_tensor_value_info("output_0", TensorProto.FLOAT, [1, 1, 17, 3])]
+    save("own-size", graph, inputs, outputs, {"images": prepared("movenet")})
 
 
 def write_yellow():
@@ -278,6 +415,9 @@ def write_embedding(name, build):
 if __name__ == "__main__":
     for family, build in FAMILIES.items():
         write(family, build)
+    for name, (family, build, input_of) in LAYOUTS.items():
+        write_layout(name, family, build, **input_of)
+    write_own_size()
     write_embedding("osnet", osnet)
     write_embedding("omz", omz)
     write_yellow()

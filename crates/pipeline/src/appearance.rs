@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::OrAuto;
 use tagalong_core::{Error, Frame, Result};
 use tagalong_geometry::Rect;
-use tagalong_network::{Convention, EmbeddingNetwork, LimitSettings, with_colours};
+use tagalong_network::{Convention, EmbeddingNetwork, LimitSettings, model_file, with_colours};
 use tagalong_vision::{Describer, Embedder};
 
 /// Description of people by a re-identification network, for `[reidentification]`, its
@@ -15,7 +15,8 @@ use tagalong_vision::{Describer, Embedder};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AppearanceSettings {
-    /// ONNX file of a re-identification network, relative to the config. Empty: people are
+    /// ONNX file of a re-identification network, relative to the config, or the name of an installed
+    /// one. Empty: people are
     /// described by colours and edges.
     pub model: String,
     /// Convention of its input: `auto` (by the outputs), `osnet` (RGB, mean and deviation of
@@ -41,12 +42,13 @@ impl AppearanceSettings {
         if !self.has_network() {
             return Ok(Describer::default());
         }
-        let path = base_dir.join(&self.model);
+        let file = model_file(base_dir, &self.model);
+        let path = file.display().to_string();
         let network =
-            EmbeddingNetwork::load(&path, self.convention.chosen(), &self.limits.limits());
-        let network = network.map_err(|why| Error::Model { path: self.model.clone(), why })?;
+            EmbeddingNetwork::load(&file, self.convention.chosen(), &self.limits.limits());
+        let network = network.map_err(|why| Error::Model { path: path.clone(), why })?;
         let mark = format!("{base_dir:?} {self:?}");
-        let embedder = OfNetwork { network, path: self.model.clone() };
+        let embedder = OfNetwork { network, path };
         Ok(Describer::new(mark, Box::new(embedder)))
     }
 }
@@ -54,7 +56,7 @@ impl AppearanceSettings {
 /// Vectors of an ONNX network.
 struct OfNetwork {
     network: EmbeddingNetwork,
-    /// The file as named in the config.
+    /// The file, as it was looked for.
     path: String,
 }
 

@@ -5,28 +5,45 @@ use tagalong_core::{Error, Result};
 use tagalong_network::{Choices, Colours, Family, Fit, LimitSettings, Preparation};
 use tagalong_vision::BoxSettings;
 
+/// Number that leaves a setting to the family of the network.
+const BY_FAMILY: f64 = -1.0;
+/// Default of `track_score`, as a part of `discover_score`.
+const TRACK_PART: f64 = 0.4;
+
+/// Probabilities from which a box is a person.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Thresholds {
+    /// A new one.
+    pub discover: f64,
+    /// The one of a confirmed track.
+    pub track: f64,
+}
+
 /// Settings of `onnx`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// ONNX file, relative to the config. Empty: no one is found, and the funnel says so.
+    /// ONNX file, relative to the config, or the name of an installed network
+    /// (`tagalong model --install`). Empty: no one is found, and the funnel says so.
     pub model: String,
     /// Family of the network: `auto` (by the file), `yolox`, `yolov8`, `yolov10`, `rt-detr`,
-    /// `rf-detr`, `nanodet`, `rtmdet` or `movenet`.
+    /// `rf-detr`, `nanodet`, `nanodet-m`, `rtmdet` or `movenet`.
     pub family: OrAuto<Family>,
     /// Columns and rows of the input where the file leaves them open, for example `[640, 640]`,
-    /// which is also taken for an empty list.
+    /// which is also taken for an empty list (256 x 256 for `movenet`).
     pub size: Vec<usize>,
     /// Classes of people; empty: that of the family (0, and 1 for `rf-detr`).
     pub classes: Vec<usize>,
-    /// Probability from which a box is a new person.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    /// Probability from which a box is a new person; -1: that of the family. Below a half, scores
+    /// are log-odds above it, so that it also is what `start_score = 0.0` of a track manager means.
+    #[schemars(range(min = -1.0, max = 1.0))]
     pub discover_score: f64,
-    /// Probability from which a box near a confirmed track is its person.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    /// Probability from which a box near a confirmed track is its person; -1: 0.4 times
+    /// `discover_score`.
+    #[schemars(range(min = -1.0, max = 1.0))]
     pub track_score: f64,
     /// Of two boxes that overlap by more than this (IoU) the less likely one is dropped; only for
-    /// families that leave it open (`yolox`, `yolov8`, `nanodet`).
+    /// families that leave it open (`yolox`, `yolov8`, `nanodet`, `nanodet-m`).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub suppress_iou: f64,
     /// Order of the channels: `auto` (that of the family), `rgb` or `bgr`.
@@ -58,8 +75,8 @@ impl Default for Config {
             family: OrAuto::Auto,
             size: Vec::new(),
             classes: Vec::new(),
-            discover_score: 0.5,
-            track_score: 0.2,
+            discover_score: BY_FAMILY,
+            track_score: BY_FAMILY,
             suppress_iou: 0.6,
             colours: OrAuto::Auto,
             fit: OrAuto::Auto,
@@ -90,6 +107,14 @@ impl Config {
     pub(crate) fn choices(&self) -> Choices {
         let size = <[usize; 2]>::try_from(&self.size[..]).ok();
         Choices { family: self.family.chosen(), size, classes: self.classes.clone() }
+    }
+
+    /// Returns the thresholds: those of the family, but for those that are set.
+    pub(crate) fn thresholds(&self, family: Family) -> Thresholds {
+        let discover =
+            if self.discover_score < 0.0 { family.usual_score() } else { self.discover_score };
+        let track = if self.track_score < 0.0 { TRACK_PART * discover } else { self.track_score };
+        Thresholds { discover, track }
     }
 
     /// Returns the preparation of images: that of the family, but for what is set.

@@ -4,16 +4,21 @@ use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, Derived, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Query, Result,
 };
-use tagalong_network::{PersonNetwork, Preparation, Runtime, ScoredBox, rten, with_colours};
+use tagalong_network::{
+    PersonNetwork, Preparation, Runtime, ScoredBox, model_file, rten, with_colours,
+};
 use tagalong_vision::log_odds_of;
 
 use crate::NAME;
-use crate::config::Config;
+use crate::config::{Config, Thresholds};
 
 /// Network with the preparation of its images.
 struct Loaded {
     network: PersonNetwork,
     preparation: Preparation,
+    thresholds: Thresholds,
+    /// The file, as it was looked for.
+    path: String,
 }
 
 /// Detector that runs a neural network from an ONNX file.
@@ -77,8 +82,7 @@ impl Onnx {
         let answer = match known.iter().find(|(mark, _)| *mark == self.mark) {
             Some((_, answer)) => answer.clone(),
             None => {
-                let least = self.config.discover_score.min(self.config.track_score);
-                let answer = loaded.answer(frame, least, &self.config)?;
+                let answer = loaded.answer(frame, &self.config)?;
                 known.push((Arc::clone(&self.mark), answer.clone()));
                 answer
             }
@@ -94,22 +98,25 @@ impl Onnx {
 }
 
 impl Loaded {
-    fn answer(&mut self, frame: &Frame, least: f64, config: &Config) -> Result<Answer> {
-        let (least, iou) = (least as f32, config.suppress_iou);
+    fn answer(&mut self, frame: &Frame, config: &Config) -> Result<Answer> {
+        let least = self.thresholds.discover.min(self.thresholds.track) as f32;
+        let iou = config.suppress_iou;
         let find = |image: &_| self.network.find(image, &self.preparation, least, iou);
         let found = with_colours(frame, find)?
-            .map_err(|why| Error::Model { path: config.model.clone(), why })?;
+            .map_err(|why| Error::Model { path: self.path.clone(), why })?;
         Ok(found.map_or(Answer::Late, |people| Answer::People(people.into())))
     }
 }
 
 fn load(runtime: Runtime, config: &Config, context: &Context) -> Result<Loaded> {
-    let path = context.base_dir.join(&config.model);
+    let file = model_file(&context.base_dir, &config.model);
+    let path = file.display().to_string();
     let limits = config.limits.limits();
-    let network = PersonNetwork::load_with(runtime, &path, &config.choices(), &limits);
-    let network = network.map_err(|why| Error::Model { path: config.model.clone(), why })?;
+    let network = PersonNetwork::load_with(runtime, &file, &config.choices(), &limits);
+    let network = network.map_err(|why| Error::Model { path: path.clone(), why })?;
     let preparation = config.preparation(network.family())?;
-    Ok(Loaded { network, preparation })
+    let thresholds = config.thresholds(network.family());
+    Ok(Loaded { network, preparation, thresholds, path })
 }
 
 impl Detector for Onnx {
@@ -129,18 +136,22 @@ impl Detector for Onnx {
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let people = self.people(frame, funnel)?;
+        let Some(Loaded { thresholds, .. }) = &self.loaded else { return Ok(Vec::new()) };
         // A track lowers the threshold only once it is believed: a weak box must not feed itself.
         let least = match search {
-            Query::Track(track) if track.confirmed => self.config.track_score,
-            _ => self.config.discover_score,
+            Query::Track(track) if track.confirmed => thresholds.track,
+            _ => thresholds.discover,
         };
+        // A box at the threshold of newcomers is even odds at least, so that the track manager starts
+        // a track from it on, however unsure of itself a network is.
+        let zero = log_odds_of(thresholds.discover).min(0.0);
         let mut found = Vec::new();
         for person in people.iter() {
             if f64::from(person.score) < least {
                 funnel.drop_at("network: score", person.rect);
                 continue;
             }
-            let score = log_odds_of(person.score.into());
+            let score = log_odds_of(person.score.into()) - zero;
             match self.config.boxes.detection(frame, &person.rect, score, NAME) {
                 Some(detection) => found.push(detection),
                 None => funnel.drop_at("outside", person.rect),

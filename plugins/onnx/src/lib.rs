@@ -1,7 +1,7 @@
 //! `onnx`: people by a neural network that the user brings as an ONNX file.
 //!
 //! The network runs through [`tagalong_network::PersonNetwork`], which knows the conventions of
-//! eight families of detectors. Its boxes of whole people become upper-body squares with a place:
+//! nine families of detectors. Its boxes of whole people become upper-body squares with a place:
 //! by depth where that shows the face, otherwise by the size of the box.
 
 mod config;

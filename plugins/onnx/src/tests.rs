@@ -11,6 +11,7 @@ use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect
 use tagalong_network::{Colours, Family, Fit, LimitSettings};
 use tagalong_vision::{BoxSettings, BoxedBody};
 
+use super::config::Thresholds;
 use super::*;
 
 const EVERYWHERE: Query<'_> = Query::Discover { occupied: &[] };
@@ -169,6 +170,37 @@ fn a_weak_box_is_the_person_of_a_confirmed_track_alone() {
     assert_eq!(count(&Query::Track(&elsewhere)), (0, 0));
 }
 
+/// A network that is never sure starts tracks by its own threshold, in a track manager that starts
+/// them from zero on.
+#[test]
+fn the_threshold_of_newcomers_is_the_zero_of_scores() {
+    let score = |discover_score: f64, brightness: u8| {
+        let config = Config { discover_score, ..config(Family::Yolox) };
+        let found = detect(&mut detector(config), &frame(1, brightness));
+        found.first().map(|detection| detection.score)
+    };
+    let by_default = score(0.5, 240).unwrap();
+    assert!((score(0.2, 240).unwrap() - by_default - 4.0_f64.ln()).abs() < 1e-6);
+    assert_eq!(score(0.5, 170), None);
+    let weak = score(0.2, 170).unwrap();
+    assert!((0.0..1.5).contains(&weak), "{weak}");
+    assert!(score(0.2, 160).is_none_or(|score| score >= 0.0));
+}
+
+#[test]
+fn thresholds_are_those_of_the_family_unless_they_are_set() {
+    let of = |config: Config, family| {
+        let Thresholds { discover, track } = config.thresholds(family);
+        [discover, track]
+    };
+    assert_eq!(of(Config::default(), Family::Yolox), [0.5, 0.2]);
+    assert_eq!(of(Config::default(), Family::MoveNet), [0.2, 0.4 * 0.2]);
+    let set = Config { discover_score: 0.0, ..Config::default() };
+    assert_eq!(of(set, Family::Yolox), [0.0, 0.0]);
+    let both = Config { discover_score: 0.6, track_score: 0.1, ..Config::default() };
+    assert_eq!(of(both, Family::MoveNet), [0.6, 0.1]);
+}
+
 #[test]
 fn a_config_without_a_model_says_so_in_the_funnel() {
     let (mut funnel, frame) = (Funnel::default(), frame(1, 240));
@@ -221,9 +253,10 @@ fn message(config: Config) -> String {
 #[test]
 fn bad_files_are_named_with_the_reason() {
     let why = message(Config { model: "none.onnx".into(), ..Config::default() });
-    assert!(why.starts_with("model file `none.onnx`: cannot be read"), "{why}");
+    let tried = models().join("none.onnx").display().to_string();
+    assert!(why.starts_with(&format!("model file `{tried}`: cannot be read")), "{why}");
     let why = message(Config { model: "yolox.json".into(), ..Config::default() });
-    assert!(why.contains("`yolox.json`: it is truncated or no ONNX file"), "{why}");
+    assert!(why.contains("yolox.json`: it is truncated or no ONNX file"), "{why}");
     let wrong = Config { family: OrAuto::Chosen(Family::RfDetr), ..config(Family::Yolox) };
     assert!(message(wrong).contains("is not of the family rf-detr"));
     let limits = LimitSettings { max_operators: 2, ..LimitSettings::default() };

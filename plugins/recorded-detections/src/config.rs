@@ -1,8 +1,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
-use tagalong_core::Result;
-use tagalong_vision::BoxSettings;
+use tagalong_core::{Error, Result};
+use tagalong_vision::{BoxSettings, log_odds_of};
 
 /// Meaning of the recorded score.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -23,6 +23,10 @@ pub struct Config {
     pub path: String,
     /// Boxes with a lower score, on the recorded scale, are dropped.
     pub min_score: f64,
+    /// Score, on the recorded scale, from which a box may be a new person; less certain ones continue
+    /// tracks alone. Scores of detections are log-odds above it. By default `min_score`, or even odds
+    /// (a probability of a half) where that is less.
+    pub discover_score: Option<f64>,
     /// Meaning of the score.
     pub score: ScoreScale,
     /// Boxes to detections with a position.
@@ -38,6 +42,7 @@ impl Default for Config {
         Self {
             path: String::new(),
             min_score: 0.3,
+            discover_score: None,
             score: ScoreScale::Probability,
             boxes: BoxSettings::default(),
             sigma_position_m: 0.15,
@@ -48,6 +53,33 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that cannot work.
     pub(crate) fn check(&self) -> Result<()> {
-        check_settings(self)
+        check_settings(self)?;
+        match self.discover_score {
+            Some(score) if score < self.min_score => {
+                let least = self.min_score;
+                let why = format!("must be at least {least}, as `min_score`, not {score}");
+                Err(Error::setting("discover_score", why))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the log-odds of a recorded score.
+    fn log_odds(&self, score: f64) -> f64 {
+        match self.score {
+            ScoreScale::LogOdds => score,
+            ScoreScale::Probability => log_odds_of(score),
+        }
+    }
+
+    /// Returns the score of a detection with this recorded score: its log-odds above those from
+    /// which a box may be a new person.
+    pub(crate) fn score_of(&self, recorded: f64) -> f64 {
+        let zero = match self.discover_score {
+            Some(score) => self.log_odds(score),
+            // A detector that is never sure starts tracks from its own threshold on.
+            None => self.log_odds(self.min_score).min(0.0),
+        };
+        self.log_odds(recorded) - zero
     }
 }

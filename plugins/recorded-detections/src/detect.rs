@@ -5,11 +5,11 @@ use tagalong_core::{
     Result,
 };
 use tagalong_geometry::ImageBox;
-use tagalong_vision::{is_shown, log_odds_of};
+use tagalong_vision::is_shown;
 
 use crate::NAME;
 use crate::boxes::{Boxes, read};
-use crate::config::{Config, ScoreScale};
+use crate::config::Config;
 
 /// Detector that returns recorded detections, with a position for each box.
 pub struct RecordedDetections {
@@ -45,7 +45,7 @@ impl RecordedDetections {
     }
 
     fn detection(&self, frame: &Frame, recorded: &ExternalDetection) -> Option<Detection> {
-        let score = self.log_odds(recorded.score);
+        let score = self.config.score_of(recorded.score);
         let Some(head) = recorded.head else {
             return self.config.boxes.detection(frame, &recorded.region?, score, NAME);
         };
@@ -58,13 +58,6 @@ impl RecordedDetections {
             source: NAME,
         };
         is_shown(&frame.camera, &detection).then_some(detection)
-    }
-
-    fn log_odds(&self, score: f64) -> f64 {
-        match self.config.score {
-            ScoreScale::LogOdds => score,
-            ScoreScale::Probability => log_odds_of(score),
-        }
     }
 }
 

@@ -28,7 +28,7 @@ const REMEDIES: &[Remedy] = &[
     },
     Remedy {
         test: "recorded score",
-        settings: &["min_score"],
+        settings: &["min_score", "discover_score"],
         look: "recorded detections that their detector doubts",
     },
 ];

@@ -43,6 +43,22 @@ fn detect(detector: &mut RecordedDetections, frame: &Frame) -> Vec<Detection> {
     detector.detect(frame, &EVERYWHERE, &mut Funnel::default()).unwrap()
 }
 
+/// A track manager starts tracks from zero on.
+#[test]
+fn newcomers_are_judged_by_the_threshold_of_their_detector() {
+    let config = |min_score: f64| Config { min_score, ..Config::default() };
+    let rounded = |config: &Config, score| (config.score_of(score) * 1e6).round() / 1e6;
+    assert_eq!(rounded(&config(0.2), 0.2), 0.0);
+    assert_eq!(rounded(&config(0.5), 0.8), (4.0_f64.ln() * 1e6).round() / 1e6);
+    assert_eq!(config(0.7).score_of(0.7), config(0.5).score_of(0.7), "even odds start tracks");
+    let apart = Config { discover_score: Some(0.6), ..config(0.1) };
+    assert_eq!(rounded(&apart, 0.6), 0.0);
+    assert!(apart.score_of(0.59) < 0.0);
+    let below = Config { discover_score: Some(0.05), ..config(0.1) };
+    let why = of_file("", below).err().unwrap().to_string();
+    assert!(why.contains("`discover_score` must be at least 0.1, as `min_score`"), "{why}");
+}
+
 /// Formats a person at this head position as a whole-body box of the file.
 fn whole_body(head: Point3<f64>) -> String {
     let upper = camera().upper_body(&head);
@@ -104,12 +120,18 @@ fn depth_beats_the_size_and_holes_do_not_count() {
 #[test]
 fn low_scores_are_dropped_and_counted() {
     let text = "1,-1,100,100,50,170,0.2\n1,-1,300,100,50,170,0.8\n";
-    let mut detector = of_file(text, Config::default()).unwrap();
+    let even = Config { min_score: 0.5, ..Config::default() };
+    let mut detector = of_file(text, even).unwrap();
     let mut funnel = Funnel::default();
     let found = detector.detect(&frame(1, None), &EVERYWHERE, &mut funnel).unwrap();
     assert_eq!((found.len(), funnel.count("recorded score")), (1, 1));
     assert!((found[0].score - 4.0_f64.ln()).abs() < 1e-9, "log-odds of 0.8");
-    let log_odds = Config { score: ScoreScale::LogOdds, min_score: -5.0, ..Config::default() };
+    let log_odds = Config {
+        score: ScoreScale::LogOdds,
+        min_score: -5.0,
+        discover_score: Some(0.0),
+        ..Config::default()
+    };
     let mut detector = of_file(text, log_odds).unwrap();
     assert_eq!(detect(&mut detector, &frame(1, None))[0].score, 0.2);
 }
@@ -237,7 +259,8 @@ fn the_most_like_of_several_near_a_track_comes_first() {
 #[test]
 fn boxes_without_a_score_are_certain_and_blank_lines_are_none() {
     let text = "\n 1 , -1, 100, 100, 50, 170\n\n1,-1,300,100,50,170,0.8\n";
-    let mut detector = of_file(text, Config::default()).unwrap();
+    let even = Config { min_score: 0.5, ..Config::default() };
+    let mut detector = of_file(text, even).unwrap();
     let found = detect(&mut detector, &frame(1, None));
     let scores: Vec<f64> = found.iter().map(|d| d.score).collect();
     let sure = (0.999_f64 / 0.001).ln();

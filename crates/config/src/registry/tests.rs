@@ -261,5 +261,7 @@ fn a_model_is_the_built_in_one_or_that_of_the_file() {
     assert_eq!(context.model("Cargo.toml", "built in", first), Ok("[package]".into()));
     let refused = |file: &str, built_in| context.model(file, built_in, first).unwrap_err();
     assert_eq!(refused("", "").to_string(), "model file ``: empty");
-    assert!(refused("nowhere.toml", "x").to_string().starts_with("model file `nowhere.toml`: "));
+    let tried = context.base_dir.join("nowhere.toml").display().to_string();
+    let why = refused("nowhere.toml", "x").to_string();
+    assert!(why.starts_with(&format!("model file `{tried}`: ")), "{why}");
 }

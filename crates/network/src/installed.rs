@@ -1,0 +1,86 @@
+//! Networks that a user has installed: ONNX files by name, in a folder of the user.
+
+use std::ffi::OsString;
+use std::path::{Component, Path, PathBuf};
+
+/// Environment variable that names the folder of the user's data.
+pub const DATA_FOLDER: &str = "TAGALONG_HOME";
+/// Folder of networks in it.
+const NETWORKS: &str = "networks";
+
+/// Environment variables by name.
+pub type Variables = fn(&str) -> Option<OsString>;
+
+/// Returns the folder of installed networks: `networks` in the folder that `TAGALONG_HOME` names,
+/// otherwise in `tagalong` of `XDG_DATA_HOME`, otherwise in `.local/share/tagalong` of the home
+/// folder; `None` where none of them is known.
+pub fn networks_folder() -> Option<PathBuf> {
+    networks_folder_of(|name| std::env::var_os(name))
+}
+
+/// Returns the folder of installed networks by the environment variables that are given.
+pub fn networks_folder_of(variable: Variables) -> Option<PathBuf> {
+    let named = |name: &str| variable(name).filter(|text| !text.is_empty()).map(PathBuf::from);
+    let data = named(DATA_FOLDER)
+        // The standard has relative paths ignored.
+        .or_else(|| {
+            Some(named("XDG_DATA_HOME").filter(|path| path.is_absolute())?.join("tagalong"))
+        })
+        .or_else(|| Some(named("HOME")?.join(".local/share/tagalong")))?;
+    Some(data.join(NETWORKS))
+}
+
+/// Returns the file that the `model` of a config names: relative to the folder of the config, or,
+/// where there is none and `model` is a plain name, the installed network of this name. A file that
+/// is not there at all is returned as the path in the folder of the config.
+pub fn model_file(folder: &Path, model: &str) -> PathBuf {
+    let file = folder.join(model);
+    if file.exists() || !is_name(model) {
+        return file;
+    }
+    let installed = networks_folder().map(|networks| networks.join(format!("{model}.onnx")));
+    installed.filter(|installed| installed.is_file()).unwrap_or(file)
+}
+
+/// Returns true for a text without folders and extension.
+fn is_name(model: &str) -> bool {
+    let path = Path::new(model);
+    let mut parts = path.components();
+    let is_one = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
+    is_one && path.extension().is_none()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_folder_is_that_of_the_user() {
+        let home: Variables = |name| (name == "HOME").then(|| "/home/ann".into());
+        let share = "/home/ann/.local/share/tagalong/networks";
+        assert_eq!(networks_folder_of(home), Some(share.into()));
+        let xdg: Variables = |name| (name != DATA_FOLDER).then(|| "/data".into());
+        assert_eq!(networks_folder_of(xdg), Some("/data/tagalong/networks".into()));
+        let relative: Variables = |name| (name == "XDG_DATA_HOME").then(|| "data".into());
+        assert_eq!(networks_folder_of(relative), None);
+        let own: Variables = |name| Some(if name == DATA_FOLDER { "mine" } else { "/data" }.into());
+        assert_eq!(networks_folder_of(own), Some("mine/networks".into()));
+        let empty: Variables = |name| Some(if name == "HOME" { "/home/ann" } else { "" }.into());
+        assert_eq!(networks_folder_of(empty), Some(share.into()));
+    }
+
+    #[test]
+    fn a_path_is_relative_to_the_config() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("plain"), "").unwrap();
+        for model in ["people.onnx", "a/people", "plain", "not-installed", "/x/y.onnx"] {
+            assert_eq!(model_file(folder.path(), model), folder.path().join(model), "{model}");
+        }
+    }
+
+    #[test]
+    fn a_name_has_neither_folder_nor_extension() {
+        let names = ["yolox-nano", "yolox.onnx", "a/b", "..", "/a", ""].map(is_name);
+        assert_eq!(names, [true, false, false, false, false, false]);
+    }
+}

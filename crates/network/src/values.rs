@@ -1,0 +1,201 @@
+//! Families told apart by the numbers of their outputs, where shapes are alike.
+
+use crate::decode::{Columns, columns_of, is_pixel_grid, scores_and_sides};
+use crate::family::{NANODET_M_BINS, STRIDES, count_cells};
+use crate::{Family, InputSize, Tensor};
+
+/// Largest offset in cells, and largest logarithm of a size in cells, of a raw grid: a box is not
+/// `exp(16)` cells wide, and pixels exceed this in all but the first cells.
+const MAX_RAW: f32 = 16.0;
+/// Rounding of probabilities.
+const ROUNDING: f32 = 1e-3;
+/// Rounding of corners, pixels.
+const ROUNDING_PX: f32 = 1.0;
+/// Columns of COCO's classes after four of the box: in a list of scores, and with an objectness.
+const COCO_COLUMNS: [usize; 2] = [84, 85];
+
+/// Returns true if the numbers of outputs, whose shapes are those of a family, can be its numbers.
+pub(crate) fn fits(family: Family, outputs: &[(&str, &Tensor)], input: InputSize) -> bool {
+    let [(_, output)] = outputs else {
+        // Several outputs have names, or a shape for each stride.
+        return family != Family::NanoDetM || scores_and_sides(outputs, input).is_some();
+    };
+    match family {
+        Family::Yolox => is_raw_grid(output) || has_pixels(output, 5),
+        Family::YoloV8 if is_transposed(output, input) => has_pixels(output, 4),
+        Family::NanoDetM => bins_of(output).is_some(),
+        Family::YoloV10 => is_list(output, input),
+        _ => true,
+    }
+}
+
+/// Returns true if the output of YOLOv8 has a row for each box.
+pub(crate) fn is_transposed(output: &Tensor, input: InputSize) -> bool {
+    let cells = count_cells(input, &STRIDES);
+    matches!(*output.shape(), [1, n, width] if n == cells && width != cells)
+}
+
+/// Returns true for a probability, but for its rounding.
+pub(crate) fn is_score(value: f32) -> bool {
+    (-ROUNDING..=1.0 + ROUNDING).contains(&value)
+}
+
+/// Returns true for the number of a class.
+fn is_label(value: f32) -> bool {
+    value >= 0.0 && value.fract() == 0.0
+}
+
+/// Returns true for a grid with offsets and logarithms of sizes in cells, and scores.
+fn is_raw_grid(output: &Tensor) -> bool {
+    output.rows().all(|row| {
+        let (place, scores) = row.split_at(4);
+        place.iter().all(|value| value.abs() <= MAX_RAW) && scores.iter().copied().all(is_score)
+    })
+}
+
+/// Returns true for a grid with middles and sizes in pixels, and scores of which `first` is the
+/// first column of a class.
+fn has_pixels(output: &Tensor, first: usize) -> bool {
+    let width = output.shape().last().copied().unwrap_or(0);
+    let other = COCO_COLUMNS[usize::from(first == 4)];
+    width > first
+        && width != other
+        && is_pixel_grid(output)
+        && output.rows().all(|row| row[4..].iter().copied().all(is_score))
+}
+
+/// Returns the bins of a distribution in the rows of NanoDet before Plus, which begin with scores.
+pub(crate) fn bins_of(output: &Tensor) -> Option<usize> {
+    let width = output.shape().last().copied()?;
+    NANODET_M_BINS.into_iter().find(|bins| {
+        let Some(classes) = width.checked_sub(4 * bins).filter(|classes| *classes > 0) else {
+            return false;
+        };
+        let are_scores = output.rows().all(|row| row[..classes].iter().copied().all(is_score));
+        let mut sides = output.rows().flat_map(|row| &row[classes..]);
+        are_scores && sides.any(|value| !is_score(*value))
+    })
+}
+
+/// Returns true for a list of boxes by their corners, with scores and classes.
+fn is_list(output: &Tensor, input: InputSize) -> bool {
+    let Columns { first, score, label } = columns_of(output);
+    let side = input.width.max(input.height) as f32;
+    output.rows().all(|row| {
+        let [left, top, right, bottom] = [0, 1, 2, 3].map(|k| row[first + k]);
+        let is_inside =
+            [left, top, right, bottom].iter().all(|at| (-side..=2.0 * side).contains(at));
+        let is_box = right >= left - ROUNDING_PX && bottom >= top - ROUNDING_PX;
+        let has_image = first == 0 || is_label(row[0]);
+        is_inside && is_box && has_image && is_score(row[score]) && is_label(row[label])
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::family::recognise;
+
+    const INPUT: InputSize = InputSize { width: 64, height: 64, channels_last: false };
+
+    /// Returns the family of one output whose rows are made by `row`.
+    fn of_rows(shape: &[usize], row: impl Fn(usize) -> Vec<f32>) -> Result<Family, String> {
+        let rows = shape[shape.len() - 2];
+        let values = (0..rows).flat_map(row).collect();
+        let output = Tensor::new(shape.to_vec(), values).unwrap();
+        recognise(&[("output", &output)], INPUT)
+    }
+
+    /// Returns the middle and the size, pixels, of a box at a cell of a grid of 64 x 64 pixels.
+    fn pixels(cell: usize) -> Vec<f32> {
+        let (cell, side, stride) = match cell {
+            0..64 => (cell, 8, 8.0),
+            64..80 => (cell - 64, 4, 16.0),
+            _ => (cell - 80, 2, 32.0),
+        };
+        let [x, y] = [cell % side, cell / side].map(|at| (at as f32 + 0.5) * stride);
+        vec![x, y, 1.2 * stride, 1.5 * stride]
+    }
+
+    /// Returns a raw offset and a raw size.
+    fn offsets(cell: usize) -> Vec<f32> {
+        vec![0.3, 0.7, -0.2 * (cell % 3) as f32, 0.6]
+    }
+
+    fn corners(cell: usize) -> Vec<f32> {
+        let [x, y, width, height] = pixels(cell)[..] else { unreachable!() };
+        vec![x - width / 2.0, y - height / 2.0, x + width / 2.0, y + height / 2.0]
+    }
+
+    fn with(place: Vec<f32>, scores: &[f32]) -> Vec<f32> {
+        [place, scores.to_vec()].concat()
+    }
+
+    #[test]
+    fn grids_of_one_shape_are_told_apart() {
+        let six = [1, 84, 6];
+        let raw = of_rows(&six, |cell| with(offsets(cell), &[0.1, 0.4]));
+        assert_eq!(raw, Ok(Family::Yolox));
+        let list = of_rows(&six, |cell| with(corners(cell), &[0.1, 0.0]));
+        assert_eq!(list, Ok(Family::YoloV10), "DeepStream");
+        let last = of_rows(&six, |cell| with(corners(cell), &[0.0, 0.1]));
+        assert_eq!(last, Ok(Family::YoloV10), "the score last");
+        let why = of_rows(&six, |cell| with(pixels(cell), &[0.1, 0.4])).unwrap_err();
+        assert!(why.contains("`yolox` (YOLOX) or `yolov8`"), "{why}");
+        let one = of_rows(&[1, 84, 5], |cell| with(pixels(cell), &[0.1]));
+        assert_eq!(one, Ok(Family::YoloV8), "an objectness needs a class");
+        let coco = |width: usize| {
+            of_rows(&[1, 84, width], |cell| with(pixels(cell), &vec![0.1; width - 4]))
+        };
+        assert_eq!((coco(84), coco(85)), (Ok(Family::YoloV8), Ok(Family::Yolox)));
+    }
+
+    /// The list of `network-family-by-shape` of the field data: one box, and nothing else.
+    #[test]
+    fn a_list_with_a_row_for_each_cell_is_no_grid() {
+        let row = |cell: usize| match cell {
+            0 => vec![15.0, 5.0, 35.0, 60.0, 0.9, 0.0],
+            _ => vec![0.0; 6],
+        };
+        assert_eq!(of_rows(&[1, 84, 6], row), Ok(Family::YoloV10));
+    }
+
+    #[test]
+    fn lists_of_one_box_are_told_from_other_rows() {
+        let list = |row: &[f32]| of_rows(&[1, row.len()], |_| row.to_vec());
+        assert_eq!(list(&[0.0, 10.0, 5.0, 30.0, 60.0, 0.0, 0.8]), Ok(Family::YoloV10));
+        assert_eq!(list(&[10.0, 5.0, 30.0, 60.0, 0.8, 0.0]), Ok(Family::YoloV10));
+        assert!(list(&[0.2, -0.1, 0.3, 0.6, 0.1, -0.2, 0.8]).is_err());
+        assert!(list(&[0.2, 0.1, 0.1, 0.6, 0.1, 0.2]).is_err());
+    }
+
+    #[test]
+    fn numbers_of_no_family_are_refused() {
+        let why = of_rows(&[1, 84, 6], |_| vec![-900.0; 6]).unwrap_err();
+        assert!(
+            why.contains("the shape of `yolox`") && why.contains("but not its numbers"),
+            "{why}"
+        );
+    }
+
+    #[test]
+    fn nanodet_before_plus_is_known_by_its_distributions() {
+        let logits = |count: usize| (0..count).map(|k| k as f32 - 3.0).collect::<Vec<f32>>();
+        for bins in NANODET_M_BINS {
+            let row = |_: usize| with(vec![0.1; 80], &logits(4 * bins));
+            assert_eq!(of_rows(&[1, 84, 80 + 4 * bins], row), Ok(Family::NanoDetM));
+        }
+        let by_stride = |scores: f32| {
+            let tensor = |cells: usize, row: &[f32]| {
+                Tensor::new(vec![1, cells, row.len()], row.repeat(cells)).unwrap()
+            };
+            let outputs =
+                [4, 64, 16].map(|cells| [tensor(cells, &logits(44)), tensor(cells, &[scores; 80])]);
+            let named: Vec<(&str, &Tensor)> =
+                outputs.iter().flatten().map(|output| ("", output)).collect();
+            recognise(&named, INPUT)
+        };
+        assert_eq!(by_stride(0.1), Ok(Family::NanoDetM));
+        assert!(by_stride(-4.0).unwrap_err().contains("not its numbers"), "logits");
+    }
+}
