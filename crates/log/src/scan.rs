@@ -10,6 +10,7 @@ use tagalong_core::Stamp;
 
 use crate::images::{
     Content, content_of_encoding, content_of_format, is_coded_picture, may_be_disparity,
+    video_codec,
 };
 use crate::log_files::LogFiles;
 use crate::msgs::{
@@ -389,9 +390,12 @@ impl Topic {
             self.content = match content_of_format(&image.format) {
                 // The format is any text, and the codec is told by the first bytes.
                 Content::Unknown if is_coded_picture(image.data) => Content::Picture,
+                // Video under any label.
+                _ if video_codec(image.data).is_some() => Content::Unknown,
                 content => content,
             };
-            self.pixels = Some(image.format);
+            let codec = video_codec(image.data).map(str::to_owned);
+            self.pixels = Some(codec.unwrap_or(image.format));
         }
         self.take_header(image.header);
         Some(())
