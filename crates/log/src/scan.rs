@@ -10,7 +10,6 @@ use tagalong_core::Stamp;
 
 use crate::images::{
     Content, content_of_encoding, content_of_format, is_coded_picture, may_be_disparity,
-    video_codec,
 };
 use crate::log_files::LogFiles;
 use crate::msgs::{
@@ -390,12 +389,13 @@ impl Topic {
             self.content = match content_of_format(&image.format) {
                 // The format is any text, and the codec is told by the first bytes.
                 Content::Unknown if is_coded_picture(image.data) => Content::Picture,
-                // Video under any label.
-                _ if video_codec(image.data).is_some() => Content::Unknown,
                 content => content,
             };
-            let codec = video_codec(image.data).map(str::to_owned);
-            self.pixels = Some(codec.unwrap_or(image.format));
+            self.pixels = Some(image.format);
+        }
+        // Video under any label.
+        if let Some(codec) = crate::images::video_codec(image.data) {
+            (self.content, self.pixels) = (Content::Unknown, Some(codec.to_owned()));
         }
         self.take_header(image.header);
         Some(())
