@@ -1,6 +1,8 @@
 //! Progress of a pass over a log.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -43,8 +45,18 @@ impl Progress {
     /// Shows what is done, of unknown duration, while it is done.
     pub fn waiting<T>(message: &str, work: impl FnOnce() -> T) -> T {
         let spinner = ProgressBar::new_spinner().with_message(message.to_owned());
-        spinner.enable_steady_tick(TICK);
-        let done = work();
+        let (ends, ended) = channel();
+        let done = thread::scope(|scope| {
+            if !spinner.is_hidden() {
+                let spinner = &spinner;
+                let turn = move || turn_until(&ended, spinner);
+                // Without another thread it stands still, and the work goes on.
+                let _ = thread::Builder::new().spawn_scoped(scope, turn);
+            }
+            // Dropped at the end of the work, also by a panic.
+            let _ends: Sender<()> = ends;
+            work()
+        });
         spinner.finish_and_clear();
         done
     }
@@ -68,6 +80,13 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// Turns a spinner until the other end of the channel is gone.
+fn turn_until(ended: &Receiver<()>, spinner: &ProgressBar) {
+    while ended.recv_timeout(TICK) == Err(RecvTimeoutError::Timeout) {
+        spinner.tick();
     }
 }
 

@@ -332,7 +332,8 @@ mod tests {
     fn unfinished_databases_are_read_up_to_their_last_commit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.db3");
-        let seeds = [(UNCOMMITTED, JOURNAL, "-journal", 6), (LOGGED_AHEAD, WRITE_AHEAD_LOG, "-wal", 7)];
+        let seeds =
+            [(UNCOMMITTED, JOURNAL, "-journal", 6), (LOGGED_AHEAD, WRITE_AHEAD_LOG, "-wal", 7)];
         for (database, beside, ending, count) in seeds {
             std::fs::write(&path, database).unwrap();
             std::fs::write(folder.path().join(format!("log.db3{ending}")), beside).unwrap();

@@ -26,8 +26,7 @@ fn at_once<S: Sync, T: Send>(
     work: &(impl Fn(&S) -> Result<T> + Sync),
 ) -> Result<Vec<T>> {
     let died = |_| Err(Error::Other("the solver panicked".into()));
-    let guarded =
-        |thing: &S| catch_unwind(AssertUnwindSafe(|| work(thing))).unwrap_or_else(died);
+    let guarded = |thing: &S| catch_unwind(AssertUnwindSafe(|| work(thing))).unwrap_or_else(died);
     // All threads are joined before the first failure counts: a thread that panics and is not
     // joined makes the scope panic.
     let results: Vec<Result<T>> = std::thread::scope(|scope| {

@@ -482,6 +482,10 @@ impl Topic {
             };
             self.pixels = Some(image.format);
         }
+        // Video under any label.
+        if let Some(codec) = crate::images::video_codec(image.data) {
+            (self.content, self.pixels) = (Content::Unknown, Some(codec.to_owned()));
+        }
         self.take_header(image.header);
         Some(())
     }

@@ -158,8 +158,7 @@ pub fn record(
             recorder.finish()
         };
         let writing = thread::Builder::new().spawn_scoped(scope, write_all);
-        let writing =
-            writing.map_err(|source| WriteError::Io { path: path.to_owned(), source })?;
+        let writing = writing.map_err(|source| WriteError::Io { path: path.to_owned(), source })?;
         let mut images = 0;
         while let Some(event) = simulation.next_event().filter(|_| goes_on()) {
             if let Event::Shot(shot) = &event {

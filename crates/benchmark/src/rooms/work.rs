@@ -205,7 +205,7 @@ impl Shift<'_> {
             // One job fewer: the calling thread works, too.
             for _ in 1..jobs {
                 // Without another thread, those that run do its work.
-            let _ = std::thread::Builder::new().spawn_scoped(scope, work);
+                let _ = std::thread::Builder::new().spawn_scoped(scope, work);
             }
             work();
         });

@@ -225,7 +225,8 @@ fn a_log_whose_name_is_no_text_is_run_checked_and_compared() {
     fs::write(people, crate::common::people(5)).unwrap();
     let command = |words: &[&str]| {
         let mut command = own_plugin();
-        let output = command.current_dir(home.folder.path()).args(words).arg(&odd).output().unwrap();
+        let output =
+            command.current_dir(home.folder.path()).args(words).arg(&odd).output().unwrap();
         assert_eq!(code(&output), 0, "{words:?} {}", text(&output.stderr));
         output
     };

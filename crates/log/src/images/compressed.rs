@@ -9,7 +9,7 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::raw::exact;
-use super::{ImageError, Pixels, check_size, deep_png, metres, metres_of_float, rvl};
+use super::{ImageError, Pixels, check_size, deep_png, metres, metres_of_float, rvl, video_codec};
 use crate::Limits;
 use crate::msgs::CompressedImage;
 
@@ -36,7 +36,10 @@ pub fn decode_compressed(
     match image.data {
         [0xff, 0xd8, ..] => jpeg(image.data, limits),
         [0x89, b'P', b'N', b'G', ..] => png(image.data, depth_unit_m, limits),
-        _ => Err(ImageError::Encoding(image.format.clone())),
+        data => {
+            let codec = video_codec(data).map(str::to_owned);
+            Err(ImageError::Encoding(codec.unwrap_or_else(|| image.format.clone())))
+        }
     }
 }
 

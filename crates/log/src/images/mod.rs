@@ -10,6 +10,7 @@ mod deep_png;
 mod disparity;
 mod raw;
 mod rvl;
+mod video;
 mod yuv;
 
 pub(crate) use compressed::Codec;
@@ -21,6 +22,7 @@ pub use disparity::{
 };
 pub use raw::{decode_raw, size_of_raw};
 use tagalong_core::{DepthImage, GreyImage, RgbImage};
+pub(crate) use video::video_codec;
 
 use crate::Limits;
 
@@ -147,7 +149,7 @@ pub fn content_of_encoding(encoding: &str, depth_unit_m: Option<f64>) -> Content
 /// Returns the reason for which images of an encoding or format cannot be read, with the remedy.
 pub(crate) fn refusal_of(pixels: &str) -> String {
     let lower = pixels.to_ascii_lowercase();
-    let video = ["h264", "h265", "hevc", "avc", "ffmpeg", "theora", "av1"];
+    let video = ["h264", "h265", "hevc", "avc", "ffmpeg", "theora", "av1", "vp8", "vp9"];
     if video.iter().any(|name| lower.contains(name)) {
         return VIDEO_REMEDY.to_owned();
     }
@@ -158,8 +160,9 @@ pub(crate) fn refusal_of(pixels: &str) -> String {
 }
 
 /// Remedy for video in a log.
-pub(crate) const VIDEO_REMEDY: &str = "video is not decoded: republish it as jpeg (`ros2 run \
-                                       image_transport republish`) and record that";
+pub(crate) const VIDEO_REMEDY: &str = "video is not decoded: record the camera's jpeg images (a topic `.../compressed`) instead; the video \
+     of a log that exists can be republished as jpeg while it plays (`ros2 run image_transport republish \
+     ffmpeg compressed`, or with `foxglove` or `theora` in place of `ffmpeg`) and recorded again";
 
 /// Returns true for colour with 16 bits a channel.
 fn is_deep(encoding: &str) -> bool {

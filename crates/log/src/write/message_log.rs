@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
@@ -25,13 +25,13 @@ impl MessageLog {
     /// Starts a file, and creates its folder.
     ///
     /// # Errors
-    /// [`WriteError::Io`], [`WriteError::Mcap`].
+    /// [`WriteError::Io`], [`WriteError::Mcap`], [`WriteError::Busy`].
     pub fn create(path: &Path) -> Result<Self, WriteError> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             fs::create_dir_all(folder).map_err(WriteError::io(folder))?;
         }
         let partial = path.with_extension("mcap.partial");
-        let file = File::create(&partial).map_err(WriteError::io(&partial))?;
+        let file = open_alone(&partial)?;
         let writer = WriteOptions::new()
             .profile("ros2")
             .library(concat!("tagalong ", env!("CARGO_PKG_VERSION")))
@@ -108,5 +108,38 @@ impl MessageLog {
     pub fn finish(mut self) -> Result<(), WriteError> {
         self.writer.finish().map_err(WriteError::mcap(&self.partial))?;
         fs::rename(&self.partial, &self.path).map_err(WriteError::io(&self.path))
+    }
+}
+
+/// Opens a file for writing that no other process is writing, and empties it.
+fn open_alone(path: &Path) -> Result<File, WriteError> {
+    // Emptied only behind the lock, or the file of the other process would be.
+    let file = File::options().write(true).create(true).truncate(false).open(path);
+    let file = file.map_err(WriteError::io(path))?;
+    match file.try_lock() {
+        // Some file systems have no locks.
+        Ok(()) | Err(TryLockError::Error(_)) => {}
+        Err(TryLockError::WouldBlock) => return Err(WriteError::Busy { path: path.to_owned() }),
+    }
+    file.set_len(0).map_err(WriteError::io(path))?;
+    Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_writers_do_not_write_one_file() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("walk.mcap");
+        // Longer than what is written now: the rest of a killed writer must not stay.
+        fs::write(home.path().join("walk.mcap.partial"), vec![7; 100_000]).unwrap();
+        let first = MessageLog::create(&path).unwrap();
+        let error = MessageLog::create(&path).err().unwrap();
+        assert!(matches!(error, WriteError::Busy { .. }), "{error}");
+        first.finish().unwrap();
+        assert!(fs::metadata(&path).unwrap().len() < 50_000);
+        MessageLog::create(&path).unwrap();
     }
 }

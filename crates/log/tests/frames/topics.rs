@@ -124,6 +124,20 @@ fn images_in_an_encoding_that_is_not_read_are_named_with_the_remedy() {
     let mut log = started();
     log.foreign("/video", "foxglove_msgs/msg/CompressedVideo", "cdr", at(0.1), &[0, 1, 0, 0]);
     assert!(refusal(log, &input, colour).to_string().contains("image_transport republish"));
+    // Some drivers publish video as compressed images of any format.
+    for (format, first, codec) in
+        [("jpeg", 0x67, "h264"), ("", 0x40, "h265"), ("h264", 0x65, "h264")]
+    {
+        let mut log = started();
+        let data = [0, 0, 0, 1, first, 1, 2, 3];
+        let header = Header::new(at(0.1), "camera");
+        let image = CompressedImage { header, format: format.into(), data: &data };
+        log.message("/cam/compressed", at(0.1), &image);
+        let error = refusal(log, &input, colour).to_string();
+        let named =
+            format!("/cam/compressed (sensor_msgs/msg/CompressedImage, {codec}) cannot be read");
+        assert!(error.contains(&named) && error.contains("republish"), "{error}");
+    }
     let mut log = started();
     log.foreign("/image", "foxglove.CompressedImage", "protobuf", at(0.1), &[8, 1]);
     let error = refusal(log, &input, colour).to_string();

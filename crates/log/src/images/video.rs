@@ -1,0 +1,61 @@
+//! Video in image messages, told by its bytes: some drivers publish it as `sensor_msgs/CompressedImage`
+//! with any format, also with `jpeg` or none.
+
+/// Returns the codec of a packet of video; `None` for everything else.
+///
+/// The packets of H.264 and H.265 begin with a start code and a unit that begins a picture (ITU-T H.264
+/// and H.265, annex B).
+pub(crate) fn video_codec(data: &[u8]) -> Option<&'static str> {
+    let unit = data.strip_prefix(&[0, 0, 0, 1]).or_else(|| data.strip_prefix(&[0, 0, 1]))?;
+    let &[first, second, ..] = unit else { return None };
+    // The kind of a unit says whether others refer to it.
+    let is_reference = first & 0x60 != 0;
+    let is_h264 = match first & 0x1f {
+        // A picture.
+        1 => true,
+        // A key picture, and parameters.
+        5 | 7 | 8 => is_reference,
+        // Further information, and a delimiter.
+        6 | 9 => !is_reference,
+        _ => false,
+    };
+    // Layer 0 and temporal layer 0. Pictures, key pictures, parameters, delimiters, further information.
+    let is_h265 =
+        first & 1 == 0 && second == 1 && matches!(first >> 1, 1..=9 | 16..=21 | 32..=35 | 39);
+    // The highest bit is always 0.
+    match (is_h264, is_h265) {
+        _ if first & 0x80 != 0 => None,
+        (true, _) => Some("h264"),
+        (false, true) => Some("h265"),
+        (false, false) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packets_of_video_are_told_by_their_first_unit() {
+        for (data, codec) in [
+            // Sequence parameters, a delimiter, a key picture and one between.
+            (&[0, 0, 0, 1, 0x67, 0x42, 0x00][..], Some("h264")),
+            (&[0, 0, 0, 1, 0x09, 0xf0], Some("h264")),
+            (&[0, 0, 1, 0x65, 0x88], Some("h264")),
+            (&[0, 0, 0, 1, 0x41, 0x9a], Some("h264")),
+            // Video parameters, sequence parameters, a delimiter, a key picture.
+            (&[0, 0, 0, 1, 0x40, 0x01, 0x0c], Some("h265")),
+            (&[0, 0, 0, 1, 0x42, 0x01], Some("h265")),
+            (&[0, 0, 0, 1, 0x46, 0x01], Some("h265")),
+            (&[0, 0, 1, 0x26, 0x01], Some("h265")),
+            (&[0, 0, 1, 0x02, 0x01], Some("h265")),
+            (&[0xff, 0xd8, 0xff, 0xe0], None),
+            (&[0, 0, 0, 1], None),
+            (&[0, 0, 0, 1, 0xe7, 1], None),
+            (&[0, 0, 0, 0], None),
+            (&[], None),
+        ] {
+            assert_eq!(video_codec(data), codec, "{data:02x?}");
+        }
+    }
+}
