@@ -250,7 +250,7 @@ mod tests {
     fn the_floor_tells_where_the_upper_body_is() {
         let lens =
             Pinhole { fx: 520.0, fy: 520.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        let camera = Camera::mounted(lens, 640, 480, 2.3, -0.5, 0.0);
+        let camera = Camera::mounted(lens, 640, 480, 2.3, 0.5, 0.0);
         let settings = BoxSettings { floor: true, ..BoxSettings::default() };
         let head = Point3::new(3.5, 0.2, 1.6);
         let square = camera.upper_body(&head);
