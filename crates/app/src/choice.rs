@@ -6,15 +6,19 @@ use tagalong_config::Registry;
 use tagalong_log::{FrameSource, InputSettings, Limits};
 
 use crate::config_file::ConfigFile;
+use crate::installed::NETWORK;
 use crate::outcome::Failure;
 
 /// The config for a camera below a conical mirror.
 const PANORAMIC: &str = "omni-rich";
 
+/// The config for colour alone where no network is installed.
+pub const WITHOUT_NETWORK: &str = "mono";
+
 /// A pipeline for logs of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Choice {
-    /// Name of the built-in config.
+    /// Name of the built-in config, or [`NETWORK`] for that of an installed network.
     pub config: &'static str,
     /// Data by which such a log is known, in words.
     pub has: &'static str,
@@ -24,7 +28,7 @@ pub struct Choice {
 
 /// The pipelines; the first that fits a log is taken. Where several fit, the order is that of
 /// `tagalong bench --leave-one-room-out` in docs/benchmarks.md.
-pub const CHOICES: [Choice; 9] = [
+pub const CHOICES: [Choice; 10] = [
     Choice {
         config: "depth-verified",
         has: "colour and depth",
@@ -57,7 +61,12 @@ pub const CHOICES: [Choice; 9] = [
         reason: "it is the one for several people before a conical mirror",
     },
     Choice {
-        config: "mono",
+        config: NETWORK,
+        has: "colour or grey images alone",
+        reason: "you installed this network; places in metres are rough",
+    },
+    Choice {
+        config: WITHOUT_NETWORK,
         has: "colour or grey images alone",
         reason: "nothing else works without depth; places in metres are rough",
     },

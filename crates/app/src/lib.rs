@@ -8,6 +8,7 @@ pub mod choice;
 pub mod config_file;
 pub mod format;
 pub mod frame_notes;
+pub mod installed;
 pub mod origin;
 pub mod outcome;
 pub mod progress;

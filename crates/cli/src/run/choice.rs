@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use tagalong_app::choice::{Choice, Fitting, fitting};
+use tagalong_app::choice::{Choice, Fitting, WITHOUT_NETWORK, fitting};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::outcome::{Failure, say};
 use tagalong_config::Registry;
@@ -15,6 +15,12 @@ pub(super) fn choose(log: &Path, registry: &Registry) -> Result<ConfigFile, Fail
         return Err(found.none_fits(log));
     };
     let Choice { config: name, has, reason } = choice;
-    say(&format!("the log has {has}: taking {name}, because {reason}"));
+    say(&format!("the log has {has}: taking {}, because {reason}", config.stem()));
+    if name == WITHOUT_NETWORK {
+        say(
+            "a neural network finds more people in colour: `tagalong model --list` names some, and \
+             `tagalong model --install FILE.onnx` makes this command take one",
+        );
+    }
     Ok(config)
 }
