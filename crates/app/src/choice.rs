@@ -7,15 +7,19 @@ use tagalong_log::{FrameSource, InputAccount, InputSettings, Limits};
 
 use crate::config_file::{ConfigFile, OuterSettings};
 use crate::input_args::InputArgs;
+use crate::installed::NETWORK;
 use crate::outcome::Failure;
 
 /// The config for a camera below a conical mirror.
 const PANORAMIC: &str = "omni-rich";
 
+/// The config for colour alone where no network is installed.
+pub const WITHOUT_NETWORK: &str = "mono";
+
 /// A pipeline for logs of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Choice {
-    /// Name of the built-in config.
+    /// Name of the built-in config, or [`NETWORK`] for that of an installed network.
     pub config: &'static str,
     /// Reason for the choice.
     pub reason: &'static str,
@@ -23,7 +27,7 @@ pub struct Choice {
 
 /// The pipelines; the first that fits a log is taken. Where several fit, the order is that of
 /// `tagalong bench --leave-one-room-out` in docs/benchmarks.md.
-pub const CHOICES: [Choice; 9] = [
+pub const CHOICES: [Choice; 10] = [
     Choice {
         config: "depth-verified",
         reason: "it has the best HOTA in rooms that no setting was chosen on",
@@ -47,7 +51,11 @@ pub const CHOICES: [Choice; 9] = [
         reason: "it is the one for several people before a conical mirror",
     },
     Choice {
-        config: "mono",
+        config: NETWORK,
+        reason: "you installed this network; places in metres are rough",
+    },
+    Choice {
+        config: WITHOUT_NETWORK,
         reason: "nothing else works without depth; places in metres are rough",
     },
     Choice {

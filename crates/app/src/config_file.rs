@@ -12,6 +12,7 @@ use tagalong_log::write::OutputSettings;
 use tagalong_log::{InputSettings, Limits, LogError};
 use tagalong_pipeline::{BuildError, ConfigSource, Pipeline, ResolvedConfig};
 
+use crate::installed;
 use crate::outcome::Failure;
 use crate::suggest::config_hint;
 
@@ -37,12 +38,19 @@ pub struct OuterSettings {
 }
 
 impl ConfigFile {
-    /// Reads a config: a file, or the name of a built-in one.
+    /// Reads a config: a file, the name of a built-in one, or that of an installed network.
     ///
     /// # Errors
     /// A file that is missing, unreadable, too long or no text: exit code 2.
     pub fn read(path: &Path) -> Result<Self, Failure> {
-        Ok(Self { source: ConfigSource::open(path)? })
+        match ConfigSource::open(path) {
+            Ok(source) => Ok(Self { source }),
+            Err(error) => {
+                let installed = path.to_str().and_then(installed::config_file);
+                let source = installed.map(ConfigSource::from_file).unwrap_or(Err(error));
+                Ok(Self { source: source? })
+            }
+        }
     }
 
     /// Returns the config of a text, whose relative paths are resolved against `folder`.
@@ -63,10 +71,12 @@ impl ConfigFile {
         ConfigSource::builtin_names()
     }
 
-    /// Returns the built-in config of a name, or of the file that it is in a clone; `None` if there
-    /// is none.
+    /// Returns the built-in config of a name, or of the file that it is in a clone, or the config of
+    /// an installed network; `None` if there is none.
     pub fn named(name: &str) -> Option<Self> {
-        Some(Self { source: ConfigSource::builtin(name).ok()? })
+        let source = ConfigSource::builtin(name).ok();
+        let source = source.or_else(|| ConfigSource::from_file(installed::config_file(name)?).ok());
+        Some(Self { source: source? })
     }
 
     /// Returns its name without folder and extension.

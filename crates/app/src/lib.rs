@@ -9,6 +9,7 @@ pub mod config_file;
 pub mod format;
 pub mod frame_notes;
 pub mod input_args;
+pub mod installed;
 pub mod origin;
 pub mod outcome;
 pub mod progress;

@@ -16,6 +16,9 @@ use tagalong_scoring::{Rate, Reports, Shots, TruthFile, assemble, comparable, co
 use super::misses::{DroppedPlaces, missed};
 use super::store::Recording;
 
+/// Height of people whose whole bodies are tracked, m: that of the truth of whole bodies.
+const STANDING_M: f64 = 1.7;
+
 /// Confidence of the bounds on the normalised innovation squared.
 const CONFIDENCE: f64 = 0.95;
 
@@ -53,7 +56,14 @@ impl Watch {
 
     fn track(&mut self, item: &LogFrame, number: u32, track: &Track) {
         let camera = &item.frame.camera;
-        let visible = track.estimate.region.clipped(camera.width, camera.height);
+        // Truth of whole people is cut to their upper bodies, and so are tracks.
+        let tracked = track.estimate.region;
+        let upper = if tracked.is_whole_body() {
+            tracked.upper_body_of_standing(STANDING_M)
+        } else {
+            tracked
+        };
+        let visible = upper.clipped(camera.width, camera.height);
         let head = track.estimate.person.position.xy();
         let id = i64::from(track.id.0);
         self.reports.entry(number).or_default().push(tagalong_eval::Report {

@@ -3,6 +3,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{HEAD_BELOW_TOP_M, UPPER_BODY_SIDE_M};
 
+/// Height of a box, in its widths, from which it is that of a whole person.
+const WHOLE_ASPECT: f64 = 1.5;
+
 /// Distance from the centre of a head to its top, m.
 pub(crate) const HALF_HEAD_M: f64 = 0.115;
 
@@ -106,6 +109,11 @@ impl Rect {
         let above = (HEAD_BELOW_TOP_M - HALF_HEAD_M) * px_per_m;
         let height = height_m * px_per_m;
         Self::new(self.centre().x - 0.25 * height, self.y + above, 0.5 * height, height)
+    }
+
+    /// Returns true for the box of a whole person, by its shape: that of an upper body is a square.
+    pub fn is_whole_body(&self) -> bool {
+        self.height > WHOLE_ASPECT * self.width
     }
 
     /// Returns true if all four numbers are finite and the size is not negative.

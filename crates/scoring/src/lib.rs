@@ -1,5 +1,6 @@
 //! Reads files of truth and tracks into a sequence that can be scored.
 
+mod extents;
 mod shots;
 mod tracks;
 mod truth;
@@ -8,6 +9,7 @@ use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::Path;
 
+pub use extents::extents_note;
 pub use shots::{Shot, Shots};
 use tagalong_app::outcome::Failure;
 use tagalong_config::{FileLimit, read_text as read_bounded};

@@ -9,6 +9,11 @@ const SURE: f64 = 1e-3;
 /// Least distance of a face from the camera, m: nearer ones are numbers gone wrong.
 const NEAREST_M: f64 = 0.05;
 
+/// Distance of a box from the lower border of the image up to which its feet may be cut off, pixels.
+const CUT_OFF_PX: f64 = 3.0;
+/// Width of a person with the arms, m.
+const PERSON_WIDTH_M: f64 = 0.63;
+
 /// Part of the body that a box encloses, and box that is tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -32,6 +37,10 @@ pub struct BoxSettings {
     /// square is tracked; `full-box`, the whole person, and the box is tracked as it is; `upper`,
     /// head and shoulders, as a square.
     pub body: BoxedBody,
+    /// Find the upper body in the box of a whole person by the floor: the feet are where the box
+    /// ends, and a person whose feet the image border cuts off is as wide as the box. For cameras
+    /// whose height and direction are known, above all those that look down.
+    pub floor: bool,
     /// Assumed height of a person whose whole body is in a box, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub height_m: f64,
@@ -58,6 +67,7 @@ impl Default for BoxSettings {
     fn default() -> Self {
         Self {
             body: BoxedBody::Full,
+            floor: false,
             height_m: 1.7,
             sigma_px: 4.0,
             sigma_depth_m: 0.1,
@@ -78,7 +88,7 @@ impl BoxSettings {
         score: f64,
         source: &'static str,
     ) -> Option<Detection> {
-        let upper_body = self.upper_body(region);
+        let upper_body = self.upper_body(&frame.camera, region);
         let PointEstimate { position, covariance } = self.locate(frame, &upper_body)?;
         let image = match self.body {
             BoxedBody::FullBox => ImageBox::full_body(*region),
@@ -88,11 +98,27 @@ impl BoxSettings {
         is_shown(&frame.camera, &detection).then_some(detection)
     }
 
-    fn upper_body(&self, region: &Rect) -> Rect {
+    fn upper_body(&self, camera: &Camera, region: &Rect) -> Rect {
         match self.body {
             BoxedBody::Upper => *region,
+            BoxedBody::Full | BoxedBody::FullBox if self.floor => self.above_floor(camera, region),
             BoxedBody::Full | BoxedBody::FullBox => region.upper_body_of_standing(self.height_m),
         }
+    }
+
+    /// Returns the upper body in the box of a whole person whose feet are on the floor.
+    fn above_floor(&self, camera: &Camera, region: &Rect) -> Rect {
+        if let Some(head) = camera.head_above_floor(region) {
+            return camera.upper_body(&head);
+        }
+        let standing = region.upper_body_of_standing(self.height_m);
+        if region.bottom() < camera.height as f64 - CUT_OFF_PX {
+            return standing;
+        }
+        // The box has the height of a part of the person, so it is the width that tells the scale.
+        let by_width = region.width * self.height_m / PERSON_WIDTH_M;
+        let whole = Rect { height: region.height.max(by_width), ..*region };
+        whole.upper_body_of_standing(self.height_m)
     }
 
     /// Returns the head position for an upper-body square: from the depth image where that shows
@@ -217,6 +243,30 @@ mod tests {
         let child = BoxSettings { height_m: 1.1, ..BoxSettings::default() };
         let nearer = boxed(&child, &region, None).unwrap();
         assert!(nearer.position.x < 0.7 * full.position.x, "{}", nearer.position);
+    }
+
+    /// A camera that looks down shows people shorter, and people near it without feet.
+    #[test]
+    fn the_floor_tells_where_the_upper_body_is() {
+        let lens =
+            Pinhole { fx: 520.0, fy: 520.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 640, 480, 2.3, 0.5, 0.0);
+        let settings = BoxSettings { floor: true, ..BoxSettings::default() };
+        let head = Point3::new(3.5, 0.2, 1.6);
+        let square = camera.upper_body(&head);
+        let whole = camera.whole_body(&square, &head);
+        assert!(whole.bottom() < 470.0, "{whole:?}");
+        let by_floor = settings.upper_body(&camera, &whole);
+        let by_height = BoxSettings::default().upper_body(&camera, &whole);
+        assert!(by_floor.iou(&square) > 0.85, "{by_floor:?} {square:?}");
+        assert!(by_height.iou(&square) < by_floor.iou(&square), "{by_height:?}");
+        let near = Point3::new(1.6, 0.0, 1.6);
+        let (square, whole) =
+            (camera.upper_body(&near), camera.whole_body(&camera.upper_body(&near), &near));
+        let cut = whole.clipped(640, 480);
+        assert!(whole.bottom() > 480.0, "{whole:?}");
+        let by_width = settings.upper_body(&camera, &cut);
+        assert!((by_width.width / square.width - 1.0).abs() < 0.1, "{by_width:?} {square:?}");
     }
 
     #[test]

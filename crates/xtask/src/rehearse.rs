@@ -24,6 +24,8 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("import tum", "needs another data set"),
     ("run configs/onnx.toml", "needs a network of the user"),
     ("yolox_s.onnx", "needs a network of the user"),
+    ("yolox_nano", "needs a network of the user"),
+    ("yolox-nano", "needs a network of the user"),
     ("people.toml", "needs a network of the user"),
     ("every-third", "needs a network that a script of Python makes"),
     ("upper-bodies", "needs a network that a script of Python makes"),

@@ -12,6 +12,7 @@ use tagalong_eval::formats::mot::Rules;
 use tagalong_eval::{Scores, Sequence, Similarity};
 use tagalong_scoring::{
     Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
+    extents_note,
 };
 
 /// Arguments of `tagalong eval`.
@@ -113,6 +114,9 @@ fn scored(args: &EvalArgs) -> Result<Scored, Failure> {
     };
     let scores = Scores::measure(&sequence, comparison(&truth, similarity))
         .map_err(|error| Failure::failed(format!("{}: {error}", args.tracks.display())))?;
+    if similarity == Similarity::Iou {
+        notes.extend(extents_note(&sequence, scores.recall));
+    }
     if scores.has_constant_scores() {
         notes.push(format!("{}: {CONSTANT_SCORES}", args.tracks.display()));
     }

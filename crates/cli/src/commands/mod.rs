@@ -5,8 +5,10 @@ mod config;
 mod eval;
 mod export;
 mod inspect;
+mod install;
 mod list;
 mod model;
+mod networks;
 mod shell;
 
 pub use check::check;

@@ -5,7 +5,7 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::{Value, json};
 use tagalong_app::format::Format;
-use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, write_file};
 use tagalong_app::serialize::to_json;
 use tagalong_config::Registry;
 use tagalong_core::RgbImage;
@@ -16,6 +16,15 @@ use tagalong_network::{
 };
 
 use super::export::Export;
+use super::install::Install;
+use super::networks;
+
+/// The config for a network of the user, without a network.
+const COLOUR_NET: &str = include_str!("../../configs/colour-net.toml");
+/// First line of its detectors, before which it says what it is for.
+const DETECTORS: &str = "[[detectors]]\n";
+/// Line of it in place of a network.
+const NO_MODEL: &str = "model = \"\"\n";
 
 /// Calls of which the fastest is told.
 const CALLS: usize = 3;
@@ -24,7 +33,22 @@ const CALLS: usize = 3;
 #[derive(Debug, Args)]
 pub struct ModelArgs {
     /// The ONNX file.
-    file: PathBuf,
+    #[arg(required_unless_present = "list")]
+    file: Option<PathBuf>,
+    /// List networks that are known to work, with their licences and figures, and those that are
+    /// installed.
+    #[arg(long, conflicts_with_all = ["file", "install", "export", "output", "size"])]
+    list: bool,
+    /// Install the file for this user: `run LOG` takes it for a log with colour alone, and a config
+    /// names it (`model = "yolox-nano"`).
+    #[arg(long, conflicts_with_all = ["export", "output", "format"])]
+    install: bool,
+    /// Name of the installed network [default: that of a known network, or of the file].
+    #[arg(long, value_name = "NAME", requires = "install")]
+    name: Option<String>,
+    /// Write the config that runs the network into this file, and name the network relative to it.
+    #[arg(short, long, value_name = "CONFIG", conflicts_with_all = ["export", "format"])]
+    output: Option<PathBuf>,
     /// Write the network of this plugin into the file, and its card beside it, instead of reading
     /// the file.
     #[arg(long, value_name = "PLUGIN", conflicts_with_all = ["size", "format"])]
@@ -45,47 +69,80 @@ pub struct ModelArgs {
 }
 
 /// Network that a config can name.
-enum Known<'a> {
+pub(super) enum Known<'a> {
     Detector(KnownDetector<'a>),
     Embedding(Box<KnownEmbedding>),
 }
 
 /// Network for re-identification.
-struct KnownEmbedding {
+pub(super) struct KnownEmbedding {
     network: EmbeddingNetwork,
-    numbers: usize,
-    call_ms: f64,
+    pub(super) numbers: usize,
+    pub(super) call_ms: f64,
 }
 
 /// Detector of a known family.
-struct KnownDetector<'a> {
+pub(super) struct KnownDetector<'a> {
     about: &'a About,
-    family: Family,
-    input: InputSize,
-    call_ms: f64,
+    pub(super) family: Family,
+    pub(super) input: InputSize,
+    pub(super) call_ms: f64,
 }
 
-/// Runs `tagalong model FILE`.
+/// Runs `tagalong model`.
 ///
 /// # Errors
 /// A file that is refused (its cause and remedy), or whose outputs no decoder reads; an export of
-/// a plugin without a network, or to a file that cannot be written.
+/// a plugin without a network; files that cannot be written.
 pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
+    let Some(file) = &args.file else {
+        print(&match args.format {
+            Format::Text => networks::as_text(),
+            Format::Json => to_json("the networks", &networks::as_json())?,
+        })?;
+        return Ok(Ended::Well);
+    };
     if let Some(plugin) = &args.export {
         let (weights, sample) = (args.weights.as_deref(), args.sample.as_deref());
-        return Export { plugin, file: &args.file, weights, sample }.run(registry);
+        return Export { plugin, file, weights, sample }.run(registry);
     }
     let size = args.size.as_deref().and_then(|size| <[usize; 2]>::try_from(size).ok());
-    let shown = args.file.display();
+    let shown = file.display();
     let refused = |why: String| Failure::failed(format!("{shown}: {why}"));
     let limits = Limits::default();
-    let about = inspect(&args.file, size, &limits).map_err(refused)?;
-    let known = known(&args.file, &about, size, &limits);
+    let about = inspect(file, size, &limits).map_err(refused)?;
+    let known = known(file, &about, size, &limits);
+    if args.install {
+        let known = known.map_err(refused)?;
+        return Install { file, name: args.name.as_deref(), about: &about, known: &known }.run();
+    }
+    if let Some(config) = &args.output {
+        let known = known.map_err(refused)?;
+        make_room_for(config)?;
+        let name = relative_to(config, file)?;
+        write_file(config, as_text(&name, &about, Some(&known)))?;
+        print(&format!("written: {}\n", config.display()))?;
+        return Ok(Ended::Well);
+    }
     print(&match args.format {
-        Format::Text => as_text(&args.file, &about, known.as_ref().ok()),
+        // The text may become a config anywhere, so it names the file from the root on.
+        Format::Text => as_text(&absolute(file)?, &about, known.as_ref().ok()),
         Format::Json => to_json("the network", &as_json(&about, known.as_ref().ok()))?,
     })?;
     known.map(|_| Ended::Well).map_err(refused)
+}
+
+/// Returns a path from the root on.
+fn absolute(file: &Path) -> Result<PathBuf, Failure> {
+    std::path::absolute(file).map_err(|why| Failure::failed(format!("{}: {why}", file.display())))
+}
+
+/// Returns the path of a file by which a config names it: relative to the folder of the config
+/// where the file is in it, and otherwise from the root on.
+fn relative_to(config: &Path, file: &Path) -> Result<PathBuf, Failure> {
+    let (config, file) = (absolute(config)?, absolute(file)?);
+    let folder = config.parent().unwrap_or(&config);
+    Ok(file.strip_prefix(folder).map(Path::to_owned).unwrap_or(file))
 }
 
 fn known<'a>(
@@ -132,7 +189,7 @@ fn list(ports: &[Port]) -> String {
 }
 
 /// Returns a part of a config, with the description as comments.
-fn as_text(file: &Path, about: &About, known: Option<&Known<'_>>) -> String {
+pub(super) fn as_text(file: &Path, about: &About, known: Option<&Known<'_>>) -> String {
     let mut out = String::new();
     // Writing to a string cannot fail.
     let _ = writeln!(out, "# inputs   {}", list(&about.inputs));
@@ -175,7 +232,7 @@ impl KnownEmbedding {
         let _ = writeln!(out, "# kind     re-identification: a person is {numbers} numbers");
         describe_input(self.network.input(), &convention.preparation(), out);
         let _ = writeln!(out, "# time     {:.1} ms a person, on one thread", self.call_ms);
-        let _ = write!(out, "\n[appearance]\nmodel = {name}    # relative to this config\n");
+        let _ = write!(out, "\n[appearance]\nmodel = {name}\n");
         let _ = writeln!(out, "convention = \"{}\"", convention.name());
         let _ = write!(out, "\n[reidentification]\nremember_s = 60.0\nassociation_weight = 4.0\n");
     }
@@ -194,15 +251,14 @@ impl KnownDetector<'_> {
 
     fn write_config(&self, file: &Path, out: &mut String) {
         // A string of JSON is one of TOML.
-        let name = json!(file.to_string_lossy());
-        let _ = write!(out, "\n[[detectors]]\nplugin = \"onnx\"\n[detectors.config]\n");
-        let _ = writeln!(out, "model = {name}    # relative to this config");
-        let _ = writeln!(out, "family = \"{}\"", self.family);
+        let mut lines = format!("model = {}\n", json!(file.to_string_lossy()));
+        let _ = writeln!(lines, "family = \"{}\"", self.family);
         let is_open = |port: &Port| port.shape.len() == 4 && port.shape[1..].contains(&None);
         if self.about.inputs.iter().any(is_open) {
-            let _ = writeln!(out, "size = [{}, {}]", self.input.width, self.input.height);
+            let _ = writeln!(lines, "size = [{}, {}]", self.input.width, self.input.height);
         }
-        let _ = writeln!(out, "\n[filter]\nplugin = \"image-kalman\"");
+        let config = COLOUR_NET.find(DETECTORS).map_or("", |at| &COLOUR_NET[at..]);
+        let _ = write!(out, "\n{}", config.replacen(NO_MODEL, &lines, 1));
     }
 }
 

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use tagalong_app::choice::{Choice, Fitting, fitting};
+use tagalong_app::choice::{Choice, Fitting, WITHOUT_NETWORK, fitting};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Failure, say};
@@ -21,9 +21,15 @@ pub(super) fn choose(
         return Err(found.none_fits(log));
     };
     let Choice { config: name, reason } = choice;
-    say(&format!("the log has {contents}: taking {name}, because {reason}"));
+    say(&format!("the log has {contents}: taking {}, because {reason}", config.stem()));
     if let Some(better) = better {
         say(&better);
+    }
+    if name == WITHOUT_NETWORK {
+        say(
+            "a neural network finds more people in colour: `tagalong model --list` names some, and \
+             `tagalong model --install FILE.onnx` makes this command take one",
+        );
     }
     Ok(config)
 }

@@ -161,7 +161,9 @@ fn whole_bodies_can_be_compared_by_their_upper_bodies() {
     fs::write(path("upper.txt"), "1,1,101.5,47.5,57,57,1,-1,-1,-1\n").unwrap();
     let (truth, tracks) = (path("whole.txt"), path("upper.txt"));
     let files = ["--truth", shown(&truth), "--tracks", shown(&tracks), "--format", "json"];
-    assert_eq!(json(&eval(&files))["TP"].as_u64(), Some(0));
+    let nothing = json(&eval(&files));
+    assert_eq!(nothing["TP"].as_u64(), Some(0));
+    assert!(nothing["notes"].to_string().contains("whole bodies? --upper-body"), "{nothing}");
     let upper = json(&eval(&[&files[..], &["--upper-body"]].concat()));
     assert!((upper["MOTP"].as_f64().unwrap() - 1.0).abs() < 1e-9, "{upper}");
 }

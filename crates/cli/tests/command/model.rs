@@ -21,7 +21,7 @@ fn a_network_is_described_by_the_config_that_runs_it() {
         "# outputs  `output` [1, 85, 34]\n",
         "# family   nanodet (NanoDet-Plus)\n",
         "BGR",
-        "model = \"net.onnx\"",
+        &format!("model = \"{}\"\n", home.path().join("net.onnx").display()),
         "ms a call",
     ] {
         assert!(config.contains(part), "{part}: {config}");
@@ -30,6 +30,98 @@ fn a_network_is_described_by_the_config_that_runs_it() {
     let check =
         tagalong().args(["check", "people.toml"]).current_dir(home.path()).output().unwrap();
     assert_eq!(code(&check), 0, "{}", text(&check.stderr));
+}
+
+/// The config is in another folder than the one in which the command runs.
+#[test]
+fn a_config_that_is_written_runs_from_where_it_is() {
+    let home = tempfile::tempdir().unwrap();
+    let place = |name: &str| home.path().join(name);
+    fs::create_dir_all(place("robot/models")).unwrap();
+    fs::copy(network("nanodet.onnx"), place("robot/models/net.onnx")).unwrap();
+    let written = ["model", "robot/models/net.onnx", "-o", "robot/people.toml"];
+    let told = tagalong().args(written).current_dir(home.path()).output().unwrap();
+    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
+    let config = fs::read_to_string(place("robot/people.toml")).unwrap();
+    assert!(config.contains("model = \"models/net.onnx\"\n"), "{config}");
+    let check = || {
+        let mut command = tagalong();
+        command.args(["check", "robot/people.toml"]).current_dir(home.path()).output().unwrap()
+    };
+    let checked = check();
+    assert_eq!(code(&checked), 0, "{}", text(&checked.stderr));
+    fs::remove_file(place("robot/models/net.onnx")).unwrap();
+    let why = text(&check().stderr);
+    assert!(why.contains("robot/models/net.onnx`: cannot be read"), "{why}");
+}
+
+#[test]
+fn known_networks_are_listed_with_their_licences() {
+    let home = tempfile::tempdir().unwrap();
+    let told = tagalong().args(["model", "--list"]).env("TAGALONG_HOME", home.path()).output();
+    let told = text(&told.unwrap().stdout);
+    for part in ["yolox-nano", "yolox_nano.onnx, 3.7 MB, Apache-2.0", "https://", "HOTA", "None is"] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+}
+
+#[test]
+fn an_installed_network_has_a_name() {
+    let home = tempfile::tempdir().unwrap();
+    let place = |name: &str| home.path().join(name);
+    let run = |arguments: &[&str]| {
+        let mut command = tagalong();
+        command.args(arguments).env("TAGALONG_HOME", place("data")).current_dir(home.path());
+        command.output().unwrap()
+    };
+    let file = network("yolox.onnx").display().to_string();
+    let told = run(&["model", "--install", &file, "--name", "blob-finder"]);
+    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
+    assert!(text(&told.stdout).contains("model = \"blob-finder\""), "{}", text(&told.stdout));
+    let card = fs::read_to_string(place("data/networks/blob-finder.card.toml")).unwrap();
+    let card: toml::Table = card.parse().unwrap();
+    assert_eq!((card["family"].as_str(), card["file"].as_str()), (Some("yolox"), Some("yolox.onnx")));
+    // A config names it, and it is a config by itself.
+    let own = "[[detectors]]\nplugin = \"onnx\"\nconfig = { model = \"blob-finder\" }\n\
+               [filter]\nplugin = \"image-kalman\"\n";
+    fs::write(place("own.toml"), own).unwrap();
+    for config in ["own.toml", "blob-finder", "network"] {
+        let checked = run(&["check", config]);
+        assert_eq!(code(&checked), 0, "{config}: {}", text(&checked.stderr));
+    }
+    let other = network("yolov8.onnx").display().to_string();
+    let taken = run(&["model", "--install", &other, "--name", "blob-finder"]);
+    let why = text(&taken.stderr);
+    assert!(why.contains("another network is installed as `blob-finder`"), "{why}");
+    let odd = run(&["model", "--install", &other, "--name", "a/b"]);
+    assert_eq!(code(&odd), 2, "{}", text(&odd.stderr));
+    let unknown = network("depth.onnx").display().to_string();
+    assert_eq!(code(&run(&["model", "--install", &unknown])), 1);
+    let list = text(&run(&["model", "--list"]).stdout);
+    assert!(list.contains("blob-finder (taken for a log with colour alone)"), "{list}");
+}
+
+/// A published network on a street: once installed, it is taken without a config or a threshold.
+#[test]
+fn an_installed_network_tracks_a_recorded_log() {
+    let Some(file) = tagalong_testdata::find("networks/yolox_nano.onnx") else { return };
+    let Some(log) = tagalong_testdata::find("logs/TUD-Stadtmitte.mcap") else { return };
+    let home = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = tagalong();
+        command.args(arguments).env("TAGALONG_HOME", home.path()).current_dir(home.path());
+        command.output().unwrap()
+    };
+    let told = run(&["model", "--install", file.to_str().unwrap()]);
+    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
+    assert!(text(&told.stdout).contains("licence Apache-2.0"), "{}", text(&told.stdout));
+    let ran = run(&["run", log.to_str().unwrap(), "-o", "out"]);
+    assert_eq!(code(&ran), 0, "{}", text(&ran.stderr));
+    assert!(text(&ran.stderr).contains("taking yolox-nano"), "{}", text(&ran.stderr));
+    let report = fs::read_to_string(home.path().join("out/report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let with_person = report["frames"]["with_person"].as_u64().unwrap();
+    assert!(with_person >= 170, "people are in all of 179 frames: {with_person}");
 }
 
 #[test]
@@ -44,7 +136,7 @@ fn a_network_for_reidentification_is_described_by_its_section() {
         "128 x 256 pixels, stretched",
         "BGR",
         "ms a person",
-        "[appearance]\nmodel = \"reid.onnx\"",
+        &format!("[appearance]\nmodel = \"{}\"", home.path().join("reid.onnx").display()),
     ] {
         assert!(section.contains(part), "{part}: {section}");
     }

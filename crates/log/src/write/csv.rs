@@ -1,6 +1,6 @@
 use std::io::{self, Write};
 
-use super::record::{FrameRecord, probability};
+use super::record::{FrameRecord, OutputSettings, probability};
 
 /// Header line of `tracks-metres.csv`.
 pub const METRES_HEADER: &str = "stamp_ns,frame,id,x_robot_m,y_robot_m,z_robot_m,x_odom_m,\
@@ -10,17 +10,20 @@ var_zz_m2,seen";
 /// Writes the lines of `tracks.csv` for one frame: the ten columns of the MOTChallenge,
 /// `frame,id,x,y,w,h,score,-1,-1,-1`.
 ///
-/// `frame` is the 1-based index of the frame; the box is the upper-body square clipped to the
-/// image, in pixels with (0, 0) at the upper left corner; `score` is a probability. Only confirmed
+/// `frame` is the 1-based index of the frame; the box is the upper-body square, or that of the whole
+/// person where the settings say so, clipped to the image, in pixels with (0, 0) at the upper left corner; `score` is a probability. Only confirmed
 /// tracks are written, unless unseen for longer than `report_unseen_s`.
 pub(super) fn boxes(
     out: &mut impl Write,
     record: &FrameRecord<'_>,
-    report_unseen_s: f64,
+    settings: &OutputSettings,
 ) -> io::Result<()> {
+    let report_unseen_s = settings.report_unseen_s;
     for track in record.confirmed() {
         let shown = track.seen || (track.unseen_s <= report_unseen_s && report_unseen_s > 0.0);
-        let Some(region) = record.visible_region(track).filter(|_| shown) else { continue };
+        let Some(region) = record.visible_region(track, settings.boxes).filter(|_| shown) else {
+            continue;
+        };
         writeln!(
             out,
             "{},{},{},{},{},{},{},-1,-1,-1",
@@ -70,6 +73,7 @@ impl std::fmt::Display for Decimal {
 mod tests {
     use nalgebra::{Isometry2, Vector2};
 
+    use super::super::record::BoxedPart;
     use super::super::testing::{camera, track};
     use super::*;
 
@@ -84,7 +88,8 @@ mod tests {
             command: None,
         };
         let (mut a, mut b) = (Vec::new(), Vec::new());
-        boxes(&mut a, &record, unseen_s).unwrap();
+        let settings = OutputSettings { report_unseen_s: unseen_s, ..OutputSettings::default() };
+        boxes(&mut a, &record, &settings).unwrap();
         metres(&mut b, &record).unwrap();
         (String::from_utf8(a).unwrap(), String::from_utf8(b).unwrap())
     }
@@ -96,6 +101,29 @@ mod tests {
         one.score = 0.0;
         let (text, _) = lines(&[one], 0.0);
         assert_eq!(text, "7,12,0.00,400.00,90.00,80.00,0.500000,-1,-1,-1\n");
+    }
+
+    #[test]
+    fn boxes_are_those_of_whole_people_where_the_settings_say_so() {
+        let one = track(4);
+        let record = FrameRecord {
+            index: 1,
+            stamp: tagalong_core::Stamp::from_nanos(1),
+            camera: &camera(),
+            odom_from_robot: &Isometry2::identity(),
+            tracks: std::slice::from_ref(&one),
+            target: None,
+            command: None,
+        };
+        let upper = record.visible_region(&one, BoxedPart::Upper).unwrap();
+        let full = record.visible_region(&one, BoxedPart::Full).unwrap();
+        assert!(full.height > 1.5 * upper.height, "{upper:?} {full:?}");
+        assert!(full.bottom() <= camera().height as f64, "it ends with the image");
+        let settings = OutputSettings { boxes: BoxedPart::Full, ..OutputSettings::default() };
+        let mut text = Vec::new();
+        boxes(&mut text, &record, &settings).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert!(text.contains(&format!(",{:.2},{:.2},", full.width, full.height)), "{text}");
     }
 
     #[test]

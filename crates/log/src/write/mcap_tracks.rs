@@ -8,7 +8,7 @@ use tagalong_core::{Stamp, TrackId};
 
 use super::body::Body;
 use super::messages;
-use super::record::FrameRecord;
+use super::record::{BoxedPart, FrameRecord};
 use super::scene;
 use crate::msgs::{
     CameraInfo, CompressedImage, Detection3DArray, Header, ImageAnnotations, MarkerArray, Message,
@@ -34,6 +34,8 @@ pub struct FrameNames {
 pub(super) struct McapTracks<W: Write + Seek> {
     writer: Writer<W>,
     frames: FrameNames,
+    /// Part of people that boxes in the image enclose.
+    boxes: BoxedPart,
     tracks: Channel,
     json: Channel,
     tf: Channel,
@@ -88,6 +90,7 @@ impl<W: Write + Seek> McapTracks<W> {
         Ok(Self {
             writer,
             frames,
+            boxes: BoxedPart::default(),
             tracks,
             json,
             tf,
@@ -100,6 +103,11 @@ impl<W: Write + Seek> McapTracks<W> {
             people: BTreeMap::new(),
             texts: BTreeMap::new(),
         })
+    }
+
+    /// Returns the writer with boxes of this part of people.
+    pub fn with_boxes(self, boxes: BoxedPart) -> Self {
+        Self { boxes, ..self }
     }
 
     /// Writes one frame.
@@ -122,7 +130,7 @@ impl<W: Write + Seek> McapTracks<W> {
         self.markers.send(&mut self.writer, at, &markers)?;
         let update = encode(&scene::scene(record, &self.frames.odom));
         self.scene.send(&mut self.writer, at, &update)?;
-        let annotations = encode(&scene::annotations(record));
+        let annotations = encode(&scene::annotations(record, self.boxes));
         self.annotations.send(&mut self.writer, at, &annotations)?;
         let Some(info) = scene::camera_info(record, &self.frames.camera) else { return Ok(()) };
         let channel = match &mut self.camera_info {

@@ -31,7 +31,7 @@ pub use mcap_tracks::FrameNames;
 use mcap_tracks::McapTracks;
 pub use message_log::MessageLog;
 pub use messages::{detections, pose};
-pub use record::{FrameRecord, OutputSettings};
+pub use record::{BoxedPart, FrameRecord, OutputSettings};
 pub use run_dir::RunDir;
 use serde::Serialize;
 use tagalong_core::Stamp;
@@ -72,7 +72,8 @@ impl TrackLog {
         config: &str,
     ) -> Result<Self, WriteError> {
         let mcap = McapTracks::new(dir.open("tracks.mcap")?, frames, config)
-            .map_err(WriteError::mcap(&dir.path().join("tracks.mcap")))?;
+            .map_err(WriteError::mcap(&dir.path().join("tracks.mcap")))?
+            .with_boxes(output.boxes);
         let boxes = dir.open("tracks.csv")?;
         let mut metres = dir.open("tracks-metres.csv")?;
         writeln!(metres, "{METRES_HEADER}").map_err(WriteError::io(dir.path()))?;
@@ -90,7 +91,7 @@ impl TrackLog {
     /// [`WriteError`]; the log must not be used after one.
     pub fn write(&mut self, record: &FrameRecord<'_>) -> Result<(), WriteError> {
         self.mcap.write(record).map_err(WriteError::mcap(&self.file("tracks.mcap")))?;
-        csv::boxes(&mut self.boxes, record, self.output.report_unseen_s)
+        csv::boxes(&mut self.boxes, record, &self.output)
             .map_err(WriteError::io(&self.file("tracks.csv")))?;
         csv::metres(&mut self.metres, record)
             .map_err(WriteError::io(&self.file("tracks-metres.csv")))?;

@@ -11,11 +11,28 @@ pub struct OutputSettings {
     /// written only in frames in which the person was seen.
     #[schemars(range(min = 0.0))]
     pub report_unseen_s: f64,
+    /// Part of a person that boxes in `tracks.csv` and in the images of `tracks.mcap` enclose:
+    /// `upper`, head and shoulders, as they are tracked; `full`, the whole person, whose feet are on
+    /// the floor below the head.
+    pub boxes: BoxedPart,
+}
+
+/// Part of a person that reported boxes enclose.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum BoxedPart {
+    /// Head and shoulders, or the box that is tracked where that is a whole person.
+    #[default]
+    Upper,
+    /// The whole person.
+    Full,
 }
 
 impl Default for OutputSettings {
     fn default() -> Self {
-        Self { report_unseen_s: 0.0 }
+        Self { report_unseen_s: 0.0, boxes: BoxedPart::Upper }
     }
 }
 
@@ -59,9 +76,15 @@ impl FrameRecord<'_> {
         self.odom_from_robot() * track.estimate.person.position
     }
 
-    /// Returns the upper-body box of a track inside the image; `None` if it lies outside.
-    pub(super) fn visible_region(&self, track: &Track) -> Option<Rect> {
-        let clipped = track.estimate.region.clipped(self.camera.width, self.camera.height);
+    /// Returns the box of a part of a track's person inside the image; `None` if it lies outside.
+    pub(super) fn visible_region(&self, track: &Track, part: BoxedPart) -> Option<Rect> {
+        let region = match part {
+            BoxedPart::Upper => track.estimate.region,
+            BoxedPart::Full => {
+                self.camera.whole_body(&track.estimate.region, &track.estimate.person.position)
+            }
+        };
+        let clipped = region.clipped(self.camera.width, self.camera.height);
         (clipped.area() > 0.0).then_some(clipped)
     }
 }

@@ -6,7 +6,7 @@ use tagalong_core::Track;
 use tagalong_geometry::Lens;
 
 use super::messages::{CROWN_ABOVE_HEAD_M, MIN_HEADING_SPEED_MPS, odom_from_person};
-use super::record::FrameRecord;
+use super::record::{BoxedPart, FrameRecord};
 use crate::msgs::{
     ArrowPrimitive, CameraInfo, Color, ColorRgba, CylinderPrimitive, Header, ImageAnnotations,
     Marker, MarkerArray, Pixel, Point, PointsAnnotation, Pose, SceneEntity, SceneEntityDeletion,
@@ -185,11 +185,11 @@ fn arrow(tail: &Isometry3<f64>, length: f64, figure: &Figure) -> ArrowPrimitive 
 }
 
 /// Returns the boxes of the confirmed people as annotations of the image.
-pub(super) fn annotations(record: &FrameRecord<'_>) -> ImageAnnotations {
+pub(super) fn annotations(record: &FrameRecord<'_>, part: BoxedPart) -> ImageAnnotations {
     let timestamp = record.stamp.into();
     let mut out = ImageAnnotations::default();
     for track in record.confirmed() {
-        let Some(region) = record.visible_region(track) else { continue };
+        let Some(region) = record.visible_region(track, part) else { continue };
         let colour = Color { a: 1.0, ..colour_of(track) };
         let (left, top) = (region.x, region.y);
         let (right, bottom) = (region.right(), region.bottom());

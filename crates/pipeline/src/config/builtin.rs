@@ -103,6 +103,6 @@ mod tests {
             }
         }
         left_out.sort();
-        assert_eq!(left_out, ["onnx"]);
+        assert_eq!(left_out, ["colour-net", "onnx"]);
     }
 }

@@ -3,6 +3,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use tagalong_config::{ConfigError, FileLimit, Settings, nearest, parse_settings, read_text};
+use tagalong_network::model_file;
 
 use super::builtin::{builtin_names, builtin_text};
 use super::document::{Document, flattened};
@@ -185,7 +186,7 @@ impl ConfigSource {
         };
         let mut names = Vec::new();
         collect_strings(&toml::Value::Table(table), &mut names);
-        let named = names.into_iter().map(|name| (name.clone(), self.folder().join(name)));
+        let named = names.into_iter().map(|name| (name.clone(), model_file(self.folder(), &name)));
         // Plugins alone know which texts are paths; a text that names a file counts as one.
         named.filter(|(_, path)| path.is_file()).collect()
     }

@@ -35,7 +35,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("tuning", &["pipeline", "eval"]),
     ("conformance", &[]),
     ("catalog", &["plugins"]),
-    ("app", &["tagalong", "pipeline", "log"]),
+    ("app", &["tagalong", "pipeline", "log", "network"]),
     ("render", &["pipeline", "vision"]),
     ("scoring", &["app", "log", "eval"]),
     ("page", &["app", "report", "pipeline"]),

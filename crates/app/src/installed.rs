@@ -1,0 +1,114 @@
+//! Networks that the user has installed, with their configs.
+//!
+//! The folder of networks holds for each the file `NAME.onnx`, its config `NAME.toml` and its card
+//! `NAME.card.toml`. The file `default` names the one that is taken for a log with colour alone.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tagalong_network::networks_folder;
+
+/// Name of the config of the default network.
+pub const NETWORK: &str = "network";
+/// File with the name of the default network.
+const DEFAULT: &str = "default";
+
+/// Files of a network in a folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NetworkFiles {
+    /// The network.
+    pub onnx: PathBuf,
+    /// Config that runs it.
+    pub config: PathBuf,
+    /// Card with its hash and licence.
+    pub card: PathBuf,
+    /// File with the name of the default network.
+    pub default: PathBuf,
+}
+
+impl NetworkFiles {
+    /// Returns the files of a network of this name.
+    pub fn of(folder: &Path, name: &str) -> Self {
+        let file = |ending: &str| folder.join(format!("{name}.{ending}"));
+        Self {
+            onnx: file("onnx"),
+            config: file("toml"),
+            card: file("card.toml"),
+            default: folder.join(DEFAULT),
+        }
+    }
+}
+
+/// Returns the config of an installed network by its name, or that of the default one for
+/// [`NETWORK`]; `None` if there is none.
+pub fn config_file(name: &str) -> Option<PathBuf> {
+    config_in(&networks_folder()?, name)
+}
+
+fn config_in(folder: &Path, name: &str) -> Option<PathBuf> {
+    let installed = installed_in(folder);
+    let taken = match name {
+        NETWORK => default_in(folder, &installed)?,
+        name => installed.into_iter().find(|known| known == name)?,
+    };
+    Some(NetworkFiles::of(folder, &taken).config)
+}
+
+/// Returns the names of the installed networks that have a config, in the order of the alphabet.
+pub fn installed_networks() -> Vec<String> {
+    networks_folder().map(|folder| installed_in(&folder)).unwrap_or_default()
+}
+
+/// Returns the name of the network that is taken for a log with colour alone.
+pub fn default_network() -> Option<String> {
+    let folder = networks_folder()?;
+    default_in(&folder, &installed_in(&folder))
+}
+
+fn installed_in(folder: &Path) -> Vec<String> {
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let mut names = Vec::new();
+    for entry in entries.flatten() {
+        let path = entry.path();
+        let is_network = path.extension().is_some_and(|ending| ending == "onnx");
+        if is_network && path.with_extension("toml").is_file() {
+            names.extend(path.file_stem().and_then(|stem| stem.to_str()).map(str::to_owned));
+        }
+    }
+    names.sort();
+    names
+}
+
+/// Returns the network that the file `default` names, or else the first one.
+fn default_in(folder: &Path, installed: &[String]) -> Option<String> {
+    let named = fs::read_to_string(folder.join(DEFAULT)).unwrap_or_default();
+    let named = installed.iter().find(|name| *name == named.trim());
+    named.or(installed.first()).cloned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_network_is_found_by_its_name_and_the_default_one_without() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = home.path();
+        assert_eq!(config_in(&folder.join("none"), NETWORK), None);
+        for name in ["yolox", "movenet"] {
+            let files = NetworkFiles::of(folder, name);
+            fs::write(files.onnx, "").unwrap();
+            fs::write(files.config, "").unwrap();
+        }
+        fs::write(folder.join("alone.onnx"), "").unwrap();
+        let config = |name: &str| config_in(folder, name);
+        assert_eq!(config("yolox"), Some(folder.join("yolox.toml")));
+        assert_eq!(config("alone"), None, "an embedding has no config");
+        assert_eq!(config(NETWORK), Some(folder.join("movenet.toml")), "the first");
+        fs::write(folder.join(DEFAULT), "yolox\n").unwrap();
+        assert_eq!(config(NETWORK), Some(folder.join("yolox.toml")));
+        fs::write(folder.join(DEFAULT), "removed").unwrap();
+        assert_eq!(config(NETWORK), Some(folder.join("movenet.toml")));
+        assert_eq!(installed_in(folder), ["movenet", "yolox"]);
+    }
+}

@@ -1,0 +1,147 @@
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+use sha2::{Digest, Sha256};
+use tagalong_app::installed::NetworkFiles;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, write_file};
+use tagalong_network::{About, DATA_FOLDER, networks_folder};
+
+use super::model::{Known, as_text};
+use super::networks::{self, KnownNetwork};
+
+/// Network that a user installs.
+pub(super) struct Install<'a> {
+    /// The ONNX file.
+    pub(super) file: &'a Path,
+    /// Name, if the user gives one.
+    pub(super) name: Option<&'a str>,
+    pub(super) about: &'a About,
+    /// The family, or the length of a vector, after a first call.
+    pub(super) known: &'a Known<'a>,
+}
+
+impl Install<'_> {
+    /// Copies the file into the folder of the user, with its config and its card.
+    ///
+    /// # Errors
+    /// A name that is no plain word, or that another network has; files that cannot be read or
+    /// written.
+    pub(super) fn run(&self) -> Outcome {
+        let bytes = fs::read(self.file)
+            .map_err(|why| Failure::failed(format!("{}: {why}", self.file.display())))?;
+        let sha256 = hash_of(&bytes);
+        let published = networks::known_by_hash(&sha256);
+        let name = self.name_or(published)?;
+        let folder = folder()?;
+        let files = NetworkFiles::of(&folder, &name);
+        check_free(&files.onnx, &name, &sha256)?;
+        make_folder(&folder)?;
+        write_file(&files.onnx, &bytes)?;
+        write_file(&files.card, self.card(&name, &sha256, bytes.len(), published))?;
+        let mut out = format!("installed: {}\n", files.onnx.display());
+        match self.known {
+            Known::Detector(known) => {
+                let file = PathBuf::from(files.onnx.file_name().unwrap_or_default());
+                write_file(&files.config, as_text(&file, self.about, Some(self.known)))?;
+                write_file(&files.default, format!("{name}\n"))?;
+                let (family, ms) = (known.family.networks(), known.call_ms);
+                let _ = writeln!(out, "family {} ({family}), {ms:.0} ms a call", known.family);
+                let _ = writeln!(out, "`tagalong run LOG` takes it for a log with colour alone");
+                let _ = writeln!(out, "a config names it: model = \"{name}\"");
+            }
+            Known::Embedding(known) => {
+                let (numbers, ms) = (known.numbers, known.call_ms);
+                let _ = writeln!(out, "re-identification, {numbers} numbers, {ms:.0} ms a person");
+                let _ = writeln!(out, "a config names it: [appearance] model = \"{name}\"");
+            }
+        }
+        if let Some(network) = published {
+            let _ = writeln!(out, "licence {}: {}", network.licence, network.published);
+        }
+        print(&out)?;
+        Ok(Ended::Well)
+    }
+
+    fn name_or(&self, published: Option<&KnownNetwork>) -> Result<String, Failure> {
+        let name = match (self.name, published) {
+            (Some(name), _) => name.to_owned(),
+            (None, Some(network)) => network.name.clone(),
+            (None, None) => name_of(self.file),
+        };
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+        if name.is_empty() || !name.chars().all(is_plain) {
+            return Err(Failure::usage(format!(
+                "a network is called by lower-case letters, digits and `-`, not `{name}`: give \
+                 another --name"
+            )));
+        }
+        Ok(name)
+    }
+
+    fn card(
+        &self,
+        name: &str,
+        sha256: &str,
+        bytes: usize,
+        published: Option<&KnownNetwork>,
+    ) -> String {
+        let file = self.file.file_name().unwrap_or_default().to_string_lossy();
+        // A string of JSON is one of TOML; writing to a string cannot fail.
+        let mut card = format!("name = {}\nfile = {}\n", json!(name), json!(file));
+        let _ = write!(card, "bytes = {bytes}\nsha256 = \"{sha256}\"\n");
+        match self.known {
+            Known::Detector(known) => {
+                let _ = writeln!(card, "family = \"{}\"", known.family);
+                let _ = writeln!(card, "input = [{}, {}]", known.input.width, known.input.height);
+            }
+            Known::Embedding(known) => {
+                let _ = writeln!(card, "numbers = {}", known.numbers);
+            }
+        }
+        if let Some(network) = published {
+            let _ = writeln!(card, "licence = {}", json!(network.licence));
+            let _ = writeln!(card, "published = {}", json!(network.published));
+        }
+        card
+    }
+}
+
+/// Returns the folder of installed networks.
+fn folder() -> Result<PathBuf, Failure> {
+    networks_folder().ok_or_else(|| {
+        Failure::failed(format!("no folder for networks is known: set {DATA_FOLDER} to one"))
+    })
+}
+
+/// Refuses a name that another network has.
+fn check_free(file: &Path, name: &str, sha256: &str) -> Result<(), Failure> {
+    match fs::read(file) {
+        Ok(present) if hash_of(&present) != sha256 => Err(Failure::failed(format!(
+            "another network is installed as `{name}` ({}): give another --name, or delete it",
+            file.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+fn hash_of(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Returns the name of a file as that of a network: `yolox-s` of `YOLOX_s.onnx`.
+fn name_of(file: &Path) -> String {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_gives_a_plain_name() {
+        assert_eq!(name_of(Path::new("models/YOLOX_s.v2.onnx")), "yolox-s-v2");
+    }
+}
