@@ -6,7 +6,7 @@ use std::path::Path;
 use tagalong_config::Registry;
 use tagalong_core::Reason;
 use tagalong_sim::{FaultKind, InjectedFault, Scene, Variant};
-use tagalong_trials::{Contender, Ride};
+use tagalong_trials::{Contender, Ride, Tick};
 
 /// Start of the fault, s.
 const AT_S: f64 = 5.0;
@@ -104,6 +104,18 @@ fn t1_a_clock_that_is_set_back_stops_the_robot() {
     let just_after = ride.ticks.iter().filter(|tick| (AT_S + 0.6..AT_S + 0.8).contains(&tick.at_s));
     let fastest = just_after.map(|tick| tick.body_mps()).fold(0.0, f64::max);
     assert!(fastest < 0.3, "{fastest}");
+}
+
+/// The robot is switched off and, a second later, reset; the button is held all the time.
+#[test]
+fn an_enable_that_sticks_does_not_move_the_robot_after_a_reset() {
+    let ride = ride(FaultKind::EnableStuck);
+    let fastest = |from_s: f64, to_s: f64| {
+        let between = ride.ticks.iter().filter(|tick| (from_s..to_s).contains(&tick.at_s));
+        between.map(Tick::body_mps).fold(0.0, f64::max)
+    };
+    assert!(fastest(AT_S - 1.0, AT_S) > 0.3, "it drives before");
+    assert!(fastest(AT_S + 1.5, 11.0) < STANDS_MPS, "{}", fastest(AT_S + 1.5, 11.0));
 }
 
 #[test]

@@ -202,6 +202,28 @@ def test_frozen_depth_and_old_odometry_stop_the_robot():
     assert [reason(same, at) for at in range(9, 16)][-1] == "frozen"
 
 
+@pytest.mark.parametrize(("stamped", "frozen"), [(True, False), (False, True)])
+def test_a_scan_that_is_given_again_with_its_stamp_is_not_frozen(stamped, frozen):
+    """The scanner is six times slower than the camera."""
+    pipeline = tagalong.Pipeline.from_toml("follow-depth")
+    rng = np.random.default_rng(2)
+    angles = np.linspace(-3.1, 3.1, 360)
+    reasons, scan = [], None
+    for at in range(24):
+        depth = (DEPTH + rng.normal(0.0, 0.003, DEPTH.shape)).astype(np.float32)
+        if at % 6 == 0:
+            ranges = 3.0 + rng.normal(0.0, 0.01, angles.shape)
+            scan = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
+            scan = np.column_stack([scan, np.full(angles.shape, 0.3)])
+        taken = 1.0 + 0.05 * (at - at % 6)
+        more = {"scan_stamp": taken} if stamped else {}
+        report = pipeline.step(
+            None, depth, CAMERA, (0.0, 0.0, 0.0), 1.0 + 0.05 * at, scan=scan, **more
+        )
+        reasons.append(report.command.reason)
+    assert ("frozen" in reasons) == frozen, reasons
+
+
 def test_a_scan_alone_makes_a_frame():
     pipeline = tagalong.Pipeline.from_toml("laser-legs")
     angles = np.linspace(-1.0, 1.0, 181)

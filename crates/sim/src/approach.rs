@@ -277,17 +277,15 @@ impl Approacher {
         let [length, width, height] = self.settings.size_m;
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), self.heading_rad);
         let foot = Point3::new(self.place.x, self.place.y, floor_m);
-        let solid = |offset: Vector3<f64>, form: Form, colour: [f64; 3]| {
-            Shape::new(form, foot + turn * offset, turn, Material::plain(colour))
-        };
         let above_m = (height - WHEELS_M).max(0.02);
         let half = Vector3::new(length, width, above_m) * 0.5;
         let body = Vector3::new(0.0, 0.0, WHEELS_M + half.z);
-        let mut shapes = vec![solid(body, Form::Block(half), [0.24, 0.27, 0.33])];
+        let paint = Material::plain([0.24, 0.27, 0.33]);
+        let mut shapes = vec![Shape::new(Form::Block(half), foot + turn * body, turn, paint)];
         let wheel = Form::Ellipsoid(Vector3::repeat(0.5 * WHEELS_M));
         for (x, y) in [(0.4, 0.4), (0.4, -0.4), (-0.4, 0.4), (-0.4, -0.4)] {
             let at = Vector3::new(x * length, y * width, 0.5 * WHEELS_M);
-            shapes.push(solid(at, wheel, [0.05; 3]));
+            shapes.push(Shape::new(wheel, foot + turn * at, turn, Material::plain([0.05; 3])));
         }
         Object::new(shapes, None, true)
     }

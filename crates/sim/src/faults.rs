@@ -80,6 +80,8 @@ pub enum FaultKind {
     ClockBack,
     /// The clock of the robot goes forward by `size` seconds.
     ClockForward,
+    /// The robot is switched off and reset, and the button of the enable sticks meanwhile.
+    EnableStuck,
 }
 
 /// Part of the robot that a fault needs.
@@ -93,7 +95,7 @@ enum Part {
 
 impl FaultKind {
     /// All kinds.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::FreezeDepth,
         Self::FreezeAll,
         Self::FreezeLaser,
@@ -123,6 +125,7 @@ impl FaultKind {
         Self::WheelLatency,
         Self::ClockBack,
         Self::ClockForward,
+        Self::EnableStuck,
     ];
 
     /// Returns the name in scenes and on the command line.
@@ -157,6 +160,7 @@ impl FaultKind {
             Self::WheelLatency => "wheel-latency",
             Self::ClockBack => "clock-back",
             Self::ClockForward => "clock-forward",
+            Self::EnableStuck => "enable-stuck",
         }
     }
 
@@ -168,6 +172,12 @@ impl FaultKind {
             Part::Laser => scene.laser.is_some(),
             Part::Sensors => scene.has_obstacle_sensors(),
         }
+    }
+
+    /// Returns true for a fault that a seed may draw: a ride in which the robot is switched off tells
+    /// nothing of its other faults.
+    fn is_drawn(self) -> bool {
+        self != Self::EnableStuck
     }
 
     fn part(self) -> Part {
@@ -355,8 +365,9 @@ impl InjectedFault {
     /// Returns the fault with all that the seed draws.
     fn scheduled(&self, scene: &Scene, mut random: Random) -> ScheduledFault {
         // Drawn always, so that a given time leaves the drawn kind as it is.
-        let able: Vec<FaultKind> =
-            FaultKind::ALL.into_iter().filter(|kind| kind.applies_to(scene)).collect();
+        let able =
+            FaultKind::ALL.into_iter().filter(|kind| kind.is_drawn() && kind.applies_to(scene));
+        let able: Vec<FaultKind> = able.collect();
         let drawn_kind = random.pick(&able);
         let [first, last] = DRAWN_BETWEEN;
         let drawn_s = scene.duration_s * random.between(first, last);

@@ -94,9 +94,10 @@ impl LaserSettings {
     ) -> Vec<f32> {
         let eye = world_from_robot * Point3::new(0.0, 0.0, self.height_m);
         let seed = tagalong_stats::number_at(seed, self.rays as u64);
+        let slice = world.slice(eye, &(world_from_robot.rotation * Vector3::z()));
         let range = |(ray, direction): (u64, f64)| {
             let ahead = Vector3::new(direction.cos(), direction.sin(), 0.0);
-            let metres = world.distance(&eye, &(world_from_robot.rotation * ahead));
+            let metres = world.distance(&slice, &(world_from_robot.rotation * ahead));
             let measured = metres + self.sigma_m * normal_at(seed, ray);
             match () {
                 () if measured > self.max_range_m => f32::INFINITY,

@@ -67,6 +67,7 @@ mod shadow;
 mod shape;
 mod sight;
 mod simulation;
+mod slice;
 mod split;
 mod variation;
 mod webcam;

@@ -189,12 +189,13 @@ impl RangeSettings {
         let robot_from_sensor = self.robot_from_sensor();
         let world_from_sensor = world_from_robot * robot_from_sensor;
         let eye = world_from_sensor * Point3::origin();
+        let slice = world.slice(eye, &(world_from_sensor.rotation * Vector3::z()));
         let mut nearest_m = f64::INFINITY;
         for ray in rays(self.field_of_view_deg.to_radians()) {
             let ray = world_from_sensor.rotation * ray;
             let met_m = match self.kind {
                 RangeKind::Sonar => world.echo(&eye, &ray),
-                RangeKind::Infrared => world.distance(&eye, &ray),
+                RangeKind::Infrared => world.distance(&slice, &ray),
             };
             nearest_m = nearest_m.min(met_m);
         }

@@ -117,6 +117,19 @@ impl Shape {
         way.norm_squared() - along * along * per_length <= self.ball.1
     }
 
+    /// True if the ball around the solid is on one side of the plane through an eye with this unit
+    /// normal.
+    pub fn is_beside(&self, eye: &Point3<f64>, normal: &Vector3<f64>) -> bool {
+        let away = normal.dot(&(self.ball.0 - eye));
+        away * away > self.ball.1
+    }
+
+    /// True if the ball around the solid is behind the plane through an eye with this unit normal.
+    pub fn is_behind(&self, eye: &Point3<f64>, normal: &Vector3<f64>) -> bool {
+        let ahead = normal.dot(&(self.ball.0 - eye));
+        ahead < 0.0 && ahead * ahead > self.ball.1
+    }
+
     /// Returns the extent of the solid from its origin along a unit vector (its support function),
     /// m.
     pub fn extent(&self, along: &Vector3<f64>) -> f64 {

@@ -23,13 +23,16 @@ pub struct SightedSolid<'a> {
     pub nearest: f64,
     /// From the eye to its origin.
     way: Vector3<f64>,
+    eye: Point3<f64>,
 }
 
 impl SightedSolid<'_> {
     /// True if a part of it is on the side of a plane through the eye that the
     /// unit vector points to.
     fn reaches(&self, normal: &Vector3<f64>) -> bool {
-        normal.dot(&self.way) + self.shape.extent(normal) > -SLACK_M
+        // The ball around a solid is a cheap question to ask first.
+        !self.shape.is_behind(&self.eye, normal)
+            && normal.dot(&self.way) + self.shape.extent(normal) > -SLACK_M
     }
 }
 
@@ -43,7 +46,7 @@ pub fn before<'a>(
     let sight = |(number, (person, shape)): (u32, (Option<u16>, &'a Shape))| {
         let way = shape.origin - eye;
         let nearest = forward.dot(&way) - shape.extent(&-forward);
-        SightedSolid { number, person, shape, seen: shape.seen_from(eye), nearest, way }
+        SightedSolid { number, person, shape, seen: shape.seen_from(eye), nearest, way, eye: *eye }
     };
     let ahead = |sight: &SightedSolid| sight.reaches(forward);
     let mut sights: Vec<_> = (0..).zip(solids).map(sight).filter(ahead).collect();

@@ -10,6 +10,7 @@ use crate::lanes::{LANES, Lanes, Vectors, dot};
 use crate::material::{Colour, Material};
 use crate::shadow::{self, Shadows};
 use crate::shape::{Shape, Surface};
+use crate::slice::Slice;
 
 /// Solids that belong together.
 #[derive(Clone, Debug)]
@@ -122,18 +123,28 @@ impl World {
         self.stage.objects.iter().chain(&self.people).flat_map(Object::solids)
     }
 
-    /// Returns the range of a laser in a direction of length one, m; infinite where it meets
-    /// nothing. It goes through glass, and mirrors send it on.
-    pub(crate) fn distance(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
-        let solids = || self.solids().filter(|(_, solid)| solid.material.passes == 0.0);
-        let Some((t, _, solid)) = meet(solids(), eye, ray) else { return f64::INFINITY };
+    /// Returns the solids that may reflect the beam of a laser whose rays are in the plane through an
+    /// eye with this unit normal: it goes through glass.
+    pub(crate) fn slice(&self, eye: Point3<f64>, normal: &Vector3<f64>) -> Slice<'_> {
+        Slice::new(self.opaque().map(|(_, solid)| solid), eye, normal)
+    }
+
+    /// Returns the range of a laser in a direction of length one in the plane of a slice, m; infinite
+    /// where it meets nothing. Mirrors send it on.
+    pub(crate) fn distance(&self, slice: &Slice<'_>, ray: &Vector3<f64>) -> f64 {
+        let Some((t, solid)) = slice.first(ray) else { return f64::INFINITY };
         if solid.material.reflects == 0.0 {
             return t;
         }
-        let at = eye + ray * t;
+        let at = slice.eye + ray * t;
         let on = mirrored(ray, &solid.normal(&solid.own(&at)));
-        let others = solids().filter(|(_, other)| !ptr::eq(*other, solid));
+        let others = self.opaque().filter(|(_, other)| !ptr::eq(*other, solid));
         meet(others, &at, &on).map_or(f64::INFINITY, |(further, ..)| t + further)
+    }
+
+    /// All solids but those of glass.
+    fn opaque(&self) -> impl Iterator<Item = (Option<u16>, &Shape)> + Clone {
+        self.solids().filter(|(_, solid)| solid.material.passes == 0.0)
     }
 
     /// Returns the range of an echo of sound in a direction of length one, m; infinite without one.

@@ -291,7 +291,8 @@ fn seen_by(simulation: &Simulation) -> Camera {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_sim::{FaultKind, FaultSettings, InjectedFault, Variant};
+    use tagalong_core::LaserScan;
+    use tagalong_sim::{FaultKind, FaultSettings, InjectedFault, LaserSettings, Variant};
 
     use super::*;
 
@@ -401,6 +402,23 @@ mod tests {
         scene.faults.inject.push(InjectedFault::new(FaultKind::OdometrySilent).at(0.0));
         let first = Draw::live(&scene, 1).next_frame().unwrap();
         assert_eq!(first.frame.odometry_age_s, f64::INFINITY);
+    }
+
+    #[test]
+    fn a_scan_has_the_stamp_of_its_frame_also_one_that_repeats_itself() {
+        let mut scene = scene();
+        scene.laser = Some(LaserSettings::default());
+        let freeze = InjectedFault::new(FaultKind::FreezeLaser).at(1.0).lasting(2.0);
+        scene.faults = FaultSettings { dropped: 0.0, late: 0.0, inject: vec![freeze] };
+        let mut repeated = 0;
+        let mut before: Option<LaserScan> = None;
+        for one in simulated(Draw::live(&scene, 1)) {
+            let scan = one.frame.laser().unwrap().clone();
+            assert_eq!(scan.stamp, Some(one.frame.stamp), "{}", at_s(&one));
+            repeated += usize::from(before.is_some_and(|before| before.points == scan.points));
+            before = Some(scan);
+        }
+        assert!((35..=41).contains(&repeated), "two seconds of frames: {repeated}");
     }
 
     #[test]

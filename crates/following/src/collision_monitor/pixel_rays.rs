@@ -1,17 +1,27 @@
 //! Viewing rays of the pixels of a depth camera.
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
-use tagalong_geometry::{Camera, Lens};
+use tagalong_geometry::{Camera, Distortion, Lens};
 
 /// Viewing rays of the sampled pixels of a camera, in its own frame. They are the same in each image,
 /// and to remove the distortion of a lens takes longer than all that is done with a reading.
 #[derive(Default)]
 pub(super) struct PixelRays {
     known: Option<Sampling>,
-    /// Rays of depth 1, row by row.
-    rays: Vec<Vector3<f64>>,
-    /// Starts of the rays; empty for a camera with a single viewpoint.
-    starts: Vec<Vector3<f64>>,
+    table: Table,
+}
+
+/// Rays of depth 1.
+#[derive(Default)]
+enum Table {
+    /// Of no camera yet.
+    #[default]
+    Empty,
+    /// Of a lens without distortion: the x of each column and the y of each row. They stay in the cache
+    /// of the processor.
+    Straight { columns: Vec<f64>, rows: Vec<f64> },
+    /// Row by row, with the starts of the rays; these are empty for a camera with a single viewpoint.
+    Any { rays: Vec<Vector3<f64>>, starts: Vec<Vector3<f64>> },
 }
 
 /// Sampling of the image of a lens.
@@ -25,8 +35,9 @@ struct Sampling {
 
 /// Pixels of an image with the pose of its camera.
 pub(super) struct PosedRays<'a> {
-    rays: &'a [Vector3<f64>],
-    starts: &'a [Vector3<f64>],
+    table: &'a Table,
+    /// Sampled columns of the image.
+    across: usize,
     turn: Matrix3<f64>,
     eye: Vector3<f64>,
 }
@@ -41,58 +52,76 @@ impl PixelRays {
     ) -> PosedRays<'_> {
         let sampling = Sampling { lens: camera.lens, width, height, step };
         if self.known != Some(sampling) {
-            self.fill(&sampling);
+            self.table = table(&sampling);
             self.known = Some(sampling);
         }
         PosedRays {
-            rays: &self.rays,
-            starts: &self.starts,
+            table: &self.table,
+            across: width.div_ceil(step),
             turn: camera.robot_from_camera.rotation.to_rotation_matrix().into_inner(),
             eye: camera.robot_from_camera.translation.vector,
         }
     }
+}
 
-    fn fill(&mut self, sampling: &Sampling) {
-        let Sampling { lens, width, height, step } = *sampling;
-        let camera = Camera { lens, width, height, robot_from_camera: Isometry3::identity() };
-        let has_viewpoint = !matches!(lens, Lens::Panorama(_));
-        self.rays.clear();
-        self.starts.clear();
-        for y in (0..height).step_by(step) {
-            for x in (0..width).step_by(step) {
+/// Returns the rays of the sampled pixels.
+fn table(sampling: &Sampling) -> Table {
+    let Sampling { lens, width, height, step } = *sampling;
+    let camera = Camera { lens, width, height, robot_from_camera: Isometry3::identity() };
+    let ray = |x: usize, y: usize| camera.ray(Point2::new(x as f64, y as f64));
+    if matches!(&lens, Lens::Pinhole(lens) if lens.distortion == Distortion::None) {
+        return Table::Straight {
+            columns: (0..width).step_by(step).map(|x| ray(x, 0).x).collect(),
+            rows: (0..height).step_by(step).map(|y| ray(0, y).y).collect(),
+        };
+    }
+    let has_viewpoint = !matches!(lens, Lens::Panorama(_));
+    let mut rays = Vec::new();
+    let mut starts = Vec::new();
+    for y in (0..height).step_by(step) {
+        for x in (0..width).step_by(step) {
+            rays.push(ray(x, y));
+            if !has_viewpoint {
                 let pixel = Point2::new(x as f64, y as f64);
-                self.rays.push(camera.ray(pixel));
-                if !has_viewpoint {
-                    self.starts.push(camera.back_project(pixel, 0.0).coords);
-                }
+                starts.push(camera.back_project(pixel, 0.0).coords);
             }
         }
     }
+    Table::Any { rays, starts }
 }
 
 impl PosedRays<'_> {
-    /// Returns the point at a depth, m, on the ray of the pixel with this number; robot frame, m.
-    pub(super) fn point(&self, pixel: usize, depth_m: f64) -> Point3<f64> {
-        let way = self.rays[pixel] * depth_m;
-        let in_camera = self.starts.get(pixel).map_or(way, |start| start + way);
+    /// Returns the point at a depth, m, on the ray of the pixel in a sampled column and row; robot
+    /// frame, m.
+    pub(super) fn point(&self, column: usize, row: usize, depth_m: f64) -> Point3<f64> {
+        let in_camera = match self.table {
+            Table::Empty => return Point3::from(self.eye),
+            Table::Straight { columns, rows } => {
+                Vector3::new(columns[column], rows[row], 1.0) * depth_m
+            }
+            Table::Any { rays, starts } => {
+                let pixel = row * self.across + column;
+                let way = rays[pixel] * depth_m;
+                starts.get(pixel).map_or(way, |start| start + way)
+            }
+        };
         Point3::from(self.turn * in_camera + self.eye)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     use super::*;
 
     fn assert_as_camera(rays: &mut PixelRays, camera: &Camera) {
         let step = 3;
-        let columns = camera.width.div_ceil(step);
         let posed = rays.of(camera, [camera.width, camera.height], step);
         for (row, y) in (0..camera.height).step_by(step).enumerate() {
             for (column, x) in (0..camera.width).step_by(step).enumerate() {
                 let expected = camera.back_project(Point2::new(x as f64, y as f64), 1.7);
-                let found = posed.point(row * columns + column, 1.7);
+                let found = posed.point(column, row, 1.7);
                 assert!((found - expected).norm() < 1e-12, "{x} {y} {found} {expected}");
             }
         }
@@ -106,5 +135,8 @@ mod tests {
         assert_as_camera(&mut rays, &camera);
         assert_as_camera(&mut rays, &Camera::mounted(lens, 40, 30, 0.4, 0.0, 0.0));
         assert_as_camera(&mut rays, &Camera { width: 20, ..camera });
+        let bent =
+            Pinhole { distortion: Distortion::PlumbBob([-0.2, 0.05, 0.001, 0.0, 0.0]), ..lens };
+        assert_as_camera(&mut rays, &Camera::mounted(bent, 40, 30, 0.4, 0.2, 0.0));
     }
 }

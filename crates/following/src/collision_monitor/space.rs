@@ -7,8 +7,13 @@ use tagalong_core::EgoMotion;
 const CELL_M: f64 = 0.1;
 /// Cells along each side: 12.8 m, which the robot takes along.
 const SIDE: i32 = 128;
-/// Step along a ray, m: no cell is passed over.
-const STEP_M: f64 = 0.08;
+/// Step along a ray, cells: no cell is passed over.
+const STEP: f64 = 0.8;
+/// Parts of a cell in which places along a ray are counted: whole numbers, which are faster than
+/// rounding.
+const PARTS_BITS: u32 = 16;
+/// Distance from the origin of the odometry up to which there are cells, cells: some 100,000 km.
+const FARTHEST: f64 = 1e9;
 /// Gap without a reading after which something in a cell has appeared anew, ms: a few frames.
 const GAP_MS: u32 = 400;
 /// Time after which a thing in a cell stands still, ms: the leg of a walking person is off sooner.
@@ -87,30 +92,41 @@ impl SpaceGrid {
         for at in met {
             self.hit(&at);
         }
-        let now_ms = self.now_ms;
         let from = self.grid_from_robot * eye;
         for end in free_to {
-            let to = self.grid_from_robot * end;
-            let way = to - from;
-            let length_m = way.norm();
-            if !length_m.is_finite() {
+            self.free(&from, &(self.grid_from_robot * end));
+        }
+    }
+
+    /// Marks the cells on the way from an eye to the end of a ray as free, without the last one; places
+    /// in the grid, m.
+    fn free(&mut self, from: &Point2<f64>, to: &Point2<f64>) {
+        let now_ms = self.now_ms;
+        let way = (to - from) / CELL_M;
+        let length = way.norm();
+        let start = from.coords / CELL_M;
+        // Positive comparison, so that a place that is no number frees nothing.
+        let is_near = length.is_finite() && start.amax() <= FARTHEST;
+        if !is_near {
+            return;
+        }
+        let reach = length.min(0.5 * f64::from(SIDE));
+        let steps = ((reach - 1.0) / STEP).max(0.0) as usize;
+        let step = way * (STEP / length.max(STEP));
+        let mut at = [parts(start.x), parts(start.y)];
+        let step = [parts(step.x), parts(step.y)];
+        let mut last = None;
+        for _ in 0..steps {
+            let place = ((at[0] >> PARTS_BITS) as i32, (at[1] >> PARTS_BITS) as i32);
+            at = [at[0] + step[0], at[1] + step[1]];
+            // Steps are shorter than cells.
+            if last == Some(place) {
                 continue;
             }
-            let reach_m = length_m.min(0.5 * CELL_M * f64::from(SIDE));
-            let steps = ((reach_m - CELL_M) / STEP_M).max(0.0) as usize;
-            let step = way * (STEP_M / length_m.max(STEP_M));
-            let mut last = None;
-            for at in 0..steps {
-                let place = coordinates(&(from + step * at as f64));
-                // Steps are shorter than cells.
-                if last == Some(place) {
-                    continue;
-                }
-                last = Some(place);
-                let cell = self.cell_of(place);
-                if cell.hit_ms != now_ms {
-                    cell.free_ms = now_ms;
-                }
+            last = Some(place);
+            let cell = self.cell_of(place);
+            if cell.hit_ms != now_ms {
+                cell.free_ms = now_ms;
             }
         }
     }
@@ -147,14 +163,18 @@ impl SpaceGrid {
         if !(place.x.is_finite() && place.y.is_finite()) {
             return;
         }
-        let is_amid_free = self.is_amid_free(coordinates(&place));
-        let cell = self.cell_mut(&place);
-        if cell.hit_ms == 0 || now_ms - cell.hit_ms > GAP_MS {
-            cell.since_ms = now_ms;
-            let was_free = cell.free_ms > cell.hit_ms && now_ms - cell.free_ms <= FREE_MS;
-            cell.appeared = was_free && is_amid_free;
-        }
+        let place = coordinates(&place);
+        let cell = self.cell_of(place);
+        let is_new = cell.hit_ms == 0 || now_ms - cell.hit_ms > GAP_MS;
+        let was_free = cell.free_ms > cell.hit_ms && now_ms - cell.free_ms <= FREE_MS;
         cell.hit_ms = now_ms;
+        // Most readings are of things that were there before: the cells around need no look.
+        if is_new {
+            let appeared = was_free && self.is_amid_free(place);
+            let cell = self.cell_of(place);
+            cell.since_ms = now_ms;
+            cell.appeared = appeared;
+        }
     }
 
     /// Returns true if most of the cells around one were seen free lately.
@@ -178,10 +198,6 @@ impl SpaceGrid {
         (cell.tag == place).then_some(cell)
     }
 
-    fn cell_mut(&mut self, at: &Point2<f64>) -> &mut Cell {
-        self.cell_of(coordinates(at))
-    }
-
     fn cell_of(&mut self, place: (i32, i32)) -> &mut Cell {
         let cell = &mut self.cells[slot(place)];
         if cell.tag != place {
@@ -201,6 +217,11 @@ fn line(metres: f64) -> i32 {
     let towards_zero = cells as i32;
     // Rounds down, as `floor`, which is a call of a library on most targets.
     towards_zero.saturating_sub(i32::from(f64::from(towards_zero) > cells))
+}
+
+/// Returns a number of cells in parts of a cell.
+fn parts(cells: f64) -> i64 {
+    (cells * f64::from(1_u32 << PARTS_BITS)).floor() as i64
 }
 
 fn slot((x, y): (i32, i32)) -> usize {

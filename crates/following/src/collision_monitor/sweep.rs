@@ -4,8 +4,8 @@
 //! For a robot of speed v that reacts after t and brakes with a, the way until it stands is
 //! `L = v t + v²/2a` and the time `T = t + v/a`. An obstacle that stands is cleared if the robot stops
 //! before its footprint, swept along the path, comes nearer than the clearance. A person may come
-//! nearer in that time by `reach(T)`; with speed u at once that is the distance of ISO 13855,
-//! `S = (u + v) t + u v/a + v²/2a + C`, where C is `protective_m`.
+//! nearer in that time, and until the wheels stand after it, by `reach(T)`; with speed u at once that
+//! is the distance of ISO 13855, `S = (u + v) t + u v/a + v²/2a + C`, where C is `protective_m`.
 
 use nalgebra::Point2;
 use tagalong_core::Reason;
@@ -56,6 +56,8 @@ pub(crate) struct Braking {
     pub(crate) decel: f64,
     /// Time from one image to the next, s: what moves is that much nearer before it is seen again.
     pub(crate) between_s: f64,
+    /// Time from the end of the braking until the wheels stand, s: people come nearer meanwhile.
+    pub(crate) settle_s: f64,
 }
 
 impl Braking {
@@ -64,8 +66,10 @@ impl Braking {
         speed * delay_s + speed * speed / (2.0 * self.decel)
     }
 
+    /// Returns the time until the robot stands, in which people come nearer, s: from before the next
+    /// image, because a person is in this one or the next.
     fn time_s(&self, speed: f64, delay_s: f64) -> f64 {
-        delay_s + speed / self.decel
+        self.between_s + delay_s + speed / self.decel + self.settle_s
     }
 
     /// Returns the largest speed from which the robot stops within this way: the positive root of
@@ -336,7 +340,7 @@ impl<'a> Sweep<'a> {
     /// speed.
     fn is_free_at(&self, speed: f64, delay_s: f64, margin_m: impl Fn(f64) -> f64) -> bool {
         let nearest_m = self.nearest_within(self.braking.way(speed, delay_s));
-        let time_s = self.braking.between_s + self.braking.time_s(speed, delay_s);
+        let time_s = self.braking.time_s(speed, delay_s);
         nearest_m >= margin_m(time_s)
     }
 }
@@ -345,7 +349,8 @@ impl<'a> Sweep<'a> {
 mod tests {
     use super::*;
 
-    const BRAKING: Braking = Braking { reaction_s: 0.5, rise_s: 0.1, decel: 1.0, between_s: 0.0 };
+    const BRAKING: Braking =
+        Braking { reaction_s: 0.5, rise_s: 0.1, decel: 1.0, between_s: 0.0, settle_s: 0.0 };
     const AHEAD: Path = Path::Arc { curvature: 0.0, backwards: false };
 
     fn octagon() -> Footprint {
@@ -432,6 +437,27 @@ mod tests {
         }
         assert_eq!(allowed(moving(1.1, 0.0, 1.6), AHEAD, 0.9).most, 0.0);
         assert_eq!(allowed(moving(1.1, 0.0, 1.6), Path::Turn { left: true }, 0.5).most, 0.0);
+    }
+
+    #[test]
+    fn before_a_person_the_wheels_have_time_to_come_to_rest() {
+        let settings = CollisionMonitorSettings::default();
+        let (hazards, speed) = ([moving(2.2, 0.0, 1.6)], 0.9);
+        let most = |settle_s: f64| {
+            let braking = Braking { settle_s, ..BRAKING };
+            allowance(&settings, &octagon(), &hazards, AHEAD, speed, &braking).most
+        };
+        let slow = most(0.25);
+        let separation_m = 1.6 * (0.75 + slow) + 0.5 * slow + 0.5 * slow * slow;
+        let gap_m = 2.2 - octagon().front_m() - settings.protective_m;
+        assert!((separation_m - gap_m).abs() < 0.02, "{slow} {separation_m} {gap_m}");
+        assert!(slow < most(0.0) - 0.1, "{slow}");
+        // Things that stand come no nearer meanwhile.
+        let thing = |settle_s: f64| {
+            let braking = Braking { settle_s, ..BRAKING };
+            allowance(&settings, &octagon(), &[still(1.2, 0.0)], AHEAD, speed, &braking).most
+        };
+        assert_eq!(thing(0.25), thing(0.0));
     }
 
     #[test]

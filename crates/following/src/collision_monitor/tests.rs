@@ -8,8 +8,10 @@ use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use super::*;
 
-const BRAKING: Braking = Braking { reaction_s: 0.5, rise_s: 0.1, decel: 1.0, between_s: 0.0 };
-const TURN: Braking = Braking { reaction_s: 0.5, rise_s: 0.05, decel: 4.0, between_s: 0.0 };
+const BRAKING: Braking =
+    Braking { reaction_s: 0.5, rise_s: 0.1, decel: 1.0, between_s: 0.0, settle_s: 0.0 };
+const TURN: Braking =
+    Braking { reaction_s: 0.5, rise_s: 0.05, decel: 4.0, between_s: 0.0, settle_s: 0.0 };
 const AHEAD: Path = Path::Arc { curvature: 0.0, backwards: false };
 
 /// A camera 1 m high with a field of view of 90 by 67 degrees.

@@ -144,9 +144,10 @@ mod tests {
         ) {
             let mut axis = Axis::default();
             for (target, dt) in steps {
-                let next = match exact {
-                    true => axis.track(target, dt, &LIMITS, 0.9),
-                    false => axis.towards(target, dt, &LIMITS),
+                let next = if exact {
+                    axis.track(target, dt, &LIMITS, 0.9)
+                } else {
+                    axis.towards(target, dt, &LIMITS)
                 };
                 prop_assert!(next.peak(&LIMITS) <= 0.9 + 1e-6, "{next:?}");
                 prop_assert!(next.accel.abs() <= LIMITS.decel + 1e-9, "{next:?}");

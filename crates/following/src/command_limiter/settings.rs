@@ -35,6 +35,10 @@ pub struct CommandLimiterSettings {
     /// least `valid_s`, because the robot drives on for that time when images cease.
     #[schemars(range(min = 0.1, max = 2.0))]
     pub reaction_s: f64,
+    /// Time from the end of the braking until the wheels stand, s: a person comes nearer meanwhile.
+    /// Bases with a slow motor control take some tenths of a second.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub settle_s: f64,
     /// Distance that is left when the robot has stopped, m.
     #[schemars(range(min = 0.3, max = 2.0))]
     pub margin_m: f64,
@@ -71,6 +75,7 @@ impl Default for CommandLimiterSettings {
             max_turn_jerk_radps3: 40.0,
             reverse: false,
             reaction_s: 0.5,
+            settle_s: 0.25,
             margin_m: 0.3,
             valid_s: 0.25,
             slow_after_s: 0.25,
@@ -101,13 +106,15 @@ impl CommandLimiterSettings {
     /// `between_s` apart.
     pub(crate) fn braking(&self, reaction_s: f64, between_s: f64) -> Braking {
         let decel = self.max_decel_mps2;
-        Braking { reaction_s, rise_s: decel / (2.0 * self.max_jerk_mps3), decel, between_s }
+        let rise_s = decel / (2.0 * self.max_jerk_mps3);
+        Braking { reaction_s, rise_s, decel, between_s, settle_s: self.settle_s }
     }
 
     /// Returns how a turn stops, as [`CommandLimiterSettings::braking`].
     pub(crate) fn turn_braking(&self, reaction_s: f64, between_s: f64) -> Braking {
         let decel = self.max_turn_accel_radps2;
-        Braking { reaction_s, rise_s: decel / (2.0 * self.max_turn_jerk_radps3), decel, between_s }
+        let rise_s = decel / (2.0 * self.max_turn_jerk_radps3);
+        Braking { reaction_s, rise_s, decel, between_s, settle_s: self.settle_s }
     }
 
     /// Refuses limits that contradict each other or those of the robot.

@@ -8,6 +8,7 @@ use super::{BODY_M, Clearance, FEELERS, FEELERS_M, LEAST_SPOTS, Simulation};
 use crate::approach::{ApproachBy, ApproachInView, ApproachState, Approacher, Surroundings};
 use crate::footprint::{Gap, Outline};
 use crate::shape::Shape;
+use crate::slice::Slice;
 use crate::world::{self, Object};
 
 impl Simulation {
@@ -35,14 +36,18 @@ impl Simulation {
     pub(super) fn gaps_to_things(&self, outline: &Outline<'_>) -> impl Iterator<Item = Gap> {
         let robot = Point2::from(self.robot.pose.translation.vector);
         let floor_m = self.scene.room.floor_m(&robot);
-        let rays = FEELERS_M.into_iter().flat_map(|height_m| {
-            (0..FEELERS).map(move |i| (height_m, TAU * f64::from(i) / f64::from(FEELERS)))
-        });
-        let things = rays.map(move |(height_m, angle)| {
-            let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
+        let slices = FEELERS_M.map(|height_m| {
+            let solids = self.stage.objects.iter().flat_map(|object| &object.shapes);
             let from = Point3::new(robot.x, robot.y, floor_m + height_m);
-            let away_m = world::distance(&self.stage.objects, &from, &ray);
-            outline.gap(&self.robot.pose, &ray.xy(), away_m, 0.0)
+            Slice::new(solids, from, &Vector3::z())
+        });
+        let things = slices.into_iter().flat_map(move |slice| {
+            (0..FEELERS).map(move |i| {
+                let angle = TAU * f64::from(i) / f64::from(FEELERS);
+                let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
+                let away_m = slice.first(&ray).map_or(f64::INFINITY, |(t, _)| t);
+                outline.gap(&self.robot.pose, &ray.xy(), away_m, 0.0)
+            })
         });
         let trolleys = self.trolleys().map(move |trolley| {
             let way = trolley.place - robot;

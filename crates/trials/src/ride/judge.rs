@@ -210,10 +210,13 @@ impl RideJudge {
         let target = report.tracks.iter().find(|track| Some(track.id) == report.target);
         match target {
             None => Whom::Nobody,
-            Some(track) if track.seen => match self.is_of(track, moment) {
-                true => Whom::Right,
-                false => Whom::Wrong,
-            },
+            Some(track) if track.seen => {
+                if self.is_of(track, moment) {
+                    Whom::Right
+                } else {
+                    Whom::Wrong
+                }
+            }
             // A target that was never observed cannot be the person.
             Some(_) if before == Whom::Nobody => Whom::Wrong,
             Some(_) => before,

@@ -1,6 +1,7 @@
 //! Closed loops: the contender's controller drives the robot through the scene.
 
 mod approach;
+mod enable;
 mod judge;
 
 use std::time::Duration;
@@ -8,9 +9,10 @@ use std::time::Duration;
 use cpu_time::ThreadTime;
 
 pub use approach::{ApproachJudge, ApproachWatch, Approached, Contact, Side, Touched};
+use enable::StuckEnable;
 pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_config::Registry;
-use tagalong_core::{Command, Frame, Reason, Stamp};
+use tagalong_core::{Command, Frame, Reason, Stamp, WheelSpeeds};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources};
 use tagalong_sim::{
     ApproachInView, ApproachState, Clearance, Event, ROBOT_RADIUS_M, Scene, ScheduledFault,
@@ -55,7 +57,7 @@ pub struct Tick {
     pub clearance: Clearance,
     /// State of the approacher of the scene, once it is there.
     pub approach: Option<ApproachState>,
-    /// Reason of the command in force.
+    /// Reason of the command in force; `None` while the enable lets nothing move.
     pub reason: Option<Reason>,
 }
 
@@ -121,11 +123,16 @@ impl Ride {
             in_view: Vec::new(),
             faults: draw.simulation().faults().to_vec(),
         };
+        let mut enable = StuckEnable::of(&ride.faults);
         let failed =
             |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
         // Time at which the last frame that led to a command was handed over.
         let mut framed = Stamp::default();
-        while let Some(simulated) = ride.next_frame(&mut draw, &pipeline, framed, witness) {
+        while let Some(simulated) =
+            ride.next_frame(&mut draw, &pipeline, framed, (&mut enable, witness))
+        {
+            let may_move = ride.may_move(&mut enable);
+            pipeline.set_driving(may_move);
             if ride.reports.is_empty() {
                 let missing = pipeline.check_sources(sources(&simulated.frame));
                 missing.map_err(|why| TrialError::Config(format!("{}: {why}", contender.name)))?;
@@ -137,7 +144,7 @@ impl Ride {
             // Between frames `command_at` steers; this is the fresh command.
             if let Some(command) = report.command {
                 framed = ride.now();
-                draw.steer(command.wheels);
+                draw.steer(if may_move { command.wheels } else { WheelSpeeds::STOP });
             }
             witness.frame(&simulated, &report);
             ride.moments.push(Moment::of(simulated));
@@ -146,10 +153,19 @@ impl Ride {
         Ok(ride)
     }
 
+    /// Returns the time of the last step of the simulation, s.
+    fn now_s(&self) -> f64 {
+        self.ticks.last().map_or(0.0, |tick| tick.at_s)
+    }
+
     /// Returns the time of the last step of the simulation.
     fn now(&self) -> Stamp {
-        let at_s = self.ticks.last().map_or(0.0, |tick| tick.at_s);
-        Stamp::default().plus_seconds(at_s)
+        Stamp::default().plus_seconds(self.now_s())
+    }
+
+    /// Returns true if the enable lets the robot move at the last step of the simulation.
+    fn may_move(&self, enable: &mut Option<StuckEnable>) -> bool {
+        enable.as_mut().is_none_or(|enable| enable.is_granted(self.now_s()))
     }
 
     fn next_frame(
@@ -157,7 +173,7 @@ impl Ride {
         draw: &mut Draw,
         pipeline: &Pipeline,
         framed: Stamp,
-        witness: &mut dyn Witness,
+        (enable, witness): (&mut Option<StuckEnable>, &mut dyn Witness),
     ) -> Option<SimulatedFrame> {
         if !witness.goes_on() {
             return None;
@@ -168,12 +184,14 @@ impl Ride {
             let at_ns = event.step_ns()?;
             let since_frame = Stamp::from_nanos(at_ns).seconds_since(framed);
             let now = Stamp::from_nanos(simulation.robot_clock_ns(at_ns));
-            let command = command(pipeline, now, since_frame);
+            let is_granted =
+                enable.as_mut().is_none_or(|enable| enable.is_granted(at_ns as f64 * 1e-9));
+            let command = command(pipeline, now, since_frame).filter(|_| is_granted);
             let tick = tick(simulation, at_ns, command.map(|command| command.reason));
             self.look(simulation, &tick);
             witness.tick(&tick);
             self.ticks.push(tick);
-            command.map(|command| command.wheels)
+            if is_granted { command.map(|command| command.wheels) } else { Some(WheelSpeeds::STOP) }
         })
     }
 

@@ -103,8 +103,13 @@ pub(super) fn approaches(args: &FollowArgs, registry: &Registry) -> Outcome {
         make_folder(folder)?;
     }
     let bar = bar(jobs.len());
-    let work = |job: &Job<'_>| approach(job, args, registry, &signals);
-    let results = in_order(&jobs, threads(args.jobs), work, |_| bar.inc(1)).map_err(failure)?;
+    let results = in_order(
+        &jobs,
+        threads(args.jobs),
+        |job| approach(job, args, registry, &signals),
+        |_| bar.inc(1),
+    );
+    let results = results.map_err(failure)?;
     bar.finish_and_clear();
     let whole: Vec<Outlived> = results.into_iter().flatten().collect();
     if let Some(signal) = signals.received() {

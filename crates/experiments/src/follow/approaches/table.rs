@@ -46,42 +46,55 @@ const COLUMNS: [&str; 15] = [
     "fastest m/s",
 ];
 
-/// Returns the name of each stratum that some approaches are in, with those approaches.
-fn strata<'a>(all: &[&'a Approached]) -> Vec<(String, Vec<&'a Approached>)> {
-    let mut strata = vec![("all".to_owned(), all.to_vec())];
-    let mut add = |name: String, is_in: &dyn Fn(&Approached) -> bool| {
-        let of: Vec<&Approached> = all.iter().copied().filter(|one| is_in(one)).collect();
-        // A stratum with all approaches would repeat the first row.
-        if !of.is_empty() && of.len() < all.len() {
-            strata.push((name, of));
+/// Approaches by what they have in common, in the order of the rows.
+struct Strata<'a> {
+    all: &'a [&'a Approached],
+    named: Vec<(String, Vec<&'a Approached>)>,
+}
+
+impl<'a> Strata<'a> {
+    /// Adds the approaches of which `is_in` is true, if they are some of them: a stratum with all
+    /// approaches would repeat the first row.
+    fn add(&mut self, name: String, is_in: impl Fn(&Approached) -> bool) {
+        let of: Vec<&Approached> = self.all.iter().copied().filter(|one| is_in(one)).collect();
+        if !of.is_empty() && of.len() < self.all.len() {
+            self.named.push((name, of));
         }
-    };
+    }
+}
+
+/// Returns the name of each stratum that some approaches are in, with those approaches.
+fn strata<'a>(all: &'a [&'a Approached]) -> Vec<(String, Vec<&'a Approached>)> {
+    let mut strata = Strata { all, named: vec![("all".to_owned(), all.to_vec())] };
     for laser in [false, true] {
         let name = if laser { "with laser" } else { "without laser" };
-        add(name.to_owned(), &|one| one.laser == laser);
+        strata.add(name.to_owned(), |one| one.laser == laser);
         for side in Side::ALL {
-            add(format!("{name}, {side}"), &|one| one.laser == laser && one.side() == Some(side));
+            strata.add(format!("{name}, {side}"), |one| {
+                one.laser == laser && one.side() == Some(side)
+            });
         }
     }
-    add("by a person".to_owned(), &|one| one.by == ApproachBy::Person);
-    add("by a trolley".to_owned(), &|one| one.by == ApproachBy::Trolley);
+    strata.add("by a person".to_owned(), |one| one.by == ApproachBy::Person);
+    strata.add("by a trolley".to_owned(), |one| one.by == ApproachBy::Trolley);
     for [low, high] in [[0.0, 0.6], [0.6, 1.1], [1.1, 1.6]] {
-        let is_in = move |one: &Approached| low < one.approach_mps && one.approach_mps <= high;
-        add(format!("at {low} to {high} m/s"), &is_in);
+        strata.add(format!("at {low} to {high} m/s"), |one| {
+            low < one.approach_mps && one.approach_mps <= high
+        });
     }
     for height_m in values(all, |one| one.camera_height_m) {
-        add(format!("camera at {height_m} m"), &|one| one.camera_height_m == height_m);
+        strata.add(format!("camera at {height_m} m"), |one| one.camera_height_m == height_m);
     }
     for latency_s in values(all, |one| one.latency_s) {
-        add(format!("wheels {latency_s} s late"), &|one| one.latency_s == latency_s);
+        strata.add(format!("wheels {latency_s} s late"), |one| one.latency_s == latency_s);
     }
     for reason in names(all, |one| one.reason.into_iter().collect()) {
-        add(format!("begun at {reason}"), &|one| one.reason == Some(reason));
+        strata.add(format!("begun at {reason}"), |one| one.reason == Some(reason));
     }
     for kind in names(all, |one| one.faults.iter().map(|fault| fault.kind.name()).collect()) {
-        add(format!("fault {kind}"), &|one| has_fault(one, kind));
+        strata.add(format!("fault {kind}"), |one| has_fault(one, kind));
     }
-    strata
+    strata.named
 }
 
 fn has_fault(approached: &Approached, kind: &str) -> bool {

@@ -329,14 +329,13 @@ impl ObstacleMemory {
         let rays = self.rays.of(camera, [depth.width(), depth.height()], step);
         let reach_square = reach_m * reach_m;
         for (sampled, y) in (0..depth.height()).step_by(step).enumerate() {
-            let first = sampled * self.columns.len();
             let row = depth.row(y).iter().step_by(step);
             for (at, (z, column)) in row.zip(&mut self.columns).enumerate() {
                 let z = f64::from(*z);
                 if !is_reading(z) {
                     continue;
                 }
-                let point = rays.point(first + at, z);
+                let point = rays.point(at, sampled, z);
                 let is_thing = is_thing(settings, &point);
                 column.take(&eye, &point, is_thing);
                 let place = if is_thing { Some(point) } else { fall(settings, &eye, &point) };

@@ -52,7 +52,8 @@ impl ObstacleMemory {
             .collect();
         let path = Path::Arc { curvature, backwards: false };
         // With this reaction and without a way to brake the speed is the way.
-        let braking = Braking { reaction_s: 1.0, rise_s: 0.0, decel: 1e12, between_s: 0.0 };
+        let braking =
+            Braking { reaction_s: 1.0, rise_s: 0.0, decel: 1e12, between_s: 0.0, settle_s: 0.0 };
         let most = allowance(settings, &self.footprint, &all, path, 2.9, &braking).most;
         Some(if most > 2.9 { Ahead::Free } else { Ahead::Something(most + settings.stop_m) })
     }

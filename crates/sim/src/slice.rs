@@ -1,0 +1,103 @@
+//! Rays in one plane, as those of a laser scanner: most solids lie above or below all of them.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::seen::SolidView;
+use crate::shape::Shape;
+
+/// Room for rounding, m.
+const SLACK_M: f64 = 1e-6;
+
+/// Solids that a plane cuts, for rays in it from one eye.
+pub(crate) struct Slice<'a> {
+    /// Start of the rays, m.
+    pub eye: Point3<f64>,
+    solids: Vec<(&'a Shape, SolidView)>,
+}
+
+impl<'a> Slice<'a> {
+    /// Keeps those of some solids that the plane through an eye with this unit normal cuts, in their
+    /// order.
+    pub fn new(
+        solids: impl Iterator<Item = &'a Shape>,
+        eye: Point3<f64>,
+        normal: &Vector3<f64>,
+    ) -> Self {
+        let mut cut = Vec::new();
+        for solid in solids {
+            let above_m = normal.dot(&(solid.origin - eye));
+            // The ball around a solid is a cheap question to ask first.
+            if solid.is_beside(&eye, normal) {
+                continue;
+            }
+            let reaches_down = solid.extent(&-normal) - above_m > -SLACK_M;
+            let reaches_up = solid.extent(normal) + above_m > -SLACK_M;
+            if reaches_down && reaches_up {
+                cut.push((solid, solid.seen_from(&eye)));
+            }
+        }
+        Self { eye, solids: cut }
+    }
+
+    /// Returns the first solid that a ray in the plane meets, and its distance in lengths of the ray.
+    pub fn first(&self, ray: &Vector3<f64>) -> Option<(f64, &'a Shape)> {
+        let per_length = 1.0 / ray.norm_squared();
+        let mut first: Option<(f64, &'a Shape)> = None;
+        for (solid, seen) in &self.solids {
+            if !solid.near(&self.eye, ray, per_length) {
+                continue;
+            }
+            if let Some(t) = seen.meet(ray)
+                && first.is_none_or(|(nearest, _)| t < nearest)
+            {
+                first = Some((t, solid));
+            }
+        }
+        first
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use nalgebra::{Isometry3, Rotation3};
+
+    use super::*;
+    use crate::material::Material;
+    use crate::shape::Form;
+    use crate::world::{self, Object};
+
+    fn solid(form: usize, at: [f64; 3], turn: f64) -> Shape {
+        let form = match form {
+            0 => Form::Ellipsoid(Vector3::new(0.3, 0.15, 0.5)),
+            1 => Form::Block(Vector3::new(0.2, 1.5, 0.05)),
+            _ => Form::Capsule { length: 1.0, first: 0.3, second: 0.1 },
+        };
+        let turn = Rotation3::from_euler_angles(turn, 2.0 * turn, 0.3);
+        Shape::new(form, Point3::from(at), turn, Material::plain([0.5; 3]))
+    }
+
+    proptest! {
+        #[test]
+        fn a_slice_loses_nothing_that_a_ray_in_its_plane_meets(
+            solids in prop::collection::vec(
+                (0..3usize, prop::array::uniform3(-3.0..3.0f64), -3.0..3.0f64), 0..30),
+            tilt in -0.2..0.2f64, height_m in -1.0..1.0f64,
+        ) {
+            let solids: Vec<Shape> =
+                solids.into_iter().map(|(form, at, turn)| solid(form, at, turn)).collect();
+            let pose = Isometry3::new(
+                Vector3::new(0.1, -0.2, height_m), Vector3::new(tilt, 0.5 * tilt, 0.0));
+            let eye = pose * Point3::origin();
+            let slice = Slice::new(solids.iter(), eye, &(pose.rotation * Vector3::z()));
+            let object = Object::new(solids.clone(), None, true);
+            for direction in 0..90 {
+                let angle = f64::from(direction) * 0.07;
+                let ray = pose.rotation * Vector3::new(angle.cos(), angle.sin(), 0.0);
+                let met = slice.first(&ray).map_or(f64::INFINITY, |(t, _)| t);
+                prop_assert_eq!(met, world::distance([&object], &eye, &ray));
+            }
+        }
+    }
+}
