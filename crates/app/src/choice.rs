@@ -93,13 +93,20 @@ impl Fittings {
     /// Returns what the log has, in words: the inputs that can be used, and how many topics cannot.
     pub fn contents(&self) -> String {
         let usable = self.account.usable();
-        let usable = if usable.is_empty() { "nothing usable".into() } else { usable.join(", ") };
+        // "Alone" only if nothing else is there.
+        let is_alone = self.account.topics.len() == usable.len();
+        let usable = match usable.split_last() {
+            None => "nothing usable".to_owned(),
+            Some((last, [])) if is_alone => format!("{last} alone"),
+            Some((last, [])) => (*last).to_owned(),
+            Some((last, others)) => format!("{} and {last}", others.join(", ")),
+        };
         let mut unusable: Vec<&str> =
             self.account.curable().filter_map(|topic| topic.could_be).collect();
         unusable.dedup();
         match unusable.is_empty() {
             true => usable,
-            false => format!("{usable}, and {} that cannot be used", unusable.join(", ")),
+            false => format!("{usable}, and also {} that cannot be used", unusable.join(", ")),
         }
     }
 
