@@ -579,6 +579,7 @@ impl Bridge {
             stamp: report.stamp,
             camera: &found.frame.camera,
             odom_from_robot: &found.odom_from_robot,
+            is_odom_known: true,
             tracks: &report.tracks,
             target: report.target,
             command: report.command.map(|command| command.wheels),

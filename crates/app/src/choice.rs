@@ -30,12 +30,12 @@ pub struct Choice {
 pub const CHOICES: [Choice; 10] = [
     Choice {
         config: "depth-verified",
-        reason: "it has the best HOTA in rooms that no setting was chosen on",
+        reason: "it has the best HOTA in leave-one-room-out tests",
     },
     Choice {
         config: "depth-alone",
-        reason: "of those that need no colour it has the best HOTA in rooms that no setting was \
-                 chosen on; one verifier judges what it finds, so expect some furniture",
+        reason: "of those that need no colour it has the best HOTA in leave-one-room-out tests; \
+                 one verifier judges what it finds, so expect some furniture",
     },
     Choice {
         config: "depth-net-ekf",
@@ -101,13 +101,20 @@ impl Fittings {
     /// Returns what the log has, in words: the inputs that can be used, and how many topics cannot.
     pub fn contents(&self) -> String {
         let usable = self.account.usable();
-        let usable = if usable.is_empty() { "nothing usable".into() } else { usable.join(", ") };
+        // "Alone" only if nothing else is there.
+        let is_alone = self.account.topics.len() == usable.len();
+        let usable = match usable.split_last() {
+            None => "nothing usable".to_owned(),
+            Some((last, [])) if is_alone => format!("{last} alone"),
+            Some((last, [])) => (*last).to_owned(),
+            Some((last, others)) => format!("{} and {last}", others.join(", ")),
+        };
         let mut unusable: Vec<&str> =
             self.account.curable().filter_map(|topic| topic.could_be).collect();
         unusable.dedup();
         match unusable.is_empty() {
             true => usable,
-            false => format!("{usable}, and {} that cannot be used", unusable.join(", ")),
+            false => format!("{usable}, and also {} that cannot be used", unusable.join(", ")),
         }
     }
 

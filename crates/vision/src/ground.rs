@@ -95,6 +95,54 @@ pub fn ground_of_depth(
     ground_of_points(&points, settings)
 }
 
+/// Least sine of the angle below the horizon of a ray that meets the floor.
+const LEAST_DOWN: f64 = 0.08;
+/// Half the width of the window in which readings count as those of one floor, relative.
+const ONE_FLOOR: f64 = 0.04;
+/// Least number of rays that point down.
+const LEAST_RAYS: usize = 150;
+/// Least share of the rays that point down that meet the floor.
+const LEAST_FLOOR: f64 = 0.1;
+/// Largest share of readings that lie clearly below the floor.
+const MOST_BELOW: f64 = 0.1;
+
+/// Returns the factor by which the readings of a camera of known height and tilt have to be multiplied
+/// for the floor to lie where it is; `None` if too little floor is seen. Along each ray that points
+/// down, a reading is at most that of the floor, and over the image the floor is met most often.
+pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
+    let pose = &camera.robot_from_camera;
+    let height_m = pose.translation.vector.z;
+    let step = (depth.width() / 160).max(1);
+    let mut ratios = Vec::new();
+    for y in (0..depth.height()).step_by(step) {
+        for x in (0..depth.width()).step_by(step) {
+            let reading = f64::from(depth.row(y)[x]);
+            let ray = pose.rotation * camera.ray(Point2::new(x as f64, y as f64));
+            if reading > 0.0 && reading.is_finite() && -ray.z > LEAST_DOWN * ray.norm() {
+                ratios.push((reading * -ray.z / height_m).ln());
+            }
+        }
+    }
+    if ratios.len() < LEAST_RAYS || height_m <= 0.0 {
+        return None;
+    }
+    ratios.sort_by(f64::total_cmp);
+    let within = |at: usize| {
+        let (low, high) = (ratios[at] - ONE_FLOOR, ratios[at] + ONE_FLOOR);
+        ratios.partition_point(|v| *v <= high) - ratios.partition_point(|v| *v < low)
+    };
+    let most = (0..ratios.len()).step_by(4).map(within).max()?;
+    // The farthest of the frequent ones, because things on the floor are nearer than it.
+    let farthest = (0..ratios.len()).rev().find(|at| within(*at) * 10 >= most * 7)?;
+    let floor = ratios[farthest] - 0.5 * ONE_FLOOR;
+    let around = ratios.iter().filter(|ratio| (*ratio - floor).abs() <= 1.5 * ONE_FLOOR);
+    let floor = tagalong_stats::median(around.copied())?;
+    let is_seen = within(farthest) as f64 >= LEAST_FLOOR * ratios.len() as f64;
+    let below = ratios.len() - ratios.partition_point(|ratio| *ratio <= floor + 4.0 * ONE_FLOOR);
+    let is_lowest = below as f64 <= MOST_BELOW * ratios.len() as f64;
+    (is_seen && is_lowest).then(|| (-floor).exp())
+}
+
 /// Fits the floor to points of the camera frame (x right, y down, z forward). Returns `None` if no
 /// plane qualifies.
 pub fn ground_of_points(points: &[Point3<f64>], settings: &GroundSettings) -> Option<Ground> {
@@ -211,6 +259,37 @@ mod tests {
             let noise = 1.0 + 0.002 * (((x * 7 + y * 13) % 11) as f64 / 5.0 - 1.0);
             if nearest < 8.0 { (nearest * noise) as f32 } else { f32::NAN }
         })
+    }
+
+    fn scaled(depth: &DepthImage, factor: f32) -> DepthImage {
+        DepthImage::from_fn(depth.width(), depth.height(), |x, y| factor * depth.row(y)[x])
+    }
+
+    #[test]
+    fn any_unit_is_measured_by_the_floor_and_a_known_height() {
+        let lens =
+            Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        for (height_m, pitch_rad) in [(1.2, 0.0), (0.4, 0.1), (1.6, 0.4), (1.0, 0.2), (2.2, 0.5)] {
+            let camera = Camera::mounted(lens, 160, 120, height_m, pitch_rad, 0.0);
+            let depth = room(&camera);
+            for factor in [1.0, 0.25, 0.1, 4.0, 10.0, 1000.0, 0.7] {
+                let found = factor_of_depth(&scaled(&depth, factor), &camera).unwrap();
+                let error = (found * f64::from(factor) - 1.0).abs();
+                assert!(error < 0.03, "{height_m} {pitch_rad} {factor}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_unit_is_measured_without_a_floor() {
+        let lens =
+            Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        let level = Camera::mounted(lens, 160, 120, 1.2, 0.0, 0.0);
+        // A wall at 2 m, right before the camera.
+        assert_eq!(factor_of_depth(&DepthImage::filled(160, 120, 2.0), &level), None);
+        assert_eq!(factor_of_depth(&DepthImage::filled(160, 120, f32::NAN), &level), None);
+        let up = Camera::mounted(lens, 160, 120, 1.2, -0.6, 0.0);
+        assert_eq!(factor_of_depth(&room(&up), &up), None);
     }
 
     proptest! {

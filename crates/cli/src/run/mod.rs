@@ -265,6 +265,7 @@ struct Desk {
     tally: Tally,
     timings: Timings,
     with_images: bool,
+    is_odom_known: bool,
     remedies: Remedies,
 }
 
@@ -284,7 +285,15 @@ impl Desk {
             .map_err(refused)?;
         let (tally, timings) = (Tally::default(), Timings::default());
         let remedies = job.remedies.clone();
-        Ok(Self { log, overlay, tally, timings, with_images: args.with_images, remedies })
+        Ok(Self {
+            log,
+            overlay,
+            tally,
+            timings,
+            with_images: args.with_images,
+            is_odom_known: !job.source.lacks_usable_odometry(),
+            remedies,
+        })
     }
 
     /// Adds the report of a frame.
@@ -301,6 +310,7 @@ impl Desk {
             stamp: report.stamp,
             camera: &item.frame.frame.camera,
             odom_from_robot: &item.frame.odom_from_robot,
+            is_odom_known: self.is_odom_known,
             tracks: &report.tracks,
             target: report.target,
             command: report.command.map(|command| command.wheels),

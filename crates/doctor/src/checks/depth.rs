@@ -1,3 +1,4 @@
+use tagalong_vision::ground::factor_of_depth;
 use tagalong_vision::quality::DepthQuality;
 
 use super::super::evidence::Evidence;
@@ -21,15 +22,23 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
         ));
     };
     let is_disparity = is_disparity(evidence);
-    let far = !PLAUSIBLE_M.contains(&quality.median_m);
+    let measured_factor = if is_disparity { None } else { measured_factor(evidence) };
+    let is_off = measured_factor.is_some_and(|factor| !PLAUSIBLE_FACTORS.contains(&factor));
+    let far = !PLAUSIBLE_M.contains(&quality.median_m) || is_off;
     let step = quality.step_m.unwrap_or(0.0);
     // The steps of stereo depth grow with the square of the distance.
     let coarse = step / quality.median_m.powi(2).max(0.1);
     let severity = Severity::beyond(if far { 1.0 } else { 0.0 }, 0.5, 0.5)
         .max(Severity::beyond(quality.without, 0.6, 0.9))
         .max(Severity::beyond(coarse, 0.02, 0.1));
+    let by_floor = measured_factor.map_or_else(String::new, |factor| {
+        format!(
+            ", the floor at {:.2} of the distance that the height of the camera says",
+            1.0 / factor
+        )
+    });
     let measured = format!(
-        "median {:.2} m, {:.0} % without a reading, steps of {:.1} mm",
+        "median {:.2} m, {:.0} % without a reading, steps of {:.1} mm{by_floor}",
         quality.median_m,
         100.0 * quality.without,
         1e3 * step
@@ -44,7 +53,10 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
             .remedy(if is_disparity {
                 better_geometry(quality.median_m)
             } else {
-                format!("[input] depth_unit_m = {}", better_unit(evidence, quality.median_m))
+                format!(
+                    "[input] depth_unit_m = {}",
+                    better_unit(evidence, quality.median_m, measured_factor)
+                )
             })
     } else {
         finding
@@ -68,12 +80,34 @@ fn better_geometry(median_m: f64) -> String {
     )
 }
 
-/// Returns the unit by which the median would be some metres: a power of ten times the present one.
-fn better_unit(evidence: &Evidence, median_m: f64) -> f64 {
+/// Factors of the unit that may come from a mount that is not quite right.
+const PLAUSIBLE_FACTORS: std::ops::RangeInclusive<f64> = 0.6..=1.7;
+
+/// Returns the factor by which depth has to be multiplied for the floor to lie as far below the camera
+/// as its mount says; `None` where the mount is not known, or too little floor is seen.
+fn measured_factor(evidence: &Evidence) -> Option<f64> {
+    let source = &evidence.inspection.facts.camera_source;
+    if evidence.is_pose_assumed() || source.starts_with("the floor") {
+        return None;
+    }
+    let camera = evidence.samples.camera.as_ref()?;
+    let factors = evidence.samples.depths.iter().filter_map(|depth| factor_of_depth(depth, camera));
+    let mut factors: Vec<f64> = factors.collect();
+    factors.sort_by(f64::total_cmp);
+    factors.get(factors.len() / 2).copied()
+}
+
+/// Returns the unit by which the floor lies where it is. Where it is not seen, that by which the
+/// median would be some metres: a power of ten times the present one.
+fn better_unit(evidence: &Evidence, median_m: f64, measured_factor: Option<f64>) -> f64 {
     let topic = evidence.inspection.facts.depth_topic.as_ref();
     let image = topic.and_then(|t| evidence.inspection.topic(t)).and_then(|t| t.image.as_ref());
     let usual = if image.is_some_and(|image| image.pixels.contains("32FC1")) { 1.0 } else { 0.001 };
     let unit = evidence.input.depth_unit_m.unwrap_or(usual);
+    if let Some(factor) = measured_factor {
+        let unit = unit * factor;
+        return format!("{unit:.1e}").parse().unwrap_or(unit);
+    }
     let tens = (3.0 / median_m).log10().round();
     let better = unit * 10f64.powf(tens);
     // In the short form: 0.001, not 0.0010000000000000002.

@@ -17,7 +17,7 @@ pub struct Row {
     pub id: i64,
     /// Centre of the head in the robot frame: forward, left, up.
     pub head_in_robot_m: [f64; 3],
-    /// The same in the odometry frame.
+    /// The same in the odometry frame; NaN where the run could not use the odometry.
     pub head_in_odom_m: [f64; 3],
     /// Whether the track was seen in this frame.
     pub seen: bool,
@@ -40,7 +40,8 @@ impl Row {
             Floor::Robot => self.head_in_robot_m,
             Floor::Odometry => self.head_in_odom_m,
         };
-        (self.frame, Report { id: self.id, region: None, floor_m: Some([x, y]), score: 1.0 })
+        let floor_m = Some([x, y]).filter(|place| place.iter().all(|value| value.is_finite()));
+        (self.frame, Report { id: self.id, region: None, floor_m, score: 1.0 })
     }
 }
 
@@ -72,7 +73,10 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
             frame: line.frame(frame, 1)?,
             id: line.whole(id, "id")?,
             head_in_robot_m: point(robot)?,
-            head_in_odom_m: point(odom)?,
+            head_in_odom_m: match line.text(odom[0], "x")? {
+                "NaN" => [f64::NAN; 3],
+                _ => point(odom)?,
+            },
             seen: line.number(seen, "seen")? != 0.0,
         });
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tagalong_core::DepthImage;
 use tagalong_geometry::{Camera, ConicalMirror, Lens};
-use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
+use tagalong_vision::ground::{Ground, GroundSettings, factor_of_depth, ground_of_depth};
 
 use super::assembly::{Assembly, Messages};
 use super::mount::{Mount, robot_frame};
@@ -213,6 +213,9 @@ pub(super) fn plan(
     plan.disparity = stereo_geometry(&plan)?;
     plan.mount = find_mount(&plan, reread)?;
     tally.note(format!("the pose of the camera comes from {}", plan.mount.source()));
+    if let Some(unit_m) = measured_unit_m(&plan, reread)? {
+        take_measured_unit(&mut plan, unit_m, tally);
+    }
     note_unread_images(&plan, tally);
     note_choices(&plan, tally);
     if plan.odom_frames.is_none() {
@@ -270,7 +273,9 @@ fn depth_unit_m(
         let kind = kind_of(topic);
         let unit = match told {
             Some((from, unit_m)) => format!("{unit_m} m by {from}"),
-            None => "a millimetre, which no message tells: `depth_unit_m` under [input]".to_owned(),
+            None => "a millimetre unless the floor tells another, because no message does: \
+                     `depth_unit_m` under [input] sets it"
+                .to_owned(),
         };
         tally.note(format!("{name} ({kind}) is taken for depth, in units of {unit}"));
     }
@@ -444,6 +449,91 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     }
 }
 
+/// Number of depth images by which the unit of depth is measured.
+const UNIT_FRAMES: usize = 3;
+/// Factors of the unit of depth that may be those of a mount that is not quite right.
+const PLAUSIBLE_FACTORS: std::ops::RangeInclusive<f64> = 0.6..=1.7;
+/// Largest difference between the images, relative.
+const SAME_FACTOR: f64 = 1.1;
+
+/// Returns the unit of depth by which the floor lies as far below the camera as the mount says, if it
+/// is clearly another one than that which is taken; `None` too where the floor does not tell.
+fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogError> {
+    let is_set = plan.input.depth_unit_m.is_some() || plan.input.disparity.is_some();
+    let topic = plan.chosen.depth.as_ref().and_then(|topic| plan.scan.topics.get(topic));
+    let Some(topic) = topic.filter(|topic| !is_set && !is_disparity_image(topic)) else {
+        return Ok(None);
+    };
+    // Every other source of the pose is measured by depth, or a guess.
+    let is_known = match &plan.mount {
+        Mount::Tf { .. } => true,
+        Mount::Fixed { .. } => plan.input.mount().is_some(),
+    };
+    let has_lens = plan.lens.is_some_and(|lens| lens.mirror.is_none());
+    if plan.scan.is_live() || !is_known || !has_lens || !plan.inputs.uses(Input::Depth) {
+        return Ok(None);
+    }
+    let mut factors: Vec<f64> = Vec::new();
+    let (mut probe, mut messages) =
+        (Assembly::new(depth_probe(plan, plan.mount.clone()), Tally::default()), reread()?);
+    for _ in 0..UNIT_FRAMES {
+        let Some(found) = probe.read(messages.as_mut()) else { break };
+        let depth = found.frame.depth().ok();
+        factors.extend(depth.and_then(|depth| factor_of_depth(depth, &found.frame.camera)));
+    }
+    factors.sort_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (factors.first(), factors.last()) else { return Ok(None) };
+    if PLAUSIBLE_FACTORS.contains(first) || last / first > SAME_FACTOR {
+        return Ok(None);
+    }
+    let is_float = topic.pixels.as_deref().is_some_and(|pixels| pixels.starts_with("32FC1"));
+    let unit_m = plan.depth_unit_m.unwrap_or(if is_float { 1.0 } else { MILLIMETRE });
+    Ok(Some(two_digits(unit_m * factors[factors.len() / 2])))
+}
+
+/// Takes a unit that was measured where nothing else tells it; tells it where the encoding has another
+/// one by convention, which only the user can overrule.
+fn take_measured_unit(plan: &mut Plan, unit_m: f64, tally: &mut Tally) {
+    let name = plan.chosen.depth.clone().unwrap_or_default();
+    let topic = plan.scan.topics.get(&name);
+    let is_open = topic.is_some_and(|topic| topic.is_deep_grey) && plan.scan.depth_units.is_empty();
+    if is_open {
+        plan.depth_unit_m = Some(unit_m);
+        tally.note(format!(
+            "the unit of {name} is taken to be {unit_m} m, by the floor and the height of the camera"
+        ));
+        return;
+    }
+    tally.count("depth_unit_doubtful");
+    tally.note(format!(
+        "the floor in {name} and the height of the camera ({}) say that its unit is {unit_m} m: set \
+         `depth_unit_m = {unit_m}` under [input]",
+        plan.mount.source()
+    ));
+}
+
+/// Returns a number with two digits, as short as it is written.
+fn two_digits(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
+}
+
+/// Returns a plan that reads depth alone.
+fn depth_probe(plan: &Plan, mount: Mount) -> Plan {
+    Plan {
+        scan: Arc::clone(&plan.scan),
+        chosen: plan.chosen.clone(),
+        account: InputAccount::default(),
+        input: plan.input.clone(),
+        limits: plan.limits.clone(),
+        // No other input than depth, so that nothing else is decoded.
+        inputs: Inputs::NONE.require(Input::Depth),
+        mount,
+        odom_frames: None,
+        sources: Vec::new(),
+        ..*plan
+    }
+}
+
 /// Number of depth images to which the floor is fitted.
 const FLOOR_FRAMES: usize = 9;
 
@@ -452,19 +542,7 @@ fn floor(plan: &Plan, reread: Reread<'_>) -> Result<Option<Mount>, LogError> {
     if plan.chosen.depth.is_none() || plan.lens.is_none() {
         return Ok(None);
     }
-    let probe = Plan {
-        scan: Arc::clone(&plan.scan),
-        chosen: plan.chosen.clone(),
-        account: InputAccount::default(),
-        input: plan.input.clone(),
-        limits: plan.limits.clone(),
-        // No other input than depth, so that nothing else is decoded.
-        inputs: Inputs::NONE.require(Input::Depth),
-        mount: Mount::assumed(),
-        odom_frames: None,
-        sources: Vec::new(),
-        ..*plan
-    };
+    let probe = depth_probe(plan, Mount::assumed());
     let (mut probe, mut messages) = (Assembly::new(probe, Tally::default()), reread()?);
     let mut floors: Vec<Ground> = Vec::new();
     for _ in 0..FLOOR_FRAMES {

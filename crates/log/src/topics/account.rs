@@ -34,6 +34,9 @@ pub struct InputAccount {
     pub topics: Vec<TopicUse>,
 }
 
+/// Order of the inputs in the account.
+const ORDER: [&str; 6] = ["colour", "depth", "right", "odometry", "laser", "detections"];
+
 impl InputAccount {
     /// Returns the topic that is used as an input.
     pub fn used_as(&self, input: &str) -> Option<&TopicUse> {
@@ -65,7 +68,13 @@ impl InputAccount {
 
     pub(super) fn sort(&mut self) {
         self.topics.sort_by(|a, b| {
-            let key = |topic: &TopicUse| (topic.used_as.is_none(), topic.topic.clone());
+            let place = |topic: &TopicUse| {
+                let used = topic.used_as.as_deref();
+                ORDER.iter().position(|input| used == Some(*input))
+            };
+            let key = |topic: &TopicUse| {
+                (topic.used_as.is_none(), place(topic).unwrap_or(ORDER.len()), topic.topic.clone())
+            };
             key(a).cmp(&key(b))
         });
     }

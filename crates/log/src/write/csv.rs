@@ -1,5 +1,7 @@
 use std::io::{self, Write};
 
+use nalgebra::Point3;
+
 use super::record::{FrameRecord, OutputSettings, probability};
 
 /// Header line of `tracks-metres.csv`.
@@ -45,7 +47,11 @@ pub(super) fn metres(out: &mut impl Write, record: &FrameRecord<'_>) -> io::Resu
         let person = &track.estimate.person;
         let covariance = &track.estimate.covariance;
         write!(out, "{},{},{}", record.stamp.nanos(), record.index, track.id)?;
-        let places = [person.position, record.head_in_odom(track)];
+        let in_odom = match record.is_odom_known {
+            true => record.head_in_odom(track),
+            false => Point3::new(f64::NAN, f64::NAN, f64::NAN),
+        };
+        let places = [person.position, in_odom];
         for value in places.iter().flat_map(|p| p.iter()).chain(person.velocity.iter()) {
             write!(out, ",{}", Decimal(*value, 4))?;
         }
@@ -83,6 +89,7 @@ mod tests {
             stamp: tagalong_core::Stamp::from_nanos(1_500_000_000),
             camera: &camera(),
             odom_from_robot: &Isometry2::new(Vector2::new(1.0, 2.0), std::f64::consts::FRAC_PI_2),
+            is_odom_known: true,
             tracks,
             target: None,
             command: None,

@@ -47,6 +47,8 @@ pub struct FrameRecord<'a> {
     pub camera: &'a Camera,
     /// Pose of the robot in the odometry frame.
     pub odom_from_robot: &'a Isometry2<f64>,
+    /// False if there is odometry and it cannot be used, so that no place in its frame is known.
+    pub is_odom_known: bool,
     /// All tracks, confirmed or not.
     pub tracks: &'a [Track],
     /// Track of the person that is followed.

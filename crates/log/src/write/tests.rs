@@ -23,6 +23,7 @@ fn with_record<T>(index: u64, tracks: &[Track], use_it: impl FnOnce(&FrameRecord
         stamp: Stamp::from_nanos(1_700_000_000_000_000_000 + index * 100_000_000),
         camera: &camera(),
         odom_from_robot: &Isometry2::new(Vector2::new(0.1 * index as f64, 0.0), 0.0),
+        is_odom_known: true,
         tracks,
         target: tracks.first().map(|track| track.id),
         command: Some(WheelSpeeds { left: 0.25, right: 0.5 }),
