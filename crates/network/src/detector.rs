@@ -7,7 +7,7 @@ use tagalong_config::{FileLimit, read_bytes};
 use tagalong_core::RgbImage;
 
 use crate::decode::{Wanted, decode, suppress};
-use crate::family::{OutputShape, recognise};
+use crate::family::{LastColumn, OutputShape, recognise};
 use crate::network::rten;
 use crate::worker::Worker;
 use crate::{
@@ -52,6 +52,8 @@ pub struct About {
     pub input: Result<InputSize, String>,
     /// Outputs of a first call; an error is a sentence.
     pub run: Result<Vec<OutputShape>, String>,
+    /// Meaning of the last column of a first call, where it has six.
+    pub last_column: LastColumn,
 }
 
 impl About {
@@ -60,7 +62,11 @@ impl About {
         let (inputs, outputs) = (network.inputs().to_vec(), network.outputs().to_vec());
         let image = image_port(&inputs).and_then(|image| input_size(&inputs[image], size));
         let run = image.clone().and_then(|input| first_run(network, input));
-        Self { inputs, outputs, input: image, run }
+        let (run, last_column) = match run {
+            Ok((shapes, last_column)) => (Ok(shapes), last_column),
+            Err(why) => (Err(why), LastColumn::Unknown),
+        };
+        Self { inputs, outputs, input: image, run, last_column }
     }
 
     /// Returns the family of the network.
@@ -68,7 +74,7 @@ impl About {
     /// # Errors
     /// A sentence with the reason why there is none.
     pub fn family(&self) -> Result<Family, String> {
-        let family = recognise(&self.run.clone()?, self.input.clone()?)?;
+        let family = recognise(&self.run.clone()?, self.input.clone()?, self.last_column)?;
         let has_sizes = self.inputs.iter().any(|port| port.name == SIZES);
         if family == Family::RtDetr && !has_sizes {
             return Err(format!(
@@ -162,7 +168,10 @@ fn with_sizes(inputs: &[Port], input: InputSize, image: Tensor) -> Vec<Tensor> {
     inputs.iter().map(tensor).collect()
 }
 
-fn first_run(network: &mut impl Network, input: InputSize) -> Result<Vec<OutputShape>, String> {
+fn first_run(
+    network: &mut impl Network,
+    input: InputSize,
+) -> Result<(Vec<OutputShape>, LastColumn), String> {
     let shape = input.shape();
     let values = vec![0.0; shape.iter().product()];
     let image = Tensor::new(shape, values).unwrap_or_default();
@@ -170,7 +179,11 @@ fn first_run(network: &mut impl Network, input: InputSize) -> Result<Vec<OutputS
     let outputs = network.run(&inputs)?;
     let names = network.outputs().iter().map(|port| port.name.clone());
     let shapes = outputs.iter().map(|output| output.shape().to_vec());
-    Ok(names.zip(shapes).map(|(name, shape)| OutputShape { name, shape }).collect())
+    let last_column = match &outputs[..] {
+        [only] => LastColumn::of(only),
+        _ => LastColumn::Unknown,
+    };
+    Ok((names.zip(shapes).map(|(name, shape)| OutputShape { name, shape }).collect(), last_column))
 }
 
 /// Network that finds people in images.

@@ -5,7 +5,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Colours, Fit, InputSize, Preparation};
+use crate::{Colours, Fit, InputSize, Preparation, Tensor};
 
 /// Mean and deviation of ImageNet in red, green, blue, 0 to 255.
 pub const IMAGENET: [[f32; 3]; 2] = [[123.675, 116.28, 103.53], [58.395, 57.12, 57.375]];
@@ -230,13 +230,69 @@ fn count_cells(input: InputSize, strides: &[usize]) -> usize {
         .sum()
 }
 
-/// Returns the family of a network by its outputs.
+/// Meaning of the last of six columns, by the values of a first call.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LastColumn {
+    /// Whole numbers behind a score and ordered corners: labels.
+    Labels,
+    /// Fractions: scores of a class.
+    Scores,
+    /// The values do not tell.
+    #[default]
+    Unknown,
+}
+
+impl LastColumn {
+    /// Returns what the rows of an output tell.
+    pub fn of(output: &Tensor) -> Self {
+        let [1, _, 6] = *output.shape() else { return Self::Unknown };
+        let mut found = Self::Unknown;
+        for row in output.rows() {
+            let &[left, top, right, bottom, score, last] = row else { return Self::Unknown };
+            // An activation is never exactly a whole number, and a label always is.
+            if last.fract() != 0.0 {
+                return Self::Scores;
+            }
+            let is_box = right > left && bottom > top;
+            if score > 0.0 && score <= 1.0 && last >= 0.0 && is_box {
+                found = Self::Labels;
+            }
+        }
+        found
+    }
+
+    fn fits(self, family: Family) -> bool {
+        match (self, family) {
+            (Self::Labels, Family::Yolox) | (Self::Scores, Family::YoloV10) => false,
+            (Self::Labels | Self::Scores | Self::Unknown, _) => true,
+        }
+    }
+}
+
+/// Returns the family of a network by its outputs: their shapes, and where these leave a choice the
+/// values of a first call.
 ///
 /// # Errors
-/// Outputs of no family: a sentence with the families and their outputs.
-pub fn recognise(outputs: &[OutputShape], input: InputSize) -> Result<Family, String> {
-    let fits = |family: &Family| family.classes(outputs, input).is_some();
-    Family::ALL.into_iter().find(fits).ok_or_else(|| {
+/// Outputs of no family: a sentence with the families and their outputs. Outputs of several: those
+/// that fit.
+pub fn recognise(
+    outputs: &[OutputShape],
+    input: InputSize,
+    last: LastColumn,
+) -> Result<Family, String> {
+    let fits = |family: &Family| family.classes(outputs, input).is_some() && last.fits(*family);
+    let fitting: Vec<Family> = Family::ALL.into_iter().filter(fits).collect();
+    if let [_, _, ..] = fitting[..] {
+        let names: Vec<String> =
+            fitting.iter().map(|family| format!("`family = \"{family}\"`")).collect();
+        let shown: Vec<String> = outputs.iter().map(OutputShape::to_string).collect();
+        return Err(format!(
+            "its outputs {} may be those of several families, and their values do not tell: set {}",
+            shown.join(", "),
+            names.join(" or ")
+        ));
+    }
+    fitting.first().copied().ok_or_else(|| {
         let shown: Vec<String> = outputs.iter().map(OutputShape::to_string).collect();
         let known = Family::ALL.map(|family| format!("\n  {family}: {}", family.outputs()));
         let (width, height) = (input.width, input.height);
@@ -265,7 +321,9 @@ mod tests {
 
     #[test]
     fn published_networks_are_recognised() {
-        let only = |shape: &[usize]| recognise(&outputs(&[("output", shape)]), INPUT).unwrap();
+        let only = |shape: &[usize]| {
+            recognise(&outputs(&[("output", shape)]), INPUT, LastColumn::Unknown).unwrap()
+        };
         assert_eq!(only(&[1, 8400, 85]), Family::Yolox);
         assert_eq!(only(&[1, 8400, 6]), Family::Yolox, "a single class");
         assert_eq!(only(&[1, 84, 8400]), Family::YoloV8);
@@ -274,23 +332,55 @@ mod tests {
         assert_eq!(only(&[1, 8500, 112]), Family::NanoDet);
         let detr: [(&str, &[usize]); 3] =
             [("scores", &[1, 300]), ("labels", &[1, 300]), ("boxes", &[1, 300, 4])];
-        assert_eq!(recognise(&outputs(&detr), INPUT), Ok(Family::RtDetr));
+        assert_eq!(recognise(&outputs(&detr), INPUT, LastColumn::Unknown), Ok(Family::RtDetr));
         let rf: [(&str, &[usize]); 2] = [("dets", &[1, 300, 4]), ("labels", &[1, 300, 91])];
-        assert_eq!(recognise(&outputs(&rf), INPUT), Ok(Family::RfDetr));
+        assert_eq!(recognise(&outputs(&rf), INPUT, LastColumn::Unknown), Ok(Family::RfDetr));
         let rtm: [(&str, &[usize]); 2] = [("dets", &[1, 100, 5]), ("labels", &[1, 100])];
-        assert_eq!(recognise(&outputs(&rtm), INPUT), Ok(Family::RtmDet));
+        assert_eq!(recognise(&outputs(&rtm), INPUT, LastColumn::Unknown), Ok(Family::RtmDet));
         let last = InputSize { width: 192, height: 192, channels_last: true };
         for shape in [&[1, 1, 17, 3][..], &[1, 6, 56]] {
-            assert_eq!(recognise(&outputs(&[("output_0", shape)]), last), Ok(Family::MoveNet));
+            assert_eq!(
+                recognise(&outputs(&[("output_0", shape)]), last, LastColumn::Unknown),
+                Ok(Family::MoveNet)
+            );
+        }
+    }
+
+    /// Returns the output of a network of 128 x 96 pixels with rows of six values.
+    fn six(row: [f32; 6]) -> Tensor {
+        let values: Vec<f32> = (0..252).flat_map(|_| row).collect();
+        Tensor::new(vec![1, 252, 6], values).unwrap()
+    }
+
+    #[test]
+    fn the_values_tell_where_the_shape_does_not() {
+        let input = InputSize { width: 128, height: 96, channels_last: false };
+        let shapes = outputs(&[("output", &[1, 252, 6])]);
+        for (row, expected) in [
+            ([10.0, 10.0, 40.0, 60.0, 0.9, 0.0], Some(Family::YoloV10)),
+            ([10.0, 10.0, 40.0, 60.0, 0.02, 17.0], Some(Family::YoloV10)),
+            ([0.3, -0.2, 1.1, 0.7, 0.004, 0.21], Some(Family::Yolox)),
+            ([0.3, -0.2, 1.1, 0.7, 0.9, 0.999], Some(Family::Yolox)),
+            ([0.0; 6], None),
+            ([40.0, 60.0, 10.0, 10.0, 0.9, 0.0], None),
+        ] {
+            let found = recognise(&shapes, input, LastColumn::of(&six(row)));
+            assert_eq!(found.clone().ok(), expected, "{row:?}");
+            if let Err(why) = found {
+                assert!(why.contains("`family = \"yolox\"` or `family = \"yolov10\"`"), "{why}");
+            }
         }
     }
 
     #[test]
     fn other_shapes_are_refused_with_those_that_are_known() {
-        let why = recognise(&outputs(&[("logits", &[1, 1000])]), INPUT).unwrap_err();
+        let why =
+            recognise(&outputs(&[("logits", &[1, 1000])]), INPUT, LastColumn::Unknown).unwrap_err();
         assert!(why.contains("`logits` [1, 1000]") && why.contains("640 x 640"), "{why}");
         assert!(Family::ALL.iter().all(|family| why.contains(family.name())), "{why}");
-        let wrong = |shape: &[usize]| recognise(&outputs(&[("output", shape)]), INPUT).is_err();
+        let wrong = |shape: &[usize]| {
+            recognise(&outputs(&[("output", shape)]), INPUT, LastColumn::Unknown).is_err()
+        };
         assert!(wrong(&[1, 8400, 5]) && wrong(&[1, 4, 8400]) && wrong(&[1, 8500, 32]));
         assert!(wrong(&[2, 8400, 85]) && wrong(&[]));
         assert!(wrong(&[1, 6, 56]), "MoveNet has its channels last");

@@ -46,7 +46,7 @@ mod worker;
 pub use decode::ScoredBox;
 pub use detector::{About, Choices, PersonNetwork, inspect};
 pub use embedding::{Convention, EmbeddingNetwork};
-pub use family::{Family, IMAGENET, OutputShape, recognise};
+pub use family::{Family, IMAGENET, LastColumn, OutputShape, recognise};
 pub use grey::with_colours;
 pub use limits::{LimitSettings, Limits};
 pub use network::{Network, Runtime, check_file, rten};
