@@ -69,6 +69,9 @@ pub(crate) struct Topic {
     pub(crate) encoding: String,
     pub(crate) count: u64,
     pub(crate) undecodable: u64,
+    /// Number of messages with a field that cannot be, and the first such field.
+    pub(crate) faulty: u64,
+    pub(crate) fault: Option<String>,
     pub(crate) first_log_time: u64,
     pub(crate) last_log_time: u64,
     /// `encoding` or `format` of the first image.
@@ -322,6 +325,8 @@ impl Gathering {
             encoding: encoding.to_owned(),
             count: 0,
             undecodable: 0,
+            faulty: 0,
+            fault: None,
             first_log_time: u64::MAX,
             last_log_time: 0,
             pixels: None,
@@ -439,6 +444,11 @@ impl Topic {
         self.stamps.len() > 1 && is_one(&self.stamps) && !is_one(&self.recorded)
     }
 
+    /// Returns the reason for which no message can be used, although all can be decoded.
+    pub(crate) fn impossible(&self) -> Option<&str> {
+        self.fault.as_deref().filter(|_| self.faulty == self.count)
+    }
+
     /// Returns the first and the last stamp in time.
     pub(crate) fn stamp_range(&self) -> Option<(Stamp, Stamp)> {
         Some((*self.stamps.iter().min()?, *self.stamps.iter().max()?))
@@ -512,7 +522,12 @@ impl Topic {
     }
 
     fn take_sensor(&mut self, data: &[u8]) -> Option<()> {
-        let header = (SensorType::of_message(&self.schema)?.header)(data).ok()?;
+        let sensor = SensorType::of_message(&self.schema)?;
+        let header = (sensor.header)(data).ok()?;
+        if let Some(fault) = (sensor.fault)(data) {
+            self.faulty += 1;
+            self.fault.get_or_insert(fault);
+        }
         header.into_iter().for_each(|header| self.take_header(header));
         Some(())
     }

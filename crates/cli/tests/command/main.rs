@@ -13,6 +13,7 @@ mod damaged;
 mod demo;
 mod doctor;
 mod eval;
+mod field;
 mod figures;
 mod follow;
 mod import;

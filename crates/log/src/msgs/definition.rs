@@ -72,7 +72,7 @@ const MOST_DEEP: usize = 16;
 /// Largest number of fields of all types of a definition.
 const MOST_FIELDS: usize = 4096;
 /// Largest number of values of a message.
-const MOST_VALUES: usize = 1 << 20;
+const MOST_VALUES: usize = 1 << 18;
 
 /// Types that recorders leave out, because each log would have them.
 const WELL_KNOWN: [(&str, &str); 3] = [
@@ -421,5 +421,39 @@ mod tests {
         assert!(boxes.read(&message).is_ok());
         message.extend([0; 9]);
         assert!(boxes.read(&message).unwrap_err().contains("9 bytes are left"), "another layout");
+    }
+
+    /// Number of mutated definitions and messages; a longer search sets the variable.
+    fn trials() -> u64 {
+        let set = std::env::var("TAGALONG_MUTATIONS").ok();
+        set.and_then(|count| count.parse().ok()).unwrap_or(5_000)
+    }
+
+    #[test]
+    fn mutated_definitions_and_messages_end_in_a_value_or_an_error() {
+        let message = encode(&Detection2DArray::default());
+        let text = Detection2DArray::DEFINITION.as_bytes();
+        let mut random = tagalong_stats::XorShift64::new(7);
+        let mut read = 0_u64;
+        for _ in 0..trials() {
+            let mut text = text.to_vec();
+            let mut message = message.clone();
+            message.extend([1, 0, 0, 0, 0, 0, 0, 0]);
+            for bytes in [&mut text, &mut message] {
+                for _ in 0..1 + random.next_u64() % 3 {
+                    let at = (random.next_u64() % bytes.len() as u64) as usize;
+                    match random.next_u64() % 3 {
+                        0 => bytes[at] = random.next_u64() as u8,
+                        1 => drop(bytes.remove(at)),
+                        _ => bytes.insert(at, b"[]=#/\n 19"[(random.next_u64() % 9) as usize]),
+                    }
+                }
+            }
+            let text = String::from_utf8_lossy(&text);
+            if let Ok(definition) = Definition::parse(Detection2DArray::TYPE, &text) {
+                read += u64::from(definition.read(&message).is_ok());
+            }
+        }
+        assert!(read < trials(), "{read}");
     }
 }

@@ -25,6 +25,7 @@ pub(super) const ENTRY: SensorType = SensorType {
     wanted: "recorded detections that `detections_topic` under [input] names",
     rank: None,
     header: |_| Ok(None),
+    fault: |_| None,
     reader: |schema, input| Box::new(Recorded::new(schema, input)),
 };
 

@@ -20,6 +20,7 @@ pub(super) const ENTRY: SensorType = SensorType {
     wanted: "laser scans",
     rank: Some(rank),
     header: |data| decode::<LaserScan>(data).map(|scan| Some(scan.header)),
+    fault: |data| scan_fault(&decode(data).ok()?),
     reader: |_, _| Box::<Scans>::default(),
 };
 

@@ -44,6 +44,8 @@ pub(crate) struct SensorType {
     pub(crate) rank: Option<fn(&str) -> i32>,
     /// Reads the header of a message in the first pass; `None` if the message is only counted.
     pub(crate) header: fn(&[u8]) -> Result<Option<Header>, CdrError>,
+    /// Returns the field of a message that cannot be, for the account of the topics.
+    pub(crate) fault: fn(&[u8]) -> Option<String>,
     /// Creates the reader of a topic from the type of its messages.
     pub(crate) reader: fn(&str, &InputSettings) -> Box<dyn SensorReader>,
 }

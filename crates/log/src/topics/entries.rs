@@ -2,7 +2,7 @@
 
 use super::account::{InputAccount, TopicUse};
 use super::kinds::{is_image, is_odometry, is_of, kind_of, unreadable};
-use super::problems::{depth_problem, scanner_problem};
+use super::problems::{SCANNER_REMEDY, depth_problem, scanner_problem};
 use super::rigs::{Rig, rigs};
 use super::{Chosen, Relation, Stream, TopicName, named_topic};
 use crate::images::Content;
@@ -121,6 +121,12 @@ impl Judge<'_> {
 
     /// Returns the reason for which a topic that is chosen gives nothing.
     fn failure(&self, name: &str) -> Option<Reason> {
+        if let Some(fault) = self.scan.topics.get(name).and_then(Topic::impossible) {
+            return Some((
+                format!("its messages cannot be: {fault}"),
+                Some(SCANNER_REMEDY.to_owned()),
+            ));
+        }
         let is_depth = self.chosen.depth.as_deref() == Some(name);
         let problem = self.chosen.depth_problem.as_ref().filter(|_| is_depth)?;
         Some((problem.why.clone(), Some(problem.remedy.clone())))

@@ -280,7 +280,9 @@ fn choose_sensor(
     let fits = |topic: &Topic| is_of(sensor, topic);
     let named = named(scan, &sensor.key(), named_topic(sensor, input), fits)?;
     let rank = |name: &str, topic: &Topic| {
-        sensor.rank.filter(|_| is_of(sensor, topic)).map(|rank| rank(name))
+        let rank = sensor.rank.filter(|_| is_of(sensor, topic))?(&name.to_lowercase());
+        // Any scanner is better than one whose scans cannot be.
+        Some(if topic.impossible().is_some() { rank - 100 } else { rank })
     };
     Ok(named.or_else(|| best_of(scan, &input.sources, scan.names(), rank)))
 }

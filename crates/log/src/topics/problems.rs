@@ -135,6 +135,9 @@ fn depth_lens(
     lens.map(|lens| (topic.clone(), lens)).map_err(|why| format!("its calibration {topic}: {why}"))
 }
 
+/// Remedy for scans with a header that cannot be.
+pub(super) const SCANNER_REMEDY: &str = "correct the driver's settings of the scanner";
+
 /// Returns the reason for which the scans of a topic cannot be used beside those of the first one.
 pub(super) fn scanner_problem(
     scan: &Scan,
@@ -144,6 +147,9 @@ pub(super) fn scanner_problem(
 ) -> Option<Problem> {
     if let Some(source) = input.sources.iter().find(|source| source.topic == topic) {
         return Problem::new(format!("it is the source of obstacles `{}`", source.name), "");
+    }
+    if let Some(fault) = scan.topics.get(topic).and_then(Topic::impossible) {
+        return Problem::new(format!("its messages cannot be: {fault}"), SCANNER_REMEDY);
     }
     let named =
         format!("`laser_topic = \"{topic}\"` under [input] takes this one in place of {first}");

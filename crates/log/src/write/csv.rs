@@ -118,6 +118,7 @@ mod tests {
             stamp: tagalong_core::Stamp::from_nanos(1),
             camera: &camera(),
             odom_from_robot: &Isometry2::identity(),
+            is_odom_known: true,
             tracks: std::slice::from_ref(&one),
             target: None,
             command: None,

@@ -66,6 +66,24 @@ impl LogWriter {
         self.writer.write_to_known_channel(&header, data).unwrap();
     }
 
+    /// Writes a message of a type whose definition is given.
+    pub fn defined(
+        &mut self,
+        topic: &str,
+        (name, definition): (&str, &str),
+        encoding: &str,
+        stamp: Stamp,
+        data: &[u8],
+    ) {
+        let language = if encoding == "ros1" { "ros1msg" } else { "ros2msg" };
+        let schema = self.writer.add_schema(name, language, definition.as_bytes()).unwrap();
+        let channel_id =
+            self.writer.add_channel(schema, topic, encoding, &BTreeMap::new()).unwrap();
+        let time = stamp.nanos();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        self.writer.write_to_known_channel(&header, data).unwrap();
+    }
+
     pub fn message<T: Message + Serialize>(&mut self, topic: &str, stamp: Stamp, message: &T) {
         self.bytes::<T>(topic, stamp, &encode(message));
     }

@@ -78,7 +78,7 @@ fn text_alone(name: &str) -> Option<&'static str> {
 }
 
 /// Returns the text of a config that another one extends: it is built in, too.
-fn read_base(path: &Path) -> io::Result<String> {
+pub(super) fn read_base(path: &Path) -> io::Result<String> {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy());
     let base = stem.and_then(|stem| text_alone(&stem));
     base.map(str::to_owned).ok_or_else(|| ErrorKind::NotFound.into())

@@ -10,7 +10,7 @@ use tagalong_config::{ConfigError, FileLimit, read_text};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::tune;
+use super::{builtin, tune};
 
 /// Longest config, bytes.
 const MAX_BYTES: usize = 1 << 20;
@@ -211,8 +211,8 @@ fn base_at(
             path.display()
         ));
     }
-    let text =
-        read_base(&path).map_err(|error| format!("cannot extend {}: {error}", path.display()))?;
+    let text = read_base(&path).or_else(|error| builtin_base(name, error));
+    let text = text.map_err(|error| format!("cannot extend {}: {error}", path.display()))?;
     Ok(Base { path, padded: "\n".repeat(start) + &text, start })
 }
 
@@ -222,6 +222,15 @@ fn is_config(path: &Path) -> bool {
     // A link does not lend its name to another file.
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     [path, &real].iter().all(|path| path.extension().is_some_and(|ending| ending == ENDING))
+}
+
+/// Returns the text of a built-in config of a plain name, where there is no such file: a program that
+/// was installed comes without the folder of its configs.
+fn builtin_base(name: &str, error: io::Error) -> io::Result<String> {
+    if error.kind() != io::ErrorKind::NotFound || name.contains(['/', '\\']) {
+        return Err(error);
+    }
+    builtin::read_base(Path::new(name)).map_err(|_| error)
 }
 
 /// Adds the keys that a table lacks. Lists are not joined, and the settings of another plugin are
@@ -368,6 +377,9 @@ mod tests {
     fn circles_and_missing_bases_are_refused_with_their_line() {
         let missing = table("a = 1\nextends = 'b.toml'\n", &[]).unwrap_err();
         assert!(missing.contains("own.toml:2:11: cannot extend "), "{missing}");
+        // A plain name without a file is that of a built-in config.
+        let builtin = table("extends = 'mono.toml'\n", &[]).unwrap();
+        assert!(builtin.contains_key("filter"), "{builtin:?}");
         let circle = [("b.toml", "extends = 'b.toml'\n")];
         let circle = table("extends = 'b.toml'\n", &circle).unwrap_err();
         assert!(circle.contains("b.toml:1:11: `extends` goes on in a circle"), "{circle}");

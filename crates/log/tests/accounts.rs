@@ -1,0 +1,508 @@
+//! The choice of inputs and the account of it, on small invented logs of many kinds.
+#![allow(clippy::unwrap_used, reason = "a failing test may panic")]
+
+#[path = "common/mod.rs"]
+mod common;
+
+use common::{LogWriter, SavedLog, at, camera, level_pose};
+use nalgebra::{Isometry3, Vector3};
+use tagalong_core::Stamp;
+use tagalong_log::msgs::{CompressedImage, Header, Image, LaserScan, Pose, encode};
+use tagalong_log::{
+    CameraSettings, FrameSource, Input, InputSettings, Inputs, Limits, LogError, StampSource,
+    TopicUse,
+};
+
+const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
+
+/// Stream of images in an invented log.
+struct Stream<'a> {
+    topic: &'a str,
+    frame: &'a str,
+    encoding: &'a str,
+    size: (u32, u32),
+    count: u32,
+}
+
+impl Default for Stream<'_> {
+    fn default() -> Self {
+        Self { topic: "", frame: "optical", encoding: "rgb8", size: (16, 12), count: 4 }
+    }
+}
+
+impl Stream<'_> {
+    fn write(&self, log: &mut LogWriter, stamp_of: impl Fn(u32) -> Stamp) {
+        let bytes = match self.encoding {
+            "rgb8" => 3,
+            "mono8" => 1,
+            "32FC1" => 4,
+            _ => 2,
+        };
+        for index in 0..self.count {
+            let values = (0..self.size.0 * self.size.1).flat_map(|_| match self.encoding {
+                "32FC1" => 2.0_f32.to_le_bytes().to_vec(),
+                "16UC1" | "mono16" => 2000_u16.to_le_bytes().to_vec(),
+                _ => vec![index as u8; bytes],
+            });
+            let data: Vec<u8> = values.collect();
+            let image = Image {
+                header: Header::new(stamp_of(index), self.frame),
+                height: self.size.1,
+                width: self.size.0,
+                encoding: self.encoding.into(),
+                is_bigendian: 0,
+                step: self.size.0 * bytes as u32,
+                data: &data,
+            };
+            log.bytes::<Image<'_>>(self.topic, recorded(index), &encode(&image));
+        }
+    }
+}
+
+fn recorded(index: u32) -> Stamp {
+    at(0.1 * f64::from(index))
+}
+
+fn colour<'a>(topic: &'a str, frame: &'a str) -> Stream<'a> {
+    Stream { topic, frame, ..Stream::default() }
+}
+
+fn depth<'a>(topic: &'a str, frame: &'a str) -> Stream<'a> {
+    Stream { topic, frame, encoding: "16UC1", ..Stream::default() }
+}
+
+fn info(log: &mut LogWriter, topic: &str, frame: &str, size: (u32, u32)) {
+    let camera = camera(size.0 as usize, size.1 as usize, 0.9 * f64::from(size.0));
+    log.info(topic, frame, &camera);
+}
+
+fn open_with(
+    log: LogWriter,
+    input: &InputSettings,
+    inputs: Inputs,
+) -> Result<(FrameSource, SavedLog), LogError> {
+    let saved = log.save();
+    let source = FrameSource::open(&saved.path, input, &Limits::default(), inputs)?;
+    Ok((source, saved))
+}
+
+fn open(log: LogWriter, inputs: Inputs) -> (FrameSource, SavedLog) {
+    open_with(log, &InputSettings::default(), inputs).unwrap()
+}
+
+fn used(source: &FrameSource, input: &str) -> String {
+    source.account().used_as(input).map(|entry| entry.topic.clone()).unwrap_or_default()
+}
+
+fn entry<'a>(source: &'a FrameSource, topic: &str) -> &'a TopicUse {
+    let found = source.account().topics.iter().find(|entry| entry.topic == topic);
+    found.unwrap_or_else(|| panic!("{topic} is not in the account"))
+}
+
+fn count_frames(source: &mut FrameSource) -> usize {
+    std::iter::from_fn(|| source.next_frame()).count()
+}
+
+/// Names of the colour and the depth topic of two devices, as drivers give them.
+const DEVICES: [[(&str, &str); 2]; 8] = [
+    [
+        ("/front_camera/color/image_raw", "/front_camera/aligned_depth_to_color/image_raw"),
+        ("/back_camera/color/image_raw", "/back_camera/aligned_depth_to_color/image_raw"),
+    ],
+    [
+        ("/camera_1/rgb/image_raw", "/camera_1/depth_registered/image_raw"),
+        ("/camera_2/rgb/image_raw", "/camera_2/depth_registered/image_raw"),
+    ],
+    [("/color/front", "/depth/front"), ("/color/rear", "/depth/rear")],
+    [
+        ("/left_cam/color/image_raw", "/left_cam/depth/image_raw"),
+        ("/right_cam/color/image_raw", "/right_cam/depth/image_raw"),
+    ],
+    [
+        ("/zed_a/zed_node/rgb/image_rect_color", "/zed_a/zed_node/depth/depth_registered"),
+        ("/zed_b/zed_node/rgb/image_rect_color", "/zed_b/zed_node/depth/depth_registered"),
+    ],
+    [
+        ("/device_0/sensor_1/Color_0/image/data", "/device_0/sensor_0/Depth_0/image/data"),
+        ("/device_1/sensor_1/Color_0/image/data", "/device_1/sensor_0/Depth_0/image/data"),
+    ],
+    [
+        ("/spot/camera/frontleft/image", "/spot/depth_registered/frontleft/image"),
+        ("/spot/camera/back/image", "/spot/depth_registered/back/image"),
+    ],
+    [
+        ("/robot/cam0/image_color", "/robot/cam0/image_depth"),
+        ("/robot/cam1/image_color", "/robot/cam1/image_depth"),
+    ],
+];
+
+/// Writes a log of two devices; the depth of the second one has a message more.
+fn two_devices(devices: &[(&str, &str); 2]) -> LogWriter {
+    let mut log = LogWriter::plain();
+    for (place, (of_colour, of_depth)) in devices.iter().enumerate() {
+        let frame = format!("optical_{place}");
+        let yaw = Vector3::new(0.0, 0.0, 3.0 * place as f64);
+        log.fixed("base_link", &frame, &(Isometry3::new(Vector3::zeros(), yaw) * level_pose()));
+        for topic in [of_colour, of_depth] {
+            let folder = topic.rsplit_once('/').unwrap().0;
+            info(&mut log, &format!("{folder}/camera_info_{place}"), &frame, (16, 12));
+        }
+        colour(of_colour, &frame).write(&mut log, recorded);
+        let count = 4 + place as u32;
+        Stream { count, ..depth(of_depth, &frame) }.write(&mut log, recorded);
+    }
+    log
+}
+
+#[test]
+fn all_images_are_of_one_device() {
+    for devices in &DEVICES {
+        let (source, _saved) = open(two_devices(devices), DEPTH);
+        let (of_colour, of_depth) = (used(&source, "colour"), used(&source, "depth"));
+        let is_pair = devices.contains(&(&of_colour, &of_depth));
+        assert!(is_pair, "{of_colour} with {of_depth}");
+        let other = devices.iter().find(|device| device.0 != of_colour).unwrap();
+        let why = entry(&source, other.1);
+        assert_eq!(why.problem.as_deref(), Some("it is of another camera"), "{why}");
+        // The remedy works.
+        let camera = why.camera.clone().unwrap();
+        assert!(why.remedy.as_ref().unwrap().contains(&camera), "{why}");
+        let input = InputSettings {
+            camera: Some(CameraSettings::Named(camera)),
+            ..InputSettings::default()
+        };
+        let (source, _saved) = open_with(two_devices(devices), &input, DEPTH).unwrap();
+        let chosen = (used(&source, "colour"), used(&source, "depth"));
+        assert_eq!((&*chosen.0, &*chosen.1), *other, "by name");
+    }
+}
+
+#[test]
+fn a_camera_that_is_not_there_is_refused_with_those_that_are() {
+    let input = InputSettings {
+        camera: Some(CameraSettings::Named("/side".into())),
+        ..InputSettings::default()
+    };
+    let error = open_with(two_devices(&DEVICES[0]), &input, DEPTH).err().unwrap().to_string();
+    assert!(error.contains("`/side`") && error.contains("/front_camera, "), "{error}");
+}
+
+#[test]
+fn streams_whose_names_have_nothing_in_common_are_one_device_unless_they_look_apart() {
+    let log = |yaw_rad: f64| {
+        let mut log = LogWriter::plain();
+        log.fixed("base_link", "a", &level_pose());
+        let turned = Isometry3::new(Vector3::zeros(), Vector3::new(0.0, 0.0, yaw_rad));
+        log.fixed("base_link", "b", &(turned * level_pose()));
+        for (topic, frame) in [("/usb_cam/camera_info", "a"), ("/kinect/camera_info", "b")] {
+            info(&mut log, topic, frame, (16, 12));
+        }
+        colour("/usb_cam/image_raw", "a").write(&mut log, recorded);
+        depth("/kinect/image", "b").write(&mut log, recorded);
+        log
+    };
+    assert_eq!(used(&open(log(0.1), Inputs::ANY).0, "depth"), "/kinect/image");
+    let (source, _saved) = open(log(3.0), Inputs::ANY);
+    assert!(used(&source, "colour").is_empty() || used(&source, "depth").is_empty());
+    // Whoever names both gets both.
+    let input = InputSettings {
+        colour_topic: Some("/usb_cam/image_raw".into()),
+        depth_topic: Some("/kinect/image".into()),
+        ..InputSettings::default()
+    };
+    let (source, _saved) = open_with(log(3.0), &input, DEPTH).unwrap();
+    assert_eq!(used(&source, "depth"), "/kinect/image");
+}
+
+#[test]
+fn calibrations_are_found_in_other_folders() {
+    for (image, other, wanted) in [
+        (
+            "/d/s1/Color_0/image/data",
+            "/d/s0/Depth_0/info/camera_info",
+            "/d/s1/Color_0/info/camera_info",
+        ),
+        ("/cam/color/image_raw", "/cam/depth/camera_info", "/cam/color/meta/camera_info"),
+        ("/cam/rgb/image/compressed", "/cam/ir/camera_info", "/cam/info/rgb"),
+        ("/left/image_raw", "/right/camera_info", "/calibration/left"),
+        ("/front/color/image", "/rear/color/camera_info", "/info/front/color"),
+    ] {
+        let mut log = LogWriter::plain();
+        log.fixed("base_link", "optical", &level_pose());
+        info(&mut log, other, "other", (32, 24));
+        info(&mut log, wanted, "optical", (16, 12));
+        colour(image, "optical").write(&mut log, recorded);
+        let (source, _saved) = open(log, Inputs::ANY);
+        assert_eq!(source.facts().calibration_topic.as_deref(), Some(wanted), "{image}");
+        assert!(entry(&source, image).calibration.as_ref().unwrap().starts_with(wanted));
+        let told = source.notes().iter().any(|note| note.contains(wanted));
+        assert!(told, "{:?}", source.notes());
+    }
+}
+
+#[test]
+fn calibrations_of_other_sizes_are_scaled_or_told() {
+    for (calibrated, is_scaled) in
+        [((16, 12), true), ((32, 24), true), ((64, 48), true), ((8, 6), true), ((20, 15), false)]
+    {
+        let mut log = LogWriter::plain();
+        log.fixed("base_link", "optical", &level_pose());
+        info(&mut log, "/cam/camera_info", "optical", calibrated);
+        colour("/cam/image_raw", "optical").write(&mut log, recorded);
+        let found = open_with(log, &InputSettings::default(), Inputs::ANY);
+        assert_eq!(found.is_ok(), is_scaled, "{calibrated:?}");
+        if let Ok((source, _saved)) = found {
+            assert!((source.facts().focal_px - 0.9 * 16.0).abs() < 1e-9, "{calibrated:?}");
+        }
+    }
+}
+
+#[test]
+fn depth_that_cannot_be_registered_names_the_topic_and_the_cause() {
+    for (size, info_of_depth, has_tf, cause) in [
+        ((24, 18), Some((16, 12)), true, "calibrated for 16x12, but the images are 24x18"),
+        ((24, 18), Some((20, 12)), true, "calibrated for 20x12, but the images are 24x18"),
+        ((24, 18), None, true, "no calibration (sensor_msgs/CameraInfo) belongs to it"),
+        ((24, 18), Some((24, 18)), false, "tf does not connect its frame `depth_optical`"),
+        (
+            (10, 10),
+            Some((30, 20)),
+            true,
+            "its images are 10x10, those of /cam/color/image_raw 16x12",
+        ),
+    ] {
+        let mut log = LogWriter::plain();
+        log.fixed("base_link", "optical", &level_pose());
+        if has_tf {
+            log.fixed("base_link", "depth_optical", &level_pose());
+        }
+        info(&mut log, "/cam/color/camera_info", "optical", (16, 12));
+        if let Some(calibrated) = info_of_depth {
+            info(&mut log, "/cam/depth/camera_info", "depth_optical", calibrated);
+        }
+        colour("/cam/color/image_raw", "optical").write(&mut log, recorded);
+        let stream = Stream { size, ..depth("/cam/depth/image_rect_raw", "depth_optical") };
+        stream.write(&mut log, recorded);
+        let (source, _saved) = open(log, Inputs::ANY);
+        let told = entry(&source, "/cam/depth/image_rect_raw");
+        assert!(told.problem.as_ref().unwrap().contains(cause), "{cause}: {told}");
+        assert_eq!(told.could_be, Some("depth"));
+        assert!(!source.account().usable().contains(&"depth"), "{told}");
+    }
+}
+
+#[test]
+fn depth_at_other_times_is_told_with_the_offset() {
+    for (offset_s, remedy) in [
+        (0.2, "`pair_tolerance_s = 0."),
+        (-0.05, "`pair_tolerance_s = 0."),
+        (3600.0, "`--stamps recording`"),
+        (-1.6e9, "`--stamps recording`"),
+        (40.0, "`--stamps recording`"),
+    ] {
+        let mut log = LogWriter::plain();
+        log.fixed("base_link", "optical", &level_pose());
+        info(&mut log, "/cam/camera_info", "optical", (16, 12));
+        Stream { count: 1, ..colour("/cam/color", "optical") }.write(&mut log, recorded);
+        let late = |index| recorded(index).plus_seconds(offset_s);
+        Stream { count: 1, ..depth("/cam/depth", "optical") }.write(&mut log, late);
+        let bytes = log.finish();
+        let saved = SavedLog::new(&bytes);
+        let open = |stamps| {
+            let input = InputSettings { stamps, ..InputSettings::default() };
+            FrameSource::open(&saved.path, &input, &Limits::default(), Inputs::ANY).unwrap()
+        };
+        let source = open(StampSource::Auto);
+        let told = entry(&source, "/cam/depth");
+        assert!(told.remedy.as_ref().unwrap().contains(remedy), "{offset_s}: {told}");
+        assert!(open(StampSource::Recording).account().usable().contains(&"depth"), "{offset_s}");
+    }
+}
+
+#[test]
+fn stamps_that_are_never_set_are_replaced_by_the_times_of_recording() {
+    for stamp in [0.0, 1.0, 1e-9, 1.7e9, 2e9] {
+        let stamp = Stamp::default().plus_seconds(stamp);
+        let log = || {
+            let mut log = LogWriter::plain();
+            log.fixed("base_link", "optical", &level_pose());
+            info(&mut log, "/cam/camera_info", "optical", (16, 12));
+            colour("/cam/color", "optical").write(&mut log, |_| stamp);
+            depth("/cam/depth", "optical").write(&mut log, |_| stamp);
+            log
+        };
+        let (mut source, _saved) = open(log(), DEPTH);
+        assert!(source.notes().iter().any(|note| note.contains("are not set: all are")));
+        assert_eq!(count_frames(&mut source), 4);
+        assert!(!source.data_lost(), "{:?}", source.notes());
+        // Whoever insists on the stamps loses images, and is told so.
+        let input = InputSettings { stamps: StampSource::Header, ..InputSettings::default() };
+        let (mut source, _saved) = open_with(log(), &input, DEPTH).unwrap();
+        assert_eq!(count_frames(&mut source), 1);
+        assert!(source.data_lost() && source.counters()["frames_of_same_stamp"] == 3);
+    }
+}
+
+#[test]
+fn odometry_of_another_clock_gives_no_places() {
+    for offset_s in [-1.7e9, 3600.0, -30.0, 5.0, 1e5] {
+        let log = || {
+            let mut log = LogWriter::plain();
+            log.fixed("base_link", "optical", &level_pose());
+            info(&mut log, "/cam/camera_info", "optical", (16, 12));
+            colour("/cam/color", "optical").write(&mut log, recorded);
+            for index in 0..4 {
+                let pose = Pose::from(&Isometry3::translation(f64::from(index), 0.0, 0.0));
+                let stamp = recorded(index).plus_seconds(offset_s);
+                log.odometry_of(recorded(index), stamp, pose);
+            }
+            log
+        };
+        let (source, _saved) = open(log(), Inputs::ANY);
+        assert!(source.lacks_usable_odometry() && !source.has_odometry(), "{offset_s}");
+        let told = entry(&source, "/odom");
+        let offset = format!("begins {:.1} s", offset_s.abs());
+        assert!(told.problem.as_ref().unwrap().contains(&offset), "{told}");
+        let input = InputSettings { stamps: StampSource::Recording, ..InputSettings::default() };
+        let (mut source, _saved) = open_with(log(), &input, Inputs::ANY).unwrap();
+        let last = std::iter::from_fn(|| source.next_frame()).last().unwrap();
+        assert!((last.odom_from_robot.translation.x - 3.0).abs() < 1e-6, "{offset_s}");
+    }
+}
+
+/// Writes a log with colour, and compressed images on another topic.
+fn log_with_compressed(topic: &str, format: &str, data: &[u8]) -> LogWriter {
+    let mut log = LogWriter::plain();
+    log.fixed("base_link", "optical", &level_pose());
+    info(&mut log, "/cam/color/camera_info", "optical", (16, 12));
+    colour("/cam/color/image_raw", "optical").write(&mut log, recorded);
+    for index in 0..4 {
+        let header = Header::new(recorded(index), "optical");
+        let image = CompressedImage { header, format: format.into(), data };
+        log.message(topic, recorded(index), &image);
+    }
+    log
+}
+
+#[test]
+fn depth_as_jpeg_is_told_to_be_none() {
+    let jpeg = include_bytes!("data/gradient-grey.jpg");
+    for (topic, format) in [
+        ("/cam/depth/image_raw/compressed", "16UC1; jpeg compressed "),
+        ("/cam/depth/image_raw/compressed", "32FC1; jpeg compressed mono8"),
+        ("/cam/aligned_depth_to_color/image/compressed", "jpeg"),
+        ("/cam/depth_registered/compressed", "mono16; jpeg compressed mono8"),
+        ("/anything", "16UC1; jpeg"),
+    ] {
+        let (source, _saved) = open(log_with_compressed(topic, format, jpeg), Inputs::ANY);
+        let told = entry(&source, topic);
+        assert!(told.problem.as_ref().unwrap().contains("JPEG keeps 8 of"), "{told}");
+        assert_eq!((told.used_as.as_ref(), told.could_be), (None, Some("depth")), "{told}");
+        let input = InputSettings { depth_topic: Some(topic.into()), ..InputSettings::default() };
+        let log = log_with_compressed(topic, format, jpeg);
+        let error = open_with(log, &input, DEPTH).err().unwrap().to_string();
+        assert!(error.contains("JPEG keeps") && error.contains(topic), "{error}");
+    }
+}
+
+/// Returns a PNG of 16 columns and 12 rows with one grey value of 16 bits.
+fn deep_png(value: u16) -> Vec<u8> {
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, 16, 12);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let data: Vec<u8> = (0..16 * 12).flat_map(|_| value.to_be_bytes()).collect();
+    encoder.write_header().unwrap().write_image_data(&data).unwrap();
+    out
+}
+
+#[test]
+fn sixteen_bits_of_grey_are_depth_by_content_if_their_name_says_so_or_the_user() {
+    let png = deep_png(2500);
+    for (topic, format, is_named) in [
+        ("/cam/depth/image/compressed", "png", true),
+        ("/cam/aligned_depth_to_color/compressed", "mono16; png compressed mono16", true),
+        ("/cam/depth_registered", "PNG", true),
+        ("/cam/image/compressed", "png", false),
+        ("/cam/deep", "", false),
+    ] {
+        let depth_of = |input: &InputSettings| {
+            let log = log_with_compressed(topic, format, &png);
+            let (mut source, _saved) = open_with(log, input, DEPTH).unwrap();
+            source.next_frame().unwrap().frame.depth().unwrap().get(3, 3).unwrap()
+        };
+        let named = InputSettings { depth_topic: Some(topic.into()), ..InputSettings::default() };
+        assert!((depth_of(&named) - 2.5).abs() < 1e-6, "{topic}");
+        let unit = InputSettings { depth_unit_m: Some(0.01), ..named };
+        assert!((depth_of(&unit) - 25.0).abs() < 1e-4, "{topic}");
+        if is_named {
+            assert!((depth_of(&InputSettings::default()) - 2.5).abs() < 1e-6, "{topic}");
+            continue;
+        }
+        let (source, _saved) = open(log_with_compressed(topic, format, &png), Inputs::ANY);
+        let told = entry(&source, topic);
+        assert!(told.to_string().contains("could be depth"), "{told}");
+        assert!(told.remedy.as_ref().unwrap().contains("`depth_topic`"), "{told}");
+    }
+}
+
+#[test]
+fn grey_images_of_16_bits_are_depth_by_their_name() {
+    for (topic, is_depth) in [
+        ("/cam/depth/image_raw", true),
+        ("/cam/aligned_depth_to_color/image_raw", true),
+        ("/device_0/sensor_0/Depth_0/image/data", true),
+        ("/cam/depth/ir/image", false),
+        ("/cam/infra1/image", false),
+    ] {
+        let mut log = LogWriter::plain();
+        log.fixed("base_link", "optical", &level_pose());
+        info(&mut log, "/cam/color/camera_info", "optical", (16, 12));
+        colour("/cam/color/image_raw", "optical").write(&mut log, recorded);
+        Stream { encoding: "mono16", ..depth(topic, "optical") }.write(&mut log, recorded);
+        let (source, _saved) = open(log, Inputs::ANY);
+        assert_eq!(used(&source, "depth") == topic, is_depth, "{topic}");
+        if !is_depth {
+            assert!(entry(&source, topic).problem.as_ref().unwrap().contains("could be depth"));
+        }
+    }
+}
+
+#[test]
+fn all_scanners_of_the_robot_are_used_and_others_are_told() {
+    for (first, second, frame, is_used) in [
+        ("/scan_front", "/scan_rear", "rear", true),
+        ("/scan", "/back/scan", "rear", true),
+        ("/laser/left/scan", "/laser/right/scan", "rear", true),
+        ("/scan", "/scan_filtered", "front", false),
+        ("/scan", "/other/scan", "unknown", false),
+    ] {
+        let mut log = LogWriter::plain();
+        log.fixed("base_link", "front", &Isometry3::translation(0.2, 0.0, 0.3));
+        log.fixed("base_link", "rear", &Isometry3::translation(-0.2, 0.0, 0.3));
+        for index in 0..4 {
+            for (topic, frame) in [(first, "front"), (second, frame)] {
+                log.message(topic, recorded(index), &sweep(recorded(index), frame));
+            }
+        }
+        let (mut source, _saved) = open(log, Inputs::NONE.require(Input::Laser));
+        let frame = source.next_frame().unwrap().frame;
+        assert_eq!(frame.scans().count(), 1 + usize::from(is_used), "{second}");
+        let told = entry(&source, second);
+        assert_eq!(told.used_as.is_some() && told.problem.is_none(), is_used, "{told}");
+        assert_eq!(told.problem.is_none(), is_used, "{told}");
+    }
+}
+
+fn sweep(stamp: Stamp, frame: &str) -> LaserScan {
+    LaserScan {
+        header: Header::new(stamp, frame),
+        angle_min: -0.5,
+        angle_max: 0.5,
+        angle_increment: 0.01,
+        range_min: 0.1,
+        range_max: 10.0,
+        ranges: vec![2.0; 101],
+        ..LaserScan::default()
+    }
+}

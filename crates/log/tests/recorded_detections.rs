@@ -1,0 +1,243 @@
+//! Recorded detections: their classes, their rates and the layouts of their messages.
+#![allow(clippy::unwrap_used, reason = "a failing test may panic")]
+
+#[path = "common/mod.rs"]
+mod common;
+
+use common::{LogWriter, at, camera, level_pose};
+use serde::Serialize;
+use tagalong_core::Stamp;
+use tagalong_log::msgs::{
+    BoundingBox2D, Detection2D, Detection2DArray, Header, ObjectHypothesis,
+    ObjectHypothesisWithPose, Point2D, Pose2D, PoseWithCovariance, encode,
+};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
+
+const TOPIC: &str = "/detections";
+
+fn started(frames: u32) -> LogWriter {
+    let mut log = LogWriter::plain();
+    log.info("/camera/color/camera_info", "colour", &camera(16, 12, 14.0));
+    log.fixed("base_link", "colour", &level_pose());
+    (0..frames).for_each(|index| log.colour(stamp(index)));
+    log
+}
+
+fn stamp(index: u32) -> Stamp {
+    at(0.1 * f64::from(index))
+}
+
+/// Returns the recorded detections of each frame; `None` for frames without a message.
+fn read(log: LogWriter, classes: &[&str]) -> (Vec<Option<usize>>, FrameSource) {
+    let saved = log.save();
+    let input = InputSettings {
+        detections_topic: Some(TOPIC.into()),
+        detection_classes: classes.iter().map(|class| (*class).to_owned()).collect(),
+        ..InputSettings::default()
+    };
+    let inputs = Inputs::NONE.require(Input::Colour).require(Input::Detections);
+    let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), inputs).unwrap();
+    let frames = std::iter::from_fn(|| source.next_frame());
+    let counts = frames.map(|found| found.frame.recorded().map(<[_]>::len)).collect();
+    (counts, source)
+}
+
+fn array(stamp: Stamp, classes: &[&str]) -> Detection2DArray {
+    let header = Header::new(stamp, "colour");
+    let detections = classes.iter().map(|class| {
+        let hypothesis = ObjectHypothesis { class_id: (*class).to_owned(), score: 0.9 };
+        let pose = PoseWithCovariance::default();
+        let center = Pose2D { position: Point2D { x: 8.0, y: 6.0 }, theta: 0.0 };
+        Detection2D {
+            header: header.clone(),
+            results: vec![ObjectHypothesisWithPose { hypothesis, pose }],
+            bbox: BoundingBox2D { center, size_x: 4.0, size_y: 6.0 },
+            id: String::new(),
+        }
+    });
+    Detection2DArray { header: header.clone(), detections: detections.collect() }
+}
+
+#[test]
+fn people_are_taken_and_other_classes_are_named() {
+    for (classes, settings, taken) in [
+        (&["person", "chair"][..], &[][..], 1),
+        (&["Pedestrian", "HUMAN", "dog"], &[], 2),
+        (&["0", "56"], &[], 1),
+        (&["", ""], &[], 2),
+        (&["person", "chair"], &["chair"], 1),
+        (&["1", "0"], &["1"], 1),
+        (&["upper_body", "hand"], &["upper body", "hand"], 2),
+        (&["car", "truck"], &[], 0),
+    ] {
+        let mut log = started(1);
+        log.message(TOPIC, stamp(0), &array(stamp(0), classes));
+        let (counts, source) = read(log, settings);
+        assert_eq!(counts, [Some(taken)], "{classes:?} {settings:?}");
+        let others = classes.len() - taken;
+        let counted = source.counters().get("detections_of_other_classes").copied().unwrap_or(0);
+        assert_eq!(counted, others as u64, "{classes:?}");
+        let told = source.notes().iter().any(|note| note.contains("detection_classes"));
+        assert_eq!(told, others > 0, "{:?}", source.notes());
+    }
+}
+
+#[test]
+fn no_message_is_no_look_and_an_empty_one_is_nobody() {
+    for every in [1, 2, 3, 5, 7] {
+        let mut log = started(10);
+        for index in (0..10).step_by(every) {
+            let classes: &[&str] = if index == 0 { &[] } else { &["person"] };
+            let index = index as u32;
+            log.message(TOPIC, stamp(index), &array(stamp(index), classes));
+        }
+        let (counts, _) = read(log, &[]);
+        for (index, count) in counts.iter().enumerate() {
+            let expected = (index % every == 0).then_some(usize::from(index > 0));
+            assert_eq!(*count, expected, "frame {index}, every {every}");
+        }
+    }
+}
+
+/// Foxy's hypothesis: a text and a score beside the pose.
+#[derive(Serialize)]
+struct FoxyHypothesis {
+    id: String,
+    score: f64,
+    pose: PoseWithCovariance,
+}
+
+#[derive(Serialize)]
+struct FlatPose {
+    x: f64,
+    y: f64,
+    theta: f64,
+}
+
+#[derive(Serialize)]
+struct FlatBox {
+    center: FlatPose,
+    size_x: f64,
+    size_y: f64,
+}
+
+const FLAT_BOX: FlatBox =
+    FlatBox { center: FlatPose { x: 8.0, y: 6.0, theta: 0.0 }, size_x: 4.0, size_y: 6.0 };
+
+#[derive(Serialize)]
+struct Foxy<'a> {
+    header: Header,
+    results: Vec<FoxyHypothesis>,
+    bbox: FlatBox,
+    source_img: tagalong_log::msgs::Image<'a>,
+    is_tracking: bool,
+    tracking_id: String,
+}
+
+fn foxy() -> Vec<u8> {
+    let header = Header::new(stamp(0), "colour");
+    let pose = PoseWithCovariance::default();
+    let hypothesis = FoxyHypothesis { id: "person".into(), score: 0.9, pose };
+    let one = Foxy {
+        header: header.clone(),
+        results: vec![hypothesis],
+        bbox: FLAT_BOX,
+        source_img: tagalong_log::msgs::Image::default(),
+        is_tracking: false,
+        tracking_id: String::new(),
+    };
+    encode(&(header, vec![one]))
+}
+
+#[derive(Serialize)]
+struct YoloBox {
+    center: Pose2D,
+    size: Point2D,
+}
+
+#[derive(Serialize)]
+struct Yolo {
+    class_id: i32,
+    class_name: String,
+    score: f64,
+    id: String,
+    bbox: YoloBox,
+}
+
+fn yolo() -> Vec<u8> {
+    let center = Pose2D { position: Point2D { x: 8.0, y: 6.0 }, theta: 0.0 };
+    let bbox = YoloBox { center, size: Point2D { x: 4.0, y: 6.0 } };
+    let one =
+        Yolo { class_id: 0, class_name: "person".into(), score: 0.9, id: String::new(), bbox };
+    encode(&(Header::new(stamp(0), "colour"), vec![one]))
+}
+
+const YOLO: &str = "std_msgs/Header header\nyolo_msgs/Detection[] detections\n====\n\
+    MSG: yolo_msgs/Detection\nint32 class_id\nstring class_name\nfloat64 score\nstring id\n\
+    yolo_msgs/BoundingBox2D bbox\n====\nMSG: yolo_msgs/BoundingBox2D\nyolo_msgs/Pose2D center\n\
+    yolo_msgs/Vector2 size\n====\nMSG: yolo_msgs/Pose2D\nyolo_msgs/Point2D position\n\
+    float64 theta\n====\nMSG: yolo_msgs/Point2D\nfloat64 x\nfloat64 y\n====\n\
+    MSG: yolo_msgs/Vector2\nfloat64 x\nfloat64 y\n";
+
+/// Returns a message as ROS 1 Noetic writes it, with a number as the class.
+fn noetic(class: i64) -> Vec<u8> {
+    let header = |out: &mut Vec<u8>| {
+        let time = stamp(0);
+        let seconds = (time.nanos() / 1_000_000_000) as u32;
+        let nanos = (time.nanos() % 1_000_000_000) as u32;
+        for word in [7_u32, seconds, nanos, 6] {
+            out.extend(word.to_le_bytes());
+        }
+        out.extend(b"colour");
+    };
+    let mut out = Vec::new();
+    header(&mut out);
+    out.extend(1_u32.to_le_bytes());
+    header(&mut out);
+    out.extend(1_u32.to_le_bytes());
+    out.extend(class.to_le_bytes());
+    out.extend(0.9_f64.to_le_bytes());
+    out.extend([0_u8; (7 + 36) * 8]);
+    for value in [8.0_f64, 6.0, 0.0, 4.0, 6.0] {
+        out.extend(value.to_le_bytes());
+    }
+    header(&mut out);
+    // Height, width, no encoding, byte, step, no data.
+    out.extend([0_u8; 4 + 4 + 4 + 1 + 4 + 4]);
+    out
+}
+
+const FOXY: &str = include_str!("../msgs/Detection2DArray-foxy.msg");
+const NOETIC: &str = include_str!("../msgs/Detection2DArray-noetic.msg");
+
+#[test]
+fn older_and_other_layouts_are_read_by_the_definition_in_the_log() {
+    let boxes = "vision_msgs/msg/Detection2DArray";
+    for (name, definition, encoding, data) in [
+        (boxes, FOXY, "cdr", foxy()),
+        // A database has no definitions: the layouts that are known are tried.
+        (boxes, "", "cdr", foxy()),
+        ("vision_msgs/Detection2DArray", NOETIC, "ros1", noetic(0)),
+        ("vision_msgs/Detection2DArray", "", "ros1", noetic(0)),
+        ("yolo_msgs/msg/DetectionArray", YOLO, "cdr", yolo()),
+        (boxes, "", "cdr", encode(&array(stamp(0), &["person"]))),
+    ] {
+        let mut log = started(1);
+        log.defined(TOPIC, (name, definition), encoding, stamp(0), &data);
+        let (counts, source) = read(log, &[]);
+        assert_eq!(counts, [Some(1)], "{name} {encoding}: {:?}", source.notes());
+        assert!(!source.data_lost(), "{:?}", source.notes());
+    }
+}
+
+#[test]
+fn a_layout_that_is_not_known_is_a_loss_with_its_reason() {
+    let mut log = started(1);
+    let mut data = foxy();
+    data.truncate(data.len() - 40);
+    log.defined(TOPIC, ("vision_msgs/msg/Detection2DArray", FOXY), "cdr", stamp(0), &data);
+    let (counts, source) = read(log, &[]);
+    assert_eq!(counts, [None]);
+    let told = source.notes().iter().any(|note| note.contains("it ends early"));
+    assert!(source.data_lost() && told, "{:?}", source.notes());
+}
