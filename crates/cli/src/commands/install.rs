@@ -126,7 +126,8 @@ fn check_free(file: &Path, name: &str, sha256: &str) -> Result<(), Failure> {
     }
 }
 
-fn hash_of(bytes: &[u8]) -> String {
+/// Returns the SHA-256 of bytes in hexadecimal digits.
+pub(super) fn hash_of(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

@@ -1,4 +1,5 @@
 use std::fmt::Write as _;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -16,8 +17,8 @@ use tagalong_network::{
 };
 
 use super::export::Export;
-use super::install::Install;
-use super::networks;
+use super::install::{Install, hash_of};
+use super::networks::{self, KnownNetwork};
 
 /// The config for a network of the user, without a network.
 const COLOUR_NET: &str = include_str!("../../configs/colour-net.toml");
@@ -87,6 +88,8 @@ pub(super) struct KnownDetector<'a> {
     pub(super) family: Family,
     pub(super) input: InputSize,
     pub(super) call_ms: f64,
+    /// The entry of the table of networks, for a file that is in it.
+    published: Option<&'static KnownNetwork>,
 }
 
 /// Runs `tagalong model`.
@@ -170,7 +173,8 @@ fn known<'a>(
         }
         Err(_) => 0.0,
     };
-    Ok(Known::Detector(KnownDetector { about, family, input, call_ms }))
+    let published = fs::read(file).ok().and_then(|bytes| networks::known_by_hash(&hash_of(&bytes)));
+    Ok(Known::Detector(KnownDetector { about, family, input, call_ms, published }))
 }
 
 /// Returns the time of the fastest of some calls.
@@ -256,6 +260,14 @@ impl KnownDetector<'_> {
         let is_open = |port: &Port| port.shape.len() == 4 && port.shape[1..].contains(&None);
         if self.about.inputs.iter().any(is_open) {
             let _ = writeln!(lines, "size = [{}, {}]", self.input.width, self.input.height);
+        }
+        if let Some(network) = self.published {
+            let scores =
+                [("discover_score", network.discover_score), ("track_score", network.track_score)];
+            for (key, score) in scores {
+                // A number of Rust is one of TOML.
+                let _ = score.map(|score| writeln!(lines, "{key} = {score:?}"));
+            }
         }
         let config = COLOUR_NET.find(DETECTORS).map_or("", |at| &COLOUR_NET[at..]);
         let _ = write!(out, "\n{}", config.replacen(NO_MODEL, &lines, 1));

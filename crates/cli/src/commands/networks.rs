@@ -26,6 +26,9 @@ pub(super) struct KnownNetwork {
     pub(super) licence: String,
     /// Where its authors publish it.
     pub(super) published: String,
+    /// Settings of `onnx` that were chosen for it on recorded logs.
+    pub(super) discover_score: Option<f64>,
+    pub(super) track_score: Option<f64>,
     /// Time of a call on one thread, ms.
     call_ms: f64,
     #[serde(default)]
