@@ -144,7 +144,7 @@ pub const MOST_FRAMES: u32 = 1_000_000;
 const FRAMES_OF_A_ROW: usize = 10;
 
 /// Largest number of a person or a track: all whole numbers up to it are told apart as `f64`.
-pub const MOST_ID: i64 = 9_000_000_000_000_000;
+pub const MOST_ID: i64 = 8_999_999_999_999_999;
 
 /// One line cut into fields, with its place for error messages.
 struct Line<'a> {
