@@ -6,6 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use tagalong_config::{FileLimit, read_text};
 use tagalong_network::networks_folder;
 
 /// Name of the config of the default network.
@@ -81,7 +82,7 @@ fn installed_in(folder: &Path) -> Vec<String> {
 
 /// Returns the network that the file `default` names, or else the first one.
 fn default_in(folder: &Path, installed: &[String]) -> Option<String> {
-    let named = fs::read_to_string(folder.join(DEFAULT)).unwrap_or_default();
+    let named = read_text(&folder.join(DEFAULT), FileLimit::Config).unwrap_or_default();
     let named = installed.iter().find(|name| *name == named.trim());
     named.or(installed.first()).cloned()
 }

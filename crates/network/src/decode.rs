@@ -233,7 +233,6 @@ pub(crate) fn scores_and_sides<'a>(
         });
         return Some(by_stride.into());
     }
-    let are_scores = |tensor: &Tensor| tensor.values().iter().copied().all(is_score);
     let mut by_stride = Vec::new();
     for stride in STRIDES {
         let cells = count_cells(input, &[stride]);
@@ -241,11 +240,10 @@ pub(crate) fn scores_and_sides<'a>(
         let pair: Vec<&Tensor> =
             of_stride.filter(|tensor| tensor.shape().get(1) == Some(&cells)).collect();
         let [a, b] = pair[..] else { return None };
-        let (scores, sides) = match (are_scores(a), are_scores(b)) {
-            (true, false) => (a, b),
-            (false, true) => (b, a),
-            _ => return None,
-        };
+        if has_scores(a) == has_scores(b) {
+            return None;
+        }
+        let [scores, sides] = if has_scores(a) { [a, b] } else { [b, a] };
         let width = sides.shape().last().copied().unwrap_or(0);
         if !NANODET_M_BINS.iter().any(|bins| 4 * bins == width) {
             return None;
@@ -257,6 +255,11 @@ pub(crate) fn scores_and_sides<'a>(
         });
     }
     Some(by_stride)
+}
+
+/// Returns true if all numbers are scores.
+fn has_scores(tensor: &Tensor) -> bool {
+    tensor.values().iter().copied().all(is_score)
 }
 
 /// Returns nothing for numbers that are not those of the family.

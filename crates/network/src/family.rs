@@ -106,14 +106,24 @@ impl<'a> Outputs<'a> {
             }
         }
         let widths = widths.filter(|_| self.0.len() == 2 * STRIDES.len())?;
-        let are_bins = |width: usize| NANODET_M_BINS.contains(&(width / 4)) && width % 4 == 0;
-        match (are_bins(widths[0]), are_bins(widths[1])) {
-            (true, false) => Some(widths[1]),
-            (false, true) => Some(widths[0]),
-            (true, true) => Some(0),
-            (false, false) => None,
+        let [a, b] = [widths[0], widths[1]];
+        if !is_distribution(a) && !is_distribution(b) {
+            return None;
         }
+        // Where both widths are those of distributions, values tell.
+        Some(if !is_distribution(a) {
+            a
+        } else if !is_distribution(b) {
+            b
+        } else {
+            0
+        })
     }
+}
+
+/// Returns true for the width of the distributions of all sides of NanoDet before Plus.
+fn is_distribution(width: usize) -> bool {
+    NANODET_M_BINS.iter().any(|bins| 4 * bins == width)
 }
 
 impl Family {

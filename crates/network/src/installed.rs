@@ -56,8 +56,8 @@ mod tests {
 
     #[test]
     fn the_folder_is_that_of_the_user() {
-        let home: Variables = |name| (name == "HOME").then(|| "/home/ann".into());
-        let share = "/home/ann/.local/share/tagalong/networks";
+        let home: Variables = |name| (name == "HOME").then(|| "/users/ann".into());
+        let share = "/users/ann/.local/share/tagalong/networks";
         assert_eq!(networks_folder_of(home), Some(share.into()));
         let xdg: Variables = |name| (name != DATA_FOLDER).then(|| "/data".into());
         assert_eq!(networks_folder_of(xdg), Some("/data/tagalong/networks".into()));
@@ -65,7 +65,7 @@ mod tests {
         assert_eq!(networks_folder_of(relative), None);
         let own: Variables = |name| Some(if name == DATA_FOLDER { "mine" } else { "/data" }.into());
         assert_eq!(networks_folder_of(own), Some("mine/networks".into()));
-        let empty: Variables = |name| Some(if name == "HOME" { "/home/ann" } else { "" }.into());
+        let empty: Variables = |name| Some(if name == "HOME" { "/users/ann" } else { "" }.into());
         assert_eq!(networks_folder_of(empty), Some(share.into()));
     }
 

@@ -1,12 +1,13 @@
 use std::fmt::Write as _;
-use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use sha2::{Digest, Sha256};
 use tagalong_app::installed::NetworkFiles;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, write_file};
-use tagalong_network::{About, DATA_FOLDER, networks_folder};
+use tagalong_config::{FileLimit, read_bytes};
+use tagalong_network::{About, DATA_FOLDER, Limits, networks_folder};
 
 use super::model::{Known, as_text};
 use super::networks::{self, KnownNetwork};
@@ -29,7 +30,7 @@ impl Install<'_> {
     /// A name that is no plain word, or that another network has; files that cannot be read or
     /// written.
     pub(super) fn run(&self) -> Outcome {
-        let bytes = fs::read(self.file)
+        let bytes = read_network(self.file)
             .map_err(|why| Failure::failed(format!("{}: {why}", self.file.display())))?;
         let sha256 = hash_of(&bytes);
         let published = networks::known_by_hash(&sha256);
@@ -117,13 +118,21 @@ fn folder() -> Result<PathBuf, Failure> {
 
 /// Refuses a name that another network has.
 fn check_free(file: &Path, name: &str, sha256: &str) -> Result<(), Failure> {
-    match fs::read(file) {
+    match read_network(file) {
         Ok(present) if hash_of(&present) != sha256 => Err(Failure::failed(format!(
             "another network is installed as `{name}` ({}): give another --name, or delete it",
             file.display()
         ))),
         _ => Ok(()),
     }
+}
+
+/// Reads the bytes of a network.
+///
+/// # Errors
+/// A file that cannot be read, or that is larger than networks may be.
+pub(super) fn read_network(file: &Path) -> io::Result<Vec<u8>> {
+    read_bytes(file, FileLimit::Bytes(Limits::default().file_bytes))
 }
 
 /// Returns the SHA-256 of bytes in hexadecimal digits.

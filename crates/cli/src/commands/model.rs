@@ -1,5 +1,4 @@
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -17,7 +16,7 @@ use tagalong_network::{
 };
 
 use super::export::Export;
-use super::install::{Install, hash_of};
+use super::install::{Install, hash_of, read_network};
 use super::networks::{self, KnownNetwork};
 
 /// The config for a network of the user, without a network.
@@ -173,7 +172,8 @@ fn known<'a>(
         }
         Err(_) => 0.0,
     };
-    let published = fs::read(file).ok().and_then(|bytes| networks::known_by_hash(&hash_of(&bytes)));
+    let published =
+        read_network(file).ok().and_then(|bytes| networks::known_by_hash(&hash_of(&bytes)));
     Ok(Known::Detector(KnownDetector { about, family, input, call_ms, published }))
 }
 

@@ -20,7 +20,7 @@ pub(super) struct KnownNetwork {
     file: String,
     bytes: u64,
     sha256: String,
-    /// What it finds.
+    /// Objects that it finds, in words.
     finds: String,
     /// Licence of the weights.
     pub(super) licence: String,

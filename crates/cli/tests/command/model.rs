@@ -60,7 +60,8 @@ fn known_networks_are_listed_with_their_licences() {
     let home = tempfile::tempdir().unwrap();
     let told = tagalong().args(["model", "--list"]).env("TAGALONG_HOME", home.path()).output();
     let told = text(&told.unwrap().stdout);
-    for part in ["yolox-nano", "yolox_nano.onnx, 3.7 MB, Apache-2.0", "https://", "HOTA", "None is"] {
+    for part in ["yolox-nano", "yolox_nano.onnx, 3.7 MB, Apache-2.0", "https://", "HOTA", "None is"]
+    {
         assert!(told.contains(part), "{part}: {told}");
     }
 }
@@ -80,7 +81,10 @@ fn an_installed_network_has_a_name() {
     assert!(text(&told.stdout).contains("model = \"blob-finder\""), "{}", text(&told.stdout));
     let card = fs::read_to_string(place("data/networks/blob-finder.card.toml")).unwrap();
     let card: toml::Table = card.parse().unwrap();
-    assert_eq!((card["family"].as_str(), card["file"].as_str()), (Some("yolox"), Some("yolox.onnx")));
+    assert_eq!(
+        (card["family"].as_str(), card["file"].as_str()),
+        (Some("yolox"), Some("yolox.onnx"))
+    );
     // A config names it, and it is a config by itself.
     let own = "[[detectors]]\nplugin = \"onnx\"\nconfig = { model = \"blob-finder\" }\n\
                [filter]\nplugin = \"image-kalman\"\n";
