@@ -184,7 +184,7 @@ fn a_camera_that_is_not_there_is_refused_with_those_that_are() {
         ..InputSettings::default()
     };
     let error = open_with(two_devices(&DEVICES[0]), &input, DEPTH).err().unwrap().to_string();
-    assert!(error.contains("`/side`") && error.contains("/front_camera, "), "{error}");
+    assert!(error.contains("`/side`") && error.contains("/back_camera, /front_camera"), "{error}");
 }
 
 #[test]
@@ -327,8 +327,9 @@ fn stamps_that_are_never_set_are_replaced_by_the_times_of_recording() {
             let mut log = LogWriter::plain();
             log.fixed("base_link", "optical", &level_pose());
             info(&mut log, "/cam/camera_info", "optical", (16, 12));
-            colour("/cam/color", "optical").write(&mut log, |_| stamp);
+            // Depth first, because an image does not wait for it until the end of the log.
             depth("/cam/depth", "optical").write(&mut log, |_| stamp);
+            colour("/cam/color", "optical").write(&mut log, |_| stamp);
             log
         };
         let (mut source, _saved) = open(log(), DEPTH);

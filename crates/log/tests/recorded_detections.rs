@@ -15,11 +15,11 @@ use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 
 const TOPIC: &str = "/detections";
 
-fn started(frames: u32) -> LogWriter {
+/// Starts a log whose images follow with [`read`].
+fn started() -> LogWriter {
     let mut log = LogWriter::plain();
     log.info("/camera/color/camera_info", "colour", &camera(16, 12, 14.0));
     log.fixed("base_link", "colour", &level_pose());
-    (0..frames).for_each(|index| log.colour(stamp(index)));
     log
 }
 
@@ -28,7 +28,9 @@ fn stamp(index: u32) -> Stamp {
 }
 
 /// Returns the recorded detections of each frame; `None` for frames without a message.
-fn read(log: LogWriter, classes: &[&str]) -> (Vec<Option<usize>>, FrameSource) {
+fn read(mut log: LogWriter, frames: u32, classes: &[&str]) -> (Vec<Option<usize>>, FrameSource) {
+    // Behind the detections, because an image does not wait for them until the end of the log.
+    (0..frames).for_each(|index| log.colour(stamp(index)));
     let saved = log.save();
     let input = InputSettings {
         detections_topic: Some(TOPIC.into()),
@@ -70,9 +72,9 @@ fn people_are_taken_and_other_classes_are_named() {
         (&["upper_body", "hand"], &["upper body", "hand"], 2),
         (&["car", "truck"], &[], 0),
     ] {
-        let mut log = started(1);
+        let mut log = started();
         log.message(TOPIC, stamp(0), &array(stamp(0), classes));
-        let (counts, source) = read(log, settings);
+        let (counts, source) = read(log, 1, settings);
         assert_eq!(counts, [Some(taken)], "{classes:?} {settings:?}");
         let others = classes.len() - taken;
         let counted = source.counters().get("detections_of_other_classes").copied().unwrap_or(0);
@@ -85,13 +87,13 @@ fn people_are_taken_and_other_classes_are_named() {
 #[test]
 fn no_message_is_no_look_and_an_empty_one_is_nobody() {
     for every in [1, 2, 3, 5, 7] {
-        let mut log = started(10);
+        let mut log = started();
         for index in (0..10).step_by(every) {
             let classes: &[&str] = if index == 0 { &[] } else { &["person"] };
             let index = index as u32;
             log.message(TOPIC, stamp(index), &array(stamp(index), classes));
         }
-        let (counts, _) = read(log, &[]);
+        let (counts, _) = read(log, 10, &[]);
         for (index, count) in counts.iter().enumerate() {
             let expected = (index % every == 0).then_some(usize::from(index > 0));
             assert_eq!(*count, expected, "frame {index}, every {every}");
@@ -222,9 +224,9 @@ fn older_and_other_layouts_are_read_by_the_definition_in_the_log() {
         ("yolo_msgs/msg/DetectionArray", YOLO, "cdr", yolo()),
         (boxes, "", "cdr", encode(&array(stamp(0), &["person"]))),
     ] {
-        let mut log = started(1);
+        let mut log = started();
         log.defined(TOPIC, (name, definition), encoding, stamp(0), &data);
-        let (counts, source) = read(log, &[]);
+        let (counts, source) = read(log, 1, &[]);
         assert_eq!(counts, [Some(1)], "{name} {encoding}: {:?}", source.notes());
         assert!(!source.data_lost(), "{:?}", source.notes());
     }
@@ -232,11 +234,11 @@ fn older_and_other_layouts_are_read_by_the_definition_in_the_log() {
 
 #[test]
 fn a_layout_that_is_not_known_is_a_loss_with_its_reason() {
-    let mut log = started(1);
+    let mut log = started();
     let mut data = foxy();
     data.truncate(data.len() - 40);
     log.defined(TOPIC, ("vision_msgs/msg/Detection2DArray", FOXY), "cdr", stamp(0), &data);
-    let (counts, source) = read(log, &[]);
+    let (counts, source) = read(log, 1, &[]);
     assert_eq!(counts, [None]);
     let told = source.notes().iter().any(|note| note.contains("it ends early"));
     assert!(source.data_lost() && told, "{:?}", source.notes());

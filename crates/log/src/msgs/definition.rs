@@ -368,6 +368,7 @@ mod tests {
     use super::*;
     use crate::msgs::{Detection2DArray, Header, Message, Odometry, encode, encode_big_endian};
     use tagalong_core::Stamp;
+    use tagalong_stats::RandomSource;
 
     #[test]
     fn what_serde_writes_is_read_by_the_definition_in_either_byte_order() {

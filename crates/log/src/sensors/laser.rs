@@ -91,7 +91,7 @@ impl Scans {
             tally.count("laser_scans_without_pose");
             let topic = moment.topic;
             tally.note(format!(
-                "tf does not connect the scanner of {topic} with the robot: it is not used"
+                "tf does not connect the laser scanner of {topic} with the robot: it is not used"
             ));
             return None;
         };
@@ -190,7 +190,7 @@ pub(crate) fn scan_fault(scan: &LaserScan) -> Option<String> {
 fn told_view_fault(scan: &LaserScan, view_rad: f64) -> Option<String> {
     let told_rad = f64::from(scan.angle_max) - f64::from(scan.angle_min);
     // Some drivers leave it out, and some turn it by whole turns.
-    if !told_rad.is_finite() || told_rad == 0.0 {
+    if !told_rad.is_finite() || told_rad == 0.0 || scan.ranges.len() < 2 {
         return None;
     }
     let step_rad = f64::from(scan.angle_increment).abs();

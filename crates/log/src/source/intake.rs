@@ -77,7 +77,7 @@ impl Intake {
         }
         let restamped = restamp(message);
         let data = restamped.as_deref().unwrap_or(message.data);
-        self.take_stamped(&Message { data, ..message.clone() }, tally);
+        self.take_stamped(&Message { data, ..*message }, tally);
     }
 
     fn take_stamped(&mut self, message: &Message<'_>, tally: &mut Tally) {

@@ -24,13 +24,14 @@ pub(crate) use kinds::{kind_of, unreadable};
 pub(crate) use name::{Stream, TopicName};
 pub(crate) use problems::Problem;
 use problems::{odometry_problem, scanner_problem};
-use rigs::{Pick, Rig, rigs};
+use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
 
 use crate::obstacles::ObstacleTopic;
 use crate::scan::{Scan, Topic};
 use crate::sensors::{SENSORS, SensorType};
+use crate::source::robot_frame;
 use crate::{InputSettings, LogError};
 
 /// Topics that are read.
@@ -250,11 +251,11 @@ fn wanted_rigs<'a>(
         }
         return Ok(called);
     }
-    for topic in [&named.colour, &named.depth, &named.right].into_iter().flatten() {
-        let of_topic: Vec<&Rig> = all.iter().filter(|rig| rig.has(topic)).collect();
-        if !of_topic.is_empty() {
-            return Ok(of_topic);
-        }
+    for topic in [&named.colour, &named.right, &named.depth].into_iter().flatten() {
+        let Some(own) = all.iter().find(|rig| rig.has(topic)) else { continue };
+        // Depth that the settings name may stand apart from the colour of its device.
+        let may_add = |rig: &Rig| named.colour.is_none() && may_be_one(scan, rig, own);
+        return Ok(all.iter().filter(|rig| rig.has(topic) || may_add(rig)).collect());
     }
     Ok(all.iter().collect())
 }
@@ -279,10 +280,13 @@ fn choose_sensor(
 ) -> Result<Option<String>, LogError> {
     let fits = |topic: &Topic| is_of(sensor, topic);
     let named = named(scan, &sensor.key(), named_topic(sensor, input), fits)?;
+    let robot = robot_frame(scan, input);
     let rank = |name: &str, topic: &Topic| {
         let rank = sensor.rank.filter(|_| is_of(sensor, topic))?(&name.to_lowercase());
-        // Any scanner is better than one whose scans cannot be.
-        Some(if topic.impossible().is_some() { rank - 100 } else { rank })
+        // Any scanner is better than one whose scans cannot be, or whose place is not known.
+        let has_place = topic.frame_id.as_ref().is_none_or(|frame| scan.tf.connects(robot, frame));
+        let is_possible = topic.impossible().is_none();
+        Some(rank - 100 * i32::from(!is_possible) - 50 * i32::from(!has_place))
     };
     Ok(named.or_else(|| best_of(scan, &input.sources, scan.names(), rank)))
 }

@@ -44,7 +44,20 @@ pub(super) fn rigs(scan: &Scan) -> Vec<Rig> {
     for rig in &mut found {
         rig.label = label_of(&rig.topics);
     }
+    let labels: Vec<String> = found.iter().map(|rig| rig.label.clone()).collect();
+    for rig in &mut found {
+        let is_shared = labels.iter().filter(|label| **label == rig.label).count() > 1;
+        if let Some(first) = rig.topics.first().filter(|_| is_shared) {
+            rig.label = words_of(first).unwrap_or_else(|| first.clone());
+        }
+    }
     found
+}
+
+/// Returns the words of the device of a topic, as one; `None` without any.
+fn words_of(topic: &str) -> Option<String> {
+    let words = TopicName::of(topic).device;
+    (!words.is_empty()).then(|| words.join("_"))
 }
 
 /// Splits a group at left and right if each side has depth of its own, which are two devices and no
@@ -103,7 +116,7 @@ fn has_content(scan: &Scan, rig: &Rig, content: Content) -> bool {
 
 /// Returns true if two groups may be streams of one device: by frame, by the mounts in tf, and
 /// without both if their names do not speak of different places.
-fn may_be_one(scan: &Scan, colour: &Rig, depth: &Rig) -> bool {
+pub(super) fn may_be_one(scan: &Scan, colour: &Rig, depth: &Rig) -> bool {
     let mut may_be = false;
     for (a, b) in colour.topics.iter().flat_map(|a| depth.topics.iter().map(move |b| (a, b))) {
         match is_one_mount(scan, a, b) {
@@ -152,12 +165,8 @@ fn label_of(topics: &[String]) -> String {
     if !label.trim_matches('/').is_empty() {
         return label;
     }
-    let device = topics.first().map(|topic| TopicName::of(topic).device).unwrap_or_default();
-    match (device.is_empty(), topics.first()) {
-        (false, _) => device.join("_"),
-        (true, Some(first)) => first.clone(),
-        (true, None) => String::new(),
-    }
+    let first = topics.first().cloned().unwrap_or_default();
+    words_of(&first).unwrap_or(first)
 }
 
 impl Rig {
