@@ -86,7 +86,8 @@ fn a_refused_enrollment_gives_its_reason_and_changes_nothing() {
 
 #[test]
 fn clear_slows_the_robot_down_and_no_person_is_followed_after_it() {
-    let mut ride = ride("");
+    // With time to come to rest the robot would stop for the person aside.
+    let mut ride = ride("[command_limiter]\nsettle_s = 0.0");
     let status = ride.go_on(15);
     assert_eq!((status.follows, status.command), (true, "limited"), "it wishes for 2 and 4 m/s");
     ride.pipeline.clear();
