@@ -45,7 +45,8 @@ fn walk(path: &Path, images: bool) -> usize {
 fn reading(c: &mut Criterion) {
     for name in ["um", "lab2-camera2"] {
         let Some(path) = tagalong_testdata::find(&format!("logs/{name}.mcap")) else { continue };
-        let (input, limits) = (InputSettings::default(), Limits::default());
+        let input = InputSettings::default();
+        let limits = Limits::default();
         let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
         c.bench_function(&format!("{name}: messages alone"), |b| b.iter(|| walk(&path, false)));
         c.bench_function(&format!("{name}: messages and pictures"), |b| {

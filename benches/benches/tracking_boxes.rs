@@ -21,9 +21,11 @@ const RECORDED: &str = include_str!("../../configs/recorded.toml");
 /// Measures the widest search there is, and the cost of each person in plain view.
 fn correlation(criterion: &mut Criterion) {
     let camera = camera();
-    let (sure, unsure) = (track(&camera, 0.1), track(&camera, 0.4));
+    let sure = track(&camera, 0.1);
+    let unsure = track(&camera, 0.4);
     let of = sure.estimate.region;
-    let (seen, in_shadow) = (frame(&camera, of, 1, 2.92), frame(&camera, of, 2, f32::NAN));
+    let seen = frame(&camera, of, 1, 2.92);
+    let in_shadow = frame(&camera, of, 2, f32::NAN);
     let mut detector =
         Correlation::new(tagalong_correlation::Config::default()).expect("the defaults work");
     let learn = |detector: &mut Correlation| {

@@ -27,7 +27,8 @@ const ABOVE_M: f64 = 0.025;
 /// Returns the box of the standing person with this upper body.
 fn whole_body(square: &Rect) -> Rect {
     let px_per_m = square.width / UPPER_BODY_SIDE_M;
-    let (height, width) = (STANDING_M * px_per_m, WIDTH * STANDING_M * px_per_m);
+    let height = STANDING_M * px_per_m;
+    let width = WIDTH * STANDING_M * px_per_m;
     Rect::new(square.centre().x - 0.5 * width, square.y + ABOVE_M * px_per_m, width, height)
 }
 
@@ -37,7 +38,9 @@ fn add_lines(text: &mut String, frame: &Frame, found: &[Detection], is_whole: bo
         let square = detection.rect_in(&frame.camera);
         let region = if is_whole { whole_body(&square) } else { square };
         let Rect { x, y, width, height } = region.clipped(frame.camera.width, frame.camera.height);
-        let (index, id, score) = (frame.index, frame.index * 1000 + number as u64, detection.score);
+        let index = frame.index;
+        let id = frame.index * 1000 + number as u64;
+        let score = detection.score;
         writeln!(text, "{index},{id},{x:.2},{y:.2},{width:.2},{height:.2},{score:.6},-1,-1,-1")
             .expect("a string takes any text");
     }
@@ -60,7 +63,9 @@ fn main() {
     let context = Context { seed: 1, base_dir: PathBuf::new(), wheels };
     let mut detector = HogUpperBody::new(config, &context).expect("the settings are right");
     let mut frames = source(Path::new(log), inputs == "depth");
-    let (mut text, mut count, mut work_ms) = (String::new(), 0_u32, 0.0);
+    let mut text = String::new();
+    let mut count = 0_u32;
+    let mut work_ms = 0.0;
     let everywhere = Query::Discover { occupied: &[] };
     while let Some(item) = frames.next_frame() {
         // The grey image is made here, so that its decoding is not timed.

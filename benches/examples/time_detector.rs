@@ -15,7 +15,8 @@ use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 
 /// All frames of a log, with their grey images made.
 fn frames(log: &Path) -> Vec<Frame> {
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
     let mut source = FrameSource::open(log, &input, &limits, inputs).expect("the log can be read");
     let mut frames = Vec::new();
@@ -29,7 +30,8 @@ fn frames(log: &Path) -> Vec<Frame> {
 fn write(frames: &[Frame], folder: &Path) {
     for (index, frame) in frames.iter().enumerate() {
         let grey = frame.grey().expect("it has images");
-        let (width, height) = (grey.width() as u32, grey.height() as u32);
+        let width = grey.width() as u32;
+        let height = grey.height() as u32;
         let image = image::GrayImage::from_raw(width, height, grey.pixels().to_vec());
         let path = folder.join(format!("{index:05}.png"));
         image.expect("all pixels").save(path).expect("the folder can be written");
@@ -56,7 +58,8 @@ fn main() {
         words.into_iter().partition(|word| word.contains('='));
     let [log, plugin, runs, folder @ ..] = &words[..] else { panic!("LOG PLUGIN RUNS [FOLDER]") };
     let runs: usize = runs.parse().expect("RUNS is a number");
-    let (mut detector, frames) = (detector(plugin, &settings), frames(Path::new(log)));
+    let mut detector = detector(plugin, &settings);
+    let frames = frames(Path::new(log));
     folder.iter().for_each(|folder| write(&frames, Path::new(folder)));
     let everywhere = Query::Discover { occupied: &[] };
     let mut found = 0;

@@ -32,7 +32,8 @@ fn weighing(count: usize, held: bool) -> Result<f64, Box<dyn Error>> {
     let depth = Arc::new(overlapping::depth(&camera));
     let weigher = Weigher::new(&DepthTemplateConfig::default());
     let people = overlapping::scenes(count, held);
-    let (mut best, mut out) = (f64::INFINITY, Vec::new());
+    let mut best = f64::INFINITY;
+    let mut out = Vec::new();
     for index in 1..=CALLS {
         let frame = overlapping::frame(index, &depth, &camera);
         weigher.log_likelihood(&frame, &[])?;

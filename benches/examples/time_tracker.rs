@@ -54,7 +54,8 @@ impl Detector for Grid {
         let side = (self.people as f64).sqrt().ceil() as usize;
         let mut off = || self.random.between(-0.05, 0.05);
         let found = (0..self.people).map(|i| {
-            let (row, column) = ((i / side) as f64, (i % side) as f64 - 0.5 * (side - 1) as f64);
+            let row = (i / side) as f64;
+            let column = (i % side) as f64 - 0.5 * (side - 1) as f64;
             let position = Point3::new(2.0 + 1.1 * row + off(), 1.1 * column + off(), 1.6 + off());
             Detection {
                 image: Some(ImageBox::upper_body(frame.camera.upper_body(&position))),
@@ -86,7 +87,8 @@ fn median_us(people: usize) -> f64 {
     let mut times = Vec::new();
     for index in 0..FIRST + TIMED {
         let stamp = Stamp::from_nanos(index * FRAME_NS);
-        let (motion, images) = (EgoMotion::at_rest(0.1), Images::default());
+        let motion = EgoMotion::at_rest(0.1);
+        let images = Images::default();
         let frame = Frame::new(index, stamp, Arc::clone(&camera), motion, images);
         let start = Instant::now();
         let report = pipeline.step(&frame).expect("nothing fails");

@@ -104,7 +104,8 @@ fn matched(truth: &[&Annotation], found: &[(u32, Rect)]) -> Vec<(usize, usize)> 
     pairs.retain(|p| p.0 >= MIN_IOU);
     // Equal overlaps are ordered by index, so that the score is repeatable.
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let (mut truths, mut boxes) = (BTreeSet::new(), BTreeSet::new());
+    let mut truths = BTreeSet::new();
+    let mut boxes = BTreeSet::new();
     pairs
         .into_iter()
         .filter_map(|(_, t, b)| {

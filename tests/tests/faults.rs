@@ -77,7 +77,8 @@ fn record(camera: &Camera, shots: &[Shot], fault: Fault) -> Recorded {
     let delay = |index: usize| fault.delay_s * ((index * 7) % 5) as f64 / 4.0;
     let mut images = Vec::new();
     for (index, shot) in shots.iter().enumerate() {
-        let (stamp, later) = (at(index), at(index).plus_seconds(fault.skew_s));
+        let stamp = at(index);
+        let later = at(index).plus_seconds(fault.skew_s);
         images.push((stamp.plus_seconds(delay(2 * index)), stamp, shot, false));
         if !fault.half_depth || index % 2 == 0 {
             images.push((later.plus_seconds(delay(2 * index + 1)), later, shot, true));
@@ -96,8 +97,10 @@ fn record(camera: &Camera, shots: &[Shot], fault: Fault) -> Recorded {
 }
 
 fn send(log: &mut MessageLog, recorded: Stamp, stamp: Stamp, images: &Images, is_depth: bool) {
-    let (colour, depth) = (images.colour.as_ref().unwrap(), images.depth.as_ref().unwrap());
-    let (width, height) = (colour.width() as u32, colour.height() as u32);
+    let colour = images.colour.as_ref().unwrap();
+    let depth = images.depth.as_ref().unwrap();
+    let width = colour.width() as u32;
+    let height = colour.height() as u32;
     let floats: Vec<u8> = depth.pixels().iter().flat_map(|z| z.to_le_bytes()).collect();
     let (topic, encoding, step, data) = match is_depth {
         true => ("/camera/depth", "32FC1", 4 * width, &floats[..]),
@@ -133,7 +136,8 @@ struct Run {
 
 fn run(recorded: &Recorded) -> Run {
     let inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let mut source = FrameSource::open(&recorded.path, &input, &limits, inputs).unwrap();
     let mut pipeline = pipeline("depth-ekf.toml");
     let mut tracks = Vec::new();
@@ -141,8 +145,8 @@ fn run(recorded: &Recorded) -> Run {
         tracks.push((found.frame.stamp, pipeline.step(&found.frame).unwrap().tracks));
     }
     let count = |name| source.counters().get(name).copied().unwrap_or(0);
-    let (colour_alone, depth_alone) =
-        (count("colour_without_depth"), count("depth_without_colour"));
+    let colour_alone = count("colour_without_depth");
+    let depth_alone = count("depth_without_colour");
     Run { tracks, colour_alone, depth_alone }
 }
 

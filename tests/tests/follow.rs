@@ -92,7 +92,8 @@ fn the_robot_stays_with_a_person_who_walks() {
     assert!(steps.len() > 100, "{} frames", steps.len());
     for Step { at_s, target, person, .. } in &steps {
         let head = person.head_in_robot;
-        let (range_m, bearing) = (head.x.hypot(head.y), head.y.atan2(head.x).to_degrees());
+        let range_m = head.x.hypot(head.y);
+        let bearing = head.y.atan2(head.x).to_degrees();
         assert!((1.5..2.4).contains(&range_m), "{range_m} m away after {at_s} s");
         assert!(bearing.abs() < 15.0, "{bearing} degrees aside after {at_s} s");
         // In the first second the track is not confirmed yet.

@@ -19,7 +19,8 @@ const CONFIG: &str = include_str!("../../crates/cli/examples/laser_legs/legs.tom
 
 fn source(name: &str, pipeline: &Pipeline) -> Option<FrameSource> {
     let log = tagalong_testdata::find(name)?;
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     Some(FrameSource::open(&log, &input, &limits, pipeline.inputs()).unwrap())
 }
 
@@ -36,7 +37,9 @@ fn pipeline() -> Pipeline {
 fn scans_alone_make_the_frames_of_a_log_without_images() {
     let mut pipeline = pipeline();
     let Some(mut source) = source("laser/laser-moving.mcap", &pipeline) else { return };
-    let (mut frames, mut way_m, mut confirmed) = (0, 0.0, 0);
+    let mut frames = 0;
+    let mut way_m = 0.0;
+    let mut confirmed = 0;
     while let Some(item) = source.next_frame() {
         let report = pipeline.step(&item.frame).unwrap();
         frames += 1;
@@ -55,7 +58,8 @@ fn scans_alone_make_the_frames_of_a_log_without_images() {
 fn a_scanner_that_tf_does_not_know_is_at_the_origin() {
     let mut pipeline = pipeline();
     let Some(mut source) = source("laser/laser-following.mcap", &pipeline) else { return };
-    let (mut frames, mut seen) = (0, 0);
+    let mut frames = 0;
+    let mut seen = 0;
     while let Some(item) = source.next_frame() {
         let report = pipeline.step(&item.frame).unwrap();
         frames += 1;
@@ -128,7 +132,9 @@ fn a_person_who_stands_still_starts_a_track() {
     let Some(mut source) = source("laser/laser-following.mcap", &pipeline) else { return };
     let truth = tagalong_testdata::find("laser/laser-following.people-floor.csv").unwrap();
     let rows = floor::parse(&std::fs::read_to_string(truth).unwrap(), "truth").unwrap();
-    let (mut found, mut first, mut ids) = (0, None, std::collections::BTreeSet::new());
+    let mut found = 0;
+    let mut first = None;
+    let mut ids = std::collections::BTreeSet::new();
     let mut number = 0;
     while let Some(item) = source.next_frame() {
         let report = pipeline.step(&item.frame).unwrap();

@@ -57,7 +57,8 @@ fn frame(index: u64) -> Frame {
         if !(left..left + 96).contains(&x) || !(96..288).contains(&y) {
             return [noise(x / 6, y / 6) as u8; 3];
         }
-        let (u, v) = (x - left, y - 96);
+        let u = x - left;
+        let v = y - 96;
         let stripe = if (u / 12 + v / 24) % 2 == 0 { 30 } else { 0 };
         [(185 + stripe + noise(u / 4, v / 4)) as u8; 3]
     });
@@ -106,7 +107,8 @@ fn frames_without_the_network_are_no_misses_and_are_predicted() {
 
 #[test]
 fn a_follower_finds_the_person_between_the_frames_of_the_network() {
-    let (alone, followed) = (run(false), run(true));
+    let alone = run(false);
+    let followed = run(true);
     assert_one_track(&followed);
     assert!(followed[9..].iter().all(|report| report.tracks[0].seen));
     let [alone, followed] = [alone, followed].map(|reports| off_px(&reports));

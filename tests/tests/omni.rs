@@ -134,9 +134,11 @@ fn seen(path: &Path) -> (Vec<(Stamp, RgbImage)>, Places) {
                background_frames = 6 }\n[filter]\nplugin = \"floor-kalman\"\n";
     let mut pipeline = Contender::new("few", few).pipeline(&registry(), 0).unwrap();
     let inputs = Inputs::ANY.require(Input::Colour);
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let mut source = FrameSource::open(path, &input, &limits, inputs).unwrap();
-    let (mut images, mut places) = (Vec::new(), Vec::new());
+    let mut images = Vec::new();
+    let mut places = Vec::new();
     while let Some(item) = source.next_frame() {
         let report = pipeline.step(&item.frame).unwrap();
         places.push(report.candidates.iter().map(|c| c.detection.position.into()).collect());
@@ -153,7 +155,8 @@ fn a_circular_log_and_an_unwrapped_one_show_the_same_people() {
     let panorama: Panorama = *simulation.panorama().unwrap();
     let mirror = panorama.mirror;
     let folder = tempfile::tempdir().unwrap();
-    let (raw, unwrapped) = (folder.path().join("raw.mcap"), folder.path().join("flat.mcap"));
+    let raw = folder.path().join("raw.mcap");
+    let unwrapped = folder.path().join("flat.mcap");
     let colour = |shot: &Shot| {
         let image = shot.images.colour.as_deref().unwrap().clone();
         (Stamp::from_nanos(1_000_000_000 + shot.captured_ns), image)

@@ -50,7 +50,8 @@ fn run(path: &Path, config: &str) -> Run {
         run.frames += 1;
         run.funnel.merge(&report.funnel);
         run.detections.insert(frame.index, report.candidates.len());
-        let (width, height) = (frame.camera.width, frame.camera.height);
+        let width = frame.camera.width;
+        let height = frame.camera.height;
         let seen = report.tracks.iter().filter(|t| t.confirmed && t.seen);
         let boxes: Vec<_> =
             seen.map(|t| (t.id.0, t.estimate.region.clipped(width, height))).collect();

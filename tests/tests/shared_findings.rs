@@ -71,9 +71,11 @@ fn untimed(mut report: FrameReport) -> FrameReport {
 
 #[test]
 fn sharing_changes_no_bit() {
-    let (mut alone, mut sharing) = (pipelines(), pipelines());
+    let mut alone = pipelines();
+    let mut sharing = pipelines();
     sharing.iter_mut().for_each(Pipeline::share_findings);
-    let (alone, sharing) = (run(&mut alone), run(&mut sharing));
+    let alone = run(&mut alone);
+    let sharing = run(&mut sharing);
     assert!(alone.len() > 8, "{} frames", alone.len());
     let last: std::collections::BTreeSet<&String> = alone.iter().flatten().collect();
     // Pipelines with equal results would not show that shared results are kept apart.

@@ -54,7 +54,8 @@ fn judged(names: &[&str], scenes: &[Scene], threads: usize) -> Vec<Vec<Tally>> {
 fn the_naive_baseline_is_clearly_worse() {
     let all = tallies(&["naive", "depth-ekf"], 4, 6.0, 2);
     let scores = |at: usize| Tally::combine(all.iter().map(|trial| &trial[at])).scores();
-    let (naive, ekf) = (scores(0), scores(1));
+    let naive = scores(0);
+    let ekf = scores(1);
     assert!(ekf.idf1 > naive.idf1.map(|f| f + 0.1), "{:?} {:?}", ekf.idf1, naive.idf1);
     assert!(ekf.mota > naive.mota, "{:?} {:?}", ekf.mota, naive.mota);
 }

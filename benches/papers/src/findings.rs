@@ -151,7 +151,9 @@ mod tests {
             lab.first_seed = first_seed;
             experiment.find(&lab).unwrap()
         };
-        let (here, again, there) = (find(30), find(30), find(31));
+        let here = find(30);
+        let again = find(30);
+        let there = find(31);
         assert_eq!(here, again);
         assert_ne!(here.findings.tables[0].rows, there.findings.tables[0].rows);
         let note = "Simulated for this table. turntable: 2 seeds of the split test from 30 on.";

@@ -227,7 +227,8 @@ impl Log {
     ) -> Result<[Counted; COASTING_S.len()], ReproduceError> {
         let failed = |error: String| ReproduceError::Other(format!("{}: {error}", self.name));
         let mut pipeline = lab.contender(config)?.pipeline(lab.registry, 1)?;
-        let (input, limits) = (InputSettings::default(), Limits::default());
+        let input = InputSettings::default();
+        let limits = Limits::default();
         let mut source = FrameSource::open(log, &input, &limits, pipeline.inputs())
             .map_err(|error| failed(error.to_string()))?;
         let mut tallies = COASTING_S.map(|coasting_s| (coasting_s, FloorTally::new(CUT_M), None));

@@ -36,7 +36,8 @@ pub(crate) fn contender(
 ) -> Result<Contender, ReproduceError> {
     let plain = lab.contender(DETECTS)?;
     let Some(of) = verifiers else { return Ok(Contender { name: name.into(), ..plain }) };
-    let (mut config, mut with) = (parsed(&plain)?, parsed(&lab.contender(of)?)?);
+    let mut config = parsed(&plain)?;
+    let mut with = parsed(&lab.contender(of)?)?;
     config.extend(OF_VERIFIERS.iter().filter_map(|key| with.remove_entry(*key)));
     Ok(Contender { name: name.into(), config: config.to_string(), ..plain })
 }
@@ -51,7 +52,8 @@ pub(crate) fn trial(
     contenders: &[Contender],
 ) -> Result<Option<Trial>, ReproduceError> {
     let Some(folder) = lab.data.as_ref().map(|data| data.join("logs")) else { return Ok(None) };
-    let (path, truth) = (folder.join(log), folder.join(log).with_extension("people.csv"));
+    let path = folder.join(log);
+    let truth = folder.join(log).with_extension("people.csv");
     if !truth.exists() {
         return Ok(None);
     }
@@ -69,7 +71,8 @@ pub(crate) fn trial(
     let mut pipelines = pipelines.collect::<Result<Vec<Pipeline>, _>>()?;
     let run = |of: &Contender| Run { pipeline: of.name.clone(), reports: vec![], worked_ms: 0.0 };
     let mut runs: Vec<Run> = contenders.iter().map(run).collect();
-    let (mut moments, mut camera) = (Vec::new(), None);
+    let mut moments = Vec::new();
+    let mut camera = None;
     while let Some(item) = source.next_frame() {
         for (pipeline, run) in pipelines.iter_mut().zip(&mut runs) {
             run.reports.push(pipeline.step(&item.frame).map_err(|error| failed(&error))?);

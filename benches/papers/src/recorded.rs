@@ -87,10 +87,13 @@ impl Log {
     ) -> Result<Recorded, ReproduceError> {
         let failed = |error: String| ReproduceError::Other(format!("{}: {error}", self.name));
         let mut pipeline: Pipeline = contender.pipeline(lab.registry, 1)?;
-        let (input, limits) = (InputSettings::default(), Limits::default());
+        let input = InputSettings::default();
+        let limits = Limits::default();
         let mut source = FrameSource::open(&self.path, &input, &limits, pipeline.inputs())
             .map_err(|error| failed(error.to_string()))?;
-        let (mut reports, mut frames, mut worked_ms) = (Vec::new(), BTreeMap::new(), 0.0);
+        let mut reports = Vec::new();
+        let mut frames = BTreeMap::new();
+        let mut worked_ms = 0.0;
         while let Some(item) = source.next_frame() {
             let camera = &item.frame.camera;
             let size = (camera.width, camera.height);

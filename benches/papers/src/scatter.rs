@@ -43,7 +43,8 @@ impl Scatter<'_> {
         }
         let mut labels = Vec::new();
         for (name, x, y) in points {
-            let (x, y) = (frame.x(x.log10()), frame.y(*y));
+            let x = frame.x(x.log10());
+            let y = frame.y(*y);
             let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"#1f6fb2\"/>");
             let label = free_place(&mut labels, (x + 9.0, y + 4.0));
             text(&mut svg, label.0, label.1, "start", name);

@@ -52,7 +52,8 @@ fn with_the_detections_of_sort_it_is_at_least_as_accurate_as_sort() {
         let row = ours.iter().find(|row| row.name.ends_with(name)).unwrap();
         row.cells[0].value.unwrap()
     };
-    let (all, six) = (mota("all eleven"), mota("these six"));
+    let all = mota("all eleven");
+    let six = mota("these six");
     assert!(all >= SORT_MOTA && six >= SORT_MOTA, "{all} {six}");
 }
 

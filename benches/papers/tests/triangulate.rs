@@ -32,7 +32,9 @@ const ROOM: &str = "seed = 3\nduration_s = 26.0\n[room]\nsize_m = [10.0, 5.0]\n[
 fn webcams(off_m: f64, off_deg: f64) -> String {
     let corners = [(0.1, 0.1, 45.0), (9.9, 0.1, 135.0), (9.9, 4.9, 225.0), (0.1, 4.9, 315.0)];
     let one = |(x, y, heading): (f64, f64, f64)| {
-        let (x, y, heading) = (x + off_m, y - off_m, heading + off_deg);
+        let x = x + off_m;
+        let y = y - off_m;
+        let heading = heading + off_deg;
         format!("[[webcams]]\nat = [{x}, {y}]\nheading_deg = {heading}\n")
     };
     corners.map(one).concat()
@@ -84,7 +86,8 @@ fn webcams_make_the_truth_of_a_log() {
 
     let measured = read_truth_lines(&path("hat.truth.jsonl")).unwrap();
     let drawn = read_truth(&path("hat.mcap"), &Limits::default()).unwrap().unwrap();
-    let (measured, drawn) = (heads(&measured), heads(&drawn));
+    let measured = heads(&measured);
+    let drawn = heads(&drawn);
     assert!(2 * measured.len() > drawn.len(), "{} of {}", measured.len(), drawn.len());
     for (stamp, place) in &measured {
         let (_, truth) = drawn.iter().find(|(at, _)| at == stamp).unwrap();

@@ -105,7 +105,8 @@ fn shape_of(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> {
 }
 
 fn sides(shape: &[usize], name: &str) -> PyResult<(usize, usize)> {
-    let (height, width) = (shape[0], shape[1]);
+    let height = shape[0];
+    let width = shape[1];
     if [height, width].iter().any(|side| *side == 0 || *side > MAX_SIDE) {
         return Err(wrong(format!(
             "{name} has {width} x {height} pixels; a side has 1 to {MAX_SIDE}"

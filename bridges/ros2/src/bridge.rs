@@ -367,8 +367,10 @@ impl Bridge {
             theirs.push(&topic, nanos.to_le_bytes().to_vec(), 1);
         };
         let reset = self.network.listen_to_reset(reset, inbox, on)?;
-        let (topic, theirs) = (&self.options.speed_limit, Arc::clone(inbox));
-        let (key, max_speed_mps) = (topic.clone(), self.max_speed_mps);
+        let topic = &self.options.speed_limit;
+        let theirs = Arc::clone(inbox);
+        let key = topic.clone();
+        let max_speed_mps = self.max_speed_mps;
         // Only the newest limit holds.
         let on = move |limit: SpeedLimit| {
             theirs.push(&key, limit.mps(max_speed_mps).to_le_bytes().to_vec(), 1);
@@ -590,7 +592,9 @@ impl Bridge {
             let _lost = self.out.target.publish(write::pose(&record, track, &self.odom_frame));
         }
         if let (Some(command), Some(lock)) = (&report.command, &report.lock) {
-            let (reason, state, why) = (command.reason.name(), lock.state.name(), lock.why);
+            let reason = command.reason.name();
+            let state = lock.state.name();
+            let why = lock.why;
             let data = format!("{reason}; {state}: {why}");
             let _lost = self.out.state.publish(StringMsg { data });
         }

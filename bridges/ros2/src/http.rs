@@ -46,12 +46,13 @@ impl HttpServer {
         let mut access = Access::at(address).with_changes(Changes::FromPrograms);
         (access.key, access.body_bytes) = (false, BODY_BYTES);
         let server = Server::open(access).map_err(|error| failed(error.to_string()))?;
-        let (address, stop) = (server.address(), Arc::new(AtomicBool::new(false)));
+        let address = server.address();
+        let stop = Arc::new(AtomicBool::new(false));
         let theirs = Arc::clone(&stop);
         let serve = move || server.serve(&Arc::new(Skill(desk)), || theirs.load(Ordering::Relaxed));
         let thread = thread::Builder::new().name("http".into()).spawn(serve);
-        let thread = thread
-            .map_err(|error| failed(format!("no thread for it can be started: {error}")))?;
+        let thread =
+            thread.map_err(|error| failed(format!("no thread for it can be started: {error}")))?;
         Ok(Self { address, stop, thread: Some(thread) })
     }
 

@@ -11,7 +11,8 @@ use tagalong_ros2::{Options, run};
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    let (stop, signal) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let signal = Arc::new(AtomicUsize::new(0));
     let listening = [SIGINT, SIGTERM].into_iter().try_for_each(|number| {
         // The number of the signal determines the exit code.
         flag::register_usize(number, Arc::clone(&signal), number as usize)?;

@@ -103,7 +103,8 @@ impl OwnedImage {
 
 impl OwnedCompressedImage {
     pub(crate) fn encode(&self) -> Vec<u8> {
-        let (header, format) = (self.header.clone(), self.format.clone());
+        let header = self.header.clone();
+        let format = self.format.clone();
         encode(&CompressedImage { header, format, data: &self.data })
     }
 }

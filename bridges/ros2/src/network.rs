@@ -213,7 +213,8 @@ impl Network {
         inbox: &Arc<Inbox>,
         on: impl Fn(Option<Origin>) + Send + 'static,
     ) -> Result<Ear, BridgeError> {
-        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        let inbox = Arc::clone(inbox);
+        let name = topic.to_owned();
         let take = move |message: Option<(Bool, MessageInfo)>| {
             if message.is_none() {
                 inbox.count_malformed(&name);
@@ -231,7 +232,8 @@ impl Network {
         inbox: &Arc<Inbox>,
         on: impl Fn(Origin) + Send + 'static,
     ) -> Result<Ear, BridgeError> {
-        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        let inbox = Arc::clone(inbox);
+        let name = topic.to_owned();
         let take = move |message: Option<(Empty, MessageInfo)>| match message {
             Some((_, info)) => on(Origin::from(&info)),
             None => inbox.count_malformed(&name),
@@ -247,7 +249,8 @@ impl Network {
         inbox: &Arc<Inbox>,
         on: impl Fn(SpeedLimit) + Send + 'static,
     ) -> Result<Ear, BridgeError> {
-        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        let inbox = Arc::clone(inbox);
+        let name = topic.to_owned();
         let take = move |message: Option<(SpeedLimit, MessageInfo)>| match message {
             Some((limit, _)) if limit.speed_limit >= 0.0 => on(limit),
             _ => inbox.count_malformed(&name),
@@ -289,7 +292,8 @@ impl Network {
         inbox: &Arc<Inbox>,
         encode: impl Fn(M) -> Vec<u8> + Send + 'static,
     ) -> Result<Ear, BridgeError> {
-        let (inbox, name) = (Arc::clone(inbox), topic.to_owned());
+        let inbox = Arc::clone(inbox);
+        let name = topic.to_owned();
         let put = move |message: Option<(M, MessageInfo)>| match message {
             Some((message, _)) => inbox.push(&name, encode(message), room),
             None => inbox.count_malformed(&name),
@@ -356,7 +360,8 @@ impl Network {
         topic: &str,
         message_type: &str,
     ) -> Result<Publisher<M>, BridgeError> {
-        let (node, qos) = (&mut self.node, reliable());
+        let node = &mut self.node;
+        let qos = reliable();
         let name = name(node.namespace(), topic)?;
         let handle = node.create_topic(&name, kind(message_type), &qos).map_err(failed)?;
         node.create_publisher(&handle, Some(qos)).map_err(failed)

@@ -79,13 +79,15 @@ pub(crate) fn offer(
         ("people/clear", Verb::Clear),
     ];
     for (name, verb) in verbs {
-        let (server, desk) = (network.server(name, "std_srvs/srv/Trigger", mapping)?, desk.clone());
+        let server = network.server(name, "std_srvs/srv/Trigger", mapping)?;
+        let desk = desk.clone();
         all.push(serve(name, server, move |_: TriggerRequest| {
             TriggerResponse::from(desk.ask(verb))
         }));
     }
     let name = "people/status";
-    let (server, theirs) = (network.server(name, "std_srvs/srv/Trigger", mapping)?, desk.clone());
+    let server = network.server(name, "std_srvs/srv/Trigger", mapping)?;
+    let theirs = desk.clone();
     all.push(serve(name, server, move |_: TriggerRequest| status(&theirs)));
     let name = "people/enroll";
     let server = network.server(name, "rcl_interfaces/srv/SetParameters", mapping)?;
@@ -138,7 +140,8 @@ fn enroll(desk: &Desk, request: &SetParametersRequest) -> SetParametersResponse 
 
 /// Parses `person` ("nearest" or "approach"), `track` or `point`, and the patience.
 fn enrollment(parameters: &[Parameter]) -> Result<Enrollment, String> {
-    let (mut person, mut patience) = (None, Enrollment::of(Choice::Nearest));
+    let mut person = None;
+    let mut patience = Enrollment::of(Choice::Nearest);
     for Parameter { name, value } in parameters {
         let wrong = |wanted: &str| format!("`{name}` must be {wanted}");
         let choice = match name.as_str() {

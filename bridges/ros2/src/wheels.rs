@@ -108,7 +108,8 @@ impl Wheels {
             is_new: false,
             quits: false,
         };
-        let (state, changed) = (Mutex::new(state), Condvar::new());
+        let state = Mutex::new(state);
+        let changed = Condvar::new();
         let shared = Arc::new(Shared { state, changed, started: Instant::now() });
         let theirs = Arc::clone(&shared);
         let thread = thread::spawn(move || theirs.drive(period, now, tell));

@@ -139,7 +139,8 @@ mod tests {
             let port = server.bound().port();
             let token = server.address().split('/').nth(3).unwrap().to_owned();
             let stop = Arc::new(AtomicBool::new(false));
-            let (app_of, stop_of) = (Arc::clone(&app), Arc::clone(&stop));
+            let app_of = Arc::clone(&app);
+            let stop_of = Arc::clone(&stop);
             let thread = Some(thread::spawn(move || {
                 server.serve(&app_of, || stop_of.load(Ordering::Relaxed));
             }));
@@ -161,7 +162,8 @@ mod tests {
         }
 
         fn get(&self, path: &str) -> (u16, Vec<u8>) {
-            let (port, token) = (self.port, &self.token);
+            let port = self.port;
+            let token = &self.token;
             let host = format!("127.0.0.1:{port}");
             self.send(format!("GET /{token}/{path} HTTP/1.1\r\nHost: {host}\r\n\r\n").as_bytes())
         }
@@ -276,7 +278,8 @@ mod tests {
     #[test]
     fn the_page_can_end_the_server() {
         let running = Running::new();
-        let (port, token) = (running.port, &running.token);
+        let port = running.port;
+        let token = &running.token;
         let request = format!(
             "POST /{token}/finish HTTP/1.1\r\nHost: localhost:{port}\r\n\
              Origin: http://localhost:{port}\r\nContent-Type: application/json\r\n\r\n"

@@ -317,7 +317,8 @@ fn at_frame(known: &[(u32, f64)], frame: u32) -> Option<f64> {
 fn clipped(region: Region, columns: usize, rows: usize) -> Option<Region> {
     let right = (region.x + region.width).min(columns as f64);
     let bottom = (region.y + region.height).min(rows as f64);
-    let (x, y) = (region.x.max(0.0), region.y.max(0.0));
+    let x = region.x.max(0.0);
+    let y = region.y.max(0.0);
     let inside = tenths(Region { x, y, width: right - x, height: bottom - y });
     let is_whole = inside == tenths(region);
     let is_seen = inside.width >= 1.0 && inside.height >= 1.0;
@@ -354,7 +355,8 @@ pub fn read_people(path: &Path, film: &Film) -> Result<BTreeMap<i64, Person>, St
     let mut keys: BTreeMap<i64, BTreeMap<u32, Key>> = BTreeMap::new();
     let mut shown: BTreeMap<i64, BTreeSet<u32>> = BTreeMap::new();
     for row in rows {
-        let (id, frame) = (row.id, row.frame);
+        let id = row.id;
+        let frame = row.frame;
         if film.shot(frame).is_none() {
             return Err(format!("{name}: frame {frame} is not in the log; is it of another one?"));
         }

@@ -28,10 +28,7 @@ pub struct Choice {
 /// The pipelines; the first that fits a log is taken. Where several fit, the order is that of
 /// `tagalong bench --leave-one-room-out` in docs/benchmarks.md.
 pub const CHOICES: [Choice; 10] = [
-    Choice {
-        config: "depth-verified",
-        reason: "it has the best HOTA in leave-one-room-out tests",
-    },
+    Choice { config: "depth-verified", reason: "it has the best HOTA in leave-one-room-out tests" },
     Choice {
         config: "depth-alone",
         reason: "of those that need no colour it has the best HOTA in leave-one-room-out tests; \
@@ -50,10 +47,7 @@ pub const CHOICES: [Choice; 10] = [
         config: PANORAMIC,
         reason: "it is the one for several people before a conical mirror",
     },
-    Choice {
-        config: NETWORK,
-        reason: "you installed this network; places in metres are rough",
-    },
+    Choice { config: NETWORK, reason: "you installed this network; places in metres are rough" },
     Choice {
         config: WITHOUT_NETWORK,
         reason: "nothing else works without depth; places in metres are rough",
@@ -91,7 +85,8 @@ impl Fittings {
         let account: String =
             self.account.lines().iter().map(|line| format!("\n  {line}")).collect();
         let account = if account.is_empty() { account } else { format!("\nits topics:{account}") };
-        let (log, refusals) = (log.display(), &self.refusals);
+        let log = log.display();
+        let refusals = &self.refusals;
         let hint = format!("`tagalong inspect {log}` lists its topics");
         Failure::failed(format!(
             "{log}: no built-in pipeline fits:{refusals}{account}\n{damage}{hint}"

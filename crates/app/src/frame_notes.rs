@@ -119,7 +119,8 @@ impl FrameNotes {
 
 impl DriveNote {
     fn of(report: &FrameReport) -> Option<Self> {
-        let (lock, command) = (report.lock.as_ref()?, report.command?);
+        let lock = report.lock.as_ref()?;
+        let command = report.command?;
         Some(Self {
             lock: lock.state.name().to_owned(),
             lock_about: lock.state.about().to_owned(),
@@ -188,7 +189,8 @@ mod tests {
 
     fn candidate(fate: Fate) -> Candidate {
         let position = Point3::new(2.0, 0.0, 1.6);
-        let (covariance, source) = (Matrix3::identity(), "eyes");
+        let covariance = Matrix3::identity();
+        let source = "eyes";
         Candidate {
             detection: Detection { image: None, position, covariance, score: 1.23456, source },
             fate,

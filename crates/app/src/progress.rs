@@ -109,7 +109,8 @@ impl Forecast {
         if total > 1 {
             say(&format!("{total} {kind}"));
         }
-        let (done, told) = (AtomicU64::new(0), AtomicU64::new(0));
+        let done = AtomicU64::new(0);
+        let told = AtomicU64::new(0);
         Self { total: total as u64, kind, done, start: Instant::now(), told }
     }
 

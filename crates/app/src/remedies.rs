@@ -217,7 +217,8 @@ fn line(resolved: &Table, key: &str, value: &Value) -> String {
         [section, at, "config", ref rest @ ..] if at.parse::<usize>().is_ok() => {
             let item = at.parse::<usize>().ok().and_then(|at| resolved.get(section)?.get(at));
             let plugin = item.and_then(|item| item.get("plugin")).and_then(Value::as_str);
-            let (plugin, rest) = (plugin.unwrap_or_default(), rest.join("."));
+            let plugin = plugin.unwrap_or_default();
+            let rest = rest.join(".");
             format!("[[{section}]] plugin = \"{plugin}\", config = {{ {rest} = {value} }}")
         }
         [section] => match value.as_table() {

@@ -27,7 +27,8 @@ fn time(size: usize) -> (f64, f64) {
     let costs: Vec<f64> = (0..size * size).map(|i| mixed(i as u64)).collect();
     let miss = vec![MISS; size];
     let calls = (2_000_000 / (size * size).max(1)).clamp(10, 5000);
-    let (mut best, mut given) = (f64::INFINITY, Vec::new());
+    let mut best = f64::INFINITY;
+    let mut given = Vec::new();
     for _ in 0..calls {
         let start = Instant::now();
         given = black_box(assign(size, &miss, |row, col| Some(costs[row * size + col])));

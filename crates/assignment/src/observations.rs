@@ -74,7 +74,8 @@ impl ObservationMemory {
     /// was observed once, or stood still to the pixel.
     pub fn direction(&self, id: TrackId) -> Option<(Rect, Vector2<f64>)> {
         let observed = self.tracks.get(&id)?;
-        let (first, last) = (observed.front()?, observed.back()?);
+        let first = observed.front()?;
+        let last = observed.back()?;
         let way = last.region.centre() - first.region.centre();
         way.try_normalize(1e-9).map(|unit| (first.region, unit))
     }
@@ -83,10 +84,12 @@ impl ObservationMemory {
     /// observations, in place and size; the last one for a track that was observed once.
     pub fn expected(&self, id: TrackId) -> Option<Rect> {
         let observed = self.tracks.get(&id)?;
-        let (first, last) = (observed.front()?, observed.back()?);
+        let first = observed.front()?;
+        let last = observed.back()?;
         let passed_s = last.time_s - first.time_s;
         let ahead = if passed_s > 0.0 { (self.time_s - last.time_s) / passed_s } else { 0.0 };
-        let (from, to) = (first.region.centre(), last.region.centre());
+        let from = first.region.centre();
+        let to = last.region.centre();
         let centre = to + (to - from) * ahead;
         let size = |from: f64, to: f64| (to + (to - from) * ahead).max(1.0);
         let width = size(first.region.width, last.region.width);

@@ -146,7 +146,8 @@ impl Pairs<'_> {
         fit: impl Fn(&Track, &Detection) -> Option<Fit>,
     ) -> Vec<Vec<Option<Fit>>> {
         let pair = |row: usize, column: usize| {
-            let (track, detection) = (&self.tracks[row], &self.detections[column]);
+            let track = &self.tracks[row];
+            let detection = &self.detections[column];
             let fit = self.gate.admits(track, detection).then(|| fit(track, detection)).flatten();
             let look = self.gate.appearance_of(row, column);
             fit.map(|fit| pair_cost.with_appearance(fit, look))
@@ -312,7 +313,8 @@ mod tests {
 
     #[test]
     fn both_measures_of_overlap() {
-        let (a, b) = (Rect::new(0.0, 0.0, 2.0, 1.0), Rect::new(1.0, 0.0, 2.0, 1.0));
+        let a = Rect::new(0.0, 0.0, 2.0, 1.0);
+        let b = Rect::new(1.0, 0.0, 2.0, 1.0);
         assert_eq!(overlap(&a, &b, Overlap::Iou), 1.0 / 3.0);
         assert_eq!(overlap(&a, &b, Overlap::Dice), 0.5);
         assert_eq!(overlap(&Rect::default(), &Rect::default(), Overlap::Dice), 0.0);
@@ -393,7 +395,8 @@ mod tests {
             ..detection_at(3.0, 0.0)
         };
         let given = |miss_factor: f64| {
-            let (tracks, seen) = (std::slice::from_ref(&track), std::slice::from_ref(&detection));
+            let tracks = std::slice::from_ref(&track);
+            let seen = std::slice::from_ref(&detection);
             associate(tracks, seen, fit, (&settings, miss_factor))
         };
         assert_eq!((given(1.0), given(0.9)), (vec![Some(0)], vec![None]));

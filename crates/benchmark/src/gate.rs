@@ -34,7 +34,8 @@ impl Rule {
         let Some(at) = text.find(['<', '>']) else {
             return Err(wrong("expected FIGURE<CHANGE or FIGURE>CHANGE, as in HOTA<-0.01".into()));
         };
-        let (name, bound) = (text[..at].trim(), text[at + 1..].trim());
+        let name = text[..at].trim();
+        let bound = text[at + 1..].trim();
         let (on_floor, figure) = match name.split_once('.') {
             Some(("metres", figure)) => (true, figure),
             Some(("image", figure)) => (false, figure),

@@ -130,9 +130,11 @@ fn picture(images: &Images, part: &Rect) -> Option<String> {
 
 /// Returns the mean colour of a block of pixels.
 fn mean(images: &Images, xs: std::ops::Range<usize>, ys: std::ops::Range<usize>) -> [u8; 3] {
-    let (mut sum, mut count) = ([0u32; 3], 0u32);
+    let mut sum = [0u32; 3];
+    let mut count = 0u32;
     for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
-        let (x, y) = (x as i64, y as i64);
+        let x = x as i64;
+        let y = y as i64;
         let pixel = match (&images.colour, &images.grey) {
             (Some(colour), _) => colour.get(x, y),
             (None, Some(grey)) => grey.get(x, y).map(|value| [value; 3]),

@@ -147,7 +147,8 @@ pub fn reread(task: &Task, registry: &Registry) -> Result<PlannedConfig, Failure
     if now == task.inputs {
         return Ok(candidate);
     }
-    let (config, truth) = (task.config.display(), task.truth.display());
+    let config = task.config.display();
+    let truth = task.truth.display();
     Err(Failure::usage(format!("{config} or {truth} changed since it was planned; plan again")))
 }
 
@@ -271,7 +272,9 @@ pub fn candidate(path: &Path, registry: &Registry) -> Result<PlannedConfig, Fail
     let file = ConfigFile::read(path)?;
     let (pipeline, settings) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
-    let (first_seed, tune, inputs) = (settings.seed, settings.tune, pipeline.inputs());
+    let first_seed = settings.seed;
+    let tune = settings.tune;
+    let inputs = pipeline.inputs();
     Ok(PlannedConfig { file, path: path.to_owned(), first_seed, outer, inputs, tune })
 }
 
@@ -356,7 +359,8 @@ pub fn sha256_of_file(path: &Path) -> Result<String, Failure> {
     let failed = |error| Failure::failed(format!("cannot read {}: {error}", path.display()));
     let mut file = File::open(path).map_err(failed)?;
     // Read in blocks: a log may be larger than the memory.
-    let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; 1 << 16];
     loop {
         match file.read(&mut buffer).map_err(failed)? {
             0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),

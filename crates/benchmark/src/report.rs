@@ -30,7 +30,8 @@ pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
         let tasks = all.into_iter().map(|stored| stored.result).collect();
         return Ok(Benchmark { version, tasks, moments });
     }
-    let (count, first) = (missing.len(), &missing[0]);
+    let count = missing.len();
+    let first = &missing[0];
     Err(Failure::failed(format!(
         "{count} of {} tasks have no result, the first is {first}; `tagalong bench run -o {}` \
          runs them",
@@ -80,7 +81,8 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
     let name_width = |name: fn(&TaskResult) -> &str| {
         benchmark.tasks.iter().map(|task| name(task).len()).max().unwrap_or(0).max(8)
     };
-    let (first, second) = (name_width(|t| &t.pipeline), name_width(|t| &t.log));
+    let first = name_width(|t| &t.pipeline);
+    let second = name_width(|t| &t.log);
     let mut out = format!(
         "{:<first$}  {:<second$}  {:>6}  {:>6}  {:>6}  {:>6}  {:>5}  {:>10}\n",
         "pipeline", "log", "seed", "HOTA", "MOTA", "IDF1", "IDSW", "error m"

@@ -124,7 +124,8 @@ impl Watch {
         result.truth = truth_paths(&sequence, shots);
         score(&sequence, truth, &self.dropped, &mut result)?;
         let size = shots.at(1).map_or((0, 0), |shot| (shot.camera.width, shot.camera.height));
-        let (width, height) = (size.0 as u32, size.1 as u32);
+        let width = size.0 as u32;
+        let height = size.1 as u32;
         Ok((result, Recording { sequence, rate_hz: shots.rate_hz(), width, height }))
     }
 }

@@ -60,7 +60,8 @@ pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally,
     let groups = groups(pending, registry, args.timing, jobs)?;
     let bar = bar(ran);
     let forecast = Forecast::new(ran, "tasks");
-    let (signals_of, timing) = (&signals, args.timing);
+    let signals_of = &signals;
+    let timing = args.timing;
     let desk =
         Desk { store, registry, signals: signals_of, bar: &bar, forecast: &forecast, timing };
     run_all(groups, jobs, &desk)?;
@@ -316,7 +317,8 @@ impl Lane {
         if let Err(why) = &self.pipeline {
             return failed(task, why);
         }
-        let (hash, timing) = (task.hash.clone(), self.watch.timing());
+        let hash = task.hash.clone();
+        let timing = self.watch.timing();
         let timing = StoredTiming { hash, machine: machine(), timing };
         let blank = TaskResult { data_lost: lost, ..blank(task) };
         match self.watch.score(truth, shots, blank) {

@@ -85,8 +85,12 @@ impl Detector for NearestThing {
 
 /// Returns the box around everything nearer than the limit, and its mean depth.
 fn nearest(depth: &DepthImage, max_depth_m: f64) -> Option<(Rect, f64)> {
-    let (mut left, mut top, mut right, mut bottom) = (usize::MAX, usize::MAX, 0, 0);
-    let (mut sum, mut count) = (0.0, 0.0);
+    let mut left = usize::MAX;
+    let mut top = usize::MAX;
+    let mut right = 0;
+    let mut bottom = 0;
+    let mut sum = 0.0;
+    let mut count = 0.0;
     for y in 0..depth.height() {
         for (x, metres) in depth.row(y).iter().enumerate() {
             if f64::from(*metres) < max_depth_m {

@@ -51,7 +51,9 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         "| until, h | frames | with the target % | most tracks | last number | ms/frame | memory, MiB |"
     );
     println!("|---|---|---|---|---|---|---|");
-    let (mut now_s, mut index, mut number_of_scene) = (0.0, 0, 0);
+    let mut now_s = 0.0;
+    let mut index = 0;
+    let mut number_of_scene = 0;
     let mut parts = Vec::new();
     for number in 1..=PARTS {
         let end_s = hours * 3600.0 * number as f64 / PARTS as f64;
@@ -118,7 +120,8 @@ fn ride(
 
 fn print(hours: f64, part: &Part) {
     let Part { frames, followed, most_tracks, last_track, ms, resident_kib } = part;
-    let (each, memory) = (ms / *frames as f64, *resident_kib as f64 / 1024.0);
+    let each = ms / *frames as f64;
+    let memory = *resident_kib as f64 / 1024.0;
     let share = 100.0 * *followed as f64 / *frames as f64;
     println!(
         "| {hours:.2} | {frames} | {share:.0} | {most_tracks} | {last_track} | {each:.2} | {memory:.1} |"

@@ -145,7 +145,8 @@ fn list_out_of_range(
 ) -> Option<(String, String)> {
     let count = items.len() as f64;
     let limit = |key: &str, default| schema[key].as_f64().unwrap_or(default);
-    let (least, most) = (limit("minItems", 0.0), limit("maxItems", f64::INFINITY));
+    let least = limit("minItems", 0.0);
+    let most = limit("maxItems", f64::INFINITY);
     if !(least..=most).contains(&count) {
         return Some((path.to_owned(), format!("must have {least} to {most} values, not {count}")));
     }

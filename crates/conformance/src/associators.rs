@@ -102,7 +102,8 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
         Ok(subject.associator(from)?.associate(&tracks, &detections, &GATE))
     };
     // Built without settings, and from the printed defaults, which must mean the same.
-    let (first, second) = (answer(From::Nothing)?, answer(From::Text(&defaults))?);
+    let first = answer(From::Nothing)?;
+    let second = answer(From::Text(&defaults))?;
     demand(first == second, || format!("two answers differ: {first:?} and {second:?}"))
 }
 

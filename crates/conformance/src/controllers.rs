@@ -65,7 +65,8 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
         Ok(steps.map(|t| command(controller, &frame, Some(&t))).collect())
     };
     let defaults = subject.info.defaults();
-    let (first, second) = (drive(From::Nothing)?, drive(From::Text(&defaults))?);
+    let first = drive(From::Nothing)?;
+    let second = drive(From::Text(&defaults))?;
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
 }
 

@@ -121,12 +121,14 @@ fn declared(subject: &Subject<'_>) -> Result<Inputs, String> {
 }
 
 fn undeclared_do_not_matter(subject: &Subject<'_>) -> Verdict {
-    let (frames, inputs) = (walk(&level()), declared(subject)?);
+    let frames = walk(&level());
+    let inputs = declared(subject)?;
     let whole = record(&mut *subject.detector(From::Nothing)?, &frames)?;
     let frames: Vec<Frame> = frames.into_iter().map(|frame| restricted(frame, &inputs)).collect();
     let declared = record(&mut *subject.detector(From::Nothing)?, &frames)?;
     demand(whole == declared, || {
-        let (with, without) = (whole.len(), declared.len());
+        let with = whole.len();
+        let without = declared.len();
         format!("{with} detections with images that it does not declare, {without} without")
     })
 }
@@ -162,7 +164,8 @@ fn roles_are_declared(subject: &Subject<'_>) -> Verdict {
     let camera = level();
     let followed = track(1, Figure::at(2.0, 0.4).head, 0.15, &camera);
     for frame in walk(&camera) {
-        let (everywhere, near) = (EVERYWHERE, Query::Track(&followed));
+        let everywhere = EVERYWHERE;
+        let near = Query::Track(&followed);
         let roles = [
             ("discovers", capabilities.discovers, everywhere),
             ("tracks", capabilities.tracks, near),
@@ -205,7 +208,8 @@ fn question_alone(subject: &Subject<'_>) -> Verdict {
                 let mut funnel = Funnel::default();
                 (detector.detect(frame, &search, &mut funnel).map_err(|e| e.to_string()), funnel)
             };
-            let (then, now) = (answer(&mut *fresh), answer(&mut *seasoned));
+            let then = answer(&mut *fresh);
+            let now = answer(&mut *seasoned);
             demand(then == now, || {
                 format!("frame {}: a fresh one says {then:?}, after the walk {now:?}", frame.index)
             })?;
@@ -253,7 +257,8 @@ fn covariance_is_positive(subject: &Subject<'_>) -> Verdict {
 
 /// Simulates two people 1.6 m apart: a search for one must not return the other.
 fn near_stays_near(subject: &Subject<'_>) -> Verdict {
-    let (sigma_m, window_m) = (0.15, 0.8);
+    let sigma_m = 0.15;
+    let window_m = 0.8;
     for (name, camera) in mountings() {
         let detector = &mut *subject.detector(From::Nothing)?;
         let couple = [Figure::at(2.6, 0.8), Figure::at(2.6, -0.8)];

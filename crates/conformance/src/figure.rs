@@ -63,7 +63,8 @@ impl World {
         let mut colour = RgbImage::filled(camera.width, camera.height, [20, 24, 32]);
         let pixels = depth.pixels_mut().iter_mut().zip(colour.pixels_mut());
         for (index, (depth, colour)) in pixels.enumerate() {
-            let (column, row) = (index % camera.width, index / camera.width);
+            let column = index % camera.width;
+            let row = index / camera.width;
             let ray = camera.ray(Point2::new(column as f64, row as f64));
             let ray = camera.robot_from_camera.rotation * ray;
             if let Some(hit) = self.cast(&shapes, eye, ray) {
@@ -157,7 +158,9 @@ impl Ellipsoid {
     fn hit(&self, eye: Vector3<f64>, ray: Vector3<f64>) -> Option<Hit> {
         let start = (self.turn * (eye - self.centre)).component_div(&self.half);
         let step = (self.turn * ray).component_div(&self.half);
-        let (a, b, c) = (step.norm_squared(), start.dot(&step), start.norm_squared() - 1.0);
+        let a = step.norm_squared();
+        let b = start.dot(&step);
+        let c = start.norm_squared() - 1.0;
         let discriminant = b * b - a * c;
         if discriminant < 0.0 {
             return None;
@@ -254,7 +257,8 @@ mod tests {
         let square = camera.upper_body(&figure.head);
         let row = depth.row(square.bottom() as usize - 1);
         let near = |x: &usize| row[*x] < 3.0;
-        let (left, right) = ((0..640).find(near).unwrap(), (0..640).rfind(near).unwrap());
+        let left = (0..640).find(near).unwrap();
+        let right = (0..640).rfind(near).unwrap();
         let width = (right - left) as f64 / square.width;
         assert!((0.75..1.0).contains(&width), "shoulders take {width} of the square");
     }
@@ -282,7 +286,8 @@ mod tests {
         let drawn =
             |seed| World { noise_seed: seed, ..World::with(&[]) }.draw(&camera).depth.unwrap();
         assert_eq!(format!("{:?}", drawn(Some(3))), format!("{:?}", drawn(Some(3))));
-        let (clean, noisy) = (drawn(None), drawn(Some(3)));
+        let clean = drawn(None);
+        let noisy = drawn(Some(3));
         let both = clean.pixels().iter().zip(noisy.pixels()).filter(|(c, _)| **c < 5.0);
         let errors: Vec<f64> = both.map(|(c, n)| f64::from(n - c)).collect();
         let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();

@@ -174,7 +174,8 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
         }
         Ok(run.estimates())
     };
-    let (first, second) = (watch(From::Nothing)?, watch(From::Text(&defaults))?);
+    let first = watch(From::Nothing)?;
+    let second = watch(From::Text(&defaults))?;
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
 }
 
@@ -229,7 +230,8 @@ fn standing_person_stands(subject: &Subject<'_>) -> Verdict {
     for motion in [driving(), EgoMotion { turn: 0.0, ..driving() }] {
         let mut run = Run::new(subject, From::Nothing, motion)?;
         run.start(&[place]);
-        let (mut offset, mut drift) = (Vector2::zeros(), Vector2::zeros());
+        let mut offset = Vector2::zeros();
+        let mut drift = Vector2::zeros();
         for i in 0..60 {
             run.step(&[(1, place)])?;
             // The first half of the run lets the velocity converge.
@@ -268,7 +270,8 @@ fn walking_person(subject: &Subject<'_>) -> Verdict {
         run.step(&[(1, place(i))])?;
     }
     let (position, seen_velocity) = run.in_world(1)?;
-    let (away, wrong) = ((position - place(40).xy()).norm(), (seen_velocity - velocity).norm());
+    let away = (position - place(40).xy()).norm();
+    let wrong = (seen_velocity - velocity).norm();
     demand(away < 0.25 && wrong < 0.4, || {
         format!("after 4 s it is {away:.2} m off and {wrong:.2} m/s wrong")
     })
@@ -292,7 +295,8 @@ fn stop_forgets(subject: &Subject<'_>) -> Verdict {
 fn ids_never_mix(subject: &Subject<'_>) -> Verdict {
     let mut run = Run::new(subject, From::Nothing, driving())?;
     run.start(&COUPLE);
-    let (a, b) = ((1, COUPLE[0]), (2, COUPLE[1]));
+    let a = (1, COUPLE[0]);
+    let b = (2, COUPLE[1]);
     let orders = [vec![a, b], vec![b, a], vec![b], vec![a]];
     for seen in orders.iter().cycle().take(24) {
         let supported = run.step(seen)?;

@@ -51,7 +51,8 @@ fn truth_outweighs(subject: &Subject<'_>) -> Verdict {
 
 fn order_does_not_matter(subject: &Subject<'_>) -> Verdict {
     with(subject, |likelihood| {
-        let (near, far) = (Figure::at(2.0, 0.1), Figure::at(3.0, -0.1));
+        let near = Figure::at(2.0, 0.1);
+        let far = Figure::at(3.0, -0.1);
         let frame = drawn(1, &level(), &[near, far]);
         let one = weigh(likelihood, &frame, &[standing(near.head), standing(far.head)])?;
         let other = weigh(likelihood, &frame, &[standing(far.head), standing(near.head)])?;
@@ -61,7 +62,8 @@ fn order_does_not_matter(subject: &Subject<'_>) -> Verdict {
 
 fn batches_agree(subject: &Subject<'_>) -> Verdict {
     with(subject, |likelihood| {
-        let (near, far) = (Figure::at(2.0, 0.1), Figure::at(3.0, -0.1));
+        let near = Figure::at(2.0, 0.1);
+        let far = Figure::at(3.0, -0.1);
         let frame = drawn(1, &level(), &[near, far]);
         let aside = |m: f64| standing(far.head + nalgebra::Vector3::new(0.0, m, 0.0));
         let people: Vec<Person> =

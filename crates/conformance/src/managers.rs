@@ -119,7 +119,8 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
     let defaults = subject.info.defaults();
     let watch = |from| -> Result<_, String> {
         let mut run = Run::new(subject, from)?;
-        let (a, b) = (run.start(0.0)?, run.start(1.0)?);
+        let a = run.start(0.0)?;
+        let b = run.start(1.0)?;
         let mut health = Vec::new();
         for i in 0..25 {
             let missed = if i % 3 == 0 { Observation::Missed } else { DETECTED };
@@ -128,7 +129,8 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
         }
         Ok((health, run.ended))
     };
-    let (first, second) = (watch(From::Nothing)?, watch(From::Text(&defaults))?);
+    let first = watch(From::Nothing)?;
+    let second = watch(From::Text(&defaults))?;
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
 }
 

@@ -13,7 +13,8 @@ pub fn picture(is_person: bool, seed: u32) -> GreyImage {
     let mut state = seed.wrapping_mul(2_654_435_761) | 1;
     GreyImage::from_fn(64, 64, |x, y| {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let (dx, dy) = (x as f64 - 32.0, y as f64 - 22.0);
+        let dx = x as f64 - 32.0;
+        let dy = y as f64 - 22.0;
         let dark = if is_person {
             dx.hypot(dy) < 9.0 || (dy > 10.0 && dx.abs() < 20.0)
         } else {

@@ -19,9 +19,11 @@ pub(crate) const DT_S: f64 = 0.1;
 fn camera(width: usize, height_m: f64, pitch_down_deg: f64, roll_deg: f64) -> Camera {
     let height = width * 3 / 4;
     let focal = width as f64 * 0.82;
-    let (cx, cy) = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
+    let cx = 0.5 * (width as f64 - 1.0);
+    let cy = 0.5 * (height as f64 - 1.0);
     let lens = Pinhole { fx: focal, fy: focal, cx, cy, distortion: Distortion::None };
-    let (pitch, roll) = (pitch_down_deg.to_radians(), roll_deg.to_radians());
+    let pitch = pitch_down_deg.to_radians();
+    let roll = roll_deg.to_radians();
     Camera::mounted(lens, width, height, height_m, pitch, roll)
 }
 
@@ -65,7 +67,8 @@ pub(crate) fn drawn(index: u64, camera: &Arc<Camera>, people: &[Figure]) -> Fram
 /// Returns frames without useful content, with their names.
 pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
     let flat = |camera: &Arc<Camera>, grey: u8, depth: f32| {
-        let (w, h) = (camera.width, camera.height);
+        let w = camera.width;
+        let h = camera.height;
         let images = Images {
             colour: Some(Arc::new(RgbImage::filled(w, h, [grey; 3]))),
             grey: Some(Arc::new(Image::filled(w, h, grey))),
@@ -148,7 +151,8 @@ pub(crate) fn sighting(
 /// Returns the mirror images.
 pub(crate) fn mirrored(images: &Images) -> Images {
     fn reversed<P: Copy>(image: &Image<P>) -> Image<P> {
-        let (w, h) = (image.width(), image.height());
+        let w = image.width();
+        let h = image.height();
         Image::from_fn(w, h, |x, y| image.row(y)[w - 1 - x])
     }
     fn flip<P: Copy>(image: &Arc<Image<P>>) -> Arc<Image<P>> {

@@ -76,7 +76,8 @@ fn undeclared_do_not_matter(subject: &Subject<'_>) -> Verdict {
     let verifier = &mut *subject.verifier(From::Nothing)?;
     let frame = || drawn(1, &level(), &[Figure::at(2.0, 0.1)]);
     let declared = restricted(frame(), &verifier.inputs());
-    let (whole, declared) = (margins(verifier, &frame())?, margins(verifier, &declared)?);
+    let whole = margins(verifier, &frame())?;
+    let declared = margins(verifier, &declared)?;
     demand(whole == declared, || {
         format!("{whole:?} with images that it does not declare, {declared:?} without")
     })
@@ -100,6 +101,7 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
 fn same_margin(subject: &Subject<'_>) -> Verdict {
     let verifier = &mut *subject.verifier(From::Nothing)?;
     let frame = drawn(1, &level(), &[Figure::at(2.0, 0.1)]);
-    let (first, again) = (margins(verifier, &frame)?, margins(verifier, &frame)?);
+    let first = margins(verifier, &frame)?;
+    let again = margins(verifier, &frame)?;
     demand(first == again, || format!("asked twice, it says {first:?} and {again:?}"))
 }

@@ -278,7 +278,8 @@ mod tests {
         let frame =
             Frame::new(1, crate::Stamp::default(), camera, motion, crate::Images::default());
         let somebody = Person { position: Point3::origin(), velocity: nalgebra::zero() };
-        let (people, mut out) = ([somebody; 5], vec![9.0]);
+        let people = [somebody; 5];
+        let mut out = vec![9.0];
         Count.log_likelihoods(&frame, &people, 2, &mut out).unwrap();
         assert_eq!(out, [2.0, 2.0, 1.0], "and what was there before is gone");
         Count.log_likelihoods(&frame, &people[..1], 0, &mut out).unwrap();

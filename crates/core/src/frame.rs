@@ -424,7 +424,8 @@ mod tests {
 
     #[test]
     fn only_declared_inputs_are_left() {
-        let (colour, grey) = (RgbImage::filled(4, 4, [9; 3]), GreyImage::filled(4, 4, 9));
+        let colour = RgbImage::filled(4, 4, [9; 3]);
+        let grey = GreyImage::filled(4, 4, 9);
         let right = RightImage { image: grey.clone(), baseline_m: 0.1 };
         let images = Images {
             colour: Some(Arc::new(colour)),
@@ -437,7 +438,8 @@ mod tests {
         assert!(frame.restricted_to(&Inputs::ANY).is_none(), "nothing has to go");
         let held = |frame: &Frame| {
             let Images { colour, grey, depth, right } = frame.images();
-            let (laser, recorded) = (frame.laser().is_some(), frame.recorded().is_some());
+            let laser = frame.laser().is_some();
+            let recorded = frame.recorded().is_some();
             assert_eq!(colour.is_some(), grey.is_some());
             [colour.is_some(), depth.is_some(), right.is_some(), laser, recorded]
         };

@@ -110,7 +110,8 @@ mod tests {
 
     #[test]
     fn the_first_places_are_kept_up_to_a_bound() {
-        let (mut sum, mut frame) = (Funnel::default(), Funnel::default());
+        let mut sum = Funnel::default();
+        let mut frame = Funnel::default();
         (0..MAX_PLACES + 5).for_each(|x| frame.drop_at("small", at(x as f64)));
         sum.drop_at("small", at(-1.0));
         sum.merge(&frame);
@@ -122,7 +123,8 @@ mod tests {
 
     #[test]
     fn funnels_of_several_frames_add_up() {
-        let (mut sum, mut frame) = (Funnel::default(), Funnel::default());
+        let mut sum = Funnel::default();
+        let mut frame = Funnel::default();
         sum.drop_at("small", at(1.0));
         frame.drop_many("small", 4);
         frame.drop_at("dark", at(5.0));

@@ -74,7 +74,8 @@ impl<P: Copy> Image<P> {
 
     /// Returns the pixel at column `x`, row `y`, or `None` outside.
     pub fn get(&self, x: i64, y: i64) -> Option<P> {
-        let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
+        let x = usize::try_from(x).ok()?;
+        let y = usize::try_from(y).ok()?;
         (x < self.width && y < self.height).then(|| self.pixels[y * self.width + x])
     }
 
@@ -98,7 +99,8 @@ impl DepthImage {
     /// Returns the depth of the surface in the middle of a region, m: the median of 5x5 samples in
     /// its central half, of which at least 8 must be readings.
     pub fn surface_m(&self, of: &Rect) -> Option<f64> {
-        let (columns, rows) = (taps(of.x, of.width), taps(of.y, of.height));
+        let columns = taps(of.x, of.width);
+        let rows = taps(of.y, of.height);
         // An array instead of a vector saves an allocation per region.
         let mut sorted = [f32::INFINITY; TAPS * TAPS];
         let readings = rows.into_iter().flat_map(|y| self.readings(&columns, y));
@@ -128,10 +130,12 @@ impl DepthImage {
     pub fn face_m(&self, upper_body: &Rect) -> Option<f64> {
         let px_per_m = upper_body.width / UPPER_BODY_SIDE_M;
         let half = HALF_FACE_M * px_per_m;
-        let (x, y) = (upper_body.centre().x, upper_body.y + HEAD_BELOW_TOP_M * px_per_m);
+        let x = upper_body.centre().x;
+        let y = upper_body.y + HEAD_BELOW_TOP_M * px_per_m;
         let face = Rect::new(x - half, y - half, 2.0 * half, 2.0 * half);
         let face = face.clipped(self.width(), self.height());
-        let (left, right) = (face.x as usize, face.right() as usize);
+        let left = face.x as usize;
+        let right = face.right() as usize;
         let rows = face.y as usize..face.bottom() as usize;
         let mut readings: Vec<f32> = rows
             // A face on the right of the image starts beyond the row.

@@ -75,7 +75,8 @@ impl EgoMotion {
         let turn = (right_mps - left_mps) / (2.0 * d) * dt;
         let chord = 0.5 * (right_mps + left_mps) * dt * sinc(0.5 * turn);
         let (sin, cos) = (0.5 * turn).sin_cos();
-        let (sl, sr) = (wheels.slip * left_mps * dt, wheels.slip * right_mps * dt);
+        let sl = wheels.slip * left_mps * dt;
+        let sr = wheels.slip * right_mps * dt;
         // Derivatives of (forward, left, turn) by the travel of each wheel, at zero turn. The
         // wheels slip independently, so their covariances add up.
         let by_left = Vector3::new(0.5, 0.0, -0.5 / d);
@@ -94,7 +95,9 @@ impl EgoMotion {
         sigma_fraction: f64,
     ) -> Self {
         let step = before.inverse() * after;
-        let (forward, left, turn) = (step.translation.x, step.translation.y, step.rotation.angle());
+        let forward = step.translation.x;
+        let left = step.translation.y;
+        let turn = step.rotation.angle();
         let travel = sigma_fraction * forward.hypot(left);
         let rotation = sigma_fraction * turn.abs();
         let covariance = Matrix3::from_diagonal(&Vector3::new(
@@ -186,7 +189,8 @@ mod tests {
         fn wheels_agree_with_small_steps(l in -0.9..0.9f64, r in -0.9..0.9f64, dt in 0.01..0.5f64) {
             let mut pose = Isometry2::<f64>::identity();
             for _ in 0..2000 {
-                let (v, w) = (0.5 * (l + r), (r - l) / (2.0 * WHEELS.half_separation_m));
+                let v = 0.5 * (l + r);
+                let w = (r - l) / (2.0 * WHEELS.half_separation_m);
                 let h = dt / 2000.0;
                 pose *= Isometry2::new(Vector2::new(v * h, 0.0), w * h);
             }
@@ -210,7 +214,8 @@ mod tests {
         let d = WHEELS.half_separation_m;
         let slipped = 0.02 * 0.5 * 0.1;
         let of = |left, right| EgoMotion::from_wheels(left, right, &WHEELS, 0.1).covariance;
-        let (left, right) = (of(0.5, 0.0), of(0.0, 0.5));
+        let left = of(0.5, 0.0);
+        let right = of(0.0, 0.5);
         for covariance in [left, right] {
             assert!((covariance[(0, 0)].sqrt() - 0.5 * slipped).abs() < 1e-12);
             assert!((covariance[(2, 2)].sqrt() - 0.5 * slipped / d).abs() < 1e-12);

@@ -38,7 +38,8 @@ pub fn tried(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Alternativ
     let mut runners = runners(visit, scope, registry);
     let inputs =
         runners.iter().fold(Inputs::NONE, |all, runner| all.union(runner.pipeline.inputs()));
-    let (input, limits) = (&visit.outer.input, &visit.outer.limits);
+    let input = &visit.outer.input;
+    let limits = &visit.outer.limits;
     let Ok(mut frames) = FrameSource::open(scope.log, input, limits, inputs) else {
         return Vec::new();
     };

@@ -40,8 +40,10 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
     if found.fitting.is_empty() {
         return Err(found.none_fits(scope.log));
     }
-    let (contents, better) = (found.contents(), found.better());
-    let (mut rows, mut first) = (Vec::new(), None);
+    let contents = found.contents();
+    let better = found.better();
+    let mut rows = Vec::new();
+    let mut first = None;
     for Fitting { choice, config } in found.fitting {
         let visit = Visit::make(config, scope, registry)?;
         if let Some(folder) = &args.output {

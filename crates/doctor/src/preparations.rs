@@ -86,7 +86,8 @@ fn network_config(section: &Value) -> Option<&Table> {
 
 /// Returns frames that are spread over the examined part of the log.
 fn sample(visit: &Visit, scope: Scope) -> Vec<Frame> {
-    let (input, limits) = (&visit.outer.input, &visit.outer.limits);
+    let input = &visit.outer.input;
+    let limits = &visit.outer.limits;
     let Ok(mut source) = FrameSource::open(scope.log, input, limits, visit.pipeline.inputs())
     else {
         return Vec::new();
@@ -108,7 +109,8 @@ impl Bench<'_> {
         if self.frames.is_empty() {
             return None;
         }
-        let (frames, now) = (self.frames.len(), self.run(&Vec::new())?);
+        let frames = self.frames.len();
+        let now = self.run(&Vec::new())?;
         if now.found as f64 >= ENOUGH * frames as f64 && !always {
             return Some(Preparations { frames, now, best: None });
         }

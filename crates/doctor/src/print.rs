@@ -15,7 +15,8 @@ const SETTING_LINES: usize = 10;
 /// Returns the diagnosis, for a terminal.
 pub fn text(diagnosis: &Diagnosis) -> String {
     let mut out = String::new();
-    let (config, log) = (diagnosis.config.display(), diagnosis.log.display());
+    let config = diagnosis.config.display();
+    let log = diagnosis.log.display();
     pipelines(&mut out, diagnosis);
     let _ = writeln!(out, "{log} through {config}, {} frames", diagnosis.frames);
     out.push('\n');
@@ -54,7 +55,9 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
     }
     let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
     if let Some(taken) = diagnosis.pipelines.iter().find(|row| row.taken) {
-        let (contents, name, why) = (&diagnosis.contents, taken.config, taken.reason);
+        let contents = &diagnosis.contents;
+        let name = taken.config;
+        let why = taken.reason;
         let _ =
             writeln!(out, "\nthe log has {contents}: `tagalong run` takes {name}, because {why}");
         if let Some(better) = &diagnosis.better {
@@ -152,7 +155,8 @@ fn drop(out: &mut String, drop: &Drop) {
 
 fn summary(out: &mut String, findings: &[Finding]) {
     let count = |severity| findings.iter().filter(|f| f.severity == severity).count();
-    let (bad, warn) = (count(Severity::Bad), count(Severity::Warn));
+    let bad = count(Severity::Bad);
+    let warn = count(Severity::Warn);
     let _ = match (bad, warn) {
         (0, 0) => writeln!(out, "\nnothing to complain about"),
         _ => writeln!(out, "\n{bad} bad, {warn} to look at; begin with the first"),

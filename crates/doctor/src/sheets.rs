@@ -42,7 +42,8 @@ fn file_name(test: &str) -> String {
 
 fn sheet(title: &str, examples: &[Example]) -> Canvas {
     let side = examples.iter().map(|example| example.picture.width()).max().unwrap_or(0);
-    let (cell, title_px) = (side + GAP_PX, LINE_PX as usize + GAP_PX);
+    let cell = side + GAP_PX;
+    let title_px = LINE_PX as usize + GAP_PX;
     let rows = examples.len().div_ceil(COLUMNS);
     // At least two pictures wide, which leaves room for the title.
     let width = COLUMNS.min(examples.len().max(2)) * cell + GAP_PX;

@@ -26,7 +26,8 @@ pub fn write(visit: &Visit, scope: Scope, folder: &Path) -> Result<(), Failure> 
     let reports = &visit.evidence.trial.reports;
     let inputs = visit.pipeline.inputs().accept(Input::Colour).accept(Input::Depth);
     // Only a log without the inputs of the pipeline cannot be opened, and has no tracks to show.
-    let (input, limits) = (&visit.outer.input, &visit.outer.limits);
+    let input = &visit.outer.input;
+    let limits = &visit.outer.limits;
     let Ok(mut frames) = FrameSource::open(scope.log, input, limits, inputs) else {
         return Ok(());
     };

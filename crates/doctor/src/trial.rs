@@ -97,7 +97,8 @@ fn picture(frame: &Frame, place: &Rect) -> Option<RgbImage> {
     let centre = place.centre();
     let half = 0.5 * SIDE_PX as f64;
     Some(RgbImage::from_fn(SIDE_PX, SIDE_PX, |x, y| {
-        let (dx, dy) = (x as f64 - half, y as f64 - half);
+        let dx = x as f64 - half;
+        let dy = y as f64 - half;
         let at = [centre.x + scale * dx, centre.y + scale * dy].map(|v| v.floor() as i64);
         let edge = |d: f64, side: f64| ((d.abs() * scale) - 0.5 * side).abs() < 0.5 * scale;
         let inside = |d: f64, side: f64| d.abs() * scale <= 0.5 * side + 0.5 * scale;

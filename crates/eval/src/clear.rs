@@ -141,7 +141,8 @@ impl Run {
     }
 
     fn step(&mut self, frame: &PreparedFrame) -> Vec<Match> {
-        let (truths, tracks) = (frame.truths.len(), frame.tracks.len());
+        let truths = frame.truths.len();
+        let tracks = frame.tracks.len();
         if truths == 0 || tracks == 0 {
             // A frame without truths or without reports does not interrupt anything.
             self.clear.fp += tracks as u64;

@@ -146,7 +146,8 @@ impl Watch<'_> {
                     // The first person of a track is its own; only others are wrong.
                     let first = *self.began_with[index as usize].get_or_insert(truth);
                     if first != truth {
-                        let (began_with, person) = (self.person_id(first), self.person_id(truth));
+                        let began_with = self.person_id(first);
+                        let person = self.person_id(truth);
                         out.push(EventKind::WrongPerson { track, began_with, person });
                     }
                 }

@@ -230,7 +230,8 @@ mod tests {
     fn tally(scans: &[(Line<'_>, Line<'_>)]) -> FloorClear {
         let mut tally = FloorTally::new(0.75);
         for (people, estimates) in scans {
-            let (people, estimates) = (points(people), points(estimates));
+            let people = points(people);
+            let estimates = points(estimates);
             tally.add(&FloorScan { people, estimates, ignored: Vec::new() });
         }
         tally.finish()
@@ -273,7 +274,8 @@ mod tests {
     #[test]
     fn an_estimate_of_an_ignored_person_is_not_false() {
         let mut tally = FloorTally::new(0.75);
-        let (ignored, estimates) = (points(&[(9, 0.0)]), points(&[(7, 0.2), (8, 2.0)]));
+        let ignored = points(&[(9, 0.0)]);
+        let estimates = points(&[(7, 0.2), (8, 2.0)]);
         tally.add(&FloorScan { people: Vec::new(), ignored, estimates });
         let clear = tally.finish();
         assert_eq!((clear.false_positives, clear.objects, clear.estimates), (1, 0, 2));

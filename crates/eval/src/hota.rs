@@ -141,7 +141,8 @@ impl Hota {
 /// that compete with it).
 fn alignment(prepared: &Prepared, table: &PairTable) -> Vec<f64> {
     let mut together = vec![0.0; table.pairs.len()];
-    let (mut of_row, mut of_col) = (Vec::new(), Vec::new());
+    let mut of_row = Vec::new();
+    let mut of_col = Vec::new();
     let mut indices = table.pair_of.iter();
     for frame in &prepared.frames {
         sums(frame, &mut of_row, &mut of_col);
@@ -184,7 +185,8 @@ struct Run {
 
 impl Run {
     fn step(&mut self, frame: &PreparedFrame, pair_of: &[u32], alignment: &[f64]) {
-        let (truths, tracks) = (frame.truths.len(), frame.tracks.len());
+        let truths = frame.truths.len();
+        let tracks = frame.tracks.len();
         // All are wrong at first; `add` takes the matched ones away again.
         for level in &mut self.hota.levels {
             level.fn_ += truths as u64;
@@ -228,7 +230,9 @@ impl Run {
 impl HotaLevel {
     /// Adds a pair that is matched in `both` of the frames that each of the two has.
     fn add(&mut self, both: u32, of_truth: u32, of_track: u32) {
-        let (n, truth, track) = (f64::from(both), f64::from(of_truth), f64::from(of_track));
+        let n = f64::from(both);
+        let truth = f64::from(of_truth);
+        let track = f64::from(of_track);
         self.tp += u64::from(both);
         self.fn_ -= u64::from(both);
         self.fp -= u64::from(both);

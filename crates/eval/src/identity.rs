@@ -28,7 +28,8 @@ impl Identity {
         let together = table.count(prepared, |pair| pair.weight >= MATCH_SIMILARITY);
         let edges = table.edges(|pair| together[pair] as f64);
         let mut matched = Vec::new();
-        let (rows, cols) = (prepared.truth_ids.len(), prepared.track_ids.len());
+        let rows = prepared.truth_ids.len();
+        let cols = prepared.track_ids.len();
         Matcher::new().best(rows, cols, &edges, &mut matched);
         let tp = matched.iter().map(|&e| edges[e as usize].weight as u64).sum();
         Self { tp, fn_: prepared.truth_count() - tp, fp: prepared.report_count() - tp }

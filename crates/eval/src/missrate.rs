@@ -95,7 +95,8 @@ impl DetectionTally {
     pub fn curve(&self) -> Vec<CurvePoint> {
         let mut sorted = self.verdicts.clone();
         sorted.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let (mut right, mut wrong) = (0_u64, 0_u64);
+        let mut right = 0_u64;
+        let mut wrong = 0_u64;
         let mut points = Vec::new();
         // Detections of equal score are accepted together: their order means nothing.
         for equal in sorted.chunk_by(|a, b| a.score == b.score) {
@@ -153,7 +154,9 @@ impl DetectionTally {
         if self.truths == 0 {
             return None;
         }
-        let (mut area, mut best, mut recall_after) = (0.0, 0.0_f64, None);
+        let mut area = 0.0;
+        let mut best = 0.0_f64;
+        let mut recall_after = None;
         // From the right, so that precision is made monotonic on the way.
         for point in self.curve().iter().rev() {
             let recall = 1.0 - point.miss_rate;

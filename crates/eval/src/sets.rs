@@ -40,7 +40,8 @@ impl SetDistance {
         let mut matched = Vec::new();
         Matcher::new().best(truths, reports, &gains, &mut matched);
         let location: f64 = matched.iter().map(|&e| pay - gains[e as usize].weight).sum();
-        let (pairs, most) = (matched.len(), truths.max(reports));
+        let pairs = matched.len();
+        let most = truths.max(reports);
         let parts = GospaParts {
             location,
             // Half the penalty for each side, as GOSPA with alpha = 2.

@@ -37,7 +37,8 @@ impl Region {
         if common <= 0.0 {
             return 0.0;
         }
-        let (own, others) = (self.area(), other.area());
+        let own = self.area();
+        let others = other.area();
         let union = own + others - common;
         if own > f64::EPSILON && others > f64::EPSILON { common / union } else { 0.0 }
     }

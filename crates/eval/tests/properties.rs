@@ -46,7 +46,8 @@ fn some_edges() -> impl Strategy<Value = (u32, u32, Vec<Edge>)> {
 /// Places of a person: a lattice, so that people meet, hide and coincide.
 fn somewhere() -> impl Strategy<Value = (Region, [f64; 2])> {
     (0..12_i32, 0..4_i32, 0.0..1.0_f64).prop_map(|(x, y, jitter)| {
-        let (x, y) = (f64::from(x) + 0.3 * jitter, f64::from(y));
+        let x = f64::from(x) + 0.3 * jitter;
+        let y = f64::from(y);
         (Region::new(4.0 * x, 8.0 * y, 12.0, 24.0), [0.25 * x, 0.4 * y])
     })
 }
@@ -122,7 +123,8 @@ fn with_perfect_tracker(mut sequence: Sequence) -> Sequence {
 /// HOTA at one threshold from the definition: a matching per threshold is made
 /// from the given per-frame assignment, counts are kept in full matrices.
 fn slow_hota(prepared: &Prepared, level: usize) -> HotaLevel {
-    let (truths, tracks) = (prepared.truth_ids.len(), prepared.track_ids.len());
+    let truths = prepared.truth_ids.len();
+    let tracks = prepared.track_ids.len();
     let mut soft = vec![vec![0.0; tracks]; truths];
     for frame in &prepared.frames {
         for pair in &frame.pairs {
@@ -140,7 +142,8 @@ fn slow_hota(prepared: &Prepared, level: usize) -> HotaLevel {
     let mut result = HotaLevel::default();
     for frame in &prepared.frames {
         let score = |pair: &Edge| {
-            let (i, j) = (frame.truths[pair.row as usize], frame.tracks[pair.col as usize]);
+            let i = frame.truths[pair.row as usize];
+            let j = frame.tracks[pair.col as usize];
             let both = soft[i as usize][j as usize];
             let frames = prepared.truth_frames[i as usize] + prepared.track_frames[j as usize];
             both / (f64::from(frames) - both) * pair.weight
@@ -160,8 +163,8 @@ fn slow_hota(prepared: &Prepared, level: usize) -> HotaLevel {
     }
     for (i, row) in counts.iter().enumerate() {
         for (j, &n) in row.iter().enumerate() {
-            let (of_truth, of_track) =
-                (f64::from(prepared.truth_frames[i]), f64::from(prepared.track_frames[j]));
+            let of_truth = f64::from(prepared.truth_frames[i]);
+            let of_track = f64::from(prepared.track_frames[j]);
             result.association_sum += n * n / (of_truth + of_track - n);
             result.association_recall_sum += n * n / of_truth;
             result.association_precision_sum += n * n / of_track;
@@ -190,7 +193,9 @@ proptest! {
     fn a_matcher_used_before_answers_like_a_new_one(
         (rows, cols, edges) in some_edges(), (r, c, before) in some_edges(),
     ) {
-        let (mut old, mut fresh, mut used) = (Matcher::new(), Vec::new(), Vec::new());
+        let mut old = Matcher::new();
+        let mut fresh = Vec::new();
+        let mut used = Vec::new();
         old.best(r as usize, c as usize, &before, &mut used);
         old.best(rows as usize, cols as usize, &edges, &mut used);
         Matcher::new().best(rows as usize, cols as usize, &edges, &mut fresh);
@@ -297,7 +302,8 @@ proptest! {
     fn a_sequence_twice_doubles_counts_and_keeps_rates(sequence in a_sequence()) {
         let one = tally(&sequence, Similarity::Iou);
         let two = Tally::combine([&one, &one]);
-        let (a, b) = (one.scores(), two.scores());
+        let a = one.scores();
+        let b = two.scores();
         prop_assert_eq!(2 * a.tp, b.tp);
         prop_assert_eq!(2 * a.truth_ids, b.truth_ids);
         let pairs = [
@@ -331,7 +337,8 @@ proptest! {
     ) {
         let near: Vec<Edge> = (0..truths.len() * reports.len())
             .map(|i| {
-                let (row, col) = (i / reports.len(), i % reports.len());
+                let row = i / reports.len();
+                let col = i % reports.len();
                 let weight = (truths[row] - reports[col]).abs();
                 Edge { row: row as u32, col: col as u32, weight }
             })

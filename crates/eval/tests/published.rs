@@ -47,7 +47,8 @@ fn mot17(mot: &Path) -> Vec<Sequence> {
 
 fn tud_campus(mot: &Path) -> Sequence {
     let folder = mot.join("py-motmetrics/TUD-Campus");
-    let (truth, tracks) = (folder.join("gt.txt"), folder.join("test.txt"));
+    let truth = folder.join("gt.txt");
+    let tracks = folder.join("test.txt");
     sequence("TUD-Campus", &truth, &tracks, mot::Rules::Mot15, 71)
 }
 
@@ -59,7 +60,8 @@ type Figure = fn(&HotaLevel) -> f64;
 
 /// All figures under TrackEval's names.
 fn figures(tally: &Tally) -> BTreeMap<String, f64> {
-    let (clear, identity) = (&tally.clear, &tally.identity);
+    let clear = &tally.clear;
+    let identity = &tally.identity;
     let plain = [
         ("MOTA", clear.mota()),
         ("MOTP", clear.motp()),
@@ -175,11 +177,13 @@ fn combined_figures_come_from_the_summed_counts() {
     let tallies: Vec<Tally> = mot17(&mot).iter().map(tally).collect();
     let all = Tally::combine(&tallies);
     // (TP - FP - IDSW) / (TP + FN), and so on, from TrackEval's table.
-    let (tp, fn_, fp) =
-        (15955 + 47060 + 6382 + 10833, 2626 + 497 + 535 + 2006, 723 + 147 + 409 + 626);
+    let tp = 15955 + 47060 + 6382 + 10833;
+    let fn_ = 2626 + 497 + 535 + 2006;
+    let fp = 723 + 147 + 409 + 626;
     let idsw = 168 + 32 + 57 + 137;
     assert_close("MOTA", all.clear.mota(), f64::from(tp - fp - idsw) / f64::from(tp + fn_));
-    let (idtp, idfn) = (9718 + 45863 + 5674 + 7748, 8863 + 1694 + 1243 + 5091);
+    let idtp = 9718 + 45863 + 5674 + 7748;
+    let idfn = 8863 + 1694 + 1243 + 5091;
     let idfp = 6960 + 1344 + 1117 + 3711;
     let idf1 = f64::from(2 * idtp) / f64::from(2 * idtp + idfn + idfp);
     assert_close("IDF1", all.identity.idf1(), idf1);
@@ -251,7 +255,9 @@ fn log_average_miss_rates_equal_the_published_ones() {
         let tally = DetectionTally::measure(&sequence, Similarity::Iou, 0.5);
         100.0 * tally.log_average_miss_rate().unwrap()
     };
-    let (all, day, night) = (rate(&frames), rate(&frames[..1455]), rate(&frames[1455..]));
+    let all = rate(&frames);
+    let day = rate(&frames[..1455]);
+    let night = rate(&frames[1455..]);
     println!("log-average miss rate: all {all:.4} day {day:.4} night {night:.4}");
     assert!((all - 7.58).abs() < 0.01, "{all}");
     assert!((day - 7.96).abs() < 0.01, "{day}");

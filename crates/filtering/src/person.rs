@@ -169,7 +169,8 @@ mod tests {
 
     #[test]
     fn a_filter_of_one_person_is_lifted_to_all() {
-        let (frame, mut filter) = (frame(), PerPerson::new(Last));
+        let frame = frame();
+        let mut filter = PerPerson::new(Last);
         let places = |filter: &PerPerson<Last>| {
             let estimates = filter.estimates(&frame.camera).into_iter();
             estimates.map(|(id, e)| (id.0, e.person.position.x)).collect::<Vec<_>>()
@@ -178,7 +179,8 @@ mod tests {
         filter.start(TrackId(2), &seen(5.0), &frame.camera);
         filter.predict(&EgoMotion { forward: 0.5, ..EgoMotion::at_rest(0.1) }, &frame.camera);
         assert_eq!(places(&filter), [(1, 1.5), (2, 4.5)]);
-        let (detection, stranger) = (seen(4.0), seen(9.0));
+        let detection = seen(4.0);
+        let stranger = seen(9.0);
         let matched =
             [Matched::certain(TrackId(2), &detection), Matched::certain(TrackId(7), &stranger)];
         let evidence =

@@ -41,7 +41,8 @@ pub struct Outcome {
 
 /// Parses mutated files until one of them is a finding, at most so many.
 pub fn run(target: &Target, files: u64, seed: u64, path: &Path, mut tick: impl FnMut()) -> Outcome {
-    let (mut mutator, mut outcome) = (Mutator::new(seed), Outcome::default());
+    let mut mutator = Mutator::new(seed);
+    let mut outcome = Outcome::default();
     while outcome.files < files && outcome.finding.is_none() {
         let bytes = mutator.mutated(&target.seeds);
         let (took, why) = tried(target, &bytes, path);

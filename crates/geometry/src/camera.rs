@@ -166,7 +166,8 @@ impl Camera {
     pub fn ray(&self, pixel: Point2<f64>) -> Vector3<f64> {
         match &self.lens {
             Lens::Pinhole(lens) => {
-                let (x, y) = ((pixel.x - lens.cx) / lens.fx, (pixel.y - lens.cy) / lens.fy);
+                let x = (pixel.x - lens.cx) / lens.fx;
+                let y = (pixel.y - lens.cy) / lens.fy;
                 let (x, y) = lens.distortion.remove(x, y);
                 Vector3::new(x, y, 1.0)
             }
@@ -462,7 +463,8 @@ mod tests {
     fn a_sighting_is_uncertain_along_the_ray_by_its_depth_and_across_by_its_pixels() {
         let camera = level(1.2);
         let c = camera.covariance(Point2::new(320.0, 240.0), 4.0, 2.0, 0.3);
-        let (across, along) = (4.0 * 2.0 / 500.0_f64, 0.3);
+        let across = 4.0 * 2.0 / 500.0_f64;
+        let along = 0.3;
         for (axis, sigma) in [(0, along), (1, across), (2, across)] {
             assert!((c[(axis, axis)].sqrt() - sigma).abs() < 1e-9, "{c}");
         }

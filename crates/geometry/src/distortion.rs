@@ -135,7 +135,8 @@ fn equidistant(k: &[f64; 4], angle: f64) -> (f64, f64) {
 
 /// Inverts [`equidistant`] within [`MAX_ANGLE_RAD`]: Newton's method between two bounds.
 fn angle_of(k: &[f64; 4], distorted: f64) -> f64 {
-    let (mut low, mut high) = (0.0, MAX_ANGLE_RAD);
+    let mut low = 0.0;
+    let mut high = MAX_ANGLE_RAD;
     let mut angle = distorted.min(MAX_ANGLE_RAD);
     for _ in 0..MAX_STEPS {
         let (value, slope) = equidistant(k, angle);

@@ -107,13 +107,15 @@ impl Camera {
     /// assert!((head.x - 3.0).abs() < 1e-9 && (head.z - 1.45).abs() < 0.05);
     /// ```
     pub fn head_above_floor(&self, whole_body: &Rect) -> Option<Point3<f64>> {
-        let (column, lowest) = (whole_body.centre().x, whole_body.y + whole_body.height);
+        let column = whole_body.centre().x;
+        let lowest = whole_body.y + whole_body.height;
         if !matches!(self.lens, Lens::Pinhole(_)) || lowest >= self.height as f64 - 1.0 {
             return None;
         }
         let eye = self.robot_from_camera.translation.vector;
         let ray = |row: f64| self.robot_from_camera.rotation * self.ray(Point2::new(column, row));
-        let (to_feet, to_top) = (ray(lowest), ray(whole_body.y));
+        let to_feet = ray(lowest);
+        let to_top = ray(whole_body.y);
         let away_m = (to_feet.z < 0.0).then(|| eye.z / -to_feet.z * to_feet.xy().norm())?;
         // The head is above the feet, so its ray is followed as far along the floor.
         let top = eye + to_top * (away_m / to_top.xy().norm());
@@ -198,7 +200,8 @@ mod tests {
         fn a_located_head_is_that_of_its_square(
             x in 1.5..6.0f64, y in -0.6..0.6f64, z in 1.2..1.9f64, sigma_m in 0.01..0.5f64,
         ) {
-            let (camera, head) = (camera(), Point3::new(x, y, z));
+            let camera = camera();
+            let head = Point3::new(x, y, z);
             let square = camera.upper_body(&head);
             let face = FaceDepth { depth_m: camera.depth_of(&head) - HEAD_RADIUS_M, sigma_m };
             let found = camera.locate_head(&square, face, 2.0);
@@ -226,7 +229,8 @@ mod tests {
 
     #[test]
     fn a_located_point_lies_on_the_ray_of_its_pixel() {
-        let (camera, pixel) = (camera(), Point2::new(200.0, 100.0));
+        let camera = camera();
+        let pixel = Point2::new(200.0, 100.0);
         let found = camera.locate(pixel, 4.0, 2.0, 0.3);
         assert!((camera.project(&found.position).unwrap() - pixel).norm() < 1e-9);
         assert!((camera.depth_of(&found.position) - 4.0).abs() < 1e-9);
@@ -252,7 +256,8 @@ mod tests {
 
     #[test]
     fn a_person_of_unknown_feet_stands() {
-        let (camera, square) = (camera(), Rect::new(300.0, 100.0, 57.0, 57.0));
+        let camera = camera();
+        let square = Rect::new(300.0, 100.0, 57.0, 57.0);
         for height_m in [-1.0, 5.0] {
             let whole = camera.whole_body(&square, &Point3::new(3.0, 0.0, height_m));
             assert!((whole.height - 170.0).abs() < 1e-9 && (whole.width - 63.0).abs() < 1e-9);

@@ -189,7 +189,8 @@ impl Panorama {
     /// direction that goes one metre outwards.
     pub fn ray(&self, pixel: Point2<f64>) -> (Point3<f64>, Vector3<f64>) {
         let (ring, height) = self.mirror.ring_m();
-        let (bearing, slope) = (self.bearing(pixel.x), self.elevation(pixel.y).tan());
+        let bearing = self.bearing(pixel.x);
+        let slope = self.elevation(pixel.y).tan();
         let out = Vector3::new(bearing.sin(), -bearing.cos(), slope);
         (Point3::new(0.0, 0.0, height + ring * slope), out)
     }
@@ -217,8 +218,8 @@ impl Panorama {
         // Rays start on the ring of viewpoints, not on the axis, hence `range + ring`.
         let (ring, height) = self.mirror.ring_m();
         let row = |z: f64| self.row((z - height).atan2(range + ring));
-        let (top, bottom) =
-            (head.z + HEAD_BELOW_TOP_M, head.z + HEAD_BELOW_TOP_M - UPPER_BODY_SIDE_M);
+        let top = head.z + HEAD_BELOW_TOP_M;
+        let bottom = head.z + HEAD_BELOW_TOP_M - UPPER_BODY_SIDE_M;
         let half_angle = (0.5 * UPPER_BODY_SIDE_M / range).atan();
         let width = 2.0 * half_angle / TAU * self.columns as f64;
         // A region starts within the image, and continues across the seam.
@@ -256,7 +257,8 @@ mod tests {
 
     #[test]
     fn front_is_the_middle_left_is_left_and_the_seam_is_behind() {
-        let (panorama, mount) = (panorama(), ConicalMirror::upright(1.5).inverse());
+        let panorama = panorama();
+        let mount = ConicalMirror::upright(1.5).inverse();
         let column = |x: f64, y: f64| panorama.pixel(&(mount * Point3::new(x, y, 1.0))).x;
         assert!((column(2.0, 0.0) - 239.5).abs() < 1e-9);
         assert!((column(0.0, 2.0) - 119.5).abs() < 1e-9);

@@ -88,7 +88,8 @@ impl Rect {
 
     /// Returns the rectangle grown by the fraction `by` of each side, about the same centre.
     pub fn inflated(&self, by: f64) -> Self {
-        let (dx, dy) = (self.width * by, self.height * by);
+        let dx = self.width * by;
+        let dy = self.height * by;
         Self::new(self.x - 0.5 * dx, self.y - 0.5 * dy, self.width + dx, self.height + dy)
     }
 
@@ -180,7 +181,8 @@ mod tests {
 
     #[test]
     fn what_is_apart_has_nothing_in_common() {
-        let (a, b) = (Rect::new(0.0, 0.0, 4.0, 4.0), Rect::new(3.0, 1.0, 4.0, 2.0));
+        let a = Rect::new(0.0, 0.0, 4.0, 4.0);
+        let b = Rect::new(3.0, 1.0, 4.0, 2.0);
         assert_eq!(a.intersection(&b), Rect::new(3.0, 1.0, 1.0, 2.0));
         let aside = a.intersection(&Rect::new(6.0, 1.0, 1.0, 1.0));
         let below = a.intersection(&Rect::new(1.0, 6.0, 1.0, 1.0));
@@ -229,7 +231,8 @@ mod tests {
         fn overlap_is_symmetric_and_a_share(
             x in -5.0..5.0f64, y in -5.0..5.0f64, width in 0.1..6.0f64, height in 0.1..6.0f64,
         ) {
-            let (a, b) = (Rect::new(0.0, 0.0, 3.0, 4.0), Rect::new(x, y, width, height));
+            let a = Rect::new(0.0, 0.0, 3.0, 4.0);
+            let b = Rect::new(x, y, width, height);
             let common = a.intersection(&b).area();
             let expected = common / (12.0 + width * height - common);
             prop_assert!((a.iou(&b) - expected).abs() < 1e-12);

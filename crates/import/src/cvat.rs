@@ -97,7 +97,8 @@ fn parse(text: &str) -> Result<Read, String> {
     if let Some(pair) =
         rows.windows(2).find(|pair| (pair[0].frame, pair[0].id) == (pair[1].frame, pair[1].id))
     {
-        let (id, frame) = (pair[0].id, pair[0].frame - 1);
+        let id = pair[0].id;
+        let frame = pair[0].frame - 1;
         return Err(format!(": person {id} is in CVAT's frame {frame} twice; number them apart"));
     }
     let note = other_shapes(&root);
@@ -243,7 +244,10 @@ fn at(node: &Node<'_, '_>, why: &str) -> String {
 /// Returns MOTChallenge text of whole bodies, of which `eval` compares the upper bodies.
 fn mot(rows: &[Row]) -> String {
     let body = |row: &Row| {
-        let (frame, id, visible, counts) = (row.frame, row.id, row.visible, !row.ignore);
+        let frame = row.frame;
+        let id = row.id;
+        let visible = row.visible;
+        let counts = !row.ignore;
         Some(WholeBody { frame, id, region: row.upper_body?, visible, counts })
     };
     boxes_csv(&rows.iter().filter_map(body).collect::<Vec<_>>())

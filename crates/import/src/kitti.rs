@@ -25,7 +25,8 @@ const HEIGHT_M: f64 = 1.65;
 /// # Errors
 /// Files that are missing or wrong.
 pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
-    let (folder, name) = (&args.path, &args.sequence);
+    let folder = &args.path;
+    let name = &args.sequence;
     let [left, right] = projections(&folder.join("calib").join(format!("{name}.txt")))?;
     // The fourth column of a projection is minus the focal length times the camera's offset.
     let baseline_m = (left[3] - right[3]) / left[0];
@@ -98,7 +99,8 @@ fn boxes(path: &Path) -> Result<String, Failure> {
         else {
             return Err(wrong());
         };
-        let (width, height) = (right - left, bottom - top);
+        let width = right - left;
+        let height = bottom - top;
         let id = words[1];
         let counts = u8::from(class == 1);
         let _ = writeln!(

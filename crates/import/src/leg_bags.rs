@@ -108,7 +108,8 @@ fn read(path: &Path) -> Result<Bag, Failure> {
 
 impl Bag {
     fn take(&mut self, message: &Message<'_>) {
-        let (channel, log_time) = (message.channel, message.log_time);
+        let channel = message.channel;
+        let log_time = message.log_time;
         if channel.schema_name.ends_with("/LaserScan") {
             match decode::<LaserScan>(message.data) {
                 Ok(scan) => {
@@ -152,7 +153,8 @@ impl Scan {
         let beams = scan.ranges.iter().enumerate();
         let seen = beams.filter(|(_, range_m)| range.contains(&f64::from(**range_m)));
         let point = |(beam, range_m): (usize, &f32)| {
-            let (angle, range_m) = (first + step * beam as f64, f64::from(*range_m));
+            let angle = first + step * beam as f64;
+            let range_m = f64::from(*range_m);
             [range_m * angle.cos(), range_m * angle.sin()]
         };
         let stamp_ns = Stamp::from(scan.header.stamp).nanos();
@@ -182,7 +184,8 @@ fn table(bag: &Bag, args: &ImportArgs) -> Result<(String, usize), Failure> {
     let mut out = "stamp_s,scan,id,x_laser_m,y_laser_m,points,ignore,source\n".to_owned();
     for ((number, id), at_m) in &rows {
         let (scan, [x, y]) = (&scans[*number], at_m);
-        let (seconds, nanos) = (scan.stamp_ns / 1_000_000_000, scan.stamp_ns % 1_000_000_000);
+        let seconds = scan.stamp_ns / 1_000_000_000;
+        let nanos = scan.stamp_ns % 1_000_000_000;
         let points = scan.points_near(*at_m);
         let _ =
             writeln!(out, "{seconds}.{nanos:09},{number},{id},{x:.4},{y:.4},{points},0,annotated");

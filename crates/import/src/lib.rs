@@ -204,7 +204,8 @@ fn beside(sequence: &Sequence, log: &Path) -> Result<(), Failure> {
     }
     if let Some(text) = &sequence.recorded {
         let config = write("recorded.toml", text)?;
-        let (config, log) = (config.display(), log.display());
+        let config = config.display();
+        let log = log.display();
         say(&format!("its detections can be tracked: tagalong run {config} {log}"));
     }
     Ok(())

@@ -134,7 +134,8 @@ fn depth(
     let image = match decoded {
         DynamicImage::ImageLuma16(image) => image,
         other => {
-            let (shown, colour) = (moment.file.display(), other.color());
+            let shown = moment.file.display();
+            let colour = other.color();
             let why = format!("depth is a 16-bit grey PNG, this is {colour:?}");
             return Err(Failure::failed(format!("cannot use {shown}: {why}")));
         }

@@ -59,7 +59,8 @@ mod tests {
 
     #[test]
     fn steps_lead_to_the_minimum_of_a_bowl() {
-        let (mut weights, mut adam) = ([3.0, -2.0, 0.5], Adam::default());
+        let mut weights = [3.0, -2.0, 0.5];
+        let mut adam = Adam::default();
         for k in 0..400 {
             let gradient = [weights[0] - 1.0, 4.0 * (weights[1] - 2.0), weights[2]];
             let rate = 0.1 * pace(f64::from(k) / 400.0) as f32;

@@ -41,7 +41,8 @@ impl Levels {
         let variance = values.clone().map(|v| (v - mean).powi(2)).sum::<f32>() / count;
         // The addend keeps the levels of a constant feature from having no width.
         let spread = 3.0 * variance.sqrt() + 1e-6;
-        let (least, step) = (mean - spread, 2.0 * spread / LEVELS as f32);
+        let least = mean - spread;
+        let step = 2.0 * spread / LEVELS as f32;
         self.scale.push((least, step));
         // The cast saturates, so that outliers land in the first or last level.
         self.levels.extend(values.take(self.samples).map(|v| ((v - least) / step) as u8));
@@ -159,7 +160,8 @@ impl Growing<'_> {
             let (left, right) = of.iter().partition(|i| usize::from(row[**i as usize]) <= level);
             [left, right]
         };
-        let (chosen, all) = (parts(chosen), parts(all));
+        let chosen = parts(chosen);
+        let all = parts(all);
         for side in 0..2 {
             let [weight, sum] = self.weight(&chosen[side]);
             // A pure leaf cannot be improved by a further question.
@@ -214,7 +216,8 @@ impl Growing<'_> {
 fn cut(histogram: &[[f32; 2]; LEVELS]) -> (f32, usize) {
     let total = histogram.iter().fold([0.0, 0.0], |[w, s], bin| [w + bin[0], s + bin[1]]);
     let explained = |[weight, sum]: [f32; 2]| if weight > 1e-9 { sum * sum / weight } else { 0.0 };
-    let (mut left, mut best) = ([0.0_f32; 2], (f32::NEG_INFINITY, 0));
+    let mut left = [0.0_f32; 2];
+    let mut best = (f32::NEG_INFINITY, 0);
     // A cut above the last level would leave one side empty.
     for (level, bin) in histogram.iter().enumerate().take(LEVELS - 1) {
         left = [left[0] + bin[0], left[1] + bin[1]];

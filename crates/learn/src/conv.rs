@@ -128,7 +128,8 @@ impl<
                     continue;
                 }
                 let mut sums: [f32; OUT] = *cell(&self.bias, 0);
-                let (up, across) = (Self::taps(row, input.rows), Self::taps(column, input.columns));
+                let up = Self::taps(row, input.rows);
+                let across = Self::taps(column, input.columns);
                 for up in up {
                     for across in across.clone() {
                         let (seen, first) = Self::tap(input, [row, column], [up, across]);
@@ -304,7 +305,8 @@ mod tests {
             out.values.iter().zip(&weigh).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
         };
         let of_out = Map::<4> { rows: 5, columns: 6, values: weigh.clone() };
-        let (mut gradient, mut of_input) = (Conv::default(), Map::new(5, 6));
+        let mut gradient = Conv::default();
+        let mut of_input = Map::new(5, 6);
         conv.backward(&input, &of_out, &mut gradient, Some(&mut of_input));
         let close = |slope: f64, found: f32| {
             assert!((slope - f64::from(found)).abs() < 0.02, "{slope} {found}");

@@ -65,7 +65,8 @@ mod tests {
     #[test]
     fn equations_without_one_solution_have_none() {
         let rows = DMatrix::from_fn(9, 2, |row, _| row as f64);
-        let (normal, right) = (NormalEquations::new(&rows), DVector::from_vec(vec![1.0, 1.0]));
+        let normal = NormalEquations::new(&rows);
+        let right = DVector::from_vec(vec![1.0, 1.0]);
         assert_eq!(normal.solve(&[-1.0, -1.0], &right), None);
         assert!(normal.solve(&[1.0, 1.0], &right).is_some());
         assert_eq!(normal.solve(&[f64::NAN, 1.0], &right), None);

@@ -10,7 +10,8 @@ pub fn parts(
     folds: usize,
     seed: u64,
 ) -> BTreeMap<u64, usize> {
-    let (mut all, mut with_people) = (BTreeSet::new(), BTreeSet::new());
+    let mut all = BTreeSet::new();
+    let mut with_people = BTreeSet::new();
     for example in examples {
         // The set sorts by the mixed number first, which shuffles the groups reproducibly.
         let key = (mix(example.group ^ seed), example.group);

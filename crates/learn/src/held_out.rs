@@ -3,7 +3,9 @@
 pub fn area(values: &[(f64, bool)]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (mut below, mut others, mut people) = (0.0, 0.0, 0.0);
+    let mut below = 0.0;
+    let mut others = 0.0;
+    let mut people = 0.0;
     for ties in sorted.chunk_by(|a, b| a.0 == b.0) {
         let here = ties.iter().filter(|(_, is_person)| *is_person).count() as f64;
         let not = ties.len() as f64 - here;

@@ -112,7 +112,8 @@ impl OnnxGraph {
         input: &str,
         output: &str,
     ) {
-        let (weights, bias) = (format!("{output}.weights"), format!("{output}.bias"));
+        let weights = format!("{output}.weights");
+        let bias = format!("{output}.bias");
         let mut turned = Vec::with_capacity(conv.weights.len());
         // A file has the weights by output, by input, by tap.
         for out in 0..OUT {

@@ -12,7 +12,8 @@ pub fn mirrored(grey: &GreyImage) -> GreyImage {
 /// Shifts a square right and down by fractions of its width, and scales it by `growth` about its
 /// new centre.
 pub fn shifted(square: &Rect, (right, down, growth): (f64, f64, f64)) -> Rect {
-    let (x, y) = (square.x + right * square.width, square.y + down * square.width);
+    let x = square.x + right * square.width;
+    let y = square.y + down * square.width;
     Rect { x, y, ..*square }.inflated(growth - 1.0)
 }
 

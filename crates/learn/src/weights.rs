@@ -73,7 +73,8 @@ fn number(table: &toml::Table, name: &str) -> Result<f64, String> {
 
 fn read_part(name: &str, values: &[toml::Value], part: &mut [f32]) -> Result<(), String> {
     if values.len() != part.len() {
-        let (has, needs) = (values.len(), part.len());
+        let has = values.len();
+        let needs = part.len();
         return Err(format!("`{name}` has {has} numbers and needs {needs}"));
     }
     for (to, value) in part.iter_mut().zip(values) {
@@ -98,7 +99,8 @@ mod tests {
     }
 
     fn read(text: &str) -> Result<(Line, Vec<f32>), String> {
-        let (mut first, mut last) = ([0.0; 20], [0.0; 2]);
+        let mut first = [0.0; 20];
+        let mut last = [0.0; 2];
         let line = FILE.read(text, &mut [&mut first, &mut last])?;
         Ok((line, [&first[..], &last].concat()))
     }

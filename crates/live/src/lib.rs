@@ -53,7 +53,8 @@ impl Live {
         registry: &Registry,
     ) -> io::Result<Self> {
         let server = Server::open(Access::at(at))?;
-        let (address, bound) = (server.address(), server.bound());
+        let address = server.address();
+        let bound = server.bound();
         let heading = Heading {
             log: input.to_owned(),
             runs: vec![format!("{name}, as it happens")],

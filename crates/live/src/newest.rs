@@ -204,7 +204,9 @@ impl State {
             let mut past = self.past.iter();
             let began = past.find(|(seq, ..)| usize::try_from(*seq) == Ok(event.i));
             let t = began.map_or(t, |(_, t, _)| *t);
-            let (kind, track, text) = (event.kind, event.track, event.text);
+            let kind = event.kind;
+            let track = event.track;
+            let text = event.text;
             self.events.push_back(LiveEvent { seq, t, kind, track, text });
         }
         while self.events.len() > EVENTS {

@@ -16,7 +16,8 @@ fn camera() -> Arc<Camera> {
 
 /// Returns a person 3 m ahead who walks to the left, in frame `index` of ten a second.
 fn moment(index: u64) -> (Frame, FrameReport) {
-    let (camera, stamp) = (camera(), Stamp::from_nanos(1_000_000_000 + index * 100_000_000));
+    let camera = camera();
+    let stamp = Stamp::from_nanos(1_000_000_000 + index * 100_000_000);
     let colour = Some(Arc::new(RgbImage::from_fn(640, 480, |x, y| [x as u8, y as u8, 0])));
     let images = Images { colour, ..Images::default() };
     let position = Point3::new(3.0, 0.05 * index as f64, 1.6);

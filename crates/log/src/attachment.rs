@@ -43,7 +43,8 @@ pub fn read_attachment(
 fn next_record(file: &mut BufReader<File>, limits: &Limits) -> Option<(u8, Vec<u8>)> {
     let mut head = [0; 9];
     file.read_exact(&mut head).ok()?;
-    let (opcode, length) = (head[0], u64::from_le_bytes(head[1..].try_into().ok()?));
+    let opcode = head[0];
+    let length = u64::from_le_bytes(head[1..].try_into().ok()?);
     if !matches!(opcode, op::HEADER | op::ATTACHMENT) || length > limits.record_bytes {
         return None;
     }
@@ -66,7 +67,8 @@ mod tests {
         let mut writer = WriteOptions::new().create(File::create(&path).unwrap()).unwrap();
         for name in names {
             let data = Cow::Owned(format!("text of {name}").into_bytes());
-            let (name, media_type) = ((*name).to_owned(), "text/plain".to_owned());
+            let name = (*name).to_owned();
+            let media_type = "text/plain".to_owned();
             let whole = Attachment { log_time: 0, create_time: 0, name, media_type, data };
             writer.attach(&whole).unwrap();
         }

@@ -31,7 +31,8 @@ impl Intrinsics {
             let times = large.0 / small.0;
             times > 1 && (times * small.0, times * small.1) == large
         };
-        let (ours, theirs) = ((self.width, self.height), (width, height));
+        let ours = (self.width, self.height);
+        let theirs = (width, height);
         if !is_multiple(ours, theirs) && !is_multiple(theirs, ours) {
             return None;
         }
@@ -160,7 +161,8 @@ pub enum CalibrationError {
 pub fn intrinsics(info: &CameraInfo, rectified: bool) -> Result<Intrinsics, CalibrationError> {
     check_finite(info)?;
     check_rotation(&info.r)?;
-    let (k, p) = (&info.k, &info.p);
+    let k = &info.k;
+    let p = &info.p;
     let is_k_blank = k.iter().all(|v| *v == 0.0);
     // P holds for rectified images; where K is left out, it is all there is.
     let rectified = rectified || is_k_blank && p[0] != 0.0;
@@ -305,7 +307,8 @@ fn baseline(p: &[f64; 12]) -> Option<f64> {
 
 fn delivered(info: &CameraInfo, full: [f64; 4], distortion: Distortion) -> Intrinsics {
     let [fx, fy, cx, cy] = full;
-    let (bx, by) = (info.binning_x.max(1), info.binning_y.max(1));
+    let bx = info.binning_x.max(1);
+    let by = info.binning_y.max(1);
     let roi = &info.roi;
     // An empty region stands for the full image.
     let whole = roi.width == 0 || roi.height == 0;

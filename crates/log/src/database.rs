@@ -128,7 +128,8 @@ impl Database {
         let topic = u32::try_from(stored.topic).unwrap_or(u32::MAX);
         let Some(channel) = walk.channel_of(topic) else { return };
         walk.buffer = data;
-        let (time, data) = (stored.time_ns.max(0) as u64, 0..walk.buffer.len());
+        let time = stored.time_ns.max(0) as u64;
+        let data = 0..walk.buffer.len();
         walk.deliver(Located { channel, log_time: time, publish_time: time, sequence: 0, data });
     }
 

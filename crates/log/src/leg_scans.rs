@@ -33,10 +33,13 @@ pub struct LegScan {
 /// A log that cannot be opened, that is damaged, or that has not as many annotations as scans.
 pub fn read_leg_scans(path: &Path, limits: &Limits) -> Result<Vec<LegScan>, LogError> {
     let file = LogFile::open(path, limits)?;
-    let (contents, is_unpacked) = (file.path().to_owned(), file.fault().is_none());
+    let contents = file.path().to_owned();
+    let is_unpacked = file.fault().is_none();
     let mut walker = LogWalker::at(&contents, file, limits)
         .map_err(|source| LogError::NotMcap { path: path.to_owned(), source })?;
-    let (mut scans, mut legs, mut unreadable) = (Vec::new(), Vec::new(), 0);
+    let mut scans = Vec::new();
+    let mut legs = Vec::new();
+    let mut unreadable = 0;
     while let Some(message) = walker.next() {
         let channel = message.channel;
         let is_scan = channel.schema_name.ends_with("/LaserScan");

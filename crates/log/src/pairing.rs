@@ -285,7 +285,8 @@ mod tests {
     /// Runs the queue; returns all images delivered and the result of each arrival.
     fn run(window: usize, arrivals: &[u64]) -> (Vec<u64>, Vec<Arrival>) {
         let mut reorder = Reorder::new(window);
-        let (mut out, mut what) = (Vec::new(), Vec::new());
+        let mut out = Vec::new();
+        let mut what = Vec::new();
         for arrival in arrivals {
             what.push(reorder.push(at(*arrival)));
             while let Some((payload, _)) = reorder.pop(false) {

@@ -64,7 +64,8 @@ impl Registration {
         // The upper limit keeps a reading close to the colour camera from covering the image.
         let side = (self.focal_ratio * reading / point.z * OVERLAP).clamp(1.0, MAX_SPLAT_PX);
         let columns = covered(pixel.x, side, out.width());
-        let (width, z) = (out.width(), point.z as f32);
+        let width = out.width();
+        let z = point.z as f32;
         for y in covered(pixel.y, side, out.height()) {
             for old in &mut out.pixels_mut()[y * width..][columns.clone()] {
                 // Also without a surface so far.
@@ -111,7 +112,8 @@ mod tests {
     fn render(camera: &Camera, depth_from_camera: &Isometry3<f64>) -> DepthImage {
         DepthImage::from_fn(camera.width, camera.height, |x, y| {
             let ray = camera.ray(Point2::new(x as f64, y as f64));
-            let (o, d) = (depth_from_camera.translation.vector, depth_from_camera.rotation * ray);
+            let o = depth_from_camera.translation.vector;
+            let d = depth_from_camera.rotation * ray;
             let hit = |z: f64| (z - o.z) / d.z;
             let at = o + d * hit(2.0);
             let on_board = at.x.abs() < 0.5 && at.y.abs() < 0.5;
@@ -159,8 +161,8 @@ mod tests {
 
     #[test]
     fn a_larger_image_has_no_holes() {
-        let (small, large) =
-            (camera(64, 48, 60.0, Distortion::None), camera(256, 192, 240.0, Distortion::None));
+        let small = camera(64, 48, 60.0, Distortion::None);
+        let large = camera(256, 192, 240.0, Distortion::None);
         let depth = DepthImage::filled(64, 48, 3.0);
         let big = Registration::new(&small, &large, Isometry3::identity()).apply(&depth).unwrap();
         let holes = big.pixels().iter().filter(|d| d.is_nan()).count();

@@ -175,7 +175,8 @@ impl Scan {
         let mut hash = Sha256::new();
         for part in parts {
             let file = LogFile::open(&part.path, limits)?;
-            let (contents, fault) = (file.path().to_owned(), file.fault().map(str::to_owned));
+            let contents = file.path().to_owned();
+            let fault = file.fault().map(str::to_owned);
             let file = Hashing { reader: file, hash, bytes: 0 };
             let mut walker = LogWalker::at(&contents, file, limits)
                 .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?

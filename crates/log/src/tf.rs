@@ -45,7 +45,8 @@ impl TfBuffer {
     /// Adds a transform; returns false if it is invalid (a number that is not finite, a quaternion
     /// that is no rotation, a frame that is its own parent) or there are too many frames.
     pub fn insert(&mut self, transform: &TransformStamped, is_static: bool) -> bool {
-        let (child, parent) = (plain(&transform.child_frame_id), plain(&transform.header.frame_id));
+        let child = plain(&transform.child_frame_id);
+        let parent = plain(&transform.header.frame_id);
         let Some(pose) = transform.transform.isometry() else { return false };
         let full = self.links.len() >= MAX_FRAMES && !self.links.contains_key(child);
         if child == parent || child.is_empty() || full {
@@ -111,7 +112,8 @@ impl TfBuffer {
 
     /// Returns true if the two frames are connected, at any time.
     pub fn connects(&self, a: &str, b: &str) -> bool {
-        let (up_a, up_b) = (self.ancestors(plain(a)), self.ancestors(plain(b)));
+        let up_a = self.ancestors(plain(a));
+        let up_b = self.ancestors(plain(b));
         up_a.iter().any(|frame| up_b.contains(frame))
     }
 
@@ -120,7 +122,8 @@ impl TfBuffer {
     /// second before their first and behind their last sample. `None` if the frames are not
     /// connected or a transform is not known at that time.
     pub fn lookup(&self, target: &str, source: &str, at: Stamp) -> Option<Isometry3<f64>> {
-        let (up_t, up_s) = (self.ancestors(plain(target)), self.ancestors(plain(source)));
+        let up_t = self.ancestors(plain(target));
+        let up_s = self.ancestors(plain(source));
         let common = up_s.iter().find(|frame| up_t.contains(frame))?;
         let target = self.climb(&up_t, common, at)?;
         let source = self.climb(&up_s, common, at)?;

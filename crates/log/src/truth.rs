@@ -98,7 +98,8 @@ impl TruthFrame {
 /// A log that cannot be opened, or a message of the channel that is no [`TruthFrame`], because an
 /// incomplete truth would give wrong figures.
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
-    let (mut frames, mut present) = (Vec::new(), false);
+    let mut frames = Vec::new();
+    let mut present = false;
     for part in LogFiles::of(path)?.parts() {
         let mut walker = LogWalker::open(part, limits)?;
         while let Some(message) = walker.next() {

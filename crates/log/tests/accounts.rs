@@ -158,7 +158,8 @@ fn two_devices(devices: &[(&str, &str); 2]) -> LogWriter {
 fn all_images_are_of_one_device() {
     for devices in &DEVICES {
         let (source, _saved) = open(two_devices(devices), DEPTH);
-        let (of_colour, of_depth) = (used(&source, "colour"), used(&source, "depth"));
+        let of_colour = used(&source, "colour");
+        let of_depth = used(&source, "depth");
         let is_pair = devices.contains(&(&of_colour, &of_depth));
         assert!(is_pair, "{of_colour} with {of_depth}");
         let other = devices.iter().find(|device| device.0 != of_colour).unwrap();

@@ -45,7 +45,8 @@ fn told(mut walker: LogWalker<impl std::io::Read>) -> (Vec<Told>, Vec<&'static s
     while let Some(m) = walker.next() {
         assert!(all.len() < 10_000, "a walk that does not end");
         let channel = m.channel;
-        let (topic, kind) = (channel.topic.clone(), channel.schema_name.clone());
+        let topic = channel.topic.clone();
+        let kind = channel.schema_name.clone();
         assert_eq!(channel.encoding, "cdr");
         all.push((topic, kind, m.log_time, m.data.to_vec()));
     }
@@ -144,7 +145,8 @@ fn a_real_database_tells_what_its_mcap_file_tells() {
         all.sort();
         all
     };
-    let (found, expected) = (sorted(messages), sorted(in_mcap(&mcap)));
+    let found = sorted(messages);
+    let expected = sorted(in_mcap(&mcap));
     for ((topic, kind, time, data), expected) in found.iter().zip(&expected) {
         let kind = kind.replace('/', "/msg/");
         assert_eq!((topic, &kind, *time), (&expected.0, &expected.1, expected.2));
@@ -344,8 +346,10 @@ struct Unfinished {
 impl Unfinished {
     /// Stores the messages, does some SQL and does not end the connection before all is copied.
     fn after(ending: &'static str, sql: &[&str]) -> Self {
-        let (home, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let (from, path) = (home.path().join("walk.db3"), folder.path().join("walk.db3"));
+        let home = tempfile::tempdir().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let from = home.path().join("walk.db3");
+        let path = folder.path().join("walk.db3");
         let messages = in_mcap(&log());
         let recorder = store(&messages, &from);
         sql.iter().for_each(|sql| recorder.execute_batch(sql).unwrap());

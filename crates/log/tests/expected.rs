@@ -51,7 +51,8 @@ fn messages_and_images_are_those_that_were_written() {
         let mut wanted: Vec<_> = listed
             .iter()
             .map(|m| {
-                let (log, publish) = (number(&m["log_time"]), number(&m["publish_time"]));
+                let log = number(&m["log_time"]);
+                let publish = number(&m["publish_time"]);
                 (log, string(&m["topic"]), publish, string(&m["payload_sha256"]))
             })
             .collect();

@@ -162,8 +162,8 @@ fn a_flipped_byte_never_delivers_a_wrong_message_unnoticed() {
         let mut random = XorShift64::new(0x1234_5678_9abc_def1);
         let mut unnoticed = 0;
         for _ in 0..600 {
-            let (place, with) =
-                (random.below(whole.len() as u64) as usize, 1 + random.below(255) as u8);
+            let place = random.below(whole.len() as u64) as usize;
+            let with = 1 + random.below(255) as u8;
             let mut bytes = whole.clone();
             bytes[place] ^= with;
             let Some(found) = walk(&bytes) else {
@@ -343,7 +343,8 @@ fn a_pipe_in_small_pieces_gives_the_same() {
 fn what_is_no_log_is_refused_in_one_line() {
     let open = |bytes: &[u8]| {
         let saved = SavedLog::new(bytes);
-        let (input, limits) = (InputSettings::default(), Limits::default());
+        let input = InputSettings::default();
+        let limits = Limits::default();
         let error = FrameSource::open(&saved.path, &input, &limits, Inputs::ANY).err().unwrap();
         let error = error.to_string();
         assert!(error.contains("test.mcap"), "{error}");

@@ -73,7 +73,8 @@ fn whoever_keeps_up_gets_the_frames_of_the_log() {
     drive(&mut log, 12);
     let log = log.finish();
     let saved = SavedLog::new(&log);
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let mut source = FrameSource::open(&saved.path, &input, &limits, DEPTH).unwrap();
     let (found, live) = live(&log, DEPTH);
     assert_eq!(found.len(), 12);
@@ -207,7 +208,8 @@ fn sources_of_obstacles_are_waited_for_and_read() {
     let stamp = last.unwrap().frame.stamp.plus_seconds(0.1);
     let header = Header::new(stamp.plus_seconds(-0.05), "sonar");
     source.take("/sonar", &encode(&Range { header, ..range }));
-    let (colour, depth) = ("/camera/color/image_raw", "/camera/depth/image_raw");
+    let colour = "/camera/color/image_raw";
+    let depth = "/camera/depth/image_raw";
     let frame_at = |source: &mut LiveSource, stamp, arrival_ns| {
         let mut next = started();
         next.colour(stamp);

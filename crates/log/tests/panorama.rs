@@ -23,7 +23,8 @@ fn mirror() -> ConicalMirror {
 
 fn raw_info() -> CameraInfo {
     let mirror = mirror();
-    let (f, c) = (mirror.focal_px, mirror.centre_px);
+    let f = mirror.focal_px;
+    let c = mirror.centre_px;
     CameraInfo {
         distortion_model: CONICAL_MIRROR.into(),
         d: mirror_coefficients(&mirror).to_vec(),
@@ -70,7 +71,8 @@ fn first(
     };
     log.message("/camera/color/image_raw", at(0.0), &image);
     let saved = log.save();
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     FrameSource::open(&saved.path, &input, &limits, INPUTS).unwrap().next_frame().unwrap()
 }
 
@@ -99,7 +101,8 @@ fn a_circular_image_becomes_a_panorama() {
 #[test]
 fn an_unwrapped_image_is_taken_as_it_is() {
     let found = first(&unwrapped_info(240, 60), 240, 60, |x, _| x < 120);
-    let (seen, raw) = (panorama(&found), mirror());
+    let seen = panorama(&found);
+    let raw = mirror();
     assert_eq!((seen.columns, seen.rows), (240, 60));
     let whole = Panorama { mirror: raw, columns: 240, rows: 60 };
     for row in [0.0, 20.0, 59.0] {
@@ -118,7 +121,8 @@ fn numbers_of_no_mirror_are_refused() {
         log.fixed("base_link", "colour", &ConicalMirror::upright(1.5));
         log.colour_of(at(0.0), SIDE, SIDE);
         let saved = log.save();
-        let (input, limits) = (InputSettings::default(), Limits::default());
+        let input = InputSettings::default();
+        let limits = Limits::default();
         let error = FrameSource::open(&saved.path, &input, &limits, INPUTS).err().unwrap();
         assert!(error.to_string().contains("conical_mirror"), "{error}");
     }

@@ -119,7 +119,8 @@ fn the_floor_gives_the_pose_of_the_camera() {
         assert!(facts.camera_source.contains("floor"));
         let (height, pitch, roll) = expected.pose.unwrap();
         // The floor of these cameras is shaped like a bowl (see the README of the logs).
-        let (metres, degrees) = (0.08, 2.0);
+        let metres = 0.08;
+        let degrees = 2.0;
         assert!((facts.camera_height_m - height).abs() < metres, "{facts:?}");
         assert!((facts.camera_pitch_down_deg - pitch).abs() < degrees, "{facts:?}");
         assert!((facts.camera_roll_deg - roll).abs() < degrees, "{facts:?}");

@@ -151,11 +151,13 @@ impl Matcher {
         }
         self.parent.extend(0..(rows + cols) as u32);
         for edge in edges.iter().filter(|edge| edge.weight > 0.0) {
-            let (row, col) = (edge.row, edge.col + rows as u32);
+            let row = edge.row;
+            let col = edge.col + rows as u32;
             if self.parent[row as usize] == self.parent[col as usize] {
                 continue;
             }
-            let (a, b) = (self.root(row), self.root(col));
+            let a = self.root(row);
+            let b = self.root(col);
             // The smaller root wins, which keeps the result independent of the order of edges.
             self.parent[a.max(b) as usize] = a.min(b);
         }
@@ -188,7 +190,8 @@ impl Matcher {
         let flipped = self.rows.len() > self.cols.len();
         let wide = self.rows.len().max(self.cols.len());
         let place = |edge: &Edge, local: &[u32]| {
-            let (r, c) = (local[edge.row as usize], local[edge.col as usize + rows]);
+            let r = local[edge.row as usize];
+            let c = local[edge.col as usize + rows];
             if flipped { (c as usize, r as usize) } else { (r as usize, c as usize) }
         };
         self.cost.clear();
@@ -311,7 +314,9 @@ impl Solver {
     fn augment(&mut self, start: u32, cost: &[f64], cols: usize) {
         reset(&mut self.distance, cols, f64::INFINITY);
         self.settled.clear();
-        let (mut row, mut via, mut shift) = (start, NONE, 0.0);
+        let mut row = start;
+        let mut via = NONE;
+        let mut shift = 0.0;
         let (end, reached) = loop {
             let Self { distance, previous, col_price, .. } = self;
             let costs = &cost[row as usize * cols..][..cols];
@@ -359,7 +364,8 @@ const LANES: usize = 8;
 fn two_cheapest(costs: &[f64], prices: &[f64]) -> (usize, f64, f64) {
     let (chunks, rest) = costs.as_chunks::<LANES>();
     let (prices_of, prices_of_rest) = prices.as_chunks::<LANES>();
-    let (mut firsts, mut seconds) = ([f64::INFINITY; LANES], [f64::INFINITY; LANES]);
+    let mut firsts = [f64::INFINITY; LANES];
+    let mut seconds = [f64::INFINITY; LANES];
     for (costs, prices) in chunks.iter().zip(prices_of) {
         for lane in 0..LANES {
             add_cost(costs[lane] - prices[lane], &mut firsts[lane], &mut seconds[lane]);
@@ -369,7 +375,8 @@ fn two_cheapest(costs: &[f64], prices: &[f64]) -> (usize, f64, f64) {
     let mut half = if chunks.is_empty() { 0 } else { LANES / 2 };
     while half > 0 {
         for lane in 0..half {
-            let (first, second) = (firsts[lane + half], seconds[lane + half]);
+            let first = firsts[lane + half];
+            let second = seconds[lane + half];
             let less = if second < seconds[lane] { second } else { seconds[lane] };
             seconds[lane] = less;
             add_cost(first, &mut firsts[lane], &mut seconds[lane]);

@@ -73,7 +73,8 @@ proptest! {
             if mixed.is_multiple_of(few) { (mixed % 1009) as f64 + 1.0 } else { 0.0 }
         };
         let weights: Vec<f64> = (0..rows * cols).map(weight).collect();
-        let (mut groups, mut whole) = (vec![None; rows], vec![None; rows]);
+        let mut groups = vec![None; rows];
+        let mut whole = vec![None; rows];
         let mut matcher = Matcher::new();
         matcher.match_groups(rows, cols, &weights, &mut groups);
         matcher.match_all(rows, cols, &weights, &mut whole);
@@ -104,7 +105,8 @@ proptest! {
         placed.sort_unstable();
         prop_assert_eq!(placed, (0..rows as u32).collect::<Vec<_>>());
         for (i, cost) in cost.iter().enumerate() {
-            let (row, col) = (i / cols, i % cols);
+            let row = i / cols;
+            let col = i % cols;
             let reduced = cost - row_price[row] - col_price[col];
             prop_assert!(reduced > -1e-6, "{}", reduced);
             prop_assert!(row_of[col] != row as u32 || reduced < 1e-6, "{}", reduced);

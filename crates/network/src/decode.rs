@@ -140,7 +140,8 @@ fn yolox(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredBox
             let [x, y, width, height] = [0, 1, 2, 3].map(|k| f64::from(row[k]));
             let score = row[4] * wanted.best(|class| row.get(5 + class).copied());
             wanted.take(score, || {
-                let (x, y) = ((x + column) * stride, (y + line) * stride);
+                let x = (x + column) * stride;
+                let y = (y + line) * stride;
                 around(x, y, width.exp() * stride, height.exp() * stride)
             })
         });
@@ -202,8 +203,10 @@ fn nanodet(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredB
         let score = wanted.best(|class| scores.get(class).copied());
         wanted.take(score, || {
             let side = |k: usize| stride * expectation(&sides[k * NANODET_BINS..][..NANODET_BINS]);
-            let (left, top) = (column * stride - side(0), line * stride - side(1));
-            let (right, bottom) = (column * stride + side(2), line * stride + side(3));
+            let left = column * stride - side(0);
+            let top = line * stride - side(1);
+            let right = column * stride + side(2);
+            let bottom = line * stride + side(3);
             Rect::new(left, top, right - left, bottom - top)
         })
     });
@@ -422,7 +425,8 @@ mod tests {
 
     #[test]
     fn outputs_are_found_by_name_in_any_order() {
-        let (labels, scores) = (tensor(&[1, 2], &[0.0, 0.0]), tensor(&[1, 2], &[0.9, 0.1]));
+        let labels = tensor(&[1, 2], &[0.0, 0.0]);
+        let scores = tensor(&[1, 2], &[0.9, 0.1]);
         let boxes = tensor(&[1, 2, 4], &[1.0, 2.0, 5.0, 10.0, 0.0, 0.0, 9.0, 9.0]);
         let outputs = [("scores", &scores), ("labels", &labels), ("boxes", &boxes)];
         let found = decode(Family::RtDetr, &outputs, INPUT, PEOPLE);
@@ -441,7 +445,8 @@ mod tests {
 
     #[test]
     fn nanodet_has_a_distribution_for_each_side() {
-        let (width, cell) = (1 + 32, 9); // Column 1, row 1 of the first grid.
+        let width = 1 + 32;
+        let cell = 9; // Column 1, row 1 of the first grid.
         let mut values = vec![0.0; 85 * width];
         let row = &mut values[cell * width..][..width];
         row[0] = 0.9;

@@ -62,7 +62,8 @@ pub struct About {
 impl About {
     /// Describes a network, and runs it once.
     fn of(network: &mut impl Network, size: OpenSize) -> Self {
-        let (inputs, outputs) = (network.inputs().to_vec(), network.outputs().to_vec());
+        let inputs = network.inputs().to_vec();
+        let outputs = network.outputs().to_vec();
         let image = image_port(&inputs).and_then(|image| input_size(&inputs[image], size));
         let run = image.clone().and_then(|input| {
             let found = first_run(network, input)?;
@@ -165,7 +166,8 @@ fn input_size(port: &Port, size: OpenSize) -> Result<InputSize, String> {
             _ => Ok(fixed.or(chosen).unwrap_or(usual[axis])),
         }
     };
-    let (width, height) = (side(width, 0)?, side(height, 1)?);
+    let width = side(width, 0)?;
+    let height = side(height, 1)?;
     if [width, height].iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
         return Err(format!("its input is {width} x {height} pixels; a side has 1 to {MAX_SIDE}"));
     }
@@ -230,7 +232,8 @@ impl PersonNetwork {
         };
         let Some(known) = family.classes(&shapes, input) else {
             let shown: Vec<String> = shapes.iter().map(OutputShape::to_string).collect();
-            let (shown, needs) = (shown.join(", "), family.outputs());
+            let shown = shown.join(", ");
+            let needs = family.outputs();
             return Err(format!("is not of the family {family}: it has {shown}, not {needs}"));
         };
         let classes = match choices.classes.is_empty() {

@@ -43,7 +43,8 @@ impl Convention {
     /// Returns the preparation of images that its networks are trained with.
     pub const fn preparation(self) -> Preparation {
         let [mean, deviation] = IMAGENET;
-        let (fit, padding) = (Fit::Stretch, 0.0);
+        let fit = Fit::Stretch;
+        let padding = 0.0;
         match self {
             Self::OsNet => Preparation { fit, padding, colours: Colours::Rgb, mean, deviation },
             Self::Omz => Preparation {
@@ -163,7 +164,8 @@ fn cut(image: &RgbImage, part: &Rect) -> RgbImage {
     if !part.is_sane() || inside.area() <= 0.0 {
         return RgbImage::default();
     }
-    let (left, top) = (inside.x as usize, inside.y as usize);
+    let left = inside.x as usize;
+    let top = inside.y as usize;
     // A box of less than a pixel has one.
     let end = |from: usize, to: f64, most: usize| (to.round() as usize).clamp(from + 1, most);
     let right = end(left, inside.x + inside.width, image.width());

@@ -283,7 +283,8 @@ impl Family {
                 return Some(1);
             }
             (Self::RtDetr, None) => {
-                let (boxes, scores) = (outputs.named("boxes")?, outputs.named("scores")?);
+                let boxes = outputs.named("boxes")?;
+                let scores = outputs.named("scores")?;
                 return match (outputs.named("labels")?, boxes, scores) {
                     (&[1, a], &[1, b, 4], &[1, c]) if a == b && b == c => Some(0),
                     _ => None,

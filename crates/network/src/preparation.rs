@@ -130,7 +130,8 @@ fn taps(from: usize, to: usize) -> Vec<Tap> {
 impl Preparation {
     /// Prepares an image, and returns its place in the input; `None` for an image without pixels.
     pub fn apply(&self, image: &RgbImage, input: InputSize) -> Option<(Tensor, Placement)> {
-        let (width, height) = (image.width(), image.height());
+        let width = image.width();
+        let height = image.height();
         if width == 0 || height == 0 {
             return None;
         }
@@ -154,7 +155,8 @@ impl Preparation {
         let columns = taps(width, place.size[0]);
         let [left, top] = place.offset.map(|offset| offset as usize);
         for (row, down) in taps(height, place.size[1]).iter().enumerate() {
-            let (upper, lower) = (image.row(down.first), image.row(down.second));
+            let upper = image.row(down.first);
+            let lower = image.row(down.second);
             let start = (top + row) * input.width + left;
             for (column, across) in columns.iter().enumerate() {
                 for (channel, &colour) in order.iter().enumerate() {
@@ -163,7 +165,8 @@ impl Preparation {
                         let second = f32::from(pixels[across.second][colour]);
                         first + (second - first) * across.weight
                     };
-                    let (above, below) = (mix(upper), mix(lower));
+                    let above = mix(upper);
+                    let below = mix(lower);
                     let value = above + (below - above) * down.weight;
                     values[at(channel, start + column)] = scaled(channel, value);
                 }
@@ -232,7 +235,8 @@ mod tests {
     fn boxes_return_to_the_image() {
         for fit in [Fit::Stretch, Fit::Centre, Fit::TopLeft] {
             let place = Placement::new(fit, 640, 480, InputSize { width: 320, ..INPUT });
-            let (u, v) = (place.scale[0] * 100.0 + place.offset[0], place.scale[1] * 60.0);
+            let u = place.scale[0] * 100.0 + place.offset[0];
+            let v = place.scale[1] * 60.0;
             let rect = Rect::new(u, v + place.offset[1], 50.0 * place.scale[0], place.scale[1]);
             let back = place.rect_to_image(&rect);
             let errors = [back.x - 100.0, back.y - 60.0, back.width - 50.0, back.height - 1.0];

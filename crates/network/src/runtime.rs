@@ -33,7 +33,8 @@ impl RtenNetwork {
         let model = ModelOptions::with_all_ops().load(bytes).map_err(|why| load_error(&why))?;
         check_tensors(&model, &survey, limits)?;
         let ports = |ids: &[NodeId]| ids.iter().map(|id| port(&model, *id)).collect::<Vec<_>>();
-        let (inputs, outputs) = (ports(model.input_ids()), ports(model.output_ids()));
+        let inputs = ports(model.input_ids());
+        let outputs = ports(model.output_ids());
         let pool = Arc::new(ThreadPool::with_num_threads(limits.threads.max(1)));
         let options = RunOptions::default().with_thread_pool(Some(pool));
         Ok(Self { model, options, inputs, outputs })
@@ -93,7 +94,8 @@ fn port(model: &Model, id: NodeId) -> Port {
 
 /// Converts a tensor to the element type of an input.
 fn to_value(port: &Port, tensor: &Tensor) -> Result<Value, String> {
-    let (shape, values) = (tensor.shape(), tensor.values());
+    let shape = tensor.shape();
+    let values = tensor.values();
     let value = match port.element {
         Element::Float | Element::Other => Value::from_shape(shape, values.to_vec()).ok(),
         Element::Integer => {

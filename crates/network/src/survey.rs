@@ -113,7 +113,8 @@ impl Survey {
             let sizes = operator.inputs.iter().filter_map(|input| self.sizes.get(input));
             let largest = sizes.copied().fold(0.0, f64::max);
             if largest > limits.tensor_values as f64 {
-                let (kind, most) = (operator.kind, limits.tensor_values);
+                let kind = operator.kind;
+                let most = limits.tensor_values;
                 return Err(format!(
                     "its operator `{kind}` makes a tensor of {largest} numbers; at most {most} may"
                 ));
@@ -213,7 +214,8 @@ impl<'a> Operator<'a> {
     }
 
     fn add_attribute(&mut self, attribute: &'a [u8]) -> Result<(), String> {
-        let (mut name, mut largest) = ("", 0);
+        let mut name = "";
+        let mut largest = 0;
         for field in Fields(attribute) {
             match field? {
                 (1, Content::Bytes(text)) => name = std::str::from_utf8(text).unwrap_or_default(),
@@ -249,7 +251,8 @@ impl Constant {
     fn of(tensor: &[u8]) -> Result<Self, String> {
         const INT64: u64 = 7;
         let mut constant = Self { values: 1.0, ..Self::default() };
-        let (mut numbers, mut kind) = (Vec::new(), 0);
+        let mut numbers = Vec::new();
+        let mut kind = 0;
         for field in Fields(tensor) {
             match field? {
                 (1, Content::Number(size)) => constant.values *= size as f64,

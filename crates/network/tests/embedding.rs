@@ -69,7 +69,9 @@ fn the_part_of_the_image_in_the_box_is_described() {
             let found = network.embed(&two_people(), &Rect::new(x, 20.0, width, 150.0)).unwrap();
             found.unwrap()
         };
-        let (red, blue, outside) = (vector(10.0, 60.0), vector(120.0, 60.0), vector(-40.0, 80.0));
+        let red = vector(10.0, 60.0);
+        let blue = vector(120.0, 60.0);
+        let outside = vector(-40.0, 80.0);
         let cosine = |a: &[f32], b: &[f32]| {
             let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
             dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()

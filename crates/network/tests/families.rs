@@ -35,7 +35,8 @@ fn is_blob(x: usize, y: usize) -> bool {
 /// The image of `make_models.py`, with each pixel `scale` times as large.
 fn scene(scale: usize) -> RgbImage {
     RgbImage::from_fn(64 * scale, 64 * scale, |x, y| {
-        let (x, y) = (x / scale, y / scale);
+        let x = x / scale;
+        let y = y / scale;
         [0, 1, 2].map(|c| match is_blob(x, y) {
             true => 230 + 10 * c as u8,
             false => ((x + 2 * y + 7 * c) % 40) as u8,
@@ -151,7 +152,8 @@ fn truncated_files_are_refused() {
 fn files_with_changed_bytes_are_survived() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("network.onnx");
-    let (mut refused, mut random) = (0, 1_u64);
+    let mut refused = 0;
+    let mut random = 1_u64;
     for round in 0..400 {
         let name = ["yolox.onnx", "rt-detr.onnx", "movenet.onnx", "nanodet.onnx"][round % 4];
         let mut bytes = fs::read(path(name)).unwrap();

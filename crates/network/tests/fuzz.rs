@@ -94,7 +94,8 @@ fn encoded(mut value: u64) -> Vec<u8> {
 
 /// Splits a message; `None` if it is none.
 fn fields(bytes: &[u8]) -> Option<Vec<Field>> {
-    let (mut at, mut found) = (0, Vec::new());
+    let mut at = 0;
+    let mut found = Vec::new();
     while at < bytes.len() {
         let start = at;
         let key = varint(bytes, &mut at)?;
@@ -132,7 +133,8 @@ fn mutate(bytes: &[u8], other: &[u8], random: &mut Random, depth: usize) -> Vec<
         return mutate_bytes(bytes, random);
     };
     let field = &fields[random.below(fields.len())];
-    let (key_end, content) = (field.content.start, &bytes[field.content.clone()]);
+    let key_end = field.content.start;
+    let content = &bytes[field.content.clone()];
     let with = |replacement: Vec<u8>| {
         let mut key = &bytes[field.start..key_end];
         // The length follows the number of the field, which has one byte here.
@@ -199,7 +201,8 @@ fn file() -> PathBuf {
 /// Runs so many mutated files, and returns the number of each outcome.
 fn fuzz(seed: u64, rounds: u64) -> BTreeMap<&'static str, u64> {
     let seeds = [files("models"), files("corpus")].concat();
-    let (mut random, mut counts) = (Random(seed.max(1)), BTreeMap::new());
+    let mut random = Random(seed.max(1));
+    let mut counts = BTreeMap::new();
     let path = file();
     for _ in 0..rounds {
         let mut bytes = seeds[random.below(seeds.len())].clone();
@@ -233,7 +236,8 @@ fn mutated_files_are_survived() {
     let number = |name: &str, usual: u64| {
         env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
     };
-    let (seed, files) = (number("TAGALONG_FUZZ_SEED", 1), number("TAGALONG_FUZZ_FILES", 1000));
+    let seed = number("TAGALONG_FUZZ_SEED", 1);
+    let files = number("TAGALONG_FUZZ_FILES", 1000);
     // Panics of the runtime are contained by its thread; their messages would hide all others.
     let usual = panic::take_hook();
     panic::set_hook(Box::new(|_| ()));

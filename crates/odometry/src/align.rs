@@ -145,14 +145,16 @@ impl AlignmentInput<'_> {
         let middle = pixel.coords * scale + point.shifts[level];
         let difference = point.patches[level].compare(self.images[level], middle)?;
         let turned = |v: Vector3<f64>| stance.nod(&(self.camera_from_robot.rotation * v));
-        let (sin, cos) = (stance.pose.rotation.im, stance.pose.rotation.re);
+        let sin = stance.pose.rotation.im;
+        let cos = stance.pose.rotation.re;
         let moves = [
             turned(Vector3::new(-cos, sin, 0.0)),
             turned(Vector3::new(-sin, -cos, 0.0)),
             turned(Vector3::new(here.y, -here.x, 0.0)),
             Vector3::new(0.0, -seen.z, seen.y),
         ];
-        let (across, down) = (seen.x / seen.z, seen.y / seen.z);
+        let across = seen.x / seen.z;
+        let down = seen.y / seen.z;
         let [fx, fy] = [self.lens.fx, self.lens.fy].map(|f| f * scale / seen.z);
         Some(PointComparison {
             difference,
@@ -176,8 +178,8 @@ struct PointComparison<'p> {
 impl PointComparison<'_> {
     fn add_to(&self, equations: &mut Equations, weight: f64) {
         let ([xx, xy, yy], [x, y]) = (self.products, self.difference.along);
-        let (by_columns, by_rows) =
-            (self.columns * *xx + self.rows * *xy, self.columns * *xy + self.rows * *yy);
+        let by_columns = self.columns * *xx + self.rows * *xy;
+        let by_rows = self.columns * *xy + self.rows * *yy;
         equations.matrix +=
             (by_columns * self.columns.transpose() + by_rows * self.rows.transpose()) * weight;
         equations.vector += (self.columns * x + self.rows * y) * weight;
@@ -199,7 +201,8 @@ impl Stance {
 
     /// Rotates a vector about the camera's horizontal axis.
     fn nod(&self, v: &Vector3<f64>) -> Vector3<f64> {
-        let (sin, cos) = (self.nod_sin, self.nod_cos);
+        let sin = self.nod_sin;
+        let cos = self.nod_cos;
         Vector3::new(v.x, cos * v.y - sin * v.z, sin * v.y + cos * v.z)
     }
 }

@@ -47,7 +47,8 @@ impl Keyframe {
     ) -> Self {
         let cell = settings.cell_px;
         let cells = |size: usize| (0..size).step_by(cell);
-        let (width, height) = (images[0].width(), images[0].height());
+        let width = images[0].width();
+        let height = images[0].height();
         let eye = camera.robot_from_camera.translation.vector.xy().into();
         // Points at a person and behind one are left out because outlines move with the person, and
         // floor points near a person because of the shadow.
@@ -79,7 +80,8 @@ impl Point {
 
 /// Returns the distance from a point to a line segment on the floor, m.
 fn distance_m(place: &Point2<f64>, [from, to]: [Point2<f64>; 2]) -> f64 {
-    let (way, off) = (to - from, place - from);
+    let way = to - from;
+    let off = place - from;
     // The minimum keeps a segment of zero length from dividing by zero.
     let part = (off.dot(&way) / way.norm_squared().max(1e-9)).clamp(0.0, 1.0);
     (off - way * part).norm()
@@ -96,7 +98,8 @@ fn point(
     let range = settings.min_depth_m as f32..=settings.max_depth_m as f32;
     // `slopes` compares pixels that are two apart; the setting is per pixel.
     let least = (2.0 * settings.min_slope) as f32;
-    let (mut best, mut slope) = (None, least);
+    let mut best = None;
+    let mut slope = least;
     for (x, y, steepness) in slopes(images[0], corner, settings.cell_px) {
         if steepness <= slope {
             continue;
@@ -139,7 +142,8 @@ fn slopes(
 
 /// Returns the depth of a pixel, m, unless it is at the border of a surface.
 fn surface_m(depth: &DepthImage, x: usize, y: usize) -> Option<f32> {
-    let (x, y) = (x as i64, y as i64);
+    let x = x as i64;
+    let y = y as i64;
     let here = depth.get(x, y)?;
     let around = [(x - NEAR, y), (x + NEAR, y), (x, y - NEAR), (x, y + NEAR)];
     let is_elsewhere = |there: f32| (there - here).abs() >= SAME_SURFACE * here;

@@ -117,7 +117,8 @@ impl Reference {
         let keyframe = Keyframe::new(settings, &frame.camera, &images, depth, people);
         let is_enough = keyframe.points.len() >= settings.min_points;
         funnel.drop_many("odometry: too few points", u64::from(!is_enough));
-        let (by_wheels, pose) = (Way::default(), Isometry2::identity());
+        let by_wheels = Way::default();
+        let pose = Isometry2::identity();
         is_enough.then_some(Self { keyframe, by_wheels, pose, nod: 0.0 })
     }
 
@@ -191,12 +192,14 @@ impl Way {
 
 /// Halves an image: each pixel is the mean of two by two.
 fn halve(image: &GreyImage, half: &mut GreyImage) {
-    let (width, height) = (image.width() / 2, image.height() / 2);
+    let width = image.width() / 2;
+    let height = image.height() / 2;
     if (half.width(), half.height()) != (width, height) {
         *half = GreyImage::filled(width, height, 0);
     }
     for (y, row) in half.pixels_mut().chunks_exact_mut(width.max(1)).enumerate() {
-        let (above, below) = (image.row(2 * y), image.row(2 * y + 1));
+        let above = image.row(2 * y);
+        let below = image.row(2 * y + 1);
         let pairs = above.chunks_exact(2).zip(below.chunks_exact(2));
         for (mean, (above, below)) in row.iter_mut().zip(pairs) {
             let sum: u16 = above.iter().chain(below).map(|grey| u16::from(*grey)).sum();

@@ -74,7 +74,8 @@ fn sample(image: &GreyImage, middle: Vector2<f64>) -> Option<[f32; PIXELS]> {
     if !(is_inside(middle.x, image.width()) && is_inside(middle.y, image.height())) {
         return None;
     }
-    let (left, top) = (middle.x as usize - HALF, middle.y as usize - HALF);
+    let left = middle.x as usize - HALF;
+    let top = middle.y as usize - HALF;
     let [across, down] = [middle.x, middle.y].map(|at| at.fract() as f32);
     let mut out = [0.0; PIXELS];
     // Each interpolated row is the lower one of one output row and the upper one of the next.
@@ -93,7 +94,8 @@ fn sample(image: &GreyImage, middle: Vector2<f64>) -> Option<[f32; PIXELS]> {
 fn between(row: &[u8], left: usize, part: f32) -> [f32; SIDE] {
     let pixels = &row[left..=left + SIDE];
     std::array::from_fn(|i| {
-        let (here, next) = (f32::from(pixels[i]), f32::from(pixels[i + 1]));
+        let here = f32::from(pixels[i]);
+        let next = f32::from(pixels[i + 1]);
         here + part * (next - here)
     })
 }
@@ -124,9 +126,12 @@ mod tests {
         let mut all = Vec::new();
         for row in -3..=3 {
             for column in -3..=3 {
-                let (x, y) = (middle.x + f64::from(column), middle.y + f64::from(row));
-                let (left, top) = (x.floor(), y.floor());
-                let (a, b) = (x - left, y - top);
+                let x = middle.x + f64::from(column);
+                let y = middle.y + f64::from(row);
+                let left = x.floor();
+                let top = y.floor();
+                let a = x - left;
+                let b = y - top;
                 all.push(
                     (1.0 - b) * ((1.0 - a) * at(left, top) + a * at(left + 1.0, top))
                         + b * ((1.0 - a) * at(left, top + 1.0) + a * at(left + 1.0, top + 1.0)),

@@ -181,7 +181,8 @@ mod tests {
 
     #[test]
     fn a_new_target_is_an_event() {
-        let (mut a, b) = (moment(&[(1, true)]), moment(&[(1, true)]));
+        let mut a = moment(&[(1, true)]);
+        let b = moment(&[(1, true)]);
         a.target = Some(1);
         let events = of_run(&[0.0, 0.1], &[Some(&a), Some(&b)]);
         let texts: Vec<&str> = events.iter().map(|event| event.text.as_str()).collect();
@@ -194,7 +195,8 @@ mod tests {
     fn a_change_of_the_lock_is_told_with_its_cause() {
         let of = |lock: &str| {
             let mut moment = moment(&[]);
-            let (lock, why) = (lock.to_owned(), "out of sight".to_owned());
+            let lock = lock.to_owned();
+            let why = "out of sight".to_owned();
             moment.notes.drive = Some(DriveNote { lock, why, ..DriveNote::default() });
             moment
         };

@@ -57,7 +57,8 @@ impl Moment {
 impl TrackState {
     fn of(track: &Track, odom_from_robot: &Isometry2<f64>) -> Self {
         let person = &track.estimate.person;
-        let (head, region) = (person.position, track.estimate.region);
+        let head = person.position;
+        let region = track.estimate.region;
         let floor = odom_from_robot * head.xy();
         Self {
             id: track.id.0,

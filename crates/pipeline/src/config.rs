@@ -348,7 +348,8 @@ impl Builder<'_> {
 
     fn associator(&self, value: Option<Value<'_>>) -> Result<Guarded<dyn Associator>, ConfigError> {
         let mut section = Section::or_default("associator", value, DEFAULT_ASSOCIATOR)?;
-        let (config, context) = (section.config.take(), self.context(4, 0));
+        let config = section.config.take();
+        let context = self.context(4, 0);
         let name = &section.settings.plugin;
         let plugin = section.at_plugin(self.registry.build_associator(name, config, &context))?;
         Ok(Guarded::new(section.settings.plugin, plugin))
@@ -356,7 +357,8 @@ impl Builder<'_> {
 
     fn manager(&self, value: Option<Value<'_>>) -> Result<Guarded<dyn TrackManager>, ConfigError> {
         let mut section = Section::or_default("manager", value, DEFAULT_MANAGER)?;
-        let (config, context) = (section.config.take(), self.context(5, 0));
+        let config = section.config.take();
+        let context = self.context(5, 0);
         let name = &section.settings.plugin;
         let plugin = section.at_plugin(self.registry.build_manager(name, config, &context))?;
         Ok(Guarded::new(section.settings.plugin, plugin))

@@ -155,8 +155,10 @@ impl Canvas {
     pub fn outline(&mut self, rect: &Rect, thick: u32, ink: Ink) {
         for inset in 0..thick {
             let by = 2.0 * f64::from(inset);
-            let (x, y) = (rect.x + 0.5 * by, rect.y + 0.5 * by);
-            let (right, bottom) = (x + rect.width - by - 1.0, y + rect.height - by - 1.0);
+            let x = rect.x + 0.5 * by;
+            let y = rect.y + 0.5 * by;
+            let right = x + rect.width - by - 1.0;
+            let bottom = y + rect.height - by - 1.0;
             let corners = [(x, y), (right, y), (right, bottom), (x, bottom), (x, y)];
             self.path(&corners.map(|(x, y)| Point2::new(x, y)), ink);
         }
@@ -164,10 +166,12 @@ impl Canvas {
 
     /// Paints the dashed outline of a rectangle, one pixel wide.
     pub fn dashed(&mut self, rect: &Rect, ink: Ink) {
-        let (left, top) = (rect.x.floor() as i64, rect.y.floor() as i64);
-        let (right, bottom) =
-            ((rect.right() - 1.0).floor() as i64, (rect.bottom() - 1.0).floor() as i64);
-        let (width, height) = (self.image.width() as i64, self.image.height() as i64);
+        let left = rect.x.floor() as i64;
+        let top = rect.y.floor() as i64;
+        let right = (rect.right() - 1.0).floor() as i64;
+        let bottom = (rect.bottom() - 1.0).floor() as i64;
+        let width = self.image.width() as i64;
+        let height = self.image.height() as i64;
         // Only columns and rows of the canvas, however far the rectangle reaches.
         for x in left.max(0)..=right.min(width - 1) {
             for y in [top, bottom] {
@@ -200,7 +204,8 @@ impl Canvas {
     /// Paints a filled disc.
     pub fn disc(&mut self, centre: Point2<f64>, radius: f64, ink: Ink) {
         let reach = radius.ceil() as i64;
-        let (cx, cy) = (centre.x.round() as i64, centre.y.round() as i64);
+        let cx = centre.x.round() as i64;
+        let cy = centre.y.round() as i64;
         for dy in -reach..=reach {
             for dx in -reach..=reach {
                 if (dx * dx + dy * dy) as f64 <= radius * radius {
@@ -227,7 +232,8 @@ impl Canvas {
         self.fill(&bar, Ink::solid([0, 0, 0]).faint(0.7 * ink.opacity));
         let (weight, raster) = lettering.raster();
         let advance = get_raster_width(weight, raster) as i64;
-        let (mut x, y) = ((x + BAR_PX) as i64, (y + BAR_PX) as i64);
+        let mut x = (x + BAR_PX) as i64;
+        let y = (y + BAR_PX) as i64;
         for letter in text.chars() {
             self.letter(x, y, letter, lettering, ink);
             x += advance;
@@ -250,7 +256,8 @@ impl Canvas {
 /// Returns the part of a line inside `bounds` (Liang and Barsky), if there is one.
 fn clip(from: Point2<f64>, to: Point2<f64>, bounds: &Rect) -> Option<(Point2<f64>, Point2<f64>)> {
     let along = to - from;
-    let (mut enter, mut leave) = (0.0f64, 1.0f64);
+    let mut enter = 0.0f64;
+    let mut leave = 1.0f64;
     for (step, room) in [
         (-along.x, from.x - bounds.x),
         (along.x, bounds.right() - from.x),
@@ -314,7 +321,8 @@ mod tests {
             ax in -30.0..40.0f64, ay in -30.0..40.0f64, bx in -30.0..40.0f64, by in -30.0..40.0f64,
         ) {
             let mut canvas = Canvas::new(10, 10, [0; 3]);
-            let (a, b) = (Point2::new(ax, ay), Point2::new(bx, by));
+            let a = Point2::new(ax, ay);
+            let b = Point2::new(bx, by);
             canvas.line(a, b, WHITE);
             for (x, y) in lit(&canvas) {
                 let centre = Point2::new(x as f64 + 0.5, y as f64 + 0.5);

@@ -18,8 +18,10 @@ pub fn enlarge(image: &RgbImage, by: usize) -> RgbImage {
     }
     let columns: Vec<Tap> = (0..by * image.width()).map(|x| tap(x, by, image.width())).collect();
     RgbImage::from_fn(by * image.width(), by * image.height(), |x, y| {
-        let (across, down) = (columns[x], tap(y, by, image.height()));
-        let (upper, lower) = (image.row(down.first), image.row(down.second));
+        let across = columns[x];
+        let down = tap(y, by, image.height());
+        let upper = image.row(down.first);
+        let lower = image.row(down.second);
         let mixed = |c: usize| {
             let upper = across.mix(upper[across.first][c], upper[across.second][c]);
             let lower = across.mix(lower[across.first][c], lower[across.second][c]);
@@ -50,7 +52,8 @@ impl Tap {
 fn tap(target: usize, by: usize, length: usize) -> Tap {
     // The centre of the target in parts of 2 * by of a source pixel, moved by one pixel so that it
     // is never negative.
-    let (whole, at) = (2 * by, 2 * target + 1 + by);
+    let whole = 2 * by;
+    let at = 2 * target + 1 + by;
     let first = (at / whole).saturating_sub(1);
     let second = (at / whole).min(length - 1);
     Tap { first: first.min(length - 1), second, share: at % whole, whole }

@@ -27,7 +27,8 @@ struct ImageView {
 /// Renders the camera's image with all overlays.
 pub fn draw(scene: &OverlayData, trails: &Trails) -> Canvas {
     let by = factor(scene.camera.width);
-    let (width, height) = (by * scene.camera.width, by * scene.camera.height);
+    let width = by * scene.camera.width;
+    let height = by * scene.camera.height;
     let mut view = ImageView { canvas: Canvas::new(width, height, [0; 3]), scale: by as f64 };
     if let Some(picture) = background(&scene.images) {
         view.canvas.paste(&enlarge(&picture, by), 0, 0);
@@ -60,7 +61,8 @@ fn scaled(rect: &Rect, by: f64) -> Rect {
 
 /// Returns the place for the labels, which spare the boxes of tracks.
 fn labels(scene: &OverlayData, by: usize) -> Labels {
-    let (width, height) = (by * scene.camera.width, by * scene.camera.height);
+    let width = by * scene.camera.width;
+    let height = by * scene.camera.height;
     let tracks = scene.report.tracks.iter().filter(|track| track.confirmed);
     let spared = tracks.map(|track| scaled(&track.estimate.region, by as f64)).collect();
     Labels::within(Rect::new(0.0, 0.0, width as f64, height as f64), spared)
@@ -153,10 +155,12 @@ impl ImageView {
     /// Renders one map with its title, above `bottom`; returns its place.
     fn draw_map(&mut self, map: &SketchMap, bottom: f64) -> Rect {
         let columns = map.columns.max(1);
-        let (cell, left) = (CELL_PX * self.scale, MAP_MARGIN_PX);
+        let cell = CELL_PX * self.scale;
+        let left = MAP_MARGIN_PX;
         let height = cell * map.values.len().div_ceil(columns) as f64;
         for (i, value) in map.values.iter().enumerate() {
-            let (x, y) = ((i % columns) as f64, (i / columns) as f64);
+            let x = (i % columns) as f64;
+            let y = (i / columns) as f64;
             let shade = (255.0 * value.clamp(0.0, 1.0)) as u8;
             let place = Rect::new(left + cell * x, bottom - height + cell * y, cell, cell);
             self.canvas.fill(&place, Ink::solid([shade, shade / 2, 255 - shade]));

@@ -5,7 +5,8 @@ use tagalong_core::RgbImage;
 
 /// Encodes an image as JPEG, reduced to at most `width` columns; empty for an image without pixels.
 pub fn jpeg(image: &RgbImage, width: usize, quality: u8) -> Vec<u8> {
-    let (columns, rows) = (image.width() as u32, image.height() as u32);
+    let columns = image.width() as u32;
+    let rows = image.height() as u32;
     let bytes = image.pixels().as_flattened().to_vec();
     let Some(whole) = ImageBuffer::<Rgb<u8>, _>::from_raw(columns, rows, bytes) else {
         return Vec::new();

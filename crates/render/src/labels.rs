@@ -112,8 +112,10 @@ impl Labels {
 
 /// Returns the places at a box, best first.
 fn places_at(of: &Rect, [width, height]: [f64; 2]) -> [Rect; 8] {
-    let (left, right) = (of.x, of.right() - width);
-    let (above, below) = (of.y - height - GAP_PX, of.bottom() + GAP_PX);
+    let left = of.x;
+    let right = of.right() - width;
+    let above = of.y - height - GAP_PX;
+    let below = of.bottom() + GAP_PX;
     let inside = of.bottom() - height - GAP_PX;
     let corners = [
         (left, above),

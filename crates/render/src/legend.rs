@@ -34,7 +34,8 @@ fn title(scene: &OverlayData) -> String {
     let people = scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count();
     let people = if people == 1 { "1 person".to_owned() } else { format!("{people} people") };
     let ms = scene.report.stamp.nanos() / 1_000_000;
-    let (s, ms) = (ms / 1000, ms % 1000);
+    let s = ms / 1000;
+    let ms = ms % 1000;
     format!("frame {}   {s}.{ms:03} s   {people} seen", scene.report.index)
 }
 
@@ -82,7 +83,8 @@ fn draw_entry(canvas: &mut Canvas, at: Point2<f64>, sample: Sample, meaning: &st
 }
 
 fn draw_sample(canvas: &mut Canvas, mark: &Rect, sample: Sample) {
-    let (centre, middle) = (mark.centre(), mark.y + 0.5 * mark.height);
+    let centre = mark.centre();
+    let middle = mark.y + 0.5 * mark.height;
     let ends = [Point2::new(mark.x, middle), Point2::new(mark.right(), middle)];
     match sample {
         Sample::Seen => draw_box(canvas, mark, true, EXAMPLE),

@@ -50,7 +50,8 @@ impl OverlayData {
     pub fn of(frame: &Frame, odom_from_robot: Isometry2<f64>, report: FrameReport) -> Self {
         let points = frame.scan().map_or(&[][..], |scan| &scan.points);
         let scan = points.iter().map(|point| point.xy()).collect();
-        let (camera, images) = (frame.camera.clone(), frame.images());
+        let camera = frame.camera.clone();
+        let images = frame.images();
         Self { camera, images, scan, odom_from_robot, report }
     }
 }

@@ -100,7 +100,8 @@ fn points_of_a_scan_are_in_the_plan() {
     let empty = scene(&[], Vec::new());
     let scanned = OverlayData { scan: vec![Point2::new(3.0, 1.0)], ..scene(&[], Vec::new()) };
     let plan = |scene: &OverlayData| plan_view::draw(scene, &Trails::default(), 450).into_image();
-    let (without, with) = (plan(&empty), plan(&scanned));
+    let without = plan(&empty);
+    let with = plan(&scanned);
     let changed: Vec<usize> =
         (0..without.pixels().len()).filter(|k| without.pixels()[*k] != with.pixels()[*k]).collect();
     // 3 m ahead and 1 m to the left, by 50 pixels a metre, of a robot at column 180 and row 400.
@@ -164,7 +165,8 @@ fn the_picture_is_a_png_of_the_frame() {
 #[test]
 fn trails_follow_people_and_end_with_them() {
     let mut trails = Trails::default();
-    let (with, without) = (scene(&[1], Vec::new()), scene(&[], Vec::new()));
+    let with = scene(&[1], Vec::new());
+    let without = scene(&[], Vec::new());
     for _ in 0..100 {
         trails.follow(&with);
     }

@@ -85,8 +85,10 @@ fn by_key(task: &TaskResult) -> BTreeMap<Key<'_>, Vec<&EventRow>> {
 /// earliest possible partner leaves as few as possible alone, because the allowed distance is the
 /// same for all.
 fn unmatched<'a>(a: &[&'a EventRow], b: &[&'a EventRow]) -> (Vec<&'a EventRow>, Vec<&'a EventRow>) {
-    let (mut only_a, mut only_b) = (Vec::new(), Vec::new());
-    let (mut i, mut j) = (0, 0);
+    let mut only_a = Vec::new();
+    let mut only_b = Vec::new();
+    let mut i = 0;
+    let mut j = 0;
     while i < a.len() && j < b.len() {
         let apart_s = b[j].t_s - a[i].t_s;
         if apart_s.abs() <= SAME_EVENT_S {
@@ -135,9 +137,11 @@ mod tests {
             a.sort_unstable();
             b.sort_unstable();
             let seconds = |v: &[u8]| v.iter().map(|&x| f64::from(x) * 0.2).collect::<Vec<_>>();
-            let (a, b) = (seconds(&a), seconds(&b));
+            let a = seconds(&a);
+            let b = seconds(&b);
             let rows = |v: &[f64]| v.iter().map(|&t| at(t)).collect::<Vec<_>>();
-            let (in_a, in_b) = (rows(&a), rows(&b));
+            let in_a = rows(&a);
+            let in_b = rows(&b);
             let (only_a, only_b) =
                 unmatched(&in_a.iter().collect::<Vec<_>>(), &in_b.iter().collect::<Vec<_>>());
             let pairs = most_pairs(&a, &b);

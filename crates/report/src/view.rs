@@ -22,7 +22,8 @@ impl<'a> OrderedBenchmark<'a> {
         let names = |of: fn(&TaskResult) -> &str| {
             tasks.iter().map(|&t| of(t)).collect::<BTreeSet<_>>().into_iter().collect()
         };
-        let (pipelines, logs) = (names(|t| &t.pipeline), names(|t| &t.log));
+        let pipelines = names(|t| &t.pipeline);
+        let logs = names(|t| &t.log);
         Self { version: &benchmark.version, tasks, pipelines, logs }
     }
 
@@ -41,7 +42,8 @@ impl<'a> OrderedBenchmark<'a> {
         };
         // The sort is stable, so that equal ones stay in the order of their names.
         self.pipelines.sort_by(|a, b| {
-            let (a, b) = (rank(a), rank(b));
+            let a = rank(a);
+            let b = rank(b);
             b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
         });
         self

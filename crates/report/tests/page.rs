@@ -223,7 +223,8 @@ fn means_are_over_logs_and_the_best_needs_all_of_them() {
     assert_eq!((hota("a").best, hota("b").best, hota("c").best), (false, true, false));
     assert_eq!((hota("c").logs, hota("c").interval), (1, None));
     let pair = |a: &str, b: &str| pair_of(&summary, a, b);
-    let (two, one) = (pair("a", "b"), pair("a", "c"));
+    let two = pair("a", "b");
+    let one = pair("a", "c");
     assert!((two.difference - 0.1).abs() < 1e-12);
     assert_eq!((two.logs, two.interval, two.p_value, two.is_clear()), (2, None, 0.5, false));
     assert_eq!((one.logs, one.interval, one.p_value, one.is_clear()), (1, None, 1.0, false));
@@ -270,7 +271,8 @@ fn the_verdict_of_a_pair_allows_for_the_other_pairs() {
     assert!(!pair.is_clear());
     let more = Summary::new(&on_logs(8, &three));
     assert!(pair_of(&more, "a", "b").is_clear());
-    let (two, three) = (html(&on_logs(6, &three[..2]), None), html(&on_logs(6, &three), None));
+    let two = html(&on_logs(6, &three[..2]), None);
+    let three = html(&on_logs(6, &three), None);
     assert!(!two.contains("Holm's correction") && three.contains("Holm's correction"));
 }
 

@@ -120,7 +120,8 @@ impl Shots {
 
     /// Returns the mean time between two images, ns.
     fn spacing_ns(&self) -> i64 {
-        let (first, last) = (self.shots.first(), self.shots.last());
+        let first = self.shots.first();
+        let last = self.shots.last();
         let steps = last.map_or(0, |l| l.number) - first.map_or(0, |f| f.number);
         let elapsed = self.elapsed_ns.last().copied().unwrap_or(0);
         // A single frame has no spacing; 10 Hz is assumed.

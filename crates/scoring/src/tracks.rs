@@ -42,7 +42,8 @@ impl Tracks {
         if path.is_dir() {
             return Self::of_run(path, length);
         }
-        let (text, name) = (read_text(path)?, path.display().to_string());
+        let text = read_text(path)?;
+        let name = path.display().to_string();
         let first = text.lines().next().unwrap_or_default();
         // Of all formats, only `tracks-metres.csv` begins with this column.
         if first.starts_with("stamp_ns") {

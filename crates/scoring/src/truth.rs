@@ -123,7 +123,8 @@ impl TruthFile {
     }
 
     fn empty(kind: Kind) -> Self {
-        let (frames, notes) = (BTreeMap::new(), Vec::new());
+        let frames = BTreeMap::new();
+        let notes = Vec::new();
         Self { kind, frames, whole_bodies: false, info: None, rules: None, notes }
     }
 
@@ -132,7 +133,8 @@ impl TruthFile {
     }
 
     fn of_mot(path: &Path, rules: RulesChoice) -> Result<Self, Failure> {
-        let (text, name) = (read_text(path)?, path.display().to_string());
+        let text = read_text(path)?;
+        let name = path.display().to_string();
         let rules = match rules {
             RulesChoice::Auto => mot::Rules::of_truth(&text, &name).map_err(|error| {
                 // Rows that no rules can read are refused by the same function.
@@ -188,7 +190,8 @@ impl TruthFile {
 
     /// Reads KITTI labels. Their frames count from 0, those of all other formats from 1.
     fn of_kitti(path: &Path) -> Result<Self, Failure> {
-        let (text, name) = (read_text(path)?, path.display().to_string());
+        let text = read_text(path)?;
+        let name = path.display().to_string();
         let labels = kitti::parse(&text, &name).map_err(Failure::failed)?;
         let mut timeline = Timeline::new();
         kitti::add_truths(&mut timeline, &labels);

@@ -184,7 +184,8 @@ fn parse_head(bytes: &[u8]) -> Result<Request, Response> {
             return Err(Response::refusal(431, "there are too many headers"));
         }
     }
-    let (method, path) = (method.to_owned(), path.to_owned());
+    let method = method.to_owned();
+    let path = path.to_owned();
     Ok(Request { method, path, headers, body: Vec::new() })
 }
 

@@ -332,7 +332,8 @@ impl Walker {
     }
 
     fn turn(&mut self, dt: f64, lead: Option<&Lead>) {
-        let (v, seated) = (self.velocity, self.stance.seated > 0.0);
+        let v = self.velocity;
+        let seated = self.stance.seated > 0.0;
         if let Some(lead) = lead.filter(|_| self.stance.speed_mps < 0.4) {
             self.turn_to(lead.heading_rad, dt);
         } else if self.stance.speed_mps > 0.08 {
@@ -371,7 +372,8 @@ pub fn play_tricks(walkers: &mut [Walker], hidden_by: &[Option<usize>], now_s: f
         } else if walkers[i].plays(Trick::Stop) {
             walkers[i].waits_until_s = now_s + walkers[i].settings.hide_s;
         } else if walkers[i].plays(Trick::Swap) {
-            let (mine, theirs) = (walkers[i].way(), walkers[hider].way());
+            let mine = walkers[i].way();
+            let theirs = walkers[hider].way();
             walkers[i].take(theirs);
             walkers[hider].take(mine);
             walkers[hider].tricked = true;
@@ -444,7 +446,8 @@ mod tests {
             let hidden = hidden_by(walkers, &Point2::origin());
             play_tricks(walkers, &hidden, now_s);
             for i in 0..walkers.len() {
-                let (lead, others) = (lead_of(walkers, i), others(walkers, i, now_s));
+                let lead = lead_of(walkers, i);
+                let others = others(walkers, i, now_s);
                 walkers[i].step(now_s, 0.02, lead.as_ref(), &others, &[]);
             }
             see(walkers);

@@ -277,7 +277,8 @@ fn held(walking: LimbAngles, side: usize, stance: &Stance) -> LimbAngles {
 /// Knee and ankle (ahead of the hip, below it) of a leg whose ankle shall be
 /// there; an ankle out of reach is lifted, and knees bend forward.
 fn leg(ahead: f64, below: f64, h: f64) -> ((f64, f64), (f64, f64)) {
-    let (thigh, shank) = (THIGH * h, SHANK * h);
+    let thigh = THIGH * h;
+    let shank = SHANK * h;
     let reach = thigh + shank;
     // Some of the reach is left for the height of the hip.
     let ahead = ahead.clamp(-0.9 * reach, 0.9 * reach);

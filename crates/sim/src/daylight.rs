@@ -72,7 +72,8 @@ impl Daylight {
         let openings = Windows::of(self.windows, room);
         let pane = Material::plain([0.85, 0.93, 1.0]).with_infrared(0.0).glowing(self.sky_lux);
         let frame = Material::plain([0.7; 3]);
-        let (middle, half) = (0.5 * (SILL_M + openings.top_m), 0.5 * (openings.top_m - SILL_M));
+        let middle = 0.5 * (SILL_M + openings.top_m);
+        let half = 0.5 * (openings.top_m - SILL_M);
         let mut shapes = Vec::new();
         for number in 0..self.windows {
             let x = openings.middle(number);
@@ -93,7 +94,8 @@ impl Daylight {
 
     /// Returns the sun as a lamp; `None` on an overcast day.
     pub(crate) fn sun(&self, room: &RoomSettings) -> Option<Lamp> {
-        let (aside, up) = (self.azimuth_deg.to_radians(), self.elevation_deg.to_radians());
+        let aside = self.azimuth_deg.to_radians();
+        let up = self.elevation_deg.to_radians();
         let towards =
             Vector3::new(up.cos() * aside.sin(), up.cos() * aside.cos(), up.sin()) * SUN_M;
         let at = Point3::new(0.5 * room.size_m[0], room.size_m[1], 1.0) + towards;

@@ -114,7 +114,8 @@ impl Gait {
             return self.slide_m(phase);
         }
         let part = (phase - end).rem_euclid(1.0) / (1.0 - (end - start));
-        let (from, to) = (self.slide_m(end), self.slide_m(start));
+        let from = self.slide_m(end);
+        let to = self.slide_m(start);
         from + (to - from) * 0.5 * (1.0 - (0.5 * TAU * part).cos())
     }
 
@@ -219,7 +220,8 @@ mod tests {
         #[test]
         fn angles_are_continuous_over_the_seam(v in 0.0..2.0f64, phase in 0.0..1.0f64) {
             let gait = Gait::new(1.7, v);
-            let (a, b) = (gait.limb(phase), gait.limb((phase + 1e-6).rem_euclid(1.0)));
+            let a = gait.limb(phase);
+            let b = gait.limb((phase + 1e-6).rem_euclid(1.0));
             prop_assert!((a.hip - b.hip).abs() < 1e-3 && (a.knee - b.knee).abs() < 1e-3);
             prop_assert!((a.elbow - b.elbow).abs() < 1e-3 && (a.ankle - b.ankle).abs() < 1e-3);
         }

@@ -80,7 +80,8 @@ impl LaserSettings {
 
     /// Directions of the rays, robot frame, to the left positive, rad.
     pub fn directions(&self) -> impl Iterator<Item = f64> + use<> {
-        let (first, step) = (self.first_rad(), self.step_rad());
+        let first = self.first_rad();
+        let step = self.step_rad();
         (0..self.rays).map(move |ray| first + ray as f64 * step)
     }
 

@@ -254,7 +254,9 @@ fn plank(own: &Vector3<f64>, width: f64) -> f64 {
     let board = floor(own.x / (8.0 * width) + uniform_at(11, row)) as u64;
     let tone = uniform_at(row, board);
     // Boards lie flat: their grain has no height.
-    let (x, y, size) = (own.x * 0.1, own.y, 0.15 * width);
+    let x = own.x * 0.1;
+    let y = own.y;
+    let size = 0.15 * width;
     let fine = 2.3 / size;
     let grain = 0.65 * flat_noise(x / size, y / size) + 0.35 * flat_noise(x * fine, y * fine);
     0.6 * tone + 0.4 * grain
@@ -296,7 +298,8 @@ fn smooth(part: f64) -> f64 {
 /// Random values at the corners of a grid, smoothly joined.
 #[inline(always)]
 fn value_noise(x: f64, y: f64, z: f64) -> f64 {
-    let (below, above) = (floor(z), floor(z).wrapping_add(1));
+    let below = floor(z);
+    let above = floor(z).wrapping_add(1);
     between(layer(x, y, below), layer(x, y, above), smooth(part(z)))
 }
 
@@ -309,9 +312,12 @@ fn flat_noise(x: f64, y: f64) -> f64 {
 /// Values of one layer of the grid.
 #[inline(always)]
 fn layer(x: f64, y: f64, layer: i64) -> f64 {
-    let (column, row) = (floor(x), floor(y));
-    let (along, across) = (smooth(part(x)), smooth(part(y)));
-    let (next_column, next_row) = (column.wrapping_add(1), row.wrapping_add(1));
+    let column = floor(x);
+    let row = floor(y);
+    let along = smooth(part(x));
+    let across = smooth(part(y));
+    let next_column = column.wrapping_add(1);
+    let next_row = row.wrapping_add(1);
     let near = between(corner(column, row, layer), corner(next_column, row, layer), along);
     let far = between(corner(column, next_row, layer), corner(next_column, next_row, layer), along);
     between(near, far, across)
@@ -365,7 +371,8 @@ mod tests {
 
         #[test]
         fn clouds_are_continuous(x in -3.0..3.0f64, y in -3.0..3.0f64) {
-            let (a, b) = (Vector3::new(x, y, 0.0), Vector3::new(x + 1e-6, y, 0.0));
+            let a = Vector3::new(x, y, 0.0);
+            let b = Vector3::new(x + 1e-6, y, 0.0);
             prop_assert!((clouds(&a, 0.1) - clouds(&b, 0.1)).abs() < 1e-3);
         }
     }

@@ -144,7 +144,8 @@ impl MirrorCamera {
     /// Where a pixel's ray leaves the mirror, and its unit direction, in the
     /// camera frame; `None` beside the mirror, where the housing is black.
     pub fn ray(&self, column: f64, row: f64) -> Option<(Point3<f64>, Vector3<f64>)> {
-        let (x, y) = (column - self.mirror.centre_px.x, row - self.mirror.centre_px.y);
+        let x = column - self.mirror.centre_px.x;
+        let y = row - self.mirror.centre_px.y;
         let sight = Vector3::new(x, y, self.mirror.focal_px).normalize();
         let pinhole = self.mirror_from_camera * Point3::origin();
         let sight = self.mirror_from_camera.rotation * sight;
@@ -163,8 +164,9 @@ impl MirrorCamera {
     fn meet(&self, from: &Point3<f64>, along: &Vector3<f64>) -> Option<f64> {
         let square = self.mirror.half_angle_rad.tan().powi(2);
         let form = |a: &Vector3<f64>, b: &Vector3<f64>| a.x * b.x + a.y * b.y - square * a.z * b.z;
-        let (a, b, c) =
-            (form(along, along), form(&from.coords, along), form(&from.coords, &from.coords));
+        let a = form(along, along);
+        let b = form(&from.coords, along);
+        let c = form(&from.coords, &from.coords);
         let root = b * b - a * c;
         if a >= 0.0 || root < 0.0 {
             return None;
@@ -247,14 +249,16 @@ impl MirrorCamera {
         let mut count = Count::default();
         for row in 0..(region.height / step) as usize {
             for column in 0..(region.width / step) as usize {
-                let (x, y) = (region.x + step * column as f64, region.y + step * row as f64);
+                let x = region.x + step * column as f64;
+                let y = region.y + step * row as f64;
                 // Truth is that of the raw image, where the pixels were measured.
                 let pixel = self.panorama.raw_pixel(x, y).map(f64::round);
                 let there = raw.get(pixel.x as i64, pixel.y as i64);
                 let (Some(there), Some((from, along))) = (there, self.ray(pixel.x, pixel.y)) else {
                     continue;
                 };
-                let (from, along) = (pose * from, pose.rotation * along);
+                let from = pose * from;
+                let along = pose.rotation * along;
                 if shapes.iter().any(|shape| shape.meet(&from, &along).is_some()) {
                     count.add(person, there.person, [x, y, x + step, y + step]);
                 }
@@ -308,7 +312,8 @@ fn within_reach<'a>(
     let reaches = |shape: &Shape| {
         // The rays of a tile start at different points of the cone.
         let (centre, radius) = shape.bound();
-        let (way, radius) = (centre - eye, radius + apart);
+        let way = centre - eye;
+        let radius = radius + apart;
         let distance = way.norm();
         distance <= radius || axis.angle(&way) <= opening + (radius / distance).asin()
     };
@@ -317,7 +322,8 @@ fn within_reach<'a>(
 
 fn mirror(settings: &CameraSettings) -> ConicalMirror {
     let of = &settings.mirror;
-    let (width, height) = (settings.width as f64, settings.height as f64);
+    let width = settings.width as f64;
+    let height = settings.height as f64;
     let [inner, outer] = of.view_deg.map(|angle| angle.to_radians().tan());
     let outer_px = 0.5 * FILLED * width.min(height);
     let focal_px = outer_px / outer;
@@ -387,9 +393,11 @@ mod tests {
 
     #[test]
     fn a_tilted_mirror_moves_what_is_seen() {
-        let (straight, askew) = (camera(), askew());
+        let straight = camera();
+        let askew = askew();
         let moved = |row: f64| {
-            let (a, b) = (straight.ray(49.0, row).unwrap().1, askew.ray(49.0, row).unwrap().1);
+            let a = straight.ray(49.0, row).unwrap().1;
+            let b = askew.ray(49.0, row).unwrap().1;
             a.angle(&b).to_degrees()
         };
         assert!(moved(20.0) > 0.3 && moved(20.0) < 9.0, "{}", moved(20.0));

@@ -79,7 +79,8 @@ const TROUSERS: &[Colour] =
 impl Outfit {
     /// Creates random clothes.
     pub fn random(random: &mut Random) -> Self {
-        let (cloth, second) = (random.pick(CLOTHS), random.pick(CLOTHS));
+        let cloth = random.pick(CLOTHS);
+        let second = random.pick(CLOTHS);
         let pattern = random.pick(&[
             Pattern::Plain,
             Pattern::Plain,
@@ -159,7 +160,8 @@ struct Drawing<'a> {
 
 impl Drawing<'_> {
     fn head(&mut self) {
-        let (h, turn) = (self.h, self.s.world_from_head);
+        let h = self.h;
+        let turn = self.s.world_from_head;
         let skin = Material::plain(self.look.skin).with_infrared(0.6);
         let hair =
             Material::patterned(self.look.hair, self.look.hair, Pattern::Plain).with_infrared(0.35);
@@ -168,10 +170,12 @@ impl Drawing<'_> {
         let face = Material { second: self.look.hair, pattern, ..skin };
         self.ellipsoid(self.s.head, turn, half, face);
         let at = |x: f64, y: f64, z: f64| self.s.head + turn * (Vector3::new(x, y, z) * h);
-        let (bridge, tip) = (at(0.053, 0.0, 0.008), at(0.060, 0.0, -0.016));
+        let bridge = at(0.053, 0.0, 0.008);
+        let tip = at(0.060, 0.0, -0.016);
         let jaw = at(0.016, 0.0, -0.040);
         let ears = [at(-0.003, 0.045, -0.004), at(-0.003, -0.045, -0.004)];
-        let (crown, back) = (at(-0.008, 0.0, 0.022), at(-0.026, 0.0, -0.045));
+        let crown = at(-0.008, 0.0, 0.022);
+        let back = at(-0.026, 0.0, -0.045);
         self.limb(bridge, tip, 0.0045 * h, 0.0085 * h, skin);
         self.ellipsoid(jaw, turn, Vector3::new(0.036, 0.034, 0.032) * h, skin);
         for ear in ears {
@@ -186,10 +190,13 @@ impl Drawing<'_> {
     }
 
     fn trunk(&mut self) {
-        let (h, w, turn) = (self.h, self.w, self.s.world_from_thorax);
+        let h = self.h;
+        let w = self.w;
+        let turn = self.s.world_from_thorax;
         let top = self.look.top;
         let down = |z: f64| self.s.chest + turn * Vector3::new(0.005 * h, 0.0, -z * h);
-        let (chest, belly) = (down(0.085), down(0.185));
+        let chest = down(0.085);
+        let belly = down(0.185);
         let collar = [0.07, -0.07]
             .map(|y| self.s.chest + turn * Vector3::new(-0.006 * h, y * w, -0.024 * h));
         let slope = [0.012, -0.012]
@@ -203,10 +210,12 @@ impl Drawing<'_> {
     }
 
     fn arms(&mut self) {
-        let (h, w) = (self.h, self.w);
+        let h = self.h;
+        let w = self.w;
         let skin = Material::plain(self.look.skin).with_infrared(0.6);
         for side in 0..2 {
-            let (shoulder, elbow) = (self.s.shoulders[side], self.s.elbows[side]);
+            let shoulder = self.s.shoulders[side];
+            let elbow = self.s.elbows[side];
             let wrist = self.s.wrists[side];
             let hand = wrist + (wrist - elbow).normalize() * (0.055 * h);
             self.limb(shoulder, elbow, 0.034 * w, 0.026 * w, self.look.top);
@@ -216,12 +225,15 @@ impl Drawing<'_> {
     }
 
     fn legs(&mut self) {
-        let (h, w, trousers) = (self.h, self.w, self.look.trousers);
+        let h = self.h;
+        let w = self.w;
+        let trousers = self.look.trousers;
         let turn = self.s.world_from_pelvis;
         let seat = self.s.pelvis + Vector3::new(0.0, 0.0, 0.015 * h);
         self.ellipsoid(seat, turn, Vector3::new(0.066 * h, 0.098 * w, 0.070 * h), trousers);
         for side in 0..2 {
-            let (hip, knee) = (self.s.hips[side], self.s.knees[side]);
+            let hip = self.s.hips[side];
+            let knee = self.s.knees[side];
             let ankle = self.s.ankles[side];
             let calf = knee + (ankle - knee) * 0.35;
             self.limb(hip, knee, 0.054 * w, 0.036 * w, trousers);
@@ -250,7 +262,9 @@ impl Drawing<'_> {
     }
 
     fn coat(&mut self) {
-        let (h, w, turn) = (self.h, self.w, self.s.world_from_pelvis);
+        let h = self.h;
+        let w = self.w;
+        let turn = self.s.world_from_pelvis;
         let upper = self.s.pelvis + Vector3::new(0.0, 0.0, 0.06 * h);
         let hem = self.s.pelvis - Vector3::new(0.0, 0.0, 0.13 * h);
         self.ellipsoid(upper, turn, Vector3::new(0.078 * h, 0.108 * w, 0.16 * h), self.look.top);
@@ -264,7 +278,8 @@ impl Drawing<'_> {
     }
 
     fn poncho(&mut self) {
-        let (h, w) = (self.h, self.w);
+        let h = self.h;
+        let w = self.w;
         let hem = self.s.pelvis - Vector3::new(0.0, 0.0, 0.04 * h);
         let collar = self.s.chest - Vector3::new(0.0, 0.0, 0.03 * h);
         self.limb(collar, hem, 0.085 * w, 0.17 * w, self.look.top);
@@ -274,10 +289,12 @@ impl Drawing<'_> {
     fn laptop(&mut self) {
         let turn = self.s.world_from_thorax;
         let before = |x: f64, z: f64| self.s.chest + turn * (Vector3::new(x, 0.0, z) * self.h);
-        let (shell, glass) = (Material::plain([0.35; 3]), Material::plain([0.05; 3]));
+        let shell = Material::plain([0.35; 3]);
+        let glass = Material::plain([0.05; 3]);
         let keys = Form::Block(Vector3::new(0.12, 0.17, 0.01));
         let screen = Form::Block(Vector3::new(0.008, 0.17, 0.11));
-        let (low, high) = (before(0.15, -0.14), before(0.225, -0.075));
+        let low = before(0.15, -0.14);
+        let high = before(0.225, -0.075);
         self.shapes.push(Shape::new(keys, low, turn, shell));
         // Glass returns hardly any projected dots.
         self.shapes.push(Shape::new(screen, high, turn, glass.with_infrared(0.03)));
@@ -292,7 +309,8 @@ impl Drawing<'_> {
     }
 
     fn hat(&mut self, colour: Colour) {
-        let (h, turn) = (self.h, self.s.world_from_head);
+        let h = self.h;
+        let turn = self.s.world_from_head;
         let felt = Material::plain(colour);
         let up = |z: f64| self.s.head + Vector3::new(0.0, 0.0, z * h);
         self.ellipsoid(up(0.040), turn, Vector3::new(0.058, 0.052, 0.045) * h, felt);
@@ -308,7 +326,8 @@ impl Drawing<'_> {
     }
 
     fn phone(&mut self) {
-        let (wrist, elbow) = (self.s.wrists[1], self.s.elbows[1]);
+        let wrist = self.s.wrists[1];
+        let elbow = self.s.elbows[1];
         let at = wrist + (wrist - elbow).normalize() * (0.06 * self.h);
         let form = Form::Block(Vector3::new(0.008, 0.037, 0.075));
         let glass = Material::plain([0.02; 3]).with_infrared(0.05);
@@ -393,7 +412,8 @@ mod tests {
             person.look.extras.clear();
             let stance = Stance::standing(Point2::origin(), 1.0);
             let (shapes, upper) = person.shapes(&Skeleton::new(&person.build, &stance));
-            let (down, from) = (-Vector3::z(), Point3::new(0.0, 0.0, 3.0));
+            let down = -Vector3::z();
+            let from = Point3::new(0.0, 0.0, 3.0);
             let from = from
                 + Rotation3::from_axis_angle(&Vector3::z_axis(), 1.0)
                     * Vector3::new(0.015, 0.0, 0.0);

@@ -79,7 +79,8 @@ impl WorldCamera<'_> {
 
     /// The eye while the strip with a row is taken.
     fn eye(&self, row: usize) -> Eye<'_> {
-        let (top, height) = (row - row % TILE, self.camera.height);
+        let top = row - row % TILE;
+        let height = self.camera.height;
         let middle = 0.5 * (top + height.min(top + TILE)) as f64;
         Eye::new(self.camera, &(self.pose)(middle / height as f64))
     }
@@ -95,7 +96,8 @@ impl WorldCamera<'_> {
     ) -> Visibility {
         let [left, top, right, bottom] = area;
         let step = ((right - left).max(bottom - top) / 40).max(1);
-        let (mut whole, mut seen) = (0u32, 0u32);
+        let mut whole = 0u32;
+        let mut seen = 0u32;
         let mut bounds: Option<[f64; 4]> = None;
         let mut hiders = std::collections::BTreeMap::<u16, u32>::new();
         for row in (top..bottom).step_by(step) {
@@ -109,7 +111,9 @@ impl WorldCamera<'_> {
                 let there = image.pixels()[row * image.width() + column].person;
                 if there == Some(person) {
                     seen += 1;
-                    let (x, y, s) = (column as f64, row as f64, step as f64);
+                    let x = column as f64;
+                    let y = row as f64;
+                    let s = step as f64;
                     bounds = Some(bounds.map_or([x, y, x + s, y + s], |b| {
                         [b[0].min(x), b[1].min(y), b[2].max(x + s), b[3].max(y + s)]
                     }));
@@ -164,7 +168,8 @@ impl WorldCamera<'_> {
                 facing: surface.facing[lane],
                 person: *person,
             };
-            let (normal, ray) = (surface.normal.at(lane), rays.at(lane));
+            let normal = surface.normal.at(lane);
+            let ray = rays.at(lane);
             *pixel = self.world.shown(own, shape, &normal, (eye, &ray));
         }
     }
@@ -196,7 +201,9 @@ fn meet_any(solids: &[SolidView], rays: &Vectors) -> [u64; LANES] {
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn straight_rays(lens: &Pinhole, turn: &Matrix3<f64>, [left, step, row]: [usize; 3]) -> Vectors {
     let mut rays = Vectors::ZERO;
-    let (left, step, y) = (left as f64, step as f64, (row as f64 - lens.cy) / lens.fy);
+    let left = left as f64;
+    let step = step as f64;
+    let y = (row as f64 - lens.cy) / lens.fy;
     for lane in 0..LANES {
         // Columns are whole numbers, so that this is exact.
         let column = left + step * lane as f64;

@@ -81,7 +81,8 @@ impl Robot {
         let bias = settings.wheel_bias;
         // Wheels are never quite of the nominal size, so the odometry has a bias.
         let mut about_one = || 1.0 + bias * random.normal();
-        let (radius, separation) = ([about_one(), about_one()], about_one());
+        let radius = [about_one(), about_one()];
+        let separation = about_one();
         let start = Vector2::from(settings.start);
         Self {
             pose: Isometry2::new(start, settings.heading_deg.to_radians()),

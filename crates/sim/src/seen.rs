@@ -217,10 +217,13 @@ fn enter_ball(start: &Vector3<f64>, step: &Vector3<f64>, tangent2: f64) -> f64 {
 fn enter_block(start: &Vector3<f64>, step: &Vector3<f64>) -> f64 {
     let along = |start: f64, step: f64| {
         let inverse = 1.0 / step;
-        let (a, b) = ((-1.0 - start) * inverse, (1.0 - start) * inverse);
+        let a = (-1.0 - start) * inverse;
+        let b = (1.0 - start) * inverse;
         (a.min(b), a.max(b))
     };
-    let (x, y, z) = (along(start.x, step.x), along(start.y, step.y), along(start.z, step.z));
+    let x = along(start.x, step.x);
+    let y = along(start.y, step.y);
+    let z = along(start.z, step.z);
     let enter = f64::NEG_INFINITY.max(x.0).max(y.0).max(z.0);
     let leave = f64::INFINITY.min(x.1).min(y.1).min(z.1);
     if enter <= leave { enter } else { f64::INFINITY }

@@ -137,7 +137,8 @@ impl<'a> Film<'a> {
         rows: &Range<usize>,
         light: impl Fn(&Hit) -> [f64; CHANNELS],
     ) -> [Vec<f32>; CHANNELS] {
-        let (width, height) = (self.seen.width(), self.seen.height());
+        let width = self.seen.width();
+        let height = self.seen.height();
         let rows = rows.start.saturating_sub(1)..height.min(rows.end + 1);
         let mut across = [(); CHANNELS].map(|()| Vec::with_capacity(rows.len() * width));
         let mut sharp = [(); CHANNELS].map(|()| vec![0.0; width]);
@@ -166,7 +167,8 @@ impl<'a> Film<'a> {
             soft.copy_from_slice(here);
             return;
         }
-        let (above, below) = (&across[at - width..at], &across[at + width..at + 2 * width]);
+        let above = &across[at - width..at];
+        let below = &across[at + width..at + 2 * width];
         weigh(above, here, below, soft);
     }
 
@@ -179,8 +181,10 @@ impl<'a> Film<'a> {
 /// Brightness of a row in 12 bits: vignetting and noise.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn develop(film: &Film<'_>, soft: &[f32], row: usize, seed: u64, levels: &mut [u16]) {
-    let (width, height) = (film.seen.width(), film.seen.height());
-    let (cx, cy) = (0.5 * width as f32, 0.5 * height as f32);
+    let width = film.seen.width();
+    let height = film.seen.height();
+    let cx = 0.5 * width as f32;
+    let cy = 0.5 * height as f32;
     let dy = row as f32 - cy;
     let (gain, [read, shot]) = (film.moment.gain, film.noise);
     let first = (row * width) as u64;
@@ -339,9 +343,12 @@ fn measure(row: &mut DepthRow, sensor: &DepthSensor, seed: u64, y: u64) {
     let [nearest, farthest] = sensor.range_m;
     // Structured light measures disparities, so depth has steps that grow with its square.
     let steps = STEPS_PER_PX * sensor.focal_px * sensor.baseline_m;
-    let (t, infrared, facing) = (&row.t[..width], &row.infrared[..width], &row.facing[..width]);
+    let t = &row.t[..width];
+    let infrared = &row.infrared[..width];
+    let facing = &row.facing[..width];
     for (x, depth_m) in row.depth_m.iter_mut().enumerate() {
-        let (t, x64) = (t[x], x as u64);
+        let t = t[x];
+        let x64 = x as u64;
         let facing = if facing[x] > 0.0 { facing[x] } else { 0.0 };
         let light = infrared[x] * facing / (t * t);
         // The matcher decides for patches of 9 x 9 dots: holes have a size.

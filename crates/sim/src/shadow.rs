@@ -142,13 +142,16 @@ fn on_face(face: usize, u: f64, v: f64) -> Vector3<f64> {
 /// The cell that a way goes through. Without branches, for loops over lanes.
 #[inline(always)]
 fn cell(way: &Vector3<f64>, side: usize) -> i32 {
-    let (x, y, z) = (way.x.abs(), way.y.abs(), way.z.abs());
+    let x = way.x.abs();
+    let y = way.y.abs();
+    let z = way.z.abs();
     let on_x = (x >= y) & (x >= z);
     let on_y = !on_x & (y >= z);
     // A face has the two axes that follow its own.
     let pick = |on: [f64; 3]| if on_x { on[0] } else { pick_other(on_y, on[1], on[2]) };
     let main = pick([way.x, way.y, way.z]);
-    let (u, v) = (pick([way.y, way.z, way.x]), pick([way.z, way.x, way.y]));
+    let u = pick([way.y, way.z, way.x]);
+    let v = pick([way.z, way.x, way.y]);
     let axis = if on_x { 0 } else { 2 - i32::from(on_y) };
     let (side, half) = (side as i32, 0.5 * side as f64);
     let scale = half / main.abs();

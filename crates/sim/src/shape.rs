@@ -270,7 +270,9 @@ fn unit(vector: &Vector3<f64>) -> Vector3<f64> {
 /// The normal of the side that a point lies on.
 #[inline(always)]
 fn block_normal(own: &Vector3<f64>, half: &Vector3<f64>) -> Vector3<f64> {
-    let (x, y, z) = (own.x.abs() / half.x, own.y.abs() / half.y, own.z.abs() / half.z);
+    let x = own.x.abs() / half.x;
+    let y = own.y.abs() / half.y;
+    let z = own.z.abs() / half.z;
     let on_x = (x >= y) & (x >= z);
     let on_y = !on_x & (y >= z);
     Vector3::new(

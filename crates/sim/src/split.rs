@@ -61,7 +61,8 @@ impl Split {
         if number < Self::SEEDS_END && Self::of(number) == self {
             return Ok(number);
         }
-        let (name, first) = (self.name(), self.index() * SEEDS);
+        let name = self.name();
+        let first = self.index() * SEEDS;
         let message = format!(
             "seed {number} does not belong to the split {name}: count from 0, or from {first}"
         );
@@ -77,7 +78,8 @@ impl Split {
         if first.saturating_add(count) <= SEEDS {
             return Ok(Seeds { split: self, first, count });
         }
-        let (name, last) = (self.name(), SEEDS - 1);
+        let name = self.name();
+        let last = SEEDS - 1;
         let message = format!(
             "{count} seeds from {first} on leave the split {name}, whose last one is {last}: \
              begin earlier or take fewer"

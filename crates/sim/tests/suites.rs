@@ -85,7 +85,8 @@ fn fourteen_crossings_differ_and_come_again_with_other_people() {
     for (i, one) in shapes.iter().enumerate() {
         assert!(!shapes[..i].contains(one), "{i}");
         assert_eq!(*one, shape(14 + i as u64));
-        let (near, far) = (one.0, one.2);
+        let near = one.0;
+        let far = one.2;
         assert!(far - near >= 0.7, "{near} {far}");
     }
     assert_ne!(scene(0), Scene { seed: 0, ..scene(14) });

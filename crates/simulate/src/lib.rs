@@ -310,7 +310,8 @@ mod tests {
         let mut frames = 0;
         while let Some(logged) = source.next_frame() {
             let drawn = draw.next_frame().unwrap().frame;
-            let (a, b) = (logged.frame.motion, drawn.motion);
+            let a = logged.frame.motion;
+            let b = drawn.motion;
             let differences =
                 [a.forward - b.forward, a.left - b.left, a.turn - b.turn, a.dt - b.dt];
             assert!(differences.iter().all(|d| d.abs() < 1e-9), "{a:?} {b:?}");
@@ -319,10 +320,12 @@ mod tests {
             let pose = |frame: &tagalong_core::Frame| frame.camera.robot_from_camera;
             let off = pose(&logged.frame).inverse() * pose(&drawn);
             assert!(off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-9);
-            let (a, b) = (logged.frame.depth().unwrap(), drawn.depth().unwrap());
+            let a = logged.frame.depth().unwrap();
+            let b = drawn.depth().unwrap();
             let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
             assert!(a.pixels().iter().zip(b.pixels()).all(same));
-            let (a, b) = (&logged.frame.laser().unwrap().points, &drawn.laser().unwrap().points);
+            let a = &logged.frame.laser().unwrap().points;
+            let b = &drawn.laser().unwrap().points;
             assert_eq!(a.len(), b.len());
             assert!(a.len() > 60, "most rays meet something: {}", a.len());
             assert!(

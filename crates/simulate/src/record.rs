@@ -232,7 +232,8 @@ impl Recorder {
     }
 
     fn raw<'a>(&self, header: &Header, encoding: &str, bytes: u32, data: &'a [u8]) -> Image<'a> {
-        let (width, height) = (self.camera.width as u32, self.camera.height as u32);
+        let width = self.camera.width as u32;
+        let height = self.camera.height as u32;
         let encoding = encoding.into();
         let step = bytes * width;
         Image { header: header.clone(), height, width, encoding, is_bigendian: 0, step, data }
@@ -271,7 +272,8 @@ fn after(start_ns: u64) -> Stamp {
 
 fn jpeg(image: &RgbImage) -> Vec<u8> {
     let mut out = Vec::new();
-    let (width, height) = (image.width() as u32, image.height() as u32);
+    let width = image.width() as u32;
+    let height = image.height() as u32;
     let written = JpegEncoder::new_with_quality(&mut out, JPEG_QUALITY).encode(
         image.pixels().as_flattened(),
         width,
@@ -313,7 +315,8 @@ fn range(header: Header, kind: RangeKind, reading: &RangeReading) -> Range {
 }
 
 fn scan(header: Header, laser: &LaserSettings, ranges: &[f32]) -> LaserScan {
-    let (first, step) = (laser.first_rad(), laser.step_rad());
+    let first = laser.first_rad();
+    let step = laser.step_rad();
     LaserScan {
         header,
         angle_min: first as f32,

@@ -27,7 +27,9 @@ pub fn exp2_of_negative(x: f64) -> f64 {
 const TERMS: [f64; 10] = terms();
 
 const fn terms() -> [f64; 10] {
-    let (mut terms, mut term, mut i) = ([1.0; 10], 1.0, 1);
+    let mut terms = [1.0; 10];
+    let mut term = 1.0;
+    let mut i = 1;
     while i < terms.len() {
         term *= std::f64::consts::LN_2 / 4.0 / i as f64;
         terms[9 - i] = term;

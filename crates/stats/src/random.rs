@@ -216,7 +216,8 @@ mod tests {
                 self.0
             }
         }
-        let (mut least, mut most) = (Constant(0), Constant(u64::MAX));
+        let mut least = Constant(0);
+        let mut most = Constant(u64::MAX);
         assert_eq!((least.uniform(), most.positive_uniform()), (0.0, 1.0));
         assert!(most.uniform() < 1.0 && least.positive_uniform() > 0.0);
         assert!(least.normal().is_finite() && most.normal().is_finite());

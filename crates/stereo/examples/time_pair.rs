@@ -15,7 +15,8 @@ use tagalong_stereo::{Matcher, Method, StereoSettings};
 
 fn grey(path: &str) -> Result<GreyImage, Box<dyn Error>> {
     let image = image::open(path)?.to_luma8();
-    let (width, height) = (image.width() as usize, image.height() as usize);
+    let width = image.width() as usize;
+    let height = image.height() as usize;
     GreyImage::from_pixels(width, height, image.into_raw()).ok_or_else(|| "an empty image".into())
 }
 
@@ -29,14 +30,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         "semi-global" => Method::SemiGlobal,
         other => return Err(format!("no method `{other}`: block or semi-global").into()),
     };
-    let (left, right) = (grey(left)?, grey(right)?);
+    let left = grey(left)?;
+    let right = grey(right)?;
     let (disparities, runs): (usize, usize) = (disparities.parse()?, runs.parse()?);
     let threads = threads.parse()?;
     let settings = StereoSettings { method, threads, ..StereoSettings::default() };
     let mut matcher = Matcher::new(settings)?;
-    let (mut best, mut own) = (Duration::MAX, Duration::MAX);
+    let mut best = Duration::MAX;
+    let mut own = Duration::MAX;
     for _ in 0..runs {
-        let (start, own_start) = (Instant::now(), ThreadTime::now());
+        let start = Instant::now();
+        let own_start = ThreadTime::now();
         matcher.disparities(&left, &right, disparities.saturating_sub(1))?;
         best = best.min(start.elapsed());
         own = own.min(own_start.elapsed());

@@ -15,7 +15,8 @@ pub const NEIGHBOURS: [(i32, i32); 8 * BYTES] = neighbours();
 
 const fn neighbours() -> [(i32, i32); 8 * BYTES] {
     let mut all = [(0, 0); 8 * BYTES];
-    let (mut cell, mut n) = (0, 0);
+    let mut cell = 0;
+    let mut n = 0;
     while cell < 25 {
         let offset = (cell % 5 - 2, cell / 5 - 2);
         if offset.0 != 0 || offset.1 != 0 {

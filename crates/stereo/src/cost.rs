@@ -75,7 +75,8 @@ pub const SLOPE_WEIGHT: u8 = 3;
 pub fn blend<const D: usize>(left: &Features, right: &Features, costs: &mut [[u8; D]]) {
     let width = costs.len();
     for (x, costs) in (0..width).zip(costs) {
-        let (from, mut cost) = (width - 1 - x, [0; D]);
+        let from = width - 1 - x;
+        let mut cost = [0; D];
         differing(&left.census, &right.census, x, from, &mut cost);
         add::<D, MOST_BRIGHTNESS, 1>(&left.brightness, &right.brightness, x, from, &mut cost);
         add::<D, MOST_SLOPE, SLOPE_WEIGHT>(&left.slope, &right.slope, x, from, &mut cost);
@@ -110,7 +111,9 @@ fn add<const D: usize, const MOST: u8, const WEIGHT: u8>(
     from: usize,
     costs: &mut [u8; D],
 ) {
-    let (l, least, greatest) = (left.own[x], left.least[x], left.most[x]);
+    let l = left.own[x];
+    let least = left.least[x];
+    let greatest = left.most[x];
     let [r, r_least, r_greatest] =
         [&right.own, &right.least, &right.most].map(|row| &row[from..from + D]);
     for d in 0..D {

@@ -74,11 +74,9 @@ impl StereoDepth {
         }
         let size = reduced_size(left, self.settings.width);
         let scale = size.0 as f64 / left.width() as f64;
-        let (fine, left, right_image) = (
-            left,
-            at_size(&mut self.left, left, size),
-            at_size(&mut self.right, &right.image, size),
-        );
+        let fine = left;
+        let left = at_size(&mut self.left, left, size);
+        let right_image = at_size(&mut self.right, &right.image, size);
         let focal_baseline = fx * scale * right.baseline_m;
         let wanted = max_disparity(&self.settings, focal_baseline);
         let max_disparity = wanted.min(MAX_DISPARITIES - 1);
@@ -125,7 +123,8 @@ fn focal_px(frame: &Frame) -> Result<f64> {
 }
 
 fn reduced_size(image: &GreyImage, width: usize) -> (usize, usize) {
-    let (from, height) = (image.width(), image.height());
+    let from = image.width();
+    let height = image.height();
     if from <= width {
         return (from, height);
     }
@@ -168,7 +167,8 @@ fn count_up(image: &GreyImage, of: impl Fn(u8) -> u32) -> u64 {
 /// brightness, does worse.
 fn are_unequal(left: &GreyImage, right: &GreyImage) -> bool {
     let sum = |image: &GreyImage| count_up(image, u32::from);
-    let (left, right) = (sum(left) as f64, sum(right) as f64);
+    let left = sum(left) as f64;
+    let right = sum(right) as f64;
     left.max(right) > MAX_RATIO * left.min(right)
 }
 
@@ -216,7 +216,8 @@ fn write(
     range: &RangeInclusive<f32>,
     depth: &mut DepthImage,
 ) -> u64 {
-    let (width, fine) = (disparities.width, (depth.width(), depth.height()));
+    let width = disparities.width;
+    let fine = (depth.width(), depth.height());
     let height = disparities.values.len() / width.max(1);
     let mut out = 0;
     let columns: Vec<usize> = (0..fine.0).map(|x| x * width / fine.0).collect();
@@ -236,7 +237,8 @@ fn write(
 /// Converts the disparities of a row into depths; returns the number out of range.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn to_depth(row: &mut [f32], focal_baseline: f32, range: &RangeInclusive<f32>) -> u32 {
-    let (nearest, farthest) = (*range.start(), *range.end());
+    let nearest = *range.start();
+    let farthest = *range.end();
     let mut out = 0_u32;
     for depth in row {
         let metres = focal_baseline / *depth;

@@ -46,7 +46,8 @@ fn next(row: &[f32], at: usize, is_so: impl Fn(f32) -> bool) -> Option<usize> {
 
 fn bridge(row: &mut [f32]) {
     let end = row.len() - 1;
-    let (first, slope) = (row[0], (row[end] - row[0]) / end as f32);
+    let first = row[0];
+    let slope = (row[end] - row[0]) / end as f32;
     for (i, value) in row.iter_mut().enumerate().take(end).skip(1) {
         *value = first + slope * i as f32;
     }

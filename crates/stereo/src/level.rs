@@ -69,9 +69,12 @@ fn slopes(sides: [(&[u8], &[u8]); 3], slopes: &mut [u8]) {
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn extremes(padded: &[u8], least: &mut [u8], most: &mut [u8]) {
     let width = least.len();
-    let (left, own, right) = (&padded[..width], &padded[1..=width], &padded[2..width + 2]);
+    let left = &padded[..width];
+    let own = &padded[1..=width];
+    let right = &padded[2..width + 2];
     for x in 0..width {
-        let (l, r) = (own[x].midpoint(left[x]), own[x].midpoint(right[x]));
+        let l = own[x].midpoint(left[x]);
+        let r = own[x].midpoint(right[x]);
         least[x] = own[x].min(l).min(r);
         most[x] = own[x].max(l).max(r);
     }

@@ -72,7 +72,8 @@ impl Matcher {
         right: &GreyImage,
         max_disparity: usize,
     ) -> Result<Disparities<'_>> {
-        let (width, height) = (left.width(), left.height());
+        let width = left.width();
+        let height = left.height();
         if let Some(error) = size_error(left, right) {
             return Err(error);
         }
@@ -81,8 +82,11 @@ impl Matcher {
         if width * height > 0 {
             self.fill(left, right, max_disparity)?;
         }
-        let (holes, threads, settings) = (self.holes(), self.threads(), &self.settings);
-        let (pixels, step) = (settings.speckle_pixels, settings.speckle_step as f32);
+        let holes = self.holes();
+        let threads = self.threads();
+        let settings = &self.settings;
+        let pixels = settings.speckle_pixels;
+        let step = settings.speckle_step as f32;
         let mut dropped = Dropped::default();
         self.strips.iter().for_each(|strip| dropped.add(&strip.dropped));
         // Refined before the filters, which compare disparities to fractions of a pixel.
@@ -97,7 +101,8 @@ impl Matcher {
         for (d, confidence) in self.disparities.iter().zip(&mut self.confidences) {
             *confidence = if d.is_nan() { 0 } else { *confidence };
         }
-        let (values, confidences) = (self.disparities.as_slice(), self.confidences.as_slice());
+        let values = self.disparities.as_slice();
+        let confidences = self.confidences.as_slice();
         Ok(Disparities { width, values, confidences, dropped })
     }
 

@@ -121,16 +121,20 @@ pub fn sums<const D: usize>(
     [left, above, right]: &mut [Excess; 3],
     sums: &mut [[u8; D]],
 ) {
-    let (last, small) = (costs.len() - 1, penalties.small);
+    let last = costs.len() - 1;
+    let small = penalties.small;
     let [mut from_left, mut from_right] = [[0; D]; 2];
     // The path from above left reads next where it writes, so its result is stored one pixel later.
     let mut waiting = [0; D];
     for x in 0..=last {
-        let (cost, before, here) = (&costs[x], place::<D>(x), place::<D>(x + 1));
+        let cost = &costs[x];
+        let before = place::<D>(x);
+        let here = place::<D>(x + 1);
         // The path from the right has already added to the right half.
         let mut sum = if 2 * x <= last { [0; D] } else { sums[x] };
         let large = |from: usize| jump(penalties, row[x], row_above[from]);
-        let (west, east) = (x.saturating_sub(1), (x + 1).min(last));
+        let west = x.saturating_sub(1);
+        let east = (x + 1).min(last);
         let after = step(cost, &left.cells[before..], small, large(west), &mut sum);
         left.cells[before + 1..=before + D].copy_from_slice(&waiting);
         waiting = after;

@@ -64,11 +64,13 @@ struct Shift {
 /// Yields the point with the most texture in both directions, of each cell.
 fn points(image: &GreyImage) -> impl Iterator<Item = (usize, usize)> {
     let border = RADIUS + UP_DOWN as usize;
-    let (width, height) =
-        (image.width().saturating_sub(2 * border), image.height().saturating_sub(2 * border));
-    let (columns, rows) = (CELLS.0.min(width), CELLS.1.min(height));
+    let width = image.width().saturating_sub(2 * border);
+    let height = image.height().saturating_sub(2 * border);
+    let columns = CELLS.0.min(width);
+    let rows = CELLS.1.min(height);
     (0..columns * rows).filter_map(move |cell| {
-        let (column, row) = (cell % columns, cell / columns);
+        let column = cell % columns;
+        let row = cell / columns;
         // Every fourth pixel is enough to find a textured one.
         let xs = (column * width / columns..(column + 1) * width / columns).step_by(4);
         let ys = (row * height / rows..(row + 1) * height / rows).step_by(4);
@@ -80,9 +82,11 @@ fn points(image: &GreyImage) -> impl Iterator<Item = (usize, usize)> {
 
 /// Returns the mean change from pixel to pixel, in the direction with the smaller one.
 fn texture(image: &GreyImage, (x, y): (usize, usize)) -> u32 {
-    let (mut across, mut down) = (0, 0);
+    let mut across = 0;
+    let mut down = 0;
     for row in y - RADIUS..=y + RADIUS {
-        let (this, next) = (image.row(row), image.row(row + 1));
+        let this = image.row(row);
+        let next = image.row(row + 1);
         for column in x - RADIUS..=x + RADIUS {
             across += u32::from(this[column].abs_diff(this[column + 1]));
             down += u32::from(this[column].abs_diff(next[column]));
@@ -111,7 +115,8 @@ fn find(left: &GreyImage, right: &GreyImage, (x, y): (usize, usize), reach: i32)
     let rival = all.iter().filter(far).map(|c| c.0).fold(f32::INFINITY, f32::min);
     let inside = best.2.abs() < UP_DOWN;
     (inside && best.0 < DISTINCT * rival).then(|| {
-        let (above, below) = (cost(best.1, best.2 - 1), cost(best.1, best.2 + 1));
+        let above = cost(best.1, best.2 - 1);
+        let below = cost(best.1, best.2 + 1);
         let rise = above.max(below) - best.0;
         let offset = if rise > 0.0 { 0.5 * (above - below) / rise } else { 0.0 };
         Shift { left: best.1, down: f64::from(best.2) + f64::from(offset) }
@@ -127,7 +132,8 @@ fn difference(a: &GreyImage, b: &GreyImage, at_a: (usize, usize), at_b: (usize, 
     };
     let mut differences = [[0_i32; SIDE]; SIDE];
     for (row, line) in differences.iter_mut().enumerate() {
-        let (a, b) = (rows(a, at_a, row), rows(b, at_b, row));
+        let a = rows(a, at_a, row);
+        let b = rows(b, at_b, row);
         *line = std::array::from_fn(|i| a[i].wrapping_sub(b[i]));
     }
     let count = (SIDE * SIDE) as f32;

@@ -37,7 +37,8 @@ impl Reducer {
 /// share.
 fn shares(at: usize, to: usize, from: usize) -> impl Iterator<Item = (usize, f32)> {
     let size = from as f32 / to as f32;
-    let (begin, end) = (at as f32 * size, (at + 1) as f32 * size);
+    let begin = at as f32 * size;
+    let end = (at + 1) as f32 * size;
     let last = (end.ceil() as usize).min(from);
     (begin as usize..last).map(move |cell| {
         let covered = end.min((cell + 1) as f32) - begin.max(cell as f32);

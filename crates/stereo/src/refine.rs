@@ -87,8 +87,10 @@ impl Refiner {
         threads: usize,
         disparities: &mut [f32],
     ) {
-        let (width, height) = (images[0].width(), images[0].height());
-        let (padded, rows) = (width.next_multiple_of(LANES), band_rows(height, threads));
+        let width = images[0].width();
+        let height = images[0].height();
+        let padded = width.next_multiple_of(LANES);
+        let rows = band_rows(height, threads);
         let Sums { was, squares, products } = &mut self.sums;
         for row in [&mut *was, &mut *squares, &mut *products] {
             row.resize(height * padded, 0.0);
@@ -137,7 +139,11 @@ fn levels(row: &[u8], padded: &mut Vec<u8>, levels: &mut Vec<[f32; 2]>) {
     let padded = &padded[..width + 4];
     for (x, level) in levels[..width].iter_mut().enumerate() {
         let at = |i: usize| i32::from(padded[x + i]);
-        let (a, b, c, d, e) = (at(0), at(1), at(2), at(3), at(4));
+        let a = at(0);
+        let b = at(1);
+        let c = at(2);
+        let d = at(3);
+        let e = at(4);
         *level = [0.25 * (b + 2 * c + d) as f32, 0.125 * (e + 2 * (d - b) - a) as f32];
     }
     levels[width] = levels[width - 1];
@@ -156,7 +162,8 @@ struct Equations {
 
 impl Equations {
     fn load(&mut self, left: &[[f32; 2]], right: &[[f32; 2]], disparities: &[f32]) {
-        let (from, to) = (MAX_RADIUS, MAX_RADIUS + disparities.len());
+        let from = MAX_RADIUS;
+        let to = MAX_RADIUS + disparities.len();
         for (row, value) in [(&mut self.d, UNKNOWN), (&mut self.g, 0.0), (&mut self.q, 0.0)] {
             row.resize(to + MAX_RADIUS + LANES, value);
             row[to..].fill(value);
@@ -164,7 +171,9 @@ impl Equations {
         for (own, d) in self.d[from..to].iter_mut().zip(disparities) {
             *own = if d.is_nan() { UNKNOWN } else { *d };
         }
-        let (d, g, q) = (&self.d[from..to], &mut self.g[from..to], &mut self.q[from..to]);
+        let d = &self.d[from..to];
+        let g = &mut self.g[from..to];
+        let q = &mut self.q[from..to];
         between(right, d, &mut self.columns, g, q);
         solve_for(left, d, gain(left, d, q), g, q);
     }
@@ -188,7 +197,8 @@ fn between(
     let width = disparities.len();
     columns.resize(width, 0);
     let columns = &mut columns[..width];
-    let (slope, level) = (&mut slope[..width], &mut level[..width]);
+    let slope = &mut slope[..width];
+    let level = &mut level[..width];
     let last = (width - 1) as f32;
     // The columns first, without access to the images: this loop becomes vector instructions.
     for x in 0..width {
@@ -221,7 +231,8 @@ fn gain(left: &[[f32; 2]], disparities: &[f32], right: &[f32]) -> f32 {
     let [mut n, mut l, mut r, mut ll, mut rr] = [0.0_f32; 5];
     for ((own, d), other) in left.iter().zip(disparities).zip(right) {
         let known = if *d < UNKNOWN { 1.0 } else { 0.0 };
-        let (own, other) = (own[0] - MIDDLE, *other - MIDDLE);
+        let own = own[0] - MIDDLE;
+        let other = *other - MIDDLE;
         n += known;
         l += known * own;
         r += known * other;
@@ -235,13 +246,16 @@ fn gain(left: &[[f32; 2]], disparities: &[f32], right: &[f32]) -> f32 {
 /// Sums up over the part of a window's row that is of one surface, around the means.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn across(row: &Equations, radius: usize, squares: &mut [f32], products: &mut [f32]) {
-    let (squares, products) = (squares.as_chunks_mut().0, products.as_chunks_mut().0);
+    let squares = squares.as_chunks_mut().0;
+    let products = products.as_chunks_mut().0;
     for (i, (squares, products)) in squares.iter_mut().zip(products).enumerate() {
         let from = MAX_RADIUS + i * LANES;
         let own = lanes(&row.d, from);
         let [mut n, mut g, mut q, mut gg, mut gq] = [[0.0_f32; LANES]; 5];
         for near in from - radius..from + radius + 1 {
-            let (ds, gs, qs) = (lanes(&row.d, near), lanes(&row.g, near), lanes(&row.q, near));
+            let ds = lanes(&row.d, near);
+            let gs = lanes(&row.g, near);
+            let qs = lanes(&row.q, near);
             for lane in 0..LANES {
                 let same = same(own[lane], ds[lane]);
                 let slope = same * gs[lane];
@@ -265,16 +279,19 @@ fn across(row: &Equations, radius: usize, squares: &mut [f32], products: &mut [f
 /// Solves for the disparities of row `y` with the sums of some rows.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn down(sums: &Sums, (y, rows): (usize, std::ops::Range<usize>), row: &mut [f32]) {
-    let (was, width) = (sums.was.as_slice(), row.len().next_multiple_of(LANES));
+    let was = sums.was.as_slice();
+    let width = row.len().next_multiple_of(LANES);
     for (i, new) in row.chunks_mut(LANES).enumerate() {
         let own = lanes(was, y * width + i * LANES);
-        let (mut squares, mut products) = ([PRIOR; LANES], [0.0_f32; LANES]);
+        let mut squares = [PRIOR; LANES];
+        let mut products = [0.0_f32; LANES];
         for lane in 0..LANES {
             products[lane] = PRIOR * own[lane];
         }
         for near in rows.clone() {
             let at = near * width + i * LANES;
-            let (ds, ss) = (lanes(was, at), lanes(&sums.squares, at));
+            let ds = lanes(was, at);
+            let ss = lanes(&sums.squares, at);
             let ps = lanes(&sums.products, at);
             for lane in 0..LANES {
                 let same = same(own[lane], ds[lane]);

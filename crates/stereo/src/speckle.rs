@@ -57,7 +57,8 @@ impl SpeckleFilter {
         let mut upper = self.rows[y - 1];
         let mut lower = self.rows[y];
         while upper < self.rows[y] && lower < self.rows[y + 1] {
-            let (a, b) = (self.runs[upper], self.runs[lower]);
+            let a = self.runs[upper];
+            let b = self.runs[lower];
             let shared = a.0.max(b.0) as usize..a.1.min(b.1) as usize;
             if shared.start < shared.end {
                 let pairs = above[shared.clone()].iter().zip(&row[shared]);
@@ -83,7 +84,8 @@ impl SpeckleFilter {
     }
 
     fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
+        let a = self.root(a);
+        let b = self.root(b);
         self.joined[a.max(b)] = a.min(b) as u32;
     }
 

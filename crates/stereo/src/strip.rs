@@ -74,7 +74,8 @@ impl Strip {
     }
 
     fn block<const D: usize>(&mut self, pair: &Pair<'_>, output: &mut Output<'_>) {
-        let (width, height) = (pair.left.width(), pair.left.height());
+        let width = pair.left.width();
+        let height = pair.left.height();
         let side = pair.settings.window;
         let radius = side / 2;
         // A sum over 9x9 pixels with 24 bits each is at most 1944, and 121 after the shift.
@@ -118,7 +119,8 @@ impl Strip {
         self.winners.find(self.sums.as_chunks::<D>().0);
         let mut found = RowWinners { disparities, confidences };
         let refused = self.winners.judge(settings.uniqueness as f32, &mut found);
-        let (tolerance, buffers) = (settings.left_right, &mut self.from_right);
+        let tolerance = settings.left_right;
+        let buffers = &mut self.from_right;
         let disagree = self.winners.look_from_right(tolerance, buffers, found.disparities);
         self.dropped.outside += u64::from(refused.outside);
         self.dropped.not_unique += u64::from(refused.not_unique);

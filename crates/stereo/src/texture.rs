@@ -43,7 +43,8 @@ impl TextureTest {
         threads: usize,
         disparities: &mut [f32],
     ) -> u64 {
-        let (width, height) = (image.width(), image.height());
+        let width = image.width();
+        let height = image.height();
         if least == 0 || disparities.is_empty() {
             return 0;
         }
@@ -117,7 +118,8 @@ fn expected(a: f32, b: f32) -> f32 {
 /// Drops the pixels that have another disparity than expected, and counts them.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn limit(row: &mut [f32], before: &[f32], behind: &[f32]) -> u32 {
-    let (before, behind) = (&before[..row.len()], &behind[..row.len()]);
+    let before = &before[..row.len()];
+    let behind = &behind[..row.len()];
     let mut dropped = 0;
     for (x, value) in row.iter_mut().enumerate() {
         let expected = expected(before[x], behind[x]);

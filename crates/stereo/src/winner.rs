@@ -66,7 +66,8 @@ impl Winners {
         // Index of right columns: offset by the longest shift to the left.
         const REACH: usize = 256;
         let width = self.disparity.len();
-        let (disparity, cost) = (&self.disparity[..width], &self.cost[..width]);
+        let disparity = &self.disparity[..width];
+        let cost = &self.cost[..width];
         // Iterators that count check for an overflow, which takes as long as the rest.
         let match_of = |x: usize| x.wrapping_add(REACH - usize::from(disparity[x]));
         best.clear();
@@ -136,7 +137,8 @@ fn rivals<const D: usize>(sums: &[[u8; D]], disparity: &[u8], second: &mut [u8])
 
 /// Writes the costs of the disparities below and above these.
 fn neighbours<const D: usize>(sums: &[[u8; D]], winners: &mut Winners) {
-    let (below, above) = (winners.below.iter_mut(), winners.above.iter_mut());
+    let below = winners.below.iter_mut();
+    let above = winners.above.iter_mut();
     for (((sums, at), below), above) in sums.iter().zip(&winners.disparity).zip(below).zip(above) {
         let at = usize::from(*at);
         (*below, *above) = (sums[at.saturating_sub(1)], sums[(at + 1).min(D - 1)]);
@@ -191,12 +193,18 @@ fn rival<const D: usize>(sums: &[u8; D], at: u8) -> u8 {
 fn judge(winners: &Winners, uniqueness: f32, found: &mut RowWinners<'_>) -> Refused {
     let width = found.disparities.len();
     let Winners { disparity, cost, below, above, second } = winners;
-    let (disparity, cost, second) = (&disparity[..width], &cost[..width], &second[..width]);
-    let (below, above) = (&below[..width], &above[..width]);
-    let (values, confidences) = (&mut *found.disparities, &mut found.confidences[..width]);
-    let (mut outside_count, mut not_unique_count) = (0_u32, 0_u32);
+    let disparity = &disparity[..width];
+    let cost = &cost[..width];
+    let second = &second[..width];
+    let below = &below[..width];
+    let above = &above[..width];
+    let values = &mut *found.disparities;
+    let confidences = &mut found.confidences[..width];
+    let mut outside_count = 0_u32;
+    let mut not_unique_count = 0_u32;
     for x in 0..width {
-        let (d, rival) = (disparity[x], f32::from(second[x]));
+        let d = disparity[x];
+        let rival = f32::from(second[x]);
         let ahead = f32::from(second[x].saturating_sub(cost[x]));
         let outside = u32::from(d) > x as u32;
         let not_unique = !outside & (ahead < uniqueness * rival);

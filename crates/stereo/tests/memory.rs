@@ -51,7 +51,8 @@ fn memory_is_flat() {
             }
             resident_bytes().unwrap()
         };
-        let (early, late) = (after(0..12), after(12..60));
+        let early = after(0..12);
+        let late = after(12..60);
         assert!(late - early < MOST_BYTES, "{method:?}: {early} to {late} bytes");
     }
 }

@@ -84,7 +84,8 @@ fn hidden(truth: &[f32]) -> Vec<bool> {
 /// Returns the bad pixels, %: of all off by more than 1 and 2 px, and of the visible ones. A pixel
 /// without a disparity is bad; one left of the disparity range or without a truth does not count.
 fn bad(found: &[f32], truth: &[f32], width: usize, disparities: usize) -> [f64; 4] {
-    let (mut count, mut pixels) = ([0_u32; 4], [0_u32; 2]);
+    let mut count = [0_u32; 4];
+    let mut pixels = [0_u32; 2];
     for (found, truth) in found.chunks(width).zip(truth.chunks(width)) {
         let hidden = hidden(truth);
         for x in (disparities..width).filter(|x| truth[*x] > 0.0) {
@@ -109,7 +110,9 @@ struct Judged {
 
 fn judge(folder: &Path, pair: &Pair, settings: &StereoSettings) -> Judged {
     let image = |name: &str| grey(&folder.join(pair.name).join(name));
-    let (left, right, truth) = (image("im2.png"), image("im6.png"), image("disp2.png"));
+    let left = image("im2.png");
+    let right = image("im6.png");
+    let truth = image("disp2.png");
     let truth: Vec<f32> = truth.pixels().iter().map(|p| f32::from(*p) / pair.scale).collect();
     let mut matcher = Matcher::new(settings.clone()).unwrap();
     let found = matcher.disparities(&left, &right, pair.disparities - 1).unwrap();

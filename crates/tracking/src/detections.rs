@@ -160,7 +160,8 @@ impl DetectionSet {
         // A detection that several tracks share is reported with the most probable one.
         let mut most = vec![f64::NEG_INFINITY; open.len()];
         for pair in &answer.pairs {
-            let (id, index) = (tracks[pair.track].id, open[pair.detection]);
+            let id = tracks[pair.track].id;
+            let index = open[pair.detection];
             self.pairs.push((id, index, pair.weight));
             if pair.weight >= most[pair.detection] {
                 most[pair.detection] = pair.weight;
@@ -270,7 +271,8 @@ mod tests {
     #[test]
     fn two_people_one_behind_the_other_are_two_unless_their_range_is_unknown() {
         let settings = MergeSettings::default();
-        let (near, far) = (person(3.0, 0.0), person(3.6, 0.0));
+        let near = person(3.0, 0.0);
+        let far = person(3.6, 0.0);
         assert!(near.rect().unwrap().iou(&far.rect().unwrap()) > settings.same_person_iou);
         assert!(!is_same_person(&near, &far, &settings));
         let vague = |d: Detection| Detection { covariance: Matrix3::identity() * 4.0, ..d };
@@ -331,7 +333,8 @@ mod tests {
         let answer = Associations { pairs, spent: vec![2] };
         set.take_over(&answer, &tracks(&[7, 9]), &[0, 1, 2, 3]);
         let fates: Vec<_> = (0..4).map(|i| set.get(i).fate).collect();
-        let (first, second) = (Fate::Matched(TrackId(7)), Fate::Matched(TrackId(9)));
+        let first = Fate::Matched(TrackId(7));
+        let second = Fate::Matched(TrackId(9));
         assert_eq!(fates, [Some(first), Some(second), Some(Fate::Dropped("associator")), None]);
         assert_eq!(set.of_track(TrackId(7)).unwrap().detection.position.x, 2.0);
         assert_eq!(set.matched().len(), 3);

@@ -18,7 +18,8 @@ pub(crate) fn held(track: &Track, motion: &EgoMotion, camera: &Camera) -> Track 
         covariance: axes * covariance * axes.transpose(),
         region: camera.upper_body(&position),
     };
-    let (age, unseen_s) = (track.age.saturating_add(1), track.unseen_s + motion.dt);
+    let age = track.age.saturating_add(1);
+    let unseen_s = track.unseen_s + motion.dt;
     Track { estimate, seen: false, occluded: false, age, unseen_s, ..track.clone() }
 }
 

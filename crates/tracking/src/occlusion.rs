@@ -141,7 +141,9 @@ fn shown(
 
 /// Counts the samples one by one.
 fn count(region: &Rect, image: &Rect, in_front: &[&Occluder], camera: &Camera) -> Shown {
-    let (mut all, mut inside, mut visible) = (0_u32, 0_u32, 0_u32);
+    let mut all = 0_u32;
+    let mut inside = 0_u32;
+    let mut visible = 0_u32;
     for point in silhouette(region) {
         all += 1;
         // A panorama continues beyond its edges.
@@ -190,7 +192,8 @@ fn silhouette(region: &Rect) -> impl Iterator<Item = Point2<f64>> {
     let region = *region;
     let step = 1.0 / SAMPLES as f64;
     let grid = (0..SAMPLES * SAMPLES).map(move |i| {
-        let (u, v) = ((i % SAMPLES) as f64 + 0.5, (i / SAMPLES) as f64 + 0.5);
+        let u = (i % SAMPLES) as f64 + 0.5;
+        let v = (i / SAMPLES) as f64 + 0.5;
         Point2::new(region.x + u * step * region.width, region.y + v * step * region.height)
     });
     grid.filter(move |point| is_on_body(&region, *point))
@@ -252,7 +255,8 @@ mod tests {
             let occluder = |b| Occluder::new(region(b), &at(b.2), &Matrix3::zeros(), &camera);
             let occluders: Vec<Occluder> = boxes[1..].iter().map(occluder).collect();
             let settings = OcclusionSettings::default();
-            let (region, range_m) = (region(&boxes[0]), boxes[0].2);
+            let region = region(&boxes[0]);
+            let range_m = boxes[0].2;
             let fast = shown(&region, &at(range_m), &occluders, &camera, &settings);
             let nearer = occluders.iter().filter(|c| range_m - c.range_m > settings.min_gap_m);
             let image = Rect::new(0.0, 0.0, 640.0, 480.0);
@@ -280,7 +284,8 @@ mod tests {
 
     #[test]
     fn who_was_seen_without_a_range_hides_from_where_they_are_expected() {
-        let (near, far) = (Point3::new(2.0, 0.0, 1.6), Point3::new(3.5, 0.0, 1.6));
+        let near = Point3::new(2.0, 0.0, 1.6);
+        let far = Point3::new(3.5, 0.0, 1.6);
         let camera = camera();
         let cover = |sigma_m: f64| {
             let covariance = Matrix3::identity() * (sigma_m * sigma_m);
@@ -318,7 +323,8 @@ mod tests {
             let region = camera.upper_body(&far);
             visibility(&region, &far, &[cover], &camera, &OcclusionSettings::default())
         };
-        let (left, right) = (Point3::new(-2.0, 0.02, 1.5), Point3::new(-4.0, -0.02, 1.5));
+        let left = Point3::new(-2.0, 0.02, 1.5);
+        let right = Point3::new(-4.0, -0.02, 1.5);
         let starts = [left, right].map(|head| camera.upper_body(&head));
         assert!(starts.iter().all(|region| region.right() > 480.0), "{starts:?}");
         assert_eq!(seen(left, right), Visibility::Hidden);

@@ -350,7 +350,8 @@ impl Tracker {
         log: &mut StageLog,
     ) -> Result<(), StepError> {
         detections.merge(&self.settings.merge);
-        let (open, found) = (detections.undecided(), detections.undecided_detections());
+        let open = detections.undecided();
+        let found = detections.undecided_detections();
         let appearance = self.reidentifier.compare(frame, predicted, &found);
         let appearance =
             appearance.map_err(|error| StepError::of_stage("[appearance]", frame, error))?;
@@ -373,7 +374,8 @@ impl Tracker {
         report: &mut TrackingReport,
         log: &mut StageLog,
     ) -> Result<Posterior, StepError> {
-        let (matched, unmatched) = (detections.matched(), detections.undecided_detections());
+        let matched = detections.matched();
+        let unmatched = detections.undecided_detections();
         let metered = self.search.likelihood().map(Metered::new);
         let likelihood = metered.as_ref().map(|metered| metered as &dyn Likelihood);
         let evidence = Evidence { frame, matched: &matched, unmatched: &unmatched, likelihood };

@@ -90,7 +90,8 @@ mod tests {
 
     #[test]
     fn scenes_are_counted_and_the_answers_stay() {
-        let (metered, frame) = (Metered::new(&Size), frame());
+        let metered = Metered::new(&Size);
+        let frame = frame();
         let people = [standing(); 5];
         let mut out = Vec::new();
         metered.log_likelihoods(&frame, &people, 2, &mut out).unwrap();

@@ -49,7 +49,8 @@ pub fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> 
 /// # Errors
 /// As for [`visit`].
 pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
-    let (table, folder) = (data.join("faces/fddb.csv"), data.join("faces/fddb"));
+    let table = data.join("faces/fddb.csv");
+    let folder = data.join("faces/fddb");
     let wrong = |why: String| Failure::failed(format!("{}: {why}", table.display()));
     let text = read_text(&table, FileLimit::Table).map_err(|error| wrong(error.to_string()))?;
     let mut lines = text.lines();
@@ -67,7 +68,8 @@ pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
         };
         // The ellipse may lie on its side; the smaller radius is the half width.
         let half = major.min(minor);
-        let (side, below) = (SIDE * half, BELOW * half);
+        let side = SIDE * half;
+        let below = BELOW * half;
         let window = Rect::new(x - 0.5 * side, y + below - 0.5 * side, side, side);
         faces.push((file, window));
     }
@@ -103,7 +105,8 @@ fn cbcl(archive: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
         let image = image::load_from_memory(content)
             .map_err(|error| wrong(format!("{name}: {error}")))?
             .into_luma8();
-        let (width, height) = (image.width() as usize, image.height() as usize);
+        let width = image.width() as usize;
+        let height = image.height() as usize;
         let grey = GreyImage::from_pixels(width, height, image.into_raw()).unwrap_or_default();
         let whole = Rect::new(0.0, 0.0, width as f64, height as f64);
         let example = Example { is_person: !name.contains("non-faces"), group };

@@ -135,7 +135,8 @@ fn show_log(
     trainer: &mut dyn Trainer,
 ) -> Result<(), Failure> {
     let truth = RealTruth::read(folder, log)?;
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
     let path = folder.join(log).with_extension("mcap");
     let mut source = FrameSource::open(&path, &input, &limits, inputs)?;

@@ -138,7 +138,8 @@ mod tests {
                 let settings = config["detectors"][0].get("config").cloned();
                 settings.unwrap_or_else(|| Table::new().into())
             };
-            let (plain, low) = (of(in_use.plain()), of(in_use.proposing().unwrap()));
+            let plain = of(in_use.plain());
+            let low = of(in_use.proposing().unwrap());
             let cost = |config: &Value| config.get("discover_cost").and_then(Value::as_float);
             assert!(cost(&low) > cost(&plain).or(Some(0.16)));
             assert_eq!(low.get("even_cost"), plain.get("even_cost"), "{kind:?}");

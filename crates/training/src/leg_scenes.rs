@@ -75,7 +75,8 @@ fn scene(seed: u64) -> Scene {
         let [length, width] = size_m;
         [chance.between(0.5, length - 0.5), chance.between(0.5, width - 0.5)]
     };
-    let (start, end) = (place(), place());
+    let start = place();
+    let end = place();
     let places: Vec<[f64; 2]> = (0..24).map(|_| place()).collect();
     let (standing, rest) = places.split_at(3);
     let (walking, things) = rest.split_at(9);

@@ -125,7 +125,8 @@ fn busts(folder: &Path) -> Vec<Photo> {
             if group_of[i] != group_of[j] && looks[i].is_like(&looks[j]) {
                 // Whole groups are merged: likeness of pairs is not transitive, membership has to
                 // be.
-                let (from, to) = (group_of[i], group_of[j]);
+                let from = group_of[i];
+                let to = group_of[j];
                 group_of.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
             }
         }
@@ -218,7 +219,8 @@ pub fn read(path: &Path) -> Result<GreyImage, Failure> {
     let image = image::open(path)
         .map_err(|error| Failure::failed(format!("{}: {error}", path.display())))?
         .into_luma8();
-    let (width, height) = (image.width() as usize, image.height() as usize);
+    let width = image.width() as usize;
+    let height = image.height() as usize;
     Ok(GreyImage::from_pixels(width, height, image.into_raw()).unwrap_or_default())
 }
 
@@ -248,7 +250,8 @@ impl Photo {
     }
 
     fn squares(&self, grey: &GreyImage, round: u64) -> Vec<Rect> {
-        let (width, height) = (grey.width() as f64, grey.height() as f64);
+        let width = grey.width() as f64;
+        let height = grey.height() as f64;
         match self.kind {
             Kind::Body => {
                 let scale = height / 128.0;
@@ -266,8 +269,8 @@ impl Photo {
                 let count = if width < 200.0 { 1 } else { SQUARES };
                 let square = |_| {
                     let side = chance.between(least, most);
-                    let (x, y) =
-                        (chance.between(0.0, width - side), chance.between(0.0, height - side));
+                    let x = chance.between(0.0, width - side);
+                    let y = chance.between(0.0, height - side);
                     Rect::new(x, y, side, side)
                 };
                 (0..count).map(square).collect()
@@ -278,8 +281,10 @@ impl Photo {
 
 /// Returns a picture as a frame of some camera.
 pub fn frame(grey: GreyImage) -> Frame {
-    let (width, height) = (grey.width(), grey.height());
-    let (cx, cy) = (0.5 * width as f64, 0.5 * height as f64);
+    let width = grey.width();
+    let height = grey.height();
+    let cx = 0.5 * width as f64;
+    let cy = 0.5 * height as f64;
     let lens = Pinhole { fx: 500.0, fy: 500.0, cx, cy, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, width, height, 1.2, 0.0, 0.0));
     let images = Images { grey: Some(Arc::new(grey)), ..Images::default() };
@@ -288,7 +293,8 @@ pub fn frame(grey: GreyImage) -> Frame {
 
 /// Returns a candidate of which only the region is known.
 pub fn candidate(region: Rect) -> Detection {
-    let (position, covariance) = (Point3::new(2.0, 0.0, 1.6), Matrix3::identity());
+    let position = Point3::new(2.0, 0.0, 1.6);
+    let covariance = Matrix3::identity();
     Detection {
         image: Some(ImageBox::upper_body(region)),
         position,
@@ -322,7 +328,8 @@ mod tests {
     fn mirror_images_and_other_cuts_look_alike() {
         let wave = |at: f64| 60.0 * at.sin();
         let image = GreyImage::from_fn(50, 50, |x, y| {
-            let (x, y) = (x as f64, y as f64);
+            let x = x as f64;
+            let y = y as f64;
             (127.0 + wave(x / 7.0) + wave(y / 6.0 + x / 19.0)) as u8
         });
         let mirrored = GreyImage::from_fn(50, 50, |x, y| image.row(y)[49 - x]);

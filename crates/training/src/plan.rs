@@ -18,7 +18,8 @@ pub struct Plan {
 impl Plan {
     /// Returns the amount that the arguments ask for.
     pub fn new(args: &TrainArgs) -> Self {
-        let (scenes, rounds) = (args.scenes, args.rounds.map(|rounds| rounds as usize));
+        let scenes = args.scenes;
+        let rounds = args.rounds.map(|rounds| rounds as usize);
         let look = ImageTiming { rate_hz: 1.0, duration_s: 7.0 };
         if args.quick {
             let test_look = ImageTiming { rate_hz: 4.0, duration_s: 2.0 };

@@ -46,7 +46,8 @@ pub struct ImageTiming {
 /// # Errors
 /// A number that is no seed.
 pub fn scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene, ConfigError> {
-    let (turn, is_room) = (number / 2, number.is_multiple_of(2));
+    let turn = number / 2;
+    let is_room = number.is_multiple_of(2);
     // The camera changes more slowly than the rest, so that every suite gets both kinds.
     let kind = if (turn / 2).is_multiple_of(2) { CameraKind::Rgbd } else { CameraKind::Stereo };
     let seed = split.seed(number)?;
@@ -65,7 +66,8 @@ pub fn scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene, Conf
 /// paths and appearance of the people depend on the seed.
 fn room(seed: u64, people: usize) -> Scene {
     let mut chance = SplitMix64::new(seed);
-    let (length, width) = (chance.between(7.0, 12.0), chance.between(5.0, 8.0));
+    let length = chance.between(7.0, 12.0);
+    let width = chance.between(5.0, 8.0);
     let start = [0.8, width * chance.between(0.3, 0.7)];
     let view = RobotView { start, room: [length, width] };
     Scene {
@@ -115,7 +117,8 @@ struct RobotView {
 impl RobotView {
     /// Returns a random place in view, within the detector's range and inside the room.
     fn place(&self, chance: &mut SplitMix64) -> [f64; 2] {
-        let (distance, angle) = (chance.between(1.8, 5.5), chance.between(-0.5, 0.5));
+        let distance = chance.between(1.8, 5.5);
+        let angle = chance.between(-0.5, 0.5);
         let inside = |at: f64, size: f64| at.clamp(0.5, size - 0.5);
         [
             inside(self.start[0] + distance * angle.cos(), self.room[0]),

@@ -120,7 +120,8 @@ fn known(truth: &tagalong_sim::Truth) -> Known {
 /// # Errors
 /// A log or a truth that cannot be used, and those of `see`.
 pub fn in_log(log: &Path, truth: &Path, see: See<'_>) -> Result<(), Failure> {
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
     let truth = TruthFile::read(truth, TruthOptions::default())?;
     let shots = Shots::read(log, &input, &limits)?;

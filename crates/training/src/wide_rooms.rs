@@ -144,7 +144,8 @@ fn piece(chance: &mut SplitMix64, view: &View) -> Furniture {
 
 /// Returns, for one in four people, a piece of furniture in front of them.
 fn in_front(chance: &mut SplitMix64, view: &View, person: &PersonSettings) -> Option<Furniture> {
-    let (is_behind, off_m) = (chance.between(0.0, 1.0) < 0.25, chance.between(0.5, 1.0));
+    let is_behind = chance.between(0.0, 1.0) < 0.25;
+    let off_m = chance.between(0.5, 1.0);
     let kind = chance.pick(&[FurnitureKind::Desk, FurnitureKind::Desk, FurnitureKind::Chair]);
     let heading_deg = chance.between(150.0, 210.0);
     let [x, y] = *person.path.first()?;

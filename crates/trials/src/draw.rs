@@ -314,7 +314,8 @@ mod tests {
 
     #[test]
     fn late_frames_are_in_order_in_a_log_and_not_on_a_robot() {
-        let (log, live) = (simulated(Draw::new(&scene(), 1)), simulated(Draw::live(&scene(), 1)));
+        let log = simulated(Draw::new(&scene(), 1));
+        let live = simulated(Draw::live(&scene(), 1));
         let sorted =
             |all: &[SimulatedFrame]| all.windows(2).all(|p| p[0].frame.stamp < p[1].frame.stamp);
         assert!(sorted(&log), "{:?}", stamps(&log));

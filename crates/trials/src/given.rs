@@ -228,7 +228,8 @@ fn given_boxes(
 /// Returns frames with a stamp each and without images, and a camera with the size of the images (a
 /// field of view of 53 degrees, at breast height).
 fn frames(info: &SequenceInfo, mut boxes: BTreeMap<u32, Vec<ExternalDetection>>) -> Vec<Frame> {
-    let (width, height) = (info.width as usize, info.height as usize);
+    let width = info.width as usize;
+    let height = info.height as usize;
     let lens = Pinhole {
         fx: width as f64,
         fy: width as f64,

@@ -135,7 +135,8 @@ fn errors_m(
     let mut errors = Vec::new();
     for (at, (moment, report)) in moments.iter().enumerate() {
         believed_home *= report.motion.isometry();
-        let (of, frame) = (&sequence.frames[at], &prepared.frames[at]);
+        let of = &sequence.frames[at];
+        let frame = &prepared.frames[at];
         let (real, believed) = match in_start {
             true => (home * moment.world_from_robot, believed_home),
             false => (Isometry2::identity(), Isometry2::identity()),
@@ -143,7 +144,8 @@ fn errors_m(
         errors.extend(matches[at].iter().filter_map(|m| {
             let truth = of.truths[frame.truth_at[m.row as usize] as usize].floor_m?;
             let report = of.reports[frame.track_at[m.col as usize] as usize].floor_m?;
-            let (truth, report) = (real * Point2::from(truth), believed * Point2::from(report));
+            let truth = real * Point2::from(truth);
+            let report = believed * Point2::from(report);
             Some(nalgebra::distance(&truth, &report))
         }));
     }

@@ -87,7 +87,8 @@ fn occlusion(
     again: usize,
 ) -> Option<Occlusion> {
     let middle = (first + again) / 2;
-    let (a, b) = (truth(trial, middle, person)?, truth(trial, middle, behind)?);
+    let a = truth(trial, middle, person)?;
+    let b = truth(trial, middle, behind)?;
     Some(Occlusion {
         person,
         behind,
@@ -103,7 +104,8 @@ pub fn outcome(trial: &Trial, run: &Run, occlusion: &Occlusion) -> Outcome {
     let Occlusion { person, first, again, .. } = *occlusion;
     let near = |index: usize| track_at(trial, &run.reports[index], index, person);
     let within = |from: usize, index: usize| {
-        let (a, b) = (trial.moments[from].stamp, trial.moments[index].stamp);
+        let a = trial.moments[from].stamp;
+        let b = trial.moments[index].stamp;
         b.seconds_since(a).abs() <= PATIENCE_S
     };
     let mut earlier = (0..first).rev().take_while(|index| within(first, *index));

@@ -32,7 +32,8 @@ pub fn in_order<S: Sync, T: Send>(
     work: impl Fn(&S) -> Result<T, TrialError> + Sync,
     done: impl Fn(usize) + Sync,
 ) -> Result<Vec<T>, TrialError> {
-    let (next, through) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let next = AtomicUsize::new(0);
+    let through = AtomicUsize::new(0);
     let worker = || {
         let mut kept = Vec::new();
         while let Some((at, thing)) = take(things, &next) {

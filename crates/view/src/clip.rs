@@ -38,7 +38,8 @@ pub fn write(args: &ViewArgs, file: &Path) -> Outcome {
     let animation = Animation { width: args.width, delay_ms: 1000 / args.fps };
     Progress::waiting("encoding", || animation.write(&pictures, file)).map_err(Failure::failed)?;
     let bytes = fs::metadata(file).map_or(0, |facts| facts.len());
-    let (shown, count) = (file.display(), pictures.len());
+    let shown = file.display();
+    let count = pictures.len();
     print(&format!("{shown}: {count} pictures, {:.1} MB\n", bytes as f64 / 1e6))?;
     Ok(Ended::Well)
 }

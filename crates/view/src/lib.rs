@@ -168,7 +168,8 @@ fn heading(runs: &[Recording], data: &PageData, notes: &[String]) -> Heading {
     let log = runs.first().map(|run| run.report.log.name.clone()).unwrap_or_default();
     let described = runs.iter().zip(&data.runs).map(|(run, shown)| {
         let frames = shown.frames.iter().flatten().count();
-        let (name, folder) = (&shown.name, run.folder.display());
+        let name = &shown.name;
+        let folder = run.folder.display();
         format!("{name}: {frames} frames, {}, from {folder}", run.report.ended)
     });
     Heading { log, runs: described.collect(), notes: notes.to_vec() }

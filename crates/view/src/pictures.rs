@@ -89,7 +89,8 @@ mod tests {
         let total = |images: &[String]| images.iter().map(String::len).sum::<usize>();
         assert!(roomy.summary().unwrap().contains("640 px"), "{:?}", roomy.summary());
         assert!(!tight.summary().unwrap().contains("640 px"), "{:?}", tight.summary());
-        let (roomy, tight) = (roomy.into_images().unwrap(), tight.into_images().unwrap());
+        let roomy = roomy.into_images().unwrap();
+        let tight = tight.into_images().unwrap();
         assert!(total(&tight) <= 200_000 && total(&tight) < total(&roomy));
     }
 

@@ -209,7 +209,8 @@ fn gather(
     mut next: impl FnMut() -> Result<Option<Moment>, Failure>,
     window: &Window,
 ) -> Result<(Vec<Moment>, u64), Failure> {
-    let (mut kept, mut every) = (Vec::new(), 1);
+    let mut kept = Vec::new();
+    let mut every = 1;
     while let Some(moment) = next()? {
         if !window.contains(moment.notes.stamp_ns) || !is_kept(&moment, every) {
             continue;

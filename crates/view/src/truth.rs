@@ -38,7 +38,8 @@ impl PageTruth {
         let mut by_number = file.frames(shots);
         let by_stamp: BTreeMap<u64, (u32, Isometry2<f64>)> =
             shots.iter().map(|shot| (shot.stamp_ns, (shot.number, shot.odom_from_robot))).collect();
-        let (mut frames, mut people) = (Vec::new(), Vec::new());
+        let mut frames = Vec::new();
+        let mut people = Vec::new();
         for stamp in stamps {
             let shot = by_stamp.get(stamp);
             let there = shot.and_then(|(number, _)| by_number.remove(number)).unwrap_or_default();
@@ -118,7 +119,8 @@ fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
     let report = |track: &tagalong_page::data::TrackData| {
         let [x, y, width, height] = track.box_px;
         let inside = Rect::new(x, y, width, height).clipped(size[0], size[1]);
-        let (dx, dy) = (track.at[0] - frame.robot[0], track.at[1] - frame.robot[1]);
+        let dx = track.at[0] - frame.robot[0];
+        let dy = track.at[1] - frame.robot[1];
         Report {
             id: i64::from(track.id),
             region: (inside.area() > 0.0).then(|| tagalong_scoring::region(&inside)),

@@ -144,7 +144,8 @@ impl<'f> Patch<'f> {
         [from_m, to_m, half_m]: [f64; 3],
     ) -> Self {
         let px = region.height / UPPER_BODY_SIDE_M;
-        let (centre, head_y) = (region.centre().x, region.y + HEAD_BELOW_TOP_M * px);
+        let centre = region.centre().x;
+        let head_y = region.y + HEAD_BELOW_TOP_M * px;
         let whole = Rect::new(
             centre - half_m * px,
             head_y + from_m * px,
@@ -165,11 +166,13 @@ impl<'f> Patch<'f> {
     /// Returns the pixels that belong to the person.
     fn pixels(&self) -> impl Iterator<Item = (i64, i64)> {
         let step = |size: f64| (size / SAMPLES as f64).max(1.0);
-        let (across, down) = (step(self.area.width), step(self.area.height));
+        let across = step(self.area.width);
+        let down = step(self.area.height);
         let columns = (self.area.width / across) as usize;
         let rows = (self.area.height / down) as usize;
         let at = move |i: usize| {
-            let (row, column) = (i / columns.max(1), i % columns.max(1));
+            let row = i / columns.max(1);
+            let column = i % columns.max(1);
             let x = self.area.x + (column as f64 + 0.5) * across;
             (x as i64, (self.area.y + (row as f64 + 0.5) * down) as i64)
         };
@@ -211,14 +214,16 @@ impl<'f> Patch<'f> {
 
 /// Adds a colour to the two nearest hues and the two nearest greys, each by its share.
 fn vote(histogram: &mut Histogram<COLOURS>, [r, g, b]: [f64; 3]) {
-    let (most, least) = (r.max(g).max(b), r.min(g).min(b));
+    let most = r.max(g).max(b);
+    let least = r.min(g).min(b);
     let saturation = if most > 0.0 { (most - least) / most } else { 0.0 };
     let [grey_below, hue_from] = SATURATION;
     let coloured = ((saturation - grey_below) / (hue_from - grey_below)).clamp(0.0, 1.0);
     let bright = ((most - 0.2) / 0.4).clamp(0.0, 1.0);
     // Soft shares: a small change of light must not move a pixel to another bin at once.
     let hue = hue(r, g, b, most, most - least) * HUES as f64;
-    let (first, share) = (hue.floor(), hue - hue.floor());
+    let first = hue.floor();
+    let share = hue - hue.floor();
     for (bin, share) in [(first as usize % HUES, 1.0 - share), ((first as usize + 1) % HUES, share)]
     {
         histogram[bin] += coloured * share * (1.0 - bright);
@@ -226,7 +231,8 @@ fn vote(histogram: &mut Histogram<COLOURS>, [r, g, b]: [f64; 3]) {
     }
     // Square root: dark greys are spread over more bins than on a linear scale.
     let level = most.sqrt() * (GREYS - 1) as f64;
-    let (first, share) = (level.floor(), level - level.floor());
+    let first = level.floor();
+    let share = level - level.floor();
     let first = (first as usize).min(GREYS - 1);
     histogram[2 * HUES + first] += (1.0 - coloured) * (1.0 - share);
     histogram[2 * HUES + (first + 1).min(GREYS - 1)] += (1.0 - coloured) * share;
@@ -270,7 +276,8 @@ mod tests {
 
     #[test]
     fn like_distributions_do_not_differ_and_disjoint_ones_wholly() {
-        let (a, b) = ([0.5, 0.5, 0.0], [0.0, 0.0, 1.0]);
+        let a = [0.5, 0.5, 0.0];
+        let b = [0.0, 0.0, 1.0];
         assert!(hellinger(&a, &a) < 1e-6);
         assert_eq!(hellinger(&a, &b), 1.0);
     }
@@ -352,7 +359,8 @@ mod tests {
 
     #[test]
     fn distributions_that_share_a_quarter_are_so_far_apart() {
-        let (a, b) = ([0.75, 0.25], [0.25, 0.75]);
+        let a = [0.75, 0.25];
+        let b = [0.25, 0.75];
         let overlap = 2.0 * (0.75_f64 * 0.25).sqrt();
         assert!((hellinger(&a, &b) - (1.0 - overlap).sqrt()).abs() < 1e-12);
         assert_eq!(normalised([3.0, 1.0], LEAST_PIXELS), Some([0.75, 0.25]));

@@ -234,7 +234,8 @@ mod tests {
         let region = Rect::new(300.0, 100.0, 60.0, 200.0);
         let upper = region.upper_body_of_standing(1.7);
         let found = |body| boxed(&of_body(body), &region, None).unwrap();
-        let (full, whole) = (found(BoxedBody::Full), found(BoxedBody::FullBox));
+        let full = found(BoxedBody::Full);
+        let whole = found(BoxedBody::FullBox);
         assert_eq!(full.image, Some(ImageBox::upper_body(upper)));
         let image = whole.image.unwrap();
         assert_eq!((image.rect, image.extent), (region, Extent::FullBody));
@@ -261,8 +262,8 @@ mod tests {
         assert!(by_floor.iou(&square) > 0.85, "{by_floor:?} {square:?}");
         assert!(by_height.iou(&square) < by_floor.iou(&square), "{by_height:?}");
         let near = Point3::new(1.6, 0.0, 1.6);
-        let (square, whole) =
-            (camera.upper_body(&near), camera.whole_body(&camera.upper_body(&near), &near));
+        let square = camera.upper_body(&near);
+        let whole = camera.whole_body(&camera.upper_body(&near), &near);
         let cut = whole.clipped(640, 480);
         assert!(whole.bottom() > 480.0, "{whole:?}");
         let by_width = settings.upper_body(&camera, &cut);

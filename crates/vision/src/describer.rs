@@ -67,7 +67,8 @@ impl Derived for Vectors {
 impl Describer {
     /// Creates a describer by a network; `mark` tells it from others.
     pub fn new(mark: String, embedder: Box<dyn Embedder>) -> Self {
-        let (embedder, missing) = (Mutex::new(embedder), AtomicU64::new(0));
+        let embedder = Mutex::new(embedder);
+        let missing = AtomicU64::new(0);
         Self { shared: Some(Arc::new(Shared { mark, embedder, missing })) }
     }
 

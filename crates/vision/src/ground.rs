@@ -128,7 +128,8 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     }
     ratios.sort_by(f64::total_cmp);
     let within = |at: usize| {
-        let (low, high) = (ratios[at] - ONE_FLOOR, ratios[at] + ONE_FLOOR);
+        let low = ratios[at] - ONE_FLOOR;
+        let high = ratios[at] + ONE_FLOOR;
         ratios.partition_point(|v| *v <= high) - ratios.partition_point(|v| *v < low)
     };
     let most = (0..ratios.len()).step_by(4).map(within).max()?;
@@ -190,7 +191,8 @@ fn is_inlier(plane: &Ground, point: &Point3<f64>, settings: &GroundSettings) -> 
 /// less twice the points well below it.
 fn score(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) -> f64 {
     let votes = points.iter().map(|point| {
-        let (height, near) = (plane.height_of(point), tolerance(point, settings));
+        let height = plane.height_of(point);
+        let near = tolerance(point, settings);
         if height.abs() < near {
             1.0 - (height / near).powi(2)
         // Nothing lies below a floor; a margin of three tolerances leaves room for noise.
@@ -246,7 +248,8 @@ mod tests {
     fn room(camera: &Camera) -> DepthImage {
         DepthImage::from_fn(camera.width, camera.height, |x, y| {
             let pixel = Point2::new(x as f64, y as f64);
-            let (eye, to) = (camera.back_project(pixel, 0.0), camera.back_project(pixel, 1.0));
+            let eye = camera.back_project(pixel, 0.0);
+            let to = camera.back_project(pixel, 1.0);
             let ray = to - eye;
             let floor = Some(-eye.z / ray.z);
             let wall = Some((5.0 - eye.x) / ray.x);

@@ -15,7 +15,8 @@ pub struct Integral {
 impl Integral {
     /// Computes the sums of an image.
     pub fn new(image: &GreyImage) -> Self {
-        let (width, height) = (image.width(), image.height());
+        let width = image.width();
+        let height = image.height();
         let stride = width + 1;
         let mut sums = vec![0_u32; stride * (height + 1)];
         for y in 0..height {

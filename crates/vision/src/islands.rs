@@ -45,7 +45,8 @@ mod tests {
     use super::*;
 
     fn of(points: &[[i64; 2]], gap: i64) -> Vec<Vec<[i64; 2]>> {
-        let (mut points, mut found) = (points.to_vec(), Vec::new());
+        let mut points = points.to_vec();
+        let mut found = Vec::new();
         islands(&mut points, |point| *point, gap, &mut |island| found.push(island.to_vec()));
         found
     }
@@ -71,7 +72,8 @@ mod tests {
             gap in 2..9i64,
         ) {
             let found = of(&points, gap);
-            let (mut all, mut points) = (found.concat(), points);
+            let mut all = found.concat();
+            let mut points = points;
             all.sort();
             points.sort();
             prop_assert_eq!(all, points);
@@ -80,7 +82,8 @@ mod tests {
                 prop_assert!(!can_be_cut(island, gap));
                 for other in &found[index + 1..] {
                     let is_apart = (0..2).any(|axis| {
-                        let (a, b) = (bounds(island, axis), bounds(other, axis));
+                        let a = bounds(island, axis);
+                        let b = bounds(other, axis);
                         b.0 - a.1 >= gap || a.0 - b.1 >= gap
                     });
                     prop_assert!(is_apart, "{island:?} {other:?}");

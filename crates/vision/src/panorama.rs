@@ -146,7 +146,8 @@ impl<P: Blend> Unwrapper<P> {
     pub fn apply(&mut self, raw: &Image<P>, out: &mut Image<P>) -> Result<()> {
         let Level { width, height, .. } = self.levels[0];
         if (raw.width(), raw.height()) != (width, height) {
-            let (w, h) = (raw.width(), raw.height());
+            let w = raw.width();
+            let h = raw.height();
             let why =
                 format!("a raw panorama of {w}x{h} pixels where {width}x{height} were set up");
             return Err(Error::Other(why));
@@ -161,7 +162,8 @@ impl<P: Blend> Unwrapper<P> {
 
     fn halve(&mut self, raw: &[P]) {
         for pair in self.levels.windows(2) {
-            let (fine, coarse) = (pair[0], pair[1]);
+            let fine = pair[0];
+            let coarse = pair[1];
             let (before, after) = self.halved.split_at_mut(coarse.start);
             let from = if fine.width == self.levels[0].width { raw } else { &before[fine.start..] };
             let rows = from.chunks_exact(2 * fine.width).zip(after.chunks_exact_mut(coarse.width));
@@ -286,8 +288,10 @@ mod tests {
     /// Returns the mean of the block of raw pixels that a pixel of a level stands for.
     fn block(raw: &GreyImage, level: usize, x: i64, y: i64) -> f64 {
         let side = 1i64 << level;
-        let (width, height) = (raw.width() as i64 / side, raw.height() as i64 / side);
-        let (x, y) = (x.clamp(0, width - 1) * side, y.clamp(0, height - 1) * side);
+        let width = raw.width() as i64 / side;
+        let height = raw.height() as i64 / side;
+        let x = x.clamp(0, width - 1) * side;
+        let y = y.clamp(0, height - 1) * side;
         let places = (0..side).flat_map(|dy| (0..side).map(move |dx| (dx, dy)));
         let sum: f64 = places.map(|(dx, dy)| f64::from(raw.get(x + dx, y + dy).unwrap())).sum();
         sum / (side * side) as f64
@@ -301,7 +305,8 @@ mod tests {
         let place = panorama.raw_pixel(column as f64, row as f64);
         let x = ((place.x + 0.5) / scale - 0.5).clamp(0.0, side(raw.width()));
         let y = ((place.y + 0.5) / scale - 0.5).clamp(0.0, side(raw.height()));
-        let (cx, cy) = (x.floor(), y.floor());
+        let cx = x.floor();
+        let cy = y.floor();
         let mut sum = 0.0;
         for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
             let weight =
@@ -329,7 +334,8 @@ mod tests {
         let mut out = RgbImage::default();
         Unwrapper::new(&panorama, 480, 480).unwrap().apply(&raw, &mut out).unwrap();
         for (at, pixel) in out.pixels().iter().enumerate() {
-            let (column, row) = ((at % 480) as f64, (at / 480) as f64);
+            let column = (at % 480) as f64;
+            let row = (at / 480) as f64;
             let expected = colour(panorama.bearing(column), panorama.elevation(row));
             // Near the centre a raw pixel covers degrees of bearing.
             let allowed = if row > 100.0 { 4.0 } else { 2.5 };

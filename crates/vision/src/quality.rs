@@ -17,7 +17,8 @@ pub struct DepthQuality {
 impl DepthQuality {
     /// Computes the statistics of several images together; `None` without a reading.
     pub fn of<'a>(images: impl IntoIterator<Item = &'a DepthImage>) -> Option<Self> {
-        let (mut readings, mut pixels) = (Vec::new(), 0usize);
+        let mut readings = Vec::new();
+        let mut pixels = 0usize;
         for image in images {
             pixels += image.pixels().len();
             let usable = image.pixels().iter().filter(|z| z.is_finite() && **z > 0.0);

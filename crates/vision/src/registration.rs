@@ -88,7 +88,8 @@ impl EdgeOverlap {
         let all = self.without(None);
         let outlines: u64 = self.parts.iter().map(|(_, count)| count).sum();
         let best = self.peak(&all)?;
-        let (here, there) = (all[all.len() / 2], all[best]);
+        let here = all[all.len() / 2];
+        let there = all[best];
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         let px = self.offset_of(best);
         let counted = (0..PARTS).filter(|part| self.parts[*part].1 > 0);
@@ -122,7 +123,8 @@ impl EdgeOverlap {
     }
 
     fn offset_of(&self, index: usize) -> [i32; 2] {
-        let (reach, side) = (self.settings.reach_px as i32, 2 * self.settings.reach_px + 1);
+        let reach = self.settings.reach_px as i32;
+        let side = 2 * self.settings.reach_px + 1;
         [(index % side) as i32 - reach, (index / side) as i32 - reach]
     }
 }
@@ -156,7 +158,8 @@ struct Changes {
 
 impl Changes {
     fn of(grey: &GreyImage, ceiling: u8) -> Self {
-        let (width, height) = (grey.width(), grey.height());
+        let width = grey.width();
+        let height = grey.height();
         let at = |x: usize, y: usize| grey.row(y)[x];
         let change = |a: u8, b: u8| a.abs_diff(b).min(ceiling);
         let next = |at: usize, size: usize| (at + 1).min(size - 1);
@@ -181,8 +184,8 @@ impl Changes {
         if !(inside(x, self.width) && inside(y, self.height)) {
             return;
         }
-        let (changes, side) =
-            (if down { &self.along_column } else { &self.along_row }, 2 * reach + 1);
+        let changes = if down { &self.along_column } else { &self.along_row };
+        let side = 2 * reach + 1;
         *count += 1;
         for (row, sums) in sums.chunks_exact_mut(side).enumerate() {
             let start = (y + row - reach) * self.width + x - reach;
@@ -195,7 +198,8 @@ impl Changes {
 
 /// Returns the outline pixels of a depth image.
 fn outlines(depth: &DepthImage, settings: &OverlapSettings) -> Vec<Outline> {
-    let (width, height) = (depth.width(), depth.height());
+    let width = depth.width();
+    let height = depth.height();
     let mut found = Vec::new();
     for y in 0..height {
         jumps(width, settings, |x| depth.row(y)[x], |x| found.push((x, y, false)));
@@ -280,7 +284,8 @@ mod tests {
         let kept = outlines(depth, &settings).into_iter();
         let kept = kept.filter(|(x, y, _)| within(*x as i64, *y as i64));
         kept.map(|(x, y, down)| {
-            let (x, y) = (x as i64 + dx, y as i64 + dy);
+            let x = x as i64 + dx;
+            let y = y as i64 + dy;
             let (sx, sy) = if down { (0, 1) } else { (1, 0) };
             let at = |x: i64, y: i64| grey.get(x.clamp(0, 159), y.clamp(0, 119)).unwrap();
             u64::from(at(x - sx, y - sy).abs_diff(at(x + sx, y + sy)).min(settings.ceiling))

@@ -102,7 +102,8 @@ impl RowSums {
     /// Returns the value at a reduced pixel: `None` outside, `Some(0)` without a reading.
     #[inline]
     pub fn value(&self, x: i64, y: i64) -> Option<u16> {
-        let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
+        let x = usize::try_from(x).ok()?;
+        let y = usize::try_from(y).ok()?;
         (x < self.width && y < self.height).then(|| self.values[y * self.width + x])
     }
 
@@ -129,14 +130,16 @@ impl RowSums {
     #[inline(always)]
     pub fn run(&self, y: usize, from: usize, to: usize) -> Sums {
         let row = &self.sums[y * (self.width + 1)..(y + 1) * (self.width + 1)];
-        let (a, b) = (row[from], row[to]);
+        let a = row[from];
+        let b = row[to];
         Sums { count: b.count - a.count, sum: b.sum - a.sum, squares: b.squares - a.squares }
     }
 }
 
 /// Returns the inverse depths of an image, reduced by `scale`.
 fn reduced(depth: &DepthImage, scale: usize) -> Vec<u16> {
-    let (width, height) = (depth.width() / scale, depth.height() / scale);
+    let width = depth.width() / scale;
+    let height = depth.height() / scale;
     let mut values = vec![0u16; width * height];
     for y in 0..height {
         let row = &mut values[y * width..(y + 1) * width];

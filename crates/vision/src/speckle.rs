@@ -174,7 +174,8 @@ mod tests {
     }
 
     fn one_surface(a: u16, b: u16) -> bool {
-        let (a, b) = (f64::from(a), f64::from(b));
+        let a = f64::from(a);
+        let b = f64::from(b);
         let most = ((0.5 * (a + b)).floor() / 8.0).floor().max(60.0);
         a > 0.0 && b > 0.0 && (a - b).abs() <= most
     }
@@ -218,7 +219,8 @@ mod tests {
                 one_surface(row[0], row[2]) && row[1] > 0 && !one_surface(row[0], row[1])
             };
             let triples = || values.chunks(width).flat_map(|row| row.windows(3));
-            let (odd, holes) = (triples().filter(is_odd).count(), triples().filter(is_hole).count());
+            let odd = triples().filter(is_odd).count();
+            let holes = triples().filter(is_hole).count();
             prop_assert_eq!(Speckles::count(values, width), Speckles { odd, holes });
         }
 
@@ -243,10 +245,8 @@ mod tests {
     fn a_row_may_be_longer_than_what_is_counted_at_a_time() {
         let values: Vec<u16> = (0..3 * BLOCK + 5).map(|x| [500, 0, 500, 900][x % 4]).collect();
         let triples = || values.windows(3);
-        let (odd, holes) = (
-            triples().filter(|row| row[1] == 900).count(),
-            triples().filter(|row| row[1] == 0).count(),
-        );
+        let odd = triples().filter(|row| row[1] == 900).count();
+        let holes = triples().filter(|row| row[1] == 0).count();
         assert_eq!(Speckles::count(&values, values.len()), Speckles { odd, holes });
     }
 

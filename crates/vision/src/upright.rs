@@ -69,7 +69,8 @@ impl Upright {
 
     /// Samples the intensities; `None` in an image without pixels.
     pub fn grey(&self, image: &GreyImage) -> Option<UprightGrey> {
-        let (width, height) = (image.width(), image.height());
+        let width = image.width();
+        let height = image.height();
         if width == 0 || height == 0 {
             return None;
         }
@@ -94,7 +95,8 @@ impl Upright {
         depth: &'a DepthImage,
         every: usize,
     ) -> impl Iterator<Item = Option<f32>> + 'a {
-        let (width, height) = (depth.width(), depth.height());
+        let width = depth.width();
+        let height = depth.height();
         let reading = move |End { pixel, ahead_m }: End| {
             let (x, has_column) = self.column(pixel.x, width);
             let (y, has_row) = nearest(pixel.y, height);
@@ -176,7 +178,8 @@ mod tests {
                 let left_m = (17.5 - column as f64) * Upright::STEP_M;
                 let place = Point3::new(3.0, left_m, 2.0 - row as f64 * Upright::STEP_M);
                 let pixel = camera().project(&place).unwrap();
-                let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
+                let x = pixel.x.round() as i64;
+                let y = pixel.y.round() as i64;
                 let cell = row * Upright::COLUMNS + column;
                 let off = shown.grey[cell] - f32::from(image.get(x, y).unwrap());
                 assert!(off.abs() <= 1.0, "{row} {column}: {off}");

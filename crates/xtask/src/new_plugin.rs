@@ -64,8 +64,8 @@ impl Kind {
 
     /// Returns the manifest: filters have a crate of shared parts.
     fn manifest(self) -> String {
-        let (core, filtering) =
-            ("tagalong-core.workspace = true\n", "tagalong-filtering.workspace = true\n");
+        let core = "tagalong-core.workspace = true\n";
+        let filtering = "tagalong-filtering.workspace = true\n";
         match self {
             Self::Filter => MANIFEST.replace(core, &format!("{core}{filtering}")),
             _ => MANIFEST.to_owned(),

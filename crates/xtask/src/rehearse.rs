@@ -70,7 +70,8 @@ pub fn rehearse(workspace: &Workspace) -> Result<()> {
     for line in PROPS {
         output(program.call(&words(line)).current_dir(&props))?;
     }
-    let (mut done, mut failed) = (0, Vec::new());
+    let mut done = 0;
+    let mut failed = Vec::new();
     for (number, document) in documents(workspace)?.iter().enumerate() {
         let lines: Vec<_> = lines(document).collect();
         if lines.is_empty() {

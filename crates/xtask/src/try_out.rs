@@ -105,7 +105,8 @@ fn copy_outside(from: &Path, to: &Path) -> io::Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
-        let (path, name) = (entry.path(), entry.file_name());
+        let path = entry.path();
+        let name = entry.file_name();
         // Executables in `deps` have no extension; libraries do.
         let is_program = from.ends_with("deps") && path.extension().is_none();
         if is_program || name.to_string_lossy().contains("tagalong") {

@@ -52,7 +52,8 @@ impl OwnBand {
 
     /// Returns the person that a segment of neighbouring columns shows.
     fn person(&self, segment: &[Point3<f64>], camera: &Camera) -> Option<Detection> {
-        let (first, last) = (segment.first()?.xy(), segment.last()?.xy());
+        let first = segment.first()?.xy();
+        let last = segment.last()?.xy();
         let [least, most] = self.0.width_m;
         if !(least..most).contains(&(last - first).norm()) {
             return None;

@@ -56,8 +56,10 @@ impl Verifier for OwnContrast {
     fn log_odds(&mut self, frame: &Frame, candidate: &Detection) -> Result<f64> {
         let grey = frame.grey()?;
         let inside = candidate.rect_in(&frame.camera).clipped(grey.width(), grey.height());
-        let (left, right) = (inside.x as usize, inside.right() as usize);
-        let (top, bottom) = (inside.y as usize, inside.bottom() as usize);
+        let left = inside.x as usize;
+        let right = inside.right() as usize;
+        let top = inside.y as usize;
+        let bottom = inside.bottom() as usize;
         // A region outside of the image is no evidence.
         if right <= left || bottom <= top {
             return Ok(0.0);

@@ -50,7 +50,8 @@ impl ArcFollow {
     }
 
     fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<Twist> {
-        let (wheels, max) = (&scene.wheels, scene.max_speed_mps);
+        let wheels = &scene.wheels;
+        let max = scene.max_speed_mps;
         if !is_sensible(wheels.half_separation_m) || !is_sensible(max) {
             return None;
         }

@@ -120,7 +120,8 @@ fn a_drive_that_cannot_be_is_not_steered() {
     let mut controller = ArcFollow::new(Config::default()).unwrap();
     let mut drives = |half_separation_m, max_speed_mps| {
         let wheels = DiffDrive { half_separation_m, slip: 0.0 };
-        let (target, tracks) = (Some(&person), &[][..]);
+        let target = Some(&person);
+        let tracks = &[][..];
         let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
         controller.command(&scene) != Twist::STOP
     };

@@ -81,7 +81,8 @@ impl Associator for Buffered {
         let strong = |at: usize| this.is_strong(&detections[at]);
         let similarity = |reach: Reach| {
             move |row: usize, column: usize| {
-                let (track, detection) = (&tracks[row], &detections[column]);
+                let track = &tracks[row];
+                let detection = &detections[column];
                 let overlap = this.overlap(track, detection, reach)?;
                 let log_ratio = gate.appearance_of(row, column);
                 let overlap = this.config.appearance().similarity(overlap, log_ratio);

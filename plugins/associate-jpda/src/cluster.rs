@@ -19,7 +19,8 @@ pub(crate) fn clusters(
     let mut open: BTreeSet<usize> = (0..tracks).collect();
     let mut found = Vec::new();
     while let Some(first) = open.pop_first() {
-        let (mut members, mut shared) = (BTreeSet::from([first]), BTreeSet::new());
+        let mut members = BTreeSet::from([first]);
+        let mut shared = BTreeSet::new();
         let mut front = vec![first];
         while let Some(track) = front.pop() {
             for detection in (0..detections).filter(|detection| is_pair(track, *detection)) {

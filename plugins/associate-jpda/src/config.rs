@@ -61,7 +61,8 @@ impl Config {
     pub(crate) fn pair_cost(&self) -> PairCost {
         let Self { gate, gate_m, gate_speed_mps, .. } = *self;
         let fusion = AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate };
-        let (cost, overlap) = (Cost::Mahalanobis, Overlap::Iou);
+        let cost = Cost::Mahalanobis;
+        let overlap = Overlap::Iou;
         PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap: 1.0, overlap, fusion }
     }
 

@@ -10,7 +10,8 @@ pub(crate) fn marginals(likelihoods: &[Vec<f64>], detections: usize) -> Vec<Vec<
     let full = (1_usize << detections) - 1;
     let total: f64 = ahead[likelihoods.len()].iter().sum();
     let weight = |track: usize, detection: usize| {
-        let (used, bit) = (&ahead[track], 1 << detection);
+        let used = &ahead[track];
+        let bit = 1 << detection;
         let free = |set: usize| sum_of_subsets(&behind[track + 1], full & !(set | bit));
         let events = (0..=full).filter(|set| set & bit == 0).map(|set| used[set] * free(set));
         likelihoods[track][detection] * events.sum::<f64>() / total
@@ -42,7 +43,8 @@ fn sums<'a>(rows: impl Iterator<Item = &'a Vec<f64>>, detections: usize) -> Vec<
 
 /// Returns the sum over all subsets of `set`.
 fn sum_of_subsets(values: &[f64], set: usize) -> f64 {
-    let (mut sum, mut subset) = (values[0], set);
+    let mut sum = values[0];
+    let mut subset = set;
     while subset != 0 {
         sum += values[subset];
         subset = (subset - 1) & set;
@@ -101,7 +103,8 @@ mod tests {
         fn the_sums_over_subsets_are_those_over_all_events(
             rows in prop::collection::vec(prop::collection::vec(0.0..9.0f64, 4), 1..5),
         ) {
-            let (fast, slow) = (marginals(&rows, 4), by_enumeration(&rows, 4));
+            let fast = marginals(&rows, 4);
+            let slow = by_enumeration(&rows, 4);
             for (a, b) in fast.iter().flatten().zip(slow.iter().flatten()) {
                 prop_assert!((a - b).abs() < 1e-12, "{fast:?} {slow:?}");
             }

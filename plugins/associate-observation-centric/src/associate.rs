@@ -72,7 +72,8 @@ impl ObservationCentric {
 impl<'a> Scene<'a> {
     /// Returns a track and a detection, unless the pair is probably no person.
     fn pair(&self, row: usize, column: usize) -> Option<(&'a Track, &'a Detection)> {
-        let (track, detection) = (&self.tracks[row], &self.detections[column]);
+        let track = &self.tracks[row];
+        let detection = &self.detections[column];
         self.gate.admits(track, detection).then_some((track, detection))
     }
 }
@@ -189,7 +190,8 @@ mod tests {
     #[test]
     fn a_weak_detection_does_not_recover_a_track() {
         let associator = walking(Config::default());
-        let (lost, there) = (track_in(1, at(60.0, 0.0)), at(12.0, 0.0));
+        let lost = track_in(1, at(60.0, 0.0));
+        let there = at(12.0, 0.0);
         assert!(associator.fits(&lost, &detection(there, 3.0), &GATE));
         assert!(!associator.fits(&lost, &detection(there, -3.0), &GATE));
     }

@@ -152,7 +152,8 @@ impl Pass {
     /// Intensities of mean zero and a deviation of about one, and the depth.
     fn show(&mut self, view: &NetworkInput) {
         let count = view.grey.len() as f32;
-        let (mut sum, mut squares) = (0u64, 0u64);
+        let mut sum = 0u64;
+        let mut squares = 0u64;
         for value in view.grey.iter().map(|value| u64::from(*value)) {
             sum += value;
             squares += value * value;

@@ -128,7 +128,8 @@ mod network {
 
     #[test]
     fn the_same_view_gets_the_same_answer() {
-        let (net, mut pass) = (net(), Pass::default());
+        let net = net();
+        let mut pass = Pass::default();
         let first = net.look(&view(1), &mut pass);
         net.look(&view(2), &mut pass);
         assert_eq!(net.look(&view(1), &mut pass), first);
@@ -138,7 +139,9 @@ mod network {
     #[cfg(feature = "train")]
     #[test]
     fn the_gradient_is_that_of_small_steps() {
-        let (mut net, mut pass, view) = (net(), Pass::default(), view(3));
+        let mut net = net();
+        let mut pass = Pass::default();
+        let view = view(3);
         let mut gradient = Net::default();
         net.look(&view, &mut pass);
         net.learn(&pass, 1.0, &mut gradient);
@@ -146,7 +149,8 @@ mod network {
         for part in 0..Net::PARTS.len() {
             let count = net.parts()[part].len();
             for k in (0..count).step_by(count.div_ceil(7)) {
-                let (value, step) = (net.parts()[part][k], 1e-4);
+                let value = net.parts()[part][k];
+                let step = 1e-4;
                 net.parts_mut()[part][k] = value + step;
                 let more = look(&net);
                 net.parts_mut()[part][k] = value - step;
@@ -194,7 +198,8 @@ mod training {
         let mut progress = Vec::new();
         let fitted = trainer(small(), 60).fit(&mut |part| progress.push(part)).unwrap();
         assert!(progress.is_sorted() && progress.last() == Some(&1.0), "{progress:?}");
-        let (model, mut pass) = (Model::from_text(&fitted.model).unwrap(), Pass::default());
+        let model = Model::from_text(&fitted.model).unwrap();
+        let mut pass = Pass::default();
         for seed in 500..520 {
             let view =
                 NetworkInput::new(&seen(seed % 2 == 0, seed), &candidate(), true).unwrap().unwrap();

@@ -30,7 +30,8 @@ impl NetworkInput {
     /// # Errors
     /// [`tagalong_core::Error::MissingImage`] for a frame without intensity.
     pub fn new(frame: &Frame, candidate: &Detection, with_depth: bool) -> Result<Option<Self>> {
-        let (grey, depth) = (frame.grey()?, frame.depth().ok().filter(|_| with_depth));
+        let grey = frame.grey()?;
+        let depth = frame.depth().ok().filter(|_| with_depth);
         let Some(plane) = Upright::new(&frame.camera, &candidate.position) else {
             return Ok(None);
         };

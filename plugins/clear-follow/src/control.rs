@@ -74,7 +74,8 @@ impl ClearFollow {
     }
 
     fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<Twist> {
-        let (wheels, max_mps) = (&scene.wheels, scene.max_speed_mps);
+        let wheels = &scene.wheels;
+        let max_mps = scene.max_speed_mps;
         let is_sensible = |number: f64| number > 0.0 && number <= MOST;
         if !is_sensible(wheels.half_separation_m) || !is_sensible(max_mps) {
             return None;

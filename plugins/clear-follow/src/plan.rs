@@ -102,7 +102,8 @@ fn hidden(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     let Some(sight) = person.try_normalize(1e-6) else { return 0.0 };
     let before = |other: &Walker| {
         let at = seen(other);
-        let (along, aside) = (at.dot(&sight), at.perp(&sight).abs());
+        let along = at.dot(&sight);
+        let aside = at.perp(&sight).abs();
         // A person behind the target, or behind the robot, hides nothing.
         let between = along > 0.0 && along < person.norm() - PERSON_M;
         if between { (1.0 - aside / SIGHT_M).max(0.0) } else { 0.0 }

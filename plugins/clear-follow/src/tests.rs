@@ -39,7 +39,9 @@ fn command(
 /// range and bearing at the end.
 fn ride(config: Config, seconds: f64, person: impl Fn(f64) -> Point2<f64>) -> (f64, f64) {
     let mut controller = ClearFollow::new(config).unwrap();
-    let (mut pose, mut motion, dt) = (Isometry2::identity(), EgoMotion::at_rest(0.1), 0.1);
+    let mut pose = Isometry2::identity();
+    let mut motion = EgoMotion::at_rest(0.1);
+    let dt = 0.1;
     let mut seen = Point2::origin();
     for step in 0..(seconds / dt) as u32 {
         let now = f64::from(step) * dt;
@@ -189,10 +191,12 @@ fn a_detour_keeps_its_curvature_while_the_robot_speeds_up() {
         let mut controller = ClearFollow::new(config).unwrap();
         let still = EgoMotion::at_rest(0.1);
         let wheels = command(&mut controller, still, Some(depth.clone()), Some(&person));
-        let (speed, turn) = (wheels.left + wheels.right, wheels.right - wheels.left);
+        let speed = wheels.left + wheels.right;
+        let turn = wheels.right - wheels.left;
         (0.5 * speed, turn / (2.0 * WHEELS.half_separation_m))
     };
-    let (at_once, slowly) = (first(1e3), first(0.5));
+    let at_once = first(1e3);
+    let slowly = first(0.5);
     // The post is to the left of the middle.
     assert!(at_once.0 > 0.2 && at_once.1 < -0.2, "{at_once:?}");
     assert!((slowly.0 - 0.05).abs() < 1e-9, "{slowly:?}");
@@ -227,7 +231,8 @@ fn the_person_is_no_obstacle_and_others_are() {
         let images = Images { depth: depth.map(Arc::new), ..Images::default() };
         let tracks: Vec<Track> = other.into_iter().chain([person.clone()]).collect();
         let frame = Frame::new(1, Stamp::default(), camera(), EgoMotion::at_rest(0.1), images);
-        let (target, tracks) = (Some(&person), &tracks[..]);
+        let target = Some(&person);
+        let tracks = &tracks[..];
         let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
         (0..30).map(|_| controller.command(&scene)).last().unwrap()
     };
@@ -264,7 +269,8 @@ fn a_drive_that_cannot_be_is_not_steered() {
     let drives = |half_separation_m, max_speed_mps| {
         let wheels = DiffDrive { half_separation_m, slip: 0.0 };
         let mut controller = ClearFollow::new(prompt()).unwrap();
-        let (target, tracks) = (Some(&person), &[][..]);
+        let target = Some(&person);
+        let tracks = &[][..];
         let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
         controller.command(&scene) != Twist::STOP
     };
@@ -332,10 +338,8 @@ proptest! {
     fn mirrored_input_gives_mirrored_wheels(
         x in -3.0..4.0f64, y in 0.01..3.0f64, vx in -1.0..1.0f64, vy in -1.0..1.0f64
     ) {
-        let (mut one, mut other) = (
-            ClearFollow::new(Config::default()).unwrap(),
-            ClearFollow::new(Config::default()).unwrap(),
-        );
+        let mut one = ClearFollow::new(Config::default()).unwrap();
+        let mut other = ClearFollow::new(Config::default()).unwrap();
         for _ in 0..5 {
             let still = EgoMotion::at_rest(0.1);
             let a = command(&mut one, still, None, Some(&target(x, y, Vector2::new(vx, vy))));

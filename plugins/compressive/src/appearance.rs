@@ -73,7 +73,8 @@ impl Normals {
 
     /// Eq. 6; the deviation is updated with the mean before this update.
     fn update(&mut self, samples: &Samples, memory: f32) {
-        let (old, new) = (memory, 1.0 - memory);
+        let old = memory;
+        let new = 1.0 - memory;
         for ((mean, sigma), (m, s)) in
             self.mean.iter_mut().zip(&mut self.sigma).zip(samples.moments())
         {
@@ -114,7 +115,8 @@ impl Appearance {
     /// H / n: the mean log-ratio of a number, above 0 for the person.
     pub fn confidence(&self, numbers: &[f32]) -> f32 {
         let ratios = self.terms.iter().zip(numbers).map(|(term, v)| {
-            let (away, here) = (v - term.mean[0], v - term.mean[1]);
+            let away = v - term.mean[0];
+            let here = v - term.mean[1];
             term.constant + away * away * term.precision[0] - here * here * term.precision[1]
         });
         ratios.sum::<f32>() / self.terms.len().max(1) as f32

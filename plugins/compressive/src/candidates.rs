@@ -61,7 +61,9 @@ mod tests {
 
     #[test]
     fn a_ring_is_filled_evenly() {
-        let (from, to, count) = (40.0, 100.0, 400);
+        let from = 40.0;
+        let to = 100.0;
+        let count = 400;
         let all: Vec<(f64, f64)> =
             ring(from, to, count).map(|(x, y)| (x as f64, y as f64)).collect();
         assert_eq!(all.len(), count);

@@ -185,7 +185,8 @@ fn sample(
     person.clear(numbers.len());
     other.clear(numbers.len());
     let mut add = |samples: &mut Samples, (dx, dy): (i64, i64)| {
-        let (x, y) = (of.x + dx, of.y + dy);
+        let x = of.x + dx;
+        let y = of.y + dy;
         if target.scaled.fits(&view.integral, x, y) {
             target.scaled.measure(&view.integral, x as usize, y as usize, numbers);
             samples.add(numbers);
@@ -338,7 +339,8 @@ impl Hunt<'_> {
     fn lead(&self, best: Scored) -> f32 {
         let far = OTHER_MODE * self.target.scaled.size().0 as f64;
         let elsewhere = self.scratch.coarse.iter().filter(|other| {
-            let (dx, dy) = ((other.x - best.x) as f64, (other.y - best.y) as f64);
+            let dx = (other.x - best.x) as f64;
+            let dy = (other.y - best.y) as f64;
             dx.hypot(dy) >= far
         });
         let second = elsewhere.map(|s| s.confidence).fold(f32::NEG_INFINITY, f32::max);
@@ -510,7 +512,8 @@ mod tests {
 
     #[test]
     fn the_place_of_a_box_moves_and_grows_with_it() {
-        let (config, camera) = (Config::default(), camera());
+        let config = Config::default();
+        let camera = camera();
         let track = track(true, false);
         let before = track.estimate.region;
         let expected = track.estimate.person.position;
@@ -562,7 +565,8 @@ mod tests {
 
     #[test]
     fn the_lead_is_over_boxes_half_a_width_away_in_any_direction() {
-        let (config, features) = (Config::default(), Features::draw(10, 4, 1));
+        let config = Config::default();
+        let features = Features::draw(10, 4, 1);
         let grey = Some(Arc::new(GreyImage::filled(320, 240, 90)));
         let images = Images { grey, ..Images::default() };
         let frame =

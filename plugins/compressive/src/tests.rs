@@ -44,7 +44,8 @@ impl World {
         let of = camera.upper_body(&self.head);
         let face_m = (camera.depth_of(&self.head) - HEAD_RADIUS_M) as f32;
         let on_person = |x: usize, y: usize| {
-            let (u, v) = ((x as f64 + 0.5 - of.x) / of.width, (y as f64 + 0.5 - of.y) / of.height);
+            let u = (x as f64 + 0.5 - of.x) / of.width;
+            let v = (y as f64 + 0.5 - of.y) / of.height;
             ((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v)).then_some((u, v))
         };
         let board = |x: usize| self.board.filter(|(_, to)| x < *to).map(|(metres, _)| metres);
@@ -118,7 +119,8 @@ fn it_conforms() {
 #[test]
 fn a_person_is_followed_who_moves_by_a_third_of_their_width() {
     for with_depth in [true, false] {
-        let (before, after) = (place(3.0, 0.0), place(3.0, 0.19));
+        let before = place(3.0, 0.0);
+        let after = place(3.0, 0.19);
         let mut detector = taught(Config::default(), before);
         let frame = World { with_depth, ..World::at(after) }.frame();
         let (found, funnel) = near(&mut detector, &frame, before);
@@ -215,18 +217,21 @@ fn the_best_box_has_to_be_sure_and_ahead_of_other_places() {
 /// Returns the width of the box found at the expected place of a person learned 3 m away, in parts
 /// of the width there.
 fn grown(config: Config, expected_m: f64, widened: f64) -> f64 {
-    let (before, now) = (place(3.0, 0.0), place(expected_m, 0.0));
+    let before = place(3.0, 0.0);
+    let now = place(expected_m, 0.0);
     let mut detector = taught(config, before);
     let mut expected = track(now, true);
     let region = expected.estimate.region;
-    let (width, height) = (widened * region.width, widened * region.height);
+    let width = widened * region.width;
+    let height = widened * region.height;
     let centre = region.centre();
     expected.estimate.region =
         Rect::new(centre.x - 0.5 * width, centre.y - 0.5 * height, width, height);
     let frame = World::at(now).frame();
     let search = Query::Track(&expected);
     let found = detector.detect(&frame, &search, &mut Funnel::default()).unwrap();
-    let (found, before) = (found[0].rect().unwrap(), camera().upper_body(&before));
+    let found = found[0].rect().unwrap();
+    let before = camera().upper_body(&before);
     let stretched = found.height / found.width / (before.height / before.width);
     assert!((stretched - 1.0).abs() < 0.021, "{stretched}");
     found.width / before.width

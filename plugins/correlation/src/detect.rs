@@ -57,7 +57,8 @@ impl Correlation {
     /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config) -> Result<Self> {
         config.check()?;
-        let (pictures, strip) = (BTreeMap::new(), Strip::default());
+        let pictures = BTreeMap::new();
+        let strip = Strip::default();
         Ok(Self { config, pictures, strip, fits: Vec::new() })
     }
 
@@ -84,7 +85,8 @@ impl Correlation {
     /// Remembers the appearance of a person in plain view.
     fn remember(&mut self, view: &FrameImages<'_>, track: &Track) {
         let Some(square) = square(track).filter(|_| track.seen && !track.occluded) else { return };
-        let (distance, least) = (distance(&self.config, view.camera, track), self.config.min_body);
+        let distance = distance(&self.config, view.camera, track);
+        let least = self.config.min_body;
         if let Some(picture) = Picture::take(view.grey, view.depth, &square, &distance, least) {
             self.pictures.insert(track.id, (view.stamp, picture));
         }
@@ -153,7 +155,8 @@ pub(crate) fn sighting(
 ) -> Detection {
     let head_m = camera.depth_of(&track.estimate.person.position);
     let step = square.width / SIDE as f64;
-    let (aside, down) = (step * best.aside as f64, step * best.down as f64);
+    let aside = step * best.aside as f64;
+    let down = step * best.down as f64;
     let region = Rect { x: square.x + aside, y: square.y + down, ..*square };
     let position = camera.head_of(&region, head_m - HEAD_RADIUS_M);
     let sigma_px = config.sigma_place_m * camera.focal_px() / head_m;

@@ -103,13 +103,18 @@ pub(crate) fn nearest(depth: &DepthImage, at: Point2<f64>) -> Option<f32> {
 
 /// The brightness at a place, between the four pixels around it; `None` outside.
 pub(crate) fn brightness(grey: &GreyImage, at: Point2<f64>) -> Option<f32> {
-    let (x, y) = (at.x - 0.5, at.y - 0.5);
-    let (left, top) = (x.floor() as i64, y.floor() as i64);
-    let (across, down) = ((x - x.floor()) as f32, (y - y.floor()) as f32);
+    let x = at.x - 0.5;
+    let y = at.y - 0.5;
+    let left = x.floor() as i64;
+    let top = y.floor() as i64;
+    let across = (x - x.floor()) as f32;
+    let down = (y - y.floor()) as f32;
     let row = |y: i64| {
-        let (here, next) = (f32::from(grey.get(left, y)?), f32::from(grey.get(left + 1, y)?));
+        let here = f32::from(grey.get(left, y)?);
+        let next = f32::from(grey.get(left + 1, y)?);
         Some(here + across * (next - here))
     };
-    let (above, below) = (row(top)?, row(top + 1)?);
+    let above = row(top)?;
+    let below = row(top + 1)?;
     Some(above + down * (below - above) - MIDDLE)
 }

@@ -57,7 +57,8 @@ impl Lattice {
     pub(crate) fn middles(self) -> impl Iterator<Item = Point2<f64>> {
         let Self { corner, step, columns, rows } = self;
         (0..columns * rows).map(move |cell| {
-            let (column, row) = ((cell % columns) as f64 + 0.5, (cell / columns) as f64 + 0.5);
+            let column = (cell % columns) as f64 + 0.5;
+            let row = (cell / columns) as f64 + 0.5;
             Point2::new(corner.x + step * column, corner.y + step * row)
         })
     }
@@ -110,7 +111,9 @@ impl Strip {
             let from = (row + line) * self.columns + column;
             let lanes =
                 |values: &[f32]| -> Lanes { std::array::from_fn(|i| values[from..from + SIDE][i]) };
-            let (seen, shown, has) = (lanes(&self.grey), lanes(&self.shown), lanes(&self.known));
+            let seen = lanes(&self.grey);
+            let shown = lanes(&self.shown);
+            let has = lanes(&self.known);
             for i in 0..SIDE {
                 let counts = body[i] * shown[i];
                 n[i] += counts;
@@ -125,7 +128,9 @@ impl Strip {
         let [n, known, a, b, aa, bb, ab] =
             [n, known, a, b, aa, bb, ab].map(|lanes| lanes.iter().sum::<f32>());
         let least = n * LEAST_CONTRAST * LEAST_CONTRAST;
-        let (own, seen, both) = (aa - a * a / n, bb - b * b / n, ab - a * b / n);
+        let own = aa - a * a / n;
+        let seen = bb - b * b / n;
+        let both = ab - a * b / n;
         let has_contrast = n > 0.0 && own > least && seen > least;
         Fit {
             correlation: if has_contrast { f64::from(both / (own * seen).sqrt()) } else { 0.0 },

@@ -50,7 +50,8 @@ impl World {
         let of = camera.upper_body(&self.head);
         let face_m = (camera.depth_of(&self.head) - HEAD_RADIUS_M) as f32;
         let on_person = |x: usize, y: usize| {
-            let (u, v) = ((x as f64 + 0.5 - of.x) / of.width, (y as f64 + 0.5 - of.y) / of.height);
+            let u = (x as f64 + 0.5 - of.x) / of.width;
+            let v = (y as f64 + 0.5 - of.y) / of.height;
             ((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v)).then_some((u, v))
         };
         let passes = |x: usize| self.passer.is_some_and(|(from, to)| (from..to).contains(&x));
@@ -170,7 +171,8 @@ fn who_left_is_forgotten() {
     let mut detector = Correlation::new(Config::default()).unwrap();
     detector.learn(&World::at(HEAD).frame(), &[track(HEAD, true)]).unwrap();
     detector.learn(&World::at(HEAD).frame(), &[]).unwrap();
-    let (expected, mut funnel) = (track(HEAD, false), Funnel::default());
+    let expected = track(HEAD, false);
+    let mut funnel = Funnel::default();
     let found = detector.detect(&in_shadow().frame(), &Query::Track(&expected), &mut funnel);
     assert_eq!(found.unwrap(), []);
     assert!(funnel.count("correlation: not seen well yet") == 1);
@@ -182,11 +184,13 @@ fn each_person_is_remembered_as_long_as_the_track_of_that_person() {
         let mut detector = Correlation::new(Config::default()).unwrap();
         detector.learn(&World::at(HEAD).frame(), &[track(HEAD, true)]).unwrap();
         detector.learn(&in_shadow().frame(), later).unwrap();
-        let (expected, mut funnel) = (track(HEAD, false), Funnel::default());
+        let expected = track(HEAD, false);
+        let mut funnel = Funnel::default();
         detector.detect(&in_shadow().frame(), &Query::Track(&expected), &mut funnel).unwrap();
         funnel.count("correlation: not seen well yet") == 0
     };
-    let (lost, other) = (track(HEAD, false), Track { id: TrackId(4), ..track(HEAD, false) });
+    let lost = track(HEAD, false);
+    let other = Track { id: TrackId(4), ..track(HEAD, false) };
     assert!(detected(std::slice::from_ref(&lost)) && detected(&[lost, other.clone()]));
     assert!(!detected(&[other]));
 }
@@ -202,10 +206,13 @@ fn slow_fit(strip: [&[f32]; 3], columns: usize, picture: &Picture, at: (usize, u
     let pairs: Vec<(f64, f64)> =
         of.iter().map(|i| (f64::from(picture.grey[*i]), cell(grey, *i))).collect();
     let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
-    let (a, b) = (mean(|p| p.0), mean(|p| p.1));
+    let a = mean(|p| p.0);
+    let b = mean(|p| p.1);
     let sum =
         |of: &dyn Fn(f64, f64) -> f64| -> f64 { pairs.iter().map(|(x, y)| of(x - a, y - b)).sum() };
-    let (aa, bb, ab) = (sum(&|x, _| x * x), sum(&|_, y| y * y), sum(&|x, y| x * y));
+    let aa = sum(&|x, _| x * x);
+    let bb = sum(&|_, y| y * y);
+    let ab = sum(&|x, y| x * y);
     let has_contrast = n > 0.0 && aa > 4.0 * n && bb > 4.0 * n;
     let body = f64::from(picture.count);
     Fit {
@@ -262,7 +269,8 @@ fn without_contrast_there_is_no_correlation() {
         let mut strip = Strip::default();
         strip.read(&grey, &depth, &lattice, &Distance { ahead_m: 2.5, tolerance_m: 0.5 });
         let cell = |i: usize| own * sign(i % SIDE, i / SIDE) as f32;
-        let (body, count) = ([1.0; CELLS], CELLS as f32);
+        let body = [1.0; CELLS];
+        let count = CELLS as f32;
         strip.fit(&Picture { grey: std::array::from_fn(cell), body, count }, 0, 0).correlation
     };
     assert!((correlation(2.5, 3.0) - 1.0).abs() < 1e-3);
@@ -295,8 +303,8 @@ fn the_best_place_must_be_good_and_better_than_all_others() {
     assert_eq!(chosen(&[placed(-8, 0.82, 1.0, 0.0), best]), Err("correlation: two places"));
     assert_eq!(chosen(&[placed(14, 0.82, 1.0, 0.0), best]), Err("correlation: two places"));
     assert_eq!(chosen(&[placed(-8, 0.79, 1.0, 0.0), best]), Ok(3), "0.1 worse");
-    let (below, above) =
-        (Placed { down: 6, ..best }, Placed { down: -6, ..placed(3, 0.85, 1.0, 0.0) });
+    let below = Placed { down: 6, ..best };
+    let above = Placed { down: -6, ..placed(3, 0.85, 1.0, 0.0) };
     assert_eq!(chosen(&[below, above]), Err("correlation: two places"), "one above the other");
     let beside = Placed { down: 3, ..placed(3, 0.89, 1.0, 0.0) };
     assert_eq!(chosen(&[below, beside]), Ok(3), "that is the same place");
@@ -375,7 +383,8 @@ fn who_is_not_in_plain_view_is_not_remembered() {
 #[test]
 fn a_sighting_says_where_by_its_cells_and_how_sure_it_is() {
     let config = Config { score: 0.7, ..Config::default() };
-    let (camera, expected) = (camera(), track(HEAD, false));
+    let camera = camera();
+    let expected = track(HEAD, false);
     let square = expected.estimate.region;
     let best = Placed { down: -6, ..placed(12, 0.9, 1.0, 0.0) };
     let found = crate::detect::sighting(&config, &camera, &expected, &square, best);

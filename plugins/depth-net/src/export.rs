@@ -91,7 +91,8 @@ fn graph(model: &Model) -> OnnxGraph {
 
 /// Cuts off sums below zero, and all cells out of view; returns the name of the result.
 fn rectified(graph: &mut OnnxGraph, sums: &str) -> String {
-    let (positive, result) = (format!("{sums}.positive"), format!("{sums}.in_view"));
+    let positive = format!("{sums}.positive");
+    let result = format!("{sums}.in_view");
     graph.operator("Relu", &[sums], &positive, &[]);
     graph.operator("Mul", &[&positive, "in_view"], &result, &[]);
     result

@@ -110,7 +110,8 @@ impl FloorMap {
 
     fn add_voxels(&mut self, camera: &Camera, depth: &DepthImage) {
         for cell in 0..Self::CELLS * Self::CELLS {
-            let (row, column) = (cell / Self::CELLS, cell % Self::CELLS);
+            let row = cell / Self::CELLS;
+            let column = cell % Self::CELLS;
             let floor = Self::centre(row, column);
             for (k, height_m) in HEIGHTS_M.into_iter().enumerate() {
                 let voxel = Point3::new(floor.x, floor.y, height_m);
@@ -147,7 +148,8 @@ pub(crate) fn for_each_point(
     mut see: impl FnMut(Point3<f64>, f64),
 ) {
     let pose = camera.robot_from_camera;
-    let (turn, origin) = (pose.rotation.to_rotation_matrix(), pose.translation.vector);
+    let turn = pose.rotation.to_rotation_matrix();
+    let origin = pose.translation.vector;
     for y in 0..depth.height() {
         for (x, depth_m) in depth.row(y).iter().enumerate() {
             // Also false for "no reading".
@@ -169,9 +171,11 @@ pub fn reduced(camera: &Camera, depth: &DepthImage) -> Option<(Camera, DepthImag
     if step < 2 {
         return None;
     }
-    let (first, by) = (step / 2, step as f64);
+    let first = step / 2;
+    let by = step as f64;
     let count = |size: usize| (size - first).div_ceil(step);
-    let (width, height) = (count(depth.width()), count(depth.height()));
+    let width = count(depth.width());
+    let height = count(depth.height());
     let image =
         DepthImage::from_fn(width, height, |x, y| depth.row(first + y * step)[first + x * step]);
     let mut lens = *lens;
@@ -262,7 +266,8 @@ mod tests {
         let depth = DepthImage::from_fn(80, 60, |x, _| if x < 25 { 2.0 } else { 4.0 });
         let map = FloorMap::new(&camera(1.1), &depth);
         let mirrored = FloorMap::new(&camera(1.1), &depth).mirrored();
-        let (mut differ, side) = (0, FloorMap::CELLS);
+        let mut differ = 0;
+        let side = FloorMap::CELLS;
         for row in 0..side {
             for column in 0..side {
                 let other = side - 1 - column;

@@ -126,7 +126,8 @@ fn the_verifier_believes_people_doubts_furniture_and_says_nothing_out_of_sight()
 fn without_depth_the_detector_complains_and_the_verifier_is_undecided() {
     let (frame, _) = room(1.2, NEAR_AND_FAR);
     let candidate = found(&frame).remove(0);
-    let (camera, motion) = (Arc::clone(&frame.camera), EgoMotion::at_rest(0.1));
+    let camera = Arc::clone(&frame.camera);
+    let motion = EgoMotion::at_rest(0.1);
     let dark = Frame::new(1, Stamp::default(), camera, motion, Images::default());
     let query = Query::Discover { occupied: &[] };
     let answer = detector(Config::default()).detect(&dark, &query, &mut Funnel::default());
@@ -204,7 +205,8 @@ mod training {
             trainer.add_frame(&frame, &people(&truth), Some("third"), 0).unwrap();
             trainer.fit(&mut |_| {}).unwrap()
         };
-        let (before, after) = (fitted(false), fitted(true));
+        let before = fitted(false);
+        let after = fitted(true);
         let rooms: Vec<&str> = before.without.iter().map(|(room, _)| room.as_str()).collect();
         assert_eq!(rooms, ["another", "third"]);
         let net = |text: &str| Model::from_text(text).unwrap().net;
@@ -223,7 +225,8 @@ mod training {
         net.parts_mut().into_iter().skip(1).step_by(2).flatten().for_each(|bias| *bias += 0.1);
         let mut pass = Pass::default();
         net.look(&map, &mut pass);
-        let (mut gradient, mut of) = (Net::default(), Pass::default());
+        let mut gradient = Net::default();
+        let mut of = Pass::default();
         let weight = |k: usize| ((k as f32) * 12.9898).sin() * 0.01;
         for (k, slope) in of.answer.values.iter_mut().enumerate() {
             *slope = if map.in_view[k / 4] { weight(k) } else { 0.0 };
@@ -237,7 +240,8 @@ mod training {
         for part in 0..Net::PARTS.len() {
             let count = net.parts()[part].len();
             for k in (0..count).step_by(count.div_ceil(5)) {
-                let (value, step) = (net.parts()[part][k], 1e-3);
+                let value = net.parts()[part][k];
+                let step = 1e-3;
                 net.parts_mut()[part][k] = value + step;
                 let more = loss(&net, &mut pass);
                 net.parts_mut()[part][k] = value - step;

@@ -36,7 +36,8 @@ impl Verifier for DepthNetVerifier {
         let (map, pass) = self.model.look(frame)?;
         let side = FloorMap::CELLS;
         let near = (0..side * side).filter(|cell| map.in_view[*cell]).filter_map(|cell| {
-            let (row, column) = (cell / side, cell % side);
+            let row = cell / side;
+            let column = cell % side;
             let off = FloorMap::centre(row, column) - candidate.position.xy();
             (off.norm() < self.radius_m).then(|| f64::from(pass.logit(row, column)))
         });

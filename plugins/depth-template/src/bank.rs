@@ -204,7 +204,8 @@ impl<'a> Cutter<'a> {
     /// A cutter at the scale and roll of a pose.
     fn new(reliefs: &'a Reliefs, pose: Pose) -> Self {
         let relief = &reliefs[pose.direction as usize][(pose.pitch - FIRST_PITCH) as usize];
-        let (scale, half_width) = (pose.px_per_m(), pose.half_width());
+        let scale = pose.px_per_m();
+        let half_width = pose.half_width();
         let (sin, cos) = (f64::from(pose.roll) * ROLL_STEP_DEG).to_radians().sin_cos();
         let column = |dx: i64| {
             let x = dx as f64 / scale;
@@ -234,7 +235,8 @@ impl<'a> Cutter<'a> {
         let (Some(first), Some(last)) = ends else {
             return TemplateRow { dy, from: 0, to: 0, guard_from: 0, guard_to: 0, relief_m: 0.0 };
         };
-        let (from, to) = (first.dx, last.dx + 1);
+        let from = first.dx;
+        let to = last.dx + 1;
         let guard = ((GUARD_M * self.scale).round() as i64).max(1).min((to - from) / 4);
         TemplateRow {
             dy,
@@ -248,7 +250,8 @@ impl<'a> Cutter<'a> {
 
     /// Returns the mean depth of the person behind the face in a row, edges included, m.
     fn mean_relief(&self, row: &TemplateRow) -> f64 {
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut count = 0.0;
         let start = self.start_of(row.dy);
         for column in self.columns_of_body(start) {
             let behind = self.behind(start, column);
@@ -276,7 +279,8 @@ impl<'a> Cutter<'a> {
         let [Some(left), Some(right)] = [self.columns.first(), self.columns.last()] else {
             return &[];
         };
-        let (up_m, least_up_m) = (left.up_m.max(right.up_m), left.up_m.min(right.up_m));
+        let up_m = left.up_m.max(right.up_m);
+        let least_up_m = left.up_m.min(right.up_m);
         let (from_m, to_m) = self.relief.extent(down_m - up_m, down_m - least_up_m);
         let from = self.columns.partition_point(|column| column.right_m + right_m < from_m);
         let to = self.columns.partition_point(|column| column.right_m + right_m <= to_m);
@@ -295,7 +299,8 @@ mod tests {
         let scale = pose.px_per_m();
         let (sin, cos) = (f64::from(pose.roll) * ROLL_STEP_DEG).to_radians().sin_cos();
         let behind = |dx: i64| {
-            let (x, y) = (dx as f64 / scale, dy as f64 / scale);
+            let x = dx as f64 / scale;
+            let y = dy as f64 / scale;
             relief.at(x * cos + y * sin, y * cos - x * sin)
         };
         let person: Vec<i64> =
@@ -303,7 +308,8 @@ mod tests {
         let [Some(first), Some(last)] = [person.first(), person.last()] else {
             return TemplateRow { dy, from: 0, to: 0, guard_from: 0, guard_to: 0, relief_m: 0.0 };
         };
-        let (from, to) = (*first, last + 1);
+        let from = *first;
+        let to = last + 1;
         let guard = ((GUARD_M * scale).round() as i64).max(1).min((to - from) / 4);
         let sum: f64 = person.iter().map(|dx| behind(*dx) - relief.at(0.0, 0.0)).sum();
         TemplateRow {
@@ -345,7 +351,8 @@ mod tests {
     #[test]
     fn a_pose_is_the_nearest_of_the_bank() {
         let steps = |pitch: f64, roll: f64| {
-            let (pitch, roll) = (pitch * PITCH_STEP_DEG, roll * ROLL_STEP_DEG);
+            let pitch = pitch * PITCH_STEP_DEG;
+            let roll = roll * ROLL_STEP_DEG;
             let pose =
                 Pose::nearest(Direction::Along, pitch.to_radians(), roll.to_radians(), 100.0);
             (pose.pitch, pose.roll)
@@ -373,7 +380,8 @@ mod tests {
 
     #[test]
     fn left_and_right_are_mirror_images() {
-        let (left, right) = (widths(Direction::Left, 0.0), widths(Direction::Right, 0.0));
+        let left = widths(Direction::Left, 0.0);
+        let right = widths(Direction::Right, 0.0);
         for (a, b) in left.rows.iter().zip(&right.rows).filter(|(a, _)| a.to > a.from) {
             assert!(
                 (a.from + b.to - 1).abs() <= 1 && (a.to + b.from - 1).abs() <= 1,

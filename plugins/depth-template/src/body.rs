@@ -78,7 +78,8 @@ impl Relief {
         // Within the relief no cell is negative, and the cast rounds as `floor` would, which is a
         // call on processors without an instruction for it.
         let cell = |m: f64| (m / Self::SIDE_M + 0.5) * Self::SIZE as f64;
-        let (x, y) = (cell(right_m), cell(down_m));
+        let x = cell(right_m);
+        let y = cell(down_m);
         let inside = |v: f64| 0.0 <= v && v < Self::SIZE as f64;
         if inside(x) && inside(y) {
             self.cells[y as i32 as usize * Self::SIZE + x as i32 as usize]
@@ -149,7 +150,8 @@ impl Ellipsoid {
 
     /// Returns the cells along an axis of the image in which the ellipsoid can lie.
     fn cells(&self, axis: &Vector3<f64>) -> Range<usize> {
-        let (middle, reach) = (axis.dot(&self.centre), axis.dot(&(self.spread * axis)).sqrt());
+        let middle = axis.dot(&self.centre);
+        let reach = axis.dot(&(self.spread * axis)).sqrt();
         // A cell more on each side, so that rounding cannot cut the border off.
         let cell = |m: f64| (m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64;
         let from = (cell(middle - reach).floor() - 1.0).max(0.0) as usize;
@@ -191,7 +193,8 @@ mod tests {
             (discriminant >= 0.0).then(|| (-b - discriminant.sqrt()) / a)
         };
         let cell = |i: usize| {
-            let (x, y) = (middle_m(i % Relief::SIZE), middle_m(i / Relief::SIZE));
+            let x = middle_m(i % Relief::SIZE);
+            let y = middle_m(i / Relief::SIZE);
             let origin = Vector3::new(0.0, -1.0, 0.0) * x + Vector3::new(-sin, 0.0, -cos) * y;
             body_parts().iter().filter_map(|part| hit(part, &origin)).fold(f64::NAN, f64::min)
         };
@@ -213,14 +216,16 @@ mod tests {
         let relief = render(0.0, 0.0);
         let slow = |right_m: f64, down_m: f64| {
             let cell = |m: f64| ((m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64).floor();
-            let (x, y) = (cell(right_m), cell(down_m));
+            let x = cell(right_m);
+            let y = cell(down_m);
             let inside = |v: f64| 0.0 <= v && v < Relief::SIZE as f64;
             let is_inside = inside(x) && inside(y);
             if is_inside { relief.cells[y as usize * Relief::SIZE + x as usize] } else { f64::NAN }
         };
         for i in -130..130 {
             for j in -130..130 {
-                let (x, y) = (f64::from(i) * 0.004_99, f64::from(j) * 0.005);
+                let x = f64::from(i) * 0.004_99;
+                let y = f64::from(j) * 0.005;
                 assert_eq!(relief.at(x, y).to_bits(), slow(x, y).to_bits(), "{x} {y}");
             }
         }

@@ -42,7 +42,8 @@ const ASLANT_M: f64 = 0.12;
 /// the head's own depth contradicts. Another person may stand on one side; but a surface that goes
 /// on above is no head.
 pub fn boundary(rows: &RowSums, local: &Local, config: &DepthTemplateConfig) -> bool {
-    let (d, margin) = (config.boundary_distance_m, config.boundary_margin_m);
+    let d = config.boundary_distance_m;
+    let margin = config.boundary_margin_m;
     let behind = |right: f64, down: f64| {
         let (x, y) = local.offset(right, down);
         rows.depth_m(x, y).map(|z| z - local.depth_m)
@@ -66,7 +67,8 @@ pub fn head_width_m(rows: &RowSums, local: &Local) -> f64 {
     let reach = |side: f64| {
         let steps = (EDGE_REACH_M * local.px_per_m) as i64 + 1;
         let allowed_holes = (0.03 * local.px_per_m).max(1.0) as i64;
-        let (mut last, mut holes) = (0, 0);
+        let mut last = 0;
+        let mut holes = 0;
         for step in 1..=steps {
             let (x, y) = local.offset(side * step as f64 / local.px_per_m, 0.0);
             match rows.value(x, y) {
@@ -90,7 +92,8 @@ pub fn head_width_m(rows: &RowSums, local: &Local) -> f64 {
 /// 1 where too few of them are visible to tell.
 pub fn body_below(rows: &RowSums, local: &Local) -> f64 {
     let (sin, cos) = local.pitch_rad.sin_cos();
-    let (mut shown, mut asked) = (0u32, 0u32);
+    let mut shown = 0u32;
+    let mut asked = 0u32;
     for drop in (0..8).map(|i| 0.30 + 0.06 * f64::from(i)) {
         let expected_m = local.depth_m + drop * sin;
         let shrink = local.depth_m / expected_m;
@@ -119,7 +122,8 @@ mod tests {
     /// shoulder.
     fn from_the_side() -> RowSums {
         let depth = DepthImage::from_fn(100, 100, |x, y| {
-            let (dx, dy) = (x as f32 - 50.0, y as f32 - 40.0);
+            let dx = x as f32 - 50.0;
+            let dy = y as f32 - 40.0;
             let is_shoulder = (56..74).contains(&x) && y >= 60;
             match (is_shoulder, dx.hypot(dy) < 9.0) {
                 (true, _) => 2.85,
@@ -133,7 +137,8 @@ mod tests {
     /// A head 3 m away in front of a wall, and things a few pixels wide.
     fn with_things(things: &[(i64, i64, f32)]) -> RowSums {
         let depth = DepthImage::from_fn(100, 100, |x, y| {
-            let (x, y) = (x as i64, y as i64);
+            let x = x as i64;
+            let y = y as i64;
             let thing =
                 things.iter().find(|(at, row, _)| (x - at).abs() < 2 && (y - row).abs() < 2);
             match (thing, (x - 50).pow(2) + (y - 40).pow(2) < 81) {
@@ -224,7 +229,8 @@ mod tests {
 
     #[test]
     fn a_shoulder_has_the_head_aslant_above_it_and_a_head_has_nothing() {
-        let (rows, config) = (from_the_side(), DepthTemplateConfig::default());
+        let rows = from_the_side();
+        let config = DepthTemplateConfig::default();
         let at = |x, y, depth_m| Local::upright(x, y, depth_m, 100.0);
         assert!(is_below_something(&rows, &at(65, 65, 2.85), &config));
         assert!(!is_below_something(&rows, &at(50, 40, 3.0), &config));

@@ -106,7 +106,8 @@ impl DepthTemplate {
     ) {
         let PreparedFrame { rows, view, .. } = scene;
         let inside = window.clipped(rows.width(), rows.height());
-        let (x0, y0) = (on_grid(inside.x), on_grid(inside.y));
+        let x0 = on_grid(inside.x);
+        let y0 = on_grid(inside.y);
         let mut dropped = Tests::default();
         for y in (y0..inside.bottom().ceil() as i64).step_by(MetricImage::GRID as usize) {
             for x in (x0..inside.right().ceil() as i64).step_by(MetricImage::GRID as usize) {

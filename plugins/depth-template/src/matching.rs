@@ -146,7 +146,8 @@ impl Matcher {
         tally.foreground_cost += match self.config.cost {
             Cost::Robust => {
                 let off = |m: f64| RowSums::UNITS / (expected_m - m).max(0.1) - expected;
-                let (free, full) = (off(face.free_m).powi(2), off(face.full_m).powi(2));
+                let free = off(face.free_m).powi(2);
+                let full = off(face.full_m).powi(2);
                 count * ((error / count - free) / (full - free)).clamp(0.0, 1.0)
             }
             Cost::Squared => error,
@@ -224,7 +225,11 @@ mod tests {
         z: f64,
     ) -> Option<f64> {
         let units = RowSums::UNITS;
-        let (mut person, mut seen, mut bad, mut beside, mut wrong) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let mut person = 0.0;
+        let mut seen = 0.0;
+        let mut bad = 0.0;
+        let mut beside = 0.0;
+        let mut wrong = 0.0;
         for row in &t.rows {
             let window = x - t.half_width..x + t.half_width + 1;
             let is_person = |u: i64| x + row.from <= u && u < x + row.to;
@@ -239,10 +244,8 @@ mod tests {
             let e = units / (z + row.relief_m).max(0.1);
             let off = |m: f64| units / (z + row.relief_m - m).max(0.1) - e;
             let noise = config.relief_per_m2 * z * z;
-            let (free, full) = (
-                off(config.relief_free_m + noise).powi(2),
-                off(config.relief_full_m + noise).powi(2),
-            );
+            let free = off(config.relief_free_m + noise).powi(2);
+            let full = off(config.relief_full_m + noise).powi(2);
             let mean_error =
                 fg.iter().map(|v| (v - e).powi(2)).sum::<f64>() / fg.len().max(1) as f64;
             bad += fg.len() as f64 * ((mean_error - free) / (full - free)).clamp(0.0, 1.0);
@@ -334,9 +337,11 @@ mod tests {
 
     #[test]
     fn a_nearer_wall_does_not_change_the_robust_cost() {
-        let (far, near) = (cost_of(Cost::Robust, 2.0, 8.0), cost_of(Cost::Robust, 2.0, 3.0));
+        let far = cost_of(Cost::Robust, 2.0, 8.0);
+        let near = cost_of(Cost::Robust, 2.0, 3.0);
         assert!(far < 0.02 && near < 0.02, "{far} {near}");
-        let (far, near) = (cost_of(Cost::Squared, 2.0, 8.0), cost_of(Cost::Squared, 2.0, 3.0));
+        let far = cost_of(Cost::Squared, 2.0, 8.0);
+        let near = cost_of(Cost::Squared, 2.0, 3.0);
         assert!(near > 3.0 * far, "one background value for all: {far} {near}");
     }
 

@@ -46,7 +46,9 @@ pub fn weighted_centre(
     fits: impl IntoIterator<Item = (i64, i64, f64)>,
     limit: f64,
 ) -> Option<(f64, f64)> {
-    let (mut x, mut y, mut sum) = (0.0, 0.0, 0.0);
+    let mut x = 0.0;
+    let mut y = 0.0;
+    let mut sum = 0.0;
     for (at_x, at_y, cost) in fits {
         let weight = (limit - cost).max(0.0);
         x += weight * at_x as f64;
@@ -79,7 +81,8 @@ mod tests {
     fn the_order_of_cells_does_not_matter() {
         let mut a: Vec<Cell> = (0..20).map(|x| cell(x, 0.1 + 0.01 * (x % 7) as f64)).collect();
         let mut b: Vec<Cell> = a.iter().rev().copied().collect();
-        let (a, b) = (group(&mut a, 0.3), group(&mut b, 0.3));
+        let a = group(&mut a, 0.3);
+        let b = group(&mut b, 0.3);
         assert_eq!(format!("{a:?}"), format!("{b:?}"));
     }
 

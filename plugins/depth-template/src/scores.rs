@@ -159,7 +159,8 @@ impl Row<'_> {
         let last = self.sums.len() as i64 - 1;
         let a = (from - self.first).max(0).min(last);
         let b = (to - self.first).max(a).min(last);
-        let (a, b) = (self.sums[a as usize], self.sums[b as usize]);
+        let a = self.sums[a as usize];
+        let b = self.sums[b as usize];
         Sum { covered: b.covered - a.covered, beside: b.beside - a.beside }
     }
 }

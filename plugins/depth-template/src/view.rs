@@ -94,7 +94,8 @@ impl MetricImage {
     pub fn new(camera: &Arc<Camera>, rows: &RowSums) -> Self {
         let columns = rows.width().div_ceil(Self::GRID as usize);
         let lines = rows.height().div_ceil(Self::GRID as usize);
-        let (camera, scale) = (Arc::clone(camera), rows.scale() as f64);
+        let camera = Arc::clone(camera);
+        let scale = rows.scale() as f64;
         let mut view = Self { camera, scale, columns, geometry: Vec::new() };
         let up = view.camera.robot_from_camera.rotation.inverse() * Vector3::z();
         let cell = |i: usize| (i % columns * 2, i / columns * 2);
@@ -118,8 +119,8 @@ impl MetricImage {
     fn geometry_of(&self, x: f64, y: f64, up_in_camera: &Vector3<f64>) -> Geometry {
         let ray = self.camera.ray(self.full_pixel(x, y));
         let slope = (self.camera.robot_from_camera.rotation * ray).z;
-        let (right, down) =
-            (up_in_camera.x - ray.x * up_in_camera.z, up_in_camera.y - ray.y * up_in_camera.z);
+        let right = up_in_camera.x - ray.x * up_in_camera.z;
+        let down = up_in_camera.y - ray.y * up_in_camera.z;
         Geometry {
             slope: slope as f32,
             pitch_rad: -(slope / ray.norm()).asin() as f32,
@@ -172,7 +173,8 @@ impl MetricImage {
     /// The neighbourhood of a head at a reduced pixel and depth.
     pub fn local(&self, x: i64, y: i64, depth_m: f64) -> Local {
         let Geometry { pitch_rad, roll_rad, .. } = self.geometry(x, y);
-        let (pitch_rad, roll_rad) = (f64::from(pitch_rad), f64::from(roll_rad));
+        let pitch_rad = f64::from(pitch_rad);
+        let roll_rad = f64::from(roll_rad);
         let px_per_m = self.px_per_m(depth_m);
         Local { x, y, depth_m, px_per_m, pitch_rad, roll_rad, sin_cos: roll_rad.sin_cos() }
     }

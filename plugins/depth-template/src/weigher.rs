@@ -250,7 +250,8 @@ impl Tools {
         if !(pixel.x.abs() < MAX_PIXEL && pixel.y.abs() < MAX_PIXEL) {
             return None;
         }
-        let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
+        let x = pixel.x.round() as i64;
+        let y = pixel.y.round() as i64;
         let (inside_x, inside_y) = view.nearest_inside(x, y);
         let local = view.local(inside_x, inside_y, depth_m);
         let pose = Pose::nearest(direction, local.pitch_rad, local.roll_rad, local.px_per_m);
@@ -378,7 +379,8 @@ impl SilhouetteFit {
     /// `one_sided`.
     fn weight(self, one_sided: f64) -> f64 {
         let Self { covered, left, right } = self;
-        let (both, rest) = (2 * left.min(right), left.abs_diff(right));
+        let both = 2 * left.min(right);
+        let rest = left.abs_diff(right);
         (covered - both) as f64 - one_sided * rest as f64
     }
 }
@@ -529,7 +531,8 @@ fn masked(masks: &[Span], span: Span, sum: impl Fn(Span) -> i32) -> i32 {
 /// which counts relative to the viewing ray.
 fn direction(person: &Person, camera: &Camera) -> Direction {
     let ray = (person.position - camera.robot_from_camera.translation.vector).coords.xy();
-    let (speed, range) = (person.velocity.norm(), ray.norm());
+    let speed = person.velocity.norm();
+    let range = ray.norm();
     if !(speed >= SLOW_MPS && range > 0.0) {
         return Direction::Along;
     }

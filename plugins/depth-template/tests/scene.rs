@@ -14,7 +14,8 @@ use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole};
 const CAMERA_HEIGHT_M: f64 = 1.2;
 
 fn camera(width: usize) -> Arc<Camera> {
-    let (w, h) = (width as f64, 0.75 * width as f64);
+    let w = width as f64;
+    let h = 0.75 * width as f64;
     let f = 0.83 * w;
     let lens = Pinhole {
         fx: f,
@@ -36,8 +37,8 @@ fn frame(width: usize, wall_m: f64, heads: &[Point3<f64>]) -> Frame {
         let mut depth = wall_m.min(floor);
         for head in heads {
             let plane = head.x;
-            let (right, down) =
-                (ray.x * plane + head.y, ray.y * plane - (CAMERA_HEIGHT_M - head.z));
+            let right = ray.x * plane + head.y;
+            let down = ray.y * plane - (CAMERA_HEIGHT_M - head.z);
             // Legs: the silhouette of the hips, down to the floor.
             let behind = body.at(right, down.min(0.45));
             if behind.is_finite() {

@@ -47,7 +47,9 @@ impl Ekf {
     /// the axes before and after the robot's turn.
     fn process_noise(&self, dt: f64) -> Matrix5 {
         let q = self.config.acceleration_noise;
-        let (position, cross, velocity) = (q * dt.powi(3) / 3.0, q * dt.powi(2) / 2.0, q * dt);
+        let position = q * dt.powi(3) / 3.0;
+        let cross = q * dt.powi(2) / 2.0;
+        let velocity = q * dt;
         let height = self.config.height_noise.powi(2) * dt;
         let mut noise =
             Matrix5::from_diagonal(&Vector5::new(position, position, height, velocity, velocity));
@@ -186,7 +188,8 @@ fn decayed(time_constant_s: f64, dt: f64) -> (f64, f64) {
 pub(crate) fn moved(m: &Matrix5, motion: &EgoMotion, decay_s: f64) -> Matrix5 {
     let back = turn_back(motion);
     let (passed, kept) = decayed(decay_s, motion.dt);
-    let (ahead, onwards) = (back * passed, back * kept);
+    let ahead = back * passed;
+    let onwards = back * kept;
     let rows = |m: &Matrix5| {
         let mut out = *m;
         for (mut out, m) in out.column_iter_mut().zip(m.column_iter()) {
@@ -248,8 +251,12 @@ pub(crate) fn motion_jacobian(predicted: &Vector5<f64>, motion: &EgoMotion) -> M
 /// dozens; `None` for a matrix that is not positive definite (Sylvester's criterion).
 pub(crate) fn inverse(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let [a, b, c, d, e, f] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|place| m[place]);
-    let (first, second, third) = (d * f - e * e, c * e - b * f, b * e - c * d);
-    let (middle, last, beside) = (a * f - c * c, a * d - b * b, b * c - a * e);
+    let first = d * f - e * e;
+    let second = c * e - b * f;
+    let third = b * e - c * d;
+    let middle = a * f - c * c;
+    let last = a * d - b * b;
+    let beside = b * c - a * e;
     let determinant = a * first + b * second + c * third;
     let is_positive = a > 0.0 && last > 0.0 && determinant > 0.0;
     let adjugate = Matrix3::new(first, second, third, second, middle, beside, third, beside, last);

@@ -9,11 +9,14 @@ use tagalong_geometry::Rect;
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let mut next = || arguments.next().expect("CASCADE.xml PICTURE RUNS");
-    let (cascade, picture, runs) = (next(), next(), next().parse::<usize>().expect("a number"));
+    let cascade = next();
+    let picture = next();
+    let runs = next().parse::<usize>().expect("a number");
     let text = std::fs::read_to_string(cascade).expect("the cascade can be read");
     let cascade = Cascade::from_xml(&text).expect("it is a cascade");
     let image = image::open(picture).expect("the picture can be read").into_luma8();
-    let (width, height) = (image.width() as usize, image.height() as usize);
+    let width = image.width() as usize;
+    let height = image.height() as usize;
     let image = GreyImage::from_pixels(width, height, image.into_raw()).expect("all pixels");
     let (mut scanner, mut found): (_, Vec<Rect>) = (Scanner::default(), Vec::new());
     for _ in 0..runs {

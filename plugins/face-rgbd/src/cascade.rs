@@ -88,7 +88,8 @@ pub struct Cascade {
 impl Cascade {
     /// Creates a cascade that accepts all windows, of `side` pixels.
     pub fn without_stages(side: usize) -> Self {
-        let (features, stages) = (Vec::new(), Vec::new());
+        let features = Vec::new();
+        let stages = Vec::new();
         Self { width: side, height: side, features, stages, calibration: None }
     }
 
@@ -125,7 +126,8 @@ impl Cascade {
         };
         let fits_tilted = |part: &Part| {
             let down = part.width.checked_add(part.height);
-            let (right, bottom) = (part.x.checked_add(part.width), down.map(|down| down + part.y));
+            let right = part.x.checked_add(part.width);
+            let bottom = down.map(|down| down + part.y);
             let is_inside = right.is_some_and(|x| x <= self.width) && part.x >= part.height;
             is_inside && bottom.is_some_and(|y| y <= self.height)
         };

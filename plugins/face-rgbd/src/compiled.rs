@@ -131,7 +131,8 @@ impl Compiled {
             }
             Feature::Binary(part) => {
                 let at = |k: usize| {
-                    let (x, y) = (part.x + k % 4 * part.width, part.y + k / 4 * part.height);
+                    let x = part.x + k % 4 * part.width;
+                    let y = part.y + k / 4 * part.height;
                     level.offset(x, y) as u32
                 };
                 WindowFeature::Binary(std::array::from_fn(at))
@@ -177,7 +178,8 @@ impl Compiled {
             alive: u32::MAX >> (32 - LANES),
         };
         if self.is_normalised {
-            let (sums, squares) = (&level.sums()[start..], &level.squares()[start..]);
+            let sums = &level.sums()[start..];
+            let squares = &level.squares()[start..];
             contrasts(sums, squares, &self.middle, self.area, &mut block.contrast);
         }
         self.judge(0, level, &mut block);
@@ -306,7 +308,8 @@ impl Block {
 }
 
 pub(crate) fn corners(part: &Part, level: &Level) -> Corners {
-    let (right, bottom) = (part.x + part.width, part.y + part.height);
+    let right = part.x + part.width;
+    let bottom = part.y + part.height;
     [(part.x, part.y), (right, part.y), (part.x, bottom), (right, bottom)]
         .map(|(x, y)| level.offset(x, y) as u32)
 }
@@ -421,10 +424,12 @@ fn add_stump(
 /// ones.
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn contrasts(sums: &[u32], squares: &[u32], corners: &Corners, area: f64, out: &mut [f32; LANES]) {
-    let (sums, squares) = (sums_beside(sums, corners), sums_beside(squares, corners));
+    let sums = sums_beside(sums, corners);
+    let squares = sums_beside(squares, corners);
     for lane in 0..LANES {
         // In f64, because the difference of two large products is small.
-        let (sum, square) = (f64::from(sums[lane]), f64::from(squares[lane]));
+        let sum = f64::from(sums[lane]);
+        let square = f64::from(squares[lane]);
         let root = (area * square - sum * sum).max(0.0).sqrt();
         let is_empty = root <= LEAST_CONTRAST * area;
         out[lane] = if is_empty { 0.0 } else { (1.0 / root) as f32 };

@@ -54,7 +54,8 @@ impl FaceRgbd {
             funnel.drop_many("point: less like skin", possible - searched);
         }
         let most = config.max_side * image.width().min(image.height()) as f64;
-        let (before, everywhere) = (scanner.looked_at(), [near.unwrap_or(whole(image))]);
+        let before = scanner.looked_at();
+        let everywhere = [near.unwrap_or(whole(image))];
         hits.clear();
         for scale in scales(cascade, config.min_side_px, most, config.scale_step) {
             if depth.is_some() {
@@ -79,7 +80,8 @@ impl FaceRgbd {
         depth: Option<&DepthImage>,
         group: &Group,
     ) -> Option<Detection> {
-        let (config, side) = (&self.config, group.region.width);
+        let config = &self.config;
+        let side = group.region.width;
         let measured = depth.and_then(|depth| depth.surface_m(&group.region));
         let face = FaceDepth::by_size(camera, config.face_m, side, config.sigma_distance)
             .or_measured(measured, config.sigma_depth_m);
@@ -223,7 +225,8 @@ mod tests {
         let detector = detector(Config::default());
         let config = &detector.config;
         let group = Group { region: Rect::new(69.5, 51.5, 20.0, 20.0), count: 5, strength: 3.0 };
-        let (camera, depth) = (camera(), DepthImage::filled(160, 120, 1.5));
+        let camera = camera();
+        let depth = DepthImage::filled(160, 120, 1.5);
         let by_depth = detector.detection(&camera, Some(&depth), &group).unwrap();
         let by_size = detector.detection(&camera, None, &group).unwrap();
         let size_m = FOCAL_PX * config.face_m / 20.0;

@@ -110,7 +110,8 @@ pub fn grouped(hits: &[Hit], fewest: usize) -> Vec<Group> {
 
 /// Returns true if a group lies inside of a stronger one.
 fn outvotes(outer: &Group, inner: &Group) -> bool {
-    let (r, o) = (&inner.region, &outer.region);
+    let r = &inner.region;
+    let o = &outer.region;
     let [dx, dy] = [o.width, o.height].map(|size| (size * ALIKE).round_ties_even());
     let fits = r.x >= o.x - dx
         && r.y >= o.y - dy

@@ -103,7 +103,8 @@ impl Level {
     /// Computes the tilted sums of the level: T(x, y) = T(x - 1, y - 1) + T(x + 1, y - 1)
     /// - T(x, y - 2) + the two pixels at (x - 1, y - 1) and (x - 1, y - 2).
     pub fn add_tilted(&mut self) {
-        let (width, height) = (self.width, self.height);
+        let width = self.width;
+        let height = self.height;
         let length = self.tilted_from + self.stride * (height + 1) + LANES;
         self.sums.resize(length.max(self.sums.len()), 0);
         let [mut before, mut above, mut row] = std::mem::take(&mut self.tilted_rows);
@@ -136,7 +137,8 @@ impl Level {
         let Self { width, pixels, columns, between, .. } = self;
         columns.clear();
         columns.extend((part.x..part.x + part.width).map(|x| place(x, size.0, image.width())));
-        let (first, last) = (columns[0].0, columns[*width - 1].0);
+        let first = columns[0].0;
+        let last = columns[*width - 1].0;
         columns.iter_mut().for_each(|(x, _)| *x -= first);
         let end = (last + 2).min(image.width());
         between.resize(last + 2 - first, 0);
@@ -172,7 +174,8 @@ impl Level {
 fn add_row<const STEP: usize>(row: &[u8], stride: usize, sums: &mut [u32], squares: &mut [u32]) {
     let ((above, below), (squares_above, squares_below)) =
         (sums.split_at_mut(stride), squares.split_at_mut(stride));
-    let (mut sum, mut square) = (0_u32, 0_u32);
+    let mut sum = 0_u32;
+    let mut square = 0_u32;
     (below[0], squares_below[0]) = (0, 0);
     for (index, values) in row.chunks(STEP).enumerate() {
         for (side, value) in values.iter().enumerate() {

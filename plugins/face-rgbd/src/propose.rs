@@ -102,7 +102,8 @@ impl Proposals {
     }
 
     fn neighbours(&mut self, at: usize) {
-        let (x, y) = (at % self.columns, at / self.columns);
+        let x = at % self.columns;
+        let y = at / self.columns;
         let beside = [
             (x > 0).then(|| at - 1),
             (x + 1 < self.columns).then(|| at + 1),
@@ -147,7 +148,8 @@ impl Proposals {
         allowed.clear();
         allowed.resize(depth.len(), false);
         for at in &*fitting {
-            let (x, y) = (at % *columns, at / *columns);
+            let x = at % *columns;
+            let y = at / *columns;
             for row in y.saturating_sub(1)..(y + 2).min(*rows) {
                 let start = row * *columns;
                 allowed[start + x.saturating_sub(1)..start + (x + 2).min(*columns)].fill(true);
@@ -169,7 +171,8 @@ impl Proposals {
     /// Returns true if a window of the size of [`Proposals::for_side`] is to be scanned.
     pub fn allows(&self, window: &Rect) -> bool {
         let Point2 { coords } = window.centre();
-        let (x, y) = (coords.x as usize / GRID_PX, coords.y as usize / GRID_PX);
+        let x = coords.x as usize / GRID_PX;
+        let y = coords.y as usize / GRID_PX;
         x < self.columns && y < self.rows && self.allowed[y * self.columns + x]
     }
 }
@@ -205,7 +208,8 @@ fn is_possible(camera: &Camera, x: i64, y: i64, metres: f32, config: &Config) ->
 /// lamps, so it only ranks regions and decides nothing alone.
 fn skin(image: &RgbImage, x: i64, y: i64) -> bool {
     image.get(x, y).is_some_and(|[r, g, b]| {
-        let (most, least) = (r.max(g).max(b), r.min(g).min(b));
+        let most = r.max(g).max(b);
+        let least = r.min(g).min(b);
         // `r > g` stands before `r - g`, which would otherwise overflow.
         r > 95 && g > 40 && b > 20 && most - least > 15 && r > b && r > g && r - g > 15
     })
@@ -268,7 +272,8 @@ mod tests {
     }
 
     fn sampled(blocks: &[Block], config: &Config) -> (Proposals, [u64; 3]) {
-        let (mut proposals, frame) = (Proposals::default(), frame(blocks));
+        let mut proposals = Proposals::default();
+        let frame = frame(blocks);
         let counts = proposals.sample(&frame, frame.depth().unwrap(), config);
         (proposals, counts)
     }

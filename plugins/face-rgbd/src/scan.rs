@@ -73,7 +73,8 @@ impl Scanner {
         hits: &mut Vec<Hit>,
     ) {
         let size = |length: usize| rounded(length as f64 * scale);
-        let (width, height) = (size(cascade.width), size(cascade.height));
+        let width = size(cascade.width);
+        let height = size(cascade.height);
         let region = |x: usize, y: usize| Rect::new(size(x), size(y), width, height);
         for area in areas {
             let wanted = |x, y| propose(&region(x, y));
@@ -171,7 +172,8 @@ impl Row<'_> {
         self.compiled.finish(self.level, &mut block);
         for lane in block.lanes() {
             let margin = self.compiled.margin(&block, lane);
-            let (x, part) = (x + lane * self.step, self.part);
+            let x = x + lane * self.step;
+            let part = self.part;
             take(PassedWindow { level: self.level, part, x, y: self.y, margin });
         }
         looked_at

@@ -101,7 +101,8 @@ fn slow_answer(image: &GreyImage, at: (usize, usize), cascade: &Cascade, node: &
         }
         (Feature::Binary(first), Split::Among(bits)) => {
             let block = |x: usize, y: usize| {
-                let (left, top) = (first.x + x * first.width, first.y + y * first.height);
+                let left = first.x + x * first.width;
+                let top = first.y + y * first.height;
                 slow_sum(image, at, &Part { x: left, y: top, ..*first }, |v| v)
             };
             let around = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
@@ -166,7 +167,8 @@ proptest! {
         level.fill(&image, (width, height), step);
         let shrunk = GreyImage::from_pixels(width, height, level.pixels().to_vec()).unwrap();
         for cascade in [small(), binary(), tilted()] {
-            let (mut scanner, mut found) = (Scanner::default(), Vec::new());
+            let mut scanner = Scanner::default();
+            let mut found = Vec::new();
             let mut take = |seen: PassedWindow<'_>| found.push((seen.x, seen.y));
             scanner.size(&image, &cascade, scale, &whole(&image), &|_, _| true, &mut take);
             prop_assert_eq!(found, slow_scan(&shrunk, &cascade, step));
@@ -204,7 +206,8 @@ proptest! {
         seed: u64, scale in 1.0..3.5f64, at in prop::array::uniform4(0.0..0.8f64),
         long in prop::array::uniform4(0.05..0.3f64),
     ) {
-        let (image, cascade) = (noise(90, 70, seed), small());
+        let image = noise(90, 70, seed);
+        let cascade = small();
         let area = |k: usize| Rect::new(90.0 * at[k], 70.0 * at[k + 1], 90.0 * long[k], 70.0 * long[k + 1]);
         let areas = [area(0), area(2)];
         // The neighbour of the last window of one area is not in the other.
@@ -213,7 +216,8 @@ proptest! {
         prop_assume!(beside.iou(&areas[1]) == 0.0);
         let wanted = |window: &Rect| areas.iter().any(|area| area.contains(window.centre()));
         let scan = |areas: &[Rect]| {
-            let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
+            let mut scanner = Scanner::default();
+            let mut hits = Vec::new();
             scanner.scan_within(&image, &cascade, scale, areas, wanted, &mut hits);
             hits.sort_by(|a, b| {
                 (a.region.y, a.region.x).partial_cmp(&(b.region.y, b.region.x)).unwrap()
@@ -229,7 +233,8 @@ proptest! {
         seed: u64, width in 13..70usize, height in 13..60usize, x in 0..12usize, y in 0..12usize,
     ) {
         let image = noise(64, 48, seed);
-        let (mut level, mut cut) = (Level::default(), Level::default());
+        let mut level = Level::default();
+        let mut cut = Level::default();
         level.fill(&image, (width, height), 1);
         let part = part(x, y, (width - x).min(20), (height - y).min(20));
         cut.fill_part(&image, (width, height), part, 1);
@@ -241,8 +246,10 @@ proptest! {
 
 #[test]
 fn areas_hold_windows_that_pass() {
-    let (image, cascade) = (noise(90, 70, 8), small());
-    let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
+    let image = noise(90, 70, 8);
+    let cascade = small();
+    let mut scanner = Scanner::default();
+    let mut hits = Vec::new();
     let area = Rect::new(30.0, 20.0, 30.0, 30.0);
     scanner.scan_within(&image, &cascade, 2.5, &[area], |_| true, &mut hits);
     assert!(!hits.is_empty() && hits.iter().all(|hit| area.contains(hit.region.centre())));
@@ -252,7 +259,8 @@ fn areas_hold_windows_that_pass() {
 fn windows_without_contrast_are_left_out() {
     let mut cascade = small();
     cascade.stages.iter_mut().for_each(|stage| stage.threshold = -9.0);
-    let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
+    let mut scanner = Scanner::default();
+    let mut hits = Vec::new();
     let flat = GreyImage::from_fn(40, 40, |x, _| 100 + (x % 2) as u8);
     scanner.scan(&flat, &cascade, [1.0].into_iter(), &mut hits);
     assert!(hits.is_empty() && scanner.looked_at() > 100);
@@ -369,7 +377,8 @@ mod training {
     fn picture(is_face: bool, seed: u64) -> GreyImage {
         let mut random = XorShift64::new(seed + 1);
         GreyImage::from_fn(96, 96, |x, y| {
-            let (dx, dy) = (x as f64 - 48.0, y as f64 - 48.0);
+            let dx = x as f64 - 48.0;
+            let dy = y as f64 - 48.0;
             let eye = (dx.abs() - 8.0).hypot(dy + 6.0) < 4.0;
             let mouth = dx.abs() < 8.0 && (dy - 10.0).abs() < 2.5;
             let grey = match is_face {

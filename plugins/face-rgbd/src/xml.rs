@@ -50,7 +50,8 @@ impl Cascade {
         let kind = if self.is_normalised() { "HAAR" } else { "LBP" };
         let trees = |stage: &Stage| stage.trees.len();
         let most = self.stages.iter().map(trees).max().unwrap_or(0);
-        let (width, height) = (self.width, self.height);
+        let width = self.width;
+        let height = self.height;
         writeln!(out, "<cascade type_id=\"opencv-cascade-classifier\">")?;
         writeln!(out, "<stageType>BOOST</stageType><featureType>{kind}</featureType>")?;
         writeln!(out, "<height>{height}</height><width>{width}</width>")?;
@@ -126,7 +127,8 @@ fn new(root: Element<'_, '_>) -> XmlResult<Cascade> {
         },
         None => None,
     };
-    let (width, height) = (number(root, "width")?, number(root, "height")?);
+    let width = number(root, "width")?;
+    let height = number(root, "height")?;
     Ok(Cascade { width, height, features, stages, calibration })
 }
 

@@ -35,7 +35,8 @@ fn equalised(grey: &GreyImage) -> GreyImage {
     grey.pixels().iter().for_each(|v| counts[usize::from(*v)] += 1);
     let first = counts.iter().position(|count| *count > 0).unwrap();
     let rest = grey.pixels().len() as u32 - counts[first];
-    let (mut sum, mut to) = (0, [0_u8; 256]);
+    let mut sum = 0;
+    let mut to = [0_u8; 256];
     for value in first + 1..256 {
         sum += counts[value];
         to[value] = (f64::from(sum) * 255.0 / f64::from(rest)).round() as u8;
@@ -45,7 +46,8 @@ fn equalised(grey: &GreyImage) -> GreyImage {
 
 fn photograph(path: &Path) -> GreyImage {
     let image = image::open(path).unwrap().into_rgb8();
-    let (width, height) = (image.width() as usize, image.height() as usize);
+    let width = image.width() as usize;
+    let height = image.height() as usize;
     let pixels = image.pixels().map(|p| p.0).collect();
     equalised(&RgbImage::from_pixels(width, height, pixels).unwrap().to_grey())
 }
@@ -66,7 +68,8 @@ fn boxes(words: &[String]) -> Vec<Rect> {
 
 /// The faces that the cascade finds with the settings of OpenCV's tests.
 fn found(cascade: &Cascade, image: &GreyImage) -> Vec<Rect> {
-    let (mut scanner, mut hits) = (Scanner::default(), Vec::new());
+    let mut scanner = Scanner::default();
+    let mut hits = Vec::new();
     let fitting = scales(cascade, 0.0, image.width() as f64, 1.1)
         .take_while(|scale| (cascade.height as f64 * scale).round() <= image.height() as f64);
     scanner.scan(image, cascade, fitting, &mut hits);
@@ -96,7 +99,9 @@ fn cascades_of_both_layouts_find_what_opencv_expects() {
             photograph(&file.with_file_name("images").join(Path::new(name).file_name().unwrap()))
         })
         .collect();
-    let (mut expected, mut missed, mut surplus) = (0, 0, 0);
+    let mut expected = 0;
+    let mut missed = 0;
+    let mut surplus = 0;
     for detector in child(root, "detectors").children().filter(Node::is_element) {
         let name = detector.tag_name().name();
         let cascade = words(child(detector, "fn")).concat();

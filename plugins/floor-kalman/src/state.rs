@@ -69,7 +69,8 @@ impl State {
     /// covariance 4 P1 + P2 - 2 (C + C') + Q, where C is theirs with each other;
     /// equation 6 has P1 + Q.
     fn step_on(&mut self, dt: f64, config: &Config) {
-        let (here, p1) = (self.position(), self.position_covariance());
+        let here = self.position();
+        let p1 = self.position_covariance();
         let mut cross = p1;
         if let Some(before) = &self.before {
             let u = here - before.position;
@@ -77,7 +78,8 @@ impl State {
             if dt > 0.0 {
                 self.mean.fixed_rows_mut::<2>(2).copy_from(&(u / dt));
             }
-            let (p2, c) = (before.covariance, before.cross);
+            let p2 = before.covariance;
+            let c = before.cross;
             self.grow(&(3.0 * p1 + p2 - 2.0 * (c + c.transpose())));
             cross = 2.0 * p1 - c.transpose();
         }

@@ -65,7 +65,8 @@ fn a_still_person_is_filtered_by_equations_5_to_9() {
     filter.start(ID, &sighting(1.0, 2.0), &camera());
     let r = Matrix2::new(0.011, -0.004, -0.004, 0.020);
     let q = Matrix2::new(0.024, -0.001, -0.001, 0.043);
-    let (mut x, mut p) = (Vector2::new(1.0, 2.0), r);
+    let mut x = Vector2::new(1.0, 2.0);
+    let mut p = r;
     for z in [Vector2::new(1.2, 2.1), Vector2::new(1.3, 2.5), Vector2::new(1.1, 2.9)] {
         // Equations 5 to 9, as they stand.
         p += q;
@@ -167,7 +168,9 @@ fn the_prediction_by_differences_is_as_uncertain_as_it_says() {
     };
     let r = Matrix2::from_diagonal_element(0.02);
     let root = config.process(config.step_s).cholesky().unwrap().l();
-    let (mut squares, mut count, mut said) = (0.0, 0.0, 0.0);
+    let mut squares = 0.0;
+    let mut count = 0.0;
+    let mut said = 0.0;
     for _ in 0..4000 {
         let mut truth = [Vector2::zeros(), Vector2::new(0.1, 0.0)];
         let noisy = |at: Vector2<f64>, n: &mut dyn FnMut() -> f64| {
@@ -229,7 +232,9 @@ impl Textbook {
             4,
             &[1.0, 0.0, dt, 0.0, 0.0, 1.0, 0.0, dt, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0],
         );
-        let (a, b, c) = (q * dt * dt * dt / 3.0, q * dt * dt / 2.0, q * dt);
+        let a = q * dt * dt * dt / 3.0;
+        let b = q * dt * dt / 2.0;
+        let c = q * dt;
         let noise = DMatrix::from_row_slice(
             4,
             4,
@@ -259,7 +264,8 @@ impl Textbook {
 #[test]
 fn four_states_are_those_of_a_filter_written_down() {
     let config = Config { room_heading_deg: 30.0, ..Config::default() };
-    let (q, speed) = (config.acceleration_noise, config.initial_speed_mps);
+    let q = config.acceleration_noise;
+    let speed = config.initial_speed_mps;
     let mut filter = FloorKalman::new(config).unwrap();
     let r = Matrix2::new(0.05, 0.02, 0.02, 0.03);
     let sighting = |x: f64, y: f64| {
@@ -312,7 +318,8 @@ fn four_states_are_those_of_a_filter_written_down() {
             rotation.transpose() * of_book * rotation
         };
         for (row, column) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
-            let (i, j) = (row + row / 2, column + column / 2);
+            let i = row + row / 2;
+            let j = column + column / 2;
             let of_filter = found.covariance.fixed_view::<2, 2>(i, j).into_owned();
             assert!((of_filter - block(row, column)).norm() < 1e-9, "{row} {column}");
         }
@@ -447,7 +454,8 @@ fn each_number_has_its_least_and_its_most() {
 fn who_is_stopped_is_forgotten_and_a_stranger_gives_no_support() {
     let mut filter = FloorKalman::new(Config::default()).unwrap();
     filter.start(ID, &sighting(2.0, 0.0), &camera());
-    let (other, frame) = (TrackId(2), frame());
+    let other = TrackId(2);
+    let frame = frame();
     let detection = sighting(2.0, 0.1);
     let matched = [Matched::certain(other, &detection)];
     let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };

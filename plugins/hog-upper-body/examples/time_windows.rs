@@ -9,13 +9,17 @@ use tagalong_hog_upper_body::{Grid, Model, Scanner, Wanted, merge, window_of};
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let mut next = || arguments.next().expect("MODEL.toml PICTURE RUNS");
-    let (model, picture, runs) = (next(), next(), next().parse::<usize>().expect("a number"));
+    let model = next();
+    let picture = next();
+    let runs = next().parse::<usize>().expect("a number");
     let text = std::fs::read_to_string(model).expect("the model can be read");
     let model = Model::from_text(&text).expect("it is a model");
     let image = image::open(picture).expect("the picture can be read").into_luma8();
-    let (width, height) = (image.width() as usize, image.height() as usize);
+    let width = image.width() as usize;
+    let height = image.height() as usize;
     let image = GreyImage::from_pixels(width, height, image.into_raw()).expect("all pixels");
-    let (mut scanner, mut windows) = (Scanner::new(&model), Vec::new());
+    let mut scanner = Scanner::new(&model);
+    let mut windows = Vec::new();
     // OpenCV does not scan windows that extend beyond the image.
     let is_inside = |square: &Rect| {
         let window = window_of(square, model.coverage);

@@ -181,7 +181,8 @@ fn smooth(
 /// these sum to 1.
 fn present(at: usize, length: usize, weights: &[f32]) -> (usize, &[f32], f32) {
     let reach = weights.len() / 2;
-    let (first, last) = (at.saturating_sub(reach), (at + reach).min(length - 1));
+    let first = at.saturating_sub(reach);
+    let last = (at + reach).min(length - 1);
     let used = &weights[first + reach - at..=last + reach - at];
     (first, used, 1.0 / used.iter().sum::<f32>())
 }

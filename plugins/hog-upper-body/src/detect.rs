@@ -47,7 +47,8 @@ impl HogUpperBody {
             (Kind::Trees, Coverage::WholeBody) => WHOLE_BODIES,
         };
         let model = context.model(&config.model, built_in, Model::from_text)?;
-        let (scanner, lattice) = (Scanner::new(&model), Lattice::default());
+        let scanner = Scanner::new(&model);
+        let lattice = Lattice::default();
         Ok(Self { config, model, scanner, lattice, windows: Vec::new() })
     }
 
@@ -111,7 +112,9 @@ impl<'a> Proposer<'a> {
         lattice: &'a mut Lattice,
         near: Option<Rect>,
     ) -> Self {
-        let (unfit, goes_on, out_of_place) = (0, 0, 0);
+        let unfit = 0;
+        let goes_on = 0;
+        let out_of_place = 0;
         Self { config, camera, depth, lattice, near, unfit, goes_on, out_of_place }
     }
 
@@ -201,7 +204,8 @@ impl Detector for HogUpperBody {
         let channel = model.depth.as_ref().filter(|_| config.depth_channel).zip(depth);
         // A window below the limit stays as long as its depth may lift it above.
         let lift = channel.map_or(0.0, |_| DepthTrees::most());
-        let (sides, least) = (sides(config, camera, near), model.sum_at(config.min_score - lift));
+        let sides = sides(config, camera, near);
+        let least = model.sum_at(config.min_score - lift);
         let before = scanner.looked_at();
         windows.clear();
         scanner.scan(grey, sides, least, |grid, wanted| proposer.propose(grid, wanted), windows);
@@ -248,7 +252,8 @@ mod tests {
         let square = camera.upper_body(&Point3::new(3.0, 0.0, 1.5));
         let above = |y: usize| (square.y - y as f64) / square.height;
         let depth = DepthImage::from_fn(640, 480, |_, y| depth(above(y)));
-        let (config, mut lattice) = (Config::default(), Lattice::default());
+        let config = Config::default();
+        let mut lattice = Lattice::default();
         let mut proposer = Proposer::new(&config, &camera, Some(&depth), &mut lattice, None);
         (proposer.is_head(&depth, &square, 2.9), proposer.goes_on)
     }
@@ -276,7 +281,8 @@ mod tests {
 
     #[test]
     fn near_is_within_half_a_width_of_the_expected_middle() {
-        let (config, camera) = (Config::default(), camera());
+        let config = Config::default();
+        let camera = camera();
         let expected = Rect::new(100.0, 100.0, 60.0, 60.0);
         let is_near = |near: Option<Rect>, dx: f64, dy: f64| {
             let mut lattice = Lattice::default();
@@ -293,7 +299,8 @@ mod tests {
 
     #[test]
     fn heads_are_at_heights_of_heads() {
-        let (config, camera) = (Config::default(), camera());
+        let config = Config::default();
+        let camera = camera();
         let depth = DepthImage::filled(640, 480, f32::NAN);
         let mut lattice = Lattice::default();
         let mut proposer = Proposer::new(&config, &camera, Some(&depth), &mut lattice, None);
@@ -316,7 +323,8 @@ mod tests {
 
     #[test]
     fn a_window_is_a_head_at_its_distance() {
-        let (detector, camera) = (detector(Config::default()), camera());
+        let detector = detector(Config::default());
+        let camera = camera();
         let config = &detector.config;
         let side = 525.0 * UPPER_BODY_SIDE_M / 4.0;
         let region = Rect::new(319.5 - 0.5 * side, 239.5 - 0.5 * side, side, side);
@@ -405,7 +413,8 @@ mod tests {
     /// Only columns of the object above a square count that lie over its middle half.
     #[test]
     fn a_head_ends_where_most_columns_above_it_are_of_something_else() {
-        let (camera, config) = (camera(), Config::default());
+        let camera = camera();
+        let config = Config::default();
         let square = camera.upper_body(&Point3::new(3.0, 0.0, 1.5));
         // The object between two columns and two rows, in sides of the square; the rest is far.
         let goes_on = |columns: [f64; 2], above: [f64; 2]| {
@@ -432,10 +441,12 @@ mod tests {
 
     /// Returns true if windows with a square of `side` pixels are proposed before a wall.
     fn is_proposed(config: &Config, side: f64, metres: f64) -> bool {
-        let (camera, depth) = (camera(), DepthImage::filled(640, 480, metres as f32));
+        let camera = camera();
+        let depth = DepthImage::filled(640, 480, metres as f32);
         let mut lattice = Lattice::default();
         let mut proposer = Proposer::new(config, &camera, Some(&depth), &mut lattice, None);
-        let (grid, mut wanted) = (Grid::new((640, 480), side), Vec::new());
+        let grid = Grid::new((640, 480), side);
+        let mut wanted = Vec::new();
         proposer.propose(&grid, &mut wanted);
         let all = grid.windows(|_| Some(None)).count();
         assert!(wanted.is_empty() || wanted.len() == all, "{side} {metres}");

@@ -24,7 +24,8 @@ impl Gradients {
         let end = whole.min(before + row.len().saturating_sub(2));
         self.length[..before].fill(0.0);
         self.length[end..].fill(0.0);
-        let (length, turn) = (&mut self.length[before..end], &mut self.turn[before..end]);
+        let length = &mut self.length[before..end];
+        let turn = &mut self.turn[before..end];
         of_row(above, row, below, length, turn);
     }
 
@@ -63,10 +64,13 @@ pub(crate) fn votes<const BINS: usize>(
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 fn of_row(above: &[f32], row: &[f32], below: &[f32], length: &mut [f32], turn: &mut [f32]) {
     let inner = length.len();
-    let (left, right) = (&row[..inner], &row[2..inner + 2]);
-    let (above, below) = (&above[1..=inner], &below[1..=inner]);
+    let left = &row[..inner];
+    let right = &row[2..inner + 2];
+    let above = &above[1..=inner];
+    let below = &below[1..=inner];
     for i in 0..inner {
-        let (x, y) = (right[i] - left[i], below[i] - above[i]);
+        let x = right[i] - left[i];
+        let y = below[i] - above[i];
         length[i] = (x * x + y * y).sqrt();
         turn[i] = half_turns(x, y);
     }
@@ -78,8 +82,10 @@ fn of_row(above: &[f32], row: &[f32], below: &[f32], length: &mut [f32], turn: &
 fn half_turns(x: f32, y: f32) -> f32 {
     const TERMS: [f32; 6] =
         [0.318_302_6, -0.105_877_35, 0.061_606_795, -0.037_061_73, 0.016_760_074, -0.003_730_975];
-    let (across, down) = (x.abs(), y.abs());
-    let (less, more) = (across.min(down), across.max(down));
+    let across = x.abs();
+    let down = y.abs();
+    let less = across.min(down);
+    let more = across.max(down);
     // The small constant makes the angle of a zero gradient 0 instead of NaN.
     let t = less / (more + 1e-20);
     let s = t * t;

@@ -37,7 +37,8 @@ impl Blocks {
     /// outermost pixels belong to no cell; they serve for the gradients of their neighbours. Only
     /// cells in `spans` are computed; other blocks are undefined.
     pub fn fill(&mut self, pixels: &[f32], width: usize, spans: &Spans) {
-        let (across, down) = (width.saturating_sub(2) / CELL, spans.cells().len());
+        let across = width.saturating_sub(2) / CELL;
+        let down = spans.cells().len();
         (self.columns, self.rows) = (across.saturating_sub(1), down.saturating_sub(1));
         // The last, additional block lets a product in full lanes read past the end of a window.
         self.values.resize(self.columns * self.rows + 1, [0.0; BLOCK]);
@@ -47,7 +48,8 @@ impl Blocks {
         self.root(pixels, width, spans);
         self.vote(width, spans);
         for (y, rows) in spans.cells().windows(2).enumerate() {
-            let (start, end) = (rows[0].start.max(rows[1].start), rows[0].end.min(rows[1].end));
+            let start = rows[0].start.max(rows[1].start);
+            let end = rows[0].end.min(rows[1].end);
             let cells = |y: usize| self.cells.get(y * across + start..y * across + end);
             if let (Some(above), Some(below)) = (cells(y), cells(y + 1)) {
                 let blocks = &mut self.values[y * self.columns + start..];
@@ -90,7 +92,8 @@ impl Blocks {
                 self.gradients.fill(rows, BEFORE, span.len() + 1);
                 let share = ramp((pixel + CELL / 2) % CELL);
                 let votes = span.start..=span.end;
-                let (above, below) = (&mut self.above[votes.clone()], &mut self.below[votes]);
+                let above = &mut self.above[votes.clone()];
+                let below = &mut self.below[votes];
                 add_votes(&self.gradients, share, above, below);
             }
         }
@@ -101,7 +104,8 @@ impl Blocks {
     /// first.
     fn finish(&mut self, y: usize, spans: &Spans) {
         if let Some(y) = y.checked_sub(1) {
-            let (span, across) = (&spans.cells()[y], self.columns + 1);
+            let span = &spans.cells()[y];
+            let across = self.columns + 1;
             let cells = &mut self.cells[y * across + span.start..y * across + span.end];
             let sides = self.above[span.start..=span.end].windows(2);
             cells.iter_mut().zip(sides).for_each(|(cell, sides)| *cell = histogram(sides));

@@ -104,7 +104,8 @@ pub(crate) struct Forest {
 
 impl Forest {
     fn new(trees: &Trees) -> Self {
-        let (trees, places) = (trees.clone(), Vec::new());
+        let trees = trees.clone();
+        let places = Vec::new();
         Self { trees, channels: Channels::default(), planes: Planes::default(), places, layout: 0 }
     }
 
@@ -114,7 +115,8 @@ impl Forest {
         // Places depend on the layout only, which rarely changes from one image to the next.
         if self.layout != self.planes.layout() {
             let place = |number: u16| {
-                let (cell, k) = (usize::from(number) / DEPTH, usize::from(number) % DEPTH);
+                let cell = usize::from(number) / DEPTH;
+                let k = usize::from(number) % DEPTH;
                 self.planes.place(cell % CELLS, cell / CELLS, k) as u32
             };
             self.places.clear();

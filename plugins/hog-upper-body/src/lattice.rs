@@ -47,7 +47,8 @@ impl Lattice {
         let [across, down] = [&grid.columns, &grid.rows].map(|cells| cells.clone().count());
         let first = grid.square(grid.columns.start, grid.rows.start);
         self.read(depth, places(first.x, first.width, across), places(first.y, first.width, down));
-        let (least, most) = (*range_m.start() as f32, *range_m.end() as f32);
+        let least = *range_m.start() as f32;
+        let most = *range_m.end() as f32;
         count(&self.readings, least, most, &mut self.counts);
         self.across = across;
         self.is_within.clear();
@@ -78,7 +79,8 @@ impl Lattice {
     /// Windows are counted row by row.
     pub(crate) fn surface_m(&self, window: usize) -> Option<f64> {
         self.is_within.get(window).filter(|is_within| **is_within)?;
-        let (x, y) = (window % self.across, window / self.across);
+        let x = window % self.across;
+        let y = window / self.across;
         let mut readings = [f32::NAN; TAPS * TAPS];
         for (readings, row) in readings.chunks_exact_mut(TAPS).zip(self.window_rows(y)) {
             readings.copy_from_slice(&self.readings[row][STRIDE * x..][..TAPS]);
@@ -112,7 +114,8 @@ fn is_reading(metres: f32) -> bool {
 fn count(readings: &[f32], least: f32, most: f32, counts: &mut Vec<Counts>) {
     counts.resize(readings.len(), 0);
     for (count, metres) in counts.iter_mut().zip(readings) {
-        let (before, behind) = (*metres < least, *metres > most);
+        let before = *metres < least;
+        let behind = *metres > most;
         let one = 1 | Counts::from(before) << BITS | Counts::from(behind) << (2 * BITS);
         *count = if is_reading(*metres) { one } else { 0 };
     }
@@ -169,7 +172,8 @@ mod tests {
                 _ => ((x * 31 + y * 17) % 50) as f32 * 0.1,
             });
             let range = f64::from(near)..=f64::from(near + long);
-            let (grid, mut lattice) = (Grid::new((width + 2, height + 2), side), Lattice::default());
+            let grid = Grid::new((width + 2, height + 2), side);
+            let mut lattice = Lattice::default();
             lattice.fill(&depth, &grid, range.clone());
             let mut found = Vec::new();
             let slow: Vec<Option<f64>> = grid

@@ -314,7 +314,8 @@ fn weights(bytes: &[u8]) -> Result<Vec<f32>, String> {
 #[multiversion::multiversion(targets("x86_64+avx2"))]
 pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut lanes = [0.0_f32; 8];
-    let (heads, tails) = (a.chunks_exact(8), b.chunks_exact(8));
+    let heads = a.chunks_exact(8);
+    let tails = b.chunks_exact(8);
     let rest: f32 = heads.remainder().iter().zip(tails.remainder()).map(|(x, y)| x * y).sum();
     for (x, y) in heads.zip(tails) {
         lanes.iter_mut().zip(x.iter().zip(y)).for_each(|(lane, (x, y))| *lane += x * y);

@@ -25,7 +25,8 @@ impl Taps {
         let reach = step.max(1.0);
         for i in 0..count {
             let centre = origin + (i as f64 + 0.5) * step - 0.5;
-            let (start, end) = ((centre - reach).ceil() as i64, (centre + reach).floor() as i64);
+            let start = (centre - reach).ceil() as i64;
+            let end = (centre + reach).floor() as i64;
             let weight = |x: i64| (1.0 - (x as f64 - centre).abs() / reach).max(0.0);
             let total: f64 = (start..=end).map(weight).sum();
             self.starts.push((start, self.weights.len()));
@@ -88,8 +89,8 @@ impl Resampler {
         self.columns.fill(origin.0, step, width);
         self.rows.fill(origin.1, step, height);
         for (index, lines) in out.chunks_mut(width * LANES).enumerate() {
-            let (span, rows) =
-                (spans.pixels(index), LANES * index..height.min(LANES * (index + 1)));
+            let span = spans.pixels(index);
+            let rows = LANES * index..height.min(LANES * (index + 1));
             if !span.is_empty() {
                 self.fill_rows(image, span, rows, lines);
             }
@@ -105,7 +106,8 @@ impl Resampler {
         lines: &mut [f32],
     ) {
         let Self { columns, rows: all_rows, tall, beside, across } = self;
-        let (sources, width) = (columns.sources(span.clone()), lines.len() / rows.len());
+        let sources = columns.sources(span.clone());
+        let width = lines.len() / rows.len();
         for (tall, row) in tall.iter_mut().zip(all_rows.of(rows)) {
             add_rows(image, row, sources.clone(), tall);
         }
@@ -126,7 +128,8 @@ fn add_rows(
     columns: Range<i64>,
     out: &mut Vec<f32>,
 ) {
-    let (last_row, last_column) = (image.height() as i64 - 1, image.width() as i64 - 1);
+    let last_row = image.height() as i64 - 1;
+    let last_column = image.width() as i64 - 1;
     let inside = columns.start.clamp(0, last_column)..columns.end.clamp(1, last_column + 1);
     out.clear();
     out.resize((columns.end - columns.start) as usize, 0.0);
@@ -138,7 +141,8 @@ fn add_rows(
         let source = &image.row(y.clamp(0, last_row) as usize)[inside.start as usize..];
         add_scaled(&mut out[middle.clone()], source, *weight);
     }
-    let (left, right) = (out[middle.start], out[middle.end - 1]);
+    let left = out[middle.start];
+    let right = out[middle.end - 1];
     out[..middle.start].fill(left);
     out[middle.end..].fill(right);
 }

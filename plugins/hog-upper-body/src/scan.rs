@@ -130,12 +130,15 @@ impl Scanner {
         let around_px = around_px(self.layout.kind);
         let [wide, tall] = self.layout.cells();
         let [left, top, right, bottom] = bounds;
-        let (across, down) = ((right - left) as usize + wide, (bottom - top) as usize + tall);
+        let across = (right - left) as usize + wide;
+        let down = (bottom - top) as usize + tall;
         let places = wanted.iter().map(|w| ((w.x - left) as usize, (w.y - top) as usize));
         self.spans.fill(places, (wide, tall), down);
         let start = |cell: i64| ((cell * CELL as i64) as f64 - around_px as f64) * step;
-        let (origin, size) = ((start(left), start(top)), [across, down].map(|n| n * CELL + 2));
-        let (size, spans) = ((size[0], size[1]), &self.spans);
+        let origin = (start(left), start(top));
+        let size = [across, down].map(|n| n * CELL + 2);
+        let size = (size[0], size[1]);
+        let spans = &self.spans;
         self.resampler.fill(image, origin, step, size, spans, &mut self.pixels);
         self.judge.fill(&self.pixels, size.0, spans);
     }
@@ -223,7 +226,8 @@ fn inside(length: f64, margin: f64) -> Range<i64> {
 pub fn window_of(square: &Rect, coverage: Coverage) -> Rect {
     let step = square.width / (FILLED * WINDOW_PX as f64);
     let (left, above) = margins();
-    let (width, height) = (WINDOW_PX as f64 * step, (coverage.rows() * CELL) as f64 * step);
+    let width = WINDOW_PX as f64 * step;
+    let height = (coverage.rows() * CELL) as f64 * step;
     Rect::new(square.x - left * step, square.y - above * step, width, height)
 }
 
@@ -242,8 +246,10 @@ pub fn window_numbers(image: &GreyImage, square: &Rect, layout: impl Into<Layout
     let layout = layout.into();
     let Layout { kind, coverage } = layout;
     let step = square.width.max(1.0) / (FILLED * WINDOW_PX as f64);
-    let (window, margin) = (window_of(square, coverage), around_px(kind) as f64 * step);
-    let (origin, cells) = ((window.x - margin, window.y - margin), layout.cells());
+    let window = window_of(square, coverage);
+    let margin = around_px(kind) as f64 * step;
+    let origin = (window.x - margin, window.y - margin);
+    let cells = layout.cells();
     let [width, height] = cells.map(|cells| cells * CELL + 2);
     let pixels = resampled(image, origin, step, cells);
     let mut field = Field::new(kind);

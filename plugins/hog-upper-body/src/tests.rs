@@ -35,7 +35,8 @@ fn slow_cell(pixels: &[f32], width: usize, cell: (usize, usize)) -> [f32; BINS] 
     let mut histogram = [0.0; BINS];
     for y in 1..height - 1 {
         for x in 1..width - 1 {
-            let (gx, gy) = (root(x + 1, y) - root(x - 1, y), root(x, y + 1) - root(x, y - 1));
+            let gx = root(x + 1, y) - root(x - 1, y);
+            let gy = root(x, y + 1) - root(x, y - 1);
             let away = |pixel: usize, cell: usize| (pixel as f32 - 0.5 - centre(cell)).abs();
             let near = |d: f32| (1.0 - d / CELL as f32).max(0.0);
             let share = near(away(x, cell.0)) * near(away(y, cell.1));
@@ -79,7 +80,8 @@ fn scan(
     sides: &[f64],
     part: impl Fn(&Rect) -> bool,
 ) -> Vec<Window> {
-    let (sides, mut found) = (sides.iter().copied(), Vec::new());
+    let sides = sides.iter().copied();
+    let mut found = Vec::new();
     let propose = |grid: &Grid, wanted: &mut Vec<Wanted>| {
         wanted.extend(grid.windows(|square| part(square).then_some(None)));
     };
@@ -150,8 +152,8 @@ fn slow_channels(pixels: &[f32], width: usize, cell: (usize, usize)) -> [f32; DE
     for y in 1 + cell.1 * channels::CELL..1 + (cell.1 + 1) * channels::CELL {
         for x in 1 + cell.0 * channels::CELL..1 + (cell.0 + 1) * channels::CELL {
             let at = |x: usize, y: usize| pixels[y * width + x] / 255.0;
-            let (gx, gy) =
-                ((at(x + 1, y) - at(x - 1, y)) / 2.0, (at(x, y + 1) - at(x, y - 1)) / 2.0);
+            let gx = (at(x + 1, y) - at(x - 1, y)) / 2.0;
+            let gy = (at(x, y + 1) - at(x, y - 1)) / 2.0;
             let length = gx.hypot(gy);
             let angle = gy.atan2(gx).rem_euclid(std::f32::consts::PI);
             let at_bin = angle / std::f32::consts::PI * bins as f32;
@@ -173,13 +175,15 @@ fn channels_are_those_of_the_slow_reference() {
     let pixels: Vec<f32> = image.pixels().iter().map(|v| f32::from(*v)).collect();
     let mut channels = Channels::default();
     channels.fill(&pixels, 50, &Spans::whole(50, 42));
-    let (columns, rows) = (12_i64, 10_i64);
+    let columns = 12_i64;
+    let rows = 10_i64;
     let cell = |x: i64, y: i64| slow_channels(&pixels, 50, (x as usize, y as usize));
     let inside = |x: i64, y: i64| (0..columns).contains(&x) && (0..rows).contains(&y);
     // Weighted mean over the existing cells around a cell.
     let mean = |x: i64, y: i64, weights: &[f32], number: &dyn Fn(i64, i64) -> f32| {
         let reach = weights.len() as i64 / 2;
-        let (mut sum, mut total) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut total = 0.0;
         for (dy, v) in (-reach..).zip(weights) {
             for (dx, w) in (-reach..).zip(weights) {
                 if inside(x + dx, y + dy) {
@@ -295,7 +299,8 @@ proptest! {
         let image = GreyImage::from_fn(120, 90, |x, y| (x + y) as u8);
         let found = resampled(&image, (x, y), step, [1, 1]);
         for (index, value) in found.iter().enumerate() {
-            let (i, j) = ((index % 10) as f64 + 0.5, (index / 10) as f64 + 0.5);
+            let i = (index % 10) as f64 + 0.5;
+            let j = (index / 10) as f64 + 0.5;
             let expected = x + i * step - 0.5 + y + j * step - 0.5;
             prop_assert!((f64::from(*value) - expected).abs() < 0.35, "{value} {expected}");
         }
@@ -305,13 +310,15 @@ proptest! {
 /// Returns a sample pixel by pixel: a triangle as wide as the step, or as a pixel.
 fn slow_sample(image: &GreyImage, (x, y): (f64, f64), step: f64) -> f64 {
     let reach = step.max(1.0);
-    let (mut sum, mut total) = (0.0, 0.0);
+    let mut sum = 0.0;
+    let mut total = 0.0;
     for row in -60..160_i64 {
         for column in -60..160_i64 {
             let near =
                 |at: i64, centre: f64| (1.0 - (at as f64 + 0.5 - centre).abs() / reach).max(0.0);
             let weight = near(column, x) * near(row, y);
-            let (right, bottom) = (image.width() as i64 - 1, image.height() as i64 - 1);
+            let right = image.width() as i64 - 1;
+            let bottom = image.height() as i64 - 1;
             let value = image.row(row.clamp(0, bottom) as usize)[column.clamp(0, right) as usize];
             sum += weight * f64::from(value);
             total += weight;
@@ -329,7 +336,8 @@ proptest! {
     ) {
         let image = noise(57, 43, 8);
         for (index, value) in resampled(&image, (x, y), step, [1, 1]).iter().enumerate().step_by(7) {
-            let (i, j) = ((index % 10) as f64 + 0.5, (index / 10) as f64 + 0.5);
+            let i = (index % 10) as f64 + 0.5;
+            let j = (index / 10) as f64 + 0.5;
             let slow = slow_sample(&image, (x + i * step, y + j * step), step);
             prop_assert!((f64::from(*value) - slow).abs() < 0.02, "{index}: {value} {slow}");
         }
@@ -341,10 +349,12 @@ proptest! {
     ) {
         let grid = Grid::new((width, height), side);
         let is_inside = |square: &Rect| {
-            let (right, bottom) = (width as f64 + 1e-9, height as f64 + 1e-9);
+            let right = width as f64 + 1e-9;
+            let bottom = height as f64 + 1e-9;
             square.x > -1e-9 && square.y > -1e-9 && square.right() < right && square.bottom() < bottom
         };
-        let (columns, rows) = (grid.columns.clone(), grid.rows.clone());
+        let columns = grid.columns.clone();
+        let rows = grid.rows.clone();
         for (x, y, is) in [
             (columns.start, rows.start, true),
             (columns.end - 1, rows.end - 1, true),
@@ -357,7 +367,8 @@ proptest! {
             prop_assert_eq!(is_inside(&square), is, "{} {}: {:?}", x, y, square);
             prop_assert_eq!((square.width, square.height), (side, side));
             // The window begins at its cell, of 8 pixels of the resampled image.
-            let (window, cell) = (crate::window_of(&square, Coverage::UpperBody), side / (0.5 * WINDOW_PX as f64) * 8.0);
+            let window = crate::window_of(&square, Coverage::UpperBody);
+            let cell = side / (0.5 * WINDOW_PX as f64) * 8.0;
             prop_assert!((window.x - x as f64 * cell).abs() < 1e-9);
             prop_assert!((window.y - y as f64 * cell).abs() < 1e-9);
             prop_assert!((window.width - 2.0 * side).abs() < 1e-9);
@@ -388,7 +399,8 @@ mod training {
     fn picture(is_person: bool, seed: u64) -> GreyImage {
         let mut random = XorShift64::new(seed + 1);
         GreyImage::from_fn(96, 96, |x, y| {
-            let (dx, dy) = (x as f64 - 48.0, y as f64 - 38.0);
+            let dx = x as f64 - 48.0;
+            let dy = y as f64 - 38.0;
             let dark = match is_person {
                 true => dx.hypot(dy) < 9.0 || (dy > 12.0 && dx.abs() < 19.0),
                 false => (x / (5 + seed as usize % 9)).is_multiple_of(2),
@@ -452,7 +464,8 @@ mod training {
                     let numbers = window_numbers(&picture(is_person, seed), &SQUARE, kind);
                     model.log_odds(model.sum_of(&numbers))
                 };
-                let (person, bars) = (log_odds(true), log_odds(false));
+                let person = log_odds(true);
+                let bars = log_odds(false);
                 assert!(person > 0.0 && bars < person, "{kind:?} {seed}: {person} {bars}");
             }
         }

@@ -216,14 +216,17 @@ impl State {
         &mut self,
         parts: impl Iterator<Item = (f64, &'s Self)> + Clone,
     ) {
-        let (mut image, mut range) = (Vector5::zeros(), Vector2::zeros());
+        let mut image = Vector5::zeros();
+        let mut range = Vector2::zeros();
         for (weight, state) in parts.clone() {
             image += state.image * weight;
             range += state.range * weight;
         }
-        let (mut image_covariance, mut range_covariance) = (Matrix5::zeros(), Matrix2::zeros());
+        let mut image_covariance = Matrix5::zeros();
+        let mut range_covariance = Matrix2::zeros();
         for (weight, state) in parts {
-            let (apart, farther) = (state.image - image, state.range - range);
+            let apart = state.image - image;
+            let farther = state.range - range;
             image_covariance += (state.image_covariance + apart * apart.transpose()) * weight;
             range_covariance += (state.range_covariance + farther * farther.transpose()) * weight;
         }
@@ -297,8 +300,10 @@ impl State {
         seen_covariance.fixed_view_mut::<2, 2>(4, 4).copy_from(&self.range_covariance);
         let jacobian = head.jacobian(camera);
         let covariance = jacobian * seen_covariance * jacobian.transpose();
-        let (width, height) = (self.image[4], self.image[4] * self.shape.aspect);
-        let (left, top) = (self.image[0] - 0.5 * width, self.image[1] - 0.5 * height);
+        let width = self.image[4];
+        let height = self.image[4] * self.shape.aspect;
+        let left = self.image[0] - 0.5 * width;
+        let top = self.image[1] - 0.5 * height;
         Estimate {
             person: Person { position: place.position, velocity: place.velocity.xy() },
             covariance: symmetric(covariance),

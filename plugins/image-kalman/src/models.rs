@@ -167,9 +167,11 @@ mod tests {
     /// Returns the probability of the last model in each frame, and the errors of the predictions
     /// in the three frames after the turn, px.
     fn walked(config: &Config) -> (Vec<f64>, f64) {
-        let (configs, camera) = (configs_of(config), camera());
+        let configs = configs_of(config);
+        let camera = camera();
         let mut models = Models::start(&configs, &seen(way(0)), &camera);
-        let (mut weights, mut off) = (Vec::new(), 0.0);
+        let mut weights = Vec::new();
+        let mut off = 0.0;
         for step in 1..40 {
             models.predict(&configs, &EgoMotion::at_rest(DT_S), &camera);
             let found = models.estimate(&camera).unwrap().region.centre();
@@ -195,7 +197,8 @@ mod tests {
 
     #[test]
     fn one_model_is_the_plain_filter() {
-        let (config, camera) = (config(0.0), camera());
+        let config = config(0.0);
+        let camera = camera();
         let configs = configs_of(&config);
         let mut models = Models::start(&configs, &seen(0.0), &camera);
         let mut plain = State::start(&config, &seen(0.0), &camera);
@@ -212,7 +215,8 @@ mod tests {
     #[test]
     fn without_changes_each_model_keeps_its_state() {
         let config = Config { manoeuvre_rate_hz: 0.0, ..config(100.0) };
-        let (configs, camera) = (configs_of(&config), camera());
+        let configs = configs_of(&config);
+        let camera = camera();
         let mut models = Models::start(&configs, &seen(0.0), &camera);
         let mut second = State::start(&configs[1], &seen(0.0), &camera);
         for step in 1..9 {
@@ -228,7 +232,8 @@ mod tests {
     /// Half and half of two states that are 10 px apart: the spread is that of both, and 5² more.
     #[test]
     fn the_mixture_has_the_moments_of_its_parts() {
-        let (configs, camera) = (configs_of(&config(100.0)), camera());
+        let configs = configs_of(&config(100.0));
+        let camera = camera();
         let mut models = Models::start(&configs, &seen(0.0), &camera);
         let before = models.0[0].state.image_covariance[(0, 0)];
         models.0[1].state.image[0] += 10.0;

@@ -47,7 +47,8 @@ impl Gap {
             return None;
         }
         let whole_s: f64 = self.steps.iter().map(|(motion, _)| motion.dt).sum();
-        let (mut state, mut passed_s) = (self.state.clone(), 0.0);
+        let mut state = self.state.clone();
+        let mut passed_s = 0.0;
         for (at, (motion, then)) in self.steps.iter().enumerate() {
             passed_s += motion.dt;
             state.predict(config, motion, then);
@@ -63,7 +64,8 @@ impl Gap {
 
 /// Returns the detection that divides the straight way from one to another.
 fn between(from: &Detection, to: &Detection, part: f64, camera: &Camera) -> Detection {
-    let (a, b) = (from.rect_in(camera), to.rect_in(camera));
+    let a = from.rect_in(camera);
+    let b = to.rect_in(camera);
     let mix = |a: f64, b: f64| a + part * (b - a);
     let rect =
         Rect::new(mix(a.x, b.x), mix(a.y, b.y), mix(a.width, b.width), mix(a.height, b.height));

@@ -35,7 +35,8 @@ impl ImagePoint {
     pub(crate) fn in_space(&self, camera: &Camera) -> RobotPoint {
         let rotation = camera.robot_from_camera.rotation;
         let ray = camera.ray(self.pixel);
-        let (length, turning) = (ray.norm(), ray_slope(camera, self.pixel) * self.velocity);
+        let length = ray.norm();
+        let turning = ray_slope(camera, self.pixel) * self.velocity;
         let unit = ray / length;
         // Only the part across the ray turns the unit vector.
         let turning = (turning - unit * unit.dot(&turning)) / length;
@@ -98,7 +99,8 @@ impl RobotPoint {
     /// Projects the point into the image; `None` behind the camera.
     pub(crate) fn seen(&self, camera: &Camera) -> Option<ImagePoint> {
         let in_camera = camera.robot_from_camera.inverse_transform_point(&self.position);
-        let (depth, range) = (in_camera.z, in_camera.coords.norm());
+        let depth = in_camera.z;
+        let range = in_camera.coords.norm();
         let pixel = camera.project_from_camera(&in_camera).filter(|_| depth > NEAREST_M)?;
         let velocity = camera.robot_from_camera.rotation.inverse() * self.velocity;
         let turning = (velocity - camera.ray(pixel) * velocity.z) / depth;

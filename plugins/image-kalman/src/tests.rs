@@ -95,7 +95,8 @@ fn the_box_coasts_with_the_picture_while_the_robot_turns() {
     let motion = EgoMotion { turn: 0.02, ..EgoMotion::at_rest(DT_S) };
     let sightings = from_a_moving_robot(&motion, 30);
     let (seen, hidden) = sightings.split_at(20);
-    let (config, camera) = (Config::default(), camera());
+    let config = Config::default();
+    let camera = camera();
     let mut state = fed(config.clone(), seen, motion);
     hidden.iter().for_each(|_| state.predict(&config, &motion, &camera));
     let iou = state.estimate(&camera).region.iou(&hidden[9].rect().unwrap());
@@ -104,7 +105,8 @@ fn the_box_coasts_with_the_picture_while_the_robot_turns() {
 
 #[test]
 fn whoever_the_robot_turns_its_back_on_is_found_again_where_they_were() {
-    let (config, camera) = (Config::default(), camera());
+    let config = Config::default();
+    let camera = camera();
     let place = Point3::new(3.0, 0.2, 1.6);
     let mut state = fed(config.clone(), &vec![person(place); 10], EgoMotion::at_rest(DT_S));
     let turn = |state: &mut State, turn: f64| {
@@ -124,7 +126,8 @@ fn whoever_the_robot_turns_its_back_on_is_found_again_where_they_were() {
 /// second.
 #[test]
 fn a_person_behind_the_robot_walks_on() {
-    let (config, camera) = (Config::default(), camera());
+    let config = Config::default();
+    let camera = camera();
     let at = |frame: usize| Point3::new(3.0, -0.5 + 0.5 * DT_S * frame as f64, 1.6);
     let sightings: Vec<Detection> = (0..40).map(|frame| person(at(frame))).collect();
     let mut state = fed(config.clone(), &sightings, EgoMotion::at_rest(DT_S));
@@ -154,7 +157,8 @@ fn the_jacobian_foretells_the_point_in_space() {
             _ => there.range[column - 4] += by,
         }
         let after = there.in_space(&camera);
-        let (place, pace) = (after.position - before.position, after.velocity - before.velocity);
+        let place = after.position - before.position;
+        let pace = after.velocity - before.velocity;
         let moved = Vector5::new(place.x, place.y, place.z, pace.x, pace.y);
         let foretold = jacobian.column(column) * by;
         assert!((foretold - moved).norm() < 0.01 * moved.norm(), "{column}: {foretold} {moved}");
@@ -292,7 +296,8 @@ impl Line {
     /// Updates by a measurement; returns the normalised innovation squared.
     fn correct(&mut self, measured: f64, noise: f64) -> f64 {
         let [[a, b], [_, d]] = self.covariance;
-        let (spread, innovation) = (a + noise, measured - self.mean[0]);
+        let spread = a + noise;
+        let innovation = measured - self.mean[0];
         self.mean =
             [self.mean[0] + a / spread * innovation, self.mean[1] + b / spread * innovation];
         let cross = b - a * b / spread;
@@ -370,7 +375,8 @@ fn doubts(range_m: f64, [forward, left, turn]: [f64; 3]) -> [f64; 3] {
         let p = &state.image_covariance;
         [p[(0, 0)], p[(1, 1)], state.range_covariance[(0, 0)]]
     };
-    let (with, without) = (after(covariance), after(Matrix3::zeros()));
+    let with = after(covariance);
+    let without = after(Matrix3::zeros());
     std::array::from_fn(|i| with[i] - without[i])
 }
 
@@ -517,7 +523,8 @@ proptest! {
 
     #[test]
     fn pixels_are_as_uncertain_as_the_place(x in 1.5..7.0f64, y in -1.0..1.0f64, z in 0.8..1.9f64) {
-        let (camera, place) = (camera(), Point3::new(x, y, z));
+        let camera = camera();
+        let place = Point3::new(x, y, z);
         let covariance = Matrix3::new(0.04, 0.01, 0.0, 0.01, 0.09, 0.0, 0.0, 0.0, 0.01);
         let root = covariance.cholesky().unwrap().l();
         let mut expected = Matrix2::zeros();
@@ -567,7 +574,8 @@ fn after_a_gap(reupdate: bool, reached: u32) -> f64 {
 
 #[test]
 fn a_gap_that_is_filtered_anew_leaves_no_wrong_velocity() {
-    let (with, without) = (after_a_gap(true, 10), after_a_gap(false, 10));
+    let with = after_a_gap(true, 10);
+    let without = after_a_gap(false, 10);
     assert!(with.abs() < 0.5, "pixels a frame: {with}");
     assert!(without.abs() > 2.0 * with.abs().max(0.1), "{without} {with}");
     let went_on = after_a_gap(true, 20);
@@ -601,7 +609,8 @@ fn a_velocity_may_decay() {
     let after = |velocity_decay_s: f64| {
         let config = Config { velocity_decay_s, ..Config::default() };
         let mut state = fed(config.clone(), &sliding(30), EgoMotion::at_rest(DT_S));
-        let (place, speed) = (state.image[0], state.image[2]);
+        let place = state.image[0];
+        let speed = state.image[2];
         for _ in 0..100 {
             state.predict(&config, &EgoMotion::at_rest(0.1), &camera());
         }
@@ -619,11 +628,13 @@ fn a_shaking_camera_moves_boxes_and_gives_them_no_velocity() {
     let after = |position_noise: f64| {
         let config = Config { position_noise, ..Config::default() };
         let mut state = State::start(&config, &ahead(4.0).1, &ahead(4.0).0);
-        let (before, width) = (state.image_covariance, state.image[4]);
+        let before = state.image_covariance;
+        let width = state.image[4];
         state.predict(&config, &EgoMotion::at_rest(0.1), &camera());
         (state.image_covariance - before) / width.powi(2)
     };
-    let (still, shaken) = (after(0.0), after(0.5));
+    let still = after(0.0);
+    let shaken = after(0.5);
     for axis in 0..2 {
         let grown = shaken[(axis, axis)] - still[(axis, axis)];
         assert!((grown - 0.25 * 0.1).abs() < 1e-9, "{grown}");
@@ -641,7 +652,8 @@ fn the_box_of_a_detection_may_be_reported_as_it_is() {
         state.predict(&config, &EgoMotion::at_rest(DT_S), &camera());
         (seen == sightings[2].rect().unwrap(), state.estimate(&camera()).region)
     };
-    let (filtered, observed) = (region(false), region(true));
+    let filtered = region(false);
+    let observed = region(true);
     assert_eq!((filtered.0, observed.0), (false, true));
     assert_eq!(filtered.1, observed.1, "what is expected is the filter's in any case");
 }

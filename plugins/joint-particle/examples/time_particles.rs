@@ -75,7 +75,8 @@ fn look_up() -> (f64, f64) {
     let known = (0..50).map(|k| 0.5 + uniform(2000 + k)).collect();
     let map = LikelihoodMap::new(Method::Kde, places(0, 50), known, &Config::default());
     let at = places(50, 625);
-    let (mut best, mut found) = (f64::INFINITY, Vec::new());
+    let mut best = f64::INFINITY;
+    let mut found = Vec::new();
     for _ in 0..CALLS {
         let start = Instant::now();
         found = black_box(map.at_all(&at));

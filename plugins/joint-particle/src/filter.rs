@@ -141,7 +141,8 @@ impl JointParticle {
                 *id = other(*id);
             }
         }
-        let (of_a, of_b) = (self.headings.remove(&a), self.headings.remove(&b));
+        let of_a = self.headings.remove(&a);
+        let of_b = self.headings.remove(&b);
         self.headings.extend(of_a.map(|h| (b, h)).into_iter().chain(of_b.map(|h| (a, h))));
     }
 
@@ -245,7 +246,8 @@ impl Filter for JointParticle {
     }
 
     fn visualise(&self, evidence: &Evidence<'_>) -> Result<Option<Visualisation>> {
-        let (mut shown, nobody) = (Sketch::default(), BTreeMap::new());
+        let mut shown = Sketch::default();
+        let nobody = BTreeMap::new();
         let Some(likelihood) = evidence.likelihood else { return Ok(None) };
         let mut look =
             WeighingInput::new(evidence.frame, likelihood, &self.config, &self.headings, &nobody);
@@ -326,8 +328,10 @@ mod tests {
     /// Returns for twelve frames without a detection if a person that explains this many nats is
     /// seen, and then for one more frame with a detection.
     fn seen(nats: f64) -> (Vec<bool>, bool) {
-        let (mut filter, id) = (JointParticle::new(Config::default(), 1).unwrap(), TrackId(1));
-        let (frame, detection) = (frame(), detection());
+        let mut filter = JointParticle::new(Config::default(), 1).unwrap();
+        let id = TrackId(1);
+        let frame = frame();
+        let detection = detection();
         let flattering = Flattering(nats);
         filter.start(id, &detection, &frame.camera);
         let mut is_seen = |matched: &[Matched<'_>]| {
@@ -344,7 +348,8 @@ mod tests {
     #[test]
     fn a_picture_shows_every_particle_and_a_map_of_two_people_who_overlap() {
         let config = Config { method: Method::Kde, ..Config::default() };
-        let (mut filter, frame) = (JointParticle::new(config.clone(), 1).unwrap(), frame());
+        let mut filter = JointParticle::new(config.clone(), 1).unwrap();
+        let frame = frame();
         let farther = Detection { position: Point3::new(3.0, 0.1, 1.6), ..detection() };
         filter.start(TrackId(1), &detection(), &frame.camera);
         filter.start(TrackId(2), &farther, &frame.camera);

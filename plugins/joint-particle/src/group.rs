@@ -305,7 +305,8 @@ mod tests {
         let one = at_places(1, &evenly, &[1.0 / 400.0; 400]);
         let merged =
             one.clone().merge(at_places(2, &evenly, &[1.0 / 400.0; 400]), &Config::default());
-        let (a, b) = (places(&merged, 0), places(&merged, 1));
+        let a = places(&merged, 0);
+        let b = places(&merged, 1);
         let product: f64 = a.iter().zip(&b).map(|(a, b)| (a - 199.5) * (b - 199.5)).sum();
         let square: f64 = a.iter().map(|a| (a - 199.5).powi(2)).sum();
         assert!((product / square).abs() < 0.15 && merged.rows() == 400, "{}", product / square);

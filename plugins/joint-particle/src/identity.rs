@@ -173,7 +173,8 @@ mod tests {
             let frame = frame(mirrored, true);
             colours(&frame, frame.colour().unwrap(), &head).unwrap()
         };
-        let (red, blue) = (of(false), of(true));
+        let red = of(false);
+        let blue = of(true);
         assert!((red.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         // In six shades, 200 and 20 of 256 are 4 and 0.
         assert_eq!((red[4 * 36], blue[4]), (1.0, 1.0));

@@ -69,7 +69,8 @@ fn parzen_lanes(
     for (place, likelihood) in places.iter().zip(likelihoods) {
         let place = [place[0] * per_unit[0], place[1] * per_unit[1]];
         for lane in 0..LANES {
-            let (near, far) = (place[0] - at[0][lane], place[1] - at[1][lane]);
+            let near = place[0] - at[0][lane];
+            let far = place[1] - at[1][lane];
             sums[lane] += likelihood * exp2_of_negative(-(near * near + far * far));
         }
     }
@@ -217,7 +218,8 @@ mod tests {
 
     /// A likelihood ridge of two people: sharp in the near one, wide and sloping in the far one.
     fn ridge(at: &PositionPair) -> f64 {
-        let (near, far) = (at[0] - 0.03, at[1] - 0.2 - 0.5 * at[0]);
+        let near = at[0] - 0.03;
+        let far = at[1] - 0.2 - 0.5 * at[0];
         (-0.5 * (near / 0.06).powi(2) - 0.5 * (far / 0.18).powi(2)).exp()
     }
 
@@ -252,7 +254,8 @@ mod tests {
 
     fn correlation(a: &[f64], b: &[f64]) -> f64 {
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-        let (ma, mb) = (mean(a), mean(b));
+        let ma = mean(a);
+        let mb = mean(b);
         let dot = |x: &[f64], mx: f64, y: &[f64], my: f64| -> f64 {
             x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum()
         };
@@ -348,7 +351,8 @@ mod tests {
             grid.iter().map(|at| at[1] * map(at)).sum::<f64>() / sum
         };
         let truth = mean(&ridge);
-        let (mut by_sum, mut by_gp) = (0.0, 0.0);
+        let mut by_sum = 0.0;
+        let mut by_gp = 0.0;
         for seed in 0..10 {
             let places = sampled(50, seed);
             let known: Vec<f64> = places.iter().map(ridge).collect();

@@ -50,7 +50,8 @@ fn link(a: &Estimate, b: &Estimate, before: Option<u32>, config: &Config) -> Opt
 }
 
 fn inflated(region: &Rect, part: f64) -> Rect {
-    let (dx, dy) = (0.5 * part * region.width, 0.5 * part * region.height);
+    let dx = 0.5 * part * region.width;
+    let dy = 0.5 * part * region.height;
     Rect::new(region.x - dx, region.y - dy, region.width + 2.0 * dx, region.height + 2.0 * dy)
 }
 
@@ -90,7 +91,8 @@ mod tests {
 
     #[test]
     fn people_whose_silhouettes_overlap_are_one_group_and_part_with_hysteresis() {
-        let (config, mut overlaps) = (Config::default(), Overlaps::default());
+        let config = Config::default();
+        let mut overlaps = Overlaps::default();
         let count = |overlaps: &mut Overlaps, y| {
             overlaps.groups(&people(&[(2.0, 0.0), (3.0, y)]), &config).len()
         };

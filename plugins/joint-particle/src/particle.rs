@@ -43,7 +43,8 @@ impl Transition {
     /// Returns F times a matrix without the products with the zeros of F, which are half of them:
     /// places and velocities turn, places move by velocities, and the height stays.
     fn times(&self, matrix: &Matrix5<f64>) -> Matrix5<f64> {
-        let (f, mut product) = (&self.f, *matrix);
+        let f = &self.f;
+        let mut product = *matrix;
         for (from, mut to) in matrix.column_iter().zip(product.column_iter_mut()) {
             for i in 0..2 {
                 to[i] = f[(i, 0)] * from[0] + f[(i, 1)] * from[1];
@@ -75,7 +76,8 @@ fn process_noise(dt: f64, config: &Config) -> Matrix5<f64> {
 /// Returns the noise that the uncertainty of the robot's own motion adds to the position.
 fn ego_noise(predicted: &Vector5<f64>, motion: &EgoMotion) -> Matrix5<f64> {
     let (sin, cos) = motion.turn.sin_cos();
-    let (x, y) = (predicted[0], predicted[1]);
+    let x = predicted[0];
+    let y = predicted[1];
     let by_motion = nalgebra::Matrix2x3::new(-cos, -sin, y, sin, -cos, -x);
     let mut noise = Matrix5::zeros();
     let place = by_motion * motion.covariance * by_motion.transpose();

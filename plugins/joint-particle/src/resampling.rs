@@ -33,7 +33,8 @@ pub fn systematic(weights: &[f64], count: usize, random: &mut Random) -> Vec<usi
 /// Returns for each of the ascending points in 0..1 the first index with a cumulated weight above
 /// it.
 fn pick(weights: &[f64], points: impl Iterator<Item = f64>) -> Vec<usize> {
-    let (mut index, mut sum) = (0, weights.first().copied().unwrap_or_default());
+    let mut index = 0;
+    let mut sum = weights.first().copied().unwrap_or_default();
     points
         .map(|point| {
             while sum <= point && index + 1 < weights.len() {

@@ -200,7 +200,8 @@ struct Lateral {
 impl Lateral {
     fn new(group: &Group, look: &WeighingInput<'_>) -> Self {
         let order = look.order(group);
-        let (near, far) = (order[0], order[1]);
+        let near = order[0];
+        let far = order[1];
         let means = [near, far].map(|person| group.mean(person));
         let origin = Point2::new(means[0][0], means[0][1]);
         let across = look.config.sampling.steps().lateral_axis(&(origin - look.eye));
@@ -243,7 +244,8 @@ impl Lateral {
             mean[1] += shift.y;
             Particle { mean, covariance: nalgebra::Matrix5::zeros() }
         };
-        let (near, far) = (moved(0), moved(1));
+        let near = moved(0);
+        let far = moved(1);
         if self.near == 0 { [near, far] } else { [far, near] }
     }
 }
@@ -293,7 +295,8 @@ fn refine(group: &mut Group, look: &mut WeighingInput<'_>, person: usize) -> Res
         if variance.is_nan() || variance <= 1e-8 {
             continue;
         }
-        let (sigma, id) = (variance.sqrt(), group.ids[person]);
+        let sigma = variance.sqrt();
+        let id = group.ids[person];
         let moved = |i: usize| {
             let mut moved = best.clone();
             moved.mean.fixed_rows_mut::<3>(0).axpy(offset(i, sigma), &h, 1.0);
@@ -436,7 +439,8 @@ pub(crate) fn sketch(
 /// Adds the maps of P3, Figure 7: the table (b), and its approximation from a few particles (d).
 /// Their peaks are so sharp that fourth roots are shown.
 fn sketch_maps(group: &Group, look: &mut WeighingInput<'_>, sketch: &mut Sketch) -> Result<()> {
-    let (lateral, grid) = (Lateral::new(group, look), Grid::new(look.config));
+    let lateral = Lateral::new(group, look);
+    let grid = Grid::new(look.config);
     let chosen = chosen(&lateral.places(group), &group.likelihoods, look.config);
     let approximated = matches!(look.config.method, Method::Kde | Method::Gp);
     let kinds = [(Method::Table, "table"), (look.config.method, "approximated")];
@@ -522,7 +526,8 @@ mod tests {
         };
         let mut group = single(1, 2.0).merge(single(2, 3.0), config);
         let frame = frame(tagalong_core::EgoMotion::at_rest(0.1), None);
-        let (headings, sightings) = (BTreeMap::new(), BTreeMap::new());
+        let headings = BTreeMap::new();
+        let sightings = BTreeMap::new();
         let mut look = WeighingInput::new(&frame, likelihood, config, &headings, &sightings);
         work(&mut group, &mut look)
     }

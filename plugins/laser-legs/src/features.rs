@@ -122,7 +122,8 @@ fn circle(points: &[Point2<f64>], middle: &Point2<f64>) -> (f64, f64) {
         let q = point - middle;
         (Vector3::new(2.0 * q.x, 2.0 * q.y, 1.0), q.norm_squared())
     });
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    let mut normal = Matrix3::zeros();
+    let mut right = Vector3::zeros();
     for (row, value) in rows {
         normal += row * row.transpose();
         right += row * value;
@@ -151,7 +152,9 @@ fn boundary(points: &[Point2<f64>]) -> [f64; 2] {
 /// Returns the mean curvature of the circles through three neighbouring points, 1/m.
 fn curvature(points: &[Point2<f64>]) -> f64 {
     let of_three = |three: &[Point2<f64>]| {
-        let (ab, bc, ac) = (three[1] - three[0], three[2] - three[1], three[2] - three[0]);
+        let ab = three[1] - three[0];
+        let bc = three[2] - three[1];
+        let ac = three[2] - three[0];
         let doubled_area = (ab.x * ac.y - ab.y * ac.x).abs();
         2.0 * doubled_area / (ab.norm() * bc.norm() * ac.norm()).max(1e-9)
     };

@@ -40,7 +40,8 @@ impl PastScans {
         for scan in &mut self.scans {
             let at = Point2::from(scan.now_from_then.translation.vector);
             let ahead = scan.now_from_then * Point2::new(1.0, 0.0);
-            let (at, ahead) = (motion.apply_to_point(at), motion.apply_to_point(ahead));
+            let at = motion.apply_to_point(at);
+            let ahead = motion.apply_to_point(ahead);
             // The heading from two points, because the motion maps points.
             let ahead = ahead - at;
             scan.now_from_then = Isometry2::new(at.coords, ahead.y.atan2(ahead.x));
@@ -69,7 +70,8 @@ impl PastScans {
     /// is not known.
     pub(crate) fn was_free(&self, place: &Point2<f64>) -> f64 {
         let old = self.scans.iter().filter(|scan| scan.age_s >= YOUNGEST_S);
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut count = 0.0;
         for vote in old.filter_map(|scan| scan.was_free(place)) {
             sum += if vote { 1.0 } else { -1.0 };
             count += 1.0;
@@ -82,13 +84,16 @@ impl PastScan {
     /// Returns whether a place was free; `None` if it was hidden.
     fn was_free(&self, place: &Point2<f64>) -> Option<bool> {
         let then = self.now_from_then.inverse_transform_point(place);
-        let (range, bearing) = (then.coords.norm(), then.y.atan2(then.x));
+        let range = then.coords.norm();
+        let bearing = then.y.atan2(then.x);
         // A thing of the size of a leg may have stood between two rays.
         let half = (NEAR_M / range.max(NEAR_M)).max(1.5 * self.step_rad);
         let first = self.bearings.partition_point(|(other, _)| *other < bearing - half);
         let window =
             self.bearings[first..].iter().take_while(|(other, _)| *other <= bearing + half);
-        let (mut is_occupied, mut nearer, mut rays) = (false, 0.0, 0.0);
+        let mut is_occupied = false;
+        let mut nearer = 0.0;
+        let mut rays = 0.0;
         for (other, there) in window {
             let across = range * (other - bearing).abs();
             is_occupied |= across.hypot(there - range) < NEAR_M;

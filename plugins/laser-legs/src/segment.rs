@@ -26,7 +26,8 @@ impl Beams {
     pub fn new(scan: &LaserScan, every: u32) -> Self {
         let every = every.max(1);
         let scanner = scan.robot_from_scanner.translation.vector.xy();
-        let (mut points, mut rays) = (Vec::new(), Vec::new());
+        let mut points = Vec::new();
+        let mut rays = Vec::new();
         for (point, ray) in scan.points.iter().zip(scan.rays.iter()) {
             if ray % every == 0 {
                 points.push(point.xy() - scanner);

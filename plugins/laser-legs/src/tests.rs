@@ -20,7 +20,8 @@ type Rounds = [([f64; 2], f64)];
 /// Returns what a scanner with so many rays all around measures, at a height in the robot frame.
 fn scan(rays: u32, rounds: &Rounds, pose: Isometry3<f64>) -> LaserScan {
     let step = TAU / f64::from(rays);
-    let (mut points, mut numbers) = (Vec::new(), Vec::new());
+    let mut points = Vec::new();
+    let mut numbers = Vec::new();
     for ray in 0..rays {
         let angle = -0.5 * TAU + f64::from(ray) * step;
         let ahead = nalgebra::Vector2::new(angle.cos(), angle.sin());
@@ -109,7 +110,8 @@ fn the_log_odds_of_a_person_are_those_of_the_legs_and_a_setting() {
         let [one] = &found[..] else { panic!("{found:?}") };
         one.clone()
     };
-    let (pair, single) = (of(&config, &LEGS), of(&config, &LEGS[..1]));
+    let pair = of(&config, &LEGS);
+    let single = of(&config, &LEGS[..1]);
     assert!((pair.score - 4.7).abs() < 1e-9 && (single.score - 1.1).abs() < 1e-9);
     for (found, sigma_m) in [(&pair, 0.08), (&single, 0.16)] {
         assert!((found.covariance[(1, 1)] - sigma_m * sigma_m).abs() < 1e-12);

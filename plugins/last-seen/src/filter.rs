@@ -72,7 +72,8 @@ impl PersonFilter for LastSeen {
         }
         let mut turn = Matrix3::identity();
         turn.fixed_view_mut::<2, 2>(0, 0).copy_from(&turn_back(&motion));
-        let (floor, height) = (self.config.wander.powi(2), HEIGHT_WANDER.powi(2));
+        let floor = self.config.wander.powi(2);
+        let height = HEIGHT_WANDER.powi(2);
         let grown = Matrix3::from_diagonal(&[floor, floor, height].into()) * motion.dt;
         let turned = turn * state.covariance * turn.transpose();
         state.covariance = 0.5 * (turned + turned.transpose()) + grown;

@@ -87,7 +87,8 @@ mod tests {
 
     #[test]
     fn each_newcomer_is_judged_alone_unless_the_config_says_otherwise() {
-        let (mut clutter, alone) = (ClutterMap::default(), Config::default());
+        let mut clutter = ClutterMap::default();
+        let alone = Config::default();
         for score in [-5.0, -5.0, 1.0] {
             assert_eq!(clutter.add_evidence(&scored(score, person(3.0, 0.0)), &alone), score);
         }

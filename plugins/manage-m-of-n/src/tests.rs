@@ -276,7 +276,8 @@ fn settings_that_cannot_work_are_refused() {
 #[test]
 fn the_older_of_two_takes_over_the_confirmation() {
     let mut rig = Rig::new(Config::default());
-    let (older, younger) = (rig.start(1.0, 0.0), rig.start(4.5, 0.0));
+    let older = rig.start(1.0, 0.0);
+    let younger = rig.start(4.5, 0.0);
     assert!(!rig.tracks[0].confirmed && rig.tracks[1].confirmed);
     assert!(rig.manager.merge(older, younger).unwrap().confirmed);
     rig.manager.stop(younger);

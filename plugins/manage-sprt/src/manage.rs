@@ -25,7 +25,8 @@ impl Sprt {
     /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config) -> Result<Self> {
         config.check()?;
-        let (evidence, clutter) = (BTreeMap::new(), ClutterMap::default());
+        let evidence = BTreeMap::new();
+        let clutter = ClutterMap::default();
         Ok(Self { config, evidence, clutter, dt_s: 0.0 })
     }
 

@@ -36,7 +36,8 @@ struct Scene {
 impl Scene {
     fn new(config: Config) -> Self {
         let manager = Sprt::new(config).unwrap();
-        let (ends, dropped) = (Vec::new(), Vec::new());
+        let ends = Vec::new();
+        let dropped = Vec::new();
         Self { manager, track: None, started: 0, ends, dropped, now_s: 0.0, confirmed_s: 0.0 }
     }
 

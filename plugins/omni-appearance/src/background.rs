@@ -80,7 +80,8 @@ impl Background {
         let kept = self.mean.iter_mut().zip(&mut self.squares).zip(&mut self.level);
         for (((mean, squares), level), colour) in kept.zip(colours) {
             // Welford's update.
-            let (value, before) = (f32::from(*colour), *mean);
+            let value = f32::from(*colour);
+            let before = *mean;
             *mean += part * (value - before);
             *squares += (value - before) * (value - *mean);
             *level = mean.round() as u8;

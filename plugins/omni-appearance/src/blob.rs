@@ -88,7 +88,8 @@ impl Blob {
             .map(|row| core.iter().map(|column| u32::from(row[*column])).sum())
             .collect();
         let full = |count: &u32| *count >= ROW_PIXELS;
-        let (top, lowest) = (rows.iter().position(full)?, rows.iter().rposition(full)?);
+        let top = rows.iter().position(full)?;
+        let lowest = rows.iter().rposition(full)?;
         let middle = above(&rows, 0.5);
         let features = Features {
             width: run.length as f64,
@@ -126,7 +127,8 @@ fn mean_colour(
     colours: &[u8],
 ) -> [f64; 3] {
     let width = counts.columns.len();
-    let (mut sums, mut pixels) = ([0.0; 3], 0.0_f64);
+    let mut sums = [0.0; 3];
+    let mut pixels = 0.0_f64;
     for at in rows.flat_map(|row| core.iter().map(move |column| row * width + column)) {
         if counts.solid[at] != 0 {
             pixels += 1.0;

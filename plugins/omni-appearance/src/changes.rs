@@ -96,7 +96,8 @@ impl Changes {
     /// images were not compared.
     pub(crate) fn part(&self, run: Run, width: usize, solid: &[u8]) -> f64 {
         let rows = solid.chunks_exact(width.max(1)).zip(self.changed.chunks_exact(width.max(1)));
-        let (mut all, mut changed) = (0_u32, 0_u32);
+        let mut all = 0_u32;
+        let mut changed = 0_u32;
         for (solid, differs) in rows {
             for column in run.columns(width).filter(|column| solid[*column] != 0) {
                 all += 1;
@@ -121,7 +122,8 @@ mod tests {
 
     #[test]
     fn the_part_is_that_of_the_solid_pixels_that_changed_across_the_seam() {
-        let (mut changes, mut sweep) = (Changes::default(), Sweep::default());
+        let mut changes = Changes::default();
+        let mut sweep = Sweep::default();
         let run = Run { first: 5, length: 3 };
         let solid = [1, 1, 1, 1, 1, 1, 1, 0, 1, 1, 1, 0];
         changes.compare(&mut sweep, &[], &image(&[], 0));
@@ -139,8 +141,10 @@ mod tests {
 
     #[test]
     fn images_of_a_fast_camera_are_compared_with_one_that_is_old_enough() {
-        let (mut changes, mut sweep) = (Changes::default(), Sweep::default());
-        let (run, solid) = (Run { first: 0, length: WIDTH }, [1; 2 * WIDTH]);
+        let mut changes = Changes::default();
+        let mut sweep = Sweep::default();
+        let run = Run { first: 0, length: WIDTH };
+        let solid = [1; 2 * WIDTH];
         let step = EgoMotion { forward: 0.05, turn: 0.1, ..EgoMotion::at_rest(0.08) };
         let mut part = |column: usize| {
             changes.move_by(&step);

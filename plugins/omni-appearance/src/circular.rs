@@ -13,7 +13,8 @@ pub struct Run {
 impl Run {
     /// Returns the columns, each below `width`.
     pub fn columns(&self, width: usize) -> impl Iterator<Item = usize> + use<> {
-        let (first, length) = (self.first, self.length);
+        let first = self.first;
+        let length = self.length;
         (0..length).map(move |i| (first + i) % width)
     }
 }
@@ -61,7 +62,8 @@ fn join_across_the_seam(found: &mut Vec<Run>, width: usize, bridge: usize) {
 /// is no weight.
 pub fn mean(run: &Run, width: usize, weight: impl Fn(usize) -> f64) -> f64 {
     // Offsets from the start of the run do not jump at the seam, as column numbers do.
-    let (mut sum, mut total) = (0.0, 0.0);
+    let mut sum = 0.0;
+    let mut total = 0.0;
     for (offset, column) in run.columns(width).enumerate() {
         sum += offset as f64 * weight(column);
         total += weight(column);
@@ -117,12 +119,14 @@ mod tests {
         ) {
             let width = on.len();
             let turned: Vec<bool> = (0..width).map(|c| on[(c + turn) % width]).collect();
-            let (before, after) = (runs(&on, 2), runs(&turned, 2));
+            let before = runs(&on, 2);
+            let after = runs(&turned, 2);
             prop_assert_eq!(before.len(), after.len());
             if before.len() == 1 && before[0].length < width {
                 let weight = |c: usize| if on[c] { 1.0 } else { 0.0 };
                 let of_turned = |c: usize| if turned[c] { 1.0 } else { 0.0 };
-                let (a, b) = (mean(&before[0], width, weight), mean(&after[0], width, of_turned));
+                let a = mean(&before[0], width, weight);
+                let b = mean(&after[0], width, of_turned);
                 let off = (a - b - turn as f64).rem_euclid(width as f64);
                 prop_assert!(off < 1e-9 || width as f64 - off < 1e-9, "{a} {b} {turn}");
             }

@@ -210,7 +210,8 @@ mod tests {
         let spread = |visible: f64| {
             let at = Point3::new(0.3 + 1.8, -2.4, 1.6);
             let c = detector().covariance(&at, &camera(), [3.0, 0.25], visible);
-            let (out, aside) = (Vector3::new(0.6, -0.8, 0.0), Vector3::new(0.8, 0.6, 0.0));
+            let out = Vector3::new(0.6, -0.8, 0.0);
+            let aside = Vector3::new(0.8, 0.6, 0.0);
             assert!(out.dot(&(c * aside)).abs() < 1e-12);
             assert!((c[(2, 2)] - 0.04).abs() < 1e-12 && c[(0, 2)].abs() + c[(1, 2)].abs() < 1e-12);
             (out.dot(&(c * out)), aside.dot(&(c * aside)))

@@ -177,7 +177,8 @@ mod tests {
 
     #[test]
     fn of_somebody_behind_another_only_what_is_seen_counts() {
-        let (near, far) = (expected(100.0, 20.0, 1.0), expected(122.0, 6.0, 3.0));
+        let near = expected(100.0, 20.0, 1.0);
+        let far = expected(122.0, 6.0, 3.0);
         let parts = divided(run(80, 49), 480, &[far, near]);
         assert_eq!(parts[0].run, run(80, 41));
         assert_eq!(parts[1].run, run(121, 8));

@@ -173,7 +173,8 @@ impl ImageState {
     /// Drops blobs that show what the previous image showed: edges of furniture that the moved
     /// background has in another place.
     fn drop_static(&mut self, config: &Config, funnel: &mut Funnel) {
-        let (solid, width) = (&self.segmenter.counts().solid, self.size.0);
+        let solid = &self.segmenter.counts().solid;
+        let width = self.size.0;
         let before = self.blobs.len();
         let changes = &self.changes;
         self.blobs.retain(|blob| changes.part(blob.run, width, solid) >= config.changed_part);
@@ -212,7 +213,8 @@ impl ImageState {
         }
         let dt_s = frame.motion.dt as f32;
         let seconds = |s: f64| if s > 0.0 { s as f32 } else { f32::INFINITY };
-        let (adapt_s, absorb_s) = (seconds(config.adapt_s), seconds(config.absorb_s));
+        let adapt_s = seconds(config.adapt_s);
+        let absorb_s = seconds(config.absorb_s);
         // Errors of the odometry accumulate in a moved background, so it is renewed soon.
         let (adapt_s, absorb_s, turns) = match self.uncertain {
             true => (adapt_s.min(MOVING_ADAPT_S), absorb_s.min(MOVING_ABSORB_S), 1),
@@ -260,7 +262,8 @@ fn warps_of(motion: &EgoMotion, frame: &Frame, panorama: &Panorama, config: &Con
 /// Returns the expected columns of the tracks that were known after the previous image.
 fn expected(known: &[Known], frame: &Frame) -> Vec<Expected> {
     let Some(view) = PanoramaGeometry::of(&frame.camera) else { return Vec::new() };
-    let (dt_s, moved) = (frame.motion.dt, frame.motion.isometry());
+    let dt_s = frame.motion.dt;
+    let moved = frame.motion.isometry();
     known.iter().map(|known| Expected::of(&known.moved(dt_s, &moved), frame, &view)).collect()
 }
 

@@ -101,7 +101,8 @@ impl Fit {
     }
 
     fn by_gradient(&self, start: Network, samples: &Scaled, rate: f64) -> (f64, Network) {
-        let (mut network, mut weights) = (start.clone(), weights_of(&start));
+        let mut network = start.clone();
+        let mut weights = weights_of(&start);
         let part = rate / samples.targets.len().max(1) as f64;
         for _ in 0..self.steps {
             let (jacobian, errors) = linearised(&network, &samples.inputs, &samples.targets);
@@ -112,7 +113,8 @@ impl Fit {
     }
 
     fn by_marquardt(&self, start: Network, samples: &Scaled) -> (f64, Network) {
-        let (mut network, mut damping) = (start, DAMPING);
+        let mut network = start;
+        let mut damping = DAMPING;
         let mut weights = weights_of(&network);
         let decay = samples.decay;
         let mut lowest = samples.cost(&network, &weights);
@@ -191,7 +193,8 @@ fn linearised(
     let mut jacobian = DMatrix::zeros(inputs.len(), weights);
     let mut errors = DVector::zeros(inputs.len());
     for (row, (x, target)) in inputs.iter().zip(targets).enumerate() {
-        let (mut column, mut answer) = (0, bias);
+        let mut column = 0;
+        let mut answer = bias;
         let behind = weights - network.output.len();
         for (unit, (hidden, weight)) in network.hidden.iter().zip(output).enumerate() {
             let (hidden, bias) = split(hidden);
@@ -248,7 +251,8 @@ mod tests {
     #[test]
     fn a_smooth_function_is_learned_and_the_same_seed_learns_the_same() {
         let (inputs, targets) = samples(150);
-        let (half, known) = (inputs[..100].to_vec(), &targets[..100]);
+        let half = inputs[..100].to_vec();
+        let known = &targets[..100];
         let network = FIT.network(&half, known, 3);
         assert_eq!(network, FIT.network(&half, known, 3));
         let off = |i: usize| (network.answer(&inputs[i]) - targets[i]).abs();
@@ -266,7 +270,8 @@ mod tests {
         };
         let printed = network(PRINTED);
         assert_eq!(printed, network(PRINTED));
-        let (slow, fast) = (mean(&printed), mean(&network(FIT)));
+        let slow = mean(&printed);
+        let fast = mean(&network(FIT));
         assert!(fast < 0.5 * slow && slow < 0.1, "{fast} {slow}");
         assert!(mean(&network(Fit { steps: 20, ..PRINTED })) > 2.0 * slow);
     }

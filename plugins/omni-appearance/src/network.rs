@@ -80,7 +80,8 @@ mod tests {
             output: vec![2.0, -1.0, 0.125],
         };
         assert!(network.is_sane(9));
-        let (a, b) = ((5.0 - 1.0) / 2.0, (0.0 - 2.0) / 4.0);
+        let a = (5.0 - 1.0) / 2.0;
+        let b = (0.0 - 2.0) / 4.0;
         let units = [(0.5_f64 * a - b + 0.25).tanh(), (a + b).tanh()];
         let expected = 3.0 + 0.5 * (2.0 * units[0] - units[1] + 0.125);
         assert!((network.answer(&[5.0, 0.0, 77.0]) - expected).abs() < 1e-12);

@@ -49,7 +49,8 @@ impl Segmenter {
         tinted: bool,
         config: &Config,
     ) {
-        let (low, high) = (&background.level, &background.level);
+        let low = &background.level;
+        let high = &background.level;
         self.compare_between(colours, [low, high], background, tinted, config);
     }
 
@@ -128,7 +129,9 @@ fn divided(run: &Run, columns: &[u16], valley: f64) -> Vec<Run> {
     let width = columns.len();
     // Smoothed, because a single thin column is not a valley between two people.
     let heights: Vec<f64> = smoothed(run, columns);
-    let (mut parts, mut start, mut peak) = (Vec::new(), 0, 0.0_f64);
+    let mut parts = Vec::new();
+    let mut start = 0;
+    let mut peak = 0.0_f64;
     let mut lowest = (f64::INFINITY, 0);
     for (at, height) in heights.iter().copied().enumerate() {
         if height > peak && lowest.0.is_infinite() {

@@ -287,7 +287,11 @@ impl Head {
 /// their mean is the standard deviation times the square root of 2 / pi. Each pair is the computed
 /// distance, then the true one.
 fn spread(pairs: impl Iterator<Item = (f64, f64)>) -> Line {
-    let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    let mut n = 0.0;
+    let mut x = 0.0;
+    let mut y = 0.0;
+    let mut xx = 0.0;
+    let mut xy = 0.0;
     for (said, truth) in pairs {
         let error = (said - truth).abs() * (0.5 * std::f64::consts::PI).sqrt();
         (n, x, y) = (n + 1.0, x + said, y + error);

@@ -33,8 +33,10 @@ impl Warp {
         motion: &EgoMotion,
         wall_m: f64,
     ) -> Self {
-        let (columns, rows) = (panorama.columns, panorama.rows);
-        let (across, down) = (columns / STEP + 2, rows / STEP + 2);
+        let columns = panorama.columns;
+        let rows = panorama.rows;
+        let across = columns / STEP + 2;
+        let down = rows / STEP + 2;
         let node = |row: usize, column: usize| {
             let at = Point2::new((column * STEP) as f64, (row * STEP) as f64);
             before(camera, panorama, motion, wall_m, at)
@@ -45,12 +47,15 @@ impl Warp {
 
     /// Returns the place of a pixel before the motion.
     fn place(&self, column: usize, row: usize) -> [f32; 2] {
-        let (i, j) = (row / STEP * self.across + column / STEP, column % STEP);
-        let (x, y) = (j as f32 / STEP as f32, (row % STEP) as f32 / STEP as f32);
+        let i = row / STEP * self.across + column / STEP;
+        let j = column % STEP;
+        let x = j as f32 / STEP as f32;
+        let y = (row % STEP) as f32 / STEP as f32;
         let node = |offset: usize| self.nodes[i + offset];
         let mix = |axis: usize| {
             let upper = node(0)[axis] + x * (node(1)[axis] - node(0)[axis]);
-            let (left, right) = (node(self.across)[axis], node(self.across + 1)[axis]);
+            let left = node(self.across)[axis];
+            let right = node(self.across + 1)[axis];
             upper + y * (left + x * (right - left) - upper)
         };
         [mix(0), mix(1)]
@@ -82,7 +87,8 @@ impl Warp {
                 let at = pixel(row, column);
                 for (colour, out) in to[at..at + 3].iter_mut().enumerate() {
                     let [a, b, c, d] = corners.map(|corner| from[corner + colour]);
-                    let (upper, lower) = (a + across * (b - a), c + across * (d - c));
+                    let upper = a + across * (b - a);
+                    let lower = c + across * (d - c);
                     *out = upper + down * (lower - upper);
                 }
             }
@@ -145,7 +151,8 @@ impl Sweep {
         times: &mut [f32],
     ) {
         let Some(first) = warps.first() else { return };
-        let (columns, rows) = (first.columns, first.rows);
+        let columns = first.columns;
+        let rows = first.rows;
         self.images.resize(warps.len(), Vec::new());
         self.costs.resize(warps.len(), Vec::new());
         for ((warp, image), costs) in warps.iter().zip(&mut self.images).zip(&mut self.costs) {
@@ -368,7 +375,9 @@ mod tests {
             let mut bounds = Bounds::default();
             bounds.of(&level, 9, [across, rows]);
             for at in 0..level.len() {
-                let (row, column, colour) = (at / 27, at % 27 / 3, at % 3);
+                let row = at / 27;
+                let column = at % 27 / 3;
+                let colour = at % 3;
                 let near = (row.saturating_sub(rows)..(row + rows + 1).min(5)).flat_map(|r| {
                     (0..=2 * across).map(move |c| (r, (column + 9 + c - across) % 9))
                 });

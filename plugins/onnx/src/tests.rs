@@ -155,7 +155,8 @@ fn track(confirmed: bool) -> Track {
 /// The scores of the networks rise from 0 to 1 around a brightness of 0.7.
 #[test]
 fn a_weak_box_is_the_person_of_a_confirmed_track_alone() {
-    let (mut detector, weak) = (detector(config(Family::Yolox)), frame(1, 170));
+    let mut detector = detector(config(Family::Yolox));
+    let weak = frame(1, 170);
     let mut count = |query: &Query<'_>| {
         let mut funnel = Funnel::default();
         let found = detector.detect(&weak, query, &mut funnel).unwrap();
@@ -203,7 +204,8 @@ fn thresholds_are_those_of_the_family_unless_they_are_set() {
 
 #[test]
 fn a_config_without_a_model_says_so_in_the_funnel() {
-    let (mut funnel, frame) = (Funnel::default(), frame(1, 240));
+    let mut funnel = Funnel::default();
+    let frame = frame(1, 240);
     let mut none = Onnx::new(Config::default(), &context()).unwrap();
     assert!(none.detect(&frame, &EVERYWHERE, &mut funnel).unwrap().is_empty());
     assert_eq!(funnel.count("no model"), 1);

@@ -63,8 +63,10 @@ fn newcomers_are_judged_by_the_threshold_of_their_detector() {
 fn whole_body(head: Point3<f64>) -> String {
     let upper = camera().upper_body(&head);
     let px_per_m = upper.width / 0.57;
-    let (width, height) = (0.5 * px_per_m, 1.7 * px_per_m);
-    let (x, y) = (upper.centre().x - 0.5 * width, upper.y + 0.025 * px_per_m);
+    let width = 0.5 * px_per_m;
+    let height = 1.7 * px_per_m;
+    let x = upper.centre().x - 0.5 * width;
+    let y = upper.y + 0.025 * px_per_m;
     format!("2,-1,{x},{y},{width},{height},0.9,-1,-1,-1\n")
 }
 
@@ -97,11 +99,10 @@ fn a_whole_body_can_be_tracked_as_the_box_that_it_is() {
     let config = |body| with_boxes(BoxSettings { body, ..BoxSettings::default() });
     let mut square = of_file(&text, config(BoxedBody::Full)).unwrap();
     let mut whole = of_file(&text, config(BoxedBody::FullBox)).unwrap();
-    let (square, whole) = (
-        detect(&mut square, &frame(2, None)).remove(0),
-        detect(&mut whole, &frame(2, None)).remove(0),
-    );
-    let (upper, full) = (square.image.unwrap(), whole.image.unwrap());
+    let square = detect(&mut square, &frame(2, None)).remove(0);
+    let whole = detect(&mut whole, &frame(2, None)).remove(0);
+    let upper = square.image.unwrap();
+    let full = whole.image.unwrap();
     assert_eq!((upper.extent, full.extent), (Extent::UpperBody, Extent::FullBody));
     assert!((full.rect.height / full.rect.width - 3.4).abs() < 1e-6, "{full:?}");
     assert_eq!((square.position, square.covariance), (whole.position, whole.covariance));
@@ -169,7 +170,8 @@ fn a_log_that_is_not_read_for_boxes_is_told_in_the_funnel() {
 
 #[test]
 fn a_search_near_a_track_finds_the_right_box_first() {
-    let (left, right) = (Point3::new(3.0, 0.5, 1.585), Point3::new(3.0, -0.4, 1.585));
+    let left = Point3::new(3.0, 0.5, 1.585);
+    let right = Point3::new(3.0, -0.4, 1.585);
     let text = whole_body(left) + &whole_body(right);
     let mut detector = of_file(&text, Config::default()).unwrap();
     let person = Person { position: right, velocity: Vector2::zeros() };
@@ -304,11 +306,13 @@ fn the_depth_is_that_of_the_face_alone() {
     let mut detector = of_file(&whole_body(head), Config::default()).unwrap();
     let square = camera().upper_body(&head);
     let px_per_m = square.width / 0.57;
-    let (x, y) = (square.centre().x, square.y + 0.14 * px_per_m);
+    let x = square.centre().x;
+    let y = square.y + 0.14 * px_per_m;
     let mut seen = |half_m: f64, inside: f32, outside: f32| {
         let half = half_m * px_per_m;
         let depth = DepthImage::from_fn(640, 480, |u, v| {
-            let (u, v) = (u as f64 + 0.5 - x, v as f64 + 0.5 - y);
+            let u = u as f64 + 0.5 - x;
+            let v = v as f64 + 0.5 - y;
             if u.abs() < half && v.abs() < half { inside } else { outside }
         });
         let images = Images { depth: Some(Arc::new(depth)), ..Images::default() };

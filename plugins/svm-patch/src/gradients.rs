@@ -35,7 +35,8 @@ pub fn of(grey: &Patch) -> Patch {
 fn histograms(grey: &Patch) -> Patch {
     let mut histograms = [0.0; PIXELS];
     for at in 0..PIXELS {
-        let (row, column) = (at / SIDE, at % SIDE);
+        let row = at / SIDE;
+        let column = at % SIDE;
         let [dx, dy] = gradient(grey, row, column);
         let turn = dy.atan2(dx).rem_euclid(TAU) / TAU * DIRECTIONS as f32;
         let lower = turn.floor();
@@ -63,7 +64,8 @@ fn gradient(grey: &Patch, row: usize, column: usize) -> [f32; 2] {
 /// Returns the mean gradient strength of a cell and its neighbours.
 fn strength_around(histograms: &Patch, cell: usize) -> f32 {
     let span = |k: usize| k.saturating_sub(1)..(k + 2).min(CELLS);
-    let (rows, columns) = (span(cell / CELLS), span(cell % CELLS));
+    let rows = span(cell / CELLS);
+    let columns = span(cell % CELLS);
     let count = (rows.len() * columns.len()) as f32;
     let strength = |cell: usize| -> f32 {
         histograms[cell * DIRECTIONS..(cell + 1) * DIRECTIONS].iter().sum()

@@ -324,8 +324,8 @@ mod tests {
     #[test]
     fn patches_of_one_value_are_compared() {
         for value in [1.0f32, -1.0] {
-            let (model, x) =
-                (Model::new(SAMPLER, 0.01, 0.0, [(&[1.0; PIXELS], 1.0)]), [value; PIXELS]);
+            let model = Model::new(SAMPLER, 0.01, 0.0, [(&[1.0; PIXELS], 1.0)]);
+            let x = [value; PIXELS];
             assert!((model.decision(&x) - slow(&model, &x)).abs() < 1e-6);
         }
     }

@@ -128,7 +128,8 @@ mod tests {
             let other = grey.map(|v| (gain * f64::from(v) + offset).round() as u8);
             let square = Rect::new(2.0, 3.0, 40.0, 40.0);
             for sampler in [UNIT, GRADIENTS] {
-                let (a, b) = (sampler.patch(&grey, &square), sampler.patch(&other, &square));
+                let a = sampler.patch(&grey, &square);
+                let b = sampler.patch(&other, &square);
                 let correlation: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
                 prop_assert!(correlation > 0.995, "{correlation}");
             }
@@ -145,7 +146,8 @@ mod tests {
     #[test]
     fn a_fraction_is_of_the_largest_grey_value() {
         let fraction = Sampler { grow: 0.0, scaling: Scaling::Fraction };
-        let (grey, square) = (noise(50, 50, 7), Rect::new(5.5, 4.2, 30.0, 30.0));
+        let grey = noise(50, 50, 7);
+        let square = Rect::new(5.5, 4.2, 30.0, 30.0);
         let both = fraction.patch(&grey, &square).into_iter().zip(RAW.patch(&grey, &square));
         both.for_each(|(part, raw)| assert!((255.0 * part - raw).abs() < 1e-3));
     }

@@ -163,7 +163,8 @@ mod training {
         };
         let scaled = Training { scaling: Scaling::Unit, ..printed.clone() };
         let first = |training| trainer(training, 60).trials(&mut |_| {}).unwrap().remove(0);
-        let (raw, unit) = (first(printed), first(scaled));
+        let raw = first(printed);
+        let unit = first(scaled);
         // Each of the two folds has its own constant.
         let mut distinct: Vec<f64> = raw.held_out.iter().map(|(f, _)| *f).collect();
         distinct.dedup();

@@ -27,7 +27,8 @@ impl Proportional {
         let limit = if self.fault == "reckless" { 1.0 } else { scene.max_speed_mps };
         let faster = if self.fault == "reckless" { 2.0 } else { 1.0 };
         let wheel = |speed: f64| (faster * speed).clamp(-limit, limit);
-        let (left, right) = (wheel(forward - turn + extra), wheel(forward + turn));
+        let left = wheel(forward - turn + extra);
+        let right = wheel(forward + turn);
         scene.wheels.twist(WheelSpeeds { left, right })
     }
 }

@@ -52,7 +52,9 @@ pub fn mood() -> f64 {
 macro_rules! register_with_fault {
     ($registry:expr, $kind:ident, $name:expr, $plugin:expr) => {{
         use tagalong_core::Error;
-        let (registry, name, plugin) = ($registry, $name, $plugin);
+        let registry = $registry;
+        let name = $name;
+        let plugin = $plugin;
         let summary = if name == "no-summary" { "" } else { "a test double" };
         match name {
             "cannot-build" => registry.$kind(name, summary, move |_: super::Healthy, _| {

@@ -34,8 +34,10 @@ impl Verifier for Brightness {
         if inside.area() <= 0.0 {
             return Ok(-1.0);
         }
-        let (x0, y0) = (inside.x as usize, inside.y as usize);
-        let (x1, y1) = (inside.right() as usize, inside.bottom() as usize);
+        let x0 = inside.x as usize;
+        let y0 = inside.y as usize;
+        let x1 = inside.right() as usize;
+        let y1 = inside.bottom() as usize;
         let pixels = (y0..y1).flat_map(|y| &grey.row(y)[x0..x1]);
         let (sum, count) =
             pixels.fold((0.0, 0.0), |(sum, count), p| (sum + f64::from(*p), count + 1.0));

@@ -237,7 +237,8 @@ fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
         parts.extend(fitted(&training, 0)?.map(|head| (head, test)));
     }
     let row = |name: &str, value: &dyn Fn(&Head, &Sample) -> f64| {
-        let (mut plain, mut ranked) = (Vec::new(), Vec::new());
+        let mut plain = Vec::new();
+        let mut ranked = Vec::new();
         for (head, test) in &parts {
             let truth: Vec<f64> = test.iter().map(|s| s.distance_m).collect();
             let values: Vec<f64> = test.iter().map(|sample| value(head, sample)).collect();
@@ -266,7 +267,8 @@ fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
 }
 
 fn pearson(a: &[f64], b: &[f64]) -> f64 {
-    let (ma, mb) = (mean(a), mean(b));
+    let ma = mean(a);
+    let mb = mean(b);
     let product = |x: &[f64], mx: f64, y: &[f64], my: f64| {
         x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum::<f64>()
     };
@@ -372,7 +374,8 @@ mod tests {
 
     #[test]
     fn correlations_are_those_of_the_definition() {
-        let (a, b) = ([1.0, 2.0, 3.0, 4.0], [1.0, 4.0, 9.0, 16.0]);
+        let a = [1.0, 2.0, 3.0, 4.0];
+        let b = [1.0, 4.0, 9.0, 16.0];
         assert!((pearson(&a, &b) - 0.984_374_038_697_6).abs() < 1e-9);
         assert!((pearson(&ranks(&a), &ranks(&b)) - 1.0).abs() < 1e-12);
         assert_eq!(ranks(&[5.0, 1.0, 5.0, 0.0]), [2.5, 1.0, 2.5, 0.0]);

@@ -92,7 +92,8 @@ fn of_room(lab: &Lab, scene: &Scene) -> [[Vec<f64>; 2]; 3] {
     // Every second position, so that both halves cover the whole walk.
     let every =
         |part: usize| -> Vec<Known> { known.iter().skip(part).step_by(2).cloned().collect() };
-    let (used, held) = (every(0), every(1));
+    let used = every(0);
+    let held = every(1);
     let guess = guessed(&truth);
     let found = calibrate(&guess, &used).stations;
     [guess, found, truth].map(|stations| [&used, &held].map(|known| distances_to(&stations, known)))

@@ -119,7 +119,8 @@ mod tests {
                     let keys = |part: &[Sample]| part.iter().map(of).collect::<BTreeSet<u64>>();
                     keys(&training).intersection(&keys(&test)).count()
                 };
-                let (places, people) = (both(&sector), both(&|sample| sample.person));
+                let places = both(&sector);
+                let people = both(&|sample| sample.person);
                 let shared = match split {
                     Split::Random => places > 8 && people == 2,
                     Split::Place => places == 0 && people == 2,

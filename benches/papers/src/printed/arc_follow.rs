@@ -175,7 +175,8 @@ mod tests {
         let lens = Pinhole { fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.5, distortion: Distortion::None };
         let camera = Arc::new(Camera::mounted(lens, 1, 1, 1.0, 0.0, 0.0));
         let frame = Frame::new(1, Stamp::default(), camera, motion, Images::default());
-        let (target, tracks) = (Some(person), std::slice::from_ref(person));
+        let target = Some(person);
+        let tracks = std::slice::from_ref(person);
         let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: 0.9 };
         WHEELS.wheels(controller.command(&scene))
     }
@@ -192,7 +193,8 @@ mod tests {
         steps: u32,
         person: impl Fn(u32) -> (Point2<f64>, Vector2<f64>),
     ) -> Vec<[f64; 2]> {
-        let (mut pose, mut motion) = (Isometry2::<f64>::identity(), EgoMotion::at_rest(0.1));
+        let mut pose = Isometry2::<f64>::identity();
+        let mut motion = EgoMotion::at_rest(0.1);
         let mut polar = Vec::new();
         for step in 0..steps {
             let (place, velocity) = person(step);
@@ -209,7 +211,9 @@ mod tests {
 
     #[test]
     fn wheels_are_those_of_the_paper() {
-        let (x, y, d) = (2.0, -0.7, WHEELS.half_separation_m);
+        let x = 2.0;
+        let y = -0.7;
+        let d = WHEELS.half_separation_m;
         let mut controller = printed(Config { latency_s: 0.0, ..Config::default() });
         let wheels = settled(&mut controller, &target(x, y, Vector2::zeros()));
         let v = 0.8 * (x.hypot(y) - 1.4);

@@ -44,10 +44,14 @@ impl FrameComparison for Dissimilarity {
     /// nothing, the mean of the other pixels stands. `None` if too little of the person
     /// has one.
     fn fit(&self, template: &Template, (x, y): (i64, i64), depth_m: f64) -> Option<Match> {
-        let (mut read, mut person, mut person_read, mut sum) = (0.0, 0.0, 0.0, 0.0);
+        let mut read = 0.0;
+        let mut person = 0.0;
+        let mut person_read = 0.0;
+        let mut sum = 0.0;
         for row in &template.rows {
             // The outline lies in the middle of the guard.
-            let (from, to) = ((row.from + row.guard_from) / 2, (row.to + row.guard_to) / 2);
+            let from = (row.from + row.guard_from) / 2;
+            let to = (row.to + row.guard_to) / 2;
             person += (to - from) as f64;
             let line = y + row.dy;
             let ends = [-template.half_width, from, to, template.half_width + 1];
@@ -90,7 +94,8 @@ mod tests {
 
     /// The sum over every pixel of the window.
     fn slow(rows: &RowSums, t: &Template, (x, y): (i64, i64), z: f64) -> (f64, f64) {
-        let (mut sum, mut read) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut read = 0.0;
         for row in &t.rows {
             let person = (row.from + row.guard_from) / 2..(row.to + row.guard_to) / 2;
             for dx in -t.half_width..=t.half_width {
@@ -142,14 +147,16 @@ mod tests {
     fn a_wall_between_the_person_and_the_one_background_costs_and_the_sum_shrinks_with_range() {
         // 3 m between the wall and the background, 1 m farther away; the window has a
         // quarter of the pixels.
-        let (near, far) = (cost_at(2.0, 1000), cost_at(4.0, 1000));
+        let near = cost_at(2.0, 1000);
+        let far = cost_at(4.0, 1000);
         let ratio = near / far;
         assert!((ratio / (4.0 * 9.0) - 1.0).abs() < 0.2, "{near} {far}: {ratio}");
     }
 
     #[test]
     fn thinned_rows_stand_for_all_of_them() {
-        let (all, some) = (cost_at(2.0, 1000), cost_at(2.0, 20));
+        let all = cost_at(2.0, 1000);
+        let some = cost_at(2.0, 20);
         assert!((some / all - 1.0).abs() < 0.05, "{all} {some}");
     }
 }

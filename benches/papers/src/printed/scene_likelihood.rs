@@ -88,7 +88,8 @@ impl Metres {
             return Sums::default();
         }
         let at = |x: i64| self.sums[(line * (self.width + 1) + x.clamp(0, self.width)) as usize];
-        let (a, b) = (at(from), at(to.max(from)));
+        let a = at(from);
+        let b = at(to.max(from));
         Sums { count: b.count - a.count, sum: b.sum - a.sum, squares: b.squares - a.squares }
     }
 }
@@ -143,7 +144,8 @@ impl Canvas {
     fn dissimilarity(&self, scene: &[PlacedPerson]) -> Option<f64> {
         let columns = bounds(scene.iter().map(PlacedPerson::columns))?;
         let lines = bounds(scene.iter().map(PlacedPerson::lines))?;
-        let (mut count, mut error) = (0.0, 0.0);
+        let mut count = 0.0;
+        let mut error = 0.0;
         let lines = lines.0.max(0)..lines.1.min(self.metres.height);
         for line in lines {
             let row = self.metres.run(line, columns);
@@ -257,7 +259,8 @@ mod tests {
         let right = cast.iter().map(|p| p.x + half(p)).max()?;
         let top = cast.iter().map(|p| p.y + p.template.rows[0].dy).min()?;
         let bottom = cast.iter().map(|p| p.y + p.template.rows.last().unwrap().dy).max()?;
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut count = 0.0;
         for (x, y) in (top..=bottom).flat_map(|y| (left..=right).map(move |x| (x, y))) {
             let Some(value) = image.0.value(x, y).filter(|value| *value > 0) else { continue };
             let here = cast.iter().filter(|p| p.covers(x, y)).map(|p| p.depth_m);

@@ -193,7 +193,8 @@ impl Walk {
         let failed = |error: tagalong_core::Error| TrialError::Witness(error.to_string());
         let mut draw = Draw::new(scene, 1);
         let mut stereo = StereoDepth::new(stereo.clone()).map_err(failed)?;
-        let (camera, mut shots) = (draw.camera().clone(), Vec::new());
+        let camera = draw.camera().clone();
+        let mut shots = Vec::new();
         while let Some(simulated) = draw.next_frame() {
             // The images of a depth camera need no stereo matching.
             let frame = match simulated.frame.depth() {
@@ -223,7 +224,8 @@ impl Walk {
         for (frame, _) in &self.shots {
             // A new frame for each trial, so that the data derived from it are freed afterwards.
             let images = frame.images();
-            let (camera, motion) = (frame.camera.clone(), frame.motion);
+            let camera = frame.camera.clone();
+            let motion = frame.motion;
             let frame = Frame::new(frame.index, frame.stamp, camera, motion, images);
             for (pipeline, run) in pipelines.iter_mut().zip(&mut runs) {
                 let failed = |error| TrialError::Step {
@@ -312,14 +314,16 @@ mod tests {
 
     #[test]
     fn a_frame_without_a_place_is_no_way_to_a_small_error() {
-        let (lost, there) = (score(&[0.05], 3), score(&[0.05, 0.1, 0.2, 0.3], 0));
+        let lost = score(&[0.05], 3);
+        let there = score(&[0.05, 0.1, 0.2, 0.3], 0);
         assert!((lost.error_m() - (0.05 + 1.5) / 4.0).abs() < 1e-12);
         assert_eq!(best(&[lost, score(&[], 0), there], Goal::Place), 2);
     }
 
     #[test]
     fn scores_of_walks_add_up() {
-        let (a, b) = (score(&[0.1], 1), score(&[0.3], 0));
+        let a = score(&[0.1], 1);
+        let b = score(&[0.3], 0);
         let both = Score::of_all([&a, &b].into_iter());
         assert_eq!((both.errors_m, both.without), (vec![0.1, 0.3], 1));
     }

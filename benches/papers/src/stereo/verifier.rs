@@ -124,7 +124,8 @@ fn real_rooms(lab: &Lab) -> Result<(Vec<Row>, Vec<Row>), ReproduceError> {
         .iter()
         .map(|(name, of)| real::contender(lab, name, *of))
         .collect::<Result<Vec<_>, _>>()?;
-    let (mut sightings, mut tracks) = (Vec::new(), Vec::new());
+    let mut sightings = Vec::new();
+    let mut tracks = Vec::new();
     for (rooms, logs) in REAL {
         lab.progress.begin(logs.len(), rooms);
         let mut sums = vec![Tally::default(); names.len()];
@@ -387,7 +388,8 @@ mod tests {
     #[test]
     fn what_is_seen_is_the_nearest_thing_if_it_is_near() {
         let piece = |kind, x| Furniture { kind, at: [x, 0.0], heading_deg: 0.0 };
-        let (stand, lamp) = (FurnitureKind::CoatStand, FurnitureKind::FloorLamp);
+        let stand = FurnitureKind::CoatStand;
+        let lamp = FurnitureKind::FloorLamp;
         let furniture = [piece(stand, 3.0), piece(lamp, 4.0)];
         assert_eq!(what_stands_at(Point2::new(3.6, 0.0), &furniture), "floor lamp");
         assert_eq!(what_stands_at(Point2::new(3.0, 0.5), &furniture), "coat stand");

@@ -349,7 +349,8 @@ mod tests {
 
     #[test]
     fn the_mean_is_over_frames_and_the_worst_over_walks() {
-        let (short, long) = ([0.1], [0.2, 0.2, 0.5]);
+        let short = [0.1];
+        let long = [0.2, 0.2, 0.5];
         let cells = cells(&vec![&short[..], &long[..]]);
         let values: Vec<f64> =
             [0, 2, 3].iter().map(|&column: &usize| cells[column].value.unwrap()).collect();

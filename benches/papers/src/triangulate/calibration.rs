@@ -63,7 +63,8 @@ fn loss(station: &Station, seen: &[(Point2<f64>, Point2<f64>)]) -> f64 {
 
 fn fit(guess: &Station, seen: &[(Point2<f64>, Point2<f64>)]) -> Station {
     let unit = guess.focal_px;
-    let (mut best, mut damping) = (*guess, 1e-3_f64);
+    let mut best = *guess;
+    let mut damping = 1e-3_f64;
     let mut lowest = loss(&best, seen);
     for _ in 0..STEPS {
         let (normal, gradient) = equations(&best, seen, unit);
@@ -94,7 +95,8 @@ fn equations(
     seen: &[(Point2<f64>, Point2<f64>)],
     unit: f64,
 ) -> (Matrix4<f64>, Vector4<f64>) {
-    let (mut normal, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
+    let mut normal = Matrix4::zeros();
+    let mut gradient = Vector4::zeros();
     for s in seen {
         let off = misfit(station, s);
         let slope = derivative(station, s, unit);
@@ -138,9 +140,11 @@ mod tests {
         for i in 0..24 {
             let place = Point2::new(1.5 + 0.33 * f64::from(i), 0.8 + 0.8 * f64::from(i % 5));
             let (way, (sine, cosine)) = (place - station.at, station.heading_rad.sin_cos());
-            let (ahead, left) = (way.x * cosine + way.y * sine, way.y * cosine - way.x * sine);
+            let ahead = way.x * cosine + way.y * sine;
+            let left = way.y * cosine - way.x * sine;
             let (s, c) = station.pitch_down_rad.sin_cos();
-            let (depth, down) = (ahead * c + 0.4 * s, 0.4 * c - ahead * s);
+            let depth = ahead * c + 0.4 * s;
+            let down = 0.4 * c - ahead * s;
             let pixel = Point2::new(159.5 - 190.0 * left / depth, 119.5 + 190.0 * down / depth);
             known.push(Known { place, sights: vec![Sight { station: 0, pixel }] });
         }
@@ -148,14 +152,16 @@ mod tests {
     }
 
     fn guess() -> Station {
-        let (at, heading_rad) = (Point2::new(0.5, -0.2), 0.65);
+        let at = Point2::new(0.5, -0.2);
+        let heading_rad = 0.65;
         Station { at, heading_rad, focal_px: 210.0, ..station() }
     }
 
     #[test]
     fn a_rough_guess_becomes_the_camera() {
         let calibrated = calibrate(&[guess()], &seen());
-        let (found, truth) = (calibrated.stations[0], station());
+        let found = calibrated.stations[0];
+        let truth = station();
         assert!((found.at - truth.at).norm() < 1e-3, "{found:?}");
         assert!((found.heading_rad - truth.heading_rad).abs() < 1e-3, "{found:?}");
         assert!((found.focal_px - truth.focal_px).abs() < 0.5, "{found:?}");

@@ -33,7 +33,8 @@ impl HatColour {
     /// True if a pixel has the colour.
     pub fn is(&self, pixel: [u8; 3]) -> bool {
         let [r, g, b] = pixel.map(|c| f64::from(c) / 255.0);
-        let (most, least) = (r.max(g).max(b), r.min(g).min(b));
+        let most = r.max(g).max(b);
+        let least = r.min(g).min(b);
         let spread = most - least;
         if most < self.min_value || spread < self.min_saturation * most || spread == 0.0 {
             return false;
@@ -63,7 +64,8 @@ pub struct Hat {
 
 /// The largest connected patch of the hat's colour, if it is large enough.
 pub fn find_hat(image: &RgbImage, colour: &HatColour) -> Option<Hat> {
-    let (width, height) = (image.width(), image.height());
+    let width = image.width();
+    let height = image.height();
     let mut open: Vec<bool> = image.pixels().iter().map(|pixel| colour.is(*pixel)).collect();
     let mut best: Option<Hat> = None;
     for start in 0..open.len() {
@@ -79,10 +81,14 @@ pub fn find_hat(image: &RgbImage, colour: &HatColour) -> Option<Hat> {
 
 /// The patch around a pixel, which is taken out.
 fn patch(start: usize, open: &mut [bool], (width, height): (usize, usize)) -> Hat {
-    let (mut waiting, mut sum, mut pixels, mut cut) = (vec![start], [0.0; 2], 0, false);
+    let mut waiting = vec![start];
+    let mut sum = [0.0; 2];
+    let mut pixels = 0;
+    let mut cut = false;
     open[start] = false;
     while let Some(at) = waiting.pop() {
-        let (x, y) = (at % width, at / width);
+        let x = at % width;
+        let y = at / width;
         (sum[0], sum[1], pixels) = (sum[0] + x as f64, sum[1] + y as f64, pixels + 1);
         cut |= x == 0 || y == 0 || x + 1 == width || y + 1 == height;
         let rows = y.saturating_sub(1)..(y + 2).min(height);

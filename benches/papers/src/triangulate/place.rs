@@ -118,7 +118,8 @@ pub fn triangulate(stations: &[Station], sights: &[Sight], sigma_rad: f64) -> Op
 
 /// Where the lines of all directions come nearest to each other.
 fn meeting(seen: &[(&Station, f64)]) -> Option<Point2<f64>> {
-    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+    let mut normal = Matrix2::zeros();
+    let mut right = Vector2::zeros();
     for (from, bearing) in seen {
         let across = Vector2::new(-bearing.sin(), bearing.cos());
         normal += across * across.transpose();
@@ -130,7 +131,8 @@ fn meeting(seen: &[(&Station, f64)]) -> Option<Point2<f64>> {
 
 /// Normal equations of the bearings about a place.
 fn equations(seen: &[(&Station, f64)], place: &Point2<f64>) -> (Matrix2<f64>, Vector2<f64>) {
-    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+    let mut normal = Matrix2::zeros();
+    let mut right = Vector2::zeros();
     for (from, bearing) in seen {
         let way = place - from.at;
         let square = way.norm_squared().max(1e-6);
@@ -161,7 +163,8 @@ mod tests {
 
     /// The pixel in row 110 that has this bearing, by bisection.
     fn pixel(station: &Station, bearing: f64) -> Point2<f64> {
-        let (mut left, mut right) = (-400.0, 700.0);
+        let mut left = -400.0;
+        let mut right = 700.0;
         for _ in 0..60 {
             let middle = Point2::new(0.5 * (left + right), 110.0);
             if wrapped(station.bearing(&middle) - bearing) > 0.0 {
@@ -178,7 +181,8 @@ mod tests {
         fn directions_without_errors_meet_where_they_come_from(
             x in 1.0..9.0f64, y in 1.0..4.0f64, left_out in 0..4usize,
         ) {
-            let (stations, place) = (stations(), Point2::new(x, y));
+            let stations = stations();
+            let place = Point2::new(x, y);
             let sights: Vec<Sight> = (0..4)
                 .filter(|station| *station != left_out)
                 .map(|station| {
@@ -195,7 +199,8 @@ mod tests {
         fn no_other_place_fits_better(
             x in 1.0..9.0f64, y in 1.0..4.0f64, noise in prop::array::uniform4(-0.01..0.01f64),
         ) {
-            let (stations, place) = (stations(), Point2::new(x, y));
+            let stations = stations();
+            let place = Point2::new(x, y);
             let sights: Vec<Sight> = (0..4)
                 .map(|station| {
                     let bearing = stations[station].towards(&place) + noise[station];
@@ -225,7 +230,8 @@ mod tests {
 
     #[test]
     fn who_contradicts_the_others_is_left_out() {
-        let (cameras, place) = (Cameras::new(stations()), Point2::new(3.0, 2.0));
+        let cameras = Cameras::new(stations());
+        let place = Point2::new(3.0, 2.0);
         let fix = cameras.fix(&sights(place, &[(0, 0.0), (1, 0.3), (2, 0.0), (3, 0.0)])).unwrap();
         assert!((fix.place - place).norm() < 1e-6 && fix.cameras == 3, "{fix:?}");
         // Of three bearings, two of which must be wrong, the right one is unknown.

@@ -20,10 +20,8 @@ pub struct Station {
 impl Station {
     /// Returns the bearing of a pixel's ray in the room, rad.
     pub fn bearing(&self, pixel: &Point2<f64>) -> f64 {
-        let (right, down) = (
-            (pixel.x - self.centre_px.x) / self.focal_px,
-            (pixel.y - self.centre_px.y) / self.focal_px,
-        );
+        let right = (pixel.x - self.centre_px.x) / self.focal_px;
+        let down = (pixel.y - self.centre_px.y) / self.focal_px;
         let (sine, cosine) = self.pitch_down_rad.sin_cos();
         wrapped(self.heading_rad - right.atan2(cosine - down * sine))
     }

@@ -33,7 +33,8 @@ pub(super) struct CameraSightings {
 impl CameraSightings {
     /// Searches for the hat in all images of so many cameras.
     pub(super) fn read(log: &Path, cameras: usize, colour: &HatColour) -> Result<Self, Failure> {
-        let (limits, mut seen) = (Limits::default(), Self::default());
+        let limits = Limits::default();
+        let mut seen = Self::default();
         for part in LogFiles::of(log).map_err(Failure::failed)?.parts() {
             let mut walker = LogWalker::open(part, &limits).map_err(Failure::failed)?;
             while let Some(message) = walker.next() {

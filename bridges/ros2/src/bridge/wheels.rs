@@ -62,7 +62,8 @@ pub(super) fn drive(
 ) -> Result<Wheels, BridgeError> {
     let half_m = setup.robot.wheels().half_separation_m;
     let publish = command_publisher(options, network)?;
-    let (base_frame, clock) = (base_frame.to_owned(), Arc::clone(clock));
+    let base_frame = base_frame.to_owned();
+    let clock = Arc::clone(clock);
     let now = {
         let clock = Arc::clone(&clock);
         move || clock.now()

@@ -26,7 +26,8 @@ use tagalong_sim::{Event, Simulation};
 #[test]
 fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     let Some(_alone) = alone() else { return };
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(12.0), 1);
     let mut robot = Robot::new(domain(0), simulation.camera());
     let tracks = robot.peer.collect::<Detection3DArray>("/people/tracks", &heard_all);
@@ -46,7 +47,9 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     let summary = bridge.join().unwrap().unwrap();
     sleep(Duration::from_millis(300));
     heard_all.store(true, Ordering::Relaxed);
-    let (tracks, poses, states) = (tracks.finish(), poses.finish(), states.finish());
+    let tracks = tracks.finish();
+    let poses = poses.finish();
+    let states = states.finish();
     let commands = commands.finish();
     eprintln!("{summary}");
 
@@ -93,7 +96,8 @@ fn what_is_missing_is_named_and_the_wait_has_an_end() {
 #[test]
 fn the_robot_moves_while_the_switch_is_held_and_after_a_stop_only_after_a_reset_and_a_press() {
     let Some(_alone) = alone() else { return };
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(25.0), 1);
     let mut robot = Robot::new(domain(3), simulation.camera());
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
@@ -154,13 +158,15 @@ fn the_robot_moves_while_the_switch_is_held_and_after_a_stop_only_after_a_reset_
 #[test]
 fn odometry_that_stops_while_frames_go_on_stops_the_robot_and_another_calibration_ends_the_ride() {
     let Some(_alone) = alone() else { return };
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(25.0), 1);
     let mut robot = Robot::new(domain(4), simulation.camera());
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
     let (bridge, said) = bridge(domain(4), &stop);
     let hand = Hand::new(domain(4), &stop);
-    let (silent, zoomed) = (Arc::new(AtomicBool::new(false)), Arc::clone(&robot.zoomed));
+    let silent = Arc::new(AtomicBool::new(false));
+    let zoomed = Arc::clone(&robot.zoomed);
     let is_silent = Arc::clone(&silent);
     let playing = thread::spawn(move || {
         robot.play_while(simulation, &|event| {
@@ -214,7 +220,8 @@ impl Controller for Stuck {
 #[test]
 fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     let Some(_alone) = alone() else { return };
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(30.0), 1);
     let mut robot = Robot::new(domain(5), simulation.camera());
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
@@ -289,7 +296,8 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
 #[test]
 fn a_controller_without_odometry_is_refused_and_tells_the_wheels_nothing() {
     let Some(_alone) = alone() else { return };
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(9.0), 1);
     let mut robot = Robot::new(domain(6), simulation.camera());
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);

@@ -156,7 +156,8 @@ impl Peer {
     {
         let topic = self.node.create_topic(&name(topic), kind(message_type), &reliable()).unwrap();
         let subscription = self.node.create_subscription::<M>(&topic, Some(reliable())).unwrap();
-        let (stop, heard) = (Arc::clone(stop), Arc::new(Mutex::new(Vec::new())));
+        let stop = Arc::clone(stop);
+        let heard = Arc::new(Mutex::new(Vec::new()));
         let theirs = Arc::clone(&heard);
         let thread = thread::spawn(move || {
             while !stop.load(Ordering::Relaxed) {
@@ -188,8 +189,11 @@ impl Hand {
         let mut peer = Peer::join(domain, "hand");
         let enable = peer.publisher_of::<Bool>("/people/enable", "std_msgs/msg/Bool", reliable());
         let reset = peer.publisher_of("/people/reset", "std_msgs/msg/Empty", reliable());
-        let (enable, holds) = (Arc::new(enable), Arc::new(AtomicBool::new(false)));
-        let (theirs, held, stop) = (Arc::clone(&enable), Arc::clone(&holds), Arc::clone(stop));
+        let enable = Arc::new(enable);
+        let holds = Arc::new(AtomicBool::new(false));
+        let theirs = Arc::clone(&enable);
+        let held = Arc::clone(&holds);
+        let stop = Arc::clone(stop);
         thread::spawn(move || {
             let _node = peer;
             while !stop.load(Ordering::Relaxed) {
@@ -307,7 +311,8 @@ impl<M> Collected<M> {
 /// Returns true if two participants hear each other at all.
 pub(crate) fn can_talk() -> bool {
     let stop = Arc::new(AtomicBool::new(false));
-    let (mut one, mut other) = (Peer::join(domain(1), "one"), Peer::join(domain(1), "other"));
+    let mut one = Peer::join(domain(1), "one");
+    let mut other = Peer::join(domain(1), "other");
     let publisher = one.publisher::<StringMsg>("/hello", reliable());
     let heard = other.collect::<StringMsg>("/hello", &stop);
     let deadline = Instant::now() + Duration::from_secs(15);
@@ -459,9 +464,12 @@ impl Robot {
         bytes: u32,
         data: Vec<u8>,
     ) -> Image<'static> {
-        let (width, height) = (self.camera.width as u32, self.camera.height as u32);
-        let (encoding, step) = (encoding.into(), bytes * width);
-        let (header, is_bigendian) = (header.clone(), 0);
+        let width = self.camera.width as u32;
+        let height = self.camera.height as u32;
+        let encoding = encoding.into();
+        let step = bytes * width;
+        let header = header.clone();
+        let is_bigendian = 0;
         // The message borrows its data, and a leak in a test does no harm.
         Image { header, height, width, encoding, is_bigendian, step, data: data.leak() }
     }
@@ -494,7 +502,8 @@ pub(crate) fn bridge_with(
     registry: Registry,
     stop: &Arc<AtomicBool>,
 ) -> (Ended, Said) {
-    let (stop, said) = (Arc::clone(stop), Said::default());
+    let stop = Arc::clone(stop);
+    let said = Said::default();
     let theirs = Arc::clone(&said);
     let ended = thread::spawn(move || {
         run_with(&options, &registry, &stop, &|sentence| {

@@ -44,7 +44,8 @@ where
     Q: Message + Clone + 'static,
     A: Message + Clone + 'static,
 {
-    let (kind, mapping) = (ServiceTypeName::new(package, kind), ServiceMapping::Enhanced);
+    let kind = ServiceTypeName::new(package, kind);
+    let mapping = ServiceMapping::Enhanced;
     peer.node.create_client(mapping, &name(service), &kind, reliable(), reliable()).unwrap()
 }
 
@@ -104,7 +105,8 @@ fn track(number: i64) -> SetParametersRequest {
 #[test]
 fn a_person_is_enrolled_and_cleared_by_services_and_over_http() {
     let Some(_alone) = alone() else { return };
-    let (stop, heard_all) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard_all = Arc::new(AtomicBool::new(false));
     let simulation = Simulation::new(&scene(60.0), 1);
     let mut robot = Robot::new(domain(7), simulation.camera());
     let plain = "geometry_msgs/msg/Twist";

@@ -60,7 +60,8 @@ impl Contestant {
         config.file.check_tuning(registry)?;
         let (pipeline, _) = config.file.pipeline(registry, None)?;
         let budget = usize::from(args.budget);
-        let (mut settings, mut refused) = (Vec::new(), 0);
+        let mut settings = Vec::new();
+        let mut refused = 0;
         for values in candidates(&config.tune, budget, args.seed) {
             match Setting::new(&config, pipeline.config(), values, locations, registry)? {
                 Some(setting) => settings.push(setting),

@@ -248,7 +248,8 @@ impl Scorer<'_> {
                 .map(|at| rooms.iter().map(|(_, logs)| self.room(at, unseen, logs)).collect())
                 .collect::<Result<Vec<Vec<Figures>>, Failure>>()
         };
-        let (unseen, seen) = (table(true)?, table(false)?);
+        let unseen = table(true)?;
+        let seen = table(false)?;
         // A model that has seen a room would make any setting look good there.
         let Choice { without, with_all } = leave_one_out(&unseen, objective);
         let in_room = |(at, (location, logs)): (usize, &(&Location, Vec<usize>))| {
@@ -286,7 +287,8 @@ impl Scorer<'_> {
             .flat_map(|location| location.logs.iter().map(|log| log.name.as_str()))
             .collect();
         let of = |log: &usize| {
-            let (without, shipped) = (self.log(chosen, true, *log)?, self.log(0, false, *log)?);
+            let without = self.log(chosen, true, *log)?;
+            let shipped = self.log(0, false, *log)?;
             Ok(InLog { log: names[*log].to_owned(), without, shipped })
         };
         logs.iter().map(of).collect()

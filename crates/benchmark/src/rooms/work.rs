@@ -84,7 +84,8 @@ impl<'a> Desk<'a> {
     ) -> Result<Self, Failure> {
         let of_room = |room: &'a Location| room.logs.iter().map(|log| (room.name.as_str(), log));
         let logs: Vec<(&str, &Annotated)> = locations.iter().flat_map(of_room).collect();
-        let (mut skips, mut tried) = (BTreeMap::new(), BTreeMap::new());
+        let mut skips = BTreeMap::new();
+        let mut tried = BTreeMap::new();
         for (contestant, about) in contestants.iter().enumerate() {
             for (log, (_, annotated)) in logs.iter().enumerate() {
                 let key = (log, about.config.reading());

@@ -45,7 +45,8 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
             out
         }
         Format::Json => {
-            let (needs, uses) = (names(inputs, Usage::Required), names(inputs, Usage::Optional));
+            let needs = names(inputs, Usage::Required);
+            let uses = names(inputs, Usage::Optional);
             let answer = serde_json::json!({
                 "config": config.to_string(), "needs": needs, "uses": uses, "log": log.map(PathText),
                 "notes": notes, "distances": distances, "blind_zone": blind_zone,
@@ -144,7 +145,8 @@ fn names(inputs: Inputs, usage: Usage) -> Vec<&'static str> {
 
 /// Formats inputs as "needs colour and depth; uses laser where the log has it".
 fn in_words(inputs: Inputs) -> String {
-    let (needs, uses) = (names(inputs, Usage::Required), names(inputs, Usage::Optional));
+    let needs = names(inputs, Usage::Required);
+    let uses = names(inputs, Usage::Optional);
     let needs = match needs.is_empty() {
         true => "no particular image".to_owned(),
         false => needs.join(" and "),

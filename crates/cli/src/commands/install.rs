@@ -47,13 +47,15 @@ impl Install<'_> {
                 let file = PathBuf::from(files.onnx.file_name().unwrap_or_default());
                 write_file(&files.config, as_text(&file, self.about, Some(self.known)))?;
                 write_file(&files.default, format!("{name}\n"))?;
-                let (family, ms) = (known.family.networks(), known.call_ms);
+                let family = known.family.networks();
+                let ms = known.call_ms;
                 let _ = writeln!(out, "family {} ({family}), {ms:.0} ms a call", known.family);
                 let _ = writeln!(out, "`tagalong run LOG` takes it for a log with colour alone");
                 let _ = writeln!(out, "a config names it: model = \"{name}\"");
             }
             Known::Embedding(known) => {
-                let (numbers, ms) = (known.numbers, known.call_ms);
+                let numbers = known.numbers;
+                let ms = known.call_ms;
                 let _ = writeln!(out, "re-identification, {numbers} numbers, {ms:.0} ms a person");
                 let _ = writeln!(out, "a config names it: [appearance] model = \"{name}\"");
             }

@@ -105,7 +105,8 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
         return Ok(Ended::Well);
     };
     if let Some(plugin) = &args.export {
-        let (weights, sample) = (args.weights.as_deref(), args.sample.as_deref());
+        let weights = args.weights.as_deref();
+        let sample = args.sample.as_deref();
         return Export { plugin, file, weights, sample }.run(registry);
     }
     let size = args.size.as_deref().and_then(|size| <[usize; 2]>::try_from(size).ok());
@@ -142,7 +143,8 @@ fn absolute(file: &Path) -> Result<PathBuf, Failure> {
 /// Returns the path of a file by which a config names it: relative to the folder of the config
 /// where the file is in it, and otherwise from the root on.
 fn relative_to(config: &Path, file: &Path) -> Result<PathBuf, Failure> {
-    let (config, file) = (absolute(config)?, absolute(file)?);
+    let config = absolute(config)?;
+    let file = absolute(file)?;
     let folder = config.parent().unwrap_or(&config);
     Ok(file.strip_prefix(folder).map(Path::to_owned).unwrap_or(file))
 }
@@ -162,7 +164,8 @@ fn known<'a>(
         let known = KnownEmbedding { network, numbers, call_ms };
         return Ok(Known::Embedding(Box::new(known)));
     }
-    let (family, input) = (about.family()?, about.input.clone()?);
+    let family = about.family()?;
+    let input = about.input.clone()?;
     let choices = Choices { size, ..Choices::default() };
     // A network without the usual class of people is known all the same.
     let call_ms = match PersonNetwork::load(file, &choices, limits) {
@@ -224,14 +227,16 @@ fn describe_input(input: InputSize, preparation: &Preparation, out: &mut String)
         Fit::Centre => format!("centred, padded with {}", preparation.padding),
         Fit::TopLeft => format!("at the top left, padded with {}", preparation.padding),
     };
-    let (mean, deviation) = (preparation.mean, preparation.deviation);
+    let mean = preparation.mean;
+    let deviation = preparation.deviation;
     let _ = writeln!(out, "# image    {} x {} pixels, {fit}", input.width, input.height);
     let _ = writeln!(out, "# colours  {colours}, mean {mean:?}, deviation {deviation:?}");
 }
 
 impl KnownEmbedding {
     fn describe(&self, file: &Path, out: &mut String) {
-        let (convention, name) = (self.network.convention(), json!(file.to_string_lossy()));
+        let convention = self.network.convention();
+        let name = json!(file.to_string_lossy());
         let numbers = self.numbers;
         let _ = writeln!(out, "# kind     re-identification: a person is {numbers} numbers");
         describe_input(self.network.input(), &convention.preparation(), out);

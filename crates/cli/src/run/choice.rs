@@ -16,7 +16,8 @@ pub(super) fn choose(
     args: &InputArgs,
 ) -> Result<ConfigFile, Failure> {
     let mut found = fitting(log, registry, args, 1);
-    let (contents, better) = (found.contents(), found.better());
+    let contents = found.contents();
+    let better = found.better();
     let Some(Fitting { choice, config }) = found.fitting.pop() else {
         return Err(found.none_fits(log));
     };

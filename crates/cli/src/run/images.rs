@@ -12,7 +12,8 @@ const QUALITY: u8 = 85;
 /// An image without pixels, or with more than the format allows.
 pub(super) fn jpeg(image: &RgbImage) -> Result<Vec<u8>, Failure> {
     let mut out = Vec::new();
-    let (width, height) = (image.width() as u32, image.height() as u32);
+    let width = image.width() as u32;
+    let height = image.height() as u32;
     JpegEncoder::new_with_quality(&mut out, QUALITY)
         .encode(image.pixels().as_flattened(), width, height, ExtendedColorType::Rgb8)
         .map_err(|error| {

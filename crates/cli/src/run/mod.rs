@@ -283,7 +283,8 @@ impl Desk {
         };
         let log = TrackLog::create(dir, names, job.outer.output.clone(), job.resolved.to_toml())
             .map_err(refused)?;
-        let (tally, timings) = (Tally::default(), Timings::default());
+        let tally = Tally::default();
+        let timings = Timings::default();
         let remedies = job.remedies.clone();
         Ok(Self {
             log,
@@ -422,7 +423,8 @@ fn no_frame(report: &RunReport) -> String {
 fn without_model(report: &RunReport, remedies: &Remedies) -> Option<String> {
     let lacks = report.funnel.iter().any(|line| line.test == NO_MODEL);
     let remedy = remedies.of(NO_MODEL).filter(|_| lacks && report.persons.is_empty())?;
-    let (name, key) = (&report.config.name, remedy.settings.join(", "));
+    let name = &report.config.name;
+    let key = remedy.settings.join(", ");
     Some(format!(
         "{name}: a detector has no model (`{key}`), so no person was detected: {}",
         remedy.look

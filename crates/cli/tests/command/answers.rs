@@ -97,7 +97,8 @@ fn the_shipped_config_runs_on_every_real_log_with_depth_and_repeats_to_the_byte(
     ];
     for name in names {
         let log = logs.join(name).with_extension("mcap");
-        let (a, b) = (home.path().join(name), home.path().join(format!("{name}-again")));
+        let a = home.path().join(name);
+        let b = home.path().join(format!("{name}-again"));
         run_real(&log, &a, "1");
         run_real(&log, &b, "3");
         for file in ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json"] {

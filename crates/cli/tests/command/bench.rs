@@ -158,7 +158,8 @@ fn the_scores_equal_those_of_eval() {
     let eval: Value = serde_json::from_slice(&eval.output().unwrap().stdout).unwrap();
     let bench = &home.report("out")["tasks"][0]["image"];
     for figure in ["HOTA", "MOTA", "IDF1", "LocA", "position_error_mean_m"] {
-        let (a, b) = (eval[figure].as_f64().unwrap(), bench[figure].as_f64().unwrap());
+        let a = eval[figure].as_f64().unwrap();
+        let b = bench[figure].as_f64().unwrap();
         assert!((a - b).abs() < 2e-3, "{figure}: eval {a}, bench {b}; files are rounded");
     }
 }

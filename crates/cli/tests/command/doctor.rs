@@ -258,7 +258,8 @@ fn a_good_log_is_let_go() {
     let printed = text(&output.stdout);
     assert!(printed.contains("nothing to complain about"), "{printed}");
     for found in said["findings"].as_array().unwrap() {
-        let (id, measured) = (found["id"].as_str().unwrap(), found["measured"].as_str().unwrap());
+        let id = found["id"].as_str().unwrap();
+        let measured = found["measured"].as_str().unwrap();
         assert!(printed.contains(id) && printed.contains(measured), "{id} is not printed");
     }
 }
@@ -267,7 +268,8 @@ fn a_good_log_is_let_go() {
 #[test]
 fn the_remedy_for_shifted_depth_cures_it() {
     let home = tempfile::tempdir().unwrap();
-    let (log, cured) = (home.path().join("shifted.mcap"), home.path().join("cured.toml"));
+    let log = home.path().join("shifted.mcap");
+    let cured = home.path().join("cured.toml");
     broken::write(good(), &log, &shifted(6, -5));
     let (_, said) = doctor(&config(), &log, &[]);
     let figures = &finding(&said, "registration")["figures"];

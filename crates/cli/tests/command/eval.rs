@@ -159,7 +159,8 @@ fn whole_bodies_can_be_compared_by_their_upper_bodies() {
     // 1.7 m over 170 pixels: the square has 57 of them, and 2.5 of air.
     fs::write(path("whole.txt"), "1,1,100,50,60,170,1,1,1\n").unwrap();
     fs::write(path("upper.txt"), "1,1,101.5,47.5,57,57,1,-1,-1,-1\n").unwrap();
-    let (truth, tracks) = (path("whole.txt"), path("upper.txt"));
+    let truth = path("whole.txt");
+    let tracks = path("upper.txt");
     let files = ["--truth", shown(&truth), "--tracks", shown(&tracks), "--format", "json"];
     let nothing = json(&eval(&files));
     assert_eq!(nothing["TP"].as_u64(), Some(0));
@@ -179,7 +180,8 @@ fn kitti_labels_count_frames_from_zero() {
         .unwrap();
     fs::write(path("tracks.txt"), "1,9,100,100,50,120,1,-1,-1,-1\n2,9,100,100,50,120,1,-1,-1,-1\n")
         .unwrap();
-    let (truth, tracks) = (path("truth.txt"), path("tracks.txt"));
+    let truth = path("truth.txt");
+    let tracks = path("tracks.txt");
     let scores =
         json(&eval(&["--truth", shown(&truth), "--tracks", shown(&tracks), "--format", "json"]));
     assert_eq!(scores["HOTA"].as_f64(), Some(1.0), "{scores}");
@@ -312,7 +314,8 @@ fn mot17_figures_equal_those_of_trackeval() {
             ("FN", "CLR_FN"),
             ("Frag", "Frag"),
         ] {
-            let (got, want) = (scores[ours].as_f64().unwrap(), figures[theirs].as_f64().unwrap());
+            let got = scores[ours].as_f64().unwrap();
+            let want = figures[theirs].as_f64().unwrap();
             assert!((got - want).abs() < 1e-6, "{name} {ours}: {got}, TrackEval {want}");
         }
     }

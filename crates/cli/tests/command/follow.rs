@@ -51,7 +51,8 @@ fn another_first_seed_rides_elsewhere_and_the_tables_name_it() {
         let more = ["--seeds", "1", "--first-seed", first, "--format", "json"];
         json(&follow(folder.path(), "follow-depth.toml", &more))
     };
-    let (near, far) = (ride("3"), ride("4"));
+    let near = ride("3");
+    let far = ride("4");
     assert_eq!(near["seeds"], serde_json::json!({ "split": "test", "first": 3, "count": 1 }));
     assert_eq!(
         (&near["rides"][0]["seed"], &far["rides"][0]["seed"]),

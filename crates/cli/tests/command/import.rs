@@ -27,7 +27,8 @@ fn import(home: &Path, args: &[&str]) -> (i32, String) {
 }
 
 fn frames(log: &Path, inputs: Inputs) -> Vec<LogFrame> {
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let mut source = FrameSource::open(log, &input, &limits, inputs).unwrap();
     std::iter::from_fn(|| source.next_frame()).collect()
 }

@@ -79,7 +79,8 @@ fn without_depth() -> [String; 2] {
 fn same_on_both(home: &Home) {
     let mut rows = 0;
     for config in without_depth() {
-        let (with, without) = (home.run(&config, "with.mcap"), home.run(&config, "without.mcap"));
+        let with = home.run(&config, "with.mcap");
+        let without = home.run(&config, "without.mcap");
         rows += with[0].lines().count();
         for (with, without) in with.iter().zip(&without) {
             assert_eq!(with, without, "{config}");
@@ -93,7 +94,8 @@ fn a_pipeline_without_depth_is_the_same_on_a_log_that_has_it() {
     let home = Home::simulated();
     same_on_both(&home);
     let uses = config("rgbd-compressive");
-    let (with, without) = (home.run(&uses, "with.mcap"), home.run(&uses, "without.mcap"));
+    let with = home.run(&uses, "with.mcap");
+    let without = home.run(&uses, "without.mcap");
     assert_ne!(with[2], without[2], "one that uses depth sees the difference");
 }
 

@@ -38,7 +38,8 @@ fn t6_a_topic_that_is_not_there_is_told_with_those_that_are() {
 fn a_topic_of_a_wrong_kind_is_told_with_its_line_its_kind_and_the_remedy() {
     let home = tempfile::tempdir().unwrap();
     Drawn::of(3).write(&home.path().join("good.mcap"));
-    let (colour, depth) = ("/camera/color/image_raw", "/camera/depth/image_raw");
+    let colour = "/camera/color/image_raw";
+    let depth = "/camera/depth/image_raw";
     for (key, wrong, kind, remedy) in [
         ("depth_topic", colour, "sensor_msgs/msg/Image, rgb8", depth),
         ("colour_topic", depth, "sensor_msgs/msg/Image, ", colour),

@@ -79,7 +79,8 @@ fn boxes_follow_the_walker_in_ten_columns() {
     assert!(rows.iter().all(|row| row.len() == 10 && row[7..] == ["-1", "-1", "-1"]));
     for row in &rows {
         let value = |i: usize| row[i].parse::<f64>().unwrap();
-        let (frame, centre) = (value(0), value(2) + 0.5 * value(4));
+        let frame = value(0);
+        let centre = value(2) + 0.5 * value(4);
         assert!((1.0..=20.0).contains(&frame));
         let walker = 90.0 - (frame - 1.0) + 13.0;
         assert!((centre - walker).abs() < 4.0, "frame {frame}: {centre}, drawn at {walker}");

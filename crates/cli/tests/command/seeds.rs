@@ -36,10 +36,13 @@ fn another_first_seed_draws_other_scenes_and_the_same_one_the_same() {
         let more = ["--seeds", "2", "--format", "json", "--jobs", jobs, "--first-seed", first];
         printed(&trials(&more))
     };
-    let (here, again, there) = (json("5", "1"), json("5", "2"), json("6", "2"));
+    let here = json("5", "1");
+    let again = json("5", "2");
+    let there = json("6", "2");
     assert_eq!(here, again);
     let read = |text: &str| serde_json::from_str::<Value>(text).unwrap();
-    let (here, there) = (read(&here), read(&there));
+    let here = read(&here);
+    let there = read(&there);
     assert_ne!(here["rows"], there["rows"]);
     let seeds = serde_json::json!({ "split": "test", "first": 5, "count": 2 });
     assert_eq!(here["seeds"], seeds);

@@ -34,7 +34,8 @@ fn the_same_scene_and_seed_are_the_same_bytes_on_any_number_of_threads() {
     let truth = read_truth(&folder.path().join("a.mcap"), &Limits::default()).unwrap().unwrap();
     let person = &truth[0].people[0];
     assert_eq!((truth.len(), truth[0].people.len(), person.id), (6, 1, 1));
-    let (joints, head) = (&person.joints, person.head_in_robot_m.unwrap());
+    let joints = &person.joints;
+    let head = person.head_in_robot_m.unwrap();
     assert_eq!(joints.len(), 12);
     let up = |name: &str| joints[name].in_robot_m[2];
     assert!(up("left_ankle") < up("left_knee") && up("left_hip") < up("left_shoulder"));

@@ -15,7 +15,8 @@ pub fn exposure(evidence: &Evidence) -> Option<Finding> {
     let count = all.len() as f64;
     let mean = |value: fn(&Exposure) -> f64| all.iter().map(value).sum::<f64>() / count;
     let blind = all.iter().filter(|e| e.black.max(e.white) > BLIND || e.contrast < 3.0).count();
-    let (black, white) = (mean(|e| e.black), mean(|e| e.white));
+    let black = mean(|e| e.black);
+    let white = mean(|e| e.white);
     let severity = Severity::beyond(blind as f64 / count, 0.05, 0.5)
         .max(Severity::beyond(black, 0.5, 0.8))
         .max(Severity::beyond(white, 0.25, 0.6));

@@ -3,7 +3,8 @@ use super::super::finding::{Finding, Severity};
 
 /// Checks that the floor is visible.
 pub fn floor(evidence: &Evidence) -> Option<Finding> {
-    let (found, tried) = (evidence.samples.floors.len(), evidence.samples.depths.len());
+    let found = evidence.samples.floors.len();
+    let tried = evidence.samples.depths.len();
     let camera = evidence.samples.camera.as_ref()?;
     if tried == 0 || camera.panorama().is_some() {
         return None;

@@ -8,7 +8,8 @@ use super::pose::mount_lines;
 
 /// Checks that the frames of tf are connected, and that the camera's is an optical one.
 pub fn frames(evidence: &Evidence) -> Option<Finding> {
-    let (facts, tf) = (&evidence.inspection.facts, &evidence.inspection.transforms);
+    let facts = &evidence.inspection.facts;
+    let tf = &evidence.inspection.transforms;
     let camera = evidence.samples.camera.as_ref()?;
     let name = facts.camera_frame.clone().unwrap_or_default();
     let ok = |measured: String| Some(Finding::new("frames", Severity::Ok, measured));
@@ -22,7 +23,8 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
     if !facts.camera_source.starts_with("tf") {
         return Some(cut(evidence, &name));
     }
-    let (pitch, roll) = (camera.pitch_down_rad().to_degrees(), camera.roll_rad().to_degrees());
+    let pitch = camera.pitch_down_rad().to_degrees();
+    let roll = camera.roll_rad().to_degrees();
     // A body frame in place of the optical one turns the camera by 90 degrees, far beyond these
     // limits.
     let upright = pitch.abs() <= 65.0 && roll.abs() <= 45.0;
@@ -43,7 +45,8 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
 
 /// Reports that the camera's frame is not connected to the robot's.
 fn cut(evidence: &Evidence, camera: &str) -> Finding {
-    let (facts, tf) = (&evidence.inspection.facts, &evidence.inspection.transforms);
+    let facts = &evidence.inspection.facts;
+    let tf = &evidence.inspection.transforms;
     let names: BTreeSet<&str> = tf.iter().flat_map(|(a, b)| [a.as_str(), b.as_str()]).collect();
     let roots: Vec<&str> = names.iter().copied().filter(|name| !tf.contains_key(*name)).collect();
     let robot = facts.robot_frame.as_str();

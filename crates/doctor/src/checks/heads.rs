@@ -35,7 +35,8 @@ pub fn heads(evidence: &Evidence) -> Option<Finding> {
         let finding = Finding::new("heads", Severity::Bad, measured);
         return Some(finding.why(WHY).remedy(remedy(camera)));
     };
-    let (near, far) = (*range.start(), *range.end());
+    let near = *range.start();
+    let far = *range.end();
     let mut severity = Severity::beyond(near, NEAR_M, BAD_NEAR_M);
     let mut measured = format!("heads leave the image nearer than {near:.1} m");
     if near <= NEAREST_M {

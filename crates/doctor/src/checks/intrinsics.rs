@@ -27,7 +27,8 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
         let measured = "none in the log: a view of 53 degrees is assumed".to_owned();
         return Some(finding(Severity::Warn, measured).remedy(remedy));
     }
-    let (width, height) = (camera.width as f64, camera.height as f64);
+    let width = camera.width as f64;
+    let height = camera.height as f64;
     let view = (2.0 * (0.5 * width / lens.fx).atan()).to_degrees();
     // Half a pixel: centres of pixels have whole coordinates.
     let off = ((lens.cx + 0.5) / width - 0.5).abs().max(((lens.cy + 0.5) / height - 0.5).abs());

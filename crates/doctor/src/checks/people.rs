@@ -19,7 +19,8 @@ pub fn people(evidence: &Evidence) -> Option<Finding> {
     }
     let coverage = &evidence.coverage;
     let tracks = coverage.moving + coverage.still + coverage.unclear;
-    let (frames, with) = (trial.frames, coverage.frames_with_people);
+    let frames = trial.frames;
+    let with = coverage.frames_with_people;
     let measured = format!("{tracks} tracks, seen in {with} of {frames} frames");
     let severity = match (frames, with) {
         (0, _) => Severity::Bad,

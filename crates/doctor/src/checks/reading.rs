@@ -17,8 +17,8 @@ const NO_REASON: [&str; 10] = [
 
 /// Checks that the images of the log became frames.
 pub fn reading(evidence: &Evidence) -> Option<Finding> {
-    let (made, wanted) =
-        (evidence.reading.made, evidence.reading.wanted.max(evidence.reading.made));
+    let made = evidence.reading.made;
+    let wanted = evidence.reading.wanted.max(evidence.reading.made);
     if wanted == 0 {
         let why = evidence.inspection.unusable.as_deref().unwrap_or("no image and no scan");
         let finding = Finding::new("frames-read", Severity::Bad, format!("no frame: {why}"))

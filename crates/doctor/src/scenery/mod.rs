@@ -73,7 +73,8 @@ impl Views {
 
     /// Compares the views with each other.
     pub fn judge(self) -> Scenery {
-        let (mut points, mut changed) = (0u64, 0u64);
+        let mut points = 0u64;
+        let mut changed = 0u64;
         let plans: Vec<Plan> = (0..self.views.len())
             .map(|at| {
                 let others = self.others(at);
@@ -128,7 +129,8 @@ impl Moment {
 
 /// Returns true if other views look through a point.
 fn has_changed(point: &Point3<f64>, others: &[&View]) -> bool {
-    let (mut through, mut onto) = (0, 0);
+    let mut through = 0;
+    let mut onto = 0;
     for view in others {
         match view.look_at(point) {
             Look::Through => through += 1,
@@ -166,7 +168,8 @@ mod tests {
     #[test]
     fn the_place_of_a_pillar_is_idle_and_that_of_a_walker_is_not() {
         let scenery = Room::default().with(Thing::walking()).seen(40, 0.0).judge();
-        let (first, walker) = (&scenery.moments[2], Thing::walking().place(0.2));
+        let first = &scenery.moments[2];
+        let walker = Thing::walking().place(0.2);
         let share = |place| first.plan.changed_share(place, 0.4).unwrap();
         assert!(share(PILLAR) < 0.05, "{}", share(PILLAR));
         assert!(share(walker) > 0.5, "{}", share(walker));

@@ -117,7 +117,8 @@ fn centre(key: &Key) -> Point2<f64> {
 
 /// Takes the cells that are connected with one, diagonals included, out of those that are left.
 fn group(first: Key, left: &mut BTreeSet<Key>) -> Vec<Key> {
-    let (mut found, mut next) = (vec![first], 0);
+    let mut found = vec![first];
+    let mut next = 0;
     while let Some([x, y]) = found.get(next).copied() {
         next += 1;
         let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
@@ -129,6 +130,7 @@ fn group(first: Key, left: &mut BTreeSet<Key>) -> Vec<Key> {
 /// Returns the extent of cells along an axis, m.
 fn extent(group: &[Key], axis: usize) -> f64 {
     let along = || group.iter().map(|key| key[axis]);
-    let (low, high) = (along().min().unwrap_or(0), along().max().unwrap_or(0));
+    let low = along().min().unwrap_or(0);
+    let high = along().max().unwrap_or(0);
     f64::from(high - low + 1) * CELL_M
 }

@@ -47,7 +47,8 @@ impl View {
         let depth = frame.images().depth?;
         let Lens::Pinhole(_) = &frame.camera.lens else { return None };
         let step = (depth.width() / COLUMNS).max(1);
-        let (columns, rows) = (depth.width() / step, depth.height() / step);
+        let columns = depth.width() / step;
+        let rows = depth.height() / step;
         let readings = reduced(&depth, step, columns, rows);
         let odom_from_robot = item.odom_from_robot;
         let shift = odom_from_robot.translation;
@@ -133,7 +134,8 @@ const MARGIN_GROWTH: f64 = 0.015;
 
 fn reduced(depth: &DepthImage, step: usize, columns: usize, rows: usize) -> Vec<f32> {
     let at = |i: usize| {
-        let (x, y) = (i % columns * step + step / 2, i / columns * step + step / 2);
+        let x = i % columns * step + step / 2;
+        let y = i / columns * step + step / 2;
         depth.row(y)[x]
     };
     (0..columns * rows).map(at).collect()
@@ -143,7 +145,8 @@ fn reduced(depth: &DepthImage, step: usize, columns: usize, rows: usize) -> Vec<
 fn nearest(depth: &[f32], columns: usize, rows: usize) -> Vec<f32> {
     let around = |v: usize, count: usize| v.saturating_sub(1)..(v + 2).min(count);
     let smallest = |at: usize| {
-        let (x, y) = (at % columns, at / columns);
+        let x = at % columns;
+        let y = at / columns;
         let cells = around(y, rows).flat_map(|y| around(x, columns).map(move |x| (x, y)));
         // `min` passes over NaN, which is no reading.
         cells.map(|(x, y)| depth[y * columns + x]).fold(f32::INFINITY, f32::min)

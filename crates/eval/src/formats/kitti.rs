@@ -88,8 +88,10 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Label>, FormatError> {
 
 fn label(line: &Line<'_>) -> Result<Label, FormatError> {
     let number = |index, name| line.number(index, name);
-    let (left, top) = (number(6, "left")?, number(7, "top")?);
-    let (right, bottom) = (number(8, "right")?, number(9, "bottom")?);
+    let left = number(6, "left")?;
+    let top = number(7, "top")?;
+    let right = number(8, "right")?;
+    let bottom = number(9, "bottom")?;
     let region = Region::new(left, top, right - left, bottom - top);
     Ok(Label {
         line: line.number,
@@ -115,7 +117,8 @@ pub fn add_truths(timeline: &mut Timeline, labels: &[Label]) {
         if label.is_dont_care() {
             frame.ignore_regions.push(label.region);
         } else if let Some(role) = label.pedestrian_role() {
-            let (region, floor_m) = (Some(label.region), label.floor_m());
+            let region = Some(label.region);
+            let floor_m = label.floor_m();
             frame.truths.push(Truth { id: label.id, region, floor_m, role, view: None });
         }
     }

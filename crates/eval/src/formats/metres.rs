@@ -56,9 +56,12 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
         let column = |axis: &str| table.column(&format!("{axis}_{frame}_m"));
         Ok([column("x")?, column("y")?, column("z")?])
     };
-    let (stamp, frame, id) =
-        (table.column("stamp_ns")?, table.column("frame")?, table.column("id")?);
-    let (robot, odom, seen) = (place("robot")?, place("odom")?, table.column("seen")?);
+    let stamp = table.column("stamp_ns")?;
+    let frame = table.column("frame")?;
+    let id = table.column("id")?;
+    let robot = place("robot")?;
+    let odom = place("odom")?;
+    let seen = table.column("seen")?;
     let mut rows = Vec::new();
     for line in &table.rows {
         let point = |at: [usize; 3]| -> Result<[f64; 3], FormatError> {

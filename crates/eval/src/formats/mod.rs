@@ -47,7 +47,8 @@ pub struct OddLines {
 impl OddLines {
     /// Returns those of all lines, given as numbers, that are odd; `None` without any.
     pub fn among(lines: impl IntoIterator<Item = (usize, bool)>) -> Option<Self> {
-        let (mut odd, mut of) = (Vec::new(), 0);
+        let mut odd = Vec::new();
+        let mut of = 0;
         for (line, is_odd) in lines {
             of += 1;
             odd.extend(is_odd.then_some(line));
@@ -210,7 +211,8 @@ fn plain(text: &str) -> Option<f64> {
     if digits.is_empty() || digits.len() > TENS.len() {
         return None;
     }
-    let (mut whole, mut behind) = (0_u32, None);
+    let mut whole = 0_u32;
+    let mut behind = None;
     for (at, byte) in digits.iter().enumerate() {
         match byte {
             b'0'..=b'9' => whole = 10 * whole + u32::from(byte - b'0'),

@@ -168,8 +168,10 @@ pub fn write(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
             write_cells(out, region.map(|r| [r.x, r.y, r.width, r.height]))?;
         }
         write_cells(out, row.head_in_camera_m)?;
-        let (ignore, key) = (u8::from(row.ignore), u8::from(row.key));
-        let (visible, occluder) = (row.visible, &row.occluder);
+        let ignore = u8::from(row.ignore);
+        let key = u8::from(row.key);
+        let visible = row.visible;
+        let occluder = &row.occluder;
         writeln!(out, ",{visible},{occluder},{ignore},{},{key}", row.interpolated)?;
     }
     Ok(())

@@ -95,7 +95,8 @@ mod tests {
 
     fn followed(likeness: Vec<(Likeness, bool)>) -> Followed {
         let ridden = Ridden { likeness, ..Ridden::default() };
-        let (suite, pipeline) = ("scene".into(), "config".into());
+        let suite = "scene".into();
+        let pipeline = "config".into();
         Followed { suite, pipeline, ridden, ..Followed::default() }
     }
 

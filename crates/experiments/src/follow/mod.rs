@@ -215,7 +215,8 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
                     let mut scene = tagalong_simulate::read(&path, &variant)?;
                     scene.faults.inject.extend(args.inject.iter().cloned());
                     scene.check_faults().map_err(Failure::usage)?;
-                    let (suite, swept) = (suite.clone(), swept.clone());
+                    let suite = suite.clone();
+                    let swept = swept.clone();
                     jobs.push(Job { suite, swept, scene, contender: contender.clone() });
                 }
             }

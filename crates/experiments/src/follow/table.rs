@@ -213,7 +213,8 @@ pub fn likeness_csv(results: &[Followed]) -> String {
             let d = &like.differences;
             let numbers =
                 [d.torso, d.legs, d.texture, Some(d.height_m), d.rivals].map(number).join(",");
-            let (seed, p) = (ridden.seed, like.probability);
+            let seed = ridden.seed;
+            let p = like.probability;
             out += &format!("{suite},{pipeline},{seed},{},{p:.4},{numbers}\n", u8::from(*same));
         }
     }

@@ -74,7 +74,8 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let suites =
         scenes.iter().map(|path| suite(path, args, seeds)).collect::<Result<Vec<_>, _>>()?;
     let trials = suites.iter().map(|(_, scenes)| scenes.len()).sum();
-    let (bar, forecast) = (bar(trials), Forecast::new(trials, "trials"));
+    let bar = bar(trials);
+    let forecast = Forecast::new(trials, "trials");
     let advance = || {
         bar.inc(1);
         forecast.advance();

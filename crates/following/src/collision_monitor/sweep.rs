@@ -392,7 +392,8 @@ mod tests {
         let bar = Footprint::new(&[[0.1, 0.1], [0.1, -0.1], [-0.5, -0.1], [-0.5, 0.1]]);
         let settings = CollisionMonitorSettings::default();
         let turn = |left| {
-            let (path, beside) = (Path::Turn { left }, [still(-0.35, -0.35)]);
+            let path = Path::Turn { left };
+            let beside = [still(-0.35, -0.35)];
             allowance(&settings, &bar, &beside, path, 1.5, &BRAKING).most
         };
         assert!(turn(true) < 1.0, "the tail turns to the right: {}", turn(true));
@@ -442,7 +443,8 @@ mod tests {
     #[test]
     fn before_a_person_the_wheels_have_time_to_come_to_rest() {
         let settings = CollisionMonitorSettings::default();
-        let (hazards, speed) = ([moving(2.2, 0.0, 1.6)], 0.9);
+        let hazards = [moving(2.2, 0.0, 1.6)];
+        let speed = 0.9;
         let most = |settle_s: f64| {
             let braking = Braking { settle_s, ..BRAKING };
             allowance(&settings, &octagon(), &hazards, AHEAD, speed, &braking).most

@@ -140,7 +140,8 @@ fn a_picture_that_does_not_change_as_the_odometry_says_is_frozen() {
                     let steps = index as f64;
                     let motion = EgoMotion { forward, turn, ..EgoMotion::at_rest(0.1) };
                     let part = if is_frozen { 0.0 } else { steps };
-                    let (x, angle) = (forward * part, turn * part);
+                    let x = forward * part;
+                    let angle = turn * part;
                     let frame = if by_laser {
                         frame(index, motion, None, Some(scan_at(index, x, angle, |_| None)))
                     } else {

@@ -524,7 +524,8 @@ impl CommandLimiter {
 
     /// Moves the turn rate towards `turn` as far as its limits and the base allow at this speed.
     fn turned(&self, before: &Motion, turn: f64, forward: &Axis, dt: f64) -> Axis {
-        let (limits, peak) = (self.turn_limits(), forward.peak(&self.forward_limits()));
+        let limits = self.turn_limits();
+        let peak = forward.peak(&self.forward_limits());
         let most = self.robot.turn_at(peak).min(self.settings.max_turn_radps);
         let turn = before.turn.track(turn.clamp(-most, most), dt, &limits, most);
         if self.robot.base != Base::Ackermann {
@@ -544,7 +545,8 @@ impl CommandLimiter {
     fn in_reach(&self, twist: Twist) -> WheelSpeeds {
         let most = self.max_speed_mps;
         if self.robot.base == Base::Holonomic {
-            let (speed, turn) = (most, self.settings.max_turn_radps);
+            let speed = most;
+            let turn = self.settings.max_turn_radps;
             let forward = twist.linear_mps.clamp(-speed, speed);
             return self.wheels.wheels(Twist::new(forward, twist.angular_rps.clamp(-turn, turn)));
         }

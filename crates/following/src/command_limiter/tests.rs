@@ -256,7 +256,9 @@ fn the_speed_that_a_planner_allows_holds_within_the_limits_of_the_robot() {
 fn before_a_wall_the_robot_stops_without_an_emergency() {
     for period_s in [0.03, 0.1] {
         let mut limiter = limiter_of(CommandLimiterSettings::default());
-        let (mut tape, mut place_m, mut speeds) = (Motion::default(), 0.0, Vec::new());
+        let mut tape = Motion::default();
+        let mut place_m = 0.0;
+        let mut speeds = Vec::new();
         for frame in 1..600_u32 {
             let stamp = Stamp::from_nanos(1_000_000_000).plus_seconds(f64::from(frame) * period_s);
             // In steps of a centimetre, as the corridor tells it.

@@ -189,7 +189,8 @@ mod tests {
 
     /// Returns the index of the frame in which a track is chosen, and its number.
     fn chosen(frames: impl IntoIterator<Item = Vec<Track>>) -> Option<(usize, u32)> {
-        let (settings, mut chooser) = (approaching(), Chooser::default());
+        let settings = approaching();
+        let mut chooser = Chooser::default();
         let mut at = frames.into_iter().enumerate().map(|(index, tracks)| {
             let found = chooser.choose(&settings, &tracks, DT_S);
             found.map(|track| (index, track.id.0))

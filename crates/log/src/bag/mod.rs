@@ -181,12 +181,14 @@ fn learn<R: Read>(walk: &mut Walk<R>, parts: &Parts) -> Option<()> {
 
 fn locate<R: Read>(walk: &mut Walk<R>, parts: &Parts) -> Option<()> {
     let fields = Fields::parse(&walk.buffer[parts.header.clone()])?;
-    let (id, time_ns) = (fields.number("conn")?, fields.time_ns("time")?);
+    let id = fields.number("conn")?;
+    let time_ns = fields.time_ns("time")?;
     let Some(channel) = walk.channel_of(id) else { return Some(()) };
     // The mark takes the place of the length of the data, which was read.
     let data = parts.data.start - ROS1_MARK.len()..parts.data.end;
     walk.buffer[data.start..parts.data.start].copy_from_slice(&ROS1_MARK);
-    let (log_time, publish_time) = (time_ns, time_ns);
+    let log_time = time_ns;
+    let publish_time = time_ns;
     walk.deliver(Located { channel, log_time, publish_time, sequence: 0, data });
     Some(())
 }

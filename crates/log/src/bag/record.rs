@@ -52,7 +52,8 @@ impl<'a> Fields<'a> {
     pub(super) fn time_ns(&self, name: &str) -> Option<u64> {
         let bytes = self.bytes(name)?;
         let both = (bytes.len() == 8).then(|| u64_at(bytes, 0))?;
-        let (seconds, nanos) = (both & u64::from(u32::MAX), both >> 32);
+        let seconds = both & u64::from(u32::MAX);
+        let nanos = both >> 32;
         Some(seconds * 1_000_000_000 + nanos)
     }
 

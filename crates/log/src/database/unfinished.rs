@@ -211,7 +211,8 @@ fn pages_of_journal(journal: &Path) -> Result<u64, String> {
             .into());
     }
     let number = |at: usize| u64::from(u32_at(&header, at));
-    let (sector, page) = (number(20), number(24));
+    let sector = number(20);
+    let page = number(24);
     // A number of each page, and a checksum.
     Ok(length.saturating_sub(sector) / (page + 8))
 }

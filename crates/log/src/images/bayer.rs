@@ -33,7 +33,8 @@ impl Pattern {
 
 /// Interpolates the colours. The outermost pixels are those next to them.
 pub(super) fn interpolate(rows: &Rows<'_>, pattern: Pattern) -> RgbImage {
-    let (width, height) = (rows.width, rows.height);
+    let width = rows.width;
+    let height = rows.height;
     let inner = |at: usize, size: usize| at.clamp(1, size.max(3) - 2);
     let mut pixels = Vec::with_capacity(width * height);
     for y in 0..height {

@@ -117,7 +117,8 @@ pub fn size_of_compressed(
         }
         [0x89, b'P', b'N', b'G', ..] => {
             let reader = png::Decoder::new(Cursor::new(data)).read_info().map_err(codec)?;
-            let (width, height) = (reader.info().width, reader.info().height);
+            let width = reader.info().width;
+            let height = reader.info().height;
             check_size(width.into(), height.into(), 4, limits)?;
             Ok((width as usize, height as usize))
         }
@@ -156,7 +157,8 @@ fn jpeg(data: &[u8], limits: &Limits) -> Result<Pixels, ImageError> {
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(data), options);
     decoder.decode_headers().map_err(codec)?;
     let info = decoder.info().ok_or_else(|| codec("no header"))?;
-    let (width, height) = (usize::from(info.width), usize::from(info.height));
+    let width = usize::from(info.width);
+    let height = usize::from(info.height);
     check_size(width as u64, height as u64, 3, limits)?;
     // Grey stays grey, which takes a third of the memory.
     let grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
@@ -182,7 +184,9 @@ fn png(data: &[u8], depth_unit_m: Option<f64>, limits: &Limits) -> Result<Pixels
     if let Some(depth) = png.scaled(|v| metres(v, unit)) {
         return Ok(Pixels::Depth(depth));
     }
-    let (w, h, bytes) = (png.width, png.height, png.bytes);
+    let w = png.width;
+    let h = png.height;
+    let bytes = png.bytes;
     let pixels = match (png.colour, png.depth) {
         (png::ColorType::Grayscale, png::BitDepth::Eight) => Pixels::Grey(exact(w, h, bytes)),
         (png::ColorType::Rgb, png::BitDepth::Eight) => {
@@ -214,7 +218,8 @@ impl PngPixels {
         let mut decoder = png::Decoder::new_with_limits(Cursor::new(data), png::Limits { bytes });
         decoder.set_transformations(png::Transformations::EXPAND);
         let mut reader = decoder.read_info().map_err(codec)?;
-        let (width, height) = (reader.info().width, reader.info().height);
+        let width = reader.info().width;
+        let height = reader.info().height;
         check_size(width.into(), height.into(), 4, limits)?;
         let size = reader.output_buffer_size().filter(|size| *size <= bytes);
         let size =
@@ -255,7 +260,9 @@ fn compressed_depth(
         f32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
     };
     if image.format.starts_with("32FC1") {
-        let (a, b, unit) = (float(4), float(8), depth_unit_m.unwrap_or(1.0) as f32);
+        let a = float(4);
+        let b = float(8);
+        let unit = depth_unit_m.unwrap_or(1.0) as f32;
         let inverse = |v: u16| if v == 0 { f32::NAN } else { a / (f32::from(v) - b) };
         depth_of(body, is_rvl, limits, |v| metres_of_float(inverse(v), unit))
     } else {
@@ -286,9 +293,11 @@ fn depth_of(
     let (size, stream) = body.split_first_chunk::<8>().ok_or_else(|| lost("RVL without a size"))?;
     let number =
         |at: usize| u32::from_le_bytes([size[at], size[at + 1], size[at + 2], size[at + 3]]);
-    let (width, height) = (number(0), number(4));
+    let width = number(0);
+    let height = number(4);
     check_size(width.into(), height.into(), 4, limits)?;
-    let (width, height) = (width as usize, height as usize);
+    let width = width as usize;
+    let height = height as usize;
     rvl::decode(stream, width * height, pixel)
         .map(|values| exact(width, height, values))
         .ok_or_else(|| lost("the RVL stream does not fit the size"))

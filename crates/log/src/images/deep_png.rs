@@ -33,7 +33,8 @@ pub(super) fn decode(
 ) -> Option<DepthImage> {
     let (width, height, stream) = parts(data)?;
     check_size(width.into(), height.into(), 4, limits).ok()?;
-    let (width, height) = (width as usize, height as usize);
+    let width = width as usize;
+    let height = height as usize;
     let row_bytes = 1 + 2 * width;
     let mut out = vec![0.0; width * height];
     let mut blocks = out.chunks_mut(width * ROWS);
@@ -50,7 +51,8 @@ pub(super) fn decode(
 /// Returns columns, rows and the deflated data of a PNG of 16 bits of grey.
 fn parts(data: &[u8]) -> Option<(u32, u32, Vec<u8>)> {
     let mut rest = data.strip_prefix(SIGNATURE)?;
-    let (mut size, mut stream) = (None, Vec::new());
+    let mut size = None;
+    let mut stream = Vec::new();
     loop {
         let (length, after) = rest.split_first_chunk::<4>()?;
         let length = u32::from_be_bytes(*length) as usize;
@@ -89,7 +91,8 @@ fn inflate(
     inflater.ignore_adler32();
     // Small enough to stay in the cache.
     let mut window = vec![0; 4 * HISTORY + block];
-    let (mut filled, mut taken) = (0, 0);
+    let mut filled = 0;
+    let mut taken = 0;
     loop {
         let (read, written) = inflater.read(stream, &mut window, filled, true).ok()?;
         stream = &stream[read..];
@@ -174,7 +177,8 @@ fn undo_simple(filter: u8, filtered: &[[u8; 2]], row: &mut [[u8; 2]]) {
     match filter {
         0 => both.for_each(|(value, filtered)| *value = *filtered),
         1 => {
-            let (mut high, mut low) = (0_u8, 0_u8);
+            let mut high = 0_u8;
+            let mut low = 0_u8;
             both.for_each(|(value, filtered)| {
                 high = high.wrapping_add(filtered[0]);
                 low = low.wrapping_add(filtered[1]);
@@ -209,7 +213,8 @@ impl Filters {
 
 /// Undoes the filters of eight rows. Left of a row its lanes are 0, as are the predictions there.
 fn undo_steps(steps: &mut [[u8; LANES]], above: &[[u8; 2]], filters: &Filters) {
-    let (mut a, mut b) = ([0; LANES], [0; LANES]);
+    let mut a = [0; LANES];
+    let mut b = [0; LANES];
     for (step, top) in steps.iter_mut().zip(above) {
         let c = b;
         // Above a pixel is that of the step before, a row further up.
@@ -242,7 +247,8 @@ fn distance(a: u8, b: u8) -> u8 {
 /// equals the first. Without a branch and in bytes, of which vector instructions take most.
 #[inline(always)]
 fn paeth(a: u8, b: u8, c: u8) -> u8 {
-    let (to_a, to_b) = (distance(b, c), distance(a, c));
+    let to_a = distance(b, c);
+    let to_b = distance(a, c);
     // Elsewhere it is farther from c than from both others.
     let is_between = (a < c) == (c < b);
     let to_c = if is_between { distance(to_a, to_b) } else { u8::MAX };

@@ -55,7 +55,8 @@ pub fn decode_disparity(
     let baseline_m = f64::from(message.t) * depth_unit_m.unwrap_or(1.0);
     let geometry = StereoGeometry { focal_px: message.f.into(), baseline_m };
     let values = values_of(&message.image, unit_px, limits)?;
-    let (least, most) = (message.min_disparity, message.max_disparity);
+    let least = message.min_disparity;
+    let most = message.max_disparity;
     let least = if least.is_finite() { least } else { 0.0 };
     // Drivers that do not know the range leave it at 0.
     let range = least..=if most > least { most } else { f32::MAX };

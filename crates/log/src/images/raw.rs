@@ -119,7 +119,8 @@ impl<'a> Rows<'a> {
         count: usize,
         row_bytes: usize,
     ) -> Result<Self, ImageError> {
-        let (width, height) = (image.width as usize, image.height as usize);
+        let width = image.width as usize;
+        let height = image.height as usize;
         let step = image.step as usize;
         // In 64 bits, where the product of two 32-bit numbers cannot overflow.
         let expected = u64::from(image.step) * count as u64;

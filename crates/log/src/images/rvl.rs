@@ -80,7 +80,8 @@ pub(super) fn decode<P: Copy>(
 ) -> Option<Vec<P>> {
     let mut nibbles = Nibbles::new(bytes);
     let mut out = vec![pixel(0); count];
-    let (mut at, mut last) = (0_usize, 0_u16);
+    let mut at = 0_usize;
+    let mut last = 0_u16;
     while at < count {
         // A damaged run may claim any length: the bounds of `out` tell.
         at = at.saturating_add(nibbles.number()? as usize);

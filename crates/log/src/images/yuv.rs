@@ -46,7 +46,8 @@ impl Order {
 /// # Errors
 /// An odd size where pixels share their colour, and a length of the data that contradicts the size.
 pub(super) fn decode(image: &Image<'_>, order: Order) -> Result<RgbImage, ImageError> {
-    let (width, height) = (image.width as usize, image.height as usize);
+    let width = image.width as usize;
+    let height = image.height as usize;
     let pixels = match order {
         Order::Packed(places) => {
             check_even(image, false)?;
@@ -98,7 +99,8 @@ fn two_planes(rows: &Rows<'_>, u: usize) -> Vec<[u8; 3]> {
 
 /// Decodes planes of one resolution. A line of colour pairs takes two lines of brightness.
 fn full_planes(image: &Image<'_>, u: usize) -> Result<Vec<[u8; 3]>, ImageError> {
-    let (width, height) = (image.width as usize, image.height as usize);
+    let width = image.width as usize;
+    let height = image.height as usize;
     // Drivers disagree on `step`, of which the common definition has one for all planes: if the
     // lines have no padding, the length of the data tells.
     let is_dense = image.data.len() == 3 * width * height;
@@ -114,7 +116,8 @@ fn full_planes(image: &Image<'_>, u: usize) -> Result<Vec<[u8; 3]>, ImageError> 
 }
 
 fn colour(y: u8, u: u8, v: u8) -> [u8; 3] {
-    let (u, v) = (i32::from(u) - 128, i32::from(v) - 128);
+    let u = i32::from(u) - 128;
+    let v = i32::from(v) - 128;
     let bright = (i32::from(y) - 16).max(0) * BRIGHTNESS + (1 << (SHIFT - 1));
     let tints = [RED_OF_V * v, GREEN_OF_V * v + GREEN_OF_U * u, BLUE_OF_U * u];
     tints.map(|tint| ((bright + tint) >> SHIFT).clamp(0, 255) as u8)

@@ -229,7 +229,8 @@ fn take_data_end<R: Read>(walk: &mut Walk<R>, length: u64, crc: u32) {
 fn locate_message<R: Read>(walk: &mut Walk<R>, body: Range<usize>) -> Option<()> {
     let head = walk.buffer.get(body.clone())?.get(..record::MESSAGE_HEAD)?;
     let id = u32::from(record::u16_at(head, 0));
-    let (sequence, log_time) = (record::u32_at(head, 2), record::u64_at(head, 6));
+    let sequence = record::u32_at(head, 2);
+    let log_time = record::u64_at(head, 6);
     let publish_time = record::u64_at(head, 14);
     if let Some(channel) = walk.channel_of(id) {
         let mut data = body.start + record::MESSAGE_HEAD..body.end;

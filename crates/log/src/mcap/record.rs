@@ -85,7 +85,9 @@ pub(super) struct Schema {
 
 pub(super) fn schema(body: &[u8]) -> Option<Schema> {
     let mut fields = Fields(body);
-    let (id, name, encoding) = (fields.u16()?, fields.string()?, fields.string()?);
+    let id = fields.u16()?;
+    let name = fields.string()?;
+    let encoding = fields.string()?;
     let length = fields.u32()? as usize;
     // Those of other languages are no text.
     let definition = std::str::from_utf8(fields.bytes(length)?).unwrap_or_default().to_owned();

@@ -141,7 +141,8 @@ pub(crate) fn seen_from(
 
 /// Returns a motion on the floor as one in space.
 pub(crate) fn on_floor(motion: &Isometry2<f64>) -> Isometry3<f64> {
-    let (x, y) = (motion.translation.x, motion.translation.y);
+    let x = motion.translation.x;
+    let y = motion.translation.y;
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), motion.rotation.angle());
     Isometry3::from_parts(Vector3::new(x, y, 0.0).into(), turn)
 }
@@ -163,7 +164,8 @@ pub(crate) fn scan_fault(scan: &LaserScan) -> Option<String> {
         return Some(format!("{name} is {value}"));
     }
     if limits(scan).is_empty() || scan.range_max.is_nan() {
-        let (min, max) = (scan.range_min, scan.range_max);
+        let min = scan.range_min;
+        let max = scan.range_max;
         return Some(format!("range_max is {max} and range_min {min}"));
     }
     let rays = scan.ranges.len();
@@ -222,12 +224,14 @@ fn limits(scan: &LaserScan) -> RangeInclusive<f32> {
 /// Yields the reflections in the frame of the scanner, m, with the index of the ray. Ranges beyond
 /// the scanner's own limits, infinite and NaN ones are rays without a reflection.
 fn points(scan: &LaserScan) -> impl Iterator<Item = (u32, Point3<f64>)> {
-    let (first, step) = (f64::from(scan.angle_min), f64::from(scan.angle_increment));
+    let first = f64::from(scan.angle_min);
+    let step = f64::from(scan.angle_increment);
     let limits = limits(scan);
     let rays = scan.ranges.iter().enumerate();
     let met = rays.filter(move |(_, range)| limits.contains(*range));
     let point = move |(ray, range): (usize, &f32)| {
-        let (angle, range) = (first + ray as f64 * step, f64::from(*range));
+        let angle = first + ray as f64 * step;
+        let range = f64::from(*range);
         (ray as u32, Point3::new(range * angle.cos(), range * angle.sin(), 0.0))
     };
     met.map(point).filter(|(_, point)| point.coords.norm().is_finite())
@@ -236,7 +240,8 @@ fn points(scan: &LaserScan) -> impl Iterator<Item = (u32, Point3<f64>)> {
 /// Yields the rays without a reflection, with what the scanner said instead.
 fn unread(scan: &LaserScan) -> impl Iterator<Item = UnreadRay> {
     let limits = limits(scan);
-    let (min_m, max_m) = (f64::from(*limits.start()), f64::from(*limits.end()));
+    let min_m = f64::from(*limits.start());
+    let max_m = f64::from(*limits.end());
     (0..).zip(&scan.ranges).filter_map(move |(ray, range)| {
         match RayReading::of(f64::from(*range), min_m, max_m) {
             RayReading::Reflection(_) => None,

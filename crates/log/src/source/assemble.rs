@@ -573,7 +573,8 @@ fn depth_of_disparity(
     tally: &mut Tally,
 ) -> Option<DepthImage> {
     let unit_px = plan.input.disparity.and_then(|settings| settings.unit_px);
-    let (unit_m, limits) = (plan.input.depth_unit_m, &plan.limits);
+    let unit_m = plan.input.depth_unit_m;
+    let limits = &plan.limits;
     let stereo = plan.disparity.ok_or_else(|| ImageError::NoDisparity("an image".into()));
     let of = |image: AnyImage<'_>| match image {
         AnyImage::Disparity(image) => decode_disparity(&image, unit_px, unit_m, limits),

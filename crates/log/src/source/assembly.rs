@@ -59,7 +59,8 @@ impl Assembly {
     /// Returns the next frame that no later message can change.
     fn next_frame(&mut self) -> Option<LogFrame> {
         while let Some((image, next)) = self.intake.frames.pop(self.ended) {
-            let (plan, intake) = (&self.plan, &mut self.intake);
+            let plan = &self.plan;
+            let intake = &mut self.intake;
             let frame = self.assembler.assemble(plan, &image, next, intake, &mut self.tally);
             self.intake.settle();
             if frame.is_some() {
@@ -77,7 +78,8 @@ impl Assembly {
     /// Returns the newest frame with all its images; older ones are skipped and counted.
     pub(super) fn newest_frame(&mut self) -> Option<LogFrame> {
         loop {
-            let (plan, intake) = (&self.plan, &mut self.intake);
+            let plan = &self.plan;
+            let intake = &mut self.intake;
             let (popped, skipped) = intake.pop_newest(plan);
             self.tally.add("frames_skipped", skipped);
             let (image, next) = popped?;
@@ -108,7 +110,8 @@ impl Assembly {
 
     /// Returns the facts about the source, complete after the first frame.
     pub(super) fn facts(&self) -> LogFacts {
-        let (scan, chosen) = (&self.plan.scan, &self.plan.chosen);
+        let scan = &self.plan.scan;
+        let chosen = &self.plan.chosen;
         let camera = self.assembler.camera();
         let of_camera = |value: fn(&Camera) -> f64| camera.map_or(0.0, |camera| value(camera));
         LogFacts {

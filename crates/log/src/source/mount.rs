@@ -84,7 +84,8 @@ pub(crate) fn robot_frame<'a>(scan: &Scan, input: &'a InputSettings) -> &'a str 
 }
 
 fn pose_of(mount: &MountSettings) -> Isometry3<f64> {
-    let (pitch, roll) = (mount.pitch_down_deg.to_radians(), mount.roll_deg.to_radians());
+    let pitch = mount.pitch_down_deg.to_radians();
+    let roll = mount.roll_deg.to_radians();
     // Any lens will do, because only the pose of the camera is used.
     let any = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, distortion: Default::default() };
     Camera::mounted(any, 1, 1, mount.height_m, pitch, roll).robot_from_camera

@@ -119,7 +119,8 @@ impl Plan {
     /// Returns true unless both calibrations are known and differ.
     pub(super) fn same_lens(&self) -> bool {
         let (Some(colour), Some(depth)) = (self.lens, self.depth_lens) else { return true };
-        let (a, b) = (colour.lens, depth.lens);
+        let a = colour.lens;
+        let b = depth.lens;
         let close = |a: f64, b: f64, off: f64| (a - b).abs() <= off;
         // Calibrations of one camera may differ slightly: by 1 % in focal length, 2 px in the
         // centre.
@@ -169,7 +170,8 @@ pub(super) fn plan(
 ) -> Result<Plan, LogError> {
     let (scan, has_recording_times) = timed(scan, input, inputs, tally)?;
     let decision = decide(&scan, input, inputs)?;
-    let (chosen, account) = (decision.chosen, decision.account);
+    let chosen = decision.chosen;
+    let account = decision.account;
     let depth_lens = match lens_of(
         &scan,
         chosen.depth.as_deref(),
@@ -474,8 +476,8 @@ fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogEr
         return Ok(None);
     }
     let mut factors: Vec<f64> = Vec::new();
-    let (mut probe, mut messages) =
-        (Assembly::new(depth_probe(plan, plan.mount.clone()), Tally::default()), reread()?);
+    let mut probe = Assembly::new(depth_probe(plan, plan.mount.clone()), Tally::default());
+    let mut messages = reread()?;
     for _ in 0..UNIT_FRAMES {
         let Some(found) = probe.read(messages.as_mut()) else { break };
         let depth = found.frame.depth().ok();
@@ -543,7 +545,8 @@ fn floor(plan: &Plan, reread: Reread<'_>) -> Result<Option<Mount>, LogError> {
         return Ok(None);
     }
     let probe = depth_probe(plan, Mount::assumed());
-    let (mut probe, mut messages) = (Assembly::new(probe, Tally::default()), reread()?);
+    let mut probe = Assembly::new(probe, Tally::default());
+    let mut messages = reread()?;
     let mut floors: Vec<Ground> = Vec::new();
     for _ in 0..FLOOR_FRAMES {
         let Some(found) = probe.read(messages.as_mut()) else { break };

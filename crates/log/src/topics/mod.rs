@@ -432,8 +432,10 @@ fn named(
             .or_else(|| as_depth.map(|remedy| format!("if it is meant, {remedy}")))
             .or_else(|| other.map(|other| format!("{other} would fit")))
             .unwrap_or_else(|| "no topic of the log would fit: leave the key out".to_owned());
-        let (path, kind) = (scan.path.clone(), kind_of(topic));
-        let (key, topic) = (key.to_owned(), name.to_owned());
+        let path = scan.path.clone();
+        let kind = kind_of(topic);
+        let key = key.to_owned();
+        let topic = name.to_owned();
         return Err(LogError::WrongTopic { path, key, topic, kind, remedy });
     }
     let near = nearest(name, fitting.map(|(name, _)| name.as_str()));

@@ -156,7 +156,8 @@ impl TopicName {
 
     /// Returns true if two names speak of devices at different places, or of different numbers.
     pub(crate) fn contradicts(&self, other: &Self) -> bool {
-        let (ours, theirs) = (self.places(), other.places());
+        let ours = self.places();
+        let theirs = other.places();
         !ours.is_empty() && !theirs.is_empty() && ours != theirs
     }
 

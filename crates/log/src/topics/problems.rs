@@ -34,7 +34,8 @@ pub(crate) fn depth_problem(
     colour: &str,
     depth: &str,
 ) -> Option<Problem> {
-    let (of_colour, of_depth) = (scan.topics.get(colour)?, scan.topics.get(depth)?);
+    let of_colour = scan.topics.get(colour)?;
+    let of_depth = scan.topics.get(depth)?;
     // On a robot, the first messages tell nothing about those to come.
     if !scan.is_live()
         && let Some(problem) = pairing_problem(of_colour, of_depth, input.pair_tolerance_s)
@@ -54,7 +55,8 @@ fn pairing_problem(first: &Topic, second: &Topic, tolerance_s: f64) -> Option<Pr
         return None;
     }
     let off_s = skew.median_s;
-    let (size_s, side) = (off_s.abs(), if off_s > 0.0 { "after" } else { "before" });
+    let size_s = off_s.abs();
+    let side = if off_s > 0.0 { "after" } else { "before" };
     let why = format!(
         "none of its images is within {:.0} ms of a colour image: by their stamps they come \
          {size_s:.3} s {side} it",
@@ -106,7 +108,8 @@ fn registration_problem(
             ),
         );
     }
-    let (from, to) = (scan.frame_of(depth)?, scan.frame_of(colour)?);
+    let from = scan.frame_of(depth)?;
+    let to = scan.frame_of(colour)?;
     if from != to && !scan.tf.connects(from, to) {
         return Problem::new(
             format!("{sizes}, and tf does not connect its frame `{from}` with `{to}`"),
@@ -170,7 +173,8 @@ pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Op
     if scan.is_live() {
         return None;
     }
-    let (frames, poses) = (scan.topics.get(primary)?, scan.topics.get(odometry)?);
+    let frames = scan.topics.get(primary)?;
+    let poses = scan.topics.get(odometry)?;
     let (first, last) = frames.stamp_range()?;
     let (begin, end) = poses.stamp_range()?;
     let behind_s = begin.seconds_since(last);

@@ -131,7 +131,8 @@ pub(super) fn may_be_one(scan: &Scan, colour: &Rig, depth: &Rig) -> bool {
 /// Returns true if two cameras sit together and look the same way, by their frames and tf; `None` if
 /// these do not tell.
 fn is_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
-    let (a, b) = (scan.frame_of(a)?, scan.frame_of(b)?);
+    let a = scan.frame_of(a)?;
+    let b = scan.frame_of(b)?;
     if a == b {
         return (!a.is_empty()).then_some(true);
     }

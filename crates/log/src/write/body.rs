@@ -77,7 +77,8 @@ fn cloud(points: &[Vector3<f64>], at: Stamp, frame: &str) -> PointCloud2 {
         datatype: PointField::FLOAT32,
         count: 1,
     };
-    let (width, step) = (points.len() as u32, 12);
+    let width = points.len() as u32;
+    let step = 12;
     let data = points.iter().flat_map(|p| [p.x, p.y, p.z]);
     PointCloud2 {
         header: Header::new(at, frame),

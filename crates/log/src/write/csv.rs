@@ -94,7 +94,8 @@ mod tests {
             target: None,
             command: None,
         };
-        let (mut a, mut b) = (Vec::new(), Vec::new());
+        let mut a = Vec::new();
+        let mut b = Vec::new();
         let settings = OutputSettings { report_unseen_s: unseen_s, ..OutputSettings::default() };
         boxes(&mut a, &record, &settings).unwrap();
         metres(&mut b, &record).unwrap();

@@ -254,7 +254,8 @@ fn write_to<W: Write + Seek>(
     at: Stamp,
     message: &[u8],
 ) -> McapResult<()> {
-    let (log_time, publish_time) = (at.nanos(), at.nanos());
+    let log_time = at.nanos();
+    let publish_time = at.nanos();
     writer.write_to_known_channel(
         &MessageHeader { channel_id, sequence, log_time, publish_time },
         message,

@@ -123,7 +123,8 @@ impl RunDir {
     /// [`WriteError::Io`].
     pub fn publish(self) -> Result<(), WriteError> {
         for name in &self.pending {
-            let (from, to) = (self.path.join(partial(name)), self.path.join(name));
+            let from = self.path.join(partial(name));
+            let to = self.path.join(name);
             fs::rename(&from, &to).map_err(WriteError::io(&to))?;
         }
         Ok(())

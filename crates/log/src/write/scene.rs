@@ -191,8 +191,10 @@ pub(super) fn annotations(record: &FrameRecord<'_>, part: BoxedPart) -> ImageAnn
     for track in record.confirmed() {
         let Some(region) = record.visible_region(track, part) else { continue };
         let colour = Color { a: 1.0, ..colour_of(track) };
-        let (left, top) = (region.x, region.y);
-        let (right, bottom) = (region.right(), region.bottom());
+        let left = region.x;
+        let top = region.y;
+        let right = region.right();
+        let bottom = region.bottom();
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
         out.points.push(PointsAnnotation {
             timestamp,

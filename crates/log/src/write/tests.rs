@@ -128,7 +128,8 @@ fn images_are_passed_through_as_they_are() {
 
 #[test]
 fn two_runs_give_the_same_bytes() {
-    let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let a = tempfile::tempdir().unwrap();
+    let b = tempfile::tempdir().unwrap();
     log(a.path(), 25, true);
     log(b.path(), 25, true);
     for name in ["tracks.mcap", "tracks.csv", "tracks-metres.csv"] {

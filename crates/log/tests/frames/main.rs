@@ -117,7 +117,8 @@ fn stamps(frames: &[LogFrame]) -> Vec<f64> {
 fn disorder_within_the_window_is_undone_to_the_byte() {
     let (mut sorted, _a) = run_of(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
     let (mut mixed, _b) = run_of(&[0.3, 0.1, 0.2, 0.4, 0.6, 0.5]);
-    let (sorted, mixed) = (frames(&mut sorted), frames(&mut mixed));
+    let sorted = frames(&mut sorted);
+    let mixed = frames(&mut mixed);
     assert_eq!(stamps(&sorted), stamps(&mixed));
     for (a, b) in sorted.iter().zip(&mixed) {
         assert_eq!(a.frame.index, b.frame.index);
@@ -343,7 +344,8 @@ fn images_of_another_size_are_refused() {
     let mut log = started();
     log.colour_of(at(0.2), 20, 12);
     let saved = log.save();
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let error = FrameSource::open(&saved.path, &input, &limits, Inputs::ANY).err().unwrap();
     assert!(matches!(error, LogError::Calibration { .. }));
     assert!(error.to_string().contains("16x12, but the images are 20x12"), "{error}");
@@ -357,7 +359,8 @@ fn a_bad_calibration_names_topic_and_field() {
     log.message(INFO, at(0.0), &info);
     log.colour(at(0.1));
     let saved = log.save();
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let error = FrameSource::open(&saved.path, &input, &limits, Inputs::ANY).err().unwrap();
     assert!(error.to_string().contains("topic /camera/color/camera_info: K = NaN"), "{error}");
 }
@@ -401,7 +404,8 @@ fn the_pose_of_the_camera_can_be_given() {
     assert!((camera.roll_rad().to_degrees() + 3.0).abs() < 1e-9);
     assert!(source.facts().camera_source.contains("[input.camera]"));
     // A wall gives no floor: without another source of the pose, the run cannot start.
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let error = FrameSource::open(&saved.path, &input, &limits, DEPTH).err().unwrap();
     assert!(error.to_string().contains("camera pose"), "{error}");
     assert!(error.to_string().contains("[input.camera]"), "{error}");
@@ -458,7 +462,8 @@ fn room(from: &Camera, colour_from_camera: &Isometry3<f64>) -> DepthImage {
 
 #[test]
 fn depth_of_another_camera_is_registered_through_tf() {
-    let (colour, depth) = (camera(80, 60, 70.0), camera(96, 72, 80.0));
+    let colour = camera(80, 60, 70.0);
+    let depth = camera(96, 72, 80.0);
     let shift = Isometry3::new(Vector3::new(0.05, -0.01, 0.0), Vector3::new(0.01, -0.02, 0.0));
     let mut log = LogWriter::plain();
     log.info(INFO, "colour", &colour);
@@ -469,7 +474,8 @@ fn depth_of_another_camera_is_registered_through_tf() {
     log.depth_of(at(0.11), "depth", 96, 72, room(&depth, &shift).pixels());
     let (mut source, _saved) = open(log, DEPTH);
     let frame = source.next_frame().unwrap().frame;
-    let (got, want) = (frame.depth().unwrap(), room(&colour, &Isometry3::identity()));
+    let got = frame.depth().unwrap();
+    let want = room(&colour, &Isometry3::identity());
     assert_eq!((got.width(), got.height()), (80, 60));
     let seen = got.pixels().iter().filter(|d| d.is_finite()).count();
     let wrong = got
@@ -515,7 +521,8 @@ fn a_truncated_log_gives_what_is_whole_and_says_so() {
     }
     let bytes = log.finish();
     let saved = SavedLog::new(&bytes[..bytes.len() * 6 / 10]);
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let mut source = FrameSource::open(&saved.path, &input, &limits, DEPTH).unwrap();
     let found = frames(&mut source);
     assert!((5..15).contains(&found.len()), "{}", found.len());
@@ -528,7 +535,8 @@ fn two_readings_are_the_same() {
     let stamps: Vec<f64> = (0..12).map(|i| f64::from(i * 7 % 12) * 0.1).collect();
     let (mut first, _a) = run_of(&stamps);
     let (mut second, _b) = run_of(&stamps);
-    let (a, b) = (frames(&mut first), frames(&mut second));
+    let a = frames(&mut first);
+    let b = frames(&mut second);
     assert_eq!(self::stamps(&a), self::stamps(&b));
     assert_eq!(first.counters(), second.counters());
     assert_eq!(first.facts().sha256, second.facts().sha256);
@@ -636,10 +644,12 @@ fn the_parts_of_a_folder_are_one_log() {
     };
     write("drive_0.mcap", part(0, 5, false));
     write("drive_1.mcap", part(5, 9, true));
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let mut split = FrameSource::open(folder.path(), &input, &limits, DEPTH).unwrap();
     let (mut whole, _saved) = open(part(0, 9, false), DEPTH);
-    let (expected, found) = (frames(&mut whole), frames(&mut split));
+    let expected = frames(&mut whole);
+    let found = frames(&mut split);
     assert_eq!(indices(&found), (1..=9).collect::<Vec<_>>());
     for (found, expected) in found.iter().zip(&expected) {
         assert_eq!(found.frame.stamp, expected.frame.stamp);
@@ -660,7 +670,8 @@ fn a_part_that_is_cut_or_missing_costs_its_own_frames() {
     let listed = "  relative_file_paths:\n    - drive_0.mcap\n    - drive_1.mcap\n    - \
                   drive_2.mcap\n";
     std::fs::write(folder.path().join("metadata.yaml"), listed).unwrap();
-    let (input, limits) = (InputSettings::default(), Limits::default());
+    let input = InputSettings::default();
+    let limits = Limits::default();
     let mut source = FrameSource::open(folder.path(), &input, &limits, DEPTH).unwrap();
     assert_eq!(frames(&mut source).len(), 9);
     assert!(source.data_lost());

@@ -56,7 +56,8 @@ fn corner_of_cell(
 
 /// Returns the smaller eigenvalue of the matrix of slopes, from its entries xx, xy, yy.
 fn least_change([xx, xy, yy]: [f64; 3]) -> f64 {
-    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let mean = 0.5 * (xx + yy);
+    let half = 0.5 * (xx - yy);
     mean - half.hypot(xy)
 }
 

@@ -46,7 +46,8 @@ pub(super) fn whole_shift(from: &[GreyImage], to: &[GreyImage]) -> Vector2<f64> 
     let level = from.len().min(to.len()).saturating_sub(1);
     let (Some(from), Some(to)) = (from.get(level), to.get(level)) else { return Vector2::zeros() };
     let reach = |side: usize| (REACH * side as f64) as i64;
-    let (columns, rows) = (reach(from.width()), reach(from.height()));
+    let columns = reach(from.width());
+    let rows = reach(from.height());
     let mut best = (misfit(from, to, (0, 0)), (0, 0));
     for dy in -rows..=rows {
         for dx in -columns..=columns {
@@ -74,8 +75,8 @@ fn misfit(from: &GreyImage, to: &GreyImage, (dx, dy): (i64, i64)) -> f64 {
     let pixels = (columns.len() * rows.len()).max(1);
     let sum: u64 = rows
         .map(|y| {
-            let (here, there) =
-                (&from.row(y)[columns.clone()], &to.row((y as i64 + dy) as usize)[there.clone()]);
+            let here = &from.row(y)[columns.clone()];
+            let there = &to.row((y as i64 + dy) as usize)[there.clone()];
             let pairs = here.iter().zip(there);
             pairs.map(|(here, there)| u64::from(here.abs_diff(*there))).sum::<u64>()
         })
@@ -120,9 +121,11 @@ mod tests {
             let at = (i + 1000.0) * 4000.0 + j + 1000.0;
             (tagalong_stats::number_at(5, at as u64) >> 56) as f64
         };
-        let (i, j) = ((x / 16.0).floor(), (y / 16.0).floor());
+        let i = (x / 16.0).floor();
+        let j = (y / 16.0).floor();
         let smooth = |part: f64| part * part * (3.0 - 2.0 * part);
-        let (across, down) = (smooth(x / 16.0 - i), smooth(y / 16.0 - j));
+        let across = smooth(x / 16.0 - i);
+        let down = smooth(y / 16.0 - j);
         let row = |j: f64| knot(i, j) + across * (knot(i + 1.0, j) - knot(i, j));
         row(j) + down * (row(j + 1.0) - row(j))
     }

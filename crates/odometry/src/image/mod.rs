@@ -145,7 +145,8 @@ impl View {
     /// Returns a fit without a motion that is less than its errors: they would shake the tracks of a
     /// camera at rest.
     fn without_noise(&self, fit: SwingFit) -> SwingFit {
-        let (right, bottom) = (self.nominal.width as f64, self.nominal.height as f64);
+        let right = self.nominal.width as f64;
+        let bottom = self.nominal.height as f64;
         let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
         let moves_px = corners.map(|(x, y)| {
             let ray = self.nominal.ray(Point2::new(x, y)).xy();

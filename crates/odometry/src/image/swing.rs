@@ -72,7 +72,8 @@ impl Swing {
     fn slopes(&self, ray: Vector2<f64>) -> Matrix2x4<f64> {
         let seen = self.new_from_old * (self.zoom * ray).push(1.0);
         let grown = self.new_from_old * (self.zoom * ray).push(0.0);
-        let (x, y) = (seen.x / seen.z, seen.y / seen.z);
+        let x = seen.x / seen.z;
+        let y = seen.y / seen.z;
         let by_zoom = (grown.xy() - Vector2::new(x, y) * grown.z) / seen.z;
         Matrix2x4::new(
             -x * y,
@@ -202,7 +203,8 @@ mod tests {
         fn the_slopes_are_those_of_small_steps(
             rotation in prop::array::uniform3(-0.1..0.1f64), x in -0.6..0.6f64, y in -0.5..0.5f64,
         ) {
-            let (swing, ray) = (known(rotation, 1.1), Vector2::new(x, y));
+            let swing = known(rotation, 1.1);
+            let ray = Vector2::new(x, y);
             let slopes = swing.slopes(ray);
             for column in 0..4 {
                 let mut step = Vector4::zeros();
@@ -216,7 +218,8 @@ mod tests {
     /// Two of five points belong to something else that moves, as a whole.
     #[test]
     fn points_that_move_otherwise_do_not_count() {
-        let (real, other) = (known([0.006, 0.012, 0.01], 1.02), known([0.0, -0.03, 0.0], 1.0));
+        let real = known([0.006, 0.012, 0.01], 1.02);
+        let other = known([0.0, -0.03, 0.0], 1.0);
         let moved = |(i, at): (usize, Vector2<f64>)| {
             [at, if i % 5 < 2 { other.apply(at) } else { real.apply(at) }]
         };

@@ -54,7 +54,8 @@ fn paint(u: f64, v: f64) -> f64 {
 fn image(look: Look, contrast: f64) -> GreyImage {
     GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
         let at = look.of(x as f64, y as f64);
-        let (u, v) = (300.0 * at.x.atan2(at.z), 300.0 * at.y.atan2(at.xz().norm()));
+        let u = 300.0 * at.x.atan2(at.z);
+        let v = 300.0 * at.y.atan2(at.xz().norm());
         (128.0 + 110.0 * contrast * paint(u, v)).round() as u8
     })
 }
@@ -62,7 +63,8 @@ fn image(look: Look, contrast: f64) -> GreyImage {
 /// A room that is bare but for its right end, and a person in a box who carries a pattern along.
 fn room(person: Rect) -> GreyImage {
     GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
-        let (x, y) = (x as f64, y as f64);
+        let x = x as f64;
+        let y = y as f64;
         let seen = match holds(&person, &Point2::new(x, y)) {
             true => paint(x - person.x, y - person.y),
             false if x > 230.0 => paint(x, y),
@@ -89,7 +91,8 @@ fn settings() -> OdometrySettings {
 
 /// Returns the motion between the last two of some images, and the funnel.
 fn seen(settings: OdometrySettings, images: &[GreyImage]) -> (CameraMoved, Funnel) {
-    let (mut stage, mut funnel) = (CameraMotion::new(settings), Funnel::default());
+    let mut stage = CameraMotion::new(settings);
+    let mut funnel = Funnel::default();
     let mut moved = None;
     for (index, image) in (1..).zip(images) {
         let frame = frame(index, image.clone(), EgoMotion::at_rest(DT_S));
@@ -212,7 +215,8 @@ fn a_bare_wall_tells_nothing() {
 
 #[test]
 fn the_motion_of_the_log_is_believed() {
-    let (mut stage, mut funnel) = (CameraMotion::new(settings()), Funnel::default());
+    let mut stage = CameraMotion::new(settings());
+    let mut funnel = Funnel::default();
     let covariance = Matrix3::identity() * 1e-6;
     let by_wheels = EgoMotion { turn: 0.02, covariance, ..EgoMotion::at_rest(DT_S) };
     let mut moved = None;
@@ -229,7 +233,8 @@ fn the_motion_of_the_log_is_believed() {
 
 #[test]
 fn after_a_jump_of_the_clock_nothing_is_compared() {
-    let (mut stage, mut funnel) = (CameraMotion::new(settings()), Funnel::default());
+    let mut stage = CameraMotion::new(settings());
+    let mut funnel = Funnel::default();
     for (index, shift, motion) in [(1, 0.0, Some(EgoMotion::at_rest(DT_S))), (2, 0.03, None)] {
         let frame = frame(index, image(panned(shift), 1.0), EgoMotion::at_rest(DT_S));
         let moved = stage.see(&frame, motion, &[], &mut funnel);

@@ -65,7 +65,8 @@ impl Document {
     /// Reads a config; `read_base` returns the texts of the configs that are extended.
     fn read_with(text: &str, folder: &Path, read_base: &ReadBase<'_>) -> Result<Self, ConfigError> {
         let mut document = Self { text: text.to_owned(), bases: Vec::new() };
-        let (mut folder, mut end) = (folder.to_owned(), text.len());
+        let mut folder = folder.to_owned();
+        let mut end = text.len();
         let mut extends = parse(text, 0)?.remove(EXTENDS).map(name_of);
         while let Some((name, span)) = &extends {
             let base = base_at(&folder, name.as_deref(), end, &document.bases, read_base)

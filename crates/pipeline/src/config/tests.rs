@@ -356,8 +356,8 @@ fn a_source_without_the_data_of_a_controller_is_refused_unless_the_config_says_s
         build(&text).unwrap().check_sources(sources)
     };
     let all = Sources { depth: true, right: false, laser: true, odometry: true };
-    let (eyes, odometry) =
-        (Sources { depth: false, laser: false, ..all }, Sources { odometry: false, ..all });
+    let eyes = Sources { depth: false, laser: false, ..all };
+    let odometry = Sources { odometry: false, ..all };
     let drive = "[controller]\nplugin = 'drive'\n";
     assert_eq!(check("", drive, all), Ok(()));
     assert_eq!(check("", drive, Sources { depth: false, ..all }), Ok(()));
@@ -436,7 +436,9 @@ impl tagalong_core::Verifier for Still {
 
 #[test]
 fn each_plugin_draws_from_a_seed_of_its_own_that_the_run_decides() {
-    let (first, again, other) = (seeds(1), seeds(1), seeds(2));
+    let first = seeds(1);
+    let again = seeds(1);
+    let other = seeds(2);
     assert_eq!((first.len(), &first), (4, &again));
     let all: std::collections::BTreeSet<u64> = first.iter().chain(&other).copied().collect();
     assert_eq!(all.len(), 8, "{first:?} {other:?}");

@@ -192,7 +192,8 @@ fn tunable(named: Named, value: Value<'_>, leaves: &[Leaf<'_>]) -> Result<Tunabl
 type Values = (Vec<toml::Value>, Vec<Range<usize>>);
 
 fn listed(key: &str, items: DeArray<'_>, now: &toml::Value) -> Result<Values, ConfigError> {
-    let (mut values, mut places) = (Vec::new(), Vec::new());
+    let mut values = Vec::new();
+    let mut places = Vec::new();
     for item in items {
         let place = item.span();
         let value = toml::Value::deserialize(toml::de::ValueDeserializer::from(item))?;
@@ -247,7 +248,8 @@ fn as_now(key: &str, value: toml::Value, now: &toml::Value) -> Result<toml::Valu
         }
         (value, now) if value.same_type(now) => Ok(value.clone()),
         _ => {
-            let (is, wanted) = (value.type_str(), now.type_str());
+            let is = value.type_str();
+            let wanted = now.type_str();
             Err(ConfigError::new(format!("`{key}` = {value} is of type {is}, not {wanted}")))
         }
     }
@@ -366,7 +368,8 @@ mod tests {
     #[test]
     fn values_are_put_where_they_belong() {
         let resolved = World::default().pipeline(PLAIN).resolved();
-        let (two, script) = (toml::Value::Integer(2), toml::Value::Integer(7));
+        let two = toml::Value::Integer(2);
+        let script = toml::Value::Integer(7);
         let values =
             [("manager.config.confirm_hits", &two), ("detectors.0.config.script", &script)];
         let text = with_values(&resolved, &values).unwrap();

@@ -68,7 +68,8 @@ fn c1_another_calibration_freezes_the_tracks_and_holds_the_robot() {
     let motion = EgoMotion { forward: 0.2, turn, ..EgoMotion::at_rest(0.1) };
     let report = pipeline.step(after(22, 2.2, motion).with_changed_calibration(true)).unwrap();
     let place = |track: &Track| track.estimate.person.position;
-    let (held, was) = (&report.tracks[0], &before[0]);
+    let held = &report.tracks[0];
+    let was = &before[0];
     assert_eq!((held.id, held.seen, held.confirmed), (was.id, false, true));
     // Where it was on the floor: now 2.8 m to the right.
     assert!((place(held) - Point3::new(0.0, -2.8, 1.6)).norm() < 1e-9, "{held:?}");

@@ -147,7 +147,8 @@ impl Detector for Script {
             "perhaps depth" => Inputs::NONE.accept(Input::Depth),
             _ => Inputs::NONE,
         };
-        let (discovers, tracks) = (self.config.how != "track", self.config.how != "discover");
+        let discovers = self.config.how != "track";
+        let tracks = self.config.how != "discover";
         Capabilities { inputs, discovers, tracks, weighs: self.config.how == "weigh" }
     }
 
@@ -264,7 +265,8 @@ struct Odd {
 impl Filter for Odd {
     fn requirements(&self) -> FilterRequirements {
         let how = self.config.how.as_str();
-        let (image_box, likelihood) = (how == "boxes", how == "weighs");
+        let image_box = how == "boxes";
+        let likelihood = how == "weighs";
         let searches = likelihood;
         FilterRequirements { inputs: Inputs::NONE, image_box, likelihood, searches }
     }

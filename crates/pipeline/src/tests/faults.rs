@@ -166,7 +166,8 @@ proptest! {
             plugin = 'drive'
         ";
         let mut pipeline = world.pipeline(config);
-        let (mut t_s, mut ended) = (10.0, BTreeSet::new());
+        let mut t_s = 10.0;
+        let mut ended = BTreeSet::new();
         for (index, (detections, step_s)) in (1..).zip(frames.into_iter().zip(steps_s)) {
             world.show(0, index, detections);
             t_s += step_s;

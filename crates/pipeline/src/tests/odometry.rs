@@ -16,7 +16,8 @@ const BY_WHEELS: &str = "
 fn wall(index: u64, motion: EgoMotion) -> Frame {
     let plain = frame(index, 0.1 * index as f64);
     let waves = |x: usize, y: usize| {
-        let (x, y) = (x as f64, y as f64);
+        let x = x as f64;
+        let y = y as f64;
         (128.0 + 50.0 * (0.13 * x + 0.05 * y).sin() + 50.0 * (0.17 * y - 0.07 * x).sin()) as u8
     };
     let images = Images {

@@ -104,10 +104,12 @@ fn two_people_who_cross_keep_their_numbers() {
         vec![person(3.0, along), person(3.5, -along)]
     };
     let reports = World::of((0..21).map(crossing)).run(PLAIN, 21, 0.1);
-    let (first, last) = (&reports[0], &reports[20]);
+    let first = &reports[0];
+    let last = &reports[20];
     assert_eq!(ids(last), [1, 2]);
     for id in [1, 2] {
-        let (before, after) = (place_of(first, id).unwrap(), place_of(last, id).unwrap());
+        let before = place_of(first, id).unwrap();
+        let after = place_of(last, id).unwrap();
         assert_eq!(before.0, after.0, "track {id} stays in its lane");
         assert!((before.1 + after.1).abs() < 1e-9, "track {id} crossed over");
     }
@@ -154,7 +156,8 @@ fn who_is_half_hidden_is_seen_aside_also_by_one_who_is_too_near_to_be_found() {
     let alone = |y: f64| vec![person(4.0, y)];
     let seen = |how, y: f64| spread_of_second(how, vec![both(y), both(y), both(y), alone(y)]);
     let how = "occlusion.body_width_m = 0.5";
-    let (off, beside) = (seen("", 0.4), seen(how, 1.2));
+    let off = seen("", 0.4);
+    let beside = seen(how, 1.2);
     assert_eq!((off, beside), ((0.1, 0.1), (0.1, 0.1)));
     let (along, across) = seen(how, 0.4);
     assert!((0.13..0.27).contains(&across) && along < 0.11, "{along} {across}");

@@ -26,7 +26,8 @@ impl Extent {
     pub fn around<'a>(all: impl IntoIterator<Item = &'a Trajectory>) -> Option<Self> {
         let mut places = all.into_iter().flat_map(|t| &t.points).filter(|p| drawable(p));
         let &[_, x, y] = places.next()?;
-        let (mut low, mut high) = ([x, y], [x, y]);
+        let mut low = [x, y];
+        let mut high = [x, y];
         for &[_, x, y] in places {
             low = [low[0].min(x), low[1].min(y)];
             high = [high[0].max(x), high[1].max(y)];

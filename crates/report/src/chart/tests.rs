@@ -21,7 +21,8 @@ fn places(svg: &str) -> (Vec<f64>, Vec<f64>) {
         let texts = names.iter().flat_map(|n| attributes(svg, n));
         texts.map(|t| t.parse().expect("a number")).collect()
     };
-    let (mut xs, mut ys) = (of(&["x", "x1", "x2", "cx"]), of(&["y", "y1", "y2", "cy"]));
+    let mut xs = of(&["x", "x1", "x2", "cx"]);
+    let mut ys = of(&["y", "y1", "y2", "cy"]);
     for pair in attributes(svg, "points").iter().flat_map(|p| p.split_whitespace()) {
         let (x, y) = pair.split_once(',').expect("a pair");
         xs.push(x.parse().expect("a number"));
@@ -80,7 +81,8 @@ proptest! {
         b in prop::collection::vec(prop::array::uniform3(any_number()), 0..9),
     ) {
         let of = |points: &[[f64; 3]]| [Trajectory { id: 1, points: points.to_vec() }];
-        let (truth, tracks) = (of(&a), of(&b));
+        let truth = of(&a);
+        let tracks = of(&b);
         if let Some(extent) = Extent::around(truth.iter().chain(&tracks)) {
             check_inside(&plan(&truth, &tracks, extent, &WORDS).into_string())?;
         }
@@ -98,7 +100,8 @@ proptest! {
     #[test]
     fn greater_values_lie_farther_along(a in -1e3..1e3, b in -1e3..1e3) {
         let axis = Axis::around(Scale::Linear, [a, b], [10.0, 90.0]);
-        let (x, y) = (axis.at(a).unwrap(), axis.at(b).unwrap());
+        let x = axis.at(a).unwrap();
+        let y = axis.at(b).unwrap();
         prop_assert_eq!(a <= b, x <= y);
     }
 }

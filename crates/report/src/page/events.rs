@@ -24,7 +24,8 @@ impl Listed {
     /// Chooses tasks of the best pipelines first, as many as the page has room for.
     pub(super) fn of(view: &OrderedBenchmark<'_>) -> Self {
         let mut listed = Self::default();
-        let (mut rows, mut bytes) = (0, 0);
+        let mut rows = 0;
+        let mut bytes = 0;
         for pipeline in &view.pipelines {
             let tasks = view.tasks.iter().enumerate().filter(|(_, t)| t.pipeline == *pipeline);
             for (number, task) in tasks.filter(|(_, t)| !t.events.is_empty()) {

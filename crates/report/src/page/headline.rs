@@ -32,7 +32,8 @@ impl Page<'_> {
     fn verdict(&self) -> Option<Markup> {
         let place = ComparisonSpace::ALL.into_iter().find(|p| self.ranked(*p).len() > 1)?;
         let ranked = self.ranked(place);
-        let (first, second) = (ranked.first()?, ranked.get(1)?);
+        let first = ranked.first()?;
+        let second = ranked.get(1)?;
         let key = MAIN.key(place);
         let names = [&first.0.pipeline, &second.0.pipeline];
         let pair = self

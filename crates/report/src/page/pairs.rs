@@ -80,7 +80,8 @@ impl Page<'_> {
     }
 
     fn gain_cell(&self, row: &str, other: &str, place: ComparisonSpace) -> Markup {
-        let (a, b) = (row.min(other), row.max(other));
+        let a = row.min(other);
+        let b = row.max(other);
         let figure = MAIN.key(place);
         let pair = self.summary.pairs.iter().find(|p| p.a == a && p.b == b && p.figure == figure);
         let Some(pair) = pair.filter(|_| row != other) else { return no_cell() };

@@ -114,7 +114,9 @@ impl StageRow {
     fn new(stage: &str, times: &[[f64; 4]], is_total: bool) -> Self {
         let of = |i: usize| mean(times.iter().map(|t| t[i])).unwrap_or(f64::NAN);
         let max_ms = times.iter().map(|t| t[3]).fold(f64::NAN, f64::max);
-        let (p50_ms, p95_ms, p99_ms) = (of(0), of(1), of(2));
+        let p50_ms = of(0);
+        let p95_ms = of(1);
+        let p99_ms = of(2);
         Self { stage: stage.to_owned(), p50_ms, p95_ms, p99_ms, max_ms, is_total }
     }
 

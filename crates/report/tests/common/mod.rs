@@ -216,7 +216,9 @@ fn events(wobble: &mut Wobble) -> Vec<EventRow> {
 /// Replaces the result of one task by another outcome, so that the page has a task to report.
 pub fn spoil(benchmark: &mut Benchmark, outcome: Outcome) {
     if let Some(task) = benchmark.tasks.last_mut() {
-        let (pipeline, log, hash) = (task.pipeline.clone(), task.log.clone(), task.hash.clone());
+        let pipeline = task.pipeline.clone();
+        let log = task.log.clone();
+        let hash = task.hash.clone();
         *task = TaskResult { pipeline, log, hash, seed: 1, outcome, ..TaskResult::default() };
     }
 }
@@ -234,7 +236,9 @@ pub fn timings(benchmark: &Benchmark) -> Timings {
         };
         let stages = ["detect", "verify", "associate", "filter"].map(|stage| {
             let p50_ms = wobble.around(1.1, 0.8) * slow;
-            let (p95_ms, p99_ms, max_ms) = (1.8 * p50_ms, 2.1 * p50_ms, 2.9 * p50_ms);
+            let p95_ms = 1.8 * p50_ms;
+            let p99_ms = 2.1 * p50_ms;
+            let max_ms = 2.9 * p50_ms;
             StageTiming { stage: stage.into(), p50_ms, p95_ms, p99_ms, max_ms }
         });
         let frame_ms_p50 = stages.iter().map(|s| s.p50_ms).sum();

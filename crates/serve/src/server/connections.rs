@@ -61,7 +61,9 @@ struct Desk<S> {
 impl<S: Site> Connections<S> {
     pub(super) fn new(guard: &Arc<Guard>, site: &Arc<S>, start: StartThread) -> Self {
         let (sender, unsent) = channel();
-        let (guard, site, busy) = (Arc::clone(guard), Arc::clone(site), Arc::default());
+        let guard = Arc::clone(guard);
+        let site = Arc::clone(site);
+        let busy = Arc::default();
         let desk = Arc::new(Desk { guard, site, unsent: sender, busy });
         Self { open: Vec::new(), unsent, desk, start }
     }

@@ -26,9 +26,12 @@ impl Running {
 
     fn with(access: Access, start: StartThread) -> Self {
         let server = Server::open(access).unwrap();
-        let (bound, token) = (server.bound(), server.guard.token.clone());
-        let (changes, stop) = (Arc::new(Mutex::new(Vec::new())), Arc::new(AtomicBool::new(false)));
-        let (theirs, stopped) = (Arc::clone(&changes), Arc::clone(&stop));
+        let bound = server.bound();
+        let token = server.guard.token.clone();
+        let changes = Arc::new(Mutex::new(Vec::new()));
+        let stop = Arc::new(AtomicBool::new(false));
+        let theirs = Arc::clone(&changes);
+        let stopped = Arc::clone(&stop);
         let asked = AtomicBool::new(false);
         let site = move |request: &Request, path: &str| match path {
             "panic" => panic!("a site with a mistake"),

@@ -16,8 +16,10 @@ impl Maker {
 
     /// As tall as a person, so that whole people are seen in it.
     pub(super) fn mirror(&mut self) {
-        let (wide, top) = (self.between(0.35, 0.6), self.between(1.75, 2.0));
-        let (low, wood) = (0.08, Material::plain(self.wood));
+        let wide = self.between(0.35, 0.6);
+        let top = self.between(1.75, 2.0);
+        let low = 0.08;
+        let wood = Material::plain(self.wood);
         let middle = 0.5 * (low + top);
         self.block([0.0, 0.0, middle], [0.005, wide, middle - low], Material::mirror());
         // Of wood behind, too: a mirror is a mirror from one side only.
@@ -56,7 +58,8 @@ mod tests {
     fn world(kind: FurnitureKind, ball_m: f64) -> World {
         let piece = Furniture { kind, at: [3.0, 0.0], heading_deg: 180.0 };
         let made = furniture(&piece, 2.8, &mut Random::new(1, 8));
-        let (form, at) = (Form::Ellipsoid(Vector3::repeat(0.2)), Point3::new(ball_m, 0.0, 1.0));
+        let form = Form::Ellipsoid(Vector3::repeat(0.2));
+        let at = Point3::new(ball_m, 0.0, 1.0);
         let ball = Shape::new(form, at, Rotation3::identity(), Material::plain([0.5, 0.1, 0.1]));
         let stage = Stage::new(vec![made], Vec::new(), 100.0);
         World::new(&Arc::new(stage), vec![Object::new(vec![ball], Some(1), true)])

@@ -20,7 +20,8 @@ fn shots(text: &str, threads: usize) -> Vec<Shot> {
 
 #[test]
 fn the_same_scene_is_the_same_whatever_the_number_of_threads() {
-    let (one, three) = (shots(SMALL, 1), shots(SMALL, 3));
+    let one = shots(SMALL, 1);
+    let three = shots(SMALL, 3);
     assert!(one.len() >= 9 && one.len() == three.len());
     for (a, b) in one.iter().zip(&three) {
         assert_eq!(a.images.colour, b.images.colour);
@@ -57,7 +58,8 @@ fn on_ramp(ramp: &str, robot_x: f64) -> Shot {
 #[test]
 fn a_ramp_lifts_people_and_tilts_the_robot() {
     let ramp = "ramp = { from_m = 3.0, length_m = 2.0, rise_m = 0.2 }";
-    let (level, below) = (on_ramp("", 2.0), on_ramp(ramp, 2.0));
+    let level = on_ramp("", 2.0);
+    let below = on_ramp(ramp, 2.0);
     let up = below.truth[0].head_in_robot - level.truth[0].head_in_robot;
     assert!((up - Vector3::new(0.0, 0.0, 0.2)).norm() < 1e-9, "{up:?}");
     let head = on_ramp("", 4.0).truth[0].head_in_robot;
@@ -136,11 +138,13 @@ fn depth_may_be_taken_later_than_colour_and_changes_nothing_else() {
 #[test]
 fn truth_agrees_with_depth_and_knows_who_hides_whom() {
     let shot = &shots(SMALL, 2)[0];
-    let (near, far) = (&shot.truth[0], &shot.truth[1]);
+    let near = &shot.truth[0];
+    let far = &shot.truth[1];
     assert!((near.head_in_robot.x - 3.0).abs() < 0.05 && near.visible_fraction > 0.95);
     assert!(far.visible_fraction < 0.5 && far.occluder == Some(1), "{far:?}");
     let area = near.upper_body.unwrap();
-    let (x, y) = (area.centre().x as i64, (area.y + 0.45 * area.height) as i64);
+    let x = area.centre().x as i64;
+    let y = (area.y + 0.45 * area.height) as i64;
     let depth = f64::from(shot.images.depth.as_ref().unwrap().get(x, y).unwrap());
     assert!((depth - 2.9).abs() < 0.15, "{depth}");
 }
@@ -150,7 +154,8 @@ fn a_stereo_pair_is_shifted_by_the_disparity() {
     let text =
         SMALL.replace("[camera]\n", "[camera]\nkind = \"stereo\"\nfield_of_view_deg = 58.0\n");
     let images = &shots(&text, 2)[0].images;
-    let (left, right) = (images.grey.as_ref().unwrap(), &images.right.as_ref().unwrap().image);
+    let left = images.grey.as_ref().unwrap();
+    let right = &images.right.as_ref().unwrap().image;
     let difference = |shift: i64| -> i64 {
         let pairs = (44..52).flat_map(|x| (24..40).map(move |y| (x, y)));
         pairs
@@ -188,17 +193,20 @@ const OMNI: &str = "duration_s = 1.0\n[camera]\nkind = \"panorama\"\nwidth = 160
 
 #[test]
 fn a_mirror_shows_people_all_around_and_the_seam_cuts_nobody() {
-    let (one, three) = (shots(OMNI, 1), shots(OMNI, 3));
+    let one = shots(OMNI, 1);
+    let three = shots(OMNI, 3);
     assert!(one.len() == 3 && one[0].images.depth.is_none());
     for (a, b) in one.iter().zip(&three) {
         assert!(a.images.colour == b.images.colour && a.truth == b.truth);
     }
-    let (behind, left) = (&one[0].truth[0], &one[0].truth[1]);
+    let behind = &one[0].truth[0];
+    let left = &one[0].truth[1];
     let seam = behind.upper_body.unwrap();
     assert!(seam.x < 480.0 && seam.right() > 480.0 && seam.width < 50.0, "{seam:?}");
     assert!((left.upper_body.unwrap().centre().x - 119.5).abs() < 6.0, "{left:?}");
     for person in [behind, left] {
-        let (whole, seen) = (person.upper_body.unwrap(), person.visible.unwrap());
+        let whole = person.upper_body.unwrap();
+        let seen = person.visible.unwrap();
         assert!(person.visible_fraction > 0.9 && !person.ignore, "{person:?}");
         assert!(seen.intersection(&whole).area() > 0.95 * seen.area(), "{person:?}");
         assert!(seen.area() > 0.5 * whole.area(), "{person:?}");
@@ -298,7 +306,8 @@ fn who_wanders_goes_elsewhere_with_every_seed_and_keeps_off_things() {
         }
         ways
     };
-    let (first, second) = (ways(4), ways(5));
+    let first = ways(4);
+    let second = ways(5);
     assert_eq!(first, ways(4));
     assert!(first.iter().all(|way| way.len() == 30));
     assert!(first[0] != first[1] && first[0] != second[0]);
@@ -316,7 +325,8 @@ fn joints_are_where_the_body_is_and_know_what_hides_them() {
     };
     // Both look away from the robot, and the second stands right behind the first.
     let pixel = |name: &str| joint(0, name).pixel.unwrap();
-    let (left, right) = (pixel("left_shoulder"), pixel("right_shoulder"));
+    let left = pixel("left_shoulder");
+    let right = pixel("right_shoulder");
     assert!(left.x < right.x - 10.0 && (left.y - right.y).abs() < 6.0, "{left} {right}");
     assert!(pixel("left_hip").y > left.y && pixel("left_knee").y > pixel("left_hip").y);
     assert!(joint(0, "left_shoulder").in_sight && joint(0, "right_knee").in_sight);
@@ -349,7 +359,8 @@ fn sunlight_makes_images_bright_and_takes_away_depth() {
         );
         shots(&text, 2).swap_remove(0)
     };
-    let (overcast, sunny) = (shot(0.0), shot(30_000.0));
+    let overcast = shot(0.0);
+    let sunny = shot(30_000.0);
     let [dark, bright] = [&overcast, &sunny].map(|shot| shot.images.colour.clone().unwrap());
     let [all, left] = [&overcast, &sunny].map(|shot| shot.images.depth.clone().unwrap());
     let at = |x: usize, y: usize| y * 160 + x;
@@ -359,7 +370,8 @@ fn sunlight_makes_images_bright_and_takes_away_depth() {
     let measured = |depth: &tagalong_core::DepthImage| {
         lit.iter().filter(|i| !depth.pixels()[**i].is_nan()).count()
     };
-    let (before, after) = (measured(&all), measured(&left));
+    let before = measured(&all);
+    let after = measured(&left);
     assert!(before > 9 * lit.len() / 10 && after < lit.len() / 10, "{before} {after}");
     // The sky in a window is as bright as it is said to be, and a hole in the depth.
     let day = "seed = 4\nduration_s = 0.2\n[camera]\nwidth = 160\nheight = 120\n\
@@ -367,7 +379,8 @@ fn sunlight_makes_images_bright_and_takes_away_depth() {
     let middle = |sky_lux: u32| {
         let images = shots(&format!("{day}{sky_lux}.0\n"), 1).swap_remove(0).images;
         // Beside the bar in the middle of the window.
-        let (colour, depth) = (images.colour.unwrap(), images.depth.unwrap());
+        let colour = images.colour.unwrap();
+        let depth = images.depth.unwrap();
         (colour.pixels()[at(90, 50)][1], depth.pixels()[at(90, 50)])
     };
     let [(dark, _), (bright, hole)] = [0, 5000].map(middle);

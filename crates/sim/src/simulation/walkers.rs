@@ -99,7 +99,8 @@ fn wanderer(
 ) -> PersonSettings {
     let mut path = vec![free_point(scene, walkers, obstacles, &MIDDLE, random)];
     path.extend((0..3).map(|_| free_point(scene, &[], obstacles, &MIDDLE, random)));
-    let (speed_mps, start_s) = (random.between(0.6, 1.3), random.between(0.0, 2.0));
+    let speed_mps = random.between(0.6, 1.3);
+    let start_s = random.between(0.0, 2.0);
     let posture = if random.chance(0.15) { Posture::Phone } else { Posture::Upright };
     let at_end = AtEnd::Loop;
     PersonSettings {

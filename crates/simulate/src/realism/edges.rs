@@ -79,7 +79,8 @@ fn name(bin: i64) -> String {
 fn displacements(simulated: &SimulatedFrame) -> Vec<f64> {
     let Some(depth) = depth(&simulated.frame) else { return Vec::new() };
     let of = |person: &Truth| {
-        let (whole, seen) = (person.upper_body?, person.visible?);
+        let whole = person.upper_body?;
+        let seen = person.visible?;
         let trunk = simulated.frame.camera.depth_of(&person.torso_in_robot) as f32;
         let measured = extent(depth, &seen, trunk)?;
         // An edge of the square is no edge of the person.
@@ -95,13 +96,16 @@ fn displacements(simulated: &SimulatedFrame) -> Vec<f64> {
 
 /// Returns the bounds of the pixels that are as far away as the trunk.
 fn extent(depth: &DepthImage, seen: &Rect, trunk_m: f32) -> Option<Rect> {
-    let (left, right) = (seen.x as i64 - REACH_PX, seen.right() as i64 + REACH_PX);
-    let (top, bottom) = (seen.y as i64 - REACH_PX, seen.bottom() as i64);
+    let left = seen.x as i64 - REACH_PX;
+    let right = seen.right() as i64 + REACH_PX;
+    let top = seen.y as i64 - REACH_PX;
+    let bottom = seen.bottom() as i64;
     let near = |x: i64, y: i64| depth.get(x, y).is_some_and(|z| (z - trunk_m).abs() < BODY_M);
     let body = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
     let body: Vec<(i64, i64)> = body.filter(|(x, y)| near(*x, *y)).collect();
     let xs = || body.iter().map(|(x, _)| *x);
-    let (x, y) = (xs().min()? as f64, body.iter().map(|(_, y)| *y).min()? as f64);
+    let x = xs().min()? as f64;
+    let y = body.iter().map(|(_, y)| *y).min()? as f64;
     Some(Rect::new(x, y, xs().max()? as f64 + 1.0 - x, bottom as f64 - y))
 }
 

@@ -22,7 +22,8 @@ pub fn checks() -> Result<Vec<Check>, TrialError> {
 
 fn of_speed(speed_mps: f64) -> Option<Vec<Check>> {
     let heads = heads(speed_mps);
-    let (first, last) = (heads.first()?, heads.last()?);
+    let first = heads.first()?;
+    let last = heads.last()?;
     let seconds = (heads.len() - 1) as f64 / RATE_HZ;
     let speed = (last - first).xy().norm() / seconds;
     let leg_m = LEG * HEIGHT_M;

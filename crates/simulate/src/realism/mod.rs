@@ -64,13 +64,15 @@ impl Check {
         value: f64,
         unit: &'static str,
     ) -> Self {
-        let (what, wanted) = (what.into(), String::new());
+        let what = what.into();
+        let wanted = String::new();
         Self { group, what, value: Some(value), unit, wanted, holds: None }
     }
 
     /// Returns a check that could not be measured, with the reason.
     pub fn skipped(group: &'static str, why: impl Into<String>) -> Self {
-        let (what, wanted) = (why.into(), String::new());
+        let what = why.into();
+        let wanted = String::new();
         Self { group, what, value: None, unit: "", wanted, holds: None }
     }
 }
@@ -134,7 +136,8 @@ fn text(checks: &[Check]) -> String {
         let _ = writeln!(out, "{}", line.trim_end());
     }
     let judged = checks.iter().filter_map(|check| check.holds);
-    let (held, all) = (judged.clone().filter(|holds| *holds).count(), judged.count());
+    let held = judged.clone().filter(|holds| *holds).count();
+    let all = judged.count();
     let _ = writeln!(out, "{held} of {all} checks hold");
     out
 }

@@ -135,10 +135,10 @@ fn cell(depth: &DepthImage, square: &Rect, side: usize, row: usize, column: usiz
     let edge = |from: f64, length: f64, index: usize| {
         (from + length * index as f64 / side as f64) as usize
     };
-    let (left, right) =
-        (edge(square.x, square.width, column), edge(square.x, square.width, column + 1));
-    let (top, bottom) =
-        (edge(square.y, square.height, row), edge(square.y, square.height, row + 1));
+    let left = edge(square.x, square.width, column);
+    let right = edge(square.x, square.width, column + 1);
+    let top = edge(square.y, square.height, row);
+    let bottom = edge(square.y, square.height, row + 1);
     let inside = bottom.min(depth.height());
     (top..inside)
         .flat_map(|y| depth.row(y)[left..right.min(depth.width())].iter().copied())
@@ -191,7 +191,8 @@ fn discriminant(a: &[Sample], b: &[Sample]) -> Option<DVector<f64>> {
     if b.is_empty() {
         return None;
     }
-    let (of_a, of_b) = (centre(a), centre(b));
+    let of_a = centre(a);
+    let of_b = centre(b);
     let mut within = scatter(a, &of_a) + scatter(b, &of_b);
     let ridge = RIDGE * within.trace() / size as f64;
     // The ridge also keeps the matrix positive definite if a feature never varies.

@@ -150,12 +150,14 @@ struct Fit {
 
 /// Fits the best plane through the middle of the image: `1 / z = a + b u + c v`.
 fn fit(depth: &DepthImage, window: [f64; 2]) -> Option<Fit> {
-    let (w, h) = (depth.width(), depth.height());
+    let w = depth.width();
+    let h = depth.height();
     let middle = |side: usize, half: f64| {
         let at = |part: f64| (part * side as f64).round() as usize;
         at(0.5 - half)..at(0.5 + half)
     };
-    let (us, vs) = (middle(w, window[0]), middle(h, window[1]));
+    let us = middle(w, window[0]);
+    let vs = middle(h, window[1]);
     let all = us.len() * vs.len();
     let pixel = |u: usize, v: usize| {
         let z = f64::from(depth.get(u as i64, v as i64)?);

@@ -87,7 +87,8 @@ fn a_mean_has_the_interval_of_student() {
 fn a_figure_of_all_draws_together_has_an_interval_too() {
     // A ratio of sums: by the textbook (Cochran, 1977, section 6.3) its error is close
     // to the spread of the residuals over the mean of the denominators.
-    let (parts, wholes) = ([3.0, 6.0, 4.0, 9.0, 5.0], [5.0, 9.0, 8.0, 12.0, 6.0]);
+    let parts = [3.0, 6.0, 4.0, 9.0, 5.0];
+    let wholes = [5.0, 9.0, 8.0, 12.0, 6.0];
     let sum = |of: &[f64], drawn: &[usize]| drawn.iter().map(|&i| of[i]).sum::<f64>();
     let interval = draws_interval(5, |drawn| sum(&parts, drawn) / sum(&wholes, drawn)).unwrap();
     assert_eq!(interval.estimate, 27.0 / 40.0);

@@ -12,7 +12,8 @@ const BASELINE_M: f64 = 0.1;
 const FX: f64 = 200.0;
 
 fn frame(left: GreyImage, right: GreyImage) -> Frame {
-    let (width, height) = (left.width(), left.height());
+    let width = left.width();
+    let height = left.height();
     let lens = Pinhole { fx: FX, fy: FX, cx: 0.0, cy: 0.0, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, width, height, 1.0, 0.0, 0.0));
     let images = Images {

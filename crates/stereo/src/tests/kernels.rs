@@ -26,7 +26,8 @@ fn images(count: usize) -> impl Strategy<Value = Vec<GreyImage>> {
 }
 
 fn features(pair: &[GreyImage], noise: u8, y: usize) -> (Features, Features) {
-    let (mut left, mut right) = (Features::default(), Features::default());
+    let mut left = Features::default();
+    let mut right = Features::default();
     left.all(&pair[0], y, noise, None);
     right.all(&pair[1], y, noise, Some(D));
     (left, right)
@@ -54,7 +55,8 @@ fn wide(cells: &[u8]) -> Vec<i64> {
 proptest! {
     #[test]
     fn costs_equal_counted_bits(pair in images(2), noise in 0..20u8) {
-        let (width, height) = (pair[0].width() as i64, pair[0].height() as i64);
+        let width = pair[0].width() as i64;
+        let height = pair[0].height() as i64;
         let slow = Volume::from_fn((width, height, D as i64), |x, y, d| {
             reference::bits(&pair, noise, x, y, d)
         });
@@ -64,7 +66,8 @@ proptest! {
 
     #[test]
     fn blended_costs_equal_added_ones(pair in images(2), noise in 0..20u8) {
-        let (width, height) = (pair[0].width(), pair[0].height());
+        let width = pair[0].width();
+        let height = pair[0].height();
         let size = (width as i64, height as i64, D as i64);
         let slow =
             Volume::from_fn(size, |x, y, d| reference::blend(&pair, noise, x, y, d));
@@ -142,7 +145,8 @@ proptest! {
         let rows = cost_rows(&pair, 0);
         let grey = &pair[0];
         let cells = wide(&rows.concat().into_flattened());
-        let (width, height) = (grey.width() as i64, grey.height() as i64);
+        let width = grey.width() as i64;
+        let height = grey.height() as i64;
         let costs = Volume { width, height, disparities: D as i64, cells };
         let mut slow = vec![0_i64; costs.cells.len()];
         for from in [(-1, 0), (1, 0), (-1, -1), (0, -1), (1, -1)] {
@@ -214,7 +218,8 @@ proptest! {
             std::array::from_fn(|i| rows.iter().map(|row| row[i]).collect::<Vec<u8>>());
         let second: Vec<u8> = second.iter().zip(&cost).map(|(s, c)| s + c).collect();
         let winners = Winners { disparity, cost, below, above, second };
-        let (mut disparities, mut confidences) = (vec![0.0; width], vec![0; width]);
+        let mut disparities = vec![0.0; width];
+        let mut confidences = vec![0; width];
         let mut found = RowWinners { disparities: &mut disparities, confidences: &mut confidences };
         let refused = winners.judge(uniqueness, &mut found);
         let mut buffers = FromRight::default();
@@ -313,7 +318,8 @@ fn a_shift_is_found() {
 #[test]
 fn what_cannot_be_matched_is_an_error() {
     let mut matcher = Matcher::new(StereoSettings::default()).unwrap();
-    let (a, b) = (GreyImage::filled(8, 6, 0), GreyImage::filled(8, 5, 0));
+    let a = GreyImage::filled(8, 6, 0);
+    let b = GreyImage::filled(8, 5, 0);
     let error = matcher.disparities(&a, &b, 15).unwrap_err().to_string();
     assert!(error.contains("8x6") && error.contains("8x5"), "{error}");
     let error = matcher.disparities(&a, &a, 256).unwrap_err().to_string();
@@ -345,7 +351,8 @@ fn faint_surfaces_are_neither_too_near_nor_too_far() {
     {
         let settings = StereoSettings { method, ..StereoSettings::default() };
         let mut matcher = Matcher::new(settings).unwrap();
-        let (left, right) = (image(1, 0.0), image(2, shift));
+        let left = image(1, 0.0);
+        let right = image(2, shift);
         let found = matcher.disparities(&left, &right, 31).unwrap();
         let inside = |at: &usize| at % 200 > 40 && at % 200 < 190;
         let errors: Vec<f32> = (0..found.values.len())

@@ -7,7 +7,8 @@ use crate::cost::{MOST_BRIGHTNESS, MOST_SLOPE, SLOPE_WEIGHT};
 use crate::winner::Winners;
 
 fn clamped(image: &GreyImage, x: i64, y: i64) -> u8 {
-    let (right, bottom) = (image.width() as i64 - 1, image.height() as i64 - 1);
+    let right = image.width() as i64 - 1;
+    let bottom = image.height() as i64 - 1;
     image.get(x.clamp(0, right), y.clamp(0, bottom)).unwrap()
 }
 
@@ -55,10 +56,12 @@ fn dissimilarity(
     let one_way = |image: &GreyImage, x: i64, own: i64| {
         let centre = level(image, x);
         let all = [centre, (centre + level(image, x - 1)) / 2, (centre + level(image, x + 1)) / 2];
-        let (least, most) = (*all.iter().min().unwrap(), *all.iter().max().unwrap());
+        let least = *all.iter().min().unwrap();
+        let most = *all.iter().max().unwrap();
         (own - most).max(least - own).max(0)
     };
-    let (l, r) = (level(&pair[0], left), level(&pair[1], right));
+    let l = level(&pair[0], left);
+    let r = level(&pair[1], right);
     one_way(&pair[1], right, l).min(one_way(&pair[0], left, r))
 }
 
@@ -66,11 +69,13 @@ fn dissimilarity(
 pub fn without_holes(image: &[f32], width: usize, most: (usize, f32), step: f32) -> Vec<f32> {
     let mut filled = image.to_vec();
     for at in (0..image.len()).filter(|at| image[*at].is_nan()) {
-        let (x, row) = (at % width, at / width * width);
+        let x = at % width;
+        let row = at / width * width;
         let before = (0..x).rev().find(|x| !image[row + x].is_nan());
         let behind = (x..width).find(|x| !image[row + x].is_nan());
         let (Some(a), Some(b)) = (before, behind) else { continue };
-        let (from, to) = (image[row + a], image[row + b]);
+        let from = image[row + a];
+        let to = image[row + b];
         let most = (most.0 as f32).max(most.1 * from.min(to));
         if (b - a - 1) as f32 <= most && (to - from).abs() <= step {
             filled[at] = from + (to - from) * (x - a) as f32 / (b - a) as f32;
@@ -155,7 +160,8 @@ pub fn without_speckles(image: &[f32], width: usize, min_pixels: usize, step: f3
         if visited[start] || image[start].is_nan() {
             continue;
         }
-        let (mut patch, mut next) = (vec![start], 0);
+        let mut patch = vec![start];
+        let mut next = 0;
         visited[start] = true;
         while next < patch.len() {
             let at = patch[next];
@@ -196,7 +202,8 @@ pub fn supported(row: &[f32], image: &GreyImage, y: usize, least: u32) -> Vec<f3
     let keeps = |x: usize| {
         let sides = ((0..x).rev().find(is_anchor), (x + 1..row.len()).find(is_anchor));
         let (Some(a), Some(b)) = sides else { return false };
-        let (far, near) = (row[a].min(row[b]), row[a].max(row[b]));
+        let far = row[a].min(row[b]);
+        let near = row[a].max(row[b]);
         let middle = if near - far <= tolerance(far) { 0.5 * (row[a] + row[b]) } else { far };
         (row[x] - middle).abs() <= tolerance(middle)
     };
@@ -225,7 +232,8 @@ fn equation(pair: &[GreyImage], x: usize, y: usize, d: f64, gain: f64) -> (f64, 
 fn matched(right: &GreyImage, x: usize, y: usize, d: f64) -> (f64, f64) {
     let last = right.width() as i64 - 1;
     let at = (x as f64 - d).clamp(0.0, last as f64);
-    let (low, part) = (at.floor(), at.fract());
+    let low = at.floor();
+    let part = at.fract();
     let [(a, a_slope), (b, b_slope)] =
         [0, 1].map(|i| smoothed(right, (low as i64 + i).min(last), y as i64));
     (a + part * (b - a), a_slope + part * (b_slope - a_slope))
@@ -262,10 +270,14 @@ fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: us
 
 /// Refines disparities pixel by pixel.
 pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f64> {
-    let (width, height) = (pair[0].width(), pair[0].height());
+    let width = pair[0].width();
+    let height = pair[0].height();
     let one = |at: usize| {
-        let (x, y, was) = (at % width, at / width, disparities[at]);
-        let (mut squares, mut sum) = (20.0, 20.0 * f64::from(was));
+        let x = at % width;
+        let y = at / width;
+        let was = disparities[at];
+        let mut squares = 20.0;
+        let mut sum = 20.0 * f64::from(was);
         for y in y.saturating_sub(radius)..(y + radius + 1).min(height) {
             let row = &disparities[y * width..(y + 1) * width];
             if (row[x] - was).abs() <= 1.0 {
@@ -286,7 +298,8 @@ pub fn judged(winners: &Winners, uniqueness: f32, tolerance: u8) -> (Vec<f32>, [
     let d = |x: usize| usize::from(winners.disparity[x]);
     let mut counts = [0; 3];
     let mut one = |x: usize| {
-        let (cost, second) = (f32::from(winners.cost[x]), f32::from(winners.second[x]));
+        let cost = f32::from(winners.cost[x]);
+        let second = f32::from(winners.second[x]);
         if d(x) > x {
             counts[0] += 1;
             return f32::NAN;
@@ -301,7 +314,8 @@ pub fn judged(winners: &Winners, uniqueness: f32, tolerance: u8) -> (Vec<f32>, [
             counts[2] += 1;
             return f32::NAN;
         }
-        let (below, above) = (f32::from(winners.below[x]), f32::from(winners.above[x]));
+        let below = f32::from(winners.below[x]);
+        let above = f32::from(winners.above[x]);
         let rise = below + above - 2.0 * cost;
         d(x) as f32 + if rise > 0.0 { 0.5 * (below - above) / rise } else { 0.0 }
     };

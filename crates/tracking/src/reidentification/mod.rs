@@ -103,8 +103,8 @@ impl Reidentifier {
         tracks: &[Track],
         detections: &[Detection],
     ) -> Result<Vec<Vec<f64>>> {
-        let (weight, evidence) =
-            (self.settings.association_weight, self.settings.association_evidence);
+        let weight = self.settings.association_weight;
+        let evidence = self.settings.association_evidence;
         // Between one track and one detection there is nothing to choose.
         if weight == 0.0
             || self.settings.remember_s == 0.0
@@ -264,8 +264,8 @@ impl Reidentifier {
         let holder = self.tracks.values().find(|other| other.person.number == rival.number);
         let Some(holder) = holder.filter(|holder| !holder.unsure.is_empty()) else { return true };
         // The exchange must be right for both tracks taken together.
-        let (stays, changes) =
-            (rival.difference(&holder.unsure), identity.person.difference(&holder.unsure));
+        let stays = rival.difference(&holder.unsure);
+        let changes = identity.person.difference(&holder.unsure);
         stays.zip(changes).is_none_or(|(stays, changes)| stays + gain > changes)
     }
 
@@ -300,7 +300,8 @@ impl Reidentifier {
             if !identity.is_new {
                 continue;
             }
-            let (reported, too_late) = (identity.reported, identity.age_s > self.settings.decide_s);
+            let reported = identity.reported;
+            let too_late = identity.age_s > self.settings.decide_s;
             let returned = self.returned(identity, track);
             let returned = returned.map(|index| self.absent.remove(index));
             let Some(identity) = self.tracks.get_mut(&track.id) else { continue };

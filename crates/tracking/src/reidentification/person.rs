@@ -29,7 +29,8 @@ pub(crate) struct Person {
 
 impl Person {
     pub(crate) fn new(number: TrackId, place: Point2<f64>) -> Self {
-        let (gallery, heights) = (Gallery::default(), (0.0, 0.0));
+        let gallery = Gallery::default();
+        let heights = (0.0, 0.0);
         Self { number, gallery, heights, place: Some(place), ago_s: 0.0 }
     }
 

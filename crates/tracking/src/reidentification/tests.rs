@@ -62,7 +62,8 @@ impl Scene {
 
 #[test]
 fn a_person_who_returns_keeps_the_number() {
-    let (mut scene, red) = (Scene::new(), frame(RED, BLUE));
+    let mut scene = Scene::new();
+    let red = frame(RED, BLUE);
     assert_eq!(scene.show(30, &red, &[track(1, 0.8, 1.6)]), [1]);
     scene.show(50, &red, &[]);
     assert_eq!(scene.show(1, &red, &[track(2, 0.8, 1.6)]), [1]);
@@ -81,7 +82,8 @@ fn a_person_in_other_clothes_or_of_another_height_gets_a_new_number() {
 /// Both were in red, so that it may be either.
 #[test]
 fn one_who_may_be_either_of_two_gets_a_new_number() {
-    let (mut scene, red) = (Scene::new(), frame(RED, RED));
+    let mut scene = Scene::new();
+    let red = frame(RED, RED);
     scene.show(30, &red, &[track(1, 0.8, 1.6), track(2, -0.8, 1.6)]);
     scene.show(50, &red, &[track(2, -0.8, 1.6)]);
     assert_eq!(scene.show(30, &red, &[track(2, -0.8, 1.6), track(3, 0.8, 1.6)]), [2, 3]);

@@ -292,7 +292,8 @@ fn episodes(looks: &[JudgedFrame]) -> Vec<Episode> {
 
 /// The longest time in one go, s.
 fn longest(looks: &[JudgedFrame], counts: impl Fn(&JudgedFrame) -> bool) -> f64 {
-    let (mut now, mut most) = (0.0_f64, 0.0_f64);
+    let mut now = 0.0_f64;
+    let mut most = 0.0_f64;
     for look in looks {
         now = if counts(look) { now + look.dt_s } else { 0.0 };
         most = most.max(now);

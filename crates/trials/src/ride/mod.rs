@@ -205,7 +205,8 @@ impl Ride {
 
 /// Returns the data of a simulated frame; its robot always has odometry.
 fn sources(frame: &Frame) -> Sources {
-    let (right, laser) = (frame.right().is_ok(), frame.laser().is_some());
+    let right = frame.right().is_ok();
+    let laser = frame.laser().is_some();
     Sources { depth: frame.depth().is_ok(), right, laser, odometry: true }
 }
 

@@ -107,7 +107,8 @@ mod tests {
 
     #[test]
     fn paths_of_one_machine_are_found_and_others_are_not() {
-        let (tmp, work) = (MACHINE[1], MACHINE[0]);
+        let tmp = MACHINE[1];
+        let work = MACHINE[0];
         assert!(names_path(&format!("see {tmp}/x"), tmp));
         assert!(names_path(&format!("`{work}`"), work));
         assert!(!names_path(&format!("target{tmp}/x"), tmp));

@@ -38,7 +38,8 @@ impl Habits {
     /// Counts the habits in a source. Code in doc comments does not count.
     fn of(source: &str) -> Self {
         let mut habits = Self { lines: source.lines().count(), ..Self::default() };
-        let (mut is_code, mut goes_on) = (false, false);
+        let mut is_code = false;
+        let mut goes_on = false;
         for line in source.lines() {
             let Some((is_doc, text)) = comment(line) else {
                 (is_code, goes_on) = (false, false);
@@ -85,7 +86,8 @@ impl Habits {
 
     /// Returns a complaint for each limit that is not kept.
     fn complaints(&self) -> Vec<String> {
-        let (persons, whats) = (self.per_thousand(self.persons), self.per_thousand(self.whats));
+        let persons = self.per_thousand(self.persons);
+        let whats = self.per_thousand(self.whats);
         let reasons = self.reasons_percent();
         let rules = [
             (self.openings == 0, format!("{} openings like `What ...`, not 0", self.openings)),
@@ -99,7 +101,8 @@ impl Habits {
 
 impl fmt::Display for Habits {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (persons, whats) = (self.per_thousand(self.persons), self.per_thousand(self.whats));
+        let persons = self.per_thousand(self.persons);
+        let whats = self.per_thousand(self.whats);
         write!(f, "{} openings, {persons:.2} who-words and {whats:.2} `what` ", self.openings)?;
         write!(f, "in 1,000 words, {:.2} % of lines `//`", self.reasons_percent())
     }

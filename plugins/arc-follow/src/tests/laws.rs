@@ -50,7 +50,8 @@ fn a_target_at_rest_keeps_sine_of_bearing_over_a_power_of_range() {
 #[test]
 fn path_c_faces_the_target_long_before_path_a() {
     let at_the_end = |path| approach(bare(path, 2.0)).last().unwrap().1.to_degrees();
-    let (circle, turning) = (at_the_end(Path::A), at_the_end(Path::C));
+    let circle = at_the_end(Path::A);
+    let turning = at_the_end(Path::C);
     assert!((circle - 8.6).abs() < 0.1, "{circle}");
     assert!((turning - 0.6).abs() < 0.05, "{turning}");
 }
@@ -75,7 +76,8 @@ fn path_b_turns_first_and_then_drives_straight() {
     let mut turned = false;
     for _ in 0..300 {
         let wheels = drive.step(place, Vector2::zeros());
-        let (v, w) = (speed(wheels), turn_rate(wheels));
+        let v = speed(wheels);
+        let w = turn_rate(wheels);
         assert!(v == 0.0 || w == 0.0, "drives at {v} and turns at {w}");
         assert!(!turned || w == 0.0, "turns again");
         turned |= v > 0.0;
@@ -285,6 +287,7 @@ fn cut_m(trail_m: f64) -> f64 {
 
 #[test]
 fn it_goes_round_a_corner_where_the_person_went() {
-    let (straight_m, trail_m) = (cut_m(0.0), cut_m(1.0));
+    let straight_m = cut_m(0.0);
+    let trail_m = cut_m(1.0);
     assert!(straight_m > 0.2 && trail_m < 0.5 * straight_m, "{straight_m} {trail_m}");
 }

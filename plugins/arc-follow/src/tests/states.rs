@@ -136,7 +136,8 @@ proptest! {
             let mut controller = ArcFollow::new(config.clone()).unwrap();
             command(&mut controller, EgoMotion::at_rest(0.1), Some(&target(x, y, velocity)))
         };
-        let (here, there) = (first(x, y), first(x + 1e-7, y - 1e-7));
+        let here = first(x, y);
+        let there = first(x + 1e-7, y - 1e-7);
         // Where turning on the spot begins, the wanted speed jumps, and the acceleration limits the
         // result.
         let near = (y.atan2(x).abs().to_degrees() - 60.0).abs() < 1e-3;

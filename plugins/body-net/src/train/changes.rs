@@ -52,8 +52,8 @@ fn cells(
     let from =
         |at: usize, by: i64, size: usize| (at as i64 - by).clamp(0, size as i64 - 1) as usize;
     (0..rows * columns).map(move |cell| {
-        let (row, column) =
-            (from(cell / columns, down, rows), from(cell % columns, right, columns));
+        let row = from(cell / columns, down, rows);
+        let column = from(cell % columns, right, columns);
         row * columns + if mirrored { columns - 1 - column } else { column }
     })
 }
@@ -74,7 +74,8 @@ mod tests {
     #[test]
     fn intensity_and_depth_move_together() {
         let mut view = NetworkInput { grey: vec![0; 80 * 36], behind: vec![0; 40 * 18] };
-        let (row, column) = (30, 8);
+        let row = 30;
+        let column = 8;
         view.behind[row * 18 + column] = 90;
         view.grey[2 * row * 36 + 2 * column] = 255;
         for seed in 0..20 {
@@ -101,11 +102,13 @@ mod tests {
     fn half_are_mirrored_and_all_moves_are_made() {
         let mut view = NetworkInput { grey: vec![128; 80 * 36], behind: vec![0; 40 * 18] };
         view.behind[20 * 18 + 5] = 90;
-        let (mut mirrored, mut moves) = (0, std::collections::BTreeMap::new());
+        let mut mirrored = 0;
+        let mut moves = std::collections::BTreeMap::new();
         for seed in 0..300 {
             let other = changed(&view, &mut Draws(1000 * seed));
             let at = other.behind.iter().position(|v| *v == 90).unwrap();
-            let (row, column) = (at / 18, at % 18);
+            let row = at / 18;
+            let column = at % 18;
             let is_mirrored = column > 8;
             mirrored += usize::from(is_mirrored);
             let column = if is_mirrored { 17 - column } else { column };

@@ -76,7 +76,8 @@ impl NetTrainer {
     fn gradient(&self, net: &Net, batch: &[usize], share: f32, seed: u64) -> Result<Net> {
         let chunks: Vec<&[usize]> = batch.chunks(batch.len().div_ceil(PARTS)).collect();
         let of_part = |part: &&[usize]| {
-            let (mut gradient, mut pass) = (Net::default(), Pass::default());
+            let mut gradient = Net::default();
+            let mut pass = Pass::default();
             for &k in *part {
                 let is_person = self.examples[k].is_person;
                 let view = changed(&self.views[k], &mut Draws(mix(seed ^ !(k as u64))));
@@ -101,7 +102,8 @@ impl NetTrainer {
     fn held_out(&self, progress: &mut dyn FnMut(f64)) -> Result<Vec<(f64, bool)>> {
         let folds = self.training.folds;
         let parts = parts(self.examples.iter().copied(), folds, self.seed);
-        let (mut said, mut pass) = (Vec::new(), Pass::default());
+        let mut said = Vec::new();
+        let mut pass = Pass::default();
         for fold in 0..folds {
             let is_out = |k: &usize| parts.get(&self.examples[*k].group) == Some(&fold);
             let (out, rest): (Vec<usize>, _) = (0..self.examples.len()).partition(is_out);

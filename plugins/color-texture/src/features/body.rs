@@ -92,7 +92,8 @@ mod tests {
             (l, u) if (0.9..1.5).contains(&u) && l < 0.2 => 90,
             _ => 200,
         };
-        let (near, far) = (numbers(2.4, legs), numbers(4.8, legs));
+        let near = numbers(2.4, legs);
+        let far = numbers(4.8, legs);
         let off: f32 = near.iter().zip(&far).map(|(a, b)| (a - b).abs()).sum();
         let pole = numbers(4.8, |left, up| if up < 0.9 && left.abs() < 0.02 { 30 } else { 200 });
         let other: f32 = pole.iter().zip(&far).map(|(a, b)| (a - b).abs()).sum();
@@ -102,7 +103,8 @@ mod tests {
     #[test]
     fn what_is_outside_the_image_is_not_known() {
         let near = numbers(1.0, |left, _| if left > 0.0 { 200 } else { 30 });
-        let (chest, feet) = (4 * 6 + 3, 9 * 6 + 3);
+        let chest = 4 * 6 + 3;
+        let feet = 9 * 6 + 3;
         let of = |block: usize| &near[block * DIRECTIONS..(block + 1) * DIRECTIONS];
         assert!(of(chest).iter().all(|v| v.is_finite()));
         assert!(of(feet).iter().all(|v| v.is_nan()));

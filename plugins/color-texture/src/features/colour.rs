@@ -24,7 +24,8 @@ pub fn push(colour: &Grid<[f32; 3]>, surface: Option<&Surface>, out: &mut Vec<f3
         let cells: Vec<[f32; 3]> = zone.cells().filter(is_on).map(|cell| colour[cell]).collect();
         zone_numbers(&cells)
     };
-    let (head, torso) = (numbers(HEAD), numbers(TORSO));
+    let head = numbers(HEAD);
+    let torso = numbers(TORSO);
     out.extend(head);
     out.extend(torso);
     let hues = head[..HUES].iter().zip(&torso[..HUES]);
@@ -139,7 +140,8 @@ mod tests {
     #[test]
     fn the_numbers_of_a_zone_are_those_of_their_definitions() {
         let numbers = zone_numbers(&[[200.0, 50.0, 50.0], [10.0, 10.0, 10.0]]);
-        let (red, green) = ([201.0 / 303.0, 11.0 / 33.0], [51.0 / 303.0, 11.0 / 33.0]);
+        let red = [201.0 / 303.0, 11.0 / 33.0];
+        let green = [51.0 / 303.0, 11.0 / 33.0];
         let expected = [
             0.5 * (red[0] + red[1]),
             0.5 * (red[0] - red[1]),

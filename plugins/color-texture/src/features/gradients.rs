@@ -69,9 +69,11 @@ impl Blocks<'_> {
     /// Half the difference of the neighbours; one-sided at the border. Then as direction,
     /// in bins, and length.
     fn gradients(&self, row: usize, out: &mut [[f32; 2]]) {
-        let (columns, last) = (self.columns, self.grey.len() / self.columns - 1);
+        let columns = self.columns;
+        let last = self.grey.len() / self.columns - 1;
         let line = |row: usize| &self.grey[row * columns..(row + 1) * columns];
-        let (above, here) = (line(row.saturating_sub(1)), line(row));
+        let above = line(row.saturating_sub(1));
+        let here = line(row);
         let below = line((row + 1).min(last));
         let left = std::iter::once(&here[0]).chain(here);
         let right = here[1..].iter().chain(here.last());
@@ -90,7 +92,8 @@ impl Blocks<'_> {
     fn around(&self, strength: &[f32], block: usize) -> f32 {
         let [down, across] = self.size();
         let span = |k: usize, end: usize| k.saturating_sub(1)..(k + 2).min(end);
-        let (rows, columns) = (span(block / across, down), span(block % across, across));
+        let rows = span(block / across, down);
+        let columns = span(block % across, across);
         let count = (rows.len() * columns.len()) as f32;
         let each = rows.flat_map(|row| columns.clone().map(move |column| row * across + column));
         each.map(|block| strength[block]).sum::<f32>() / count
@@ -101,7 +104,8 @@ impl Blocks<'_> {
 fn add(histogram: &mut [f32; DIRECTIONS], [direction, length]: [f32; 2]) {
     // Interpolated between neighbouring directions, so that a small turn changes little.
     let turn = direction + (DIRECTIONS as f32 - 0.5);
-    let (lower, part) = (turn as usize, turn.fract());
+    let lower = turn as usize;
+    let part = turn.fract();
     histogram[lower % DIRECTIONS] += (1.0 - part) * length;
     histogram[(lower + 1) % DIRECTIONS] += part * length;
 }
@@ -109,7 +113,8 @@ fn add(histogram: &mut [f32; DIRECTIONS], [direction, length]: [f32; 2]) {
 /// Angle of a line, 0 to pi, to 0.0003 rad; a polynomial without branches, so that many
 /// are found at once.
 fn direction(dx: f32, dy: f32) -> f32 {
-    let (x, y) = (dx.abs(), dy.abs());
+    let x = dx.abs();
+    let y = dy.abs();
     let ratio = x.min(y) / x.max(y).max(f32::MIN_POSITIVE);
     let square = ratio * ratio;
     let arc = ratio
@@ -129,7 +134,8 @@ mod tests {
 
     /// Slowly, by the library's functions.
     fn histograms(blocks: &Blocks<'_>) -> Vec<[f32; DIRECTIONS]> {
-        let (rows, columns) = (blocks.grey.len() / blocks.columns, blocks.columns);
+        let rows = blocks.grey.len() / blocks.columns;
+        let columns = blocks.columns;
         let at = |row: usize, column: usize| {
             blocks.grey[row.min(rows - 1) * columns + column.min(columns - 1)]
         };
@@ -140,7 +146,8 @@ mod tests {
             let dy = 0.5 * (at(row + 1, column) - at(row.saturating_sub(1), column));
             let turn = dy.atan2(dx).rem_euclid(PI) / PI * DIRECTIONS as f32 - 0.5;
             let first = (turn.floor() as i32).rem_euclid(DIRECTIONS as i32) as usize;
-            let (part, length) = (turn - turn.floor(), dx.hypot(dy));
+            let part = turn - turn.floor();
+            let length = dx.hypot(dy);
             let histogram =
                 &mut histograms[row / blocks.block[0] * across + column / blocks.block[1]];
             histogram[first] += (1.0 - part) * length;
@@ -174,7 +181,9 @@ mod tests {
             push(&grey, &mut out);
             out
         };
-        let (weak, strong, inverted) = (edge(80.0, 140.0), edge(20.0, 240.0), edge(240.0, 20.0));
+        let weak = edge(80.0, 140.0);
+        let strong = edge(20.0, 240.0);
+        let inverted = edge(240.0, 20.0);
         assert_eq!(weak.len(), COUNT);
         let block = 3 * BLOCKS + 4;
         let here = &strong[block * DIRECTIONS..][..DIRECTIONS];

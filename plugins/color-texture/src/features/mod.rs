@@ -81,7 +81,8 @@ impl Features {
     /// [`tagalong_core::Error::MissingImage`] for a frame without intensity.
     /// Colour and depth may be missing.
     pub fn look(&mut self, frame: &Frame, candidate: &Detection) -> Result<()> {
-        let (grey, region) = (frame.grey()?, &candidate.rect_in(&frame.camera));
+        let grey = frame.grey()?;
+        let region = &candidate.rect_in(&frame.camera);
         let out = &mut self.0;
         out.clear();
         let Some(window) = Window::new(grey, region) else {
@@ -131,7 +132,9 @@ fn same_size(colour: &tagalong_core::RgbImage, grey: &tagalong_core::GreyImage) 
 
 /// Mean and standard deviation; NaN for nothing.
 fn spread(values: impl Iterator<Item = f32>) -> [f32; 2] {
-    let (mut count, mut sum, mut squares) = (0.0f32, 0.0f32, 0.0f32);
+    let mut count = 0.0f32;
+    let mut sum = 0.0f32;
+    let mut squares = 0.0f32;
     for value in values {
         count += 1.0;
         sum += value;

@@ -60,7 +60,8 @@ fn profile(surface: &Surface, pair: usize) -> [f32; 3] {
 /// Mean depth of a block of the map.
 fn block_depth(surface: &Surface, block: usize) -> f32 {
     let across = SIDE / COARSE;
-    let (top, left) = (block / across * COARSE, block % across * COARSE);
+    let top = block / across * COARSE;
+    let left = block % across * COARSE;
     let zone = Zone { rows: [top, top + COARSE], columns: [left, left + COARSE] };
     let depths = zone.cells().map(|cell| surface.0[cell]).filter(|d| !d.is_nan());
     // Far background counts as far, not as how far.
@@ -76,7 +77,8 @@ fn unevenness(surface: &Surface, zone: Zone) -> f32 {
             (place / 16.0, surface.0[cell])
         })
     };
-    let (mut squares, mut sums) = (Matrix3::zeros(), Vector3::zeros());
+    let mut squares = Matrix3::zeros();
+    let mut sums = Vector3::zeros();
     for (place, depth) in points() {
         squares += place * place.transpose();
         sums += place * depth;

@@ -96,7 +96,9 @@ mod tests {
         for (zone, mean) in [(HEAD, 150.0), (TORSO, 50.0)] {
             zone.cells().for_each(|c| grey[c] = mean + if c % 2 == 0 { 10.0 } else { -10.0 });
         }
-        let (head, torso, count) = (110.0_f64, 300.0_f64, (SIDE * SIDE) as f64);
+        let head = 110.0_f64;
+        let torso = 300.0_f64;
+        let count = (SIDE * SIDE) as f64;
         let mean = (150.0 * head + 50.0 * (count - head)) / count;
         let squares = head * (150.0 - mean).powi(2) + (count - head) * (50.0 - mean).powi(2);
         let all = ((squares + 100.0 * (head + torso)) / count).sqrt();

@@ -48,7 +48,8 @@ impl Window {
     /// Creates the window of a square; outside of the image its border is continued. `None` in an
     /// image without pixels.
     pub fn new(image: &GreyImage, region: &Rect) -> Option<Self> {
-        let (width, height) = (image.width(), image.height());
+        let width = image.width();
+        let height = image.height();
         let around = region.inflated(GROW);
         (width > 0 && height > 0).then(|| Self {
             columns: cells(around.x, around.width, width),
@@ -147,7 +148,8 @@ mod tests {
             let square = Rect { x: square.x + shift, y: square.y + shift, ..square };
             let grid = Window::new(&image, &square).unwrap().grey(&image);
             for (cell, mean) in grid.iter().enumerate() {
-                let (left, top) = (x + cell % SIDE * block, y + cell / SIDE * block);
+                let left = x + cell % SIDE * block;
+                let top = y + cell / SIDE * block;
                 let pixels = (top..top + block).flat_map(|y| (left..left + block).map(move |x| (x, y)));
                 let sum: f32 = pixels.map(|(x, y)| f32::from(image.row(y)[x])).sum();
                 prop_assert!((mean - sum / (block * block) as f32).abs() < 1e-3);

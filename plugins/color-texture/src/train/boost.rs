@@ -171,8 +171,8 @@ impl Grower<'_> {
 }
 
 fn loss(examples: &Examples, index: usize, sum: f64) -> Sums {
-    let (weight, target) =
-        (examples.weights[index], f64::from(u8::from(examples.is_person[index])));
+    let weight = examples.weights[index];
+    let target = f64::from(u8::from(examples.is_person[index]));
     let p = 1.0 / (1.0 + (-sum).exp());
     Sums { slope: weight * (target - p), curvature: weight * p * (1.0 - p) }
 }
@@ -212,7 +212,8 @@ mod tests {
                 Grower { examples: &examples, losses: &losses, tried: &[], training: &training };
             let Split { gain, stump, .. } = grower.split(&chosen, feature).unwrap();
             let slow = |threshold: f32| {
-                let (mut below, mut above) = (Sums::default(), Sums::default());
+                let mut below = Sums::default();
+                let mut above = Sums::default();
                 for k in 0..40 {
                     let value = values[k * COUNT + feature];
                     if value < threshold { below.add(losses[k]) } else if value >= threshold { above.add(losses[k]) }
@@ -254,7 +255,8 @@ mod tests {
         let (values, examples) = examples(3, 60);
         let chosen: Vec<usize> = (0..60).collect();
         let losses: Vec<Sums> = chosen.iter().map(|k| loss(&examples, *k, 0.0)).collect();
-        let (training, tried) = (Training::default(), [5, 7, 9]);
+        let training = Training::default();
+        let tried = [5, 7, 9];
         let grower =
             Grower { examples: &examples, losses: &losses, tried: &tried, training: &training };
         let mut sums = vec![0.0; 60];

@@ -303,7 +303,8 @@ mod tests {
             below,
             above,
         };
-        let (below, above) = (stump(texture, -1.0, 1.0), stump(gradients, 0.0, 1.0));
+        let below = stump(texture, -1.0, 1.0);
+        let above = stump(gradients, 0.0, 1.0);
         let tree = Tree { feature: gradients, threshold: 0.0, below, above };
         let model = Model { trees: vec![tree], slope: 1.0, offset: 0.0 };
         // 2 by texture, 1 and a half by gradients.

@@ -91,7 +91,9 @@ impl DepthNetTrainer {
     fn gradient(&self, net: &Net, batch: &[(usize, u64)]) -> Result<Net> {
         let chunks: Vec<&[(usize, u64)]> = batch.chunks(batch.len().div_ceil(PARTS)).collect();
         let of_part = |part: &&[(usize, u64)]| {
-            let (mut gradient, mut pass, mut cells) = (Net::default(), Pass::default(), 0.0);
+            let mut gradient = Net::default();
+            let mut pass = Pass::default();
+            let mut cells = 0.0;
             for (sample, seed) in *part {
                 let (map, targets) = self.samples[*sample].varied(&mut Draws(*seed));
                 net.look(&map, &mut pass);
@@ -101,7 +103,8 @@ impl DepthNetTrainer {
             }
             Ok((gradient, cells))
         };
-        let (mut sum, mut cells) = (Net::default(), 0.0);
+        let mut sum = Net::default();
+        let mut cells = 0.0;
         for (part, of_part) in side_by_side(&chunks, of_part, &mut |_| {})? {
             cells += of_part;
             let pairs =
@@ -116,7 +119,8 @@ impl DepthNetTrainer {
 
     /// Returns the answers of a network to some samples, unvaried.
     fn scored(&self, net: &Net, chosen: &Chosen) -> Score {
-        let (mut score, mut pass) = (Score::default(), Pass::default());
+        let mut score = Score::default();
+        let mut pass = Pass::default();
         for sample in chosen {
             let sample = &self.samples[*sample];
             let map = FloorMap::new(&sample.camera, &sample.depth());
@@ -320,7 +324,8 @@ mod tests {
         add(&mut trainer, false, None, 1);
         let net = start(5);
         let gradient = |batch: &[(usize, u64)]| values(&trainer.gradient(&net, batch).unwrap());
-        let (person, empty) = ((0, 11), (1, 12));
+        let person = (0, 11);
+        let empty = (1, 12);
         let alone = [gradient(&[person]), gradient(&[empty])];
         assert!(apart(&alone[0], &gradient(&[person; 2])) < 1e-4);
         assert!(apart(&alone[1], &gradient(&[empty; 5])) < 1e-4, "in four parts of unlike size");
@@ -355,7 +360,8 @@ mod tests {
     fn further_training_goes_by_half_the_rate() {
         let mut trainer = trainer(Training { real_steps: 2, batch: 1, ..Training::default() });
         add(&mut trainer, true, None, 0);
-        let (rate, begun) = (trainer.training.rate, start(2));
+        let rate = trainer.training.rate;
+        let begun = start(2);
         let step = |net: Net| apart_by(&values(&begun), &values(&net));
         let all = vec![0];
         let none = Chosen::new();

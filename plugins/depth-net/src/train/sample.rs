@@ -79,7 +79,8 @@ impl Sample {
         let (camera, depth) = reduced(&frame.camera, depth)
             .unwrap_or_else(|| ((*frame.camera).clone(), depth.clone()));
         let steps = depth.pixels().iter().map(|metres| (metres / STEP_M).round() as u16).collect();
-        let (people, room) = (people.to_vec(), room.map(str::to_owned));
+        let people = people.to_vec();
+        let room = room.map(str::to_owned);
         Ok(Self { camera, steps, people, room, group })
     }
 
@@ -94,7 +95,8 @@ impl Sample {
     /// larger or smaller, the camera a little off, the image cut, noisier and with holes, all of it
     /// perhaps mirrored.
     pub fn varied(&self, draws: &mut Draws) -> (FloorMap, Targets) {
-        let (mut camera, mut people) = (self.camera.clone(), self.people.clone());
+        let mut camera = self.camera.clone();
+        let mut people = self.people.clone();
         let scale = draws.between(SCALE[0], SCALE[1]);
         let mut depth = self.depth();
         depth.pixels_mut().iter_mut().for_each(|metres| *metres *= scale as f32);
@@ -106,8 +108,8 @@ impl Sample {
         camera.robot_from_camera = misjudged(&pose, draws);
         degrade(&mut depth, draws);
         let (camera, depth) = cut(camera, depth, draws);
-        let (map, targets) =
-            (FloorMap::new(&camera, &depth), Targets::new(&people, &camera, &depth));
+        let map = FloorMap::new(&camera, &depth);
+        let targets = Targets::new(&people, &camera, &depth);
         match draws.chance(0.5) {
             true => (map.mirrored(), targets.mirrored()),
             false => (map, targets),
@@ -125,7 +127,8 @@ fn misjudged(pose: &Isometry3<f64>, draws: &mut Draws) -> Isometry3<f64> {
 
 /// Takes readings away, and adds noise.
 fn degrade(depth: &mut DepthImage, draws: &mut Draws) {
-    let (width, height) = (depth.width(), depth.height());
+    let width = depth.width();
+    let height = depth.height();
     if draws.chance(0.3) {
         let share = draws.between(0.0, 0.4);
         let lost = |metres: &mut f32| {
@@ -137,8 +140,10 @@ fn degrade(depth: &mut DepthImage, draws: &mut Draws) {
     }
     if draws.chance(0.3) {
         for _ in 0..1 + draws.below(5) {
-            let (left, top) = (draws.below(width), draws.below(height));
-            let (right, bottom) = (left + 5 + draws.below(45), top + 5 + draws.below(45));
+            let left = draws.below(width);
+            let top = draws.below(height);
+            let right = left + 5 + draws.below(45);
+            let bottom = top + 5 + draws.below(45);
             for y in top..bottom.min(height) {
                 let row = y * width;
                 depth.pixels_mut()[row + left..row + right.min(width)].fill(f32::NAN);
@@ -193,12 +198,14 @@ mod tests {
 
     #[test]
     fn the_person_moves_with_the_answer_in_every_variation() {
-        let (sample, mut places) = (sample(), Vec::new());
+        let sample = sample();
+        let mut places = Vec::new();
         for seed in 0..40 {
             let (map, targets) = sample.varied(&mut Draws(mix(seed)));
             // A person with few pixels left need not be found.
             let Some(place) = targets.places().first().copied() else { continue };
-            let (row, column) = (place[0] as usize, place[1] as usize);
+            let row = place[0] as usize;
+            let column = place[1] as usize;
             let near =
                 (row - 3..row + 4).flat_map(|y| (column - 3..column + 4).map(move |x| (y, x)));
             let is_tall = |(y, x): (usize, usize)| {
@@ -249,7 +256,8 @@ mod tests {
         assert!(pairs.len() > 30, "{}", pairs.len());
         let count = pairs.len() as f64;
         let (x, y) = pairs.iter().fold((0.0, 0.0), |(x, y), pair| (x + pair.0, y + pair.1));
-        let (x, y) = (x / count, y / count);
+        let x = x / count;
+        let y = y / count;
         let across: f64 = pairs.iter().map(|pair| (pair.0 - x) * (pair.1 - y)).sum();
         let along: f64 = pairs.iter().map(|pair| (pair.0 - x).powi(2)).sum();
         assert!((0.7..1.3).contains(&(across / along)), "{}", across / along);
@@ -307,7 +315,8 @@ mod tests {
             let share = |depth: &DepthImage| 1.0 - readings(depth).len() as f64 / (120.0 * 90.0);
             degraded(metres).iter().map(share).collect()
         };
-        let (near, far) = (lost(2.9), lost(6.0));
+        let near = lost(2.9);
+        let far = lost(6.0);
         let whole = |shares: &[f64]| shares.iter().filter(|share| **share < 1e-9).count();
         let none_left = |shares: &[f64]| shares.iter().filter(|share| **share > 1.0 - 1e-9).count();
         // Nothing within 3 m is too far; a fifth of the cameras ends before 5.5 m.
@@ -344,7 +353,9 @@ mod tests {
     #[test]
     fn a_cut_image_shows_the_same_points() {
         let sample = sample();
-        let (mut shifted, mut whole, mut shortest) = (0, 0, usize::MAX);
+        let mut shifted = 0;
+        let mut whole = 0;
+        let mut shortest = usize::MAX;
         for seed in 0..100 {
             let (camera, image) = cut(sample.camera.clone(), sample.depth(), &mut Draws(mix(seed)));
             assert_eq!((camera.height, camera.width), (image.height(), 320));

@@ -189,7 +189,8 @@ mod tests {
     fn each_cell_is_drawn_to_its_target() {
         let mut cells = vec![Target::Empty; 64 * 64];
         (cells[1], cells[2]) = (Target::Person([0.1, -0.2, 0.3]), Target::Any);
-        let (mut pass, mut of) = (Pass::default(), Pass::default());
+        let mut pass = Pass::default();
+        let mut of = Pass::default();
         let answers = [[1.0, 0.5, 0.5, 0.5], [0.7, 0.2, -0.3, 0.4], [1.0; 4]];
         pass.answer.values[..12].copy_from_slice(&answers.concat());
         assert_eq!(Targets { cells }.slopes(&pass, &mut of), 1.0, "one cell of a person");

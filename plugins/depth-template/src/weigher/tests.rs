@@ -27,7 +27,8 @@ fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
     let inside = |span: Option<Span>, x: i64| span.is_some_and(|(a, b)| a <= x && x < b);
     let mut weight = 0.0;
     for (k, person) in cast.iter().enumerate() {
-        let (mut sum, mut beside) = (0, [0, 0]);
+        let mut sum = 0;
+        let mut beside = [0, 0];
         let mut bank = Bank::new(usize::MAX);
         let rows = &bank.template(person.silhouette.pose).rows;
         for (index, row) in rows.iter().enumerate() {
@@ -39,8 +40,10 @@ fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
             let half = person.silhouette.half_width;
             for x in (person.x - half..=person.x + half).filter(|x| (0..80).contains(x)) {
                 let pixel = tools.scores.pixel(x, line, level);
-                let (from, to) = (person.x + row.from, person.x + row.to);
-                let (edge, end) = (person.x + row.guard_from, person.x + row.guard_to);
+                let from = person.x + row.from;
+                let to = person.x + row.to;
+                let edge = person.x + row.guard_from;
+                let end = person.x + row.guard_to;
                 if from <= x && x < to {
                     let hidden = cast[..k].iter().any(|p| inside(p.body(line), x));
                     sum += if hidden { 0 } else { pixel.covered };
@@ -81,7 +84,8 @@ proptest! {
         size in 1usize..4,
     ) {
         let scenes: Vec<&[Person]> = scenes.iter().map(|scene| &scene[..size]).collect();
-        let (weigher, frame) = (Weigher::new(&DepthTemplateConfig::default()), frame(pixels));
+        let weigher = Weigher::new(&DepthTemplateConfig::default());
+        let frame = frame(pixels);
         let mut fast = Vec::new();
         weigher.log_likelihoods(&frame, &scenes.concat(), size, &mut fast).unwrap();
         prop_assert_eq!(fast.len(), scenes.len());
@@ -131,7 +135,8 @@ fn painted(people: &[Person]) -> Frame {
         .filter_map(|p| tools.place(p, direction(p, &empty.camera), &empty.camera, &view))
         .collect();
     let depth = DepthImage::from_fn(80, 60, |x, y| {
-        let (x, y) = (x as i64, y as i64);
+        let x = x as i64;
+        let y = y as i64;
         let here = |p: &&PlacedPerson| p.body(y).is_some_and(|(a, b)| a <= x && x < b);
         let relief = |p: &PlacedPerson| {
             let row = p.silhouette.rows.iter().find(|row| p.y + row.dy == y);
@@ -154,7 +159,8 @@ fn weight(frame: &Frame, scene: &[Person]) -> f64 {
 
 #[test]
 fn a_visible_person_weighs_all_and_a_hidden_one_nothing() {
-    let (near, hidden) = (standing(1.8, 0.0), standing(3.6, 0.0));
+    let near = standing(1.8, 0.0);
+    let hidden = standing(3.6, 0.0);
     let frame = painted(&[near]);
     let alone = weight(&frame, &[near]);
     assert!((alone - 12.0).abs() < 1.5, "{alone}");
@@ -170,7 +176,8 @@ fn a_person_weighs_as_much_at_any_range() {
 
 #[test]
 fn who_stands_half_behind_another_is_weighed_by_what_is_seen() {
-    let (near, far) = (standing(1.8, 0.0), standing(3.0, 0.35));
+    let near = standing(1.8, 0.0);
+    let far = standing(3.0, 0.35);
     let frame = painted(&[near, far]);
     let gain = |y| weight(&frame, &[near, standing(3.0, y)]) - weight(&frame, &[near]);
     assert!(gain(0.35) > 2.0 && gain(0.35) > gain(0.15).max(gain(0.6)), "{}", gain(0.35));
@@ -208,13 +215,16 @@ fn laden(near: Person, left: bool, right: bool) -> Frame {
 fn a_rucksack_costs_less_than_furniture_on_both_sides() {
     let near = standing(1.8, 0.0);
     let of = |left, right| weight(&laden(near, left, right), &[near]);
-    let (bare, one, both) = (of(false, false), of(true, false), of(true, true));
+    let bare = of(false, false);
+    let one = of(true, false);
+    let both = of(true, true);
     assert!(one < bare && (bare - one) * 3.0 < bare - both, "{bare} {one} {both}");
 }
 
 #[test]
 fn who_is_behind_does_not_explain_what_is_seen_in_front() {
-    let (near, frame) = (standing(1.8, 0.0), laden(standing(1.8, 0.0), true, true));
+    let near = standing(1.8, 0.0);
+    let frame = laden(standing(1.8, 0.0), true, true);
     let gain = |y| weight(&frame, &[near, standing(3.2, y)]) - weight(&frame, &[near]);
     assert!((-8..=8).all(|i| gain(0.05 * f64::from(i)) < 0.05), "{} {}", gain(0.2), gain(0.3));
 }
@@ -223,7 +233,8 @@ fn who_is_behind_does_not_explain_what_is_seen_in_front() {
 fn what_is_shown_of_somebody_is_what_nobody_hides() {
     assert_eq!(outside((2, 12), vec![(8, 9), (1, 3), (2, 6)]), [(6, 8), (9, 12)]);
     assert_eq!(outside((2, 12), vec![(0, 20)]), []);
-    let (near, far) = (standing(1.8, 0.0), standing(3.0, 0.35));
+    let near = standing(1.8, 0.0);
+    let far = standing(3.0, 0.35);
     let frame = painted(&[near, far]);
     let weigher = Weigher::new(&DepthTemplateConfig::default());
     let area = |scene: &[Person]| -> Vec<f64> {
@@ -231,7 +242,8 @@ fn what_is_shown_of_somebody_is_what_nobody_hides() {
         let ComparedPixels(runs) = shown.downcast_ref().unwrap();
         runs.iter().map(|runs| runs.iter().map(Rect::area).sum()).collect()
     };
-    let (alone, together) = (area(&[far])[0], area(&[far, near]));
+    let alone = area(&[far])[0];
+    let together = area(&[far, near]);
     assert!(together[0] > 0.2 * alone && together[0] < 0.9 * alone, "{alone} {together:?}");
     assert_eq!(together[1], area(&[near])[0]);
 }

@@ -92,7 +92,8 @@ proptest! {
         let root = Matrix3::from_iterator(root);
         let core = root * root.transpose() + Matrix3::identity() * 0.05;
         let m = scale * core * scale;
-        let (ours, slow) = (inverse(&m).unwrap(), m.cholesky().unwrap().inverse());
+        let ours = inverse(&m).unwrap();
+        let slow = m.cholesky().unwrap().inverse();
         let unit = scale * (ours - slow) * scale;
         prop_assert!(unit.amax() < 1e-10, "{}", unit);
         let shifted = core - Matrix3::identity() * off;
@@ -165,7 +166,8 @@ fn tracking_in_the_robot_frame_equals_tracking_in_the_odometry_frame() {
         let measured = Vector3::new(floor.x, floor.y, seen.position.z);
         reference.step(measured, seen.covariance, &config);
         let (position, velocity) = world.of_belief(&state);
-        let (x, v) = (reference.mean.fixed_rows::<2>(0), reference.mean.fixed_rows::<2>(3));
+        let x = reference.mean.fixed_rows::<2>(0);
+        let v = reference.mean.fixed_rows::<2>(3);
         assert!((position.coords - x).norm() < 1e-9);
         assert!((velocity - v).norm() < 1e-9);
         assert!((state.covariance.trace() - reference.covariance.trace()).abs() < 1e-9);
@@ -185,8 +187,8 @@ fn velocity_variance_after_1s(config: &Config, steps: u32) -> f64 {
 #[test]
 fn the_process_noise_does_not_depend_on_the_frame_rate() {
     let config = Config::default();
-    let (slow, fast) =
-        (velocity_variance_after_1s(&config, 5), velocity_variance_after_1s(&config, 50));
+    let slow = velocity_variance_after_1s(&config, 5);
+    let fast = velocity_variance_after_1s(&config, 50);
     assert!((slow - 0.5).abs() < 1e-9 && (fast - 0.5).abs() < 1e-9);
 }
 

@@ -25,7 +25,10 @@ struct Outcome {
 }
 
 fn run(filter: &Ekf, turn_radps: f64) -> Outcome {
-    let (mut velocities, mut positions, mut nis, mut coasted) = (vec![], vec![], vec![], vec![]);
+    let mut velocities = vec![];
+    let mut positions = vec![];
+    let mut nis = vec![];
+    let mut coasted = vec![];
     for seed in 0..SEEDS {
         let mut world = World::new(seed);
         let seen = world.look();

@@ -67,9 +67,11 @@ impl World {
 
     /// White acceleration of density `q` and a height that wanders.
     pub fn walk(&mut self, q: f64, height_noise: f64) {
-        let (a, b) = (normal3(&mut self.random), normal3(&mut self.random));
+        let a = normal3(&mut self.random);
+        let b = normal3(&mut self.random);
         let root = q.sqrt();
-        let (dv, dp) = (DT_S.sqrt(), DT_S.powf(1.5));
+        let dv = DT_S.sqrt();
+        let dp = DT_S.powf(1.5);
         let kick = root * dv * a.xy();
         let slide = root * dp * (0.5 * a.xy() + b.xy() / 12.0_f64.sqrt());
         let moved = self.person.xy() + self.velocity * DT_S + slide;

@@ -48,7 +48,8 @@ fn drawn(side: usize, seed: u64) -> Feature {
     };
     loop {
         let (columns, rows) = KINDS[below(KINDS.len())];
-        let (width, height) = (1 + below(side / columns), 1 + below(side / rows));
+        let width = 1 + below(side / columns);
+        let height = 1 + below(side / rows);
         if width * height < LEAST_BLOCK {
             continue;
         }
@@ -143,10 +144,13 @@ mod tests {
 
     #[test]
     fn drawn_features_are_everywhere_in_the_window_and_of_all_kinds() {
-        let (mut triples, mut crosswise, mut borders) = (0, 0, [0; 4]);
+        let mut triples = 0;
+        let mut crosswise = 0;
+        let mut borders = [0; 4];
         for seed in 0..1000 {
             let Feature::Haar(parts) = drawn(20, mix(seed)) else { panic!() };
-            let (whole, block) = (parts[0].0, parts[1].0);
+            let whole = parts[0].0;
+            let block = parts[1].0;
             assert!(whole.x + whole.width <= 20 && whole.y + whole.height <= 20, "{whole:?}");
             assert!(block.width * block.height >= LEAST_BLOCK, "{block:?}");
             triples += usize::from(parts[1].1 == 3.0);

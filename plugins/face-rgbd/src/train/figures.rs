@@ -32,7 +32,8 @@ impl GroupCounts {
         picture: &Picture,
     ) {
         let grey = &*picture.grey;
-        let (most, mut hits) = (grey.width().min(grey.height()) as f64, Vec::new());
+        let most = grey.width().min(grey.height()) as f64;
+        let mut hits = Vec::new();
         let sizes = scales(cascade, 0.0, most, config.scale_step);
         scanner.scan(grey, cascade, sizes, &mut hits);
         let mut groups = grouped(&hits, config.min_neighbours);
@@ -56,7 +57,8 @@ impl GroupCounts {
         let allowed = (false_alarms * self.pictures as f64) as usize;
         let mut sorted = self.groups.clone();
         sorted.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let (mut found, mut wrong) = (0, 0);
+        let mut found = 0;
+        let mut wrong = 0;
         for (_, is_face) in sorted {
             if is_face {
                 found += 1;
@@ -77,7 +79,8 @@ fn search(
     pictures: &[Picture],
     wanted: impl Fn(&Picture) -> bool,
 ) -> GroupCounts {
-    let (mut found, mut scanner) = (GroupCounts::default(), Scanner::default());
+    let mut found = GroupCounts::default();
+    let mut scanner = Scanner::default();
     let least = cascade.width.min(cascade.height);
     let is_large = |p: &&Picture| p.grey.width() > least && p.grey.height() > least;
     for picture in pictures.iter().filter(|p| wanted(p)).filter(is_large) {

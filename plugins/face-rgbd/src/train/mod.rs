@@ -73,7 +73,8 @@ impl CascadeTrainer {
         if (begun.width, begun.height) != (side, side) {
             return Err(Error::Other(format!("windows of the cascade are not {side} wide")));
         }
-        let (faces, others) = (Vec::new(), Vec::new());
+        let faces = Vec::new();
+        let others = Vec::new();
         Ok(Self { config, seed, begun, faces, others, pictures: Vec::new() })
     }
 
@@ -124,7 +125,8 @@ impl CascadeTrainer {
     ) -> Vec<Patch> {
         let Picture { grey, faces, .. } = &self.pictures[index];
         let side = self.config.training.side;
-        let (mut found, mut seen) = (Vec::new(), 0_u64);
+        let mut found = Vec::new();
+        let mut seen = 0_u64;
         let longest = grey.width().min(grey.height()) as f64;
         for scale in scales(cascade, 0.0, longest, SCALE_STEP) {
             let is_other = |x: usize, y: usize| {
@@ -153,7 +155,8 @@ impl CascadeTrainer {
 
     fn train(&self, progress: &mut dyn FnMut(f64)) -> (Cascade, Vec<Mined>) {
         let Training { stages, others: wanted, fewest_others, .. } = self.config.training;
-        let (mut faces, mut others) = (self.faces.clone(), self.others.clone());
+        let mut faces = self.faces.clone();
+        let mut others = self.others.clone();
         others.truncate(wanted);
         let begun = self.begun.stages.len();
         // Further stages are trained without the patches that the existing ones reject.
@@ -163,7 +166,8 @@ impl CascadeTrainer {
             faces.retain(|patch| patch.passes_last(&until));
             others.retain(|patch| patch.passes_last(&until));
         }
-        let (mut cascade, mut log) = (self.begun.clone(), Vec::new());
+        let mut cascade = self.begun.clone();
+        let mut log = Vec::new();
         for number in begun..stages {
             progress(number as f64 / (stages + 1) as f64);
             let mut mined = Mined::default();
@@ -240,7 +244,8 @@ impl Trainer for CascadeTrainer {
 
 /// Returns true if a region lies in a picture.
 fn is_inside(grey: &GreyImage, region: &Rect) -> bool {
-    let (width, height) = (grey.width() as f64, grey.height() as f64);
+    let width = grey.width() as f64;
+    let height = grey.height() as f64;
     region.x >= 0.0 && region.y >= 0.0 && region.right() <= width && region.bottom() <= height
 }
 

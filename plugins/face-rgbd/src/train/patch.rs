@@ -21,14 +21,16 @@ impl Patch {
         let values =
             || (1..side - 1).flat_map(|y| pixels.row(y)[1..side - 1].iter().map(|v| f64::from(*v)));
         let area = ((side - 2) * (side - 2)) as f64;
-        let (sum, squares) = (values().sum::<f64>(), values().map(|v| v * v).sum::<f64>());
+        let sum = values().sum::<f64>();
+        let squares = values().map(|v| v * v).sum::<f64>();
         let root = (area * squares - sum * sum).max(0.0).sqrt();
         (root > 10.0 * area).then(|| Self { level, contrast: (1.0 / root) as f32 })
     }
 
     /// Cuts out a window that a scan took for a face.
     pub(super) fn of(seen: &PassedWindow<'_>, side: usize) -> Option<Self> {
-        let (pixels, width) = (seen.level.pixels(), seen.level.width());
+        let pixels = seen.level.pixels();
+        let width = seen.level.width();
         let cut = GreyImage::from_fn(side, side, |x, y| pixels[(seen.y + y) * width + seen.x + x]);
         Self::new(&cut, side)
     }
@@ -46,7 +48,8 @@ impl Patch {
 /// averaging over skipped pixels. Outside the picture its border is continued. The window is turned
 /// clockwise about its middle by `tilt`, rad.
 pub(super) fn window(grey: &GreyImage, region: &Rect, tilt: f64, side: usize) -> GreyImage {
-    let (scale, middle) = (region.width / side as f64, region.centre());
+    let scale = region.width / side as f64;
+    let middle = region.centre();
     let (sin, cos) = tilt.sin_cos();
     let clamp = |v: i64, length: usize| v.clamp(0, length.max(1) as i64 - 1);
     let at = |x: i64, y: i64| {
@@ -56,9 +59,12 @@ pub(super) fn window(grey: &GreyImage, region: &Rect, tilt: f64, side: usize) ->
         let [right, down] = [i, j].map(|at| (at as f64 + 0.5 - 0.5 * side as f64) * scale);
         let x = middle.x + right * cos - down * sin - 0.5;
         let y = middle.y + right * sin + down * cos - 0.5;
-        let (left, top) = (x.floor(), y.floor());
-        let (right, down) = (x - left, y - top);
-        let (left, top) = (left as i64, top as i64);
+        let left = x.floor();
+        let top = y.floor();
+        let right = x - left;
+        let down = y - top;
+        let left = left as i64;
+        let top = top as i64;
         let across = |y: i64| at(left, y) * (1.0 - right) + at(left + 1, y) * right;
         (across(top) * (1.0 - down) + across(top + 1) * down).round() as u8
     })
@@ -81,7 +87,8 @@ mod tests {
             let middle = region.centre() - nalgebra::Point2::new(0.5, 0.5);
             let turn = nalgebra::Rotation2::new(tilt);
             for (index, value) in found.pixels().iter().enumerate() {
-                let (i, j) = ((index % 12) as f64 - 5.5, (index / 12) as f64 - 5.5);
+                let i = (index % 12) as f64 - 5.5;
+                let j = (index / 12) as f64 - 5.5;
                 let at = middle + turn * nalgebra::Vector2::new(i, j) * width / 12.0;
                 prop_assert!((f64::from(*value) - at.x - 0.5 * at.y).abs() < 1.5, "{value} {at}");
             }

@@ -74,9 +74,12 @@ impl DepthWindows {
 /// Returns the squares that depth and geometry allow in a frame, with the distances of their
 /// objects.
 fn proposals(frame: &Frame, depth: &DepthImage) -> Vec<(tagalong_geometry::Rect, f64)> {
-    let (config, mut lattice, camera) = (Config::default(), Lattice::default(), &*frame.camera);
+    let config = Config::default();
+    let mut lattice = Lattice::default();
+    let camera = &*frame.camera;
     let mut proposer = Proposer::new(&config, camera, Some(depth), &mut lattice, None);
-    let (mut wanted, mut found) = (Vec::new(), Vec::new());
+    let mut wanted = Vec::new();
+    let mut found = Vec::new();
     for side in sides(&config, camera, None) {
         let grid = Grid::new((camera.width, camera.height), side);
         wanted.clear();

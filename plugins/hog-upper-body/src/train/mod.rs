@@ -320,7 +320,8 @@ impl Trainer for HogTrainer {
         room: Option<&str>,
         group: u64,
     ) -> Result<()> {
-        let (people, room) = (rooms::known(frame, people), self.number_or_drawn(room));
+        let people = rooms::known(frame, people);
+        let room = self.number_or_drawn(room);
         self.depth.add(frame, &people, room, group);
         // Simulated rooms teach depth alone: their textures are not those of real ones.
         if room != DRAWN {
@@ -344,7 +345,8 @@ impl Trainer for HogTrainer {
             model = self.machine(round + 1, &|_| true);
         }
         self.finish(&mut model);
-        let (mut without, mut in_rooms) = (Vec::new(), toml::Table::new());
+        let mut without = Vec::new();
+        let mut in_rooms = toml::Table::new();
         if !self.rooms.is_empty() {
             let of_photographs = model;
             if self.training.rooms {
@@ -352,8 +354,8 @@ impl Trainer for HogTrainer {
                 mined.push(self.mine(&of_photographs, true));
             }
             for room in 1..=self.rooms.len() {
-                let (name, left_out) =
-                    (self.rooms[room - 1].clone(), self.without(room, &of_photographs));
+                let name = self.rooms[room - 1].clone();
+                let left_out = self.without(room, &of_photographs);
                 let rows = [("photographs only", &of_photographs), ("left out", &left_out)];
                 in_rooms.extend(rows.map(|(row, model)| {
                     (format!("{name}: {row}"), rooms::figures(&self.missed_in(model, room)))
@@ -376,7 +378,8 @@ impl Trainer for HogTrainer {
 fn search(scanner: &mut Scanner, picture: &GreyImage, least: f32) -> Vec<crate::Window> {
     let most = picture.width().min(picture.height()) as f64;
     let sides = std::iter::successors(Some(SMALLEST_PX), |side| Some(side * SCALE_STEP));
-    let (sides, mut found) = (sides.take_while(|side| *side <= most), Vec::new());
+    let sides = sides.take_while(|side| *side <= most);
+    let mut found = Vec::new();
     let all = |grid: &Grid, wanted: &mut Vec<Wanted>| wanted.extend(grid.windows(|_| Some(None)));
     scanner.scan(picture, sides, least, all, &mut found);
     found

@@ -88,7 +88,9 @@ impl HogTrainer {
 
     /// Returns the miss rate of a model in a room at some rates of false alarms in a frame.
     pub(super) fn missed_in(&self, model: &Model, room: usize) -> Vec<f64> {
-        let (mut scanner, mut verdicts, mut count) = (Scanner::new(model), Vec::new(), 0);
+        let mut scanner = Scanner::new(model);
+        let mut verdicts = Vec::new();
+        let mut count = 0;
         let frames = self.pictures.iter().filter(|picture| picture.room == room);
         let frames: Vec<&Picture> = frames.collect();
         for Picture { grey, people, .. } in &frames {

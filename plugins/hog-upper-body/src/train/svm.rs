@@ -41,7 +41,8 @@ pub(crate) fn separate(
     seed: u64,
 ) -> (Vec<f32>, f32) {
     let width = windows.width();
-    let (mut weights, mut bias) = (vec![0.0_f32; width], 0.0_f32);
+    let mut weights = vec![0.0_f32; width];
+    let mut bias = 0.0_f32;
     let mut alphas = vec![0.0_f32; windows.len()];
     let row = |i: usize| &windows.numbers[i * width..(i + 1) * width];
     // The bias is the weight of a constant value 1, which adds 1 to each squared length.

@@ -22,7 +22,8 @@ fn drawn() -> Config {
 
 /// Counts the scenes of two people for which the first frame needs a likelihood.
 fn scenes_of_two(config: Config) -> usize {
-    let (mut rig, likelihood) = (pair(config), Formula::flat(3.0));
+    let mut rig = pair(config);
+    let likelihood = Formula::flat(3.0);
     rig.look(&likelihood);
     likelihood.asked().iter().filter(|scene| scene.len() == 2).count()
 }
@@ -373,7 +374,8 @@ fn the_compared_places_of_both_count_from_the_near_one() {
         let of = |scene: &Vec<Person>| scene[person].position.y;
         [of(&asked[0]), of(&asked[1280])]
     };
-    let (near, far) = (span(1), span(0));
+    let near = span(1);
+    let far = span(0);
     assert!((near[0] + 0.3).abs() < 0.02 && (near[1] - 0.3).abs() < 0.02, "{near:?}");
     assert!((far[0] + 0.9).abs() < 0.02 && (far[1] - 0.9).abs() < 0.02, "{far:?}");
     assert!(asked.iter().all(|scene| (scene[0].position.z - 1.7).abs() < 0.01));
@@ -408,7 +410,8 @@ fn walked(swap_margin: f64, mirrored: bool) -> Rig {
 
 #[test]
 fn people_who_come_out_with_each_others_colours_get_each_others_names() {
-    let (crossed, straight) = (walked(0.3, true), walked(0.3, false));
+    let crossed = walked(0.3, true);
+    let straight = walked(0.3, false);
     assert!(straight.place(1).y > 0.5 && straight.place(2).y < -0.5);
     assert!(crossed.place(1).y < -0.5 && crossed.place(2).y > 0.5, "{}", crossed.place(1));
     assert!(walked(2.0, true).place(1).y > 0.5, "2 is never");

@@ -43,18 +43,17 @@ const LOOK_M: [f64; 3] = [0.1, 0.1, 0.06];
 /// slightly wrong positions. Compares the estimate after eight frames with Kalman filters of the
 /// three axes.
 fn follows_kalman(config: Config, tolerance: f64) {
-    let (q, place, velocity, height) = (
-        config.acceleration_noise,
-        config.position_noise,
-        config.velocity_noise,
-        config.height_noise,
-    );
+    let q = config.acceleration_noise;
+    let place = config.position_noise;
+    let velocity = config.velocity_noise;
+    let height = config.height_noise;
     let mut axes = [2.4, 0.1, 1.62].map(|at| Axis::new(at, 0.15, config.initial_velocity_variance));
     axes[2].covariance[(1, 1)] = 0.0;
     let mut rig = Rig::new(config, 3);
     rig.start(1, [2.4, 0.1, 1.62], [0.15; 3]);
     let motion = EgoMotion { forward: 0.03, left: 0.005, turn: 0.03, ..EgoMotion::at_rest(DT_S) };
-    let (mut robot, mut heading) = (Vector2::zeros(), 0.0);
+    let mut robot = Vector2::zeros();
+    let mut heading = 0.0;
     let wrong = [0.05, -0.06, 0.02, 0.07, -0.03, -0.05, 0.06, 0.01];
     for (frame, wrong) in (1..).zip(wrong) {
         let way = 0.12 * f64::from(frame);
@@ -67,7 +66,8 @@ fn follows_kalman(config: Config, tolerance: f64) {
         }
         robot += Rotation2::new(heading) * Vector2::new(motion.forward, motion.left);
         heading += motion.turn;
-        let (to_world, from) = (Rotation2::new(heading), robot);
+        let to_world = Rotation2::new(heading);
+        let from = robot;
         let likelihood = Formula::new(move |scene| {
             let at = scene.first().map_or_else(Vector2::zeros, |p| p.position.coords.xy());
             let floor = to_world * at + from;
@@ -77,7 +77,8 @@ fn follows_kalman(config: Config, tolerance: f64) {
         });
         rig.look_after(motion, &likelihood, &[], None);
     }
-    let (estimate, back) = (rig.estimate(1), Rotation2::new(-heading));
+    let estimate = rig.estimate(1);
+    let back = Rotation2::new(-heading);
     let floor = back * (Vector2::new(axes[0].mean[0], axes[1].mean[0]) - robot);
     let speed = back * Vector2::new(axes[0].mean[1], axes[1].mean[1]);
     let found = estimate.person.position;
@@ -254,7 +255,8 @@ fn by_particles(config: Config, seed: u64, sharp: f64) -> [(f64, f64); 2] {
 /// Largest difference of the means, m, and of the standard deviations, as the logarithm of their
 /// ratio.
 fn apart(config: &Config, sharp: f64) -> [f64; 2] {
-    let (grid, mut apart) = (by_grid(sharp), [0f64; 2]);
+    let grid = by_grid(sharp);
+    let mut apart = [0f64; 2];
     for seed in 0..3 {
         let found = by_particles(config.clone(), seed, sharp);
         for (found, grid) in found.iter().zip(&grid) {

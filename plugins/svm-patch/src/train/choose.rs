@@ -83,10 +83,11 @@ pub fn subset(samples: &[Sample], most: usize, seed: u64) -> Vec<&Sample> {
         class.sort_by_key(|(key, _)| *key);
         class.into_iter().map(|(_, s)| s).collect::<Vec<_>>()
     };
-    let (mut people, mut others) = (of_class(true), of_class(false));
+    let mut people = of_class(true);
+    let mut others = of_class(false);
     let half = most / 2;
-    let (spare_people, spare_others) =
-        (half.saturating_sub(people.len()), half.saturating_sub(others.len()));
+    let spare_people = half.saturating_sub(people.len());
+    let spare_others = half.saturating_sub(others.len());
     people.truncate(half + spare_others);
     others.truncate(half + spare_people);
     people.extend(others);

@@ -41,7 +41,8 @@ pub fn write(from: &Path, to: &Path, changes: &Changes) {
     let bytes = fs::read(from).unwrap();
     let file = BufWriter::new(File::create(to).unwrap());
     let mut writer = WriteOptions::new().profile("ros2").create(file).unwrap();
-    let (mut channels, mut counts) = (BTreeMap::new(), BTreeMap::new());
+    let mut channels = BTreeMap::new();
+    let mut counts = BTreeMap::new();
     let mut end_ns = None;
     for message in MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
@@ -98,7 +99,8 @@ impl Changes {
         let Some(change) = &self.depth else { return encode(&Image { header, ..image }) };
         let readings: Vec<u16> =
             image.data.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
-        let (width, height) = (i64::from(image.width), i64::from(image.height));
+        let width = i64::from(image.width);
+        let height = i64::from(image.height);
         let changed = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let data: Vec<u8> = changed
             .flat_map(|(x, y)| change(&readings, width as usize, x, y).to_le_bytes())

@@ -206,9 +206,11 @@ pub fn people(frames: u64) -> String {
     let header = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,head_x,head_y,head_z,\
                   visible,occluder,ignore,interpolated\n";
     let row = |index: u64| {
-        let (depth, centre) = (2.8, 90.0 - index as f64 + 13.0);
+        let depth = 2.8;
+        let centre = 90.0 - index as f64 + 13.0;
         let scale = 130.0 / depth;
-        let (side, top) = (0.57 * scale, 40.0 - 0.025 * scale);
+        let side = 0.57 * scale;
+        let top = 40.0 - 0.025 * scale;
         let x = (centre - 79.5) * depth / 130.0;
         let y = (top + 0.14 * scale - 59.5) * depth / 130.0;
         let left = centre - 0.5 * side;
@@ -245,7 +247,8 @@ impl Log {
         let about = BTreeMap::new();
         let channel_id = self.writer.add_channel(schema, TRUTH_TOPIC, "json", &about).unwrap();
         for frame in frames {
-            let (log_time, publish_time) = (frame.stamp_ns, frame.stamp_ns);
+            let log_time = frame.stamp_ns;
+            let publish_time = frame.stamp_ns;
             let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time };
             self.writer
                 .write_to_known_channel(&header, &serde_json::to_vec(frame).unwrap())

@@ -148,7 +148,8 @@ fn jobs<'a>(
             let suite = format!("{name}{value}");
             for contender in contenders {
                 jobs.extend(seeds.numbers().map(|seed| {
-                    let (suite, set) = (suite.clone(), set.clone());
+                    let suite = suite.clone();
+                    let set = set.clone();
                     Job { contender, path, suite, set, seed }
                 }));
             }

@@ -239,7 +239,8 @@ mod tests {
             came_near: true,
             stopping_s: contact.is_none().then_some(0.5),
         };
-        let (suite, pipeline) = ("approach".into(), "config".into());
+        let suite = "approach".into();
+        let pipeline = "config".into();
         Outlived { suite, pipeline, approached, story: Vec::new() }
     }
 

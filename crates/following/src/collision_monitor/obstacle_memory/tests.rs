@@ -140,7 +140,8 @@ fn people_are_not_remembered_and_what_is_gone_is_forgotten() {
     let settings = settings();
     let mut surroundings = memory();
     let mut look = |x| {
-        let (depth, still) = (with_box(x, 0.0), EgoMotion::at_rest(0.1));
+        let depth = with_box(x, 0.0);
+        let still = EgoMotion::at_rest(0.1);
         surroundings.update(&settings, &camera(), &depth, &still, None);
         surroundings.ahead(&settings, 0.0, None)
     };
@@ -154,7 +155,8 @@ fn what_the_person_sat_on_is_remembered_when_they_have_gone() {
     let settings = settings();
     let mut surroundings = memory();
     let mut look = |x: f64, forward: f64, person: &Person| {
-        let (depth, still) = (with_box(x, 0.0), EgoMotion::at_rest(0.1));
+        let depth = with_box(x, 0.0);
+        let still = EgoMotion::at_rest(0.1);
         let motion = EgoMotion { forward, ..still };
         surroundings.update(&settings, &camera(), &depth, &motion, Some(person));
         surroundings.ahead(&settings, 0.0, Some(person.position.xy()))
@@ -263,7 +265,8 @@ fn what_stands_beside_whoever_stands_may_be_carried_away() {
 fn who_stood_and_left_is_gone_down_to_the_feet() {
     let settings = settings();
     for (top_m, is_gone) in [(1.4, true), (0.5, false)] {
-        let (camera, empty) = (camera(), with_box(9.0, 0.0));
+        let camera = camera();
+        let empty = with_box(9.0, 0.0);
         let seen = |x: f64, stands: bool| {
             DepthImage::from_fn(80, 60, |u, v| {
                 let at = camera.back_project(Point2::new(u as f64, v as f64), x);
@@ -381,7 +384,8 @@ fn with_edge(edge_m: f64, drop_m: f64) -> DepthImage {
 fn before_edge(edge_m: f64, drop_m: f64, target: Option<Point2<f64>>) -> Option<Ahead> {
     let settings = settings();
     let mut surroundings = memory();
-    let (depth, still) = (with_edge(edge_m, drop_m), EgoMotion::at_rest(0.1));
+    let depth = with_edge(edge_m, drop_m);
+    let still = EgoMotion::at_rest(0.1);
     surroundings.update(&settings, &fine_camera(), &depth, &still, None);
     surroundings.ahead(&settings, 0.0, target)
 }
@@ -422,7 +426,8 @@ fn a_fall_below_the_image_is_remembered() {
 #[test]
 fn a_fall_that_was_seen_too_briefly_is_not_remembered() {
     let settings = settings();
-    let (fall, floor) = (with_edge(1.6, 0.17), with_edge(9.0, 0.0));
+    let fall = with_edge(1.6, 0.17);
+    let floor = with_edge(9.0, 0.0);
     let nothing = DepthImage::from_fn(160, 120, |u, v| match floor.row(v)[u] {
         z if z == fall.row(v)[u] => z,
         _ => f32::NAN,

@@ -129,7 +129,8 @@ proptest! {
             if !command.reason.moves() && command.reason != Reason::Blocked {
                 prop_assert_eq!(command.wheels, WheelSpeeds::STOP);
             }
-            let (before, accels) = (tape.before, tape.accels);
+            let before = tape.before;
+            let accels = tape.accels;
             if wish.aim == Aim::Nobody {
                 // An acceleration fades first.
                 let fades = accels.is_none_or(|[accel, _]| accel > 0.0);
@@ -145,7 +146,8 @@ proptest! {
     #[test]
     fn a_mirrored_wish_gives_mirrored_wheels(wishes in prop::collection::vec((any_number(), any_number()), 20)) {
         let new = || limiter_of(CommandLimiterSettings::default());
-        let (mut one, mut other) = (new(), new());
+        let mut one = new();
+        let mut other = new();
         for (frame, (left, right)) in wishes.into_iter().enumerate() {
             let a = one.limit(&wish(frame as u64, left, right), free).wheels;
             let b = other.limit(&wish(frame as u64, right, left), free).wheels;

@@ -69,7 +69,8 @@ fn slow_rvl(bytes: &[u8], count: usize) -> Option<Vec<u16>> {
         }
         None
     };
-    let (mut out, mut last) = (Vec::new(), 0_u16);
+    let mut out = Vec::new();
+    let mut last = 0_u16;
     while out.len() < count {
         let zeros = number()? as usize;
         out.extend((0..zeros.min(count + 1)).map(|_| 0));

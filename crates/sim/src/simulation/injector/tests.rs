@@ -131,7 +131,8 @@ fn blank_and_saturated_depth_says_nothing() {
 #[test]
 fn of_dark_columns_only_a_share_has_readings() {
     for (shot, whole) in broken(fault(FaultKind::DarkColumns).with_share(0.25)) {
-        let (depth, whole) = (shot.images.depth.unwrap(), whole.images.depth.unwrap());
+        let depth = shot.images.depth.unwrap();
+        let whole = whole.images.depth.unwrap();
         let is_dark = |column: &usize| {
             (0..depth.height()).all(|row| depth.pixels()[row * 32 + column].is_nan())
         };
@@ -149,7 +150,8 @@ fn noise_has_the_size_that_is_asked_for() {
     let mut squares = 0.0;
     let mut count = 0.0;
     for (shot, whole) in broken(fault(FaultKind::NoiseDepth).with_size(0.2)) {
-        let (depth, whole) = (shot.images.depth.unwrap(), whole.images.depth.unwrap());
+        let depth = shot.images.depth.unwrap();
+        let whole = whole.images.depth.unwrap();
         for (z, whole) in depth.pixels().iter().zip(whole.pixels()) {
             assert_eq!(z.is_nan(), whole.is_nan());
             if *whole > 1.5 {
@@ -167,7 +169,8 @@ fn broken_rays_are_those_ahead() {
     let ahead = |ray: &usize| (*ray as f64 + 0.5 - 36.0).abs() <= 9.0;
     let mut kinds = [0; 3];
     for (shot, whole) in broken(fault(FaultKind::LaserInvalid)) {
-        let (ranges, whole) = (shot.laser.unwrap(), whole.laser.unwrap());
+        let ranges = shot.laser.unwrap();
+        let whole = whole.laser.unwrap();
         for ray in (0..72).filter(ahead) {
             match ranges[ray] {
                 range if range.is_nan() => kinds[0] += 1,
