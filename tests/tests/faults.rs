@@ -102,9 +102,10 @@ fn send(log: &mut MessageLog, recorded: Stamp, stamp: Stamp, images: &Images, is
     let width = colour.width() as u32;
     let height = colour.height() as u32;
     let floats: Vec<u8> = depth.pixels().iter().flat_map(|z| z.to_le_bytes()).collect();
-    let (topic, encoding, step, data) = match is_depth {
-        true => ("/camera/depth", "32FC1", 4 * width, &floats[..]),
-        false => ("/camera/color", "rgb8", 3 * width, colour.pixels().as_flattened()),
+    let (topic, encoding, step, data) = if is_depth {
+        ("/camera/depth", "32FC1", 4 * width, &floats[..])
+    } else {
+        ("/camera/color", "rgb8", 3 * width, colour.pixels().as_flattened())
     };
     let header = Header::new(stamp, "camera");
     let encoding = encoding.into();

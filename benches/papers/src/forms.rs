@@ -280,9 +280,12 @@ fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], digits: usize) 
     let tallies = |of: &[Vec<Form>]| of.iter().map(|forms| forms[at].tally.clone()).collect();
     let (logs, draws): (Vec<Tally>, Vec<Tally>) = (tallies(real), tallies(simulated));
     // Three rooms bear no interval.
-    let real = |score: fn(&Scores) -> Option<f64>| match logs.is_empty() {
-        true => Cell::default(),
-        false => Cell::number(score(&Tally::combine(&logs).scores()).unwrap_or(f64::NAN), 3),
+    let real = |score: fn(&Scores) -> Option<f64>| {
+        if logs.is_empty() {
+            Cell::default()
+        } else {
+            Cell::number(score(&Tally::combine(&logs).scores()).unwrap_or(f64::NAN), 3)
+        }
     };
     let draws: Vec<&Tally> = draws.iter().collect();
     let mean = |of: fn(&Form) -> &Vec<f64>, digits| {

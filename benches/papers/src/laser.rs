@@ -299,12 +299,13 @@ impl Log {
 
     fn cells(&self, clear: &FloorClear) -> Vec<Cell> {
         let number = |value: u64| Cell::number(value as f64, 0);
-        let (false_positives, mota) = match self.is_complete {
-            true => (
+        let (false_positives, mota) = if self.is_complete {
+            (
                 number(clear.false_positives),
                 clear.mota().map_or_else(Cell::default, |mota| Cell::number(100.0 * mota, 1)),
-            ),
-            false => (Cell::default(), Cell::default()),
+            )
+        } else {
+            (Cell::default(), Cell::default())
         };
         vec![
             number(clear.objects),

@@ -41,10 +41,8 @@ fn load(family: Family) -> Result<PersonNetwork, String> {
 fn scene() -> RgbImage {
     RgbImage::from_fn(64, 64, |x, y| {
         let inside = (32..48).contains(&x) && (16..48).contains(&y);
-        [0, 1, 2].map(|c| match inside {
-            true => 230 + 10 * c as u8,
-            false => ((x + 2 * y + 7 * c) % 40) as u8,
-        })
+        [0, 1, 2]
+            .map(|c| if inside { 230 + 10 * c as u8 } else { ((x + 2 * y + 7 * c) % 40) as u8 })
     })
 }
 

@@ -146,9 +146,10 @@ fn distorted(model: &str, given: &[f64]) -> PyResult<Distortion> {
     if given.iter().all(|value| *value == 0.0) {
         return Ok(Distortion::None);
     }
-    let most = |count: usize| match given.len() <= count {
-        true => Ok(()),
-        false => {
+    let most = |count: usize| {
+        if given.len() <= count {
+            Ok(())
+        } else {
             Err(wrong(format!("{model} has at most {count} coefficients, not {}", given.len())))
         }
     };

@@ -263,10 +263,11 @@ pub fn stamp(given: &Bound<'_, PyAny>) -> PyResult<Stamp> {
         return Ok(Stamp::from_nanos(nanos));
     }
     let seconds: f64 = given.extract()?;
-    match (0.0..1e10).contains(&seconds) {
-        true => Ok(Stamp::from_nanos((seconds * 1e9).round() as u64)),
-        false => Err(crate::errors::wrong(format!(
+    if (0.0..1e10).contains(&seconds) {
+        Ok(Stamp::from_nanos((seconds * 1e9).round() as u64))
+    } else {
+        Err(crate::errors::wrong(format!(
             "stamp is {seconds} s; give nanoseconds as an int, or seconds, at least 0, as a float"
-        ))),
+        )))
     }
 }

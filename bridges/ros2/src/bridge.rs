@@ -621,9 +621,10 @@ impl Bridge {
     fn limit_speed(&mut self, data: &[u8], tell: &dyn Fn(&str)) {
         let most_mps = <[u8; 8]>::try_from(data).map_or(0.0, f64::from_le_bytes);
         self.pipeline.allow_speed(most_mps);
-        tell(&match most_mps.is_finite() {
-            true => format!("speed limit: {most_mps:.2} m/s"),
-            false => "no speed limit beside that of the config".to_owned(),
+        tell(&if most_mps.is_finite() {
+            format!("speed limit: {most_mps:.2} m/s")
+        } else {
+            "no speed limit beside that of the config".to_owned()
         });
     }
 

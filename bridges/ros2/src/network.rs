@@ -376,9 +376,10 @@ fn name(namespace: &str, topic: &str) -> Result<Name, BridgeError> {
 }
 
 fn full_name(namespace: &str, topic: &str) -> String {
-    match topic.starts_with('/') {
-        true => topic.to_owned(),
-        false => format!("{}/{topic}", namespace.trim_end_matches('/')),
+    if topic.starts_with('/') {
+        topic.to_owned()
+    } else {
+        format!("{}/{topic}", namespace.trim_end_matches('/'))
     }
 }
 

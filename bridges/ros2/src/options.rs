@@ -129,9 +129,10 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    match (least..=most).contains(&value) {
-        true => Ok(value),
-        false => Err(format!("must lie between {least} and {most}")),
+    if (least..=most).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("must lie between {least} and {most}"))
     }
 }
 

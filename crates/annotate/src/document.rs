@@ -153,9 +153,12 @@ impl Document {
             Some(Some(_)) => Ok(vec![*id]),
             _ => Err(format!("person {id} is not in frame {frame}")),
         };
-        let known = |id: &i64| match self.people.contains_key(id) {
-            true => Ok(vec![*id]),
-            false => Err(format!("there is no person {id}")),
+        let known = |id: &i64| {
+            if self.people.contains_key(id) {
+                Ok(vec![*id])
+            } else {
+                Err(format!("there is no person {id}"))
+            }
         };
         match change {
             Change::Box { id, region, .. } => {

@@ -96,14 +96,13 @@ pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
         return Ok(Ended::BySignal(signal));
     }
     let film = Arc::new(material.film);
-    let people = match continues {
-        true => read_people(&output, &film).map_err(Failure::failed)?,
-        false => material.people,
+    let people = if continues {
+        read_people(&output, &film).map_err(Failure::failed)?
+    } else {
+        material.people
     };
-    let origin = match continues {
-        true => format!("{} is continued", output.display()),
-        false => material.origin,
-    };
+    let origin =
+        if continues { format!("{} is continued", output.display()) } else { material.origin };
     say(&origin);
     let app = app(args, film, people, &output, origin);
     print(&format!(

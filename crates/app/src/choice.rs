@@ -107,9 +107,10 @@ impl Fittings {
         let mut unusable: Vec<&str> =
             self.account.curable().filter_map(|topic| topic.could_be).collect();
         unusable.dedup();
-        match unusable.is_empty() {
-            true => usable,
-            false => format!("{usable}, and also {} that cannot be used", unusable.join(", ")),
+        if unusable.is_empty() {
+            usable
+        } else {
+            format!("{usable}, and also {} that cannot be used", unusable.join(", "))
         }
     }
 

@@ -114,9 +114,10 @@ pub type Outcome = Result<Ended, Failure>;
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|error| {
         let why = format!("cannot make the folder {}: {error}", folder.display());
-        match is_full(&error) {
-            true => disk_full(why),
-            false => Failure::usage(format!("{why}; choose another with -o")),
+        if is_full(&error) {
+            disk_full(why)
+        } else {
+            Failure::usage(format!("{why}; choose another with -o"))
         }
     })
 }

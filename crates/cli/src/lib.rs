@@ -77,9 +77,10 @@ fn tell(failure: &Failure, for_programs: bool) -> u8 {
     let Failure { message, code } = failure;
     // An empty message: stdout was closed, and there is no reader to inform.
     if !message.is_empty() {
-        say(&match for_programs {
-            true => serde_json::json!({ "error": message, "exit_code": code }).to_string(),
-            false => format!("error: {message}"),
+        say(&if for_programs {
+            serde_json::json!({ "error": message, "exit_code": code }).to_string()
+        } else {
+            format!("error: {message}")
         });
     }
     *code

@@ -250,12 +250,11 @@ fn at_its_key<T: Settings>(error: toml::de::Error, value: &Value<'_>) -> ConfigE
     };
     let wrong = if is_precise { None } else { wrong_key(value, &fails) };
     let Some(WrongKey { path, key, entry }) = wrong else { return error.into() };
-    match error.message().starts_with("unknown field") {
-        true => {
-            let message = format!("{}, expected one of {}", error.message(), names_in::<T>(&path));
-            ConfigError { message: with_suggestion(&message), span: Some(key) }
-        }
-        false => ConfigError { span: Some(entry), ..error.into() },
+    if error.message().starts_with("unknown field") {
+        let message = format!("{}, expected one of {}", error.message(), names_in::<T>(&path));
+        ConfigError { message: with_suggestion(&message), span: Some(key) }
+    } else {
+        ConfigError { span: Some(entry), ..error.into() }
     }
 }
 

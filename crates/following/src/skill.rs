@@ -291,9 +291,10 @@ fn with_patience(
 }
 
 fn bounded(key: &'static str, value: f64, least: f64, most: f64) -> Result<f64, EnrollmentError> {
-    match (least..=most).contains(&value) {
-        true => Ok(value),
-        false => Err(EnrollmentError::Bounds { key, value, least, most }),
+    if (least..=most).contains(&value) {
+        Ok(value)
+    } else {
+        Err(EnrollmentError::Bounds { key, value, least, most })
     }
 }
 

@@ -217,9 +217,8 @@ fn first_trees(text: &str) -> String {
 /// a mutation is more likely to hit something else than a digit.
 fn short_numbers(text: &str) -> String {
     let is_row = |line: &str| line.starts_with("  ") && line.ends_with(',');
-    let shortened = |line: &str| match is_row(line) {
-        true => "1.0,".repeat(line.matches(',').count()),
-        false => line.to_owned(),
+    let shortened = |line: &str| {
+        if is_row(line) { "1.0,".repeat(line.matches(',').count()) } else { line.to_owned() }
     };
     text.lines().map(|line| shortened(line) + "\n").collect()
 }

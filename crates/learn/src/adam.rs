@@ -47,9 +47,10 @@ impl Adam {
 /// Returns the factor of the rate when this part of a training is done: it warms up, and falls to
 /// zero as a cosine (Loshchilov and Hutter, ICLR 2017).
 pub fn pace(part: f64) -> f64 {
-    match part < WARM {
-        true => part / WARM,
-        false => 0.5 + 0.5 * (std::f64::consts::PI * (part - WARM) / (1.0 - WARM)).cos(),
+    if part < WARM {
+        part / WARM
+    } else {
+        0.5 + 0.5 * (std::f64::consts::PI * (part - WARM) / (1.0 - WARM)).cos()
     }
 }
 

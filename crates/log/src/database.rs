@@ -187,10 +187,7 @@ fn stored(row: &Row<'_>) -> rusqlite::Result<Stored> {
 fn channel(row: &Row<'_>, longest: u64) -> rusqlite::Result<Channel> {
     let text = |at: usize| -> rusqlite::Result<String> {
         let text: String = row.get(at)?;
-        match text.len() as u64 <= longest {
-            true => Ok(text),
-            false => Err(rusqlite::Error::InvalidQuery),
-        }
+        if text.len() as u64 <= longest { Ok(text) } else { Err(rusqlite::Error::InvalidQuery) }
     };
     Ok(Channel {
         id: row.get(0)?,

@@ -89,9 +89,10 @@ impl LogFile {
             return Ok(Self { file, path: path.to_owned(), _unpacked: None, fault: None });
         }
         let claimed = get_frame_content_size(&head).ok().flatten().unwrap_or(0);
-        let unpacked = match claimed > limits.file_bytes {
-            true => Err(too_large(claimed, limits)),
-            false => unpack_file(file, limits),
+        let unpacked = if claimed > limits.file_bytes {
+            Err(too_large(claimed, limits))
+        } else {
+            unpack_file(file, limits)
         };
         unpacked.map_err(|why| LogError::Packed { path: path.to_owned(), why })
     }

@@ -505,10 +505,8 @@ impl Topic {
         let message: DisparityImage<'_> = decode(data).ok()?;
         if self.pixels.is_none() {
             let image = &message.image;
-            self.content = match may_be_disparity(&image.encoding) {
-                true => Content::Depth,
-                false => Content::Unknown,
-            };
+            self.content =
+                if may_be_disparity(&image.encoding) { Content::Depth } else { Content::Unknown };
             self.size = Some((image.width, image.height));
             self.pixels = Some(format!("{} disparity", image.encoding));
         }

@@ -236,9 +236,10 @@ impl PersonNetwork {
             let needs = family.outputs();
             return Err(format!("is not of the family {family}: it has {shown}, not {needs}"));
         };
-        let classes = match choices.classes.is_empty() {
-            true => vec![family.person_class()],
-            false => choices.classes.clone(),
+        let classes = if choices.classes.is_empty() {
+            vec![family.person_class()]
+        } else {
+            choices.classes.clone()
         };
         if let Some(beyond) = classes.iter().find(|class| known > 0 && **class >= known) {
             return Err(format!("has {known} classes from 0, and no {beyond}: set `classes`"));

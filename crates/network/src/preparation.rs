@@ -59,9 +59,10 @@ pub struct InputSize {
 impl InputSize {
     /// Returns the shape of the tensor.
     pub fn shape(&self) -> Vec<usize> {
-        match self.channels_last {
-            true => vec![1, self.height, self.width, 3],
-            false => vec![1, 3, self.height, self.width],
+        if self.channels_last {
+            vec![1, self.height, self.width, 3]
+        } else {
+            vec![1, 3, self.height, self.width]
         }
     }
 }
@@ -143,9 +144,8 @@ impl Preparation {
         };
         let scaled =
             |channel: usize, value: f32| (value - self.mean[channel]) / self.deviation[channel];
-        let at = |channel: usize, pixel: usize| match input.channels_last {
-            true => 3 * pixel + channel,
-            false => channel * area + pixel,
+        let at = |channel: usize, pixel: usize| {
+            if input.channels_last { 3 * pixel + channel } else { channel * area + pixel }
         };
         let mut values = vec![0.0; 3 * area];
         for channel in 0..3 {

@@ -30,10 +30,8 @@ fn network(name: &str) -> EmbeddingNetwork {
 fn scene() -> RgbImage {
     RgbImage::from_fn(128, 256, |x, y| {
         let inside = (32..48).contains(&x) && (16..48).contains(&y);
-        [0, 1, 2].map(|c| match inside {
-            true => 230 + 10 * c as u8,
-            false => ((x + 2 * y + 7 * c) % 40) as u8,
-        })
+        [0, 1, 2]
+            .map(|c| if inside { 230 + 10 * c as u8 } else { ((x + 2 * y + 7 * c) % 40) as u8 })
     })
 }
 

@@ -37,9 +37,8 @@ fn scene(scale: usize) -> RgbImage {
     RgbImage::from_fn(64 * scale, 64 * scale, |x, y| {
         let x = x / scale;
         let y = y / scale;
-        [0, 1, 2].map(|c| match is_blob(x, y) {
-            true => 230 + 10 * c as u8,
-            false => ((x + 2 * y + 7 * c) % 40) as u8,
+        [0, 1, 2].map(|c| {
+            if is_blob(x, y) { 230 + 10 * c as u8 } else { ((x + 2 * y + 7 * c) % 40) as u8 }
         })
     })
 }

@@ -60,10 +60,7 @@ impl Watch {
     /// Takes a frame at a position and time of the page.
     pub fn take(&mut self, at: usize, t_s: f64, moment: &Moment) {
         for track in moment.tracks.iter().filter(|track| track.confirmed) {
-            match track.seen {
-                true => self.see(at, t_s, track.id),
-                false => self.miss(at, t_s, track.id),
-            }
+            if track.seen { self.see(at, t_s, track.id) } else { self.miss(at, t_s, track.id) }
         }
         self.end_absent(at, moment);
         if moment.target != self.target {

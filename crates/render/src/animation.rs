@@ -79,10 +79,7 @@ fn changed(shown: &mut RgbaImage, picture: RgbaImage) -> RgbaImage {
     }
     for (new, old) in part.pixels_mut().zip(shown.pixels_mut()) {
         let is_same = new.0.iter().zip(old.0).all(|(a, b)| a.abs_diff(b) <= SAME);
-        match is_same {
-            true => *new = Rgba([0, 0, 0, 0]),
-            false => *old = *new,
-        }
+        if is_same { *new = Rgba([0, 0, 0, 0]) } else { *old = *new }
     }
     part
 }

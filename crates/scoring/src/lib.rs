@@ -79,9 +79,10 @@ pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequenc
 
 /// Returns the comparison that the truth's protocol asks for.
 pub fn comparison(truth: &TruthFile, similarity: Similarity) -> Comparison {
-    match truth.is_kitti() && similarity == Similarity::Iou {
-        true => kitti::comparison(similarity),
-        false => similarity.into(),
+    if truth.is_kitti() && similarity == Similarity::Iou {
+        kitti::comparison(similarity)
+    } else {
+        similarity.into()
     }
 }
 

@@ -50,9 +50,10 @@ impl Tracks {
             let reports = places(&text, &name, length)?;
             return Ok(Self { reports, in_robot_frame: true, ..Self::default() });
         }
-        match is_kitti(first) {
-            true => Self::of_kitti(&text, &name),
-            false => Self::of_boxes(&text, &name, length),
+        if is_kitti(first) {
+            Self::of_kitti(&text, &name)
+        } else {
+            Self::of_boxes(&text, &name, length)
         }
     }
 

@@ -109,10 +109,7 @@ fn bags(session: &Session<'_>) -> Result<Vec<PathBuf>, Failure> {
     let mut bags: Vec<PathBuf> =
         paths.filter(|path| path.extension().is_some_and(|e| e == "bag")).collect();
     bags.sort();
-    match bags.is_empty() {
-        true => Err(why(&format!("; {} has none", folder.display()))),
-        false => Ok(bags),
-    }
+    if bags.is_empty() { Err(why(&format!("; {} has none", folder.display()))) } else { Ok(bags) }
 }
 
 /// Passes the scans of a bag to the trainer; returns their number.

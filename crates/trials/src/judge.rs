@@ -137,9 +137,10 @@ fn errors_m(
         believed_home *= report.motion.isometry();
         let of = &sequence.frames[at];
         let frame = &prepared.frames[at];
-        let (real, believed) = match in_start {
-            true => (home * moment.world_from_robot, believed_home),
-            false => (Isometry2::identity(), Isometry2::identity()),
+        let (real, believed) = if in_start {
+            (home * moment.world_from_robot, believed_home)
+        } else {
+            (Isometry2::identity(), Isometry2::identity())
         };
         errors.extend(matches[at].iter().filter_map(|m| {
             let truth = of.truths[frame.truth_at[m.row as usize] as usize].floor_m?;

@@ -132,12 +132,11 @@ fn unit(vector: &[f32]) -> Option<Vector> {
 
 /// Returns the box of a whole person inside the image; `None` if too little of it is there.
 fn person_box(region: &Rect, head: &Point3<f64>, frame: &Frame) -> Option<Rect> {
-    let whole = match region.height >= WHOLE_FROM * region.width {
-        true => *region,
-        false => {
-            let [least_m, most_m] = HEIGHTS_M;
-            region.standing_of_upper_body(head.z.clamp(least_m, most_m))
-        }
+    let whole = if region.height >= WHOLE_FROM * region.width {
+        *region
+    } else {
+        let [least_m, most_m] = HEIGHTS_M;
+        region.standing_of_upper_body(head.z.clamp(least_m, most_m))
     };
     let inside = whole.clipped(frame.camera.width, frame.camera.height);
     let enough = inside.area() >= LEAST_INSIDE * whole.area() && inside.height >= LEAST_PX;

@@ -100,9 +100,10 @@ fn filled(
         let (old, next) =
             body.split_once(END).with_context(|| format!("`{command}` has no `{END}`"))?;
         out += &format!("{before}{BEGIN}{command} -->");
-        out += &match wanted(command) {
-            true => format!("\n\n{}\n\n", print(command)?.trim()),
-            false => old.to_owned(),
+        out += &if wanted(command) {
+            format!("\n\n{}\n\n", print(command)?.trim())
+        } else {
+            old.to_owned()
         };
         out += END;
         rest = next;

@@ -137,9 +137,10 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     for entry in fs::read_dir(from)? {
         let entry: PathBuf = entry?.path();
         let Some(name) = entry.file_name() else { continue };
-        match entry.is_dir() {
-            true => copy(&entry, &to.join(name))?,
-            false => copy_file(&entry, &to.join(name))?,
+        if entry.is_dir() {
+            copy(&entry, &to.join(name))?
+        } else {
+            copy_file(&entry, &to.join(name))?
         }
     }
     Ok(())

@@ -26,9 +26,10 @@ pub struct OwnPatient(pub Config);
 impl TrackManager for OwnPatient {
     fn initiate(&mut self, _: TrackId, new: &Unassociated<'_>) -> Initiation {
         let log_odds = new.detection.score;
-        match new.discovered && log_odds >= self.start_log_odds() {
-            true => Initiation::Start(TrackHealth { confirmed: true, log_odds }),
-            false => Initiation::Drop("score"),
+        if new.discovered && log_odds >= self.start_log_odds() {
+            Initiation::Start(TrackHealth { confirmed: true, log_odds })
+        } else {
+            Initiation::Drop("score")
         }
     }
 

@@ -27,9 +27,10 @@ impl DepthNet {
 
     fn detection(&self, camera: &Camera, peak: &Peak) -> Option<Detection> {
         let config = &self.config;
-        let sigma_height_m = match is_in_image(camera, peak) {
-            true => config.sigma_height_m,
-            false => config.sigma_unseen_height_m,
+        let sigma_height_m = if is_in_image(camera, peak) {
+            config.sigma_height_m
+        } else {
+            config.sigma_unseen_height_m
         };
         let sigmas = Vector3::new(config.sigma_m, config.sigma_m, sigma_height_m);
         let region = camera.upper_body(&peak.head);

@@ -96,9 +96,10 @@ impl Scores {
         if same && covered {
             return;
         }
-        self.columns = match same {
-            true => wanted.start.min(self.columns.start)..wanted.end.max(self.columns.end),
-            false => wanted,
+        self.columns = if same {
+            wanted.start.min(self.columns.start)..wanted.end.max(self.columns.end)
+        } else {
+            wanted
         };
         self.image = Arc::clone(image);
         self.sums.clear();

@@ -338,10 +338,8 @@ impl Tools {
             let pixels = self.scores.row(line as usize, person.levels.behind(row.relief_m));
             let beside = |side| pixels.of(common(side, body)).beside;
             let [left, right] = person.beside(row);
-            let covered = match is_nearer {
-                true => pixels.of(common(person.inside(row), body)).covered,
-                false => 0,
-            };
+            let covered =
+                if is_nearer { pixels.of(common(person.inside(row), body)).covered } else { 0 };
             taken.add(covered, beside(left), beside(right));
         }
         taken

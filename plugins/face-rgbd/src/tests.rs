@@ -92,9 +92,12 @@ fn slow_answer(image: &GreyImage, at: (usize, usize), cascade: &Cascade, node: &
             let squares = slow_sum(image, at, &middle, |v| v * v);
             let contrast = (area * squares - sum * sum).sqrt();
             let is_tilted = matches!(cascade.features[node.feature], Feature::Tilted(_));
-            let of = |part: &Part| match is_tilted {
-                true => slow_tilted(image, at, part),
-                false => slow_sum(image, at, part, |v| v),
+            let of = |part: &Part| {
+                if is_tilted {
+                    slow_tilted(image, at, part)
+                } else {
+                    slow_sum(image, at, part, |v| v)
+                }
             };
             let value: f64 = parts.iter().map(|(part, w)| f64::from(*w) * of(part)).sum();
             value / contrast < f64::from(limit)

@@ -83,9 +83,10 @@ pub(crate) fn depth_numbers(depth: &DepthImage, square: &Rect, surface_m: f64) -
         // Cameras write 0 where they measured nothing.
         let measured = taps.filter_map(|(x, y)| reading(x, y)).filter(|metres| *metres > 0.0);
         let nearest = measured.fold(f32::INFINITY, f32::min);
-        match nearest.is_finite() {
-            true => (f64::from(nearest) - surface_m).clamp(-MOST_M, MOST_M) as f32,
-            false => MISSING,
+        if nearest.is_finite() {
+            (f64::from(nearest) - surface_m).clamp(-MOST_M, MOST_M) as f32
+        } else {
+            MISSING
         }
     };
     (0..DEPTH_NUMBERS).map(|k| cell(k % CELLS, k / CELLS)).collect()

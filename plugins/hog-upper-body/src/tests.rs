@@ -401,9 +401,10 @@ mod training {
         GreyImage::from_fn(96, 96, |x, y| {
             let dx = x as f64 - 48.0;
             let dy = y as f64 - 38.0;
-            let dark = match is_person {
-                true => dx.hypot(dy) < 9.0 || (dy > 12.0 && dx.abs() < 19.0),
-                false => (x / (5 + seed as usize % 9)).is_multiple_of(2),
+            let dark = if is_person {
+                dx.hypot(dy) < 9.0 || (dy > 12.0 && dx.abs() < 19.0)
+            } else {
+                (x / (5 + seed as usize % 9)).is_multiple_of(2)
             };
             (if dark { 60.0 } else { 150.0 } + 20.0 * random.uniform()) as u8
         })

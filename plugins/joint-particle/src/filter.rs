@@ -123,9 +123,10 @@ impl JointParticle {
                 let velocity = Vector2::new(mean[3], mean[4]);
                 let walks = velocity.norm() > WALKING_MPS;
                 let stands_alone = group.people() == 1 && !walks;
-                let by_image = match self.config.facing_by_image || stands_alone {
-                    true => facing(group, person, look)?,
-                    false => None,
+                let by_image = if self.config.facing_by_image || stands_alone {
+                    facing(group, person, look)?
+                } else {
+                    None
                 };
                 headings.extend(by_image.or(walks.then_some(velocity)).map(|way| (*id, way)));
             }

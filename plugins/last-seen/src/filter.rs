@@ -60,10 +60,7 @@ impl PersonFilter for LastSeen {
     }
 
     fn predict(&self, state: &mut State, motion: &EgoMotion) {
-        let motion = match self.config.ego_motion {
-            true => *motion,
-            false => EgoMotion::at_rest(motion.dt),
-        };
+        let motion = if self.config.ego_motion { *motion } else { EgoMotion::at_rest(motion.dt) };
         let floor = motion.apply_to_point(state.position.xy());
         state.position = Point3::new(floor.x, floor.y, state.position.z);
         for (ago, place) in &mut state.sightings {

@@ -32,9 +32,10 @@ impl MOfN {
     fn judge(&mut self, candidate: &Unassociated<'_>) -> std::result::Result<f64, &'static str> {
         let Unassociated { detection, detector_log_odds, discovered } = *candidate;
         let start_score = self.config.start_score;
-        let log_odds = match discovered {
-            true => self.clutter.add_evidence(detection, &self.config),
-            false => detection.score,
+        let log_odds = if discovered {
+            self.clutter.add_evidence(detection, &self.config)
+        } else {
+            detection.score
         };
         if log_odds < start_score {
             let alone = detection.score < start_score;

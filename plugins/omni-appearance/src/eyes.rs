@@ -216,9 +216,10 @@ impl ImageState {
         let adapt_s = seconds(config.adapt_s);
         let absorb_s = seconds(config.absorb_s);
         // Errors of the odometry accumulate in a moved background, so it is renewed soon.
-        let (adapt_s, absorb_s, turns) = match self.uncertain {
-            true => (adapt_s.min(MOVING_ADAPT_S), absorb_s.min(MOVING_ABSORB_S), 1),
-            false => (adapt_s, absorb_s, TURNS),
+        let (adapt_s, absorb_s, turns) = if self.uncertain {
+            (adapt_s.min(MOVING_ADAPT_S), absorb_s.min(MOVING_ABSORB_S), 1)
+        } else {
+            (adapt_s, absorb_s, TURNS)
         };
         let pace = Pace { part: dt_s / adapt_s, absorb_s, dt_s, turns };
         self.taken.clone_from(&self.segmenter.counts().taken);

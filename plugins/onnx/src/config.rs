@@ -98,9 +98,10 @@ impl Config {
         }
         triple("mean", &self.mean)?;
         let deviation = triple("deviation", &self.deviation)?;
-        match deviation.is_some_and(|parts| parts.iter().any(|part| *part <= 0.0)) {
-            true => Err(Error::setting("deviation", "must be above zero")),
-            false => Ok(()),
+        if deviation.is_some_and(|parts| parts.iter().any(|part| *part <= 0.0)) {
+            Err(Error::setting("deviation", "must be above zero"))
+        } else {
+            Ok(())
         }
     }
 

@@ -63,10 +63,8 @@ impl Onnx {
     pub fn with_runtime(runtime: Runtime, config: Config, context: &Context) -> Result<Self> {
         config.check()?;
         let mark = format!("{:?} {config:?}", context.base_dir).into();
-        let loaded = match config.model.is_empty() {
-            true => None,
-            false => Some(load(runtime, &config, context)?),
-        };
+        let loaded =
+            if config.model.is_empty() { None } else { Some(load(runtime, &config, context)?) };
         Ok(Self { config, loaded, mark })
     }
 

@@ -89,11 +89,10 @@ fn contestants(
     registry: &Registry,
 ) -> Result<Vec<Contestant>, Failure> {
     let named = &args.configs;
-    let mut configs = match named.is_empty() {
-        true => plan::shipped(registry)?,
-        false => {
-            named.iter().map(|path| plan::candidate(path, registry)).collect::<Result<_, _>>()?
-        }
+    let mut configs = if named.is_empty() {
+        plan::shipped(registry)?
+    } else {
+        named.iter().map(|path| plan::candidate(path, registry)).collect::<Result<_, _>>()?
     };
     // A config that is named takes part even without `[tune]`, for comparison.
     if named.is_empty() {

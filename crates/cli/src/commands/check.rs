@@ -147,12 +147,11 @@ fn names(inputs: Inputs, usage: Usage) -> Vec<&'static str> {
 fn in_words(inputs: Inputs) -> String {
     let needs = names(inputs, Usage::Required);
     let uses = names(inputs, Usage::Optional);
-    let needs = match needs.is_empty() {
-        true => "no particular image".to_owned(),
-        false => needs.join(" and "),
-    };
-    match uses.is_empty() {
-        true => format!("needs {needs}"),
-        false => format!("needs {needs}; uses {} where the log has it", uses.join(" and ")),
+    let needs =
+        if needs.is_empty() { "no particular image".to_owned() } else { needs.join(" and ") };
+    if uses.is_empty() {
+        format!("needs {needs}")
+    } else {
+        format!("needs {needs}; uses {} where the log has it", uses.join(" and "))
     }
 }

@@ -216,9 +216,12 @@ fn rate(args: &EvalArgs, truth: &TruthFile) -> Result<Rate, Failure> {
 
 /// Returns the frames of the log, if one is named, or found where it is needed.
 fn shots(args: &EvalArgs, truth: &TruthFile, tracks: &Tracks) -> Result<Shots, Failure> {
-    let found = args.log.clone().or_else(|| match truth.is_in_log() {
-        true => Some(args.truth.clone()),
-        false => beside(&args.truth, tracks.log_name.as_deref()),
+    let found = args.log.clone().or_else(|| {
+        if truth.is_in_log() {
+            Some(args.truth.clone())
+        } else {
+            beside(&args.truth, tracks.log_name.as_deref())
+        }
     });
     let Some(log) = found else {
         let shown = args.truth.display();

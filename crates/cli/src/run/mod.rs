@@ -411,9 +411,10 @@ fn no_frame(report: &RunReport) -> String {
     let telling = report.counters.iter().filter(|(name, _)| !NO_REASON.contains(&name.as_str()));
     let reasons: Vec<String> =
         telling.map(|(name, count)| format!("{} {count}", name.replace('_', " "))).collect();
-    let why = match reasons.is_empty() {
-        true => "it has no image (or scan) that could make one".to_owned(),
-        false => reasons.join(", "),
+    let why = if reasons.is_empty() {
+        "it has no image (or scan) that could make one".to_owned()
+    } else {
+        reasons.join(", ")
     };
     let name = &report.log.name;
     format!("not one frame could be made of {name}: {why}; `tagalong doctor` tells more")

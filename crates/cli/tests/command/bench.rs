@@ -59,12 +59,11 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let name = entry.file_name().into_string().unwrap();
-        match entry.path().is_dir() {
-            true => {
-                let inner = files(&entry.path()).into_iter();
-                all.extend(inner.map(|(inside, bytes)| (format!("{name}/{inside}"), bytes)));
-            }
-            false => _ = all.insert(name, fs::read(entry.path()).unwrap()),
+        if entry.path().is_dir() {
+            let inner = files(&entry.path()).into_iter();
+            all.extend(inner.map(|(inside, bytes)| (format!("{name}/{inside}"), bytes)));
+        } else {
+            _ = all.insert(name, fs::read(entry.path()).unwrap())
         }
     }
     all

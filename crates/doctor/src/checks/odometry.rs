@@ -16,12 +16,13 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     let metres = evidence.driven.metres;
     let stands = metres < STANDS_M;
     let all_moves = stands && evidence.changed.is_some_and(|share| share > ALL_MOVES);
-    let way = match stands {
-        true => "the robot stands still".to_owned(),
-        false => format!(
+    let way = if stands {
+        "the robot stands still".to_owned()
+    } else {
+        format!(
             "{metres:.1} m driven, {:.0} degrees turned",
             evidence.driven.turned_rad.to_degrees()
-        ),
+        )
     };
     let source = evidence.inspection.facts.odometry_topic.as_deref();
     let (severity, measured) = match (source, gaps + jumps) {

@@ -232,9 +232,10 @@ fn lines<'a>(text: &'a str, file: &'a str) -> impl Iterator<Item = Line<'a>> {
         move |(index, line)| {
             // Room for the fields of most formats, which are not known before the end of the line.
             let mut fields = Vec::with_capacity(10);
-            match line.contains(',') {
-                true => fields.extend(line.split(',').map(str::trim)),
-                false => fields.extend(line.split_whitespace()),
+            if line.contains(',') {
+                fields.extend(line.split(',').map(str::trim))
+            } else {
+                fields.extend(line.split_whitespace())
             }
             Line { file, number: index + 1, fields, last_frame }
         },

@@ -39,9 +39,8 @@ pub fn looks(results: &[Followed]) -> LooksSettings {
     // Colours have no weight where a network describes people, and the other way round: such a term
     // keeps its default.
     let usual = LooksSettings::default();
-    let known = |weight: f64, offset: f64, usual: [f64; 2]| match weight == 0.0 && offset == 0.0 {
-        true => usual,
-        false => term(weight, offset),
+    let known = |weight: f64, offset: f64, usual: [f64; 2]| {
+        if weight == 0.0 && offset == 0.0 { usual } else { term(weight, offset) }
     };
     LooksSettings {
         torso: known(torso, torso_0, usual.torso),

@@ -204,9 +204,10 @@ impl Table {
         let named = self.rows.iter().filter(perfect);
         let all: Vec<String> =
             named.map(|row| format!("{} on {}", row.pipeline, row.suite)).collect();
-        match all.is_empty() {
-            true => "no pipeline is perfect (MOTA 1) on any suite".into(),
-            false => format!("perfect, so the suite is too easy: {}", all.join(", ")),
+        if all.is_empty() {
+            "no pipeline is perfect (MOTA 1) on any suite".into()
+        } else {
+            format!("perfect, so the suite is too easy: {}", all.join(", "))
         }
     }
 }

@@ -153,9 +153,10 @@ pub(crate) fn refusal_of(pixels: &str) -> String {
     if video.iter().any(|name| lower.contains(name)) {
         return VIDEO_REMEDY.to_owned();
     }
-    match is_deep(pixels) {
-        true => ImageError::Deep(pixels.to_owned()).to_string(),
-        false => ImageError::Encoding(pixels.to_owned()).to_string(),
+    if is_deep(pixels) {
+        ImageError::Deep(pixels.to_owned()).to_string()
+    } else {
+        ImageError::Encoding(pixels.to_owned()).to_string()
     }
 }
 

@@ -148,9 +148,10 @@ impl Recorded {
             }
         };
         let people = self.people(value.list("detections"), moment.topic, tally);
-        match self.in_space {
-            false => Some(people.iter().filter_map(|(it, score)| in_image(it, *score)).collect()),
-            true => Some(in_space(&people, message, moment, tally)),
+        if self.in_space {
+            Some(in_space(&people, message, moment, tally))
+        } else {
+            Some(people.iter().filter_map(|(it, score)| in_image(it, *score)).collect())
         }
     }
 

@@ -153,10 +153,8 @@ impl Assembler {
         image: &Payload,
         tally: &mut Tally,
     ) -> Option<(Images, (usize, usize))> {
-        let seen = match plan.reads_primary() {
-            true => pixels(plan, plan.primary(), image, tally),
-            false => None,
-        };
+        let seen =
+            if plan.reads_primary() { pixels(plan, plan.primary(), image, tally) } else { None };
         let size = match &seen {
             Some(pixels) => pixels.size(),
             None if plan.requires_primary() => return None,

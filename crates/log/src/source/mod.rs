@@ -174,9 +174,10 @@ impl FrameSource {
     /// Returns the fraction of the file that has been read, 0 to 1.
     pub fn progress(&self) -> f64 {
         let bytes = self.assembly.plan.scan.bytes.max(1);
-        match self.assembly.has_ended() {
-            true => 1.0,
-            false => (self.walker.position() as f64 / bytes as f64).min(1.0),
+        if self.assembly.has_ended() {
+            1.0
+        } else {
+            (self.walker.position() as f64 / bytes as f64).min(1.0)
         }
     }
 

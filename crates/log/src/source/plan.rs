@@ -190,9 +190,10 @@ pub(super) fn plan(
         None => depth_lens,
     };
     let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref(), false)?;
-    let sources = match inputs.uses(Input::OBSTACLES) {
-        true => planned_sources(&scan, input, tally)?,
-        false => Vec::new(),
+    let sources = if inputs.uses(Input::OBSTACLES) {
+        planned_sources(&scan, input, tally)?
+    } else {
+        Vec::new()
     };
     let mut plan = Plan {
         mount: Mount::assumed(),

@@ -30,9 +30,10 @@ pub(super) fn restamp(message: &Message<'_>) -> Option<Vec<u8>> {
     let is_ros1 = data.starts_with(&ROS1_MARK);
     let at = if is_ros1 { 8 } else { 4 };
     let is_big_endian = !is_ros1 && data.get(1) == Some(&0);
-    let (sec, nanosec) = match is_big_endian {
-        true => (time.sec.to_be_bytes(), time.nanosec.to_be_bytes()),
-        false => (time.sec.to_le_bytes(), time.nanosec.to_le_bytes()),
+    let (sec, nanosec) = if is_big_endian {
+        (time.sec.to_be_bytes(), time.nanosec.to_be_bytes())
+    } else {
+        (time.sec.to_le_bytes(), time.nanosec.to_le_bytes())
     };
     data.get_mut(at..at + 4)?.copy_from_slice(&sec);
     data.get_mut(at + 4..at + 8)?.copy_from_slice(&nanosec);

@@ -200,9 +200,10 @@ fn choose_images(
     let named = Pick {
         colour: named(scan, "colour_topic", colour_topic, is_usable_picture)?,
         depth: depth.or(disparity),
-        right: match inputs.uses(Input::Right) {
-            true => named(scan, "right_topic", input.right_topic.as_deref(), is_usable_picture)?,
-            false => None,
+        right: if inputs.uses(Input::Right) {
+            named(scan, "right_topic", input.right_topic.as_deref(), is_usable_picture)?
+        } else {
+            None
         },
         depth_problem: None,
     };

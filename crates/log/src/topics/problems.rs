@@ -190,15 +190,16 @@ pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Op
         "no stamp of it is within {NEAR_S} s of any frame: it begins {:.1} s {side}",
         off_s.abs()
     );
-    match is_other_time {
-        true => Problem::new(
+    if is_other_time {
+        Problem::new(
             format!("{why}, because it was recorded at another time"),
             "record it together with the sensor that makes the frames",
-        ),
-        false => Problem::new(
+        )
+    } else {
+        Problem::new(
             format!("{why}, by another clock (simulated time against that of the computer?)"),
             RECORDING,
-        ),
+        )
     }
 }
 

@@ -47,9 +47,10 @@ pub(super) fn metres(out: &mut impl Write, record: &FrameRecord<'_>) -> io::Resu
         let person = &track.estimate.person;
         let covariance = &track.estimate.covariance;
         write!(out, "{},{},{}", record.stamp.nanos(), record.index, track.id)?;
-        let in_odom = match record.is_odom_known {
-            true => record.head_in_odom(track),
-            false => Point3::new(f64::NAN, f64::NAN, f64::NAN),
+        let in_odom = if record.is_odom_known {
+            record.head_in_odom(track)
+        } else {
+            Point3::new(f64::NAN, f64::NAN, f64::NAN)
         };
         let places = [person.position, in_odom];
         for value in places.iter().flat_map(|p| p.iter()).chain(person.velocity.iter()) {

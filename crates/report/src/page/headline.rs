@@ -240,9 +240,10 @@ pub(super) fn span_of([low, high]: [f64; 2], decimals: usize) -> String {
 /// Returns both p-values of a pair where they differ, as the table of pairs has both.
 fn p_of(pair: &PairSummary) -> String {
     let [alone, corrected] = [pair.p_value, pair.p_corrected].map(p_equals);
-    match alone == corrected {
-        true => format!("p {alone}"),
-        false => format!("p {alone} for this pair alone, p {corrected} corrected for all pairs"),
+    if alone == corrected {
+        format!("p {alone}")
+    } else {
+        format!("p {alone} for this pair alone, p {corrected} corrected for all pairs")
     }
 }
 

@@ -110,10 +110,7 @@ impl Sample {
         let (camera, depth) = cut(camera, depth, draws);
         let map = FloorMap::new(&camera, &depth);
         let targets = Targets::new(&people, &camera, &depth);
-        match draws.chance(0.5) {
-            true => (map.mirrored(), targets.mirrored()),
-            false => (map, targets),
-        }
+        if draws.chance(0.5) { (map.mirrored(), targets.mirrored()) } else { (map, targets) }
     }
 }
 

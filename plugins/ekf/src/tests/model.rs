@@ -383,10 +383,8 @@ fn every_number_has_its_bound_and_zero_is_allowed_where_it_means_none() {
             Ekf::new(config).err().map(|error| error.to_string())
         };
         assert_eq!(refusal(0.5), None);
-        let bound = match may_be_zero {
-            true => "lie between 0 and 1e6",
-            false => "be positive and at most 1e6",
-        };
+        let bound =
+            if may_be_zero { "lie between 0 and 1e6" } else { "be positive and at most 1e6" };
         assert_eq!(refusal(0.0).is_none(), may_be_zero, "{key}");
         for wrong in [-1.0, f64::NAN, f64::INFINITY] {
             let message = refusal(wrong).unwrap();

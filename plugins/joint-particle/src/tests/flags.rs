@@ -133,9 +133,12 @@ fn faces(config: Config, people: usize, walks: Vector2<f64>) -> Vector2<f64> {
             1.6,
         );
         let log = move |scene: &[Person]| {
-            let place = |p: &Person| match p.position.x < 2.5 {
-                true => -0.5 * ((p.position - at).norm() / 0.03).powi(2),
-                false => 0.0,
+            let place = |p: &Person| {
+                if p.position.x < 2.5 {
+                    -0.5 * ((p.position - at).norm() / 0.03).powi(2)
+                } else {
+                    0.0
+                }
             };
             let turned = scene.iter().filter(|p| p.velocity.y > 0.3).count();
             scene.iter().map(place).sum::<f64>() + 3.0 * turned as f64

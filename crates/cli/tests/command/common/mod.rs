@@ -162,9 +162,8 @@ fn walker(index: u64) -> std::ops::Range<usize> {
 }
 
 fn colour(index: u64) -> Vec<u8> {
-    let pixel = |x: usize, y: usize| match walker(index).contains(&x) && y >= 40 {
-        true => [200, 120, 40],
-        false => [x as u8, y as u8, 90],
+    let pixel = |x: usize, y: usize| {
+        if walker(index).contains(&x) && y >= 40 { [200, 120, 40] } else { [x as u8, y as u8, 90] }
     };
     (0..HEIGHT).flat_map(|y| (0..WIDTH).flat_map(move |x| pixel(x, y))).collect()
 }
