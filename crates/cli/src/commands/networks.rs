@@ -79,7 +79,11 @@ pub(super) fn as_text() -> String {
             );
         }
     }
-    let _ = write!(out, "\nThe figures are those of `{}`.\n", KNOWN.command);
+    let _ = write!(
+        out,
+        "\nThe figures are those of `{}`, with depth where the log has it.\n",
+        KNOWN.command
+    );
     let default = default_network();
     let installed = installed_networks();
     let _ = match installed[..] {
