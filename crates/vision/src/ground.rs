@@ -144,6 +144,24 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     (is_seen && is_lowest).then(|| (-floor).exp())
 }
 
+/// Leading digits of the units that cameras have.
+const ROUND_UNITS: [f64; 7] = [1.0, 1.25, 2.0, 2.5, 4.0, 5.0, 8.0];
+/// Accuracy of a unit that is measured by the floor, relative.
+const UNIT_ACCURACY: f64 = 0.03;
+
+/// Returns a measured unit of depth, m, as it may be written: a round number within the accuracy of
+/// the measurement, else one of two digits.
+pub fn written_unit_m(measured_m: f64) -> f64 {
+    let power = measured_m.log10().floor();
+    let tens = [power, power + 1.0];
+    let round = tens.iter().flat_map(|power| ROUND_UNITS.map(|digits| format!("{digits}e{power}")));
+    let round = round.filter_map(|text| text.parse::<f64>().ok());
+    let off = |unit_m: &f64| (unit_m / measured_m - 1.0).abs();
+    let nearest =
+        round.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|it| off(it) < UNIT_ACCURACY);
+    nearest.unwrap_or_else(|| format!("{measured_m:.1e}").parse().unwrap_or(measured_m))
+}
+
 /// Fits the floor to points of the camera frame (x right, y down, z forward). Returns `None` if no
 /// plane qualifies.
 pub fn ground_of_points(points: &[Point3<f64>], settings: &GroundSettings) -> Option<Ground> {
@@ -280,6 +298,20 @@ mod tests {
                 let error = (found * f64::from(factor) - 1.0).abs();
                 assert!(error < 0.03, "{height_m} {pitch_rad} {factor}: {found}");
             }
+        }
+    }
+
+    #[test]
+    fn a_measured_unit_is_written_as_a_round_number_near_it() {
+        for (measured_m, written_m) in [
+            (0.000_099_5, 0.0001),
+            (0.000_252, 0.00025),
+            (0.001_01, 0.001),
+            (0.000_123_9, 0.000125),
+            (0.000_333, 0.00033),
+            (0.98, 1.0),
+        ] {
+            assert_eq!(written_unit_m(measured_m), written_m, "{measured_m}");
         }
     }
 

@@ -2,7 +2,7 @@
 //! the repository; the relatives of each kind are made by the tests of `crates/log`.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -210,16 +210,20 @@ fn the_unit_of_depth_is_measured() {
 fn a_network_of_which_the_shape_does_not_tell_the_family_is_told_apart_or_refused() {
     let Some(network) = field("network-family-by-shape/boxes-score-label.onnx") else { return };
     let Some(log) = field("fallback-reason-false/depth-mono16.mcap") else { return };
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/onnx.toml");
     let config = |family: &str| {
         format!(
-            "extends = \"onnx.toml\"\n[[detectors]]\nplugin = \"onnx\"\n\
+            "extends = \"{}\"\n[[detectors]]\nplugin = \"onnx\"\n\
              config = {{ model = \"{}\"{family} }}\n",
+            shipped.display(),
             network.display()
         )
     };
     let found = run(&config(""), &log, &[]);
     let is_refused = found.code == 2 && found.said.contains("yolov10");
     assert!(is_refused || found.persons() == 1, "{}", found.said);
+    let named = run(&config(", family = \"yolov10\""), &log, &[]);
+    assert_eq!((named.code, named.persons()), (0, 1), "{}", named.said);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-use tagalong_vision::ground::factor_of_depth;
+use tagalong_vision::ground::{factor_of_depth, written_unit_m};
 use tagalong_vision::quality::DepthQuality;
 
 use super::super::evidence::Evidence;
@@ -105,8 +105,7 @@ fn better_unit(evidence: &Evidence, median_m: f64, measured_factor: Option<f64>)
     let usual = if image.is_some_and(|image| image.pixels.contains("32FC1")) { 1.0 } else { 0.001 };
     let unit = evidence.input.depth_unit_m.unwrap_or(usual);
     if let Some(factor) = measured_factor {
-        let unit = unit * factor;
-        return format!("{unit:.1e}").parse().unwrap_or(unit);
+        return written_unit_m(unit * factor);
     }
     let tens = (3.0 / median_m).log10().round();
     let better = unit * 10f64.powf(tens);

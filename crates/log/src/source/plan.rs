@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use tagalong_core::DepthImage;
 use tagalong_geometry::{Camera, ConicalMirror, Lens};
-use tagalong_vision::ground::{Ground, GroundSettings, factor_of_depth, ground_of_depth};
+use tagalong_vision::ground::{
+    Ground, GroundSettings, factor_of_depth, ground_of_depth, written_unit_m,
+};
 
 use super::assembly::{Assembly, Messages};
 use super::mount::{Mount, robot_frame};
@@ -491,7 +493,7 @@ fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogEr
     }
     let is_float = topic.pixels.as_deref().is_some_and(|pixels| pixels.starts_with("32FC1"));
     let unit_m = plan.depth_unit_m.unwrap_or(if is_float { 1.0 } else { MILLIMETRE });
-    Ok(Some(two_digits(unit_m * factors[factors.len() / 2])))
+    Ok(Some(written_unit_m(unit_m * factors[factors.len() / 2])))
 }
 
 /// Takes a unit that was measured where nothing else tells it; tells it where the encoding has another
@@ -513,11 +515,6 @@ fn take_measured_unit(plan: &mut Plan, unit_m: f64, tally: &mut Tally) {
          `depth_unit_m = {unit_m}` under [input]",
         plan.mount.source()
     ));
-}
-
-/// Returns a number with two digits, as short as it is written.
-fn two_digits(value: f64) -> f64 {
-    format!("{value:.1e}").parse().unwrap_or(value)
 }
 
 /// Returns a plan that reads depth alone.

@@ -82,13 +82,15 @@ impl InputAccount {
 
 impl fmt::Display for TopicUse {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { topic, kind, used_as, calibration, problem, remedy, .. } = self;
+        let Self { topic, kind, camera, used_as, calibration, problem, remedy, .. } = self;
         match used_as {
             Some(input) => write!(f, "{input}: {topic} ({kind}")?,
             None => write!(f, "not used: {topic} ({kind}")?,
         }
         match calibration {
             Some(calibration) => write!(f, "; calibration {calibration})")?,
+            // Without one, positions in metres are guesses.
+            None if used_as.is_some() && camera.is_some() => write!(f, "; no calibration)")?,
             None => write!(f, ")")?,
         }
         if let Some(problem) = problem {
