@@ -59,7 +59,7 @@ fn frame(index: u64) -> Frame {
         }
         let u = x - left;
         let v = y - 96;
-        let stripe = if (u / 12 + v / 24) % 2 == 0 { 30 } else { 0 };
+        let stripe = if (u / 12 + v / 24).is_multiple_of(2) { 30 } else { 0 };
         [(185 + stripe + noise(u / 4, v / 4)) as u8; 3]
     });
     let images = Images { colour: Some(Arc::new(colour)), ..Images::default() };

@@ -107,7 +107,9 @@ fn rows(out: &mut String, path: &str, table: &Value, root: &Value) {
         let (text, target) = resolve(property, root);
         if target["properties"].is_object() {
             rows(out, &format!("{path}{key}."), target, root);
-            continue;
+            if !alternatives(property).any(|it| it["type"] == "string") {
+                continue;
+            }
         }
         let default = match &property["default"] {
             Value::Null => "none".to_owned(),
@@ -121,13 +123,17 @@ fn rows(out: &mut String, path: &str, table: &Value, root: &Value) {
 
 /// Returns the description of a property, and the schema that it refers to.
 fn resolve<'a>(property: &'a Value, root: &'a Value) -> (Option<&'a str>, &'a Value) {
-    let any = property["anyOf"].as_array().into_iter().flatten();
-    let mut references = std::iter::once(property).chain(any).map(|p| &p["$ref"]);
-    let target = references
-        .find_map(Value::as_str)
+    let target = alternatives(property)
+        .find_map(|it| it["$ref"].as_str())
         .and_then(|path| root.pointer(path.trim_start_matches('#')))
         .unwrap_or(property);
     (property["description"].as_str().or_else(|| target["description"].as_str()), target)
+}
+
+/// Returns the schemas of which a value must match one: of a property and of those that it holds.
+fn alternatives(property: &Value) -> Box<dyn Iterator<Item = &Value> + '_> {
+    let inner = property["anyOf"].as_array().into_iter().flatten().flat_map(alternatives);
+    Box::new(std::iter::once(property).chain(inner))
 }
 
 /// Returns a JSON schema of a whole config: the sections, and in each the settings of the plugin
@@ -249,7 +255,13 @@ mod tests {
                 assert!(text.contains(&format!("| `{}", key.0)), "{} of {}", key.0, plugin.name);
             }
         }
-        for key in ["merge.same_person_m", "input.depth_offset_px", "input.camera.height_m"] {
+        let around = [
+            "merge.same_person_m",
+            "input.depth_offset_px",
+            "input.camera.height_m",
+            "input.camera",
+        ];
+        for key in around {
             assert!(text.contains(&format!("| `{key}` |")), "{key}");
         }
         assert!(!text.contains("|  |\n"), "a key without a meaning");

@@ -32,11 +32,8 @@ pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     moments.extend(images(folder, "depth.txt", Eye::Depth, &mut notes)?);
     moments.sort_by_key(|moment| (moment.stamp, moment.eye));
     let truth = folder.join("groundtruth.txt");
-    let placed = match is_bonn(folder) {
-        true => Vec::new(),
-        false if truth.exists() => poses(&truth)?,
-        false => Vec::new(),
-    };
+    let has_poses = !is_bonn(folder) && truth.exists();
+    let placed = if has_poses { poses(&truth)? } else { Vec::new() };
     if placed.is_empty() && args.height.is_none() {
         notes.push(
             "no poses of the camera: it is taken to stand still; --height and --tilt tell where"

@@ -535,10 +535,12 @@ fn direction(person: &Person, camera: &Camera) -> Direction {
         return Direction::Along;
     }
     let along = person.velocity.dot(&ray) / (speed * range);
-    match along.abs() > TURNED_COSINE {
-        true => Direction::Along,
-        false if ray.x * person.velocity.y > ray.y * person.velocity.x => Direction::Left,
-        false => Direction::Right,
+    if along.abs() > TURNED_COSINE {
+        Direction::Along
+    } else if ray.x * person.velocity.y > ray.y * person.velocity.x {
+        Direction::Left
+    } else {
+        Direction::Right
     }
 }
 

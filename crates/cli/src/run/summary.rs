@@ -60,11 +60,11 @@ fn persons(out: &mut String, report: &RunReport) {
 /// Returns a path as one word of a POSIX shell.
 fn quoted(path: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:@%,".contains(c);
-    match !path.is_empty() && path.chars().all(is_plain) {
-        true => path.to_owned(),
-        // A quote ends the quoted word, stands escaped, and begins the next.
-        false => format!("'{}'", path.replace('\'', "'\\''")),
+    if !path.is_empty() && path.chars().all(is_plain) {
+        return path.to_owned();
     }
+    // A quote ends the quoted word, stands escaped, and begins the next.
+    format!("'{}'", path.replace('\'', "'\\''"))
 }
 
 /// Writes the tests that dropped most.

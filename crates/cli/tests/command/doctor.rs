@@ -94,6 +94,12 @@ fn turned(tf: &mut TFMessage, axis: usize, degrees: f64) {
     }
 }
 
+/// Takes all numbers of a calibration away: K alone would be replaced by P.
+fn uncalibrated(info: &mut CameraInfo) {
+    info.k = [0.0; 9];
+    info.p = [0.0; 12];
+}
+
 fn cases() -> Vec<Case> {
     let case = |name, changes, id, severity, remedy| Case { name, changes, id, severity, remedy };
     vec![
@@ -121,7 +127,7 @@ fn cases() -> Vec<Case> {
             "bad",
             "colour_info_topic",
         ),
-        case("uncalibrated", with_info(|info| info.k = [0.0; 9]), "intrinsics", "bad", "REP 104"),
+        case("uncalibrated", with_info(uncalibrated), "intrinsics", "bad", "REP 104"),
         case("tilted", with_tf(|tf| turned(tf, 0, 8.0)), "mount", "bad", "pitch_down_deg"),
         case("rolled", with_tf(|tf| turned(tf, 2, 5.0)), "mount", "warn", "roll_deg"),
         case(

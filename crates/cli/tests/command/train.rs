@@ -15,7 +15,7 @@ fn train(folder: &Path, arguments: &[&str]) -> std::process::Output {
 fn the_same_seed_makes_the_same_model_and_card_and_the_model_works() {
     let folder = tempfile::tempdir().unwrap();
     let make = |name: &str| {
-        let output = train(folder.path(), &["svm-patch", "--quick", "--scenes", "3", "-o", name]);
+        let output = train(folder.path(), &["svm-patch", "--quick", "--scenes", "4", "-o", name]);
         assert_eq!(code(&output), 0, "{}", text(&output.stderr));
         let read = |extension: &str| {
             fs::read_to_string(folder.path().join(name).with_extension(extension)).unwrap()
@@ -25,7 +25,7 @@ fn the_same_seed_makes_the_same_model_and_card_and_the_model_works() {
     let first = make("a.toml");
     assert_eq!(first, make("b.toml"));
     let card: toml::Table = first.1.parse().unwrap();
-    assert_eq!(card["scenes"].as_integer(), Some(3));
+    assert_eq!(card["scenes"].as_integer(), Some(4));
     assert!(card["fit"]["people"].as_integer().unwrap() > 0, "{card}");
     assert!(card["fit"]["others"].as_integer().unwrap() > 0, "{card}");
     let config = "[[detectors]]\nplugin = \"depth-template\"\n[filter]\nplugin = \"ekf\"\n\

@@ -65,10 +65,12 @@ fn room(person: Rect) -> GreyImage {
     GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
         let x = x as f64;
         let y = y as f64;
-        let seen = match holds(&person, &Point2::new(x, y)) {
-            true => paint(x - person.x, y - person.y),
-            false if x > 230.0 => paint(x, y),
-            false => 0.0,
+        let seen = if holds(&person, &Point2::new(x, y)) {
+            paint(x - person.x, y - person.y)
+        } else if x > 230.0 {
+            paint(x, y)
+        } else {
+            0.0
         };
         (128.0 + 110.0 * seen).round() as u8
     })
