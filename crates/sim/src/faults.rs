@@ -511,8 +511,9 @@ mod tests {
         assert_eq!(drawn(1), drawn(1));
         let kinds: std::collections::BTreeSet<FaultKind> =
             (0..300).map(|seed| drawn(seed).kind).collect();
-        // The default robot has a depth camera, but no laser scanner and no further sensors.
-        assert_eq!(kinds.len(), FaultKind::ALL.len() - 6);
+        // The default robot has a depth camera, but no laser scanner and no further sensors; the
+        // enable that sticks is not drawn.
+        assert_eq!(kinds.len(), FaultKind::ALL.len() - 7);
         assert!((0..300).all(|seed| (2.0..=6.0).contains(&drawn(seed).from_s)));
         assert!(drawn(1).to_s.is_infinite());
     }

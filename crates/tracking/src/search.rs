@@ -10,9 +10,6 @@ use crate::{DetectorSettings, Fate, Role};
 /// Log-odds that stand for certainty. Larger ones would outweigh all other evidence.
 const CERTAIN: f64 = 100.0;
 
-/// Inputs that make the frames, so that each frame has its own.
-const IMAGES: [Input; 3] = [Input::Colour, Input::Depth, Input::Right];
-
 /// A detector and its settings.
 pub struct DetectorSlot {
     /// Its settings.
@@ -27,14 +24,14 @@ impl DetectorSlot {
         self.settings.roles.contains(&role)
     }
 
-    /// Returns true if the detector runs on the frame with this count from 0. A frame without a
-    /// message of a sensor that it requires is no frame on which it looked: detections and scans come
-    /// more seldom than images.
+    /// Returns true if the detector runs on the frame with this count from 0. On a frame without a
+    /// message of another detector, which may be slower than the images, it has not looked.
     pub(crate) fn is_due(&self, frame: &Frame, count: u64) -> bool {
         let every = u64::from(self.settings.every.max(1));
         let inputs = self.plugin.plugin().capabilities().inputs;
-        let mut messages = inputs.of(Usage::Required).filter(|input| !IMAGES.contains(input));
-        count % every == u64::from(self.settings.offset) && messages.all(|input| frame.holds(input))
+        let lacks_message = inputs.of(Usage::Required).any(|input| input == Input::Detections)
+            && !frame.holds(Input::Detections);
+        count % every == u64::from(self.settings.offset) && !lacks_message
     }
 }
 
