@@ -23,8 +23,8 @@ use super::networks::{self, KnownNetwork};
 const COLOUR_NET: &str = include_str!("../../configs/colour-net.toml");
 /// First line of its detectors, before which it says what it is for.
 const DETECTORS: &str = "[[detectors]]\n";
-/// Line of it in place of a network.
-const NO_MODEL: &str = "model = \"\"\n";
+/// Line of it below which the settings of the network stand.
+const SETTINGS: &str = "[detectors.config]\n";
 
 /// Calls of which the fastest is told.
 const CALLS: usize = 3;
@@ -275,7 +275,8 @@ impl KnownDetector<'_> {
             }
         }
         let config = COLOUR_NET.find(DETECTORS).map_or("", |at| &COLOUR_NET[at..]);
-        let _ = write!(out, "\n{}", config.replacen(NO_MODEL, &lines, 1));
+        let settings = format!("{SETTINGS}{lines}");
+        let _ = write!(out, "\n{}", config.replacen(SETTINGS, &settings, 1));
     }
 }
 
