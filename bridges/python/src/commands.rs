@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use tagalong_app::format::Format;
+use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Outcome};
 use tagalong_app::signals::Signals;
 use tagalong_cli::{EvalArgs, RunArgs, SimilarityChoice, eval_json, main_from, run_until};
@@ -31,7 +32,7 @@ pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
 /// Runs a pipeline over a log and writes the files of `tagalong run`; returns true if part of the
 /// log was lost.
 #[pyfunction]
-#[pyo3(signature = (config, log, out, *, overlay, with_images, overwrite, strict, seed))]
+#[pyo3(signature = (config, log, out, *, overlay, with_images, overwrite, strict, seed, camera))]
 #[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python function")]
 pub fn run(
     py: Python<'_>,
@@ -43,6 +44,7 @@ pub fn run(
     overwrite: bool,
     strict: bool,
     seed: Option<u64>,
+    camera: Option<String>,
 ) -> PyResult<bool> {
     let (config, log) = match config {
         Some(config) => (config, Some(log)),
@@ -62,6 +64,7 @@ pub fn run(
         realtime: false,
         format: Format::default(),
         quiet: true,
+        input: InputArgs { camera, ..InputArgs::default() },
     };
     match interruptible(py, args)?.map_err(raised)? {
         Ended::Well => Ok(false),

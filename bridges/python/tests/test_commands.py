@@ -33,6 +33,11 @@ def test_a_log_that_is_none_is_an_error(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_camera_is_named_as_for_the_program(log, tmp_path):
+    with pytest.raises((tagalong.TagalongError, tagalong.ConfigError), match="/no_such_camera"):
+        tagalong.run("depth-ekf", log, tmp_path / "out", camera="/no_such_camera")
+
+
 def test_figures_are_those_of_the_program(log, run, program):
     done = program("eval", "--truth", log, "--tracks", run, "--format", "json")
     assert done.returncode == 0, done.stderr

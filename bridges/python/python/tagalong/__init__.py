@@ -81,12 +81,14 @@ def run(
     overwrite=False,
     strict=False,
     seed=None,
+    camera=None,
 ):
     """Run a pipeline over a log, as `tagalong run`, and return its report.json as a dict.
 
     config: a TOML file or the name of a built-in one; None takes the one for what the log has.
     out: the folder of results, which must not exist without `overwrite`. With `strict` a log of
-    which something was lost raises TagalongError. Ctrl-C stops the run; the files are whole then.
+    which something was lost raises TagalongError. `camera` names one of several cameras. Ctrl-C
+    stops the run; the files are whole then.
     """
     _tagalong.run(
         config,
@@ -97,6 +99,7 @@ def run(
         overwrite=overwrite,
         strict=strict,
         seed=seed,
+        camera=camera,
     )
     with open(_os.path.join(out, "report.json"), encoding="utf-8") as file:
         return _json.load(file)

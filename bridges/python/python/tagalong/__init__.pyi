@@ -30,6 +30,7 @@ def run(
     overwrite: bool = False,
     strict: bool = False,
     seed: Optional[int] = None,
+    camera: Optional[str] = None,
 ) -> dict[str, Any]: ...
 def eval(
     truth: _Path,

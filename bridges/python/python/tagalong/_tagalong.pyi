@@ -185,6 +185,7 @@ def run(
     overwrite: bool,
     strict: bool,
     seed: Optional[int],
+    camera: Optional[str],
 ) -> bool: ...
 def scores(
     truth: _Path,
