@@ -272,23 +272,18 @@ pub struct Visibility {
 mod tests {
     use std::sync::Arc;
 
-    use nalgebra::Rotation3;
     use proptest::prelude::*;
 
     use super::*;
     use crate::daylight::Daylight;
     use crate::material::{Material, Pattern};
     use crate::scene::RoomSettings;
-    use crate::shape::Form;
+    use crate::shape::samples;
     use crate::world::{Lamp, Object, Stage};
 
     fn shape(form: usize, at: [f64; 3], turn: f64) -> Shape {
-        let form = match form {
-            0 => Form::Ellipsoid(Vector3::new(0.3, 0.15, 0.5)),
-            1 => Form::Block(Vector3::new(0.2, 1.5, 0.05)),
-            _ => Form::Capsule { length: 1.0, first: 0.3, second: 0.1 },
-        };
-        let turn = Rotation3::from_euler_angles(turn, 2.0 * turn, 0.3);
+        let form = samples::form(form);
+        let turn = samples::turn(turn);
         let patterns = [
             Pattern::Plain,
             Pattern::Stripes(0.1),

@@ -282,6 +282,26 @@ fn block_normal(own: &Vector3<f64>, half: &Vector3<f64>) -> Vector3<f64> {
     )
 }
 
+/// Forms and turns for tests.
+#[cfg(test)]
+pub(crate) mod samples {
+    use super::*;
+
+    /// Returns a form of each kind, by a number from 0 to 2.
+    pub(crate) fn form(number: usize) -> Form {
+        match number {
+            0 => Form::Ellipsoid(Vector3::new(0.3, 0.15, 0.5)),
+            1 => Form::Block(Vector3::new(0.2, 1.5, 0.05)),
+            _ => Form::Capsule { length: 1.0, first: 0.3, second: 0.1 },
+        }
+    }
+
+    /// Returns a turn about no axis of the form.
+    pub(crate) fn turn(angle: f64) -> Rotation3<f64> {
+        Rotation3::from_euler_angles(angle, 2.0 * angle, 0.3)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

@@ -61,20 +61,16 @@ impl<'a> Slice<'a> {
 mod tests {
     use proptest::prelude::*;
 
-    use nalgebra::{Isometry3, Rotation3};
+    use nalgebra::Isometry3;
 
     use super::*;
     use crate::material::Material;
-    use crate::shape::Form;
+    use crate::shape::samples;
     use crate::world::{self, Object};
 
     fn solid(form: usize, at: [f64; 3], turn: f64) -> Shape {
-        let form = match form {
-            0 => Form::Ellipsoid(Vector3::new(0.3, 0.15, 0.5)),
-            1 => Form::Block(Vector3::new(0.2, 1.5, 0.05)),
-            _ => Form::Capsule { length: 1.0, first: 0.3, second: 0.1 },
-        };
-        let turn = Rotation3::from_euler_angles(turn, 2.0 * turn, 0.3);
+        let form = samples::form(form);
+        let turn = samples::turn(turn);
         Shape::new(form, Point3::from(at), turn, Material::plain([0.5; 3]))
     }
 
