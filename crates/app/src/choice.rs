@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tagalong_config::Registry;
-use tagalong_log::{FrameSource, InputAccount, InputSettings, Limits};
+use tagalong_log::{FrameSource, InputAccount, Inspection, Limits};
 
 use crate::config_file::{ConfigFile, OuterSettings};
 use crate::input_args::InputArgs;
@@ -76,17 +76,18 @@ pub struct Fittings {
     pub account: InputAccount,
     /// A line for each of the others.
     pub refusals: String,
+    /// A line about lost data; nothing for a whole log.
+    damage: String,
 }
 
 impl Fittings {
     /// Returns the failure of a log that no pipeline fits.
     pub fn none_fits(&self, log: &Path) -> Failure {
-        let damage = damage(log);
         let account: String =
             self.account.lines().iter().map(|line| format!("\n  {line}")).collect();
         let account = if account.is_empty() { account } else { format!("\nits topics:{account}") };
         let log = log.display();
-        let refusals = &self.refusals;
+        let Self { refusals, damage, .. } = self;
         let hint = format!("`tagalong inspect {log}` lists its topics");
         Failure::failed(format!(
             "{log}: no built-in pipeline fits:{refusals}{account}\n{damage}{hint}"
@@ -138,16 +139,23 @@ impl Fittings {
 }
 
 /// Returns a line about a log of which part was lost; nothing for a whole one.
-fn damage(log: &Path) -> String {
-    let found = tagalong_log::inspect(log, &InputSettings::default(), &Limits::default());
-    let Some(found) = found.ok().filter(|found| found.data_lost) else { return String::new() };
+fn damage(found: &Inspection) -> String {
+    if !found.data_lost {
+        return String::new();
+    }
     let first = found.notes.first().map_or("", String::as_str);
     format!("part of the log was lost ({first}): record it again, or look for a whole copy\n")
 }
 
 /// Returns the first pipelines that fit a log, at most `most`, by trying each on its first frame.
 pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -> Fittings {
-    let mut found = Fittings { account: account(log, args), ..Fittings::default() };
+    let mut found = Fittings::default();
+    let input = args.applied(OuterSettings::default()).input;
+    // Of a log that cannot be read the trials tell why.
+    if let Ok(inspected) = tagalong_log::inspect(log, &input, &Limits::default()) {
+        found.damage = damage(&inspected);
+        found.account = inspected.inputs;
+    }
     for choice in CHOICES {
         let Some(config) = ConfigFile::named(choice.config) else { continue };
         if found.fitting.len() == most {
@@ -159,14 +167,6 @@ pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -
         }
     }
     found
-}
-
-/// Returns the use of the topics by a pipeline that takes all inputs; nothing for a log that cannot be
-/// read, of which the trials tell why.
-fn account(log: &Path, args: &InputArgs) -> InputAccount {
-    let input = args.applied(OuterSettings::default()).input;
-    let found = tagalong_log::inspect(log, &input, &Limits::default());
-    found.map(|found| found.inputs).unwrap_or_default()
 }
 
 /// Returns a line that says why a config does not fit: without the path of the log and the list of
