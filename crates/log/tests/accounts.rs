@@ -205,7 +205,7 @@ fn streams_whose_names_have_nothing_in_common_are_one_device_unless_they_look_ap
     assert_eq!(used(&open(log(0.1), Inputs::ANY).0, "depth"), "/kinect/image");
     let (source, _saved) = open(log(3.0), Inputs::ANY);
     assert!(used(&source, "colour").is_empty() || used(&source, "depth").is_empty());
-    // Whoever names both gets both.
+    // Both are used if the settings name both.
     let input = InputSettings {
         colour_topic: Some("/usb_cam/image_raw".into()),
         depth_topic: Some("/kinect/image".into()),
@@ -337,7 +337,7 @@ fn stamps_that_are_never_set_are_replaced_by_the_times_of_recording() {
         assert!(source.notes().iter().any(|note| note.contains("are not set: all are")));
         assert_eq!(count_frames(&mut source), 4);
         assert!(!source.data_lost(), "{:?}", source.notes());
-        // Whoever insists on the stamps loses images, and is told so.
+        // If the settings insist on the stamps, images are lost, and reported as lost.
         let input = InputSettings { stamps: StampSource::Header, ..InputSettings::default() };
         let (mut source, _saved) = open_with(log(), &input, DEPTH).unwrap();
         assert_eq!(count_frames(&mut source), 1);

@@ -123,13 +123,13 @@ fn folder_of(image: &str) -> &str {
 
 /// Returns the number of folders at the start that two topics share.
 fn common_folders(a: &str, b: &str) -> usize {
-    let folders = |topic: &str| -> Vec<String> {
-        let mut parts: Vec<String> =
-            topic.trim_matches('/').split('/').map(str::to_owned).collect();
-        parts.pop();
-        parts
-    };
-    folders(a).iter().zip(&folders(b)).take_while(|(a, b)| a == b).count()
+    folders(a).zip(folders(b)).take_while(|(a, b)| a == b).count()
+}
+
+/// Returns the folders of a topic, without its last name.
+fn folders(topic: &str) -> impl Iterator<Item = &str> {
+    let (path, _) = topic.trim_matches('/').rsplit_once('/').unwrap_or_default();
+    path.split('/').filter(move |_| !path.is_empty())
 }
 
 /// Returns the lens of an image topic by a calibration, scaled to the size of the images where a

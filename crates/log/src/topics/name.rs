@@ -100,7 +100,7 @@ impl TopicName {
         let mut words =
             lower.split(['/', '_', '-', '.']).filter(|word| !word.is_empty()).peekable();
         while let Some(word) = words.next() {
-            // What depth is aligned *to* says nothing about the images themselves.
+            // The stream behind "to" is that which depth is aligned to, not that of the images.
             if word == "to" && words.peek().is_some_and(|next| stream_of(next).is_some()) {
                 words.next();
                 continue;
