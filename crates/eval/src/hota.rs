@@ -246,3 +246,16 @@ impl HotaLevel {
 fn highest_level(similarity: f64) -> Option<usize> {
     (0..LEVELS).rev().find(|&level| similarity >= alpha(level) - f64::EPSILON)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_similarity_at_a_threshold_reaches_it_and_one_below_does_not() {
+        for level in 0..LEVELS {
+            assert_eq!(highest_level(alpha(level)), Some(level));
+            assert_eq!(highest_level(alpha(level) - 1e-9), level.checked_sub(1));
+        }
+    }
+}

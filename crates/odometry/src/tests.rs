@@ -164,6 +164,18 @@ fn who_walks_before_a_bare_wall_is_no_landmark() {
     assert!((unknown - by_wheels).abs() > 0.02, "{unknown} rad: who walks was believed");
 }
 
+/// The points of the wall agree with each other, those of the person do not fit.
+#[test]
+fn an_unknown_person_before_a_textured_wall_is_outvoted() {
+    let walking = |step: usize| World {
+        somebody: Some(Point2::new(2.2, -0.3 + 0.06 * step as f64)),
+        ..WALLPAPER
+    };
+    let (place, heading) = error(&drive(walking, false).0);
+    let (_, by_wheels) = wheels_alone();
+    assert!(place < 0.03 && heading < 0.6 * by_wheels, "{place} m, {heading} rad");
+}
+
 #[test]
 fn without_a_motion_or_depth_nothing_is_compared() {
     let mut odometry = VisualOdometry::new(OdometrySettings::default());

@@ -1,10 +1,10 @@
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector2};
 use tagalong_config::{NamedTensor, Registry};
-use tagalong_conformance::{Suite, context};
+use tagalong_conformance::{Suite, context, target};
 use tagalong_core::{
-    Detection, Detector, EgoMotion, Error, Frame, Funnel, Images, Query, Stamp, Verifier,
+    Detection, Detector, EgoMotion, Error, Frame, Funnel, Images, Query, Stamp, Track, Verifier,
 };
 use tagalong_network::{Limits, Network, RtenNetwork, Tensor};
 use tagalong_sim::{Event, Scene, Simulation, Truth};
@@ -120,6 +120,19 @@ fn the_verifier_believes_people_doubts_furniture_and_says_nothing_out_of_sight()
     let shelf = Point3::new(5.5, -1.0, 1.5);
     assert!(log_odds(shelf) < -1.0, "{}", log_odds(shelf));
     assert_eq!(log_odds(Point3::new(-2.0, 0.0, 1.5)), 0.0);
+}
+
+#[test]
+fn near_a_confirmed_track_a_lower_score_suffices() {
+    let (frame, truth) = room(1.2, NEAR_AND_FAR);
+    let config = Config { discover_score: 1e3, track_score: -1e3, ..Config::default() };
+    let head = truth[0].head_in_robot;
+    let followed = |confirmed: bool| {
+        let track = Track { confirmed, ..target(head.x, head.y, Vector2::zeros()) };
+        let query = Query::Track(&track);
+        detector(config.clone()).detect(&frame, &query, &mut Funnel::default()).unwrap().len()
+    };
+    assert_eq!([followed(true), followed(false)], [1, 0]);
 }
 
 #[test]

@@ -206,3 +206,31 @@ fn the_papers_background_is_the_wall_where_the_percentile_is_high() {
     let usual = score(DepthTemplateConfig::default().background_percentile);
     assert!(usual > score(10.0) + 0.5, "{usual} {}", score(10.0));
 }
+
+#[test]
+fn the_depth_of_a_head_is_the_less_certain_the_farther_away_it_is() {
+    let config = DepthTemplateConfig { sigma_depth_per_m2: 0.01, ..Default::default() };
+    for range_m in [2.0, 4.0] {
+        let scene = frame(640, 7.0, &[Point3::new(range_m, 0.0, CAMERA_HEIGHT_M)]);
+        let low = DepthTemplateConfig { min_head_height_m: 0.9, ..config.clone() };
+        let found = discover(low, &scene).0.remove(0);
+        let depth_m = scene.camera.depth_of(&found.position) - config.centre_behind_m;
+        let expected_m = config.sigma_depth_m + 0.01 * depth_m * depth_m;
+        let sigma_m = found.covariance[(0, 0)].sqrt();
+        assert!((sigma_m - expected_m).abs() < 0.003, "{range_m} m: {sigma_m}, {expected_m}");
+    }
+}
+
+#[test]
+fn a_confirmed_track_is_judged_by_a_cost_of_its_own() {
+    let head = Point3::new(2.5, 0.0, 1.6);
+    let scene = frame(640, 6.0, &[head]);
+    let followed = |confirmed: bool, discover_cost: f64, follow_cost: f64| {
+        let config = DepthTemplateConfig { discover_cost, follow_cost, ..Default::default() };
+        let mut detector = DepthTemplate::new(config).unwrap();
+        let track = Track { confirmed, ..track_at(head, &scene.camera) };
+        detector.detect(&scene, &Query::Track(&track), &mut Funnel::default()).unwrap().len()
+    };
+    assert_eq!([followed(true, 0.0, 10.0), followed(false, 0.0, 10.0)], [1, 0]);
+    assert_eq!([followed(true, 10.0, 0.0), followed(false, 10.0, 0.0)], [0, 1]);
+}

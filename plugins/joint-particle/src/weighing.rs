@@ -616,4 +616,20 @@ mod tests {
     fn a_flat_likelihood_measures_nothing() {
         assert_eq!(measurement(&[-3.0; SAMPLES], 0.2), None);
     }
+
+    /// The farther person is sampled for the places of the nearer one that fit, so that no particle
+    /// is spent on the others.
+    #[test]
+    fn places_of_the_nearer_person_that_do_not_fit_are_left_before_the_next() {
+        let config = Config { method: Method::Partitioned, ..Config::default() };
+        let fits = |scene: &[Person]| -> f64 {
+            let near = scene.iter().find(|person| person.position.x < 2.5);
+            near.map_or(0.0, |near| if near.position.y > 0.05 { 0.0 } else { -50.0 })
+        };
+        let (effective, rows) = looking(&config, &Formula::new(fits), |group, look| {
+            partitioned(group, look).unwrap();
+            (effective_size(&group.weights), group.rows() as f64)
+        });
+        assert!(effective > 0.9 * rows, "{effective} of {rows}");
+    }
 }

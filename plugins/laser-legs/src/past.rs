@@ -118,14 +118,20 @@ impl PastScan {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Rotation2;
     use tagalong_core::LaserScan;
 
     use super::*;
 
     fn beams(places: &[[f64; 2]]) -> Beams {
+        beams_of(0.01, places)
+    }
+
+    /// Beams of a scanner with this angle between its rays, rad.
+    fn beams_of(increment_rad: f64, places: &[[f64; 2]]) -> Beams {
         let points: Vec<_> =
             places.iter().map(|at| nalgebra::Point3::new(at[0], at[1], 0.2)).collect();
-        let scan = LaserScan { increment_rad: 0.01, ..LaserScan::of_points(points) };
+        let scan = LaserScan { increment_rad, ..LaserScan::of_points(points) };
         Beams::new(&scan, 1)
     }
 
@@ -163,5 +169,50 @@ mod tests {
         // After a while nothing is known any more.
         (0..20).for_each(|_| past.predict(&motion(0.0)));
         assert_eq!(past.was_free(&Point2::new(1.0, 0.0)), 0.0);
+    }
+
+    /// The robot turns by 0.2 rad before each scan.
+    #[test]
+    fn past_scans_turn_with_the_robot() {
+        let things = [Point2::new(3.0, -2.0), Point2::new(3.0, 0.0), Point2::new(3.0, 2.0)];
+        let turning = EgoMotion { turn: 0.2, ..EgoMotion::at_rest(0.2) };
+        let seen_after = |turns: i32| things.map(|at| Rotation2::new(-0.2 * f64::from(turns)) * at);
+        let mut past = PastScans::default();
+        for turns in 1..=3 {
+            past.predict(&turning);
+            past.add(&beams(&seen_after(turns).map(|at| [at.x, at.y])), Vector2::zeros());
+        }
+        past.predict(&turning);
+        past.predict(&turning);
+        assert_eq!(past.was_free(&seen_after(5)[1]), -1.0);
+    }
+
+    #[test]
+    fn the_scans_of_the_last_moment_do_not_count() {
+        let mut past = PastScans::default();
+        for number in 0..4 {
+            let ahead_m = if number < 3 { 3.0 } else { 2.0 };
+            past.predict(&motion(0.0));
+            past.add(&beams(&[[3.0, -2.0], [ahead_m, 0.0], [3.0, 2.0]]), Vector2::zeros());
+        }
+        past.predict(&motion(0.0));
+        assert_eq!(past.was_free(&Point2::new(2.0, 0.0)), 1.0, "it came 0.2 s ago");
+    }
+
+    /// A wall that few rays meet hides also what is between two of them.
+    #[test]
+    fn a_coarse_scanner_does_not_see_through_a_wall() {
+        let wall: Vec<[f64; 2]> = (-4..=4)
+            .map(|ray| 0.15 * f64::from(ray))
+            .map(|angle: f64| [2.0 * angle.cos(), 2.0 * angle.sin()])
+            .collect();
+        let mut past = PastScans::default();
+        for _ in 0..4 {
+            past.predict(&motion(0.0));
+            past.add(&beams_of(0.15, &wall), Vector2::zeros());
+        }
+        past.predict(&motion(0.0));
+        let between = Rotation2::new(0.075) * Point2::new(3.9, 0.0);
+        assert_eq!(past.was_free(&between), 0.0);
     }
 }

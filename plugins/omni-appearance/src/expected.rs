@@ -193,4 +193,26 @@ mod tests {
         assert_eq!([469.0, 470.0, 479.0, 5.0, 9.0].map(holds), [false, true, true, true, true]);
         assert_eq!([10.0, 100.0].map(holds), [false, false]);
     }
+
+    #[test]
+    fn of_people_in_a_run_the_hidden_ones_are_not_expected() {
+        let near = expected(100.0, 20.0, 1.0);
+        let hidden = expected(118.0, 6.0, 3.0);
+        let shown = expected(122.0, 6.0, 3.0);
+        assert_eq!(visible(run(80, 41), 480, &[hidden, near]), [near]);
+        assert_eq!(visible(run(80, 49), 480, &[shown, near]), [near, shown]);
+    }
+
+    /// The robot turns to the left by a right angle.
+    #[test]
+    fn a_known_person_walks_on_and_turns_with_the_frame() {
+        let known = Known {
+            position: Point3::new(2.0, 0.0, 1.6),
+            velocity: nalgebra::Vector2::new(1.0, 0.0),
+        };
+        let turn = Isometry2::new(nalgebra::Vector2::zeros(), std::f64::consts::FRAC_PI_2);
+        let moved = known.moved(0.5, &turn);
+        assert!((moved.position - Point3::new(0.0, -2.5, 1.6)).norm() < 1e-12, "{moved:?}");
+        assert!((moved.velocity - nalgebra::Vector2::new(0.0, -1.0)).norm() < 1e-12, "{moved:?}");
+    }
 }

@@ -255,4 +255,17 @@ mod tests {
         let numbered = TargetSettings { track: Some(2), ..none };
         assert_eq!(chosen(&numbered), Some(2));
     }
+
+    #[test]
+    fn only_a_nearer_person_in_sight_is_taken_instead_of_the_chosen_one() {
+        let settings = TargetSettings { reconsider_s: 5.0, ..TargetSettings::default() };
+        let chosen = track(1, 2.5, 0.0, 0.0);
+        let instead = |seen: bool| {
+            let tracks = [chosen.clone(), Track { seen, ..track(2, 1.5, 0.0, 0.0) }];
+            let nearer = Chooser::default().reconsider(&settings, &chosen, &tracks, DT_S);
+            nearer.map(|track| track.id.0)
+        };
+        assert_eq!(instead(true), Some(2));
+        assert_eq!(instead(false), None, "predicted only");
+    }
 }

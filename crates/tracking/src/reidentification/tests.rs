@@ -119,6 +119,19 @@ fn tracks_that_changed_over_change_their_numbers_back() {
     assert_eq!(scene.show(10, &frame(BLUE, RED), &apart), [2, 1], "and each stays");
 }
 
+/// After the contact both tracks look like person 2: an exchange would be right for one of them
+/// only.
+#[test]
+fn a_track_does_not_change_over_against_the_looks_of_the_other() {
+    let mut scene = Scene::new();
+    let apart = [track(1, 0.8, 1.6), track(2, -0.8, 1.6)];
+    assert_eq!(scene.show(30, &frame(RED, BLUE), &apart), [1, 2]);
+    scene.show(5, &frame(RED, BLUE), &[track(1, 0.1, 1.6), track(2, -0.1, 1.6)]);
+    // Track 2 is seen first, so that its looks are known when track 1 is judged.
+    scene.show(2, &frame(RED, BLUE), &apart[1..]);
+    assert_eq!(scene.show(10, &frame(BLUE, BLUE), &apart), [1, 2]);
+}
+
 #[test]
 fn without_memory_each_track_has_its_number() {
     let mut scene = Scene {
