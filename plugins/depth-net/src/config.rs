@@ -24,12 +24,18 @@ pub struct Config {
     /// Standard deviation of a head's place on the floor, m.
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub sigma_m: f64,
-    /// Standard deviation of a head's height, m.
+    /// Standard deviation of a head's height as the network tells it, m.
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub sigma_height_m: f64,
     /// The same of a head outside of the image, m.
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub sigma_unseen_height_m: f64,
+    /// Measures a head on the surface that the depth image shows of it, where it does; otherwise the
+    /// place and the height are those of the network.
+    pub measure_heads: bool,
+    /// Standard deviation of the height of a head that was measured, m.
+    #[schemars(range(min = 1e-6, max = 10.0))]
+    pub sigma_measured_height_m: f64,
     /// Settings of the fit; only `tagalong train` reads them.
     pub training: Training,
 }
@@ -46,6 +52,8 @@ impl Default for Config {
             sigma_m: 0.08,
             sigma_height_m: 0.08,
             sigma_unseen_height_m: 0.2,
+            measure_heads: true,
+            sigma_measured_height_m: 0.03,
             training: Training::default(),
         }
     }

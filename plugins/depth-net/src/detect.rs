@@ -5,6 +5,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, ImageBox};
 
+use crate::surface::Surface;
 use crate::{BUILT_IN, Config, Model, NAME, Peak, peaks};
 
 /// Detector of people in a plan view of depth.
@@ -25,18 +26,22 @@ impl DepthNet {
         Ok(Self { config, model })
     }
 
-    fn detection(&self, camera: &Camera, peak: &Peak) -> Option<Detection> {
+    fn detection(&self, camera: &Camera, surface: &Surface<'_>, peak: &Peak) -> Option<Detection> {
         let config = &self.config;
-        let sigma_height_m = if is_in_image(camera, peak) {
+        let measured = if config.measure_heads { surface.head(&peak.head) } else { None };
+        let sigma_height_m = if measured.is_some() {
+            config.sigma_measured_height_m
+        } else if is_in_image(camera, peak) {
             config.sigma_height_m
         } else {
             config.sigma_unseen_height_m
         };
         let sigmas = Vector3::new(config.sigma_m, config.sigma_m, sigma_height_m);
-        let region = camera.upper_body(&peak.head);
+        let head = measured.unwrap_or(peak.head);
+        let region = camera.upper_body(&head);
         let detection = Detection {
             image: Some(ImageBox::upper_body(region)),
-            position: peak.head,
+            position: head,
             covariance: Matrix3::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
             score: self.model.log_odds(peak.logit).min(config.max_score),
             source: NAME,
@@ -90,17 +95,18 @@ impl Detector for DepthNet {
             all.into_iter().partition(|peak| self.model.log_odds(peak.logit) >= least);
         funnel.drop_many("peak: score", low.len() as u64);
         let camera = &*frame.camera;
+        let surface = Surface::new(frame.depth()?, camera);
         Ok(match search {
             Query::Track(track) => self
                 .near(track, &found)
-                .and_then(|peak| self.detection(camera, peak))
+                .and_then(|peak| self.detection(camera, &surface, peak))
                 .into_iter()
                 .collect(),
             Query::Discover { .. } => {
                 // People who are tracked already would be discovered twice.
                 let free =
                     found.iter().filter(|peak| !search.is_occupied(&peak.head, separation_m));
-                free.filter_map(|peak| self.detection(camera, peak)).collect()
+                free.filter_map(|peak| self.detection(camera, &surface, peak)).collect()
             }
         })
     }

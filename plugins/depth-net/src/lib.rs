@@ -21,6 +21,7 @@ mod map;
 mod model;
 mod net;
 mod peaks;
+mod surface;
 #[cfg(test)]
 mod tests;
 #[cfg(feature = "train")]
