@@ -624,7 +624,7 @@ mod tests {
         let config = Config { method: Method::Partitioned, ..Config::default() };
         let fits = |scene: &[Person]| -> f64 {
             let near = scene.iter().find(|person| person.position.x < 2.5);
-            near.map_or(0.0, |near| if near.position.y > 0.05 { 0.0 } else { -50.0 })
+            near.map_or(0.0, |near| -0.5 * (near.position.y / 0.001).powi(2))
         };
         let (effective, rows) = looking(&config, &Formula::new(fits), |group, look| {
             partitioned(group, look).unwrap();
