@@ -98,9 +98,13 @@ fn keep_nearer(place: &mut Option<Obstacle>, thing: Obstacle) {
 
 /// Returns the direction of a place; `None` for a place that is far away or not a number.
 fn direction(at: &Point2<f64>) -> Option<usize> {
+    // Most points of an image are far away, and the angle costs more than the distance.
+    let is_near = at.coords.norm() < RANGE_M;
+    if !is_near {
+        return None;
+    }
     let part = at.y.atan2(at.x).rem_euclid(TAU) / TAU;
-    let direction = (part * DIRECTIONS as f64) as usize % DIRECTIONS;
-    (at.coords.norm() < RANGE_M).then_some(direction)
+    Some((part * DIRECTIONS as f64) as usize % DIRECTIONS)
 }
 
 #[cfg(test)]
