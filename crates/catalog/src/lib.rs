@@ -10,11 +10,7 @@ use tagalong_config::Registry;
 /// Registers every plugin of the workspace.
 pub fn register(registry: &mut Registry) {
     tagalong_arc_follow::register(registry);
-    tagalong_associate_buffered::register(registry);
-    tagalong_associate_hungarian::register(registry);
-    tagalong_associate_jpda::register(registry);
-    tagalong_associate_observation_centric::register(registry);
-    tagalong_associate_two_stage::register(registry);
+    tagalong_associators::register(registry);
     tagalong_body_net::register(registry);
     tagalong_clear_follow::register(registry);
     tagalong_color_texture::register(registry);

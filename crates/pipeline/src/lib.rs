@@ -34,7 +34,7 @@
 //! # }
 //!
 //! let mut registry = Registry::default();
-//! tagalong_associate_hungarian::register(&mut registry);
+//! tagalong_associators::hungarian::register(&mut registry);
 //! tagalong_ekf::register(&mut registry);
 //! tagalong_manage_m_of_n::register(&mut registry);
 //! registry.detector("nearest", "the nearest laser point", |_: NoSettings, _| Ok(Nearest));

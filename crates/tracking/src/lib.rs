@@ -59,7 +59,7 @@
 //!     }],
 //!     verifiers: Vec::new(),
 //!     associator: {
-//!         let hungarian = tagalong_associate_hungarian::Hungarian::new(Default::default())?;
+//!         let hungarian = tagalong_associators::hungarian::Hungarian::new(Default::default())?;
 //!         Guarded::new("associate-hungarian", Box::new(hungarian))
 //!     },
 //!     filter: {

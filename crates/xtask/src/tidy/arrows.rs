@@ -20,7 +20,6 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("steering", &[]),
     ("stereo", &["vision"]),
     ("odometry", &[]),
-    ("assignment", &["matching"]),
     ("tracking", &["vision"]),
     ("following", &["tracking", "vision"]),
     ("pipeline", &["stereo", "odometry", "tracking", "following", "network", "vision", "catalog"]),
@@ -91,7 +90,7 @@ const ARROWS: &[(&str, &[&str])] = &[
 const WORDS: &[&str] = &["stats", "geometry", "core", "config"];
 
 /// Crates that a plugin may depend on.
-const OF_PLUGINS: &[&str] = &["vision", "learn", "network", "assignment", "filtering", "steering"];
+const OF_PLUGINS: &[&str] = &["vision", "learn", "network", "matching", "filtering", "steering"];
 
 /// Crates that the tests of any crate may depend on in addition.
 const FOR_TESTS: &[&str] =
