@@ -26,10 +26,9 @@ pub fn register(registry: &mut Registry) {
     tagalong_joint_particle::register(registry);
     tagalong_laser_legs::register(registry);
     tagalong_last_seen::register(registry);
-    tagalong_manage_m_of_n::register(registry);
-    tagalong_manage_sprt::register(registry);
     tagalong_omni_appearance::register(registry);
     tagalong_onnx::register(registry);
     tagalong_recorded_detections::register(registry);
     tagalong_svm_patch::register(registry);
+    tagalong_track_managers::register(registry);
 }

@@ -67,7 +67,7 @@
 //!         Guarded::new("ekf", Box::new(PerPerson::new(ekf)))
 //!     },
 //!     manager: {
-//!         let counts = tagalong_manage_m_of_n::MOfN::new(Default::default())?;
+//!         let counts = tagalong_track_managers::m_of_n::MOfN::new(Default::default())?;
 //!         Guarded::new("manage-m-of-n", Box::new(counts))
 //!     },
 //!     describer: Describer::default(),

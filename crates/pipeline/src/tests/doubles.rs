@@ -101,7 +101,7 @@ impl World {
         let world = self.clone();
         tagalong_associators::hungarian::register(&mut registry);
         tagalong_image_kalman::register(&mut registry);
-        tagalong_manage_m_of_n::register(&mut registry);
+        tagalong_track_managers::m_of_n::register(&mut registry);
         registry.filter("steady", "believes what it saw", move |_: Config, _| {
             Ok(PerPerson::new(Steady(world.clone())))
         });

@@ -8,7 +8,7 @@ use tagalong_core::{
 use tagalong_geometry::Rect;
 
 use super::detection;
-use crate::{Config, Sprt};
+use crate::sprt::{Config, Sprt};
 
 const ID: TrackId = TrackId(1);
 

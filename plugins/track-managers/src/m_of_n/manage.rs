@@ -5,9 +5,9 @@ use tagalong_core::{
     Unassociated,
 };
 
-use crate::Config;
-use crate::clutter::ClutterMap;
-use crate::track::TrackCount;
+use crate::m_of_n::Config;
+use crate::m_of_n::clutter::ClutterMap;
+use crate::m_of_n::track::TrackCount;
 
 /// The track manager.
 pub struct MOfN {

@@ -1,8 +1,8 @@
 use nalgebra::Point2;
 use tagalong_core::{EgoMotion, Observation, Track, TrackHealth};
 
-use crate::Config;
-use crate::looks::Looks;
+use crate::sprt::Config;
+use crate::sprt::looks::Looks;
 
 /// Standard deviations of its position by which a track must be away from its start to have
 /// moved.

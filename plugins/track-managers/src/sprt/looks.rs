@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 use tagalong_core::EgoMotion;
 
-use crate::Config;
+use crate::sprt::Config;
 
 /// Most looks that are kept; the oldest one is forgotten.
 const MOST: usize = 32;

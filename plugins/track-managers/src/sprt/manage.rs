@@ -5,9 +5,9 @@ use tagalong_core::{
     Unassociated,
 };
 
-use crate::Config;
-use crate::clutter::ClutterMap;
-use crate::evidence::{Evidence, NEVER_MOVED};
+use crate::sprt::Config;
+use crate::sprt::clutter::ClutterMap;
+use crate::sprt::evidence::{Evidence, NEVER_MOVED};
 
 /// The track manager.
 pub struct Sprt {

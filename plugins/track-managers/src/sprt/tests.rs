@@ -8,7 +8,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{ImageBox, Rect};
 
-use crate::{Config, Sprt};
+use crate::sprt::{Config, Sprt};
 
 const DT_S: f64 = 0.1;
 
@@ -107,7 +107,7 @@ fn still() -> EgoMotion {
 #[test]
 fn the_promises_of_track_managers_are_kept() {
     let mut registry = Registry::default();
-    crate::register(&mut registry);
+    crate::sprt::register(&mut registry);
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }

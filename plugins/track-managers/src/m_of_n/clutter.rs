@@ -7,7 +7,7 @@
 use nalgebra::Point2;
 use tagalong_core::{Detection, EgoMotion};
 
-use crate::Config;
+use crate::m_of_n::Config;
 
 /// ClutterMap fade out below this, log-odds.
 const FAINT: f64 = 0.05;
@@ -71,7 +71,7 @@ impl ClutterMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::{person, scored};
+    use crate::m_of_n::tests::{person, scored};
 
     fn settings() -> Config {
         Config { doubt_s: 2.0, ..Config::default() }

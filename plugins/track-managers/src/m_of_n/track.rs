@@ -1,6 +1,6 @@
 use tagalong_core::{Observation, TrackHealth};
 
-use crate::Config;
+use crate::m_of_n::Config;
 
 /// Counts of one track.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{ImageBox, Rect};
 
-use crate::{Config, MOfN};
+use crate::m_of_n::{Config, MOfN};
 
 /// A person at a place on the floor, whose head is 1.6 m high.
 pub(crate) fn person(x: f64, y: f64) -> Detection {
@@ -105,7 +105,7 @@ fn confirmed(config: Config, score: f64, observations: &[Observation]) -> bool {
 #[test]
 fn the_promises_of_track_managers_are_kept() {
     let mut registry = Registry::default();
-    crate::register(&mut registry);
+    crate::m_of_n::register(&mut registry);
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }
