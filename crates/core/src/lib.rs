@@ -2,7 +2,8 @@
 //!
 //! All types that two crates of the workspace exchange are defined here and nowhere else: a
 //! [`Detector`] finds people in a [`Frame`] as [`Detection`]s, a [`Verifier`] judges them, an
-//! [`Associator`] assigns them to [`Track`]s, a [`Filter`] estimates their states, a
+//! [`Associator`] assigns them to [`Track`]s, a [`Filter`] (or a [`PersonFilter`], for one person
+//! at a time) estimates their states, a
 //! [`TrackManager`] starts and ends them, and a [`Controller`] steers after one of them.
 //!
 //! # Why a detection has a position, and a box if a camera made it
@@ -36,8 +37,10 @@ mod funnel;
 mod image;
 mod inputs;
 mod manager;
+mod mixture;
 mod motion;
 mod obstacles;
+mod person_filter;
 mod scan;
 mod sensors;
 mod time;
@@ -58,8 +61,10 @@ pub use inputs::{Capabilities, Input, Inputs, Usage};
 pub use manager::{
     Initiation, Observation, ObservedTrack, TrackChanges, TrackHealth, TrackManager, Unassociated,
 };
+pub use mixture::match_moments;
 pub use motion::{DiffDrive, EgoMotion, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, planar_pose};
 pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReading};
+pub use person_filter::{PerPerson, PersonFilter};
 pub use scan::{FurtherScans, LaserScan, RayReading, UnreadRay};
 pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};
 pub use time::Stamp;

@@ -24,7 +24,7 @@
 //!
 //! ```
 //! use tagalong_core::*;
-//! use tagalong_filtering::PerPerson;
+//! use tagalong_core::PerPerson;
 //! use tagalong_tracking::{
 //!     DetectorSettings, DetectorSlot, Guarded, Parts, Tracker, TrackerSettings,
 //! };

@@ -61,16 +61,6 @@ impl Kind {
             Self::Controller => template!("controller", "control"),
         }
     }
-
-    /// Returns the manifest: filters have a crate of shared parts.
-    fn manifest(self) -> String {
-        let core = "tagalong-core.workspace = true\n";
-        let filtering = "tagalong-filtering.workspace = true\n";
-        match self {
-            Self::Filter => MANIFEST.replace(core, &format!("{core}{filtering}")),
-            _ => MANIFEST.to_owned(),
-        }
-    }
 }
 
 /// Writes the crate, its lines in the workspace and the catalog, and a config.
@@ -83,7 +73,7 @@ pub fn create(workspace: &Workspace, kind: Kind, name: &str) -> Result<()> {
     let fill = |text: &str| fill(text, name);
     let folder = format!("plugins/{name}");
     let (verb, verb_text) = template.verb;
-    workspace.write(format!("{folder}/Cargo.toml"), &fill(&kind.manifest()))?;
+    workspace.write(format!("{folder}/Cargo.toml"), &fill(MANIFEST))?;
     workspace.write(format!("{folder}/README.md"), &fill(template.readme))?;
     workspace.write(format!("{folder}/src/lib.rs"), &fill(template.lib))?;
     workspace.write(format!("{folder}/src/config.rs"), &fill(template.config))?;

@@ -12,10 +12,10 @@ use std::time::Instant;
 
 use nalgebra::{Matrix3, Point3};
 use tagalong_core::{
-    Detection, EgoMotion, Evidence, Filter, Frame, Images, Matched, Result, Stamp, TrackId,
+    Detection, EgoMotion, Evidence, Filter, Frame, Images, Matched, PerPerson, Result, Stamp,
+    TrackId,
 };
 use tagalong_ekf::{Config, Ekf};
-use tagalong_filtering::PerPerson;
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 const ROUNDS: usize = 100;

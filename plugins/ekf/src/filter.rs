@@ -1,6 +1,7 @@
 use nalgebra::{Matrix2, Matrix3, Point3, SMatrix, SVector, Vector2, Vector3, Vector5};
-use tagalong_core::{Detection, EgoMotion, Estimate, Person, Result, Update};
-use tagalong_filtering::{PersonFilter, match_moments};
+use tagalong_core::{
+    Detection, EgoMotion, Estimate, Person, PersonFilter, Result, Update, match_moments,
+};
 use tagalong_geometry::Camera;
 
 use crate::Config;

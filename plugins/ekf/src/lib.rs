@@ -17,7 +17,7 @@ mod tests;
 pub use config::Config;
 pub use filter::{Ekf, State};
 use tagalong_config::Registry;
-use tagalong_filtering::PerPerson;
+use tagalong_core::PerPerson;
 
 /// Registers the filter `ekf`.
 pub fn register(registry: &mut Registry) {

@@ -1,8 +1,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{Matrix2, Matrix3, Point2, Point3, SMatrix, Vector2};
-use tagalong_core::{Detection, EgoMotion, Estimate, Person, Result, Update};
-use tagalong_filtering::PersonFilter;
+use tagalong_core::{Detection, EgoMotion, Estimate, Person, PersonFilter, Result, Update};
 use tagalong_geometry::Camera;
 
 use crate::Config;

@@ -10,7 +10,7 @@ mod filter;
 pub use config::Config;
 pub use filter::{LastSeen, State};
 use tagalong_config::Registry;
-use tagalong_filtering::PerPerson;
+use tagalong_core::PerPerson;
 
 /// Registers the filter `last-seen`.
 pub fn register(registry: &mut Registry) {

@@ -9,9 +9,8 @@ use nalgebra::{Matrix2, Matrix3, Matrix5, SMatrix, Vector5};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{Registry, check_settings};
-use tagalong_core::{Detection, EgoMotion, Estimate, Result, Update};
+use tagalong_core::{Detection, EgoMotion, Estimate, PerPerson, PersonFilter, Result, Update};
 use tagalong_ekf::{Ekf, State};
-use tagalong_filtering::{PerPerson, PersonFilter};
 use tagalong_geometry::Camera;
 
 /// A coordinate with a larger variance, m², was not measured.

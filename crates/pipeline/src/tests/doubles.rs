@@ -10,10 +10,9 @@ use tagalong_config::Registry;
 use tagalong_core::{
     Association, Associations, Associator, Capabilities, Controller, Detection, Detector,
     EgoMotion, Error, Estimate, Evidence, Filter, FilterRequirements, Frame, Funnel, Gate, Images,
-    Input, Inputs, LaserScan, Likelihood, Person, Query, Result, Scene, Stamp, Track, TrackId,
-    Twist, Update, Verifier, WheelSpeeds,
+    Input, Inputs, LaserScan, Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene,
+    Stamp, Track, TrackId, Twist, Update, Verifier, WheelSpeeds,
 };
-use tagalong_filtering::{PerPerson, PersonFilter};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
 use crate::{FrameReport, Pipeline};

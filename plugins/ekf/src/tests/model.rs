@@ -3,8 +3,7 @@
 use nalgebra::{Matrix3, Point3, SMatrix, Vector3, Vector5};
 use proptest::prelude::*;
 use tagalong_config::{Context, Registry};
-use tagalong_core::{DiffDrive, EgoMotion};
-use tagalong_filtering::PersonFilter;
+use tagalong_core::{DiffDrive, EgoMotion, PersonFilter};
 
 use super::world::{DT_S, World, camera, detection, normal3};
 use crate::filter::{inverse, less_seen, motion_jacobian, moved, state_jacobian};

@@ -1,8 +1,7 @@
 //! A person at rest observed from a moving robot stays at rest in the world.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
-use tagalong_core::EgoMotion;
-use tagalong_filtering::PersonFilter;
+use tagalong_core::{EgoMotion, PersonFilter};
 
 use super::world::{DT_S, World, mean, normal3, track};
 use crate::{Config, Ekf, State};

@@ -2,8 +2,7 @@
 //! that the numbers are the same everywhere.
 
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, Rotation2, Vector2, Vector3};
-use tagalong_core::{Detection, EgoMotion};
-use tagalong_filtering::PersonFilter;
+use tagalong_core::{Detection, EgoMotion, PersonFilter};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 use tagalong_stats::{RandomSource, SplitMix64};
 

@@ -1,8 +1,6 @@
 use std::collections::BTreeMap;
 
-use tagalong_core::{
-    Detection, EgoMotion, Estimate, Evidence, Filter, Matched, Result, TrackId, Update,
-};
+use crate::{Detection, EgoMotion, Estimate, Evidence, Filter, Matched, Result, TrackId, Update};
 use tagalong_geometry::Camera;
 
 /// A filter of one person.
@@ -122,8 +120,8 @@ impl<F: PersonFilter> Filter for PerPerson<F> {
 mod tests {
     use std::sync::Arc;
 
+    use crate::{FilterRequirements, Frame, Images, Person, Stamp};
     use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
-    use tagalong_core::{FilterRequirements, Frame, Images, Person, Stamp};
     use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;

@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 /// ```
 /// # use nalgebra::{Vector1, Matrix1};
 /// let parts = [(0.5, Vector1::new(-1.0), Matrix1::new(0.1)), (0.5, Vector1::new(1.0), Matrix1::new(0.1))];
-/// let (mean, covariance) = tagalong_filtering::match_moments(&parts);
+/// let (mean, covariance) = tagalong_core::match_moments(&parts);
 /// assert_eq!((mean.x, covariance.x), (0.0, 1.1));
 /// ```
 pub fn match_moments<const N: usize>(
