@@ -18,14 +18,11 @@ pub fn register(registry: &mut Registry) {
     tagalong_correlation::register(registry);
     tagalong_depth_net::register(registry);
     tagalong_depth_template::register(registry);
-    tagalong_ekf::register(registry);
     tagalong_face_rgbd::register(registry);
-    tagalong_floor_kalman::register(registry);
+    tagalong_filters::register(registry);
     tagalong_hog_upper_body::register(registry);
-    tagalong_image_kalman::register(registry);
     tagalong_joint_particle::register(registry);
     tagalong_laser_legs::register(registry);
-    tagalong_last_seen::register(registry);
     tagalong_omni_appearance::register(registry);
     tagalong_onnx::register(registry);
     tagalong_recorded_detections::register(registry);

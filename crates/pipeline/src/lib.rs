@@ -35,7 +35,7 @@
 //!
 //! let mut registry = Registry::default();
 //! tagalong_associators::hungarian::register(&mut registry);
-//! tagalong_ekf::register(&mut registry);
+//! tagalong_filters::ekf::register(&mut registry);
 //! tagalong_track_managers::m_of_n::register(&mut registry);
 //! registry.detector("nearest", "the nearest laser point", |_: NoSettings, _| Ok(Nearest));
 //! let config = "filter.plugin = 'ekf'\n[[detectors]]\nplugin = 'nearest'\n";

@@ -63,7 +63,7 @@
 //!         Guarded::new("associate-hungarian", Box::new(hungarian))
 //!     },
 //!     filter: {
-//!         let ekf = tagalong_ekf::Ekf::new(Default::default())?;
+//!         let ekf = tagalong_filters::ekf::Ekf::new(Default::default())?;
 //!         Guarded::new("ekf", Box::new(PerPerson::new(ekf)))
 //!     },
 //!     manager: {

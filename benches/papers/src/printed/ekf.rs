@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{Registry, check_settings};
 use tagalong_core::{Detection, EgoMotion, Estimate, PerPerson, PersonFilter, Result, Update};
-use tagalong_ekf::{Ekf, State};
+use tagalong_filters::ekf::{Ekf, State};
 use tagalong_geometry::Camera;
 
 /// A coordinate with a larger variance, m², was not measured.
@@ -70,8 +70,10 @@ impl PrintedEkf {
     pub fn new(config: Config) -> Result<Self> {
         check_settings(&config)?;
         let initial_velocity_variance = config.initial_velocity_variance;
-        let settings = tagalong_ekf::Config { initial_velocity_variance, ..Default::default() };
-        let exact = Ekf::new(tagalong_ekf::Config { extra_sigma_m: 0.0, ..settings.clone() })?;
+        let settings =
+            tagalong_filters::ekf::Config { initial_velocity_variance, ..Default::default() };
+        let exact =
+            Ekf::new(tagalong_filters::ekf::Config { extra_sigma_m: 0.0, ..settings.clone() })?;
         Ok(Self { config, corrected: Ekf::new(settings)?, exact })
     }
 

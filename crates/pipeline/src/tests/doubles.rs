@@ -99,7 +99,7 @@ impl World {
         registry.verifier("choosy", "doubts some", |config: Config, _| Ok(Choosy(config)));
         let world = self.clone();
         tagalong_associators::hungarian::register(&mut registry);
-        tagalong_image_kalman::register(&mut registry);
+        tagalong_filters::image_kalman::register(&mut registry);
         tagalong_track_managers::m_of_n::register(&mut registry);
         registry.filter("steady", "believes what it saw", move |_: Config, _| {
             Ok(PerPerson::new(Steady(world.clone())))

@@ -6,8 +6,8 @@ use nalgebra::{
 use tagalong_core::{Detection, EgoMotion, Estimate, Person, Update};
 use tagalong_geometry::{Camera, Rect};
 
-use crate::Config;
-use crate::space::{ImagePoint, RobotPoint, pixel_covariance, range};
+use crate::image_kalman::Config;
+use crate::image_kalman::space::{ImagePoint, RobotPoint, pixel_covariance, range};
 
 type Matrix3x5 = SMatrix<f64, 3, 5>;
 

@@ -7,7 +7,7 @@ mod world;
 #[test]
 fn it_keeps_the_promises_of_its_kind() {
     let mut registry = Registry::default();
-    crate::register(&mut registry);
+    crate::ekf::register(&mut registry);
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }

@@ -6,7 +6,7 @@ use tagalong_core::{Detection, EgoMotion, PersonFilter};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 use tagalong_stats::{RandomSource, SplitMix64};
 
-use crate::{Ekf, State};
+use crate::ekf::{Ekf, State};
 
 pub const DT_S: f64 = 0.09;
 pub const SIGMA_M: f64 = 0.05;

@@ -1,6 +1,6 @@
 use nalgebra::{Matrix2, Matrix4, Matrix4x2, Vector2, Vector4};
 
-use crate::{Config, Form};
+use crate::floor_kalman::{Config, Form};
 
 /// Gaussian state of a person, in the room. The forms without velocity use the position's part of
 /// mean and covariance only.

@@ -4,7 +4,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::Camera;
 
-use crate::Config;
+use crate::ekf::Config;
 
 type Matrix5 = SMatrix<f64, 5, 5>;
 type Matrix5x3 = SMatrix<f64, 5, 3>;

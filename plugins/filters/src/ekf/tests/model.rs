@@ -6,8 +6,8 @@ use tagalong_config::{Context, Registry};
 use tagalong_core::{DiffDrive, EgoMotion, PersonFilter};
 
 use super::world::{DT_S, World, camera, detection, normal3};
-use crate::filter::{inverse, less_seen, motion_jacobian, moved, state_jacobian};
-use crate::{Config, Ekf, State};
+use crate::ekf::filter::{inverse, less_seen, motion_jacobian, moved, state_jacobian};
+use crate::ekf::{Config, Ekf, State};
 
 fn filter(config: Config) -> Ekf {
     Ekf::new(config).unwrap()
@@ -303,7 +303,7 @@ fn the_region_is_that_of_the_estimated_place() {
 #[test]
 fn settings_that_cannot_work_are_refused() {
     let mut registry = Registry::default();
-    crate::register(&mut registry);
+    crate::ekf::register(&mut registry);
     let context = Context {
         seed: 0,
         base_dir: ".".into(),

@@ -7,7 +7,7 @@
 use tagalong_core::{Detection, EgoMotion};
 use tagalong_geometry::{Camera, ImageBox, Rect};
 
-use crate::{Config, State};
+use crate::image_kalman::{Config, State};
 
 /// Longest gap that is bridged, frames; a longer one says nothing about the way.
 const MAX_FRAMES: usize = 256;

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use tagalong_core::{EgoMotion, PersonFilter};
 
 use super::world::{DT_S, World, mean, normal3, track};
-use crate::{Config, Ekf, State};
+use crate::ekf::{Config, Ekf, State};
 
 const SEEDS: u64 = 40;
 const SPEED_MPS: f64 = 0.5;

@@ -8,8 +8,8 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
-use crate::space::{ImagePoint, RobotPoint, pixel_covariance};
-use crate::{Config, ImageKalman, State};
+use crate::image_kalman::space::{ImagePoint, RobotPoint, pixel_covariance};
+use crate::image_kalman::{Config, ImageKalman, State};
 
 mod camera_motion;
 
@@ -56,7 +56,7 @@ fn sliding(frames: usize) -> Vec<Detection> {
 #[test]
 fn it_conforms() {
     let mut registry = Registry::default();
-    crate::register(&mut registry);
+    crate::image_kalman::register(&mut registry);
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }

@@ -2,7 +2,7 @@
 //! rounds of a thousand. `benches/peers/kernels.py` compares it with OpenCV's and filterpy's filters.
 //!
 //! ```sh
-//! cargo run --release -p tagalong-ekf --example time_filter
+//! cargo run --release -p tagalong-filters --example time_filter
 //! ```
 #![allow(clippy::print_stdout, reason = "an example answers on the terminal")]
 
@@ -15,7 +15,7 @@ use tagalong_core::{
     Detection, EgoMotion, Evidence, Filter, Frame, Images, Matched, PerPerson, Result, Stamp,
     TrackId,
 };
-use tagalong_ekf::{Config, Ekf};
+use tagalong_filters::ekf::{Config, Ekf};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 const ROUNDS: usize = 100;

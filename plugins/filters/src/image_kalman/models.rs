@@ -9,8 +9,8 @@
 use tagalong_core::{Detection, EgoMotion, Estimate, Update};
 use tagalong_geometry::Camera;
 
-use crate::reupdate::Gap;
-use crate::{Config, State};
+use crate::image_kalman::reupdate::Gap;
+use crate::image_kalman::{Config, State};
 
 /// Least probability of a model, so that one that did not fit for long can still take over.
 const LEAST: f64 = 1e-4;

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Matrix3, Point2, Point3, SMatrix, Vector2};
 use tagalong_core::{Detection, EgoMotion, Estimate, Person, PersonFilter, Result, Update};
 use tagalong_geometry::Camera;
 
-use crate::Config;
+use crate::last_seen::Config;
 
 /// Random walk of the height of an unobserved head, metres per square root of a second.
 const HEIGHT_WANDER: f64 = 0.1;

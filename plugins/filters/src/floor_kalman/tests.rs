@@ -7,8 +7,8 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
-use crate::state::State;
-use crate::{Config, FloorKalman, Form, Measurement};
+use crate::floor_kalman::state::State;
+use crate::floor_kalman::{Config, FloorKalman, Form, Measurement};
 
 const ID: TrackId = TrackId(1);
 
@@ -147,8 +147,8 @@ fn settings_that_cannot_work_are_refused() {
 #[test]
 fn it_keeps_the_promises_of_its_kind() {
     let mut registry = tagalong_config::Registry::default();
-    crate::register(&mut registry);
-    assert!(registry.find(crate::NAME).is_ok());
+    crate::floor_kalman::register(&mut registry);
+    assert!(registry.find(crate::floor_kalman::NAME).is_ok());
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }

@@ -5,8 +5,8 @@ use tagalong_core::{
 };
 use tagalong_geometry::Camera;
 
-use crate::Config;
-use crate::models::{Models, configs_of};
+use crate::image_kalman::Config;
+use crate::image_kalman::models::{Models, configs_of};
 
 /// Kalman filter of the box in the image, with one state for each track, or two that interact.
 pub struct ImageKalman {

@@ -7,7 +7,7 @@ use tagalong_core::{EgoMotion, Evidence, Filter, Frame, Images, Matched, Stamp, 
 use tagalong_geometry::{Camera, Lens, Pinhole};
 
 use super::{DT_S, camera, person};
-use crate::{Config, ImageKalman, State};
+use crate::image_kalman::{Config, ImageKalman, State};
 
 /// The same lens and place, looking down by more.
 fn nodding(by_rad: f64) -> Arc<Camera> {

@@ -6,8 +6,8 @@ use tagalong_core::{
 };
 use tagalong_geometry::Camera;
 
-use crate::state::State;
-use crate::{Config, Measurement};
+use crate::floor_kalman::state::State;
+use crate::floor_kalman::{Config, Measurement};
 
 /// A coordinate with a larger variance, m², was not measured.
 const UNMEASURED_M2: f64 = 100.0;
