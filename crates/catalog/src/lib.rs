@@ -9,12 +9,11 @@ use tagalong_config::Registry;
 
 /// Registers every plugin of the workspace.
 pub fn register(registry: &mut Registry) {
-    tagalong_arc_follow::register(registry);
     tagalong_associators::register(registry);
     tagalong_body_net::register(registry);
-    tagalong_clear_follow::register(registry);
     tagalong_color_texture::register(registry);
     tagalong_compressive::register(registry);
+    tagalong_controllers::register(registry);
     tagalong_correlation::register(registry);
     tagalong_depth_net::register(registry);
     tagalong_depth_template::register(registry);

@@ -13,7 +13,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
-use crate::{ArcFollow, Config, Path};
+use crate::arc_follow::{ArcFollow, Config, Path};
 
 const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.0 };
 const MAX_MPS: f64 = 0.9;
@@ -95,7 +95,7 @@ impl Drive {
 #[test]
 fn it_conforms() {
     let mut registry = Registry::default();
-    crate::register(&mut registry);
+    crate::arc_follow::register(&mut registry);
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }

@@ -1,10 +1,10 @@
+use crate::{CommandHistory, coasting_weight, step_s};
 use nalgebra::{Point2, Vector2};
 use tagalong_core::{Controller, EgoMotion, Input, Inputs, Scene, Track, Twist, WheelSpeeds};
-use tagalong_steering::{CommandHistory, coasting_weight, step_s};
 
-use crate::around::NearestObstacles;
-use crate::config::{Config, MOST};
-use crate::plan::{PlanningInput, Walker, plan};
+use crate::clear_follow::around::NearestObstacles;
+use crate::clear_follow::config::{Config, MOST};
+use crate::clear_follow::plan::{PlanningInput, Walker, plan};
 
 /// Distance within which points belong to a person, m.
 const PERSON_M: f64 = 0.45;

@@ -12,7 +12,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
-use crate::{ClearFollow, Config};
+use crate::clear_follow::{ClearFollow, Config};
 
 const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.0 };
 const MAX_MPS: f64 = 0.9;
@@ -63,7 +63,7 @@ fn prompt() -> Config {
 #[test]
 fn it_keeps_the_promises_of_controllers() {
     let mut registry = Registry::default();
-    crate::register(&mut registry);
+    crate::clear_follow::register(&mut registry);
     let failures = tagalong_conformance::check_all(&registry);
     assert!(failures.is_empty(), "{failures:#?}");
 }

@@ -1,12 +1,12 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
+use crate::{CommandHistory, coasting_weight, step_s};
 use nalgebra::Vector2;
 use tagalong_core::{Controller, EgoMotion, Scene, Track, Twist, WheelSpeeds};
-use tagalong_steering::{CommandHistory, coasting_weight, step_s};
 
-use crate::aim::Aim;
-use crate::config::{Config, MOST, Path};
-use crate::trail::Trail;
+use crate::arc_follow::aim::Aim;
+use crate::arc_follow::config::{Config, MOST, Path};
+use crate::arc_follow::trail::Trail;
 
 /// Bearing from which on the robot turns towards the person, wherever they went, rad.
 const IN_VIEW_RAD: f64 = 0.4;

@@ -1,7 +1,7 @@
 use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_core::Twist;
 
-use crate::config::Config;
+use crate::clear_follow::config::Config;
 
 /// The horizon is looked at in so many steps.
 const STEPS: u32 = 6;

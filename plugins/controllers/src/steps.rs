@@ -1,9 +1,3 @@
-//! Shared parts of controllers: the commands that the wheels have not executed yet, the time step
-//! of a frame, and the caution towards a target that was not seen lately.
-
-mod history;
-
-pub use history::CommandHistory;
 use tagalong_core::EgoMotion;
 
 /// A longer pause between frames counts as this one, s: speeds must not jump after it.
