@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3};
 use tagalong_core::{Association, Associations, Associator, Detection, Track};
-use tagalong_stats::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64};
 
 use crate::samples::{GATE, track_at, with_variance};
 use crate::scenes::{level, sighting};

@@ -12,7 +12,7 @@ use tagalong_core::{
     TrackId, Update,
 };
 use tagalong_geometry::Camera;
-use tagalong_stats::SplitMix64;
+use tagalong_math::SplitMix64;
 
 use crate::scenes::{DT_S, level, moving_frame, odd_frames, sighting};
 use crate::subject::{From, Subject};

@@ -7,7 +7,7 @@ use tagalong_core::{
     Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track, TrackId,
     TrackManager, Unassociated,
 };
-use tagalong_stats::SplitMix64;
+use tagalong_math::SplitMix64;
 
 use crate::scenes::{DT_S, level, sighting};
 use crate::subject::{From, Subject};

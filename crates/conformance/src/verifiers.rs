@@ -2,7 +2,7 @@
 
 use tagalong_core::{Detection, Error, Frame, Verifier};
 use tagalong_geometry::{ImageBox, Rect};
-use tagalong_stats::SplitMix64;
+use tagalong_math::SplitMix64;
 
 use crate::figure::Figure;
 use crate::scenes::{bare_frame, drawn, level, odd_frames, required, restricted, sighting};

@@ -218,7 +218,7 @@ fn pose(state: &State) -> Isometry2<f64> {
 /// Returns the median; `None` of fewer than [`LEAST_POINTS`] values.
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let values: Vec<f64> = values.collect();
-    (values.len() >= LEAST_POINTS).then(|| tagalong_stats::median(values)).flatten()
+    (values.len() >= LEAST_POINTS).then(|| tagalong_math::median(values)).flatten()
 }
 
 #[cfg(test)]

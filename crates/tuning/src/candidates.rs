@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 
+use tagalong_math::{ChaCha, RandomSource};
 use tagalong_pipeline::Tunable;
-use tagalong_stats::{ChaCha, RandomSource};
 
 /// One value for each tunable setting, in their order.
 pub type Candidate = Vec<toml::Value>;

@@ -86,7 +86,7 @@ pub fn mean<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Figures {
     let all: Vec<&Figures> = figures.into_iter().collect();
     let part = |figure: fn(&Figures) -> Option<f64>| {
         let values: Vec<f64> = all.iter().filter_map(|figures| figure(figures)).collect();
-        tagalong_stats::mean(&values)
+        tagalong_math::mean(&values)
     };
     Figures {
         hota: part(|f| Some(f.hota)).unwrap_or(0.0),

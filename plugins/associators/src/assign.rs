@@ -1,6 +1,6 @@
 use std::cell::RefCell;
 
-use tagalong_matching::Matcher;
+use tagalong_math::matching::Matcher;
 
 thread_local! {
     /// Kept for its memory alone: with few people more time would go into asking for that than

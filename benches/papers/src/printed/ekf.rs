@@ -172,7 +172,7 @@ mod tests {
     use nalgebra::{Isometry2, Point2, Point3, Rotation2, Vector2, Vector3};
     use tagalong_core::DiffDrive;
     use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
-    use tagalong_stats::{RandomSource as _, SplitMix64};
+    use tagalong_math::{RandomSource as _, SplitMix64};
 
     use super::*;
 

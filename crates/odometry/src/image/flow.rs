@@ -119,7 +119,7 @@ mod tests {
     fn pattern(x: f64, y: f64) -> f64 {
         let knot = |i: f64, j: f64| {
             let at = (i + 1000.0) * 4000.0 + j + 1000.0;
-            (tagalong_stats::number_at(5, at as u64) >> 56) as f64
+            (tagalong_math::number_at(5, at as u64) >> 56) as f64
         };
         let i = (x / 16.0).floor();
         let j = (y / 16.0).floor();

@@ -1,7 +1,7 @@
 //! Rotation and zoom of a camera, fitted to points of which some are wrong.
 
 use nalgebra::{Matrix2x4, Matrix4, Rotation3, Vector2, Vector3, Vector4};
-use tagalong_stats::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64};
 
 /// Seed of the samples: the same for each frame, so that a run can be repeated.
 const SEED: u64 = 0x5151_1A12;

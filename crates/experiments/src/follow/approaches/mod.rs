@@ -16,9 +16,9 @@ use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
+use tagalong_math::{RandomSource, SplitMix64};
 use tagalong_report::Table;
 use tagalong_sim::{InjectedFault, Scene, Seeds, Split};
-use tagalong_stats::{RandomSource, SplitMix64};
 use tagalong_trials::{
     ApproachJudge, ApproachWatch, Approached, Contender, Ride, TrialError, in_order,
 };

@@ -1,6 +1,6 @@
+use tagalong_math::{CONFIDENCE, exact_upper_bound, percentile};
 use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::{ApproachBy, Seeds};
-use tagalong_stats::{CONFIDENCE, exact_upper_bound, percentile};
 use tagalong_trials::{ApproachJudge, Approached, Contact, Side, Touched};
 
 use super::Outlived;

@@ -106,7 +106,7 @@ proptest! {
         seed in any::<u64>(), sigma in 1e-4..1.0f64, motion in motions(),
     ) {
         let filter = filter(Config::default());
-        let mut random = tagalong_stats::SplitMix64::new(seed);
+        let mut random = tagalong_math::SplitMix64::new(seed);
         let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
         for _ in 0..30 {
             filter.predict(&mut state, &motion);

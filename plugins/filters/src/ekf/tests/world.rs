@@ -4,7 +4,7 @@
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, Rotation2, Vector2, Vector3};
 use tagalong_core::{Detection, EgoMotion, PersonFilter};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
-use tagalong_stats::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64};
 
 use crate::ekf::{Ekf, State};
 

@@ -67,7 +67,7 @@ impl Matcher {
     /// are never matched, and the rest holds as for [`Matcher::best`].
     ///
     /// ```
-    /// use tagalong_matching::Matcher;
+    /// use tagalong_math::matching::Matcher;
     /// let weights = [3.0, 2.0, 2.5, 0.0];
     /// assert_eq!(Matcher::new().best_of_matrix(2, 2, &weights), [Some(1), Some(0)]);
     /// ```

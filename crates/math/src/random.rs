@@ -62,7 +62,7 @@ pub trait RandomSource {
 /// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014): small, seeded, the same everywhere.
 ///
 /// ```
-/// use tagalong_stats::{RandomSource, SplitMix64};
+/// use tagalong_math::{RandomSource, SplitMix64};
 /// assert_eq!(SplitMix64::new(1_234_567).next_u64(), 6_457_827_717_110_365_317);
 /// ```
 #[derive(Clone, Debug)]
@@ -127,7 +127,7 @@ impl RandomSource for XorShift64 {
 /// machine, and another one for nearly all other bytes.
 ///
 /// ```
-/// use tagalong_stats::fingerprint;
+/// use tagalong_math::fingerprint;
 /// assert_eq!(fingerprint(*b"foobar"), 0x8594_4171_f739_67e8);
 /// ```
 pub fn fingerprint(bytes: impl IntoIterator<Item = u8>) -> u64 {

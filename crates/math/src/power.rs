@@ -3,7 +3,7 @@
 /// instructions with the same bits on every processor.
 ///
 /// ```
-/// use tagalong_stats::exp2_of_negative;
+/// use tagalong_math::exp2_of_negative;
 /// assert_eq!(exp2_of_negative(-3.0), 0.125);
 /// ```
 #[inline(always)]

@@ -27,7 +27,7 @@ pub struct Gain {
 /// different length, or hold a value that is no number.
 ///
 /// ```
-/// let gain = tagalong_stats::paired_gain(&[0.5, 0.2, 0.7], &[0.6, 0.4, 0.8]).unwrap();
+/// let gain = tagalong_math::paired_gain(&[0.5, 0.2, 0.7], &[0.6, 0.4, 0.8]).unwrap();
 /// assert!((gain.difference.estimate - 0.4 / 3.0).abs() < 1e-12);
 /// assert_eq!(gain.p_value, 0.25, "three draws cannot say more");
 /// ```
@@ -50,8 +50,8 @@ pub fn is_significant(p_value: f64) -> bool {
 /// Smyth, 2010). Nothing without differences, or with one that is no number.
 ///
 /// ```
-/// assert_eq!(tagalong_stats::sign_flip(&[0.1, 0.2]), Some(0.5));
-/// assert_eq!(tagalong_stats::sign_flip(&[0.1; 6]), Some(2.0 / 64.0));
+/// assert_eq!(tagalong_math::sign_flip(&[0.1, 0.2]), Some(0.5));
+/// assert_eq!(tagalong_math::sign_flip(&[0.1; 6]), Some(2.0 / 64.0));
 /// ```
 pub fn sign_flip(differences: &[f64]) -> Option<f64> {
     let mut sizes: Vec<f64> = differences.iter().map(|d| d.abs()).collect();
@@ -96,7 +96,7 @@ fn drawn_sum(sizes: &[f64], random: &mut SplitMix64) -> f64 {
 /// in twenty is below 0.05 by chance. One alone stays as it is.
 ///
 /// ```
-/// assert_eq!(tagalong_stats::holm(&[0.03, 0.01, 0.2]), [0.06, 0.03, 0.2]);
+/// assert_eq!(tagalong_math::holm(&[0.03, 0.01, 0.2]), [0.06, 0.03, 0.2]);
 /// ```
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p_values.len()).collect();

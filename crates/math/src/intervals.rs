@@ -42,7 +42,7 @@ impl Interval {
     /// without ends stays so.
     ///
     /// ```
-    /// let interval = tagalong_stats::mean_interval(&[0.9, 1.0, 1.0]).unwrap();
+    /// let interval = tagalong_math::mean_interval(&[0.9, 1.0, 1.0]).unwrap();
     /// assert!(interval.upper > 1.0 && interval.within(0.0, 1.0).upper == 1.0);
     /// ```
     #[must_use]
@@ -78,7 +78,7 @@ fn open_above<'de, D: Deserializer<'de>>(end: D) -> Result<f64, D::Error> {
 /// `confidence` lies between 0 and 1, both excluded, for example 0.95.
 ///
 /// ```
-/// let rate = tagalong_stats::wilson(10, 10, 0.95).unwrap();
+/// let rate = tagalong_math::wilson(10, 10, 0.95).unwrap();
 /// assert_eq!(rate.estimate, 1.0);
 /// assert!((rate.lower - 0.7225).abs() < 1e-4);
 /// ```
@@ -92,7 +92,7 @@ pub fn wilson(successes: u64, trials: u64, confidence: f64) -> Option<Interval> 
 /// events, like contacts, of which only the upper end matters. `None` without trials.
 ///
 /// ```
-/// let bound = tagalong_stats::exact_upper_bound(0, 3000, 0.95).unwrap();
+/// let bound = tagalong_math::exact_upper_bound(0, 3000, 0.95).unwrap();
 /// assert!((bound - 0.001).abs() < 1e-5, "three thousand without an event: one in a thousand");
 /// ```
 pub fn exact_upper_bound(events: u64, trials: u64, confidence: f64) -> Option<f64> {
@@ -151,7 +151,7 @@ fn student_quantile(freedom: usize) -> f64 {
 /// Nothing without trials; an interval without ends from one cluster of several.
 ///
 /// ```
-/// use tagalong_stats::{clustered_share, wilson};
+/// use tagalong_math::{clustered_share, wilson};
 /// let alone = clustered_share(&[[1, 1], [0, 1], [1, 1]]).unwrap();
 /// assert_eq!(Some(alone), wilson(2, 3, 0.95), "one trial each: independent");
 /// let rides = clustered_share(&[[90, 100], [95, 100], [40, 100]]).unwrap();
@@ -200,7 +200,7 @@ fn independent_trials(clusters: &[[u64; 2]], rate: f64, trials: f64) -> f64 {
 /// For a figure of all draws together combine their own tallies:
 ///
 /// ```
-/// use tagalong_stats::draws_interval;
+/// use tagalong_math::draws_interval;
 /// // Found and missed people of two runs.
 /// let runs = [[8.0, 2.0], [5.0, 0.0]];
 /// let recall = |drawn: &[usize]| {

@@ -1,4 +1,4 @@
-//! Random numbers and statistics, in one place for the whole workspace.
+//! Random numbers, statistics and exact assignment, in one place for the whole workspace.
 //!
 //! * [`SplitMix64`], [`ChaCha`], [`XorShift64`]: seeded generators with the same numbers on every
 //!   machine; [`RandomSource`] has the distributions. [`mix`] and [`number_at`] turn keys into
@@ -8,11 +8,14 @@
 //! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`],
 //!   [`exact_upper_bound`]: how far a figure can be trusted; [`paired_gain`], [`sign_flip`],
 //!   [`holm`]: how far a difference can.
+//! * [`matching`]: the assignment of rows to columns with the greatest weight, for metrics and for
+//!   associators.
 //! * [`exp2_of_negative`]: an exponential function for loops over many numbers.
 //!
 //! There is no clock and no global generator: the same seed gives the same bytes.
 
 mod intervals;
+pub mod matching;
 mod power;
 mod random;
 mod significance;

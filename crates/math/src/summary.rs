@@ -1,7 +1,7 @@
 /// Returns the mean; `None` without values.
 ///
 /// ```
-/// assert_eq!(tagalong_stats::mean(&[1.0, 3.0]), Some(2.0));
+/// assert_eq!(tagalong_math::mean(&[1.0, 3.0]), Some(2.0));
 /// ```
 pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
@@ -19,7 +19,7 @@ pub fn mean_and_deviation(values: &[f64]) -> Option<(f64, f64)> {
 /// always one of the values; `None` without values.
 ///
 /// ```
-/// assert_eq!(tagalong_stats::median([4.0, 1.0, 3.0, 2.0]), Some(3.0));
+/// assert_eq!(tagalong_math::median([4.0, 1.0, 3.0, 2.0]), Some(3.0));
 /// ```
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
