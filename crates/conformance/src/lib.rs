@@ -29,6 +29,7 @@ pub mod patch;
 pub mod samples;
 mod scenes;
 mod subject;
+pub mod testdata;
 mod verifiers;
 
 use std::collections::BTreeSet;

@@ -6,7 +6,7 @@
 //! one; if [`REQUIRE`] is set to `1`, the test fails instead.
 //!
 //! ```no_run
-//! let Some(log) = tagalong_testdata::find("logs/um.mcap") else { return };
+//! let Some(log) = tagalong_conformance::testdata::find("logs/um.mcap") else { return };
 //! ```
 
 use std::io::Write;
