@@ -114,10 +114,10 @@ pub use tagalong_following::{
     LockReport, LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission,
     RobotSettings, SafetyDistances, SearchSettings, SourceKind, SourceSettings, TargetSettings,
 };
-pub use tagalong_odometry::{MotionSource, OdometrySettings};
 pub use tagalong_stereo::StereoSettings;
 pub use tagalong_tracking::StepError;
 pub use tagalong_tracking::{
     Candidate, ClockSettings, DetectorSettings, Fate, MergeSettings, OcclusionSettings, Outcome,
     Role, Weighing,
 };
+pub use tagalong_vision::odometry::{MotionSource, OdometrySettings};

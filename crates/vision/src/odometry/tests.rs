@@ -6,7 +6,7 @@ use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_core::{DepthImage, EgoMotion, Frame, Funnel, GreyImage, Images, Stamp};
 use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
 
-use crate::{OdometrySettings, VisualOdometry};
+use crate::odometry::{OdometrySettings, VisualOdometry};
 
 const SIZE: (usize, usize) = (192, 144);
 /// Distance of the wall, m.

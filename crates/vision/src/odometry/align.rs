@@ -8,8 +8,8 @@
 use nalgebra::{Isometry2, Isometry3, Matrix3, Matrix4, Vector2, Vector3, Vector4};
 use tagalong_geometry::{Camera, Pinhole};
 
-use crate::keyframe::{Keyframe, Point, Pyramid};
-use crate::patch::Difference;
+use crate::odometry::keyframe::{Keyframe, Point, Pyramid};
+use crate::odometry::patch::Difference;
 
 /// Maximum number of steps at each of the two image sizes.
 const STEPS: usize = 12;
@@ -228,7 +228,7 @@ mod tests {
     use tagalong_geometry::Distortion;
 
     use super::*;
-    use crate::OdometrySettings;
+    use crate::odometry::OdometrySettings;
 
     #[test]
     fn wheels_are_not_wrong_by_any_angle() {

@@ -4,8 +4,8 @@ use nalgebra::{Isometry2, Point2, Point3, Vector2};
 use tagalong_core::{DepthImage, GreyImage};
 use tagalong_geometry::Camera;
 
-use crate::OdometrySettings;
-use crate::patch::Patch;
+use crate::odometry::OdometrySettings;
+use crate::odometry::patch::Patch;
 
 /// Distance at which the depth around a point is checked, px.
 const NEAR: i64 = 3;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Point2, Vector2};
 use tagalong_core::GreyImage;
 
-use crate::patch::Patch;
+use crate::odometry::patch::Patch;
 
 /// Most steps at each size of the images.
 const STEPS: usize = 15;
@@ -113,7 +113,7 @@ fn refined(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::levels;
+    use crate::odometry::image::levels;
 
     /// A pattern without a period: random brightness in squares of 16 pixels, and smooth between.
     fn pattern(x: f64, y: f64) -> f64 {

@@ -3,8 +3,8 @@
 use nalgebra::Point2;
 use tagalong_core::GreyImage;
 
-use crate::OdometrySettings;
-use crate::patch::{PIXELS, Patch};
+use crate::odometry::OdometrySettings;
+use crate::odometry::patch::{PIXELS, Patch};
 
 /// Distance between candidates, px of the half image: a patch is as wide as two of these.
 const STRIDE: usize = 4;

@@ -14,7 +14,7 @@ use nalgebra::{Isometry3, Matrix3, Point2, UnitQuaternion, Vector2, Vector3};
 use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, GreyImage};
 use tagalong_geometry::{Camera, Lens, Rect};
 
-use crate::{OdometrySettings, halve};
+use crate::odometry::{OdometrySettings, halve};
 use corners::corners;
 use flow::{track, whole_shift};
 use swing::Pair;
