@@ -1,8 +1,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::outcome::Failure;
 use serde::Deserialize;
-use tagalong_app::outcome::Failure;
 use tagalong_eval::Report;
 use tagalong_eval::formats::{Timeline, kitti, metres, mot};
 

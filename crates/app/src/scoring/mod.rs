@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::Path;
 
+use crate::outcome::Failure;
 pub use extents::extents_note;
 pub use shots::{Shot, Shots};
-use tagalong_app::outcome::Failure;
 use tagalong_config::{FileLimit, read_text as read_bounded};
 use tagalong_eval::formats::{OddLines, kitti};
 use tagalong_eval::{Comparison, Frame, Region, Report, Sequence, Similarity, Truth};

@@ -1,8 +1,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::outcome::Failure;
 use nalgebra::Isometry2;
-use tagalong_app::outcome::Failure;
 use tagalong_geometry::Camera;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};
 

@@ -1,9 +1,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::outcome::Failure;
 use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3};
-use tagalong_app::outcome::Failure;
 use tagalong_eval::formats::mot::{self, SequenceInfo};
 use tagalong_eval::formats::{Timeline, floor, kitti, people};
 use tagalong_eval::{Region, Role, Truth};
