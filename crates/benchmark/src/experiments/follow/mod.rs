@@ -27,7 +27,7 @@ use tagalong_sim::{InjectedFault, Scene, ScheduledFault, Seeds, Split, Variant};
 use tagalong_simulate::scenes;
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
-use crate::contender::contender;
+use crate::experiments::contender::contender;
 
 /// Folder and name prefix of the default scenes.
 const SCENES: (&str, &str) = ("configs/scenes", "follow-");

@@ -17,7 +17,7 @@ use tagalong_config::Registry;
 use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::Contender;
 
-use crate::contender::contender;
+use crate::experiments::contender::contender;
 
 /// Scenes on which no pipeline should be perfect.
 const HARD: [&str; 6] = [

@@ -1,7 +1,7 @@
 use tagalong_sim::{ApproachBy, Scene};
 use tagalong_trials::{ApproachJudge, Approached, Contact, Ride, Tick};
 
-use crate::follow::story::words;
+use crate::experiments::follow::story::words;
 
 /// Returns the course of an approach: who comes from where, the faults, and a line for each change of
 /// the target and of the reason for the motion.

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use crate::tuning::{Choice, Figures, Objective, candidates, leave_one_out, mean};
 use clap::{Args, ValueEnum};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
@@ -17,7 +18,6 @@ use tagalong_eval::Tally;
 use tagalong_pipeline::{Tunable, with_values};
 use tagalong_report::{Cell, Row, Table};
 use tagalong_trials::{Contender, GivenSequence, GivenTracks, for_given_boxes, in_order};
-use tagalong_tuning::{Choice, Figures, Objective, candidates, leave_one_out, mean};
 
 /// The config that is run where none is named.
 const RECORDED: &str = "configs/recorded.toml";
