@@ -7,6 +7,7 @@ use std::process::Command;
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::ValueEnum;
 
+use crate::tidy::plugins;
 use crate::workspace::{Workspace, succeed};
 
 /// The six kinds of plugin.
@@ -115,6 +116,9 @@ fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
         !taken.contains(name),
         "`{name}` is the name of a crate or command of the workspace: choose another"
     );
+    // Some plugins share a crate, so that no folder has their name.
+    let plugins = plugins::registered(workspace).unwrap_or_default();
+    ensure!(!plugins.contains(name), "`{name}` is a plugin already: choose another name");
     for path in [format!("plugins/{name}"), format!("configs/{name}.toml")] {
         if workspace.root().join(&path).exists() {
             bail!("{path} exists already: choose another name, or remove it first");

@@ -7,7 +7,7 @@ mod files;
 mod licences;
 mod names;
 mod paths;
-mod plugins;
+pub mod plugins;
 mod words;
 
 use anyhow::{Result, bail};
