@@ -40,6 +40,7 @@ mod manager;
 mod mixture;
 mod motion;
 mod obstacles;
+mod person;
 mod person_filter;
 mod scan;
 mod sensors;
@@ -48,12 +49,12 @@ mod track;
 mod visualisation;
 
 pub use associator::{Association, Associations, Associator, Gate};
-pub use control::{Command, Controller, Reason, Scene, Twist, WheelSpeeds};
+pub use control::{Command, Controller, Reason, Scene};
 pub use detection::Detection;
 pub use detector::{Detector, Likelihood, Query, Verifier};
 pub use error::{Error, Result};
 pub use external::ExternalDetection;
-pub use filter::{Estimate, Evidence, Filter, FilterRequirements, Matched, Person, Update};
+pub use filter::{Evidence, Filter, FilterRequirements, Matched, Update};
 pub use frame::{Derived, Frame, Images};
 pub use funnel::{Dropped, Funnel, MAX_PLACES};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
@@ -62,8 +63,11 @@ pub use manager::{
     Initiation, Observation, ObservedTrack, TrackChanges, TrackHealth, TrackManager, Unassociated,
 };
 pub use mixture::match_moments;
-pub use motion::{DiffDrive, EgoMotion, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, planar_pose};
+pub use motion::{
+    DiffDrive, EgoMotion, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, Twist, WheelSpeeds, planar_pose,
+};
 pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReading};
+pub use person::{Estimate, Person};
 pub use person_filter::{PerPerson, PersonFilter};
 pub use scan::{FurtherScans, LaserScan, RayReading, UnreadRay};
 pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};

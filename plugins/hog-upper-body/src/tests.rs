@@ -5,9 +5,9 @@ use tagalong_geometry::Rect;
 use tagalong_math::{RandomSource, XorShift64};
 
 use crate::channels::{self, DEPTH};
+use crate::coverage::SIDE;
+use crate::coverage::WINDOW_PX;
 use crate::hog::{BINS, BLOCK, CELL};
-use crate::model::SIDE;
-use crate::scan::WINDOW_PX;
 use crate::trees::channel_numbers;
 use crate::{
     Blocks, Channels, Coverage, DepthTrees, Grid, Machine, Model, NUMBERS, Scanner, Spans, Tree,
