@@ -65,7 +65,7 @@ class Assignment:
     """Tracks to as many detections, every pair allowed."""
 
     def __init__(self):
-        self.program = built("tagalong-assignment", "time_assignment")
+        self.program = built("tagalong-associators", "time_assignment")
         self.costs = {n: mixed(n * n).reshape(n, n) for n in SIZES}
 
     def ours(self):

@@ -74,7 +74,7 @@ pub struct FilterRequirements {
 }
 
 /// Estimates the states of **all** people at once, so that a joint filter needs no special
-/// interface. The crate `tagalong-filtering` adapts filters of one person.
+/// interface. [`PerPerson`](crate::PerPerson) adapts filters of one person.
 ///
 /// ```
 /// # use std::collections::BTreeMap;

@@ -2,12 +2,9 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::check_settings;
 
-use crate::LogError;
 use crate::camera_settings::{CameraSettings, MountSettings};
 use crate::obstacles::ObstacleTopic;
-use crate::sensors::{SENSORS, SensorType};
 
 /// Settings of the input from a log. Topics that are not named are found by message type and
 /// encoding.
@@ -127,26 +124,6 @@ impl InputSettings {
             CameraSettings::Mounted(mount) => Some(mount),
         }
     }
-
-    /// Checks the values.
-    ///
-    /// # Errors
-    /// [`LogError::Settings`], which names the key.
-    pub fn check(&self) -> Result<(), LogError> {
-        check_settings(self).map_err(|error| LogError::Settings(error.to_string()))?;
-        self.topics.keys().try_for_each(|name| check_sensor(name))
-    }
-}
-
-/// Checks that the table of sensors has one of this name whose topic has no key of its own.
-fn check_sensor(name: &str) -> Result<(), LogError> {
-    let keys: Vec<String> = SENSORS.iter().map(SensorType::key).collect();
-    let wanted = format!("topics.{name}");
-    if keys.contains(&wanted) {
-        return Ok(());
-    }
-    let hint = keys.join(", ");
-    Err(LogError::Settings(format!("`{wanted}`: no sensor of that name is read; sensors: {hint}")))
 }
 
 /// Images of disparity: depth is focal length times baseline, divided by disparity.

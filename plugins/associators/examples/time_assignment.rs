@@ -3,7 +3,7 @@
 //! with other solvers of the same costs.
 //!
 //! ```sh
-//! cargo run --release -p tagalong-assignment --example time_assignment -- 5 20 100
+//! cargo run --release -p tagalong-associators --example time_assignment -- 5 20 100
 //! ```
 #![allow(clippy::print_stdout, reason = "an example answers on the terminal")]
 

@@ -2,6 +2,7 @@
 //! plugins, documents without stale parts, plain words in comments.
 
 mod arrows;
+mod circles;
 mod commands;
 mod files;
 mod licences;
@@ -22,6 +23,7 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     let mut complaints = arrows::check(workspace, &metadata)?;
     complaints.extend(plugins::check(workspace, &metadata)?);
     complaints.extend(licences::check(workspace, &metadata)?);
+    complaints.extend(circles::check(workspace)?);
     complaints.extend(files::check(workspace)?);
     complaints.extend(names::check(workspace)?);
     complaints.extend(words::check(workspace)?);

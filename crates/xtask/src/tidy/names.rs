@@ -85,7 +85,7 @@ mod tests {
             "crates/cli/tests/command/run.rs",
             "crates/pipeline/src/config/tests.rs",
             "crates/cli/examples/legs.toml",
-            "plugins/ekf/src/lib.rs",
+            "plugins/filters/src/lib.rs",
         ] {
             assert!(!is_shared_code(file), "{file}");
         }
