@@ -16,3 +16,16 @@ pub fn register(registry: &mut Registry) {
     arc_follow::register(registry);
     clear_follow::register(registry);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_promises_of_controllers_are_kept() {
+        let mut registry = Registry::default();
+        register(&mut registry);
+        let failures = tagalong_conformance::check_all(&registry);
+        assert!(failures.is_empty(), "{failures:#?}");
+    }
+}

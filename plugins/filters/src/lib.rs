@@ -15,3 +15,16 @@ pub fn register(registry: &mut Registry) {
     image_kalman::register(registry);
     last_seen::register(registry);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_promises_of_filters_are_kept() {
+        let mut registry = Registry::default();
+        register(&mut registry);
+        let failures = tagalong_conformance::check_all(&registry);
+        assert!(failures.is_empty(), "{failures:#?}");
+    }
+}

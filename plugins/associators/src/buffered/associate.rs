@@ -1,4 +1,5 @@
 use crate::{ObservationMemory, Staged, buffered_iou};
+use tagalong_config::check_settings;
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 use tagalong_geometry::Rect;
 
@@ -23,7 +24,7 @@ impl Buffered {
     /// # Errors
     /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config) -> Result<Self> {
-        config.check()?;
+        check_settings(&config)?;
         let memory = ObservationMemory::new(config.motion_frames);
         Ok(Self { config, memory })
     }

@@ -1,8 +1,6 @@
 use crate::{AppearanceFusion, Fusion, PrioritySettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::check_settings;
-use tagalong_core::Result;
 
 /// Source of the box at which a track is expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -74,10 +72,5 @@ impl Config {
     /// Returns the part of the appearance.
     pub(crate) fn appearance(&self) -> AppearanceFusion {
         AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate }
-    }
-
-    /// Refuses numbers that cannot work.
-    pub(crate) fn check(&self) -> Result<()> {
-        check_settings(self)
     }
 }

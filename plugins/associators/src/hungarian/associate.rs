@@ -1,4 +1,5 @@
 use crate::{Fit, Pairs};
+use tagalong_config::check_settings;
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::hungarian::Config;
@@ -15,7 +16,7 @@ impl Hungarian {
     /// # Errors
     /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config) -> Result<Self> {
-        config.check()?;
+        check_settings(&config)?;
         Ok(Self { config })
     }
 

@@ -1,8 +1,6 @@
 use crate::{AppearanceFusion, Cost, Fusion, Overlap, PairCost};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::check_settings;
-use tagalong_core::Result;
 
 /// Settings of the associator `associate-hungarian`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -61,10 +59,5 @@ impl Config {
         let Self { cost, gate, gate_m, gate_speed_mps, min_overlap, overlap, .. } = *self;
         let fusion = AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate };
         PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap, overlap, fusion }
-    }
-
-    /// Refuses numbers that cannot work.
-    pub(crate) fn check(&self) -> Result<()> {
-        check_settings(self)
     }
 }

@@ -1,6 +1,7 @@
 use std::f64::consts::TAU;
 
 use crate::{Fit, Pairs};
+use tagalong_config::check_settings;
 use tagalong_core::{Association, Associations, Associator, Detection, Gate, Result, Track};
 
 use crate::jpda::Config;
@@ -18,7 +19,7 @@ impl Jpda {
     /// # Errors
     /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config) -> Result<Self> {
-        config.check()?;
+        check_settings(&config)?;
         Ok(Self { config })
     }
 

@@ -1,8 +1,6 @@
 use crate::{AppearanceFusion, Cost, Fusion, Overlap, PairCost};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::check_settings;
-use tagalong_core::Result;
 
 /// Settings of the associator `associate-jpda`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -64,10 +62,5 @@ impl Config {
         let cost = Cost::Mahalanobis;
         let overlap = Overlap::Iou;
         PairCost { cost, gate, gate_m, gate_speed_mps, min_overlap: 1.0, overlap, fusion }
-    }
-
-    /// Refuses numbers that cannot work.
-    pub(crate) fn check(&self) -> Result<()> {
-        check_settings(self)
     }
 }

@@ -1,6 +1,7 @@
 use std::f64::consts::PI;
 
 use crate::{ObservationMemory, Staged, buffered_iou, probability};
+use tagalong_config::check_settings;
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 use tagalong_geometry::Rect;
 
@@ -25,7 +26,7 @@ impl ObservationCentric {
     /// # Errors
     /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config) -> Result<Self> {
-        config.check()?;
+        check_settings(&config)?;
         let memory = ObservationMemory::new(config.direction_frames);
         Ok(Self { config, memory })
     }

@@ -1,7 +1,5 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::check_settings;
-use tagalong_core::Result;
 
 use crate::hungarian;
 
@@ -22,12 +20,5 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self { pairs: hungarian::Config::default(), strong_log_odds: 0.5, weak_gate: 0.5 }
-    }
-}
-
-impl Config {
-    /// Refuses numbers that cannot work.
-    pub(crate) fn check(&self) -> Result<()> {
-        check_settings(self)
     }
 }

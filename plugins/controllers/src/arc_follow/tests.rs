@@ -6,7 +6,6 @@ mod states;
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point2, Vector2};
-use tagalong_config::Registry;
 use tagalong_conformance::target;
 use tagalong_core::{
     Controller, DiffDrive, EgoMotion, Frame, Images, Scene, Stamp, Track, Twist, WheelSpeeds,
@@ -90,14 +89,6 @@ impl Drive {
         self.pose *= self.motion.isometry();
         wheels
     }
-}
-
-#[test]
-fn it_conforms() {
-    let mut registry = Registry::default();
-    crate::arc_follow::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
 }
 
 #[test]

@@ -1,4 +1,5 @@
 use nalgebra::{Matrix2, Matrix3, Point3, SMatrix, SVector, Vector2, Vector3, Vector5};
+use tagalong_config::check_settings;
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Person, PersonFilter, Result, Update, match_moments,
 };
@@ -35,7 +36,7 @@ impl Ekf {
     /// # Errors
     /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config) -> Result<Self> {
-        config.check()?;
+        check_settings(&config)?;
         Ok(Self { config })
     }
 

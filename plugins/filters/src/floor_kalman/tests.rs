@@ -144,15 +144,6 @@ fn settings_that_cannot_work_are_refused() {
     assert!(refused(Config { step_s: 0.0, ..Config::default() }));
 }
 
-#[test]
-fn it_keeps_the_promises_of_its_kind() {
-    let mut registry = tagalong_config::Registry::default();
-    crate::floor_kalman::register(&mut registry);
-    assert!(registry.find(crate::floor_kalman::NAME).is_ok());
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
-}
-
 /// The cross covariance that `last-difference` carries along is that of the
 /// errors of two posteriors: many walks, drawn and filtered.
 #[test]

@@ -1,7 +1,5 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::check_settings;
-use tagalong_core::Result;
 
 /// Settings of `image-kalman`. Lengths in the image are given in widths of the box, so that they
 /// hold at every distance; the box of an upper body is 0.57 m wide.
@@ -79,12 +77,5 @@ impl Default for Config {
             reupdate: false,
             observed_boxes: false,
         }
-    }
-}
-
-impl Config {
-    /// Refuses settings outside their ranges.
-    pub(crate) fn check(&self) -> Result<()> {
-        check_settings(self)
     }
 }

@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 
+use tagalong_config::check_settings;
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Result, TrackId, Update,
 };
@@ -21,7 +22,7 @@ impl ImageKalman {
     /// # Errors
     /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config) -> Result<Self> {
-        config.check()?;
+        check_settings(&config)?;
         Ok(Self { configs: configs_of(&config), states: BTreeMap::new() })
     }
 }

@@ -2,7 +2,6 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix2, Matrix3, Point2, Point3, Vector2, Vector3, Vector5};
 use proptest::prelude::*;
-use tagalong_config::Registry;
 use tagalong_core::{
     Detection, EgoMotion, Evidence, Filter, Frame, Images, Matched, Stamp, TrackId,
 };
@@ -51,14 +50,6 @@ fn sliding(frames: usize) -> Vec<Detection> {
     (0..frames)
         .map(|i| Detection { image: Some(ImageBox::upper_body(shifted(i))), ..start.clone() })
         .collect()
-}
-
-#[test]
-fn it_conforms() {
-    let mut registry = Registry::default();
-    crate::image_kalman::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
 }
 
 #[test]

@@ -1,7 +1,5 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::check_settings;
-use tagalong_core::Result;
 
 /// Settings of the filter `last-seen`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -24,12 +22,5 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self { ego_motion: true, wander: 0.5, velocity_over_s: 1.0 }
-    }
-}
-
-impl Config {
-    /// Refuses numbers that cannot work.
-    pub(crate) fn check(&self) -> Result<()> {
-        check_settings(self)
     }
 }

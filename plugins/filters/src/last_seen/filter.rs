@@ -1,6 +1,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{Matrix2, Matrix3, Point2, Point3, SMatrix, Vector2};
+use tagalong_config::check_settings;
 use tagalong_core::{Detection, EgoMotion, Estimate, Person, PersonFilter, Result, Update};
 use tagalong_geometry::Camera;
 
@@ -35,7 +36,7 @@ impl LastSeen {
     /// # Errors
     /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
     pub fn new(config: Config) -> Result<Self> {
-        config.check()?;
+        check_settings(&config)?;
         Ok(Self { config })
     }
 

@@ -20,16 +20,3 @@ pub fn register(registry: &mut Registry) {
         |config: Config, _| Ok(PerPerson::new(LastSeen::new(config)?)),
     );
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn it_conforms() {
-        let mut registry = Registry::default();
-        register(&mut registry);
-        let failures = tagalong_conformance::check_all(&registry);
-        assert!(failures.is_empty(), "{failures:#?}");
-    }
-}

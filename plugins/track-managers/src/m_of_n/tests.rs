@@ -1,5 +1,4 @@
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
-use tagalong_config::Registry;
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track,
     TrackChanges, TrackId, TrackManager, Unassociated,
@@ -100,14 +99,6 @@ fn live(config: Config, score: f64, observations: &[Observation]) -> (Track, Vec
 
 fn confirmed(config: Config, score: f64, observations: &[Observation]) -> bool {
     live(config, score, observations).0.confirmed
-}
-
-#[test]
-fn the_promises_of_track_managers_are_kept() {
-    let mut registry = Registry::default();
-    crate::m_of_n::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
 }
 
 #[test]

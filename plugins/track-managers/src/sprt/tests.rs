@@ -1,7 +1,6 @@
 mod arithmetic;
 
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
-use tagalong_config::Registry;
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track, TrackId,
     TrackManager, Unassociated,
@@ -102,14 +101,6 @@ impl Scene {
 
 fn still() -> EgoMotion {
     EgoMotion::at_rest(DT_S)
-}
-
-#[test]
-fn the_promises_of_track_managers_are_kept() {
-    let mut registry = Registry::default();
-    crate::sprt::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
 }
 
 /// A blanket over a chair: the detector believes in it a little, in every frame.
