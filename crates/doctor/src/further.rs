@@ -1,4 +1,4 @@
-//! What a visit leaves open, asked where its findings ask for it: other settings and other configs.
+//! Questions after a visit, where its findings ask for them: other settings and other configs.
 
 use tagalong_app::choice::{CHOICES, fitting};
 use tagalong_config::Registry;

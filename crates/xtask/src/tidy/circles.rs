@@ -21,7 +21,7 @@ const DEPTH: usize = 6;
 /// Names from the root of a crate to a module or an item.
 type Names = Vec<String>;
 
-/// What a module names: its paths, and whether it exports them.
+/// Paths that a module names, and whether it exports them.
 type Uses = Vec<(bool, Names)>;
 
 /// Complains about circles of files.
@@ -133,9 +133,14 @@ fn names(path: &str) -> Names {
     path.split("::").map(str::trim).filter(|name| !name.is_empty()).map(String::from).collect()
 }
 
+fn is_import(line: &str) -> bool {
+    let line = line.trim_start();
+    line.starts_with("use ") || (line.starts_with("pub") && line.contains(" use "))
+}
+
 /// Adds the paths of several names in a piece of code that is no `use`.
 fn add_paths(code: &str, uses: &mut Uses) {
-    if code.lines().any(|line| line.trim_start().starts_with("use ")) {
+    if code.lines().any(is_import) {
         return;
     }
     let in_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
@@ -275,6 +280,8 @@ mod tests {
         assert_eq!(circle(&[lib, a, ("b", "use crate::A;")]), [["a", "b"]]);
         assert_eq!(circle(&[("lib", "mod a;\nuse a::A;"), ("a", "use crate::g;")]), [["", "a"]]);
         assert!(circle(&[lib, a, ("b", "")]).is_empty());
+        let nested = ("lib", "mod a;\npub use a::{b::{C}, A};");
+        assert!(circle(&[nested, ("a", "fn f() { crate::g(); }")]).is_empty());
     }
 
     #[test]
