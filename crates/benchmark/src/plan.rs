@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::outcome::{Failure, say};
+use tagalong_app::scoring::TruthFile;
 use tagalong_app::suggest::{self, check_log_path, toml_files};
 use tagalong_config::{Registry, path_text};
 use tagalong_log::{FrameSource, Inputs, LogError};
 use tagalong_pipeline::Tunable;
-use tagalong_scoring::TruthFile;
 
 use super::args::PlanArgs;
 

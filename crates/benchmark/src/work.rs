@@ -8,12 +8,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::progress::Forecast;
 use tagalong_app::remedies::Remedies;
+use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions};
 use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, Inputs};
 use tagalong_pipeline::Pipeline;
 use tagalong_report::{Outcome, TaskResult};
-use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
 
 use super::args::{RunArgs, Shard};
 use super::pictures::Wanted;

@@ -1,9 +1,7 @@
 use std::fmt::Write as _;
 
-use super::alternatives::Alternative;
-use super::comparison::Row;
-use super::coverage::Coverage;
-use super::diagnosis::{Diagnosis, Drop};
+use super::coverage::{Alternative, Coverage};
+use super::diagnosis::{Diagnosis, Drop, Row};
 use super::finding::{Finding, Severity};
 
 /// Lines of the funnel that are shown.

@@ -1,7 +1,11 @@
 use std::path::PathBuf;
 
 use crate::camera_info::CalibrationError;
-use crate::mcap::NotMcap;
+
+/// Error for a file that is no container of messages: a sentence without its name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct NotMcap(pub String);
 
 /// Reason for which a log cannot be used at all. Damage inside a log is no error: it is skipped and
 /// counted.

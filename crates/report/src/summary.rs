@@ -118,7 +118,7 @@ pub fn per_log<'a>(
             values.entry(&task.log).or_default().push(value);
         }
     }
-    values.into_iter().filter_map(|(log, v)| Some((log, tagalong_stats::mean(&v)?))).collect()
+    values.into_iter().filter_map(|(log, v)| Some((log, tagalong_math::mean(&v)?))).collect()
 }
 
 fn pipeline(view: &OrderedBenchmark<'_>, name: &str) -> PipelineSummary {

@@ -282,7 +282,7 @@ mod tests {
     use super::*;
     use crate::daylight::Daylight;
     use crate::material::{Material, Pattern};
-    use crate::scene::RoomSettings;
+    use crate::room_settings::RoomSettings;
     use crate::shape::samples;
     use crate::world::{Lamp, Object, Stage};
 

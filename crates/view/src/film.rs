@@ -7,12 +7,12 @@ use nalgebra::Isometry2;
 use tagalong_app::config_file::OuterSettings;
 use tagalong_app::outcome::Failure;
 use tagalong_app::progress::Progress;
+use tagalong_app::scoring::{Shot, Shots};
 use tagalong_geometry::Camera;
 use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
 use tagalong_page::data::{FrameData, RunData};
 use tagalong_page::frame::{add_trails, scan_points, view_edges};
 use tagalong_render::background;
-use tagalong_scoring::{Shot, Shots};
 
 use crate::pictures::Pictures;
 use crate::recording::Recording;

@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
 use tagalong_app::remedies::Remedies;
+use tagalong_app::scoring::TruthFile;
 use tagalong_config::Registry;
 use tagalong_page::data::{PageData, RunData};
 use tagalong_page::html::{Heading, html};
-use tagalong_scoring::TruthFile;
 
 use crate::assemble::{run_data, stamps, times};
 use crate::film::Film;

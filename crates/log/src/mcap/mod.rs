@@ -17,13 +17,9 @@ use chunk::ChunkFault;
 use record::Opcode;
 
 use crate::bag;
+use crate::error::NotMcap;
 use crate::msgs::ROS1_MARK;
 use crate::walk::{Channel, Located, Walk};
-
-/// Error for a file that is no container of messages: a sentence without its name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct NotMcap(pub String);
 
 /// Findings in an MCAP file that other containers do not have.
 #[derive(Default)]
