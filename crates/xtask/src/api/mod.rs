@@ -87,7 +87,7 @@ mod tests {
                    pub use nalgebra;\npub use other::Thing;\nfn private() {}\n";
         let inner = "pub mod deep;\npub struct Kept { pub a: f64, b: u8 }\npub struct Hidden;\n\
                      impl Kept { pub fn a(&self) -> f64 { self.a } fn b(&self) {} }\n\
-                     impl Clone for Kept { fn clone(&self) -> Self { todo!() } }\n";
+                     impl Clone for Kept { fn clone(&self) -> Self { Self { ..*self } } }\n";
         let deep = "/// Words.\n#[derive(Debug)]\n#[non_exhaustive]\npub enum Deep { A(u8), B { x: f64 } }\n\
                     #[cfg(test)]\nmod tests { pub fn unseen() {} }\n";
         let open = "pub const MOST: usize = 3;\npub(crate) const LEAST: usize = 1;\n\
