@@ -300,7 +300,7 @@ Examples:
 const TRAIN_HELP: &str = "\
 Candidates are what the template detector proposes in simulated rooms and annotated logs. Same seed and
 data, same bytes. The card beside the model has the counts, the cross-validation and the figures on
-held-out rooms and logs.
+held-out rooms and logs. Trainers are in programs that are built with `--features train`.
 
 Examples:
   tagalong train svm-patch --quick -o quick.toml

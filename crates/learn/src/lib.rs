@@ -13,6 +13,7 @@ mod adam;
 pub mod boost;
 mod calibrate;
 pub mod conv;
+#[cfg(feature = "train")]
 pub mod dense;
 mod folds;
 mod held_out;
