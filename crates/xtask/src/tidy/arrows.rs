@@ -36,9 +36,9 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("conformance", &[]),
     ("catalog", &["plugins"]),
     ("app", &["tagalong", "pipeline", "log", "network"]),
-    ("render", &["pipeline", "vision"]),
+    ("render", &["pipeline", "log", "vision"]),
     ("scoring", &["app", "log", "eval"]),
-    ("page", &["app", "report", "pipeline"]),
+    ("page", &["app", "report", "log", "pipeline"]),
     ("live", &["app", "page", "render", "pipeline", "serve"]),
     (
         "simulate",
