@@ -2,7 +2,7 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const SVG = "http://www.w3.org/2000/svg";
-  const COLOURS = 8;
+  const COLOURS = 10;
   let [WIDTH, HEIGHT] = data.image_px;
   let last = data.t.length - 1;
   const id = (name) => document.getElementById(name);
@@ -338,7 +338,8 @@
     target.setAttribute("viewBox", `0 0 ${STRIP_WIDTH} ${height}`);
     target.setAttribute("preserveAspectRatio", "none");
     const parts = lives.flatMap((life) => stretches(life.points).map((part) =>
-      svg("line", { class: `life ${colour(life.track)}${part.seen ? "" : " weak"}`, x1: column(part.from), x2: Math.max(column(part.to), column(part.from) + 1.5), y1: 10 * life.lane + 5, y2: 10 * life.lane + 5, "stroke-width": 6 })));
+      svg("line", { class: `life ${colour(life.track)}${part.seen ? "" : " weak"}`, x1: column(part.from), x2: Math.max(column(part.to), column(part.from) + 1.5), y1: 10 * life.lane + 5, y2: 10 * life.lane + 5, "stroke-width": 6 },
+        svg("title", {}, `person ${life.track}`))));
     for (const event of run.events) if (event.kind === "missed") {
       parts.push(svg("line", { class: "gap", x1: column(event.i), x2: column(event.i), y1: height - 6, y2: height, "stroke-width": 2 }));
     }
@@ -445,11 +446,18 @@
 
   const tracksNear = (frame, question) => frame.tracks.filter((track) => isNear(track.box, question));
 
+  // Tracks near a question that no other annotated person has.
+  const freeTracks = (run, at, question) => {
+    const hits = (run.hits && run.hits[at]) || {};
+    const taken = Object.entries(hits).filter(([person]) => Number(person) !== question.person).map(([, track]) => track);
+    return tracksNear(run.frames[at], question).filter((track) => question.person === undefined || !taken.includes(track.id));
+  };
+
   // The track that was confirmed at this place shortly before, and is not any more.
   const ENDED_S = 2;
   const endedNear = (run, question) => {
     for (let i = state.at - 1; i >= 0 && data.t[state.at] - data.t[i] <= ENDED_S; i -= 1) {
-      const before = run.frames[i] && tracksNear(run.frames[i], question).find((track) => track.state !== "tentative");
+      const before = run.frames[i] && freeTracks(run, i, question).find((track) => track.state !== "tentative");
       if (before) return { id: before.id, s: data.t[state.at] - data.t[i] };
     }
     return null;
@@ -469,7 +477,11 @@
 
   // The one cause, as a sentence.
   const causeOf = (run, frame, question) => {
-    const [track] = tracksNear(frame, question).sort((a, b) => (a.state === "tentative") - (b.state === "tentative"));
+    const here = run.frames[state.at] ? freeTracks(run, state.at, question) : tracksNear(frame, question);
+    const [track] = here.sort((a, b) => (a.state === "tentative") - (b.state === "tentative"));
+    if (track && track.state !== "tentative" && isMissed(run, state.at, question.person)) {
+      return `Person ${track.id} is tracked near here, ${track.state}; its box does not overlap the annotated one enough.`;
+    }
     if (track && track.state !== "tentative") return `Not missed: person ${track.id} is tracked here, ${track.state}.`;
     if (track) {
       return `Tracked here, and not confirmed yet: track ${track.id}, probability ${fixed(track.p, 2)}. It is reported once the track manager confirms it.`;

@@ -2,7 +2,7 @@ use tagalong_core::TrackId;
 
 /// Colours of tracks: neighbours in number are far apart in hue. All are of medium lightness, so
 /// that each stands out from white and from dark paper.
-const COLOURS: [[u8; 3]; 8] = [
+const COLOURS: [[u8; 3]; 10] = [
     [61, 139, 253],
     [232, 113, 10],
     [26, 161, 121],
@@ -11,6 +11,8 @@ const COLOURS: [[u8; 3]; 8] = [
     [140, 148, 20],
     [11, 157, 181],
     [176, 125, 66],
+    [90, 160, 40],
+    [214, 69, 46],
 ];
 
 /// Number of colours before they repeat.
@@ -46,8 +48,8 @@ mod tests {
     }
 
     #[test]
-    fn colours_repeat_after_eight_tracks() {
-        assert_eq!(track_colour(TrackId(2)), track_colour(TrackId(10)));
+    fn colours_repeat_after_ten_tracks() {
+        assert_eq!(track_colour(TrackId(2)), track_colour(TrackId(12)));
         assert_ne!(track_colour(TrackId(2)), track_colour(TrackId(3)));
     }
 }

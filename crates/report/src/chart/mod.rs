@@ -26,9 +26,12 @@ pub fn series_class(index: usize) -> String {
     format!("s{}", index % SERIES)
 }
 
+/// Colours of tracks, which are others than those of pipelines.
+const TRACK_COLOURS: i64 = 10;
+
 /// Returns the class that colours a track, as pictures and pages of runs colour it.
 pub fn track_class(id: i64) -> String {
-    format!("t{}", id.rem_euclid(SERIES as i64))
+    format!("t{}", id.rem_euclid(TRACK_COLOURS))
 }
 
 /// Returns the dashes of a series; a second round of colours gets other dashes.
