@@ -183,7 +183,7 @@ fn people(view: &OrderedBenchmark<'_>, pipeline: &str) -> Vec<[u64; 2]> {
 
 fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: ComparisonSpace) {
     let key = figure.key(place);
-    // Who finds nobody has no false positives, too, and is not the best by that.
+    // A pipeline without any detection has no false positives either; that makes it the best in nothing.
     let finding = pipelines.iter().filter(|p| p.finds_people());
     let with: Vec<Estimate> = finding.filter_map(|p| p.figures.get(&key).copied()).collect();
     let most = with.iter().map(|e| e.logs).max().unwrap_or(0);
