@@ -63,8 +63,8 @@ pub enum LogError {
         key: String,
         /// The topic.
         topic: String,
-        /// Nearest name, or empty.
-        hint: String,
+        /// Nearest name, or empty; boxed, because the largest variant is the size of every result.
+        hint: Box<str>,
         /// Topics of the log, one per line.
         present: String,
     },

@@ -445,7 +445,7 @@ fn named(
         path: scan.path.clone(),
         key: key.to_owned(),
         topic: name.to_owned(),
-        hint,
+        hint: hint.into_boxed_str(),
         present: scan.listing(),
     })
 }
