@@ -221,7 +221,11 @@ fn config_hash(config: &PlannedConfig, seed: u64, registry: &Registry) -> Result
 pub fn why_not(config: &PlannedConfig, log: &Annotated) -> Result<Option<String>, Failure> {
     match config.open(&log.log) {
         Ok(_) => Ok(None),
-        Err(error @ (LogError::Missing { .. } | LogError::Calibration { .. })) => {
+        Err(
+            error @ (LogError::Missing { .. }
+            | LogError::UnknownTopic { .. }
+            | LogError::Calibration { .. }),
+        ) => {
             let text = error.to_string();
             // The first line names the problem, the others give advice; the folder must not reach
             // the report.

@@ -25,7 +25,7 @@ use std::process::ExitCode;
 use args::{Cli, Command};
 use clap::{CommandFactory as _, Parser};
 pub use commands::{EvalArgs, SimilarityChoice, eval_json};
-pub use run::{RunArgs, run_until};
+pub use run::{Overlaid, RunArgs, run_until};
 use tagalong_app::outcome::{Failure, Outcome, say};
 use tagalong_config::Registry;
 

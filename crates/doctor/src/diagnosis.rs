@@ -62,6 +62,8 @@ pub struct Drop {
     pub look: Option<String>,
     /// Settings that belong to it, with their present values.
     pub settings: Vec<String>,
+    /// Sentence with the meaning of the test and two settings at most.
+    pub why: String,
     /// Pictures of the dropped candidates.
     pub pictures: Option<PathBuf>,
 }
@@ -163,6 +165,7 @@ fn funnel(
                 count: entry.count,
                 settings: remedy.as_ref().map_or_else(Vec::new, |remedy| remedy.lines(resolved)),
                 look: remedy.map(|remedy| remedy.look.clone()),
+                why: remedies.sentence(entry.test, resolved),
                 pictures: pictures.remove(entry.test),
             }
         })

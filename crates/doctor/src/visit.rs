@@ -59,7 +59,10 @@ impl Visit {
         let read = inputs.accept(Input::Colour).accept(Input::Depth);
         let mut found = examine(scope.log, &outer.input, &outer.limits, read)?;
         // A topic of a wrong kind is a mistake of the config, and shown as such.
-        let is_mistake = matches!(found.refusal, Some(LogError::WrongTopic { .. }));
+        let is_mistake = matches!(
+            found.refusal,
+            Some(LogError::WrongTopic { .. } | LogError::UnknownTopic { .. })
+        );
         if let Some(error) = found.refusal.take_if(|_| is_mistake) {
             return Err(refused_log(error, pipeline.config()));
         }

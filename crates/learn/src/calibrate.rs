@@ -61,7 +61,7 @@ mod tests {
     fn of_balanced_classes_the_line_is_that_of_linfa() {
         let values: Vec<(f64, bool)> = (0..400)
             .map(|k: u64| {
-                let noise = tagalong_stats::mix(k) as f64 / u64::MAX as f64;
+                let noise = tagalong_math::mix(k) as f64 / u64::MAX as f64;
                 (4.0 * noise - if k.is_multiple_of(2) { 1.0 } else { 3.0 }, k.is_multiple_of(2))
             })
             .collect();

@@ -35,7 +35,7 @@ mod tests {
     fn the_area_is_that_of_linfa() {
         let values: Vec<(f64, bool)> = (0..300)
             .map(|k: u64| {
-                let noise = (tagalong_stats::mix(k) % 1000) as f64 / 1000.0;
+                let noise = (tagalong_math::mix(k) % 1000) as f64 / 1000.0;
                 (if k.is_multiple_of(3) { noise.sqrt() } else { noise }, k.is_multiple_of(3))
             })
             .collect();

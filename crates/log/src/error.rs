@@ -58,6 +58,20 @@ pub enum LogError {
         /// Topics of the log, one per line.
         present: String,
     },
+    /// A topic that the settings name is not in the log.
+    #[error("`{}` has no topic `{topic}` fit for `{key}` of [input]{hint}\npresent:\n{present}", path.display())]
+    UnknownTopic {
+        /// Path of the file.
+        path: PathBuf,
+        /// Key under `[input]`.
+        key: String,
+        /// The topic.
+        topic: String,
+        /// Nearest name, or empty; boxed, because the largest variant is the size of every result.
+        hint: Box<str>,
+        /// Topics of the log, one per line.
+        present: String,
+    },
     /// A topic that the settings name is of another kind.
     #[error("`{}`: `{key}` under [input] names {topic}, which is {kind}; {remedy}", path.display())]
     WrongTopic {

@@ -237,7 +237,7 @@ fn add_log(
         }
     };
     let log = source.facts().path.clone();
-    let film = Film::of(source, stamps, &mut data.runs, image_bytes);
+    let film = Film::of(source, stamps, &mut data.runs, runs, image_bytes);
     notes.extend(film.pictures.summary());
     data.scans = film.scans();
     data.view_rad = film.view_rad;

@@ -1,5 +1,6 @@
 //! Commands for developers of Tagalong: `cargo xtask --help`.
 
+mod accuracy;
 mod api;
 mod ci;
 mod docs;

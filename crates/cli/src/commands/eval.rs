@@ -225,8 +225,9 @@ fn shots(args: &EvalArgs, truth: &TruthFile, tracks: &Tracks) -> Result<Shots, F
     });
     let Some(log) = found else {
         let shown = args.truth.display();
-        let text =
-            format!("{shown} tells frames by their stamps; name the log with --log LOG.mcap");
+        let text = format!(
+            "{shown} gives stamps instead of frame numbers; name the log with --log LOG.mcap"
+        );
         return if truth.needs_stamps() { Err(Failure::usage(text)) } else { Ok(Shots::default()) };
     };
     let outer = match &args.config {

@@ -30,8 +30,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("conformance", &[]),
     ("catalog", &["plugins"]),
     ("app", &["tagalong", "pipeline", "log", "network", "eval"]),
-    ("render", &["pipeline", "vision"]),
-    ("page", &["app", "report", "pipeline"]),
+    ("render", &["pipeline", "log", "vision"]),
+    ("page", &["app", "report", "log", "pipeline"]),
     ("live", &["app", "page", "render", "pipeline", "serve"]),
     (
         "simulate",

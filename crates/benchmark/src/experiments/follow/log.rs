@@ -6,7 +6,7 @@ use serde::Serialize;
 use tagalong_app::signals::Signals;
 use tagalong_log::write::WriteError;
 use tagalong_pipeline::FrameReport;
-use tagalong_render::{Overlay, OverlayData};
+use tagalong_render::{Overlay, OverlayData, OverlayStyle};
 use tagalong_sim::{Event, Scene, Simulation};
 use tagalong_simulate::Recorder;
 use tagalong_trials::{SimulatedFrame, TrialError, Witness};
@@ -56,7 +56,7 @@ impl RideLog {
             let shown = folder.display();
             TrialError::Witness(format!("cannot make the folder {shown} for pictures: {error}"))
         })?;
-        self.overlay = Some(Overlay::new(folder.to_owned()));
+        self.overlay = Some(Overlay::new(folder.to_owned(), OverlayStyle::default()));
         Ok(self)
     }
 
