@@ -14,7 +14,7 @@ target=${CARGO_TARGET_DIR:-target}
 folder=$profile
 [ "$profile" != dev ] || folder=debug
 
-cargo build --locked --profile "$profile" -p tagalong-cli
+cargo build --locked --profile "$profile" -p tagalong-cli --features train
 program=$target/$folder/tagalong
 # cargo-deb takes generated files from here, whatever the target folder is.
 rm -rf target/deb

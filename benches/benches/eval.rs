@@ -45,7 +45,7 @@ fn families(sequence: &Sequence) -> f64 {
 }
 
 fn scoring(c: &mut Criterion) {
-    let Some(mot) = tagalong_testdata::find("mot") else { return };
+    let Some(mot) = tagalong_conformance::testdata::find("mot") else { return };
     let read = || -> Vec<Sequence> { NAMES.iter().map(|name| sequence(&mot, name)).collect() };
     let sequences = read();
     c.bench_function("MOT17 train: read", |b| b.iter(read));

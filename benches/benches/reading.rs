@@ -44,7 +44,9 @@ fn walk(path: &Path, images: bool) -> usize {
 
 fn reading(c: &mut Criterion) {
     for name in ["um", "lab2-camera2"] {
-        let Some(path) = tagalong_testdata::find(&format!("logs/{name}.mcap")) else { continue };
+        let Some(path) = tagalong_conformance::testdata::find(&format!("logs/{name}.mcap")) else {
+            continue;
+        };
         let input = InputSettings::default();
         let limits = Limits::default();
         let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);

@@ -14,8 +14,8 @@ use std::path::Path;
 use cpu_time::ThreadTime;
 use tagalong_config::Registry;
 use tagalong_log::FrameSource;
+use tagalong_math::percentile;
 use tagalong_pipeline::{FrameReport, Pipeline};
-use tagalong_stats::percentile;
 
 const RUNS: usize = 5;
 

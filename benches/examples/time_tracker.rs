@@ -18,8 +18,8 @@ use tagalong_core::{
     Stamp,
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
+use tagalong_math::{RandomSource, SplitMix64, median};
 use tagalong_pipeline::Pipeline;
-use tagalong_stats::{RandomSource, SplitMix64, median};
 
 /// Frames until all tracks are confirmed, and those that are timed.
 const FIRST: u64 = 30;

@@ -65,7 +65,7 @@ class Assignment:
     """Tracks to as many detections, every pair allowed."""
 
     def __init__(self):
-        self.program = built("tagalong-assignment", "time_assignment")
+        self.program = built("tagalong-associators", "time_assignment")
         self.costs = {n: mixed(n * n).reshape(n, n) for n in SIZES}
 
     def ours(self):
@@ -181,7 +181,7 @@ class Filters:
     JOB = "Kalman filter of a person"
 
     def __init__(self):
-        self.program = built("tagalong-ekf", "time_filter")
+        self.program = built("tagalong-filters", "time_filter")
         moves, sees = np.eye(5), np.eye(3, 5)
         moves[0, 3] = moves[1, 4] = 0.1
         self.seen = np.array([[3.0], [0.0], [1.6]])

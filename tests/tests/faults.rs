@@ -12,9 +12,9 @@ use tagalong_geometry::{Camera, Lens};
 use tagalong_log::msgs::{CameraInfo, Header, Image, TFMessage, TransformStamped};
 use tagalong_log::write::MessageLog;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
+use tagalong_math::{RandomSource as _, SplitMix64};
 use tagalong_pipeline::{FrameReport, LockState, Pipeline};
 use tagalong_sim::{Event, Scene, Shot, Simulation};
-use tagalong_stats::{RandomSource as _, SplitMix64};
 
 const SCENE: &str = include_str!("../scenes/small-room.toml");
 

@@ -18,7 +18,7 @@ use tagalong_pipeline::Pipeline;
 const CONFIG: &str = include_str!("../../crates/cli/examples/laser_legs/legs.toml");
 
 fn source(name: &str, pipeline: &Pipeline) -> Option<FrameSource> {
-    let log = tagalong_testdata::find(name)?;
+    let log = tagalong_conformance::testdata::find(name)?;
     let input = InputSettings::default();
     let limits = Limits::default();
     Some(FrameSource::open(&log, &input, &limits, pipeline.inputs()).unwrap())
@@ -83,7 +83,8 @@ fn people_at_rest_stay_at_rest_while_the_robot_drives() {
     tagalong_catalog::register(&mut registry);
     let mut pipeline = Pipeline::builder(&registry).from_toml(LEGS).unwrap();
     let Some(mut source) = source("laser/laser-moving.mcap", &pipeline) else { return };
-    let truth = tagalong_testdata::find("laser/laser-moving.people-floor.csv").unwrap();
+    let truth =
+        tagalong_conformance::testdata::find("laser/laser-moving.people-floor.csv").unwrap();
     let rows = floor::parse(&std::fs::read_to_string(truth).unwrap(), "truth").unwrap();
     let mut places: [Vec<Point2<f64>>; 2] = Default::default();
     let mut robots: [Vec<Point2<f64>>; 2] = Default::default();
@@ -130,7 +131,8 @@ fn a_person_who_stands_still_starts_a_track() {
     tagalong_catalog::register(&mut registry);
     let mut pipeline = Pipeline::builder(&registry).folder(&configs).from_toml(&text).unwrap();
     let Some(mut source) = source("laser/laser-following.mcap", &pipeline) else { return };
-    let truth = tagalong_testdata::find("laser/laser-following.people-floor.csv").unwrap();
+    let truth =
+        tagalong_conformance::testdata::find("laser/laser-following.people-floor.csv").unwrap();
     let rows = floor::parse(&std::fs::read_to_string(truth).unwrap(), "truth").unwrap();
     let mut found = 0;
     let mut first = None;

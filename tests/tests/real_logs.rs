@@ -26,7 +26,7 @@ struct Run {
 }
 
 fn data(file: &str) -> Option<PathBuf> {
-    tagalong_testdata::find(&format!("logs/{file}"))
+    tagalong_conformance::testdata::find(&format!("logs/{file}"))
 }
 
 fn run(path: &Path, config: &str) -> Run {

@@ -19,7 +19,7 @@ const PEDESTRIAN_M: Point2<f64> = Point2::new(11.2, 3.15);
 
 fn reports() -> Option<Vec<FrameReport>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let path = tagalong_testdata::find("logs/kitti-stereo.mcap")?;
+    let path = tagalong_conformance::testdata::find("logs/kitti-stereo.mcap")?;
     let configs = root.join("configs");
     let text = std::fs::read_to_string(configs.join("stereo-street.toml")).unwrap();
     // The log has no odometry, without which no robot drives unless the config says so.

@@ -6,7 +6,7 @@ use crate::Cell;
 
 /// Returns the mean; 0 of no values.
 pub(crate) fn mean(values: &[f64]) -> f64 {
-    tagalong_stats::mean(values).unwrap_or(0.0)
+    tagalong_math::mean(values).unwrap_or(0.0)
 }
 
 /// Returns the means of the draws that have any values.

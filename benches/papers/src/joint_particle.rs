@@ -410,7 +410,7 @@ fn p3(numbers: &[f64; 5]) -> Vec<Cell> {
 
 /// Returns the mean; NaN of no values.
 fn mean(values: &[f64]) -> f64 {
-    tagalong_stats::mean(values).unwrap_or(f64::NAN)
+    tagalong_math::mean(values).unwrap_or(f64::NAN)
 }
 
 fn results(trial: Trial) -> std::result::Result<Vec<Result>, TrialError> {

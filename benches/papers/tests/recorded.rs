@@ -42,7 +42,7 @@ fn table(of: [&str; 2], data: Option<PathBuf>, seeds: Option<u64>) -> Table {
 
 #[test]
 fn with_the_detections_of_sort_it_is_at_least_as_accurate_as_sort() {
-    let Some(mot) = tagalong_testdata::find("mot") else { return };
+    let Some(mot) = tagalong_conformance::testdata::find("mot") else { return };
     let table = table(["rgbd-compressive", "given"], Some(mot.with_file_name("")), None);
     println!("{}", table.text());
     let ours: Vec<_> = table.rows.iter().filter(|row| !row.published).collect();

@@ -11,7 +11,7 @@ use tagalong_app::format::Format;
 use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Outcome};
 use tagalong_app::signals::Signals;
-use tagalong_cli::{EvalArgs, RunArgs, SimilarityChoice, eval_json, main_from, run_until};
+use tagalong_cli::{EvalArgs, Overlaid, RunArgs, SimilarityChoice, eval_json, main_from, run_until};
 
 use crate::errors::{failed, raised, wrong};
 
@@ -54,7 +54,7 @@ pub fn run(
         config: Some(config),
         log,
         output: Some(out),
-        overlay,
+        overlay: overlay.then_some(Overlaid::People),
         with_images,
         overwrite,
         strict,

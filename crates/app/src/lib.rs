@@ -14,6 +14,7 @@ pub mod origin;
 pub mod outcome;
 pub mod progress;
 pub mod remedies;
+pub mod scoring;
 pub mod serialize;
 pub mod signals;
 pub mod suggest;

@@ -96,9 +96,10 @@ impl From<LogError> for Failure {
     /// are 2.
     fn from(error: LogError) -> Self {
         match error {
-            LogError::Settings(_) | LogError::WrongTopic { .. } | LogError::Source { .. } => {
-                Self::usage(error)
-            }
+            LogError::Settings(_)
+            | LogError::WrongTopic { .. }
+            | LogError::UnknownTopic { .. }
+            | LogError::Source { .. } => Self::usage(error),
             _ => Self::failed(error),
         }
     }

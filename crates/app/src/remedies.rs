@@ -10,6 +10,9 @@ use crate::serialize::to_toml;
 /// Table of the tests that are no plugin's.
 const TABLE: &str = include_str!("remedies.toml");
 
+/// Settings that a sentence names at most: a reader tries one or two.
+const MOST_SETTINGS: usize = 2;
+
 /// Remedy for the candidates that a test drops.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -105,6 +108,20 @@ impl Remedies {
     /// Returns the remedy for a test, if there is one.
     pub fn of(&self, test: &str) -> Option<&Remedy> {
         self.drop.iter().find(|remedy| remedy.is_for(test))
+    }
+
+    /// Returns the sentence that says why a test dropped a person, and the settings that decide it, by
+    /// which each page and `doctor` explain it. Settings are those of a resolved config, two at most.
+    pub fn sentence(&self, test: &str, resolved: &Table) -> String {
+        let Some(remedy) = self.of(test) else {
+            return format!("the test \"{test}\" dropped the candidate");
+        };
+        let lines = remedy.lines(resolved);
+        let settings = match lines.len() {
+            0 => "no setting decides it".to_owned(),
+            count => format!("decided by {}", lines[..count.min(MOST_SETTINGS)].join(" and ")),
+        };
+        format!("the test \"{test}\" dropped the candidate ({}); {settings}", remedy.look)
     }
 
     /// Returns the changes of a resolved config that are offered for its plugins; none of them has
@@ -343,6 +360,30 @@ mod tests {
         let lines = remedies.of("too blue").unwrap().lines(&resolved);
         assert_eq!(lines, ["[[detectors]] plugin = \"own\", config = { hue = 3 }"]);
         assert!(Remedies::default().of("too blue").is_none());
+    }
+
+    #[test]
+    fn a_sentence_names_the_test_its_meaning_and_two_settings_at_most() {
+        let mut registry = Registry::default();
+        let settings = &["a", "b", "c"];
+        registry.remedies(
+            "own",
+            &[tagalong_config::Remedy { test: "too blue", settings, look: "the sky" }],
+        );
+        let remedies = Remedies::new(&registry);
+        let config = "[[detectors]]\nplugin = 'own'\nconfig = { a = 1, b = 2, c = 3 }\n";
+        let resolved: Table = toml::from_str(config).unwrap();
+        assert_eq!(
+            remedies.sentence("too blue", &resolved),
+            "the test \"too blue\" dropped the candidate (the sky); decided by [[detectors]] plugin = \
+             \"own\", config = { a = 1 } and [[detectors]] plugin = \"own\", config = { b = 2 }"
+        );
+        let without = remedies.sentence("too blue", &Table::new());
+        assert!(without.ends_with("; no setting decides it"), "{without}");
+        assert_eq!(
+            remedies.sentence("unknown", &resolved),
+            "the test \"unknown\" dropped the candidate"
+        );
     }
 
     #[test]

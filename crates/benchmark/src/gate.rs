@@ -6,10 +6,10 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 use tagalong_app::outcome::Failure;
+use tagalong_app::scoring::read_text;
 use tagalong_config::nearest;
 use tagalong_eval::Scores;
 use tagalong_report::{Benchmark, Outcome, TaskResult};
-use tagalong_scoring::read_text;
 
 use super::args::GateArgs;
 

@@ -6,6 +6,7 @@
 //! results.
 
 mod args;
+pub mod experiments;
 mod export;
 mod folder;
 mod gate;
@@ -16,6 +17,7 @@ mod plan;
 mod report;
 mod rooms;
 mod store;
+mod tuning;
 mod watch;
 mod work;
 

@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::outcome::{Failure, say};
+use tagalong_app::scoring::TruthFile;
 use tagalong_app::suggest::{self, check_log_path, toml_files};
 use tagalong_config::{Registry, path_text};
 use tagalong_log::{FrameSource, Inputs, LogError};
 use tagalong_pipeline::Tunable;
-use tagalong_scoring::TruthFile;
 
 use super::args::PlanArgs;
 
@@ -221,7 +221,11 @@ fn config_hash(config: &PlannedConfig, seed: u64, registry: &Registry) -> Result
 pub fn why_not(config: &PlannedConfig, log: &Annotated) -> Result<Option<String>, Failure> {
     match config.open(&log.log) {
         Ok(_) => Ok(None),
-        Err(error @ (LogError::Missing { .. } | LogError::Calibration { .. })) => {
+        Err(
+            error @ (LogError::Missing { .. }
+            | LogError::UnknownTopic { .. }
+            | LogError::Calibration { .. }),
+        ) => {
             let text = error.to_string();
             // The first line names the problem, the others give advice; the folder must not reach
             // the report.

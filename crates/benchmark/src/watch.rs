@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use tagalong_app::scoring::{
+    Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region,
+};
 use tagalong_app::timings::{StageTimes, Timings, WHOLE_FRAME};
 use tagalong_core::{Funnel, Track};
 use tagalong_eval::{
@@ -11,7 +14,6 @@ use tagalong_eval::{
 use tagalong_log::LogFrame;
 use tagalong_pipeline::FrameReport;
 use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Trajectory};
-use tagalong_scoring::{Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region};
 
 use super::misses::{DroppedPlaces, missed};
 use super::store::Recording;

@@ -8,12 +8,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::progress::Forecast;
 use tagalong_app::remedies::Remedies;
+use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions};
 use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, Inputs};
 use tagalong_pipeline::Pipeline;
 use tagalong_report::{Outcome, TaskResult};
-use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
 
 use super::args::{RunArgs, Shard};
 use super::pictures::Wanted;
@@ -324,7 +324,8 @@ impl Lane {
         match self.watch.score(truth, shots, blank) {
             Ok((result, recording)) => {
                 let deciding = deciding(&self.pipeline, &result, remedies);
-                let result = TaskResult { deciding, ..result };
+                let reasons = reasons(&self.pipeline, &result, remedies);
+                let result = TaskResult { deciding, reasons, ..result };
                 let stored = Stored { result, recording: Some(recording), ..Stored::default() };
                 (stored, Some(timing))
             }
@@ -349,6 +350,18 @@ fn failed(task: &Task, why: &str) -> Kept {
     let outcome = Outcome::Failed { why: why.to_owned() };
     let result = TaskResult { outcome, ..blank(task) };
     (Stored { result, ..Stored::default() }, None)
+}
+
+/// Returns the sentences that say why the tests dropped missed people.
+fn reasons(
+    pipeline: &Result<Pipeline, String>,
+    result: &TaskResult,
+    remedies: &Remedies,
+) -> BTreeMap<String, String> {
+    let Ok(pipeline) = pipeline else { return BTreeMap::new() };
+    let config = pipeline.config().values();
+    let tests = result.missed.iter().filter_map(|missed| missed.test.as_ref());
+    tests.map(|test| (test.clone(), remedies.sentence(test, config))).collect()
 }
 
 /// Returns the lines of the config that decide the tests that dropped missed people.

@@ -9,31 +9,22 @@ use tagalong_config::Registry;
 
 /// Registers every plugin of the workspace.
 pub fn register(registry: &mut Registry) {
-    tagalong_arc_follow::register(registry);
-    tagalong_associate_buffered::register(registry);
-    tagalong_associate_hungarian::register(registry);
-    tagalong_associate_jpda::register(registry);
-    tagalong_associate_observation_centric::register(registry);
-    tagalong_associate_two_stage::register(registry);
+    tagalong_associators::register(registry);
     tagalong_body_net::register(registry);
-    tagalong_clear_follow::register(registry);
     tagalong_color_texture::register(registry);
     tagalong_compressive::register(registry);
+    tagalong_controllers::register(registry);
     tagalong_correlation::register(registry);
     tagalong_depth_net::register(registry);
     tagalong_depth_template::register(registry);
-    tagalong_ekf::register(registry);
     tagalong_face_rgbd::register(registry);
-    tagalong_floor_kalman::register(registry);
+    tagalong_filters::register(registry);
     tagalong_hog_upper_body::register(registry);
-    tagalong_image_kalman::register(registry);
     tagalong_joint_particle::register(registry);
     tagalong_laser_legs::register(registry);
-    tagalong_last_seen::register(registry);
-    tagalong_manage_m_of_n::register(registry);
-    tagalong_manage_sprt::register(registry);
     tagalong_omni_appearance::register(registry);
     tagalong_onnx::register(registry);
     tagalong_recorded_detections::register(registry);
     tagalong_svm_patch::register(registry);
+    tagalong_track_managers::register(registry);
 }

@@ -6,10 +6,10 @@ use tagalong_annotate::{AnnotateArgs, HELP as ANNOTATE_HELP};
 use tagalong_app::format::{Format, TableFormat};
 use tagalong_app::input_args::InputArgs;
 use tagalong_benchmark::BenchArgs;
+use tagalong_benchmark::experiments::boxes::{BoxesArgs, HELP as BOXES_HELP};
+use tagalong_benchmark::experiments::follow::FollowArgs;
+use tagalong_benchmark::experiments::trials::TrialsArgs;
 use tagalong_doctor::DoctorArgs;
-use tagalong_experiments::boxes::{BoxesArgs, HELP as BOXES_HELP};
-use tagalong_experiments::follow::FollowArgs;
-use tagalong_experiments::trials::TrialsArgs;
 use tagalong_import::ImportArgs;
 use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
@@ -300,7 +300,7 @@ Examples:
 const TRAIN_HELP: &str = "\
 Candidates are what the template detector proposes in simulated rooms and annotated logs. Same seed and
 data, same bytes. The card beside the model has the counts, the cross-validation and the figures on
-held-out rooms and logs.
+held-out rooms and logs. Trainers are in programs that are built with `--features train`.
 
 Examples:
   tagalong train svm-patch --quick -o quick.toml

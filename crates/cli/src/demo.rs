@@ -14,7 +14,7 @@ use tagalong_log::write::RunDir;
 use tagalong_sim::{Scene, Simulation};
 use tagalong_simulate::record;
 
-use crate::run::{self, RunArgs};
+use crate::run::{self, Overlaid, RunArgs};
 
 const SCENE: &str = include_str!("../configs/scenes/demo.toml");
 
@@ -92,7 +92,7 @@ fn run_args(folder: &Path, name: &str, config: PathBuf, log: &Path) -> RunArgs {
         log: Some(log.to_owned()),
         output: Some(folder.join(name)),
         with_images: false,
-        overlay: true,
+        overlay: Some(Overlaid::People),
         overwrite: true,
         strict: false,
         threads: None,

@@ -25,7 +25,7 @@ use std::process::ExitCode;
 use args::{Cli, Command};
 use clap::{CommandFactory as _, Parser};
 pub use commands::{EvalArgs, SimilarityChoice, eval_json};
-pub use run::{RunArgs, run_until};
+pub use run::{Overlaid, RunArgs, run_until};
 use tagalong_app::outcome::{Failure, Outcome, say};
 use tagalong_config::Registry;
 
@@ -110,11 +110,11 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Demo(args) => demo::demo(args, registry),
         Command::Doctor(args) => tagalong_doctor::doctor(args, registry),
         Command::Import(args) => tagalong_import::import(args),
-        Command::Follow(args) => tagalong_experiments::follow::follow(args, registry),
+        Command::Follow(args) => tagalong_benchmark::experiments::follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
         Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
-        Command::Boxes(args) => tagalong_experiments::boxes::boxes(args, registry),
-        Command::Trials(args) => tagalong_experiments::trials::trials(args, registry),
+        Command::Boxes(args) => tagalong_benchmark::experiments::boxes::boxes(args, registry),
+        Command::Trials(args) => tagalong_benchmark::experiments::trials::trials(args, registry),
         Command::Train(args) => tagalong_training::train(args, registry),
         Command::Model(args) => commands::model(args, registry),
         Command::Inspect { log, config, input, format } => {

@@ -253,6 +253,11 @@ impl Registry {
         self.training.insert(name, offer);
     }
 
+    /// Returns whether any plugin can be trained.
+    pub fn has_trainers(&self) -> bool {
+        !self.trainers.is_empty()
+    }
+
     /// Returns how the model of a trainer is trained.
     pub fn training_offer(&self, name: &str) -> TrainingOffer {
         let is_detector = self.plugins.get(name).is_some_and(|info| info.kind == Kind::Detector);

@@ -2,12 +2,12 @@
 
 use nalgebra::{Matrix3, Point3};
 use tagalong_core::{Association, Associations, Associator, Detection, Track};
-use tagalong_stats::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64};
 
 use crate::samples::{GATE, track_at, with_variance};
 use crate::scenes::{level, sighting};
 use crate::subject::{From, Subject};
-use crate::{Check, Verdict, demand};
+use crate::verdict::{Check, Verdict, demand};
 
 pub(crate) const CHECKS: &[Check] = &[
     ("nothing leads to no pair", nothing_leads_to_nothing),

@@ -6,7 +6,7 @@ use tagalong_core::{Controller, Frame, Images, Scene, Track, Twist, WheelSpeeds}
 use crate::figure::{Figure, World};
 use crate::scenes::{bare_frame, frame, level, mirrored, odd_frames, track};
 use crate::subject::{From, Subject, WHEELS};
-use crate::{Check, Verdict, demand};
+use crate::verdict::{Check, Verdict, demand};
 
 pub(crate) const CHECKS: &[Check] = &[
     ("never panics on odd frames", odd_frames_are_survived),

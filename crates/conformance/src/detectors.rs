@@ -9,7 +9,7 @@ use tagalong_geometry::Camera;
 use crate::figure::Figure;
 use crate::scenes::{bare_frame, drawn, level, mountings, odd_frames, required, restricted, track};
 use crate::subject::{From, Subject};
-use crate::{Check, Verdict, demand};
+use crate::verdict::{Check, Verdict, demand};
 
 pub(crate) const CHECKS: &[Check] = &[
     ("never panics on odd frames", odd_frames_are_survived),

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point2, Point3, Rotation3, Vector3};
 use tagalong_core::{DepthImage, Images, LaserScan, RgbImage};
 use tagalong_geometry::Camera;
-use tagalong_stats::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64};
 
 /// Height of the laser scanner above the floor, m: that of shins.
 pub const SCANNER_HEIGHT_M: f64 = 0.3;

@@ -12,11 +12,11 @@ use tagalong_core::{
     TrackId, Update,
 };
 use tagalong_geometry::Camera;
-use tagalong_stats::SplitMix64;
+use tagalong_math::SplitMix64;
 
 use crate::scenes::{DT_S, level, moving_frame, odd_frames, sighting};
 use crate::subject::{From, Subject};
-use crate::{Check, Verdict, demand};
+use crate::verdict::{Check, Verdict, demand};
 
 pub(crate) const CHECKS: &[Check] = &[
     ("never panics on odd frames", odd_frames_are_survived),

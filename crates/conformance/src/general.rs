@@ -3,7 +3,7 @@
 use tagalong_config::nearest;
 
 use crate::subject::{From, Subject};
-use crate::{Check, Verdict, demand};
+use crate::verdict::{Check, Verdict, demand};
 
 pub(crate) const BUILDS: Check = ("is built from its defaults", builds);
 

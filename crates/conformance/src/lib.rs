@@ -29,6 +29,8 @@ pub mod patch;
 pub mod samples;
 mod scenes;
 mod subject;
+pub mod testdata;
+mod verdict;
 mod verifiers;
 
 use std::collections::BTreeSet;
@@ -42,6 +44,7 @@ use tagalong_config::{Context, Kind, Registry};
 
 pub use controllers::target;
 use subject::{Subject, WHEELS};
+use verdict::{Check, Verdict};
 
 /// Failure of one check by one plugin.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,9 +69,6 @@ pub fn context() -> Context {
     Context { seed: 1, base_dir: PathBuf::from("."), wheels: WHEELS }
 }
 
-/// A check: its name and its function. The error is a sentence.
-type Check = (&'static str, fn(&Subject<'_>) -> Verdict);
-type Verdict = Result<(), String>;
 type Checks = Chain<slice::Iter<'static, Check>, slice::Iter<'static, Check>>;
 
 /// The suite over one registry.
@@ -219,11 +219,6 @@ fn failure(plugin: &str, check: &'static str, what: String) -> Failure {
 fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a message")
-}
-
-/// Fails with a sentence unless `holds`.
-fn demand(holds: bool, otherwise: impl FnOnce() -> String) -> Verdict {
-    if holds { Ok(()) } else { Err(otherwise()) }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use tagalong_core::{Detector, Error, Frame, Likelihood, Person};
 use crate::figure::Figure;
 use crate::scenes::{bare_frame, drawn, level, odd_frames};
 use crate::subject::{From, Subject};
-use crate::{Check, Verdict, demand};
+use crate::verdict::{Check, Verdict, demand};
 
 pub(crate) const CHECKS: &[Check] = &[
     ("likelihood: the true scene outweighs a shifted one", truth_outweighs),

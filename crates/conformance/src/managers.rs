@@ -7,11 +7,11 @@ use tagalong_core::{
     Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track, TrackId,
     TrackManager, Unassociated,
 };
-use tagalong_stats::SplitMix64;
+use tagalong_math::SplitMix64;
 
 use crate::scenes::{DT_S, level, sighting};
 use crate::subject::{From, Subject};
-use crate::{Check, Verdict, demand};
+use crate::verdict::{Check, Verdict, demand};
 
 pub(crate) const CHECKS: &[Check] = &[
     ("same input, same output", repeatable),

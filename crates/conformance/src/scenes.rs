@@ -8,7 +8,7 @@ use tagalong_core::{
     RgbImage, RightImage, Stamp, Track, TrackId, Usage,
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
-use tagalong_stats::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64};
 
 use crate::figure::{Figure, World};
 

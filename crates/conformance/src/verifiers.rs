@@ -2,12 +2,12 @@
 
 use tagalong_core::{Detection, Error, Frame, Verifier};
 use tagalong_geometry::{ImageBox, Rect};
-use tagalong_stats::SplitMix64;
+use tagalong_math::SplitMix64;
 
 use crate::figure::Figure;
 use crate::scenes::{bare_frame, drawn, level, odd_frames, required, restricted, sighting};
 use crate::subject::{From, Subject};
-use crate::{Check, Verdict, demand};
+use crate::verdict::{Check, Verdict, demand};
 
 pub(crate) const CHECKS: &[Check] = &[
     ("never panics on odd frames", odd_frames_are_survived),

@@ -1,50 +1,6 @@
 use std::fmt;
 
-use crate::{DiffDrive, Frame, Inputs, Stamp, Track};
-
-/// Speeds over ground of the two driven wheels, m/s.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct WheelSpeeds {
-    /// Left wheel.
-    pub left: f64,
-    /// Right wheel.
-    pub right: f64,
-}
-
-impl WheelSpeeds {
-    /// Robot at rest.
-    pub const STOP: Self = Self { left: 0.0, right: 0.0 };
-}
-
-/// Velocity of the robot over ground, in the robot frame.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Twist {
-    /// Speed forward, m/s.
-    pub linear_mps: f64,
-    /// Speed to the left, m/s; 0 for a differential drive, which cannot move sideways.
-    pub lateral_mps: f64,
-    /// Turn rate, rad/s, positive to the left.
-    pub angular_rps: f64,
-}
-
-impl Twist {
-    /// Robot at rest.
-    pub const STOP: Self = Self { linear_mps: 0.0, lateral_mps: 0.0, angular_rps: 0.0 };
-
-    /// Creates the twist of a robot that drives forward and turns.
-    pub const fn new(linear_mps: f64, angular_rps: f64) -> Self {
-        Self { linear_mps, lateral_mps: 0.0, angular_rps }
-    }
-
-    /// Returns the twist on the same arc at `by` times the speed.
-    pub fn scaled(self, by: f64) -> Self {
-        Self {
-            linear_mps: self.linear_mps * by,
-            lateral_mps: self.lateral_mps * by,
-            angular_rps: self.angular_rps * by,
-        }
-    }
-}
+use crate::{DiffDrive, Frame, Inputs, Stamp, Track, Twist, WheelSpeeds};
 
 /// Velocity to drive, with a period of validity and a reason.
 #[derive(Clone, Copy, Debug, PartialEq)]

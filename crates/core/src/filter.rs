@@ -1,40 +1,9 @@
 use std::collections::BTreeMap;
 
-use nalgebra::{Point3, SMatrix, Vector2};
-
-use crate::{Detection, EgoMotion, Frame, Inputs, Likelihood, Result, TrackId, Visualisation};
-use tagalong_geometry::{Camera, Rect};
-
-/// State of a person in the robot frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Person {
-    /// Centre of the head, m.
-    pub position: Point3<f64>,
-    /// Velocity over ground (not relative to the robot), in robot axes, m/s.
-    pub velocity: Vector2<f64>,
-}
-
-/// State estimate of one person.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
-    /// The mean.
-    pub person: Person,
-    /// Covariance of (x, y, z, vx, vy).
-    pub covariance: SMatrix<f64, 5, 5>,
-    /// The expected upper-body square in the image.
-    pub region: Rect,
-}
-
-impl Estimate {
-    /// Returns true if every number is finite and no variance is negative.
-    pub fn is_sane(&self) -> bool {
-        self.person.position.iter().all(|v| v.is_finite())
-            && self.person.velocity.iter().all(|v| v.is_finite())
-            && self.covariance.iter().all(|v| v.is_finite())
-            && self.covariance.diagonal().iter().all(|v| *v >= 0.0)
-            && self.region.is_sane()
-    }
-}
+use crate::{
+    Detection, EgoMotion, Estimate, Frame, Inputs, Likelihood, Result, TrackId, Visualisation,
+};
+use tagalong_geometry::Camera;
 
 /// A detection that the association assigned to a track.
 #[derive(Clone, Copy)]
@@ -105,7 +74,7 @@ pub struct FilterRequirements {
 }
 
 /// Estimates the states of **all** people at once, so that a joint filter needs no special
-/// interface. The crate `tagalong-filtering` adapts filters of one person.
+/// interface. [`PerPerson`](crate::PerPerson) adapts filters of one person.
 ///
 /// ```
 /// # use std::collections::BTreeMap;
@@ -191,33 +160,5 @@ pub trait Filter: Send {
     fn visualise(&self, evidence: &Evidence<'_>) -> Result<Option<Visualisation>> {
         let _ = evidence;
         Ok(None)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_number_of_an_estimate_is_looked_at() {
-        let person = Person { position: Point3::new(3.0, 0.0, 1.6), velocity: Vector2::zeros() };
-        let covariance = SMatrix::<f64, 5, 5>::zeros();
-        let fine = Estimate { person, covariance, region: Rect::new(0.0, 0.0, 1.0, 1.0) };
-        assert!(fine.is_sane());
-        let mut endless = covariance;
-        endless[(4, 0)] = f64::INFINITY;
-        let mut negative = covariance;
-        negative[(3, 3)] = -1e-9;
-        let position = Point3::new(f64::NAN, 0.0, 0.0);
-        let velocity = Vector2::new(0.0, f64::NAN);
-        for broken in [
-            Estimate { person: Person { position, ..person }, ..fine.clone() },
-            Estimate { person: Person { velocity, ..person }, ..fine.clone() },
-            Estimate { covariance: endless, ..fine.clone() },
-            Estimate { covariance: negative, ..fine.clone() },
-            Estimate { region: Rect::new(0.0, 0.0, -1.0, 1.0), ..fine.clone() },
-        ] {
-            assert!(!broken.is_sane(), "{broken:?}");
-        }
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! All types that two crates of the workspace exchange are defined here and nowhere else: a
 //! [`Detector`] finds people in a [`Frame`] as [`Detection`]s, a [`Verifier`] judges them, an
-//! [`Associator`] assigns them to [`Track`]s, a [`Filter`] estimates their states, a
+//! [`Associator`] assigns them to [`Track`]s, a [`Filter`] (or a [`PersonFilter`], for one person
+//! at a time) estimates their states, a
 //! [`TrackManager`] starts and ends them, and a [`Controller`] steers after one of them.
 //!
 //! # Why a detection has a position, and a box if a camera made it
@@ -36,8 +37,11 @@ mod funnel;
 mod image;
 mod inputs;
 mod manager;
+mod mixture;
 mod motion;
 mod obstacles;
+mod person;
+mod person_filter;
 mod scan;
 mod sensors;
 mod time;
@@ -45,12 +49,12 @@ mod track;
 mod visualisation;
 
 pub use associator::{Association, Associations, Associator, Gate};
-pub use control::{Command, Controller, Reason, Scene, Twist, WheelSpeeds};
+pub use control::{Command, Controller, Reason, Scene};
 pub use detection::Detection;
 pub use detector::{Detector, Likelihood, Query, Verifier};
 pub use error::{Error, Result};
 pub use external::ExternalDetection;
-pub use filter::{Estimate, Evidence, Filter, FilterRequirements, Matched, Person, Update};
+pub use filter::{Evidence, Filter, FilterRequirements, Matched, Update};
 pub use frame::{Derived, Frame, Images};
 pub use funnel::{Dropped, Funnel, MAX_PLACES};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
@@ -58,8 +62,13 @@ pub use inputs::{Capabilities, Input, Inputs, Usage};
 pub use manager::{
     Initiation, Observation, ObservedTrack, TrackChanges, TrackHealth, TrackManager, Unassociated,
 };
-pub use motion::{DiffDrive, EgoMotion, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, planar_pose};
+pub use mixture::match_moments;
+pub use motion::{
+    DiffDrive, EgoMotion, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, Twist, WheelSpeeds, planar_pose,
+};
 pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReading};
+pub use person::{Estimate, Person};
+pub use person_filter::{PerPerson, PersonFilter};
 pub use scan::{FurtherScans, LaserScan, RayReading, UnreadRay};
 pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};
 pub use time::Stamp;

@@ -1,6 +1,5 @@
 //! Other settings, tried on the same frames: how the figures of a pipeline would have changed.
 
-use serde::Serialize;
 use tagalong_app::choice::fitting;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::progress::Progress;
@@ -11,20 +10,11 @@ use tagalong_log::{FrameSource, LogFrame};
 use tagalong_pipeline::Pipeline;
 use toml::Table;
 
-use super::coverage::{Course, Coverage};
+use super::coverage::{Alternative, Course, Coverage};
 use super::visit::{Scope, Visit};
 
 /// Most built-in configs that are tried beside the one of the user.
 const MOST_CONFIGS: usize = 4;
-
-/// Other setting, and its figures.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Alternative {
-    /// Line of a config, or the name of another config.
-    pub change: String,
-    /// Figures with it.
-    pub coverage: Coverage,
-}
 
 /// Pipeline with another setting, on its way over the log.
 struct Runner {

@@ -3,17 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use tagalong_app::choice::Choice;
 use tagalong_app::outcome::{Failure, make_folder};
 use tagalong_app::remedies::Remedies;
 use tagalong_config::path_text;
 use tagalong_log::InputAccount;
 
-use super::alternatives::Alternative;
-use super::comparison::Row;
-use super::coverage::Coverage;
+use super::args::DoctorArgs;
+use super::coverage::{Alternative, Coverage};
+use super::evidence::Evidence;
 use super::finding::Finding;
 use super::visit::Visit;
-use super::{DoctorArgs, checks, present, sheets};
+use super::{alternatives, checks, present, sheets};
 
 /// Complete result of the doctor.
 #[derive(Debug, Serialize)]
@@ -61,8 +62,46 @@ pub struct Drop {
     pub look: Option<String>,
     /// Settings that belong to it, with their present values.
     pub settings: Vec<String>,
+    /// Sentence with the meaning of the test and two settings at most.
+    pub why: String,
     /// Pictures of the dropped candidates.
     pub pictures: Option<PathBuf>,
+}
+
+/// Pipeline in the comparison.
+#[derive(Debug, Serialize)]
+pub struct Row {
+    /// Name of the built-in config.
+    pub config: &'static str,
+    /// True for the one that `tagalong run` takes.
+    pub taken: bool,
+    /// Reason for the choice of such a pipeline.
+    pub reason: &'static str,
+    /// Figures on the log.
+    pub coverage: Coverage,
+    /// Mean time of a frame, ms.
+    pub frame_ms: f64,
+    /// Error of a plugin that ended it.
+    pub failure: Option<String>,
+}
+
+impl Row {
+    /// Returns the row of a pipeline after its visit.
+    pub fn of(choice: Choice, evidence: &Evidence, taken: bool) -> Self {
+        Self {
+            config: choice.config,
+            taken,
+            reason: choice.reason,
+            coverage: evidence.coverage.clone(),
+            frame_ms: evidence.coverage.frame_ms,
+            failure: evidence.trial.failure.clone(),
+        }
+    }
+
+    /// Returns the pipeline as an alternative to the one that is taken.
+    pub fn alternative(&self) -> Alternative {
+        Alternative { change: alternatives::another(self.config), coverage: self.coverage.clone() }
+    }
 }
 
 impl Diagnosis {
@@ -126,6 +165,7 @@ fn funnel(
                 count: entry.count,
                 settings: remedy.as_ref().map_or_else(Vec::new, |remedy| remedy.lines(resolved)),
                 look: remedy.map(|remedy| remedy.look.clone()),
+                why: remedies.sentence(entry.test, resolved),
                 pictures: pictures.remove(entry.test),
             }
         })

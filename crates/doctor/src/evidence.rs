@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
 use tagalong_core::{DepthImage, Frame, LaserScan};
 use tagalong_geometry::Camera;
 use tagalong_log::{InputSettings, Inputs, Inspection, LogError, LogFrame};
@@ -10,9 +11,7 @@ use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
 use tagalong_vision::quality::Exposure;
 use tagalong_vision::registration::{EdgeOverlap, OverlapSettings};
 
-use super::alternatives::Alternative;
-use super::coverage::Coverage;
-use super::preparations::Preparations;
+use super::coverage::{Alternative, Coverage};
 use super::trial::Trial;
 
 /// Number of measured frames, spread over those that are read.
@@ -64,6 +63,29 @@ impl Evidence {
     pub fn is_pose_assumed(&self) -> bool {
         self.inspection.facts.camera_source.starts_with("an assumption")
     }
+}
+
+/// Result of a preparation.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Prepared {
+    /// Settings that differ from the config, as a line; empty for the config as it is.
+    pub change: String,
+    /// Frames in which people are found.
+    pub found: usize,
+    /// Mean over the frames of the probability of the likeliest person; 0 for frames without one.
+    pub score: f64,
+}
+
+/// Preparations of the images of one network.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Preparations {
+    /// Frames that were tried.
+    pub frames: usize,
+    /// That of the config.
+    pub now: Prepared,
+    /// The best other one, with as few settings as it takes; none was tried where that of the
+    /// config finds people in most frames.
+    pub best: Option<Prepared>,
 }
 
 /// Numbers of frames of a pass.

@@ -8,12 +8,14 @@
 //! visits the log with each built-in pipeline that fits it.
 
 mod alternatives;
+mod args;
 mod checks;
 mod comparison;
 mod coverage;
 mod diagnosis;
 mod evidence;
 mod finding;
+mod further;
 mod preparations;
 mod present;
 mod print;
@@ -23,12 +25,9 @@ mod snapshots;
 mod trial;
 mod visit;
 
-use std::path::PathBuf;
-
-use clap::{Args, ValueEnum};
+pub use args::{DoctorArgs, Trying};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::Format;
-use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::remedies::Remedies;
 use tagalong_app::serialize::to_json;
@@ -39,49 +38,6 @@ use tagalong_log::write::RunDir;
 use self::diagnosis::Diagnosis;
 use self::finding::Severity;
 use self::visit::{Scope, Visit};
-
-/// Arguments of `tagalong doctor`.
-#[derive(Args, Debug)]
-#[command(allow_missing_positional = true)]
-pub struct DoctorArgs {
-    /// The pipeline, a TOML file or the name of a built-in one [default: the recommended ones that
-    /// fit the log, one after the other].
-    pub config: Option<PathBuf>,
-    /// The log: MCAP, `.db3`, `.bag`, or the folder of a bag.
-    #[arg(required = true)]
-    pub log: PathBuf,
-    /// Write pictures into this folder: frames with their tracks, and the candidates that each test
-    /// dropped.
-    #[arg(short, long, value_name = "DIR")]
-    pub output: Option<PathBuf>,
-    /// Replace the pictures of an earlier visit in the same folder.
-    #[arg(long)]
-    pub overwrite: bool,
-    /// Number of frames to examine, from the first one on.
-    #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..))]
-    pub frames: u64,
-    /// Try other settings on this log, and print what each would have changed.
-    #[arg(long, value_enum, default_value_t)]
-    pub settings: Trying,
-    /// Output format.
-    #[arg(long, value_enum, default_value_t)]
-    pub format: Format,
-    /// Way in which the log is read.
-    #[command(flatten)]
-    pub input: InputArgs,
-}
-
-/// Occasion for trying other settings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Trying {
-    /// Where tracks and things that come and go do not agree.
-    #[default]
-    Auto,
-    /// Always.
-    Always,
-    /// Never: a log is passed once.
-    Never,
-}
 
 /// Runs the checks and a pipeline on a log, and reports the problems.
 ///
@@ -124,7 +80,7 @@ fn diagnose(
     registry: &Registry,
 ) -> Result<Diagnosis, Failure> {
     let mut visit = Visit::make(config, scope, registry)?;
-    visit.ask_further(args.settings, scope, registry);
+    further::ask_further(&mut visit, args.settings, scope, registry);
     let pictures = args.output.as_ref().map(|folder| folder.join("frames"));
     if let Some(folder) = &pictures {
         snapshots::write(&visit, scope, folder)?;

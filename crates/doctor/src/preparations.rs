@@ -1,14 +1,14 @@
 //! Preparations of images for a neural network, tried on frames of the log: a wrong one finds no
 //! people without a word.
 
-use serde::Serialize;
 use tagalong_config::{Context, Registry};
 use tagalong_core::{Detector, DiffDrive, Frame, Funnel, Query};
 use tagalong_log::FrameSource;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-use super::Trying;
+use super::args::Trying;
+use super::evidence::{Preparations, Prepared};
 use super::trial::Spread;
 use super::visit::{Scope, Visit};
 
@@ -25,29 +25,6 @@ const ENOUGH: f64 = 0.75;
 const SAME: f64 = 0.02;
 /// Means and deviations of ImageNet in red, green, blue, 0 to 255, as torchvision states them.
 const IMAGENET: [[f64; 3]; 2] = [[123.675, 116.28, 103.53], [58.395, 57.12, 57.375]];
-
-/// Result of a preparation.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Prepared {
-    /// Settings that differ from the config, as a line; empty for the config as it is.
-    pub change: String,
-    /// Frames in which people are found.
-    pub found: usize,
-    /// Mean over the frames of the probability of the likeliest person; 0 for frames without one.
-    pub score: f64,
-}
-
-/// Preparations of the images of one network.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Preparations {
-    /// Frames that were tried.
-    pub frames: usize,
-    /// That of the config.
-    pub now: Prepared,
-    /// The best other one, with as few settings as it takes; none was tried where that of the
-    /// config finds people in most frames.
-    pub best: Option<Prepared>,
-}
 
 /// Settings of the plugin.
 type Settings = Vec<(&'static str, Value)>;

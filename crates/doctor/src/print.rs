@@ -1,9 +1,7 @@
 use std::fmt::Write as _;
 
-use super::alternatives::Alternative;
-use super::comparison::Row;
-use super::coverage::Coverage;
-use super::diagnosis::{Diagnosis, Drop};
+use super::coverage::{Alternative, Coverage};
+use super::diagnosis::{Diagnosis, Drop, Row};
 use super::finding::{Finding, Severity};
 
 /// Lines of the funnel that are shown.
@@ -146,9 +144,8 @@ fn finding(out: &mut String, finding: &Finding) {
 
 fn drop(out: &mut String, drop: &Drop) {
     let _ = writeln!(out, "  {:>9}  {}", drop.count, drop.test);
-    let look = drop.look.iter();
     let pictures = drop.pictures.iter().map(|path| format!("pictures: {}", path.display()));
-    for line in look.cloned().chain(drop.settings.iter().cloned()).chain(pictures) {
+    for line in std::iter::once(drop.why.clone()).chain(pictures) {
         let _ = writeln!(out, "{:13}{line}", "");
     }
 }

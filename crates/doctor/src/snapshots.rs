@@ -6,7 +6,7 @@ use std::path::Path;
 use tagalong_app::outcome::{Failure, make_folder};
 use tagalong_app::progress::Progress;
 use tagalong_log::{FrameSource, Input};
-use tagalong_render::{Overlay, OverlayData};
+use tagalong_render::{Overlay, OverlayData, OverlayStyle};
 
 use super::visit::{Scope, Visit};
 
@@ -31,7 +31,8 @@ pub fn write(visit: &Visit, scope: Scope, folder: &Path) -> Result<(), Failure> 
     let Ok(mut frames) = FrameSource::open(scope.log, input, limits, inputs) else {
         return Ok(());
     };
-    let mut overlay = Overlay::new(folder.to_owned());
+    let style = OverlayStyle::debug(visit.outer.output.boxes);
+    let mut overlay = Overlay::new(folder.to_owned(), style);
     let progress = Progress::titled("pictures");
     for report in reports {
         let Some(item) = frames.next_frame() else { break };

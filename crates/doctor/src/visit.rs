@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use tagalong::logs::sources_of;
-use tagalong_app::choice::{CHOICES, fitting};
 use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
 use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::Failure;
@@ -16,7 +15,6 @@ use super::coverage::Coverage;
 use super::evidence::{Driven, Evidence, Reading, Samples};
 use super::scenery::{Scenery, Views};
 use super::trial::Trial;
-use super::{Trying, alternatives, checks, preparations};
 
 /// A pipeline after its pass over a log.
 pub struct Visit {
@@ -61,7 +59,10 @@ impl Visit {
         let read = inputs.accept(Input::Colour).accept(Input::Depth);
         let mut found = examine(scope.log, &outer.input, &outer.limits, read)?;
         // A topic of a wrong kind is a mistake of the config, and shown as such.
-        let is_mistake = matches!(found.refusal, Some(LogError::WrongTopic { .. }));
+        let is_mistake = matches!(
+            found.refusal,
+            Some(LogError::WrongTopic { .. } | LogError::UnknownTopic { .. })
+        );
         if let Some(error) = found.refusal.take_if(|_| is_mistake) {
             return Err(refused_log(error, pipeline.config()));
         }
@@ -95,24 +96,6 @@ impl Visit {
         evidence.changed = (!scenery.moments.is_empty()).then_some(scenery.changed);
         evidence.coverage = Coverage::of(&evidence.trial.course, &scenery);
         Ok(Self { config, pipeline, outer, tunables: settings.tune, evidence, scenery })
-    }
-
-    /// Looks for other settings and other configs where the findings ask for them.
-    pub fn ask_further(&mut self, when: Trying, scope: Scope, registry: &Registry) {
-        if self.evidence.refusal.is_some() {
-            let found = fitting(scope.log, registry, scope.input, CHOICES.len()).fitting;
-            self.evidence.fitting = found.iter().map(|other| other.choice.config).collect();
-            return;
-        }
-        self.evidence.preparations = preparations::tried(self, when, scope, registry);
-        let is_wanted = match when {
-            Trying::Never => false,
-            Trying::Always => true,
-            Trying::Auto => checks::asks_for_settings(&self.evidence),
-        };
-        if is_wanted && self.evidence.trial.failure.is_none() {
-            self.evidence.alternatives = alternatives::tried(self, scope, registry);
-        }
     }
 }
 

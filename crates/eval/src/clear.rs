@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::prepare::{Prepared, PreparedFrame};
 use crate::ratio;
-use tagalong_matching::{Edge, Matcher};
+use tagalong_math::matching::{Edge, Matcher};
 
 /// The similarity from which on a match counts in CLEAR MOT and Identity.
 pub const MATCH_SIMILARITY: f64 = 0.5;

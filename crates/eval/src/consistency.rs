@@ -37,7 +37,7 @@ impl Consistency {
         let tail = 0.5 * (1.0 - confidence);
         let limit = chi_square_quantile(confidence, single)?;
         Some(Self {
-            mean: tagalong_stats::mean(values)?,
+            mean: tagalong_math::mean(values)?,
             expected: single,
             lower: chi_square_quantile(tail, single * count)? / count,
             upper: chi_square_quantile(1.0 - tail, single * count)? / count,

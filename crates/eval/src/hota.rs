@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use crate::pairs::PairTable;
 use crate::prepare::{Prepared, PreparedFrame};
 use crate::ratio;
-use tagalong_matching::{Edge, Matcher};
+use tagalong_math::matching::{Edge, Matcher};
 
 /// Number of similarity thresholds.
 pub const LEVELS: usize = 19;

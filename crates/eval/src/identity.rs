@@ -4,7 +4,7 @@ use crate::clear::MATCH_SIMILARITY;
 use crate::pairs::PairTable;
 use crate::prepare::Prepared;
 use crate::ratio;
-use tagalong_matching::Matcher;
+use tagalong_math::matching::Matcher;
 
 /// The identity counts (Ristani et al., ECCV 2016 workshops): each truth is
 /// given one track for the whole sequence so that as many frames as possible

@@ -70,8 +70,8 @@ pub use position::{PositionError, position_errors_m};
 pub use prepare::{Comparison, Prepared, PreparedFrame};
 pub use scores::{Scores, Tally};
 pub use sets::{FrameDistance, GospaParts, SetDistance, SetTally};
-pub use tagalong_matching::{Edge, Matcher};
-pub use tagalong_stats::{
+pub use tagalong_math::matching::{Edge, Matcher};
+pub use tagalong_math::{
     CONFIDENCE, Gain, Interval, clustered_share, draws_interval, holm, is_significant,
     mean_interval, paired_gain, percentile, sign_flip, wilson,
 };

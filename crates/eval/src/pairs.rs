@@ -1,5 +1,5 @@
 use crate::prepare::Prepared;
-use tagalong_matching::Edge;
+use tagalong_math::matching::Edge;
 
 /// All pairs of a truth and a track that are alike in any frame, numbered, so
 /// that counts per pair are plain lists and the inner loops need no hashing.

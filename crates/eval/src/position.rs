@@ -1,5 +1,5 @@
 use serde::{Deserialize, Serialize};
-use tagalong_stats::{mean, percentile};
+use tagalong_math::{mean, percentile};
 
 use crate::clear::Match;
 use crate::prepare::Prepared;

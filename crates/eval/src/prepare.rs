@@ -1,6 +1,6 @@
 use crate::error::EvalError;
 use crate::types::{Frame, Report, Role, Sequence, Similarity, Truth};
-use tagalong_matching::{Edge, Matcher};
+use tagalong_math::matching::{Edge, Matcher};
 
 /// Comparison of truth and reports before anything is counted.
 #[derive(Clone, Copy, PartialEq, Debug)]

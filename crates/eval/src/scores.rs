@@ -164,9 +164,9 @@ impl Tally {
     }
 
     fn add_times(&self, scores: &mut Scores) {
-        scores.time_to_confirm_mean_s = tagalong_stats::mean(&self.times.confirm_s);
+        scores.time_to_confirm_mean_s = tagalong_math::mean(&self.times.confirm_s);
         scores.never_confirmed = self.times.never_confirmed;
-        scores.time_to_reacquire_mean_s = tagalong_stats::mean(&self.times.reacquire_s);
+        scores.time_to_reacquire_mean_s = tagalong_math::mean(&self.times.reacquire_s);
         scores.never_reacquired = self.times.never_reacquired;
         scores.wrong_person_s = self.times.wrong_person_s;
     }

@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::prepare::{Prepared, PreparedFrame};
 use crate::types::{Frame, Sequence, Similarity, distance_m};
-use tagalong_matching::{Edge, Matcher};
+use tagalong_math::matching::{Edge, Matcher};
 
 /// Settings of the distances between sets.
 #[derive(Clone, Copy, PartialEq, Debug)]

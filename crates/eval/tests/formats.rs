@@ -376,7 +376,7 @@ fn kitti_objects_that_are_not_told_apart_are_left_out() {
 
 #[test]
 fn people_csv_survives_a_round_trip_in_any_order_of_columns() {
-    let Some(path) = tagalong_testdata::find("logs/um.people.csv") else { return };
+    let Some(path) = tagalong_conformance::testdata::find("logs/um.people.csv") else { return };
     let source = fs::read_to_string(&path).unwrap();
     let rows = people::parse(&source, "um.people.csv").unwrap();
     assert_eq!(rows.len(), source.lines().count() - 1);

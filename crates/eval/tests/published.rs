@@ -8,12 +8,12 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
+use tagalong_conformance::testdata::find;
 use tagalong_eval::formats::{Timeline, mot};
 use tagalong_eval::{
     Comparison, DetectionTally, Frame, HotaLevel, Region, Report, Role, Sequence, SetDistance,
     Similarity, Tally, Truth,
 };
-use tagalong_testdata::find;
 
 fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))

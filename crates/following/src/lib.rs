@@ -25,6 +25,7 @@ mod collision_monitor;
 mod command_limiter;
 mod distances;
 mod enable;
+mod robot;
 mod settings;
 mod skill;
 mod steering;
@@ -36,7 +37,8 @@ pub use collision_monitor::{
 pub use command_limiter::{CommandLimiterSettings, Orders};
 pub use distances::{BlindZone, SafetyDistances};
 pub use enable::{Enable, EnableSwitch, Permission};
-pub use settings::{Base, FollowSettings, OdometrySource, RobotSettings};
+pub use robot::{Base, OdometrySource, RobotSettings};
+pub use settings::FollowSettings;
 pub use skill::{Choice, Enrollment, EnrollmentError, FollowStatus, PersonStatus};
 pub use steering::{Steered, Steering};
 pub use target_lock::{

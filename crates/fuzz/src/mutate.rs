@@ -1,6 +1,6 @@
 //! Random mutations of a valid file.
 
-use tagalong_stats::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64};
 
 /// Numbers at which parsers go wrong, as little-endian lengths and counts.
 const ODD: [u64; 10] = [

@@ -11,7 +11,7 @@ use tagalong_eval::Region;
 use tagalong_eval::formats::people::Row;
 use tagalong_eval::formats::{MOST_FRAMES, MOST_ID};
 
-use super::ImportArgs;
+use super::args::ImportArgs;
 use super::truth::{WholeBody, boxes_csv, people_csv};
 
 /// Longest file that is read, bytes.

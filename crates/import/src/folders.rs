@@ -6,9 +6,9 @@ use tagalong_app::outcome::Failure;
 use tagalong_config::{FileLimit, read_text};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
+use super::args::{ImportArgs, MAX_HZ};
 use super::recorded;
 use super::sequence::{Eye, Sequence, pictures, size, steady, text};
-use super::{ImportArgs, MAX_HZ};
 
 /// Reads a folder of images, with one of depth if the options say so.
 ///

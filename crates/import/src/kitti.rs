@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use tagalong_app::outcome::Failure;
 use tagalong_eval::formats::MOST_FRAMES;
 
-use super::ImportArgs;
+use super::args::ImportArgs;
 use super::folders::level;
 use super::sequence::{Calibration, EPOCH, Eye, Placed, Sequence, numbers, pictures, steady, text};
 

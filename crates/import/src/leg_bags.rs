@@ -18,7 +18,7 @@ use tagalong_core::Stamp;
 use tagalong_log::msgs::{LaserScan, Pose, decode};
 use tagalong_log::{Limits, LogWalker, Message};
 
-use super::ImportArgs;
+use super::args::ImportArgs;
 
 /// Topic of the annotations.
 const PEOPLE: &str = "ground_truth_people_tracks";

@@ -8,7 +8,7 @@ use tagalong_app::outcome::Failure;
 use tagalong_config::{FileLimit, read_text};
 use tagalong_core::Stamp;
 
-use super::ImportArgs;
+use super::args::ImportArgs;
 
 /// Start time of a sequence without a clock.
 pub const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);

@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use tagalong_app::outcome::Failure;
 use tagalong_core::Stamp;
 
-use super::ImportArgs;
+use super::args::ImportArgs;
 use super::folders::level;
 use super::sequence::{
     Calibration, Eye, Moment, Placed, Sequence, lines, numbers, stamp as seconds, text,

@@ -10,8 +10,9 @@ pub struct Line {
 }
 
 /// Fits Platt's logistic calibration with smoothed targets (Platt 1999). Both classes have equal
-/// weight, so that the line gives the log-likelihood ratio without the prior. The values have to
-/// come from data that the classifier was not fitted to.
+/// weight, so that the line gives the log-likelihood ratio without the prior; `linfa`'s Platt
+/// scaling, which knows no weights, gives the same line where both classes are as frequent. The
+/// values have to come from data that the classifier was not fitted to.
 pub fn platt(values: &[(f64, bool)]) -> Line {
     let people = values.iter().filter(|(_, is_person)| *is_person).count() as f64;
     let others = values.len() as f64 - people;
@@ -32,6 +33,10 @@ pub fn platt(values: &[(f64, bool)]) -> Line {
 
 #[cfg(test)]
 mod tests {
+    use linfa::ParamGuard as _;
+    use linfa::composing::platt_scaling::{Platt, platt_newton_method};
+    use ndarray::Array1;
+
     use super::*;
 
     #[test]
@@ -49,6 +54,25 @@ mod tests {
         let prior = (people / (values.len() as f64 - people)).ln();
         assert!((line.slope - 2.0).abs() < 0.02, "{line:?}");
         assert!((line.offset - (-1.0 - prior)).abs() < 0.05, "{line:?}");
+    }
+
+    /// The reference: `linfa`'s line is that of the probability of the negative class.
+    #[test]
+    fn of_balanced_classes_the_line_is_that_of_linfa() {
+        let values: Vec<(f64, bool)> = (0..400)
+            .map(|k: u64| {
+                let noise = tagalong_math::mix(k) as f64 / u64::MAX as f64;
+                (4.0 * noise - if k.is_multiple_of(2) { 1.0 } else { 3.0 }, k.is_multiple_of(2))
+            })
+            .collect();
+        let params = Platt::<f64, ()>::params().check().unwrap();
+        let decisions: Array1<f64> = values.iter().map(|v| v.0).collect();
+        let truth: Array1<bool> = values.iter().map(|v| v.1).collect();
+        let found = platt_newton_method(decisions.view(), truth.view(), &params).unwrap();
+        let line = platt(&values);
+        assert!((line.slope + found.0).abs() < 1e-3, "{line:?} {found:?}");
+        assert!((line.offset + found.1).abs() < 1e-3, "{line:?} {found:?}");
+        assert!(line.slope > 0.5, "{line:?}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tagalong_config::Example;
-use tagalong_stats::mix;
+use tagalong_math::mix;
 
 /// Deals the groups out to `folds` parts, those with people and those without in turn, so that each
 /// part has both. The deal depends on the seed, not on the order of the examples.

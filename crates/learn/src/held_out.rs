@@ -25,7 +25,27 @@ pub fn accepted(values: &[(f64, bool)], people: bool) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use linfa::dataset::Pr;
+    use linfa::metrics::BinaryClassification as _;
+
     use super::*;
+
+    /// The reference, which takes probabilities only, in single precision.
+    #[test]
+    fn the_area_is_that_of_linfa() {
+        let values: Vec<(f64, bool)> = (0..300)
+            .map(|k: u64| {
+                let noise = (tagalong_math::mix(k) % 1000) as f64 / 1000.0;
+                (if k.is_multiple_of(3) { noise.sqrt() } else { noise }, k.is_multiple_of(3))
+            })
+            .collect();
+        let probabilities: Vec<Pr> = values.iter().map(|v| Pr::new(v.0 as f32)).collect();
+        let truth: Vec<bool> = values.iter().map(|v| v.1).collect();
+        let curve = probabilities.as_slice().roc(&truth).unwrap();
+        let expected = f64::from(curve.area_under_curve());
+        assert!((area(&values) - expected).abs() < 2e-3, "{} {expected}", area(&values));
+        assert!(expected > 0.6, "{expected}");
+    }
 
     #[test]
     fn the_area_counts_ordered_pairs() {

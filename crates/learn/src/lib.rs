@@ -13,6 +13,7 @@ mod adam;
 pub mod boost;
 mod calibrate;
 pub mod conv;
+#[cfg(feature = "train")]
 pub mod dense;
 mod folds;
 mod held_out;
@@ -30,6 +31,6 @@ pub use held_out::{accepted, area};
 pub use logistic::{Example, logistic};
 pub use parallel::side_by_side;
 pub use score::ScoreCalibration;
-pub use tagalong_stats::{fingerprint, mix};
+pub use tagalong_math::{fingerprint, mix};
 pub use variants::{mirrored, shifted};
 pub use weights::NetworkFile;

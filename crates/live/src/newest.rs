@@ -19,8 +19,11 @@ use tagalong_pipeline::FrameReport;
 use tagalong_render::{background, jpeg};
 use toml::Table;
 
-/// Frames of a trail.
-const TRAIL_FRAMES: usize = 40;
+/// Frames that are kept for trails and for the times of events.
+const PAST_FRAMES: usize = 64;
+
+/// Time that a trail reaches back, s.
+const TRAIL_S: f64 = 2.0;
 
 /// Events that a page which begins, or was away, still gets.
 const EVENTS: usize = 200;
@@ -134,11 +137,11 @@ impl Newest {
             images: frame.images(),
             scan: frame.laser().map(|laser| Arc::clone(&laser.points)),
             odom_from_robot: *odom_from_robot,
-            past: state.past.iter().map(|(_, _, frame)| Arc::clone(frame)).collect(),
+            past: trail_at(&state.past, t),
             parts: OnceLock::new(),
         };
         state.past.push_back((seq, t, Arc::new(data)));
-        while state.past.len() > TRAIL_FRAMES {
+        while state.past.len() > PAST_FRAMES {
             state.past.pop_front();
         }
         state.shot = Some(Arc::new(shot));
@@ -213,6 +216,12 @@ impl State {
             self.events.pop_front();
         }
     }
+}
+
+/// Returns the frames of the trails at a time.
+fn trail_at(past: &VecDeque<(u64, f64, Arc<FrameData>)>, now_s: f64) -> Vec<Arc<FrameData>> {
+    let recent = past.iter().filter(|(_, t, _)| now_s - t <= TRAIL_S);
+    recent.map(|(_, _, frame)| Arc::clone(frame)).collect()
 }
 
 impl Shot {

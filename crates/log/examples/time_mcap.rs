@@ -16,7 +16,7 @@ use std::time::Instant;
 use mcap::records::MessageHeader;
 use mcap::{Compression, MessageStream, WriteOptions};
 use tagalong_log::{Limits, LogWalker};
-use tagalong_stats::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64};
 
 /// Calls, of which the fastest counts.
 const CALLS: usize = 9;

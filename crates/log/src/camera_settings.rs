@@ -6,8 +6,6 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::MountSettings;
-
 /// `camera` under `[input]`: the name of one, or a table with its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraSettings {
@@ -64,5 +62,30 @@ impl JsonSchema for CameraSettings {
         json_schema!({
             "anyOf": [generator.subschema_for::<MountSettings>(), { "type": "string" }],
         })
+    }
+}
+
+/// Pose of the camera: above the robot's origin, looking forward.
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct MountSettings {
+    /// Camera whose images are used, of several: the folder that its topics share.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Height above the floor, m.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 100))]
+    pub height_m: f64,
+    /// Angle of the optical axis below the horizon, degrees.
+    #[schemars(range(min = -180.0, max = 180.0))]
+    pub pitch_down_deg: f64,
+    /// Roll, degrees; positive if its right side is raised.
+    #[schemars(range(min = -180.0, max = 180.0))]
+    pub roll_deg: f64,
+}
+
+impl MountSettings {
+    /// Returns the pose as that of the camera of this name.
+    pub fn with_name(self, name: &str) -> Self {
+        Self { name: Some(name.to_owned()), ..self }
     }
 }

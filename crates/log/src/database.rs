@@ -16,7 +16,7 @@ use rusqlite::{OptionalExtension as _, Row};
 
 use self::unfinished::Opened;
 use crate::Limits;
-use crate::mcap::NotMcap;
+use crate::error::NotMcap;
 use crate::walk::{Channel, Located, Walk};
 
 /// First bytes of a database.

@@ -1,7 +1,11 @@
 use std::path::PathBuf;
 
 use crate::camera_info::CalibrationError;
-use crate::mcap::NotMcap;
+
+/// Error for a file that is no container of messages: a sentence without its name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct NotMcap(pub String);
 
 /// Reason for which a log cannot be used at all. Damage inside a log is no error: it is skipped and
 /// counted.
@@ -51,6 +55,20 @@ pub enum LogError {
         wanted: String,
         /// Nearest name or other advice, or empty.
         hint: String,
+        /// Topics of the log, one per line.
+        present: String,
+    },
+    /// A topic that the settings name is not in the log.
+    #[error("`{}` has no topic `{topic}` fit for `{key}` of [input]{hint}\npresent:\n{present}", path.display())]
+    UnknownTopic {
+        /// Path of the file.
+        path: PathBuf,
+        /// Key under `[input]`.
+        key: String,
+        /// The topic.
+        topic: String,
+        /// Nearest name, or empty; boxed, because the largest variant is the size of every result.
+        hint: Box<str>,
         /// Topics of the log, one per line.
         present: String,
     },

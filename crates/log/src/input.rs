@@ -2,12 +2,9 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::check_settings;
 
-use crate::LogError;
-use crate::camera_settings::CameraSettings;
+use crate::camera_settings::{CameraSettings, MountSettings};
 use crate::obstacles::ObstacleTopic;
-use crate::sensors::{SENSORS, SensorType};
 
 /// Settings of the input from a log. Topics that are not named are found by message type and
 /// encoding.
@@ -127,26 +124,6 @@ impl InputSettings {
             CameraSettings::Mounted(mount) => Some(mount),
         }
     }
-
-    /// Checks the values.
-    ///
-    /// # Errors
-    /// [`LogError::Settings`], which names the key.
-    pub fn check(&self) -> Result<(), LogError> {
-        check_settings(self).map_err(|error| LogError::Settings(error.to_string()))?;
-        self.topics.keys().try_for_each(|name| check_sensor(name))
-    }
-}
-
-/// Checks that the table of sensors has one of this name whose topic has no key of its own.
-fn check_sensor(name: &str) -> Result<(), LogError> {
-    let keys: Vec<String> = SENSORS.iter().map(SensorType::key).collect();
-    let wanted = format!("topics.{name}");
-    if keys.contains(&wanted) {
-        return Ok(());
-    }
-    let hint = keys.join(", ");
-    Err(LogError::Settings(format!("`{wanted}`: no sensor of that name is read; sensors: {hint}")))
 }
 
 /// Images of disparity: depth is focal length times baseline, divided by disparity.
@@ -174,31 +151,6 @@ pub enum StampSource {
     Header,
     /// The times at which they were recorded.
     Recording,
-}
-
-/// Pose of the camera: above the robot's origin, looking forward.
-#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct MountSettings {
-    /// Camera whose images are used, of several: the folder that its topics share.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Height above the floor, m.
-    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 100))]
-    pub height_m: f64,
-    /// Angle of the optical axis below the horizon, degrees.
-    #[schemars(range(min = -180.0, max = 180.0))]
-    pub pitch_down_deg: f64,
-    /// Roll, degrees; positive if its right side is raised.
-    #[schemars(range(min = -180.0, max = 180.0))]
-    pub roll_deg: f64,
-}
-
-impl MountSettings {
-    /// Returns the pose as that of the camera of this name.
-    pub fn with_name(self, name: &str) -> Self {
-        Self { name: Some(name.to_owned()), ..self }
-    }
 }
 
 #[cfg(test)]

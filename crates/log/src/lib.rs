@@ -45,22 +45,19 @@ mod walker;
 pub mod write;
 
 pub use attachment::read_attachment;
-pub use camera_settings::CameraSettings;
-pub use error::LogError;
-pub use input::{DisparitySettings, InputSettings, MountSettings, StampSource};
+pub use camera_settings::{CameraSettings, MountSettings};
+pub use error::{LogError, NotMcap};
+pub use input::{DisparitySettings, InputSettings, StampSource};
 pub use inspect::{Examination, ImageFacts, Inspection, TopicFacts, examine, inspect};
 pub use leg_scans::{LegScan, read_leg_scans};
 pub use limits::Limits;
-pub use log_files::LogFiles;
-pub use mcap::NotMcap;
+pub use log_files::{LogFiles, TRUTH_TOPIC};
 pub use obstacles::{ObstacleKind, ObstacleTopic};
 pub use packed::LogFile;
 pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
 pub use tagalong_core::{Input, Inputs, Usage};
 pub use timing::{Skew, Timing};
 pub use topics::{InputAccount, TopicUse};
-pub use truth::{
-    TRUTH_SCHEMA, TRUTH_TOPIC, TruthFrame, TruthJoint, TruthPerson, read_truth, read_truth_lines,
-};
+pub use truth::{TRUTH_SCHEMA, TruthFrame, TruthJoint, TruthPerson, read_truth, read_truth_lines};
 pub use walk::{Channel, Counters, LOSSES, Message};
 pub use walker::LogWalker;

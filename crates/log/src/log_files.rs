@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 
 use crate::LogError;
 
+/// Topic of the truth.
+pub const TRUTH_TOPIC: &str = "/truth/people";
+
 /// File of a rosbag2 folder that lists its parts.
 const METADATA: &str = "metadata.yaml";
 /// Endings of the files of a rosbag2 folder.

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use tagalong_core::Stamp;
-use tagalong_stats::median;
+use tagalong_math::median;
 
 /// Statistics of the stamps of one topic, in the order of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -1,6 +1,6 @@
 //! Ground truth inside a log: positions of the people, from a simulator or an annotator.
 //!
-//! The channel [`TRUTH_TOPIC`] carries one JSON text per image, with the image's stamp (see
+//! The channel [`crate::TRUTH_TOPIC`] carries one JSON text per image, with the image's stamp (see
 //! [`TruthFrame`]). JSON is used because no ROS message has a field for "hidden and does not
 //! count", and because it can be read in any viewer. It is written as a `std_msgs/String`, because
 //! some readers of ROS 2 logs refuse a file with any other kind of schema. A plain JSON message can
@@ -14,13 +14,10 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::log_files::{LogFiles, open_file};
+use crate::log_files::{LogFiles, TRUTH_TOPIC, open_file};
 use crate::msgs::{StringMsg, decode};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
-
-/// Topic of the truth.
-pub const TRUTH_TOPIC: &str = "/truth/people";
 
 /// Name of its schema in plain JSON.
 pub const TRUTH_SCHEMA: &str = "tagalong/TruthFrame";

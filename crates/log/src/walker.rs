@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use crate::bag::{self, Bag};
 use crate::database::{self, Database};
-use crate::mcap::{Mcap, NotMcap};
+use crate::error::NotMcap;
+use crate::mcap::Mcap;
 use crate::packed::LogFile;
 use crate::walk::{Channel, Counters, LOSSES, Message, Source, Walk};
 use crate::{Limits, LogError};

@@ -257,7 +257,8 @@ fn a_bag_makes_frames() {
 
 #[test]
 fn annotated_legs_belong_to_the_scans_in_their_order() {
-    let Some(path) = tagalong_testdata::find("laser/train/positive_2_extracted.bag") else {
+    let Some(path) = tagalong_conformance::testdata::find("laser/train/positive_2_extracted.bag")
+    else {
         return;
     };
     let scans = read_leg_scans(&path, &Limits::default()).unwrap();
@@ -274,7 +275,8 @@ fn annotated_legs_belong_to_the_scans_in_their_order() {
 
 #[test]
 fn a_truncated_bag_of_legs_is_refused() {
-    let Some(path) = tagalong_testdata::find("laser/train/positive_2_extracted.bag") else {
+    let Some(path) = tagalong_conformance::testdata::find("laser/train/positive_2_extracted.bag")
+    else {
         return;
     };
     let bytes = std::fs::read(&path).unwrap();

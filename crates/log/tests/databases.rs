@@ -135,7 +135,10 @@ fn a_database_makes_the_frames_of_the_mcap_file() {
 
 #[test]
 fn a_real_database_tells_what_its_mcap_file_tells() {
-    let Some(path) = tagalong_testdata::find("mcap/klintan-real-cdr/sample.db3") else { return };
+    let Some(path) = tagalong_conformance::testdata::find("mcap/klintan-real-cdr/sample.db3")
+    else {
+        return;
+    };
     let walker = LogWalker::at(&path, File::open(&path).unwrap(), &Limits::default()).unwrap();
     let (messages, counters, lost) = told(walker);
     assert!(!lost && messages.len() == 5, "{} {counters:?}", messages.len());

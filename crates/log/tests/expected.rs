@@ -11,7 +11,7 @@ use tagalong_log::images::{decode_compressed, decode_raw};
 use tagalong_log::msgs::{CompressedImage, Image, StringMsg, decode};
 
 fn folder() -> Option<PathBuf> {
-    tagalong_testdata::find("mcap")
+    tagalong_conformance::testdata::find("mcap")
 }
 
 fn walker(path: &Path) -> LogWalker<BufReader<std::fs::File>> {

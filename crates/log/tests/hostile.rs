@@ -11,7 +11,7 @@ use mcap::{Compression, WriteOptions};
 use tagalong_log::LogWalker;
 use tagalong_log::msgs::StringMsg;
 use tagalong_log::{FrameSource, InputSettings, Inputs, Limits};
-use tagalong_stats::{RandomSource, XorShift64};
+use tagalong_math::{RandomSource, XorShift64};
 
 const MESSAGES: usize = 120;
 const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];

@@ -34,7 +34,7 @@ const LOGS: [Expected; 8] = [
 ];
 
 fn logs() -> Option<PathBuf> {
-    tagalong_testdata::find("logs")
+    tagalong_conformance::testdata::find("logs")
 }
 
 fn open(folder: &Path, name: &str, input: &InputSettings, inputs: Inputs) -> FrameSource {

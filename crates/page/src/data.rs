@@ -105,6 +105,9 @@ pub struct TrackData {
     /// Upper-body square, pixels.
     #[serde(rename = "box")]
     pub box_px: [f64; 4],
+    /// Box of the whole person, pixels, where the run reports such boxes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub whole: Option<[f64; 4]>,
     /// Place in the odometry frame, m.
     pub at: [f64; 2],
     /// Velocity in the odometry frame, m/s.
@@ -160,8 +163,8 @@ pub struct DroppedData {
 pub struct TestData {
     /// Lines of the config that decide it, with their values in this run.
     pub settings: Vec<String>,
-    /// Advice on the test.
-    pub look: String,
+    /// Sentence that says why it drops people, with two settings at most.
+    pub why: String,
 }
 
 /// Event to jump to.

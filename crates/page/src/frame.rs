@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry2, Point2, Point3};
 use tagalong_app::frame_notes::{CandidateNote, DriveNote, DroppedNote, FateNote, FrameNotes};
 use tagalong_app::remedies::Remedies;
-use tagalong_geometry::Camera;
+use tagalong_geometry::{Camera, Rect};
 use toml::Table;
 
 use crate::data::{CandidateData, DriveData, DroppedData, FrameData, TestData, TrackData};
@@ -21,11 +21,13 @@ pub fn tests<'a>(
     remedies: &Remedies,
 ) -> BTreeMap<String, TestData> {
     let names: BTreeSet<&str> = notes.flat_map(dropping_tests).collect();
-    let data = |name: &str| match remedies.of(name) {
-        Some(remedy) => TestData { settings: remedy.lines(config), look: remedy.look.clone() },
-        None => TestData::default(),
-    };
-    names.into_iter().map(|name| (name.to_owned(), data(name))).collect()
+    let mut tests = BTreeMap::new();
+    for name in names {
+        let settings = remedies.of(name).map_or_else(Vec::new, |remedy| remedy.lines(config));
+        let why = remedies.sentence(name, config);
+        tests.insert(name.to_owned(), TestData { settings, why });
+    }
+    tests
 }
 
 fn dropping_tests(notes: &FrameNotes) -> impl Iterator<Item = &str> {
@@ -72,6 +74,7 @@ fn track_data(track: &TrackState, heading: f64) -> TrackData {
         z: rounded(z, 1e2),
         d: rounded(track.head_robot_m[0].hypot(track.head_robot_m[1]), 1e2),
         p: rounded(track.probability, 1e2),
+        whole: None,
         trail: Vec::new(),
     }
 }
@@ -124,6 +127,18 @@ fn drive_data(note: &DriveNote) -> DriveData {
     }
 }
 
+/// Adds the boxes of whole people to a frame.
+pub fn add_whole_people(frame: &mut FrameData, camera: &Camera, odom_from_robot: &Isometry2<f64>) {
+    for track in &mut frame.tracks {
+        let floor = odom_from_robot.inverse_transform_point(&Point2::from(track.at));
+        let [x, y, width, height] = track.box_px;
+        let head = Point3::new(floor.x, floor.y, track.z);
+        let whole = camera.whole_body(&Rect::new(x, y, width, height), &head);
+        let sides = [whole.x, whole.y, whole.width, whole.height];
+        track.whole = Some(sides.map(|v| rounded(v, 10.0)));
+    }
+}
+
 /// Returns evenly chosen points of a scan in the odometry frame, cm.
 pub fn scan_points(points: &[Point3<f64>], odom_from_robot: &Isometry2<f64>) -> Vec<i32> {
     let every = points.len().div_ceil(SCAN_POINTS).max(1);
@@ -148,8 +163,10 @@ pub fn add_trails(
     camera: &Camera,
     odom_from_robot: &Isometry2<f64>,
 ) {
-    for track in frame.tracks.iter_mut().filter(|track| track.state != "tentative") {
+    for track in frame.tracks.iter_mut().filter(|track| track.state == "seen") {
         let heads = past.iter().filter_map(|frame| frame.tracks.iter().find(|t| t.id == track.id));
+        // A predicted position is no place at which the person was.
+        let heads = heads.filter(|t| t.state == "seen");
         let heads = heads.map(|t| {
             let floor = odom_from_robot.inverse_transform_point(&Point2::from(t.at));
             Point3::new(floor.x, floor.y, t.z)
@@ -190,7 +207,11 @@ mod tests_of_data {
         let tests = tests([&moment.notes].into_iter(), &config, &Remedies::new(&registry));
         let lines = &tests["head width"].settings;
         assert!(lines.iter().any(|line| line.contains("min_head_width_m = 0.1")), "{lines:?}");
-        assert!(!tests["head width"].look.is_empty());
+        assert!(
+            tests["head width"].why.contains("(hats); decided by"),
+            "{:?}",
+            tests["head width"]
+        );
     }
 
     #[test]

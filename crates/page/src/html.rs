@@ -1,6 +1,8 @@
 //! HTML of the page: its frame, with data, and with style and script inlined or beside it.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use tagalong_core::TrackId;
+use tagalong_log::write::{TRACK_COLOURS, track_colour};
 use tagalong_report::COLOURS;
 
 use crate::data::PageData;
@@ -37,7 +39,7 @@ pub struct Heading {
 /// # Errors
 /// Data that JSON cannot express.
 pub fn html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
-    let style = html! { style { (PreEscaped(COLOURS)) (PreEscaped(STYLE)) } };
+    let style = html! { style { (PreEscaped(style())) } };
     whole(heading, data, &style, &html! { script { (PreEscaped(SCRIPT)) } })
 }
 
@@ -56,7 +58,15 @@ pub fn live_html(heading: &Heading, data: &PageData) -> serde_json::Result<Strin
 
 /// Returns the style of [`live_html`].
 pub fn style() -> String {
-    [COLOURS, STYLE].concat()
+    let mut text = [COLOURS, STYLE].concat();
+    for id in 0..TRACK_COLOURS {
+        text += &format!(".c{id} {{ --c: {}; }}\n", hex(track_colour(TrackId(id))));
+    }
+    text
+}
+
+fn hex([r, g, b]: [u8; 3]) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 /// Returns names and texts of the scripts of [`live_html`], in their order.
@@ -245,7 +255,7 @@ mod tests {
             ..CandidateData::default()
         }];
         let frame = FrameData { found, ..FrameData::default() };
-        let test = TestData { settings: vec![HOSTILE.into()], look: HOSTILE.into() };
+        let test = TestData { settings: vec![HOSTILE.into()], why: HOSTILE.into() };
         let run = RunData {
             name: HOSTILE.into(),
             frames: vec![Some(frame)],
@@ -278,6 +288,18 @@ mod tests {
         assert_eq!(data["runs"][0]["name"], HOSTILE);
         assert_eq!(data["runs"][0]["frames"][0]["found"][0]["test"], HOSTILE);
         assert_eq!(data["runs"][0]["tests"][HOSTILE]["look"], HOSTILE);
+    }
+
+    #[test]
+    fn tracks_have_the_colours_of_pictures_and_logs() {
+        assert!(SCRIPT.contains(&format!("const COLOURS = {TRACK_COLOURS};")));
+        let page = hostile_page();
+        for id in 0..TRACK_COLOURS {
+            let colour = hex(track_colour(TrackId(id)));
+            assert!(page.contains(&format!(".c{id} {{ --c: {colour}; }}")), "{id}");
+            // Plans of a report have the same.
+            assert!(COLOURS.contains(&format!("--t{id}: {colour};")), "{id}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 // Asks for what happens now and appends it to the page. The server answers with the newest frame, so
 // a page that is slow gets fewer of them.
 (() => {
-  const { data, state, events, id, show, play, resize, extended, strips, listEvents } = globalThis.tagalong;
+  const { data, state, events, id, show, play, resize, extended, strips, listEvents, turnFrame, turnScan } = globalThis.tagalong;
   const [run] = data.runs;
 
   // Frames that can be looked at again, and events that are listed.
@@ -36,6 +36,8 @@
 
   const append = (now) => {
     resize(now.image_px);
+    turnFrame(now.frame);
+    turnScan(now.scan);
     data.t.push(now.t);
     data.images.push(now.image);
     data.scans.push(now.scan);

@@ -2,7 +2,7 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const SVG = "http://www.w3.org/2000/svg";
-  const COLOURS = 8;
+  const COLOURS = 10;
   let [WIDTH, HEIGHT] = data.image_px;
   let last = data.t.length - 1;
   const id = (name) => document.getElementById(name);
@@ -19,6 +19,35 @@
     fill(document.createElementNS(SVG, tag), attributes, children);
   const colour = (track) => `c${track % COLOURS}`;
   const fixed = (value, digits) => value.toFixed(digits).replace("-", "−");
+
+  // The plan has the robot's first heading upwards, as the pictures of `run --overlay` have it: all
+  // coordinates are turned once, when they come.
+  let turn = null;
+  const turned = ([x, y]) => [turn.cos * x - turn.sin * y, turn.sin * x + turn.cos * y];
+  const startTurn = (heading) => {
+    const angle = Math.PI / 2 - heading;
+    turn = { angle, cos: Math.cos(angle), sin: Math.sin(angle) };
+  };
+  const turnFrame = (frame) => {
+    if (!frame) return;
+    if (!turn) startTurn(frame.robot[2]);
+    frame.robot = [...turned(frame.robot), frame.robot[2] + turn.angle];
+    for (const thing of [...frame.tracks, ...frame.found]) thing.at = turned(thing.at);
+    for (const track of frame.tracks) track.v = turned(track.v);
+  };
+  const turnScan = (scan) => {
+    if (!turn) startTurn(0);
+    for (let i = 0; scan && i < scan.length; i += 2) [scan[i], scan[i + 1]] = turned([scan[i], scan[i + 1]]);
+  };
+  const turnAll = () => {
+    for (const run of data.runs) run.frames.forEach(turnFrame);
+    for (const scan of data.scans || []) turnScan(scan);
+    for (const people of data.truth || []) for (const person of people) if (person.at) {
+      if (!turn) startTurn(0);
+      person.at = turned(person.at);
+    }
+  };
+  turnAll();
 
   const state = { at: 0, playing: false, question: null, from: 0, since: 0 };
 
@@ -80,6 +109,7 @@
       svg("text", { class: "tag-text", x: place.x + 0.35 * size, y: place.y + size, "font-size": size }, text));
   };
 
+  const shownBox = (track) => track.whole || track.box;
   const STATES = { seen: "", hidden: " hidden", unseen: " unseen", tentative: " ?" };
   const trackKind = (track) =>
     track.state === "seen" ? colour(track.id)
@@ -118,14 +148,14 @@
       const far = [...frame.tracks].reverse();
       if (id("show-trails").checked) parts.push(...far.map((track) => trailLine(track, k)));
       for (const track of far) {
-        const node = outline(track.box, trackKind(track), k, track.state === "seen" ? 2.5 : 1.5, describe(track));
+        const node = outline(shownBox(track), trackKind(track), k, track.state === "seen" ? 2.5 : 1.5, describe(track));
         node.dataset.track = track.id;
         parts.push(node);
       }
       const taken = [];
       for (const track of frame.tracks) {
         const sign = frame.target === track.id ? "◎" : "";
-        parts.push(label(taken, track.box, `${sign}${track.id}${STATES[track.state]} · ${fixed(track.d, 1)} m`, k));
+        parts.push(label(taken, shownBox(track), `${sign}${track.id}${STATES[track.state]} · ${fixed(track.d, 1)} m`, k));
       }
     }
     if (state.question) parts.push(outline(state.question.box, "asked", k, 2, "the place in question"));
@@ -180,7 +210,7 @@
     for (let x = from(area.x - area.w / 2); x < area.x + area.w / 2; x += step) line(x, -area.y - area.h / 2, x, -area.y + area.h / 2);
     for (let y = from(area.y - area.h / 2); y < area.y + area.h / 2; y += step) line(area.x - area.w / 2, -y, area.x + area.w / 2, -y);
     const corner = { x: area.x - area.w / 2 + 8 * k, y: -area.y + area.h / 2 - 8 * k };
-    parts.push(svg("text", { class: "axis-text", ...corner, "font-size": 12 * k }, `grid ${step} m`));
+    parts.push(svg("text", { class: "axis-text", ...corner, "font-size": 12 * k }, `grid ${step} m, up: the robot's first heading`));
     return parts;
   };
 
@@ -207,12 +237,15 @@
     return svg("polyline", { class: "path", points: points.join(" "), "stroke-width": 1.5 * k });
   };
 
-  const TRAIL_FRAMES = 60;
+  const TRAIL_S = 2;
   const planTrail = (run, track, k) => {
+    if (track.state !== "seen") return null;
     const points = [];
-    for (let i = Math.max(0, state.at - TRAIL_FRAMES); i <= state.at; i += 1) {
+    let from = state.at;
+    while (from > 0 && data.t[state.at] - data.t[from - 1] <= TRAIL_S) from -= 1;
+    for (let i = from; i <= state.at; i += 1) {
       const past = run.frames[i] && run.frames[i].tracks.find((other) => other.id === track.id);
-      if (past) points.push(`${past.at[0]},${-past.at[1]}`);
+      if (past && past.state === "seen") points.push(`${past.at[0]},${-past.at[1]}`);
     }
     return svg("polyline", { class: `trail ${colour(track.id)}`, points: points.join(" "), "stroke-width": 2 * k });
   };
@@ -305,7 +338,8 @@
     target.setAttribute("viewBox", `0 0 ${STRIP_WIDTH} ${height}`);
     target.setAttribute("preserveAspectRatio", "none");
     const parts = lives.flatMap((life) => stretches(life.points).map((part) =>
-      svg("line", { class: `life ${colour(life.track)}${part.seen ? "" : " weak"}`, x1: column(part.from), x2: Math.max(column(part.to), column(part.from) + 1.5), y1: 10 * life.lane + 5, y2: 10 * life.lane + 5, "stroke-width": 6 })));
+      svg("line", { class: `life ${colour(life.track)}${part.seen ? "" : " weak"}`, x1: column(part.from), x2: Math.max(column(part.to), column(part.from) + 1.5), y1: 10 * life.lane + 5, y2: 10 * life.lane + 5, "stroke-width": 6 },
+        svg("title", {}, `person ${life.track}`))));
     for (const event of run.events) if (event.kind === "missed") {
       parts.push(svg("line", { class: "gap", x1: column(event.i), x2: column(event.i), y1: height - 6, y2: height, "stroke-width": 2 }));
     }
@@ -341,7 +375,7 @@
 
   const settings = (run, test) => {
     const of = run.tests[test];
-    return el("td", {}, ...(of ? of.settings : []).map((line) => el("code", {}, line)), of && of.look ? el("span", { class: "soft" }, of.look) : null);
+    return el("td", {}, ...(of ? of.settings : []).map((line) => el("code", {}, line)));
   };
 
   const funnel = (run, place) => {
@@ -410,10 +444,53 @@
     return [...counts].sort((a, b) => b[1] - a[1]);
   };
 
-  const tracksNear = (frame, question) => frame.tracks.filter((track) => isNear(track.box, question)).map((track) =>
-    track.state === "tentative"
-      ? `A tentative track (${track.id}, probability ${fixed(track.p, 2)}) is here: the track manager has not confirmed it yet.`
-      : `Person ${track.id} is tracked here, ${track.state}.`);
+  const tracksNear = (frame, question) => frame.tracks.filter((track) => isNear(track.box, question));
+
+  // Tracks near a question that no other annotated person has.
+  const freeTracks = (run, at, question) => {
+    const hits = (run.hits && run.hits[at]) || {};
+    const taken = Object.entries(hits).filter(([person]) => Number(person) !== question.person).map(([, track]) => track);
+    return tracksNear(run.frames[at], question).filter((track) => question.person === undefined || !taken.includes(track.id));
+  };
+
+  // The track that was confirmed at this place shortly before, and is not any more.
+  const ENDED_S = 2;
+  const endedNear = (run, question) => {
+    for (let i = state.at - 1; i >= 0 && data.t[state.at] - data.t[i] <= ENDED_S; i -= 1) {
+      const before = run.frames[i] && freeTracks(run, i, question).find((track) => track.state !== "tentative");
+      if (before) return { id: before.id, s: data.t[state.at] - data.t[i] };
+    }
+    return null;
+  };
+
+  // The test that decided: of the candidate here with the best log-odds, else of the place that was
+  // dropped here in most of the frames around.
+  const decidingTest = (run, frame, question) => {
+    const candidates = frame.found.filter((c) => c.test && isNear(c.box, question));
+    if (candidates.length) return candidates.reduce((best, c) => (c.score > best.score ? c : best)).test;
+    const here = new Set(droppedNear(frame, question).map((item) => item.test));
+    const common = aroundCounts(run, question).find(([test]) => here.has(test));
+    return common ? common[0] : null;
+  };
+
+  const sentence = (run, test) => (run.tests[test] && run.tests[test].why) || `the test "${test}" dropped the candidate`;
+
+  // The one cause, as a sentence.
+  const causeOf = (run, frame, question) => {
+    const here = run.frames[state.at] ? freeTracks(run, state.at, question) : tracksNear(frame, question);
+    const [track] = here.sort((a, b) => (a.state === "tentative") - (b.state === "tentative"));
+    if (track && track.state !== "tentative" && isMissed(run, state.at, question.person)) {
+      return `Person ${track.id} is tracked near here, ${track.state}; its box does not overlap the annotated one enough.`;
+    }
+    if (track && track.state !== "tentative") return `Not missed: person ${track.id} is tracked here, ${track.state}.`;
+    if (track) {
+      return `Tracked here, and not confirmed yet: track ${track.id}, probability ${fixed(track.p, 2)}. It is reported once the track manager confirms it.`;
+    }
+    const test = decidingTest(run, frame, question);
+    const why = test ? sentence(run, test) : "no detector proposed a candidate near this place";
+    const ended = endedNear(run, question);
+    return ended ? `Track ${ended.id} is gone since ${fixed(ended.s, 1)} s, and no new one began: ${why}.` : `No track began here: ${why}.`;
+  };
 
   // Many tests drop thousands of places and record some of them.
   const unplaced = (frame) => {
@@ -425,17 +502,18 @@
   const explain = (run, place) => {
     const frame = frameOf(run, state.at);
     if (!state.question || !frame) return place.replaceChildren();
+    const isOpen = Boolean(place.querySelector("details[open]"));
     const groups = grouped(droppedNear(frame, state.question));
     const row = ([test, texts]) => el("tr", {},
       el("th", { scope: "row" }, test), el("td", {}, texts.length > 1 ? `${texts.length}: ${texts[0]}` : texts[0]), settings(run, test));
-    const parts = tracksNear(frame, state.question).map((text) => el("p", {}, text));
-    parts.push(groups.length
+    const rest = [groups.length
       ? table(`Tests of ${run.name} that dropped candidates here`, ["Dropped by", "What", "Decided by"], groups.map(row))
-      : el("p", {}, "No recorded candidate was dropped near this place in this frame."));
-    parts.push(el("p", { class: "soft" }, unplaced(frame)));
+      : el("p", {}, "No recorded candidate was dropped near this place in this frame.")];
+    rest.push(el("p", { class: "soft" }, unplaced(frame)));
     const around = aroundCounts(run, state.question);
-    if (around.length) parts.push(el("p", { class: "soft" }, `In the ${2 * AROUND + 1} frames around: ${around.map(([test, n]) => `${test} in ${n}`).join(", ")}.`));
-    return place.replaceChildren(...parts);
+    if (around.length) rest.push(el("p", { class: "soft" }, `In the ${2 * AROUND + 1} frames around: ${around.map(([test, n]) => `${test} in ${n}`).join(", ")}.`));
+    return place.replaceChildren(el("p", { class: "cause" }, causeOf(run, frame, state.question)),
+      el("details", isOpen ? { open: "" } : {}, el("summary", {}, "All tests here"), ...rest));
   };
 
   const ask = (question) => {
@@ -688,5 +766,5 @@
     fillKinds();
     fillEvents();
   };
-  if (data.live) globalThis.tagalong = { data, state, events, id, show, play, resize, extended, strips, listEvents };
+  if (data.live) globalThis.tagalong = { data, state, events, id, show, play, resize, extended, strips, listEvents, turnFrame, turnScan };
 })();

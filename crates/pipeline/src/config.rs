@@ -17,7 +17,7 @@ use crate::pipeline::Pipeline;
 use crate::preprocessors::preprocessors;
 use crate::settings::{PipelineSettings, PluginSettings};
 use tagalong_following::{CommandLimiterSettings, RobotSettings, Steering};
-use tagalong_stats::mix;
+use tagalong_math::mix;
 use tagalong_vision::Describer;
 
 mod builtin;

@@ -34,9 +34,9 @@
 //! # }
 //!
 //! let mut registry = Registry::default();
-//! tagalong_associate_hungarian::register(&mut registry);
-//! tagalong_ekf::register(&mut registry);
-//! tagalong_manage_m_of_n::register(&mut registry);
+//! tagalong_associators::hungarian::register(&mut registry);
+//! tagalong_filters::ekf::register(&mut registry);
+//! tagalong_track_managers::m_of_n::register(&mut registry);
 //! registry.detector("nearest", "the nearest laser point", |_: NoSettings, _| Ok(Nearest));
 //! let config = "filter.plugin = 'ekf'\n[[detectors]]\nplugin = 'nearest'\n";
 //! let mut pipeline = Pipeline::builder(&registry).from_toml(config)?;
@@ -114,10 +114,10 @@ pub use tagalong_following::{
     LockReport, LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission,
     RobotSettings, SafetyDistances, SearchSettings, SourceKind, SourceSettings, TargetSettings,
 };
-pub use tagalong_odometry::{MotionSource, OdometrySettings};
 pub use tagalong_stereo::StereoSettings;
 pub use tagalong_tracking::StepError;
 pub use tagalong_tracking::{
     Candidate, ClockSettings, DetectorSettings, Fate, MergeSettings, OcclusionSettings, Outcome,
     Role, Weighing,
 };
+pub use tagalong_vision::odometry::{MotionSource, OdometrySettings};

@@ -4,10 +4,10 @@ use nalgebra::Point2;
 use std::sync::Arc;
 
 use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, Result};
-use tagalong_odometry::{CameraMotion, MotionSource, OdometrySettings, VisualOdometry};
 use tagalong_stereo::StereoDepth;
 use tagalong_tracking::Guarded;
 use tagalong_tracking::{Preprocessed, Preprocessor};
+use tagalong_vision::odometry::{CameraMotion, MotionSource, OdometrySettings, VisualOdometry};
 
 /// Depth from the stereo pair, for frames that have none.
 struct DepthOfPair(StereoDepth);

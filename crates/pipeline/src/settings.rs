@@ -4,8 +4,8 @@ use tagalong_core::Input;
 use tagalong_following::{
     CollisionMonitorSettings, CommandLimiterSettings, FollowSettings, RobotSettings, TargetSettings,
 };
-use tagalong_odometry::OdometrySettings;
 use tagalong_stereo::StereoSettings;
+use tagalong_vision::odometry::OdometrySettings;
 
 use crate::AppearanceSettings;
 

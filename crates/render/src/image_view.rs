@@ -1,5 +1,5 @@
 use nalgebra::Point2;
-use tagalong_core::{DepthImage, Images, RgbImage, Track};
+use tagalong_core::{DepthImage, Images, RgbImage, Track, TrackId};
 use tagalong_geometry::Rect;
 use tagalong_pipeline::Fate;
 use tagalong_vision::{Sketch, SketchMap, SketchPoint};
@@ -8,7 +8,7 @@ use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
 use super::enlarge::{enlarge, factor};
 use super::labels::Labels;
 use super::trails::Trails;
-use super::{OverlayData, TENTATIVE, colour_of};
+use super::{OverlayData, OverlayStyle, colour, colour_of};
 
 /// Depth at which the shading of depth images is darkest, m.
 const FAR_M: f32 = 8.0;
@@ -25,7 +25,7 @@ struct ImageView {
 }
 
 /// Renders the camera's image with all overlays.
-pub fn draw(scene: &OverlayData, trails: &Trails) -> Canvas {
+pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> Canvas {
     let by = factor(scene.camera.width);
     let width = by * scene.camera.width;
     let height = by * scene.camera.height;
@@ -33,26 +33,27 @@ pub fn draw(scene: &OverlayData, trails: &Trails) -> Canvas {
     if let Some(picture) = background(&scene.images) {
         view.canvas.paste(&enlarge(&picture, by), 0, 0);
     }
-    let mut labels = labels(scene, by);
+    let mut labels = labels(scene, by, style);
     // Tracks come last, so that nothing hides them.
     let shown = scene.report.visualisation.as_ref();
     if let Some(sketch) = shown.and_then(|shown| shown.downcast_ref::<Sketch>()) {
-        view.draw_sketch(sketch, &mut labels);
+        view.draw_silhouettes(sketch);
+        if style.is_debug() {
+            view.draw_filter(sketch, &mut labels);
+        }
     }
-    view.draw_dropped(scene);
+    if style.is_debug() {
+        view.draw_dropped(scene);
+    }
     view.draw_trails(scene, trails);
     // Far to near, so that near people cover far ones.
-    for track in scene.report.tracks.iter().rev() {
-        let region = view.scaled(&track.estimate.region);
+    for track in style.tracks(scene).rev() {
+        let region = view.scaled(&style.region(scene, track));
         draw_box(&mut view.canvas, &region, track.seen, colour(track));
     }
-    add_labels(&mut labels, scene, by);
+    add_labels(&mut labels, scene, by, style);
     labels.paint(&mut view.canvas);
     view.canvas
-}
-
-fn colour(track: &Track) -> Ink {
-    if track.confirmed { colour_of(track.id.0) } else { TENTATIVE }
 }
 
 fn scaled(rect: &Rect, by: f64) -> Rect {
@@ -60,32 +61,33 @@ fn scaled(rect: &Rect, by: f64) -> Rect {
 }
 
 /// Returns the place for the labels, which spare the boxes of tracks.
-fn labels(scene: &OverlayData, by: usize) -> Labels {
+fn labels(scene: &OverlayData, by: usize, style: OverlayStyle) -> Labels {
     let width = by * scene.camera.width;
     let height = by * scene.camera.height;
     let tracks = scene.report.tracks.iter().filter(|track| track.confirmed);
-    let spared = tracks.map(|track| scaled(&track.estimate.region, by as f64)).collect();
+    let spared = tracks.map(|track| scaled(&style.region(scene, track), by as f64)).collect();
     Labels::within(Rect::new(0.0, 0.0, width as f64, height as f64), spared)
 }
 
-/// Adds the labels of tracks, near to far, and those of dropped candidates where there is room.
-pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize) {
+/// Adds the labels of tracks, near to far, and, to debug, those of dropped candidates where there is
+/// room.
+pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize, style: OverlayStyle) {
     let lettering = Lettering::of_width(by * scene.camera.width);
-    for track in &scene.report.tracks {
-        let region = scaled(&track.estimate.region, by as f64);
+    for track in style.tracks(scene) {
+        let region = scaled(&style.region(scene, track), by as f64);
         labels.add(&region, name_of(track), lettering, colour(track));
     }
-    for (region, test) in dropped(scene) {
+    for (region, test) in dropped(scene).into_iter().filter(|_| style.is_debug()) {
         labels.add_if_room(&scaled(&region, by as f64), test, Lettering::Small, DROPPED.faint(1.0));
     }
 }
 
 /// Returns the labels of a scene as they are placed.
 #[cfg(test)]
-pub fn placed_labels(scene: &OverlayData) -> Labels {
+pub fn placed_labels(scene: &OverlayData, style: OverlayStyle) -> Labels {
     let by = factor(scene.camera.width);
-    let mut labels = labels(scene, by);
-    add_labels(&mut labels, scene, by);
+    let mut labels = labels(scene, by, style);
+    add_labels(&mut labels, scene, by, style);
     labels
 }
 
@@ -133,15 +135,18 @@ impl ImageView {
         point * self.scale
     }
 
-    /// Renders the state of the filter: bodies, particles, and maps in the lower left corner.
-    fn draw_sketch(&mut self, sketch: &Sketch, labels: &mut Labels) {
+    fn draw_silhouettes(&mut self, sketch: &Sketch) {
         for body in &sketch.silhouettes {
-            let ink = colour_of(body.id.0).faint(0.4);
+            let ink = colour_of(body.id).faint(0.4);
             body.runs.iter().for_each(|run| self.canvas.fill(&scaled(run, self.scale), ink));
         }
+    }
+
+    /// Renders the state of the filter: particles, and maps in the lower left corner.
+    fn draw_filter(&mut self, sketch: &Sketch, labels: &mut Labels) {
         for SketchPoint { id, pixel, weight } in &sketch.points {
             let opacity = 0.25 + 0.75 * weight.clamp(0.0, 1.0);
-            let ink = colour_of(id.0).faint(opacity as f32);
+            let ink = colour_of(*id).faint(opacity as f32);
             self.canvas.disc(self.pixel(pixel), 1.0 + 0.5 * self.scale, ink);
         }
         let mut bottom = self.canvas.height() as f64 - MAP_MARGIN_PX;
@@ -180,10 +185,22 @@ impl ImageView {
 
     fn draw_trails(&mut self, scene: &OverlayData, trails: &Trails) {
         for (id, trail) in trails.in_robot(scene) {
-            let seen = trail.iter().filter_map(|p| scene.camera.project(p));
-            let points: Vec<_> = seen.map(|p| self.pixel(&p)).collect();
-            self.canvas.thick_path(&points, colour_of(id.0).faint(0.8));
+            let mut piece = Vec::new();
+            for head in &trail {
+                match scene.camera.project(head) {
+                    Some(pixel) => piece.push(self.pixel(&pixel)),
+                    // A line across the part out of view would cut through the picture.
+                    None => self.draw_trail(&mut piece, id),
+                }
+            }
+            self.draw_trail(&mut piece, id);
         }
+    }
+
+    /// Renders a piece of a trail and empties it.
+    fn draw_trail(&mut self, piece: &mut Vec<Point2<f64>>, id: TrackId) {
+        self.canvas.thick_path(piece, colour_of(id).faint(0.8));
+        piece.clear();
     }
 }
 

@@ -4,11 +4,14 @@ use tagalong_vision::Sketch;
 
 use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
 use super::image_view::{DROPPED, draw_box};
-use super::{OverlayData, TENTATIVE};
+use super::trails::Trails;
+use super::{OverlayData, OverlayStyle, TENTATIVE};
 
-/// Height of the strip under image and plan, pixels: the same for all frames, so that pictures make
-/// a video.
-pub const HEIGHT_PX: usize = 64;
+/// Returns the height of the strip under image and plan, pixels: the same for all frames, so that
+/// pictures make a video.
+pub fn height_px(style: OverlayStyle) -> usize {
+    if style.is_debug() { 64 } else { 46 }
+}
 
 const MARGIN_PX: f64 = 6.0;
 const WHITE: Ink = Ink::solid([235, 235, 235]);
@@ -16,13 +19,28 @@ const QUIET: Ink = Ink::solid([190, 190, 190]);
 /// Colour of the examples, which is that of no track.
 const EXAMPLE: Ink = Ink::solid([120, 190, 255]);
 
-/// Renders frame, meaning of the lines, and counts of dropped candidates in the strip below `top`.
-pub fn draw(canvas: &mut Canvas, top: usize, scene: &OverlayData) {
+/// Renders frame, meaning of the lines, and, to debug, counts of dropped candidates in the strip below
+/// `top`.
+pub fn draw(
+    canvas: &mut Canvas,
+    top: usize,
+    scene: &OverlayData,
+    trails: &Trails,
+    style: OverlayStyle,
+) {
     let rows = [0.0, 1.0, 2.0].map(|row| top as f64 + 4.0 + row * (LINE_PX + 1.0));
-    canvas.write(Point2::new(MARGIN_PX, rows[0]), &title(scene), Lettering::Bold, WHITE);
+    canvas.write(
+        Point2::new(MARGIN_PX, rows[0]),
+        &title(scene, trails, style),
+        Lettering::Bold,
+        WHITE,
+    );
     let mut at = Point2::new(MARGIN_PX, rows[1]);
-    for (sample, meaning) in entries(scene) {
+    for (sample, meaning) in entries(scene, style) {
         at.x += draw_entry(canvas, at, sample, meaning);
+    }
+    if !style.is_debug() {
+        return;
     }
     let columns =
         (canvas.width() as f64 - 2.0 * MARGIN_PX) / Lettering::Small.size_px("m")[0].max(1.0);
@@ -30,9 +48,13 @@ pub fn draw(canvas: &mut Canvas, top: usize, scene: &OverlayData) {
     canvas.text(Point2::new(MARGIN_PX, rows[2]), &dropped, QUIET);
 }
 
-fn title(scene: &OverlayData) -> String {
+fn title(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> String {
     let people = scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count();
     let people = if people == 1 { "1 person".to_owned() } else { format!("{people} people") };
+    if !style.is_debug() {
+        let elapsed_s = trails.elapsed_s(scene.report.stamp);
+        return format!("{elapsed_s:.1} s   {people} seen   frame {}", scene.report.index);
+    }
     let ms = scene.report.stamp.nanos() / 1_000_000;
     let s = ms / 1000;
     let ms = ms % 1000;
@@ -53,7 +75,15 @@ enum Sample {
 }
 
 /// Returns the marks with their meanings, most important first.
-fn entries(scene: &OverlayData) -> Vec<(Sample, &'static str)> {
+fn entries(scene: &OverlayData, style: OverlayStyle) -> Vec<(Sample, &'static str)> {
+    if !style.is_debug() {
+        return vec![
+            (Sample::Seen, "seen, distance from the robot"),
+            (Sample::Predicted, "predicted"),
+            (Sample::Trail, "trail of 2 s"),
+            (Sample::Velocity, "position in 1 s"),
+        ];
+    }
     let sketch = scene.report.visualisation.as_ref().and_then(|shown| shown.downcast_ref());
     let has_particles = sketch.is_some_and(|sketch: &Sketch| !sketch.points.is_empty());
     let image = [
@@ -63,7 +93,7 @@ fn entries(scene: &OverlayData) -> Vec<(Sample, &'static str)> {
         (Sample::Dropped, "dropped, by test"),
         (Sample::Trail, "trail"),
     ];
-    let plan = [(Sample::Velocity, "place in 1 s"), (Sample::Ellipse, "2 sigma")];
+    let plan = [(Sample::Velocity, "position in 1 s"), (Sample::Ellipse, "2 sigma")];
     let particles = has_particles.then_some((Sample::Particles, "particles"));
     image.into_iter().chain(particles).chain(plan).collect()
 }

@@ -1,9 +1,10 @@
 //! Pictures of the pipeline's detections and tracks, one per frame.
 //!
 //! On the left the camera's image (depth in shades where there is no colour), enlarged to at least
-//! 640 columns, with upper-body boxes, ids and trails; dropped candidates are dashed, with the test
-//! that dropped them. On the right the same people from above, below a legend. All pictures of a run
-//! have the same size.
+//! 640 columns, with the people, their ids, distances and trails. On the right the same people from
+//! above, above a legend. [`Detail::Debug`] adds dropped candidates, dashed, with the test that
+//! dropped them, tentative tracks and the state of the filter. All pictures of a run have the same
+//! size.
 
 mod animation;
 pub mod canvas;
@@ -13,6 +14,7 @@ mod jpeg;
 mod labels;
 mod legend;
 mod plan_view;
+mod style;
 mod trails;
 
 use std::fs::File;
@@ -26,8 +28,10 @@ use self::canvas::{Canvas, Ink};
 pub use image_view::background;
 pub use jpeg::jpeg;
 use nalgebra::{Isometry2, Point2};
-use tagalong_core::{Frame, Images, RgbImage};
+pub use style::{Detail, OverlayStyle};
+use tagalong_core::{Frame, Images, RgbImage, Track, TrackId};
 use tagalong_geometry::Camera;
+use tagalong_log::write::track_colour;
 use tagalong_pipeline::FrameReport;
 use trails::Trails;
 
@@ -59,13 +63,14 @@ impl OverlayData {
 /// Renderer of the pictures of a run, into a folder.
 pub struct Overlay {
     folder: PathBuf,
+    style: OverlayStyle,
     trails: Trails,
 }
 
 impl Overlay {
     /// Renders into `folder`, which exists.
-    pub fn new(folder: PathBuf) -> Self {
-        Self { folder, trails: Trails::default() }
+    pub fn new(folder: PathBuf, style: OverlayStyle) -> Self {
+        Self { folder, style, trails: Trails::default() }
     }
 
     /// Renders one frame as `000001.png` and so on, by the frame's index.
@@ -74,7 +79,7 @@ impl Overlay {
     /// A sentence that names the file.
     pub fn draw(&mut self, scene: &OverlayData) -> Result<(), String> {
         self.trails.follow(scene);
-        let picture = picture(scene, &self.trails);
+        let picture = picture(scene, &self.trails, self.style);
         let path = self.folder.join(format!("{:06}.png", scene.report.index));
         write_png(&path, &picture).map_err(|why| format!("cannot write {}: {why}", path.display()))
     }
@@ -88,34 +93,26 @@ const ROWS_ALONE: usize = 800;
 
 const TENTATIVE: Ink = Ink::solid([190, 190, 190]);
 
-fn picture(scene: &OverlayData, trails: &Trails) -> RgbImage {
-    let image = image_view::draw(scene, trails).into_image();
+fn picture(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> RgbImage {
+    let image = image_view::draw(scene, trails, style).into_image();
     // Even, because most video formats ask for it.
     let least = if image.width() == 0 { ROWS_ALONE } else { LEAST_ROWS };
     let [left, rows] = [image.width(), image.height().max(least)].map(|n| n.next_multiple_of(2));
     let plan_width = plan_view::width_px(rows);
-    let mut canvas = Canvas::new(left + plan_width, rows + legend::HEIGHT_PX, [24, 24, 28]);
-    canvas.paste(&plan_view::draw(scene, trails, rows).into_image(), left, 0);
+    let mut canvas = Canvas::new(left + plan_width, rows + legend::height_px(style), [24, 24, 28]);
+    canvas.paste(&plan_view::draw(scene, trails, style, rows).into_image(), left, 0);
     canvas.paste(&image, 0, 0);
-    legend::draw(&mut canvas, rows, scene);
+    legend::draw(&mut canvas, rows, scene, trails, style);
     canvas.into_image()
 }
 
-/// Returns the colour of a track: neighbours in number are far apart in hue.
-fn colour_of(id: u32) -> Ink {
-    const COLOURS: [[u8; 3]; 10] = [
-        [255, 99, 71],
-        [64, 196, 255],
-        [124, 252, 0],
-        [255, 215, 0],
-        [238, 130, 238],
-        [0, 250, 154],
-        [255, 140, 0],
-        [173, 216, 230],
-        [255, 105, 180],
-        [154, 205, 50],
-    ];
-    Ink::solid(COLOURS[id as usize % COLOURS.len()])
+/// Returns the colour of a track: grey until it is confirmed.
+fn colour(track: &Track) -> Ink {
+    if track.confirmed { colour_of(track.id) } else { TENTATIVE }
+}
+
+fn colour_of(id: TrackId) -> Ink {
+    Ink::solid(track_colour(id))
 }
 
 /// Writes a picture.

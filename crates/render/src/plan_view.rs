@@ -5,7 +5,7 @@ use tagalong_geometry::Rect;
 use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
 use super::labels::Labels;
 use super::trails::Trails;
-use super::{OverlayData, TENTATIVE, colour_of};
+use super::{OverlayData, OverlayStyle, colour, colour_of};
 
 /// Reach of the view ahead of the robot, m.
 const AHEAD_M: f64 = 8.0;
@@ -63,7 +63,7 @@ impl Plan {
 }
 
 /// Renders the people from above, `height` pixels high.
-pub fn draw(scene: &OverlayData, trails: &Trails, height: usize) -> Canvas {
+pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: usize) -> Canvas {
     let plan = Plan::new(height);
     let mut canvas = Canvas::new(width_px(height), height, [24, 24, 28]);
     draw_grid(&mut canvas, &plan);
@@ -77,14 +77,17 @@ pub fn draw(scene: &OverlayData, trails: &Trails, height: usize) -> Canvas {
     canvas.disc(plan.robot, 5.0, AXIS);
     for (id, trail) in trails.in_robot(scene) {
         let points: Vec<_> = trail.iter().map(|p| plan.of(p)).collect();
-        canvas.thick_path(&points, colour_of(id.0).faint(0.7));
+        canvas.thick_path(&points, colour_of(id).faint(0.7));
     }
     let is_target = |track: &Track| scene.report.target == Some(track.id);
-    for track in scene.report.tracks.iter().rev() {
+    for track in style.tracks(scene).rev() {
         draw_track(&mut canvas, &plan, track, is_target(track));
+        if style.is_debug() {
+            draw_uncertainty(&mut canvas, &plan, track);
+        }
     }
-    let mut labels = labels(scene, &plan, height);
-    for track in scene.report.tracks.iter().filter(|track| plan.shows(track, height)) {
+    let mut labels = labels(scene, &plan, style, height);
+    for track in style.tracks(scene).filter(|track| plan.shows(track, height)) {
         let text =
             if is_target(track) { format!("{} target", track.id) } else { track.id.to_string() };
         labels.add(&plan.mark(track), text, Lettering::Bold, colour(track));
@@ -94,13 +97,9 @@ pub fn draw(scene: &OverlayData, trails: &Trails, height: usize) -> Canvas {
 }
 
 /// Returns the place for the labels, which spare the marks of all tracks.
-fn labels(scene: &OverlayData, plan: &Plan, height: usize) -> Labels {
-    let marks = scene.report.tracks.iter().map(|track| plan.mark(track)).collect();
+fn labels(scene: &OverlayData, plan: &Plan, style: OverlayStyle, height: usize) -> Labels {
+    let marks = style.tracks(scene).map(|track| plan.mark(track)).collect();
     Labels::within(Rect::new(0.0, 0.0, plan.width, height as f64), marks)
-}
-
-fn colour(track: &Track) -> Ink {
-    if track.confirmed { colour_of(track.id.0) } else { TENTATIVE }
 }
 
 /// Renders a line every metre, its number every second one.
@@ -143,8 +142,13 @@ fn draw_track(canvas: &mut Canvas, plan: &Plan, track: &Track, target: bool) {
     // The line ends where the person will be in one second.
     let soon = person.position.xy() + person.velocity;
     canvas.line(at, plan.pixel(soon.x, soon.y), ink.faint(opacity));
+}
+
+/// Renders the ellipse of two standard deviations.
+fn draw_uncertainty(canvas: &mut Canvas, plan: &Plan, track: &Track) {
+    let person = &track.estimate.person;
     let covariance = track.estimate.covariance.fixed_view::<2, 2>(0, 0).into_owned();
-    canvas.path(&ellipse(plan, &person.position, covariance), ink.faint(0.6));
+    canvas.path(&ellipse(plan, &person.position, covariance), colour(track).faint(0.6));
 }
 
 /// Returns the ellipse of two standard deviations around a position on the floor.

@@ -3,11 +3,15 @@ use std::ops::Range;
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{DepthImage, Detection, Estimate, Person, Stamp, Track, TrackId};
 use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
+use tagalong_log::write::BoxedPart;
 use tagalong_pipeline::{Candidate, Fate};
 use tagalong_vision::{Silhouette, Sketch, SketchMap, SketchPoint};
 
 use super::canvas::LINE_PX;
 use super::*;
+
+const CALM: OverlayStyle = OverlayStyle { detail: Detail::People, boxes: BoxedPart::Upper };
+const DEBUG: OverlayStyle = OverlayStyle { detail: Detail::Debug, boxes: BoxedPart::Upper };
 
 fn track(id: u32, camera: &Camera) -> Track {
     let person = Person { position: Point3::new(3.0, 0.4, 1.6), velocity: Vector2::new(0.5, 0.0) };
@@ -49,7 +53,7 @@ fn changed(a: &RgbImage, b: &RgbImage, columns: Range<usize>, rows: Range<usize>
 
 #[test]
 fn the_state_of_the_filter_shows_in_the_image() {
-    let without = picture(&scene(&[], Vec::new()), &Trails::default());
+    let without = picture(&scene(&[], Vec::new()), &Trails::default(), DEBUG);
     let mut scene = scene(&[], Vec::new());
     let run = Rect::new(100.0, 60.0, 30.0, 2.0);
     scene.report.visualisation = Some(Arc::new(Sketch {
@@ -57,7 +61,7 @@ fn the_state_of_the_filter_shows_in_the_image() {
         silhouettes: vec![Silhouette { id: TrackId(1), runs: vec![run] }],
         maps: vec![SketchMap { title: String::new(), columns: 10, values: vec![0.5; 50] }],
     }));
-    let with = picture(&scene, &Trails::default());
+    let with = picture(&scene, &Trails::default(), DEBUG);
     let changed = |columns| changed(&without, &with, columns, 0..480);
     assert_eq!(changed(200..260), 4 * 60, "a run, twice as large in both directions");
     assert!(changed(390..412) > 4, "a particle");
@@ -67,8 +71,8 @@ fn the_state_of_the_filter_shows_in_the_image() {
 
 #[test]
 fn a_person_shows_in_the_image_and_from_above() {
-    let empty = picture(&scene(&[], Vec::new()), &Trails::default());
-    let one = picture(&scene(&[1], Vec::new()), &Trails::default());
+    let empty = picture(&scene(&[], Vec::new()), &Trails::default(), DEBUG);
+    let one = picture(&scene(&[1], Vec::new()), &Trails::default(), DEBUG);
     assert!(changed(&empty, &one, 0..640, 0..480) > 400);
     assert!(changed(&empty, &one, 640..1024, 0..480) > 100);
     // Title and counts are in the strip below.
@@ -78,12 +82,12 @@ fn a_person_shows_in_the_image_and_from_above() {
 #[test]
 fn small_images_are_enlarged_to_640_columns_and_all_pictures_have_one_even_size() {
     let size = |scene: &OverlayData| {
-        let picture = picture(scene, &Trails::default());
+        let picture = picture(scene, &Trails::default(), DEBUG);
         (picture.width(), picture.height())
     };
     let image = (640, 480);
     let plan = 480 * 4 / 5;
-    assert_eq!(size(&scene(&[], Vec::new())), (image.0 + plan, image.1 + legend::HEIGHT_PX));
+    assert_eq!(size(&scene(&[], Vec::new())), (image.0 + plan, image.1 + legend::height_px(DEBUG)));
     assert_eq!(size(&scene(&[1, 2], Vec::new())), size(&scene(&[], Vec::new())));
     let mut odd = scene(&[1], Vec::new());
     odd.camera = Arc::new(Camera { width: 217, height: 121, ..(*odd.camera).clone() });
@@ -92,14 +96,15 @@ fn small_images_are_enlarged_to_640_columns_and_all_pictures_have_one_even_size(
     // Without a camera there is the plan alone.
     odd.camera = Arc::new(Camera { width: 0, height: 0, ..(*odd.camera).clone() });
     odd.images = Images::default();
-    assert_eq!(size(&odd), (640, ROWS_ALONE + legend::HEIGHT_PX));
+    assert_eq!(size(&odd), (640, ROWS_ALONE + legend::height_px(DEBUG)));
 }
 
 #[test]
 fn points_of_a_scan_are_in_the_plan() {
     let empty = scene(&[], Vec::new());
     let scanned = OverlayData { scan: vec![Point2::new(3.0, 1.0)], ..scene(&[], Vec::new()) };
-    let plan = |scene: &OverlayData| plan_view::draw(scene, &Trails::default(), 450).into_image();
+    let plan =
+        |scene: &OverlayData| plan_view::draw(scene, &Trails::default(), DEBUG, 450).into_image();
     let without = plan(&empty);
     let with = plan(&scanned);
     let changed: Vec<usize> =
@@ -118,7 +123,7 @@ fn the_labels_of_two_people_side_by_side_do_not_overlap() {
         (region.x, region.y) = (x, y);
     }
     scene.report.tracks[1].seen = false;
-    let labels = image_view::placed_labels(&scene);
+    let labels = image_view::placed_labels(&scene, DEBUG);
     let bars = labels.bars();
     let texts: Vec<&str> = bars.iter().map(|(_, text)| *text).collect();
     assert_eq!(texts, ["1 3.0 m", "2 unseen 3.0 m", "3 3.0 m", "head width"]);
@@ -144,8 +149,8 @@ fn dropped(test: &'static str) -> Candidate {
 
 #[test]
 fn dropped_candidates_are_in_the_picture() {
-    let empty = picture(&scene(&[], Vec::new()), &Trails::default());
-    let shown = picture(&scene(&[], vec![dropped("margin")]), &Trails::default());
+    let empty = picture(&scene(&[], Vec::new()), &Trails::default(), DEBUG);
+    let shown = picture(&scene(&[], vec![dropped("margin")]), &Trails::default(), DEBUG);
     assert!(changed(&empty, &shown, 40..160, 0..480) > 200);
     assert_eq!(changed(&empty, &shown, 240..1024, 0..480), 0);
 }
@@ -153,26 +158,77 @@ fn dropped_candidates_are_in_the_picture() {
 #[test]
 fn the_picture_is_a_png_of_the_frame() {
     let home = tempfile::tempdir().unwrap();
-    let mut overlay = Overlay::new(home.path().to_owned());
+    let mut overlay = Overlay::new(home.path().to_owned(), DEBUG);
     overlay.draw(&scene(&[1], Vec::new())).unwrap();
     let file = std::io::BufReader::new(File::open(home.path().join("000003.png")).unwrap());
     let reader = png::Decoder::new(file).read_info().unwrap();
     assert_eq!((reader.info().width, reader.info().height), (1024, 544));
-    let error = Overlay::new(home.path().join("gone")).draw(&scene(&[], Vec::new())).unwrap_err();
+    let error =
+        Overlay::new(home.path().join("gone"), DEBUG).draw(&scene(&[], Vec::new())).unwrap_err();
     assert!(error.contains("000003.png"), "{error}");
 }
 
 #[test]
-fn trails_follow_people_and_end_with_them() {
+fn calm_pictures_show_confirmed_people_alone() {
+    let empty = picture(&scene(&[], Vec::new()), &Trails::default(), CALM);
+    let mut busy = scene(&[1], vec![dropped("margin")]);
+    busy.report.tracks[0].confirmed = false;
+    busy.report.visualisation = Some(Arc::new(Sketch {
+        points: vec![SketchPoint { id: TrackId(1), pixel: Point2::new(200.5, 90.5), weight: 1.0 }],
+        silhouettes: Vec::new(),
+        maps: vec![SketchMap { title: "map".into(), columns: 10, values: vec![0.5; 50] }],
+    }));
+    let calm = picture(&busy, &Trails::default(), CALM);
+    assert_eq!(changed(&empty, &calm, 0..1024, 0..480), 0);
+    let debug = picture(&busy, &Trails::default(), DEBUG);
+    assert!(changed(&empty, &debug, 0..1024, 0..480) > 1000);
+    let labels = image_view::placed_labels(&scene(&[1], vec![dropped("margin")]), CALM);
+    assert_eq!(labels.bars().len(), 1, "{:?}", labels.bars());
+}
+
+#[test]
+fn boxes_are_those_of_the_output_settings() {
+    let scene = scene(&[1], Vec::new());
+    let full = OverlayStyle { boxes: BoxedPart::Full, ..CALM };
+    let track = &scene.report.tracks[0];
+    assert_eq!(CALM.region(&scene, track), track.estimate.region);
+    let whole = full.region(&scene, track);
+    assert!(whole.height > 2.0 * track.estimate.region.height, "{whole:?}");
+    let calm = picture(&scene, &Trails::default(), CALM);
+    // Feet are 3 m away, below the middle of the image, where no upper body is.
+    let feet = (2.0 * whole.bottom()) as usize;
+    assert!(feet > 260 && feet < 480, "{feet}");
+    let shown = picture(&scene, &Trails::default(), full);
+    assert!(changed(&calm, &shown, 0..640, feet - 8..feet + 8) > 20);
+}
+
+#[test]
+fn trails_end_with_their_people_and_after_two_seconds() {
     let mut trails = Trails::default();
-    let with = scene(&[1], Vec::new());
-    let without = scene(&[], Vec::new());
-    for _ in 0..100 {
+    let mut with = scene(&[1], Vec::new());
+    for tenth in 0..100 {
+        with.report.stamp = Stamp::from_nanos(1_000_000_000 + tenth * 100_000_000);
         trails.follow(&with);
     }
     let [(id, points)] = &trails.in_robot(&with)[..] else { panic!("one trail") };
-    assert_eq!((id.0, points.len()), (1, 60));
+    assert_eq!((id.0, points.len()), (1, 21));
     assert!((points[0] - Point3::new(3.0, 0.4, 1.6)).norm() < 1e-12);
+    let without = scene(&[], Vec::new());
     trails.follow(&without);
     assert!(trails.in_robot(&without).is_empty());
+}
+
+#[test]
+fn a_person_who_is_not_seen_has_no_trail_and_a_gap_splits_it() {
+    let mut trails = Trails::default();
+    let mut scene = scene(&[1], Vec::new());
+    for tenth in 0..20 {
+        scene.report.stamp = Stamp::from_nanos(1_000_000_000 + tenth * 100_000_000);
+        scene.report.tracks[0].seen = !(5..15).contains(&tenth);
+        trails.follow(&scene);
+        let is_empty = trails.in_robot(&scene).is_empty();
+        assert_eq!(is_empty, !scene.report.tracks[0].seen, "{tenth}");
+    }
+    let pieces: Vec<usize> = trails.in_robot(&scene).iter().map(|(_, at)| at.len()).collect();
+    assert_eq!(pieces, [5, 5]);
 }

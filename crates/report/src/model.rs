@@ -103,6 +103,9 @@ pub struct TaskResult {
     /// Lines of the config that decide the tests that dropped missed people, by test.
     #[serde(default)]
     pub deciding: BTreeMap<String, Vec<String>>,
+    /// Sentences that say why these tests drop people, by test.
+    #[serde(default)]
+    pub reasons: BTreeMap<String, String>,
 }
 
 /// Outcome of a task.

@@ -54,6 +54,20 @@ pub struct Estimate {
     pub best: bool,
 }
 
+impl PipelineSummary {
+    /// Returns the number of people that were found in at least one frame, if there is truth.
+    pub fn people_found_count(&self) -> Option<u64> {
+        let found = self.people_found.as_ref()?;
+        // The summary keeps the share; the count is recovered from it.
+        Some((found.estimate * self.people as f64).round() as u64)
+    }
+
+    /// Returns false if there are people in the truth and the pipeline found none.
+    fn finds_people(&self) -> bool {
+        self.people_found_count() != Some(0)
+    }
+}
+
 /// Difference of `b` from `a` in one figure, on the logs that both have.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct PairSummary {
@@ -118,7 +132,7 @@ pub fn per_log<'a>(
             values.entry(&task.log).or_default().push(value);
         }
     }
-    values.into_iter().filter_map(|(log, v)| Some((log, tagalong_stats::mean(&v)?))).collect()
+    values.into_iter().filter_map(|(log, v)| Some((log, tagalong_math::mean(&v)?))).collect()
 }
 
 fn pipeline(view: &OrderedBenchmark<'_>, name: &str) -> PipelineSummary {
@@ -169,15 +183,17 @@ fn people(view: &OrderedBenchmark<'_>, pipeline: &str) -> Vec<[u64; 2]> {
 
 fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: ComparisonSpace) {
     let key = figure.key(place);
-    let with: Vec<Estimate> =
-        pipelines.iter().filter_map(|p| p.figures.get(&key).copied()).collect();
+    // A pipeline without any detection has no false positives either; that makes it the best in nothing.
+    let finding = pipelines.iter().filter(|p| p.finds_people());
+    let with: Vec<Estimate> = finding.filter_map(|p| p.figures.get(&key).copied()).collect();
     let most = with.iter().map(|e| e.logs).max().unwrap_or(0);
     let rivals: Vec<f64> = with.iter().filter(|e| e.logs == most).map(|e| e.mean).collect();
     // Without a rival no pipeline is the best.
     if rivals.len() < 2 {
         return;
     }
-    for estimate in pipelines.iter_mut().filter_map(|p| p.figures.get_mut(&key)) {
+    let finding = pipelines.iter_mut().filter(|p| p.finds_people());
+    for estimate in finding.filter_map(|p| p.figures.get_mut(&key)) {
         let beaten = rivals.iter().any(|&rival| figure.better(rival, estimate.mean));
         estimate.best = estimate.logs == most && !beaten;
     }

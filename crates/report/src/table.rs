@@ -48,14 +48,13 @@ impl Cell {
 
     /// Creates a cell of mean and standard deviation; empty without values.
     pub fn mean(values: &[f64], digits: usize) -> Self {
-        tagalong_stats::mean_and_deviation(values).map_or_else(
-            Self::default,
-            |(mean, deviation)| Self {
+        tagalong_math::mean_and_deviation(values).map_or_else(Self::default, |(mean, deviation)| {
+            Self {
                 // One value does not spread.
                 deviation: (values.len() > 1).then_some(deviation),
                 ..Self::number(mean, digits)
-            },
-        )
+            }
+        })
     }
 
     /// Creates a cell of an estimate with its interval, if there is one.

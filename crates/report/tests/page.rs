@@ -51,6 +51,7 @@ fn hostile_names_are_escaped_everywhere() {
         }
         task.missed.iter_mut().for_each(|m| m.test = Some(HOSTILE.into()));
         task.deciding = [(HOSTILE.to_owned(), vec![HOSTILE.to_owned()])].into();
+        task.reasons = [(HOSTILE.to_owned(), HOSTILE.to_owned())].into();
     }
     for moment in &mut benchmark.moments {
         moment.log += HOSTILE;
@@ -389,4 +390,30 @@ fn people_are_counted_once_whatever_the_number_of_seeds() {
     let found = two.pipelines[0].people_found.unwrap();
     assert_eq!((found.estimate, two.pipelines[0].people), (0.5, 8));
     assert!(found.lower < 0.1 && found.upper > 0.9, "logs differ more than people: {found:?}");
+}
+
+#[test]
+fn each_pair_says_in_one_line_why() {
+    let page = html(&two_by_three(), None);
+    let section = &page[page.find("id=\"pairs\"").unwrap()..];
+    let line = &section[section.find("class=\"pair-why\">").unwrap() + 17..];
+    let line = &line[..line.find('<').unwrap()];
+    assert!(line.contains(" people, ") && line.contains(" misses of "), "{line}");
+    assert!(line.ends_with("by margin.") || line.ends_with("by size."), "{line}");
+}
+
+#[test]
+fn a_pipeline_that_finds_nobody_is_the_best_in_nothing() {
+    let mut benchmark = two_by_three();
+    let silent = benchmark.tasks[0].pipeline.clone();
+    for task in benchmark.tasks.iter_mut().filter(|task| task.pipeline == silent) {
+        for scores in [&mut task.image, &mut task.metres].into_iter().flatten() {
+            scores.never_confirmed = scores.truth_ids;
+            scores.fp_per_frame = Some(0.0);
+        }
+    }
+    let summary = Summary::new(&benchmark);
+    let own = summary.pipeline(&silent).unwrap();
+    assert_eq!(own.people_found_count(), Some(0));
+    assert!(own.figures.values().all(|estimate| !estimate.best));
 }

@@ -4,8 +4,8 @@ use nalgebra::{Isometry2, Point2, Point3, Rotation2, Rotation3, Vector2, Vector3
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::behaviour::Obstacle;
 use crate::material::Material;
+use crate::obstacle::Obstacle;
 use crate::shape::{Form, Shape};
 use crate::world::Object;
 

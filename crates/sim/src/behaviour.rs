@@ -1,12 +1,14 @@
 //! Behaviour of people: they walk along their ways, keep off each other and off furniture, and some
 //! of them play tricks when the robot cannot see them.
 
+use crate::obstacle::Obstacle;
 use nalgebra::{Point2, Rotation2, Vector2};
 
 use crate::body::{Stance, feet_ahead_m};
 use crate::gait::Gait;
 use crate::person::Person;
-use crate::scene::{AtEnd, PersonSettings, Posture, Trick};
+use crate::posture::Posture;
+use crate::scene::{AtEnd, PersonSettings, Trick};
 
 /// Largest change of a walker's velocity, m/s².
 const MAX_ACCELERATION: f64 = 1.2;
@@ -44,24 +46,6 @@ const STANDS_MPS: f64 = 0.1;
 const TOO_NEAR_M: f64 = 0.6;
 /// Time in which a companion closes a gap to their place, s.
 const CATCH_UP_S: f64 = 0.8;
-
-/// A round thing that people walk around.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Obstacle {
-    /// Where it stands, m.
-    pub at: Point2<f64>,
-    /// Its radius, m.
-    pub radius_m: f64,
-    /// Velocity with which it moves, if it moves, m: a blocked walker goes round behind it.
-    pub ahead: Vector2<f64>,
-}
-
-impl Obstacle {
-    /// A thing that stays where it is.
-    pub fn standing(at: Point2<f64>, radius_m: f64) -> Self {
-        Self { at, radius_m, ahead: Vector2::zeros() }
-    }
-}
 
 /// Wanted place and motion of a companion.
 #[derive(Clone, Copy, Debug, PartialEq)]

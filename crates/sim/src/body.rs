@@ -6,8 +6,8 @@
 use nalgebra::{Point2, Point3, Rotation3, Vector3};
 
 use crate::gait::{Gait, LimbAngles};
+use crate::posture::Posture;
 use crate::random::Random;
-use crate::scene::Posture;
 
 /// Length of the head, chin to top, as a fraction of the height.
 const HEAD: f64 = 0.130;

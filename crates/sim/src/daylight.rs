@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::material::Material;
-use crate::scene::RoomSettings;
+use crate::room_settings::RoomSettings;
 use crate::shape::{Form, Shape};
 use crate::world::{Lamp, Object};
 

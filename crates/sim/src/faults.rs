@@ -7,8 +7,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::nearest;
 
+use crate::camera_settings::CameraKind;
 use crate::random::Random;
-use crate::scene::{CameraKind, Scene};
+use crate::scene::Scene;
 
 /// First stream of random numbers of the faults; each fault has its own.
 const FIRST_STREAM: u64 = 64;

@@ -94,7 +94,7 @@ impl LaserSettings {
         seed: u64,
     ) -> Vec<f32> {
         let eye = world_from_robot * Point3::new(0.0, 0.0, self.height_m);
-        let seed = tagalong_stats::number_at(seed, self.rays as u64);
+        let seed = tagalong_math::number_at(seed, self.rays as u64);
         let slice = world.slice(eye, &(world_from_robot.rotation * Vector3::z()));
         let range = |(ray, direction): (u64, f64)| {
             let ahead = Vector3::new(direction.cos(), direction.sin(), 0.0);

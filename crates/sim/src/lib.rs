@@ -43,6 +43,7 @@
 mod approach;
 mod behaviour;
 mod body;
+mod camera_settings;
 mod daylight;
 mod faults;
 mod footprint;
@@ -52,14 +53,17 @@ mod lanes;
 mod laser;
 mod material;
 mod mirror;
+mod obstacle;
 mod obstacle_sensors;
 mod parallel;
 mod person;
+mod posture;
 mod ramp;
 mod random;
 mod render;
 mod robot;
 mod room;
+mod room_settings;
 mod scene;
 mod seen;
 mod sensor;
@@ -74,6 +78,7 @@ mod webcam;
 mod world;
 
 pub use approach::{ApproachBy, ApproachInView, ApproachSettings, ApproachState};
+pub use camera_settings::{CameraKind, CameraSettings};
 pub use daylight::Daylight;
 pub use faults::{FaultKind, InjectedFault, ScheduledFault};
 pub use footprint::ROBOT_RADIUS_M;
@@ -84,12 +89,11 @@ pub use obstacle_sensors::{
     BumperSettings, RangeKind, RangeSettings, ScannerSettings, SensorData, SensorReading,
 };
 pub use person::Extra;
+pub use posture::Posture;
 pub use ramp::Ramp;
 pub use robot::Encoder;
-pub use scene::{
-    AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, LightSettings, PersonSettings,
-    Posture, RobotSettings, RoomSettings, Scene, Trick,
-};
+pub use room_settings::{Floor, RoomSettings};
+pub use scene::{AtEnd, FaultSettings, LightSettings, PersonSettings, RobotSettings, Scene, Trick};
 pub use simulation::{
     Clearance, Event, Joint, OdometryReading, Shot, Simulation, Truth, WebcamShot,
 };

@@ -95,6 +95,11 @@ impl Material {
         Self { infrared, ..self }
     }
 
+    /// Returns true for a surface that is neither a mirror nor glass.
+    pub fn shows_itself(&self) -> bool {
+        self.reflects == 0.0 && self.passes == 0.0
+    }
+
     /// The colour at a point in the solid's own axes.
     pub fn at(&self, own: &Vector3<f64>) -> Colour {
         match self.pattern {

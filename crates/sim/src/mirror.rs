@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::Image;
 use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole, Rect};
 
+use crate::camera_settings::CameraSettings;
 use crate::parallel::in_pieces;
 use crate::random::Random;
 use crate::render::Visibility;
-use crate::scene::CameraSettings;
 use crate::shape::Shape;
 use crate::world::{Hit, World};
 

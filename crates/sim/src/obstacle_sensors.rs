@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{LaserScan, RangeReading};
-use tagalong_stats::{fingerprint, number_at};
+use tagalong_math::{fingerprint, number_at};
 
 use crate::laser::LaserSettings;
 use crate::random::normal_at;

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::body::{Build, Skeleton};
 use crate::material::{Colour, Material, Pattern, scaled};
+use crate::posture::Posture;
 use crate::random::Random;
-use crate::scene::Posture;
 use crate::shape::{Form, Shape};
 
 /// Clothes and carried things of a person.

@@ -1,4 +1,4 @@
-use tagalong_stats::{ChaCha, RandomSource, number_at};
+use tagalong_math::{ChaCha, RandomSource, number_at};
 
 /// Seeded random numbers that are the same on every machine.
 #[derive(Clone, Debug)]
@@ -73,7 +73,7 @@ mod tests {
         let sequence: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
         let keyed: Vec<f64> = (0..20_000).map(|key| normal_at(7, key)).collect();
         for values in [sequence, keyed] {
-            let (mean, deviation) = tagalong_stats::mean_and_deviation(&values).unwrap();
+            let (mean, deviation) = tagalong_math::mean_and_deviation(&values).unwrap();
             assert!(mean.abs() < 0.03 && (deviation - 1.0).abs() < 0.025, "{mean} {deviation}");
         }
     }

@@ -160,6 +160,8 @@ impl WorldCamera<'_> {
         let surface = shape.surface(points, rays);
         let Shine { light, infrared } =
             self.world.shine(&shape.material, points, &surface, wanted, self.lit);
+        // Nearly all surfaces show themselves, without a look at normals and rays.
+        let shows_itself = shape.material.shows_itself();
         for (lane, pixel) in pixels.iter_mut().enumerate().filter(|(lane, _)| wanted[*lane]) {
             let own = Hit {
                 t: t[lane],
@@ -168,9 +170,12 @@ impl WorldCamera<'_> {
                 facing: surface.facing[lane],
                 person: *person,
             };
-            let normal = surface.normal.at(lane);
-            let ray = rays.at(lane);
-            *pixel = self.world.shown(own, shape, &normal, (eye, &ray));
+            *pixel = if shows_itself {
+                own
+            } else {
+                let normal = surface.normal.at(lane);
+                self.world.beyond(own, shape, &normal, (eye, &rays.at(lane)))
+            };
         }
     }
 }
@@ -277,7 +282,7 @@ mod tests {
     use super::*;
     use crate::daylight::Daylight;
     use crate::material::{Material, Pattern};
-    use crate::scene::RoomSettings;
+    use crate::room_settings::RoomSettings;
     use crate::shape::samples;
     use crate::world::{Lamp, Object, Stage};
 

@@ -2,12 +2,14 @@
 
 use nalgebra::{Point2, Point3, Rotation2, Rotation3, Vector2, Vector3};
 
-use crate::behaviour::Obstacle;
 use crate::furniture::{Furniture, FurnitureKind};
 use crate::material::{Colour, Material, Pattern, scaled};
+use crate::obstacle::Obstacle;
 use crate::ramp::Ramp;
 use crate::random::Random;
-use crate::scene::{Floor, LightSettings, RoomSettings, Scene};
+use crate::room_settings::Floor;
+use crate::room_settings::RoomSettings;
+use crate::scene::{LightSettings, Scene};
 use crate::shape::{Form, Shape};
 use crate::world::{Lamp, Object};
 

@@ -1,6 +1,8 @@
 //! Scenes as TOML: everything that a simulated log depends on, the seed included.
 
-use nalgebra::Point2;
+use crate::camera_settings::{CameraKind, CameraSettings};
+use crate::posture::Posture;
+use crate::room_settings::RoomSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::ConfigError;
@@ -13,7 +15,6 @@ use crate::faults::InjectedFault;
 use crate::footprint;
 use crate::furniture::Furniture;
 use crate::laser::LaserSettings;
-use crate::mirror::MirrorSettings;
 use crate::obstacle_sensors::{self, BumperSettings, RangeSettings, ScannerSettings};
 use crate::person::Extra;
 use crate::ramp::Ramp;
@@ -271,60 +272,6 @@ fn complete_camera(root: &mut DeTable<'_>) {
     }
 }
 
-/// The room.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RoomSettings {
-    /// Length and width, m.
-    pub size_m: [f64; 2],
-    /// Height, m.
-    pub height_m: f64,
-    /// The walls have wallpaper; without it stereo finds nothing on them.
-    pub wallpaper: bool,
-    /// The floor.
-    pub floor: Floor,
-    /// Pieces of furniture of any kind at random places along the walls, off
-    /// everybody's way.
-    pub clutter: usize,
-    /// The door at the far end stands open to a dark room.
-    pub open_door: bool,
-    /// A ramp across the room; without it the floor is level.
-    pub ramp: Option<Ramp>,
-}
-
-impl RoomSettings {
-    /// Returns the height of the floor at a place, m.
-    pub fn floor_m(&self, at: &Point2<f64>) -> f64 {
-        self.ramp.as_ref().map_or(0.0, |ramp| ramp.height_m(at.x))
-    }
-}
-
-impl Default for RoomSettings {
-    fn default() -> Self {
-        Self {
-            size_m: [9.0, 6.0],
-            height_m: 2.8,
-            wallpaper: false,
-            floor: Floor::Planks,
-            clutter: 0,
-            open_door: false,
-            ramp: None,
-        }
-    }
-}
-
-/// Material of the floor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Floor {
-    /// Boards.
-    Planks,
-    /// Tiles.
-    Tiles,
-    /// Carpet.
-    Carpet,
-}
-
 /// The light.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -342,85 +289,6 @@ pub struct LightSettings {
 impl Default for LightSettings {
     fn default() -> Self {
         Self { lux: 350.0, lamps: 2, ambient: 0.35, day: None }
-    }
-}
-
-/// Images of the camera.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum CameraKind {
-    /// Colour and registered depth of a structured-light camera.
-    Rgbd,
-    /// A rectified pair of grey images.
-    Stereo,
-    /// The circular colour image of a camera that looks up into a conical
-    /// mirror, of which `width`, `height`, `rate_hz`, `height_m` and `mirror` hold.
-    Panorama,
-}
-
-/// The camera on the robot. Where a scene leaves them out, width, height, field
-/// of view and baseline are those of the kind: 640x480, 58 degrees and 0.075 m
-/// of `rgbd`; 512x384, 100 degrees and 0.12 m of `stereo`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CameraSettings {
-    /// Images that it delivers.
-    pub kind: CameraKind,
-    /// Without it an `rgbd` camera delivers depth only, and images are drawn
-    /// several times faster.
-    pub colour: bool,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Horizontal field of view, degrees.
-    pub field_of_view_deg: f64,
-    /// Images per second.
-    pub rate_hz: f64,
-    /// Height above the floor, m.
-    pub height_m: f64,
-    /// Looks this far down, degrees.
-    pub pitch_down_deg: f64,
-    /// Distance of the two cameras, or of camera and projector, m.
-    pub baseline_m: f64,
-    /// Nearest depth that is measured, m.
-    pub min_depth_m: f64,
-    /// Farthest depth that is measured, m.
-    pub max_depth_m: f64,
-    /// Exposure time, s.
-    pub exposure_s: f64,
-    /// From the first row to the last, s; 0 takes all rows at once. The stamp is
-    /// that of the middle row, and people stand still meanwhile. Not for mirrors.
-    pub rolling_shutter_s: f64,
-    /// The depth of an `rgbd` camera with colour is taken this much later than
-    /// the colour, s; its stamp says so.
-    pub depth_offset_s: f64,
-    /// Typical error of the mount as stated in the log, degrees and (in hundredths) metres.
-    pub mount_error_deg: f64,
-    /// The mirror of a panorama camera.
-    pub mirror: MirrorSettings,
-}
-
-impl Default for CameraSettings {
-    fn default() -> Self {
-        Self {
-            kind: CameraKind::Rgbd,
-            colour: true,
-            width: 640,
-            height: 480,
-            field_of_view_deg: 58.0,
-            rate_hz: 10.0,
-            height_m: 1.2,
-            pitch_down_deg: 0.0,
-            baseline_m: 0.075,
-            min_depth_m: 0.5,
-            max_depth_m: 8.0,
-            exposure_s: 0.012,
-            rolling_shutter_s: 0.0,
-            depth_offset_s: 0.0,
-            mount_error_deg: 0.4,
-            mirror: MirrorSettings::default(),
-        }
     }
 }
 
@@ -525,21 +393,6 @@ pub enum AtEnd {
     Return,
     /// Goes on to the first point, and so on.
     Loop,
-}
-
-/// Posture of a person.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Posture {
-    /// Stands and walks.
-    #[default]
-    Upright,
-    /// Looks down at a phone while standing and walking.
-    Phone,
-    /// Sits on a chair at the first point of the path; with more points, gets up by `start_s`.
-    Seated,
-    /// Bends down now and then while standing.
-    Bending,
 }
 
 /// A person.

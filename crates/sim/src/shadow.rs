@@ -12,7 +12,7 @@ use crate::sight::{before, between};
 /// every image, and for what stands still.
 pub const COARSE: usize = 16;
 /// See [`COARSE`].
-pub const FINE: usize = 32;
+pub const FINE: usize = 2 * COARSE;
 
 /// Objects around a lamp that cast shadows.
 #[derive(Clone, Debug, Default)]
@@ -61,9 +61,9 @@ impl Shadows {
         numbers.any(|n| self.solids[*n as usize].meet(way).is_some_and(|t| t < 1.0))
     }
 
-    /// Closes the `open` ways from the lamp in which something stands.
-    pub fn darken(&self, ways: &Vectors, open: &mut [bool; LANES]) {
-        let cells = cells(ways, self.side);
+    /// Closes the `open` ways from the lamp in which something stands; `cells` are those that the ways
+    /// go through.
+    pub fn darken(&self, ways: &Vectors, cells: &[i32; LANES], open: &mut [bool; LANES]) {
         let mut left = bits(open);
         let mut dark = 0;
         while left != 0 {
@@ -113,14 +113,31 @@ fn barred(solids: &[SolidView], numbers: &[u32], ways: &Vectors, interest: u32) 
     bits(&barred.map(|barred| barred != 0))
 }
 
-/// Returns the cells that some ways go through.
+/// Returns the cells that some ways go through, of faces with `side` cells along a side.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn cells(ways: &Vectors, side: usize) -> [i32; LANES] {
+pub fn cells(ways: &Vectors, side: usize) -> [i32; LANES] {
     let mut cells = [0; LANES];
     for lane in 0..LANES {
         cells[lane] = cell(&ways.at(lane), side);
     }
     cells
+}
+
+/// Returns the coarse cells in which [`FINE`] cells lie. Twice as many cells along a side are exactly
+/// half as large, so that these are the ones that [`cells`] returns, without its divisions.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+pub fn coarse_cells(fine: &[i32; LANES]) -> [i32; LANES] {
+    // Sides are powers of two: column, row and face are digits of the number of a cell.
+    const BITS: u32 = FINE.trailing_zeros();
+    const DIGIT: i32 = FINE as i32 - 1;
+    let mut coarse = [0; LANES];
+    for lane in 0..LANES {
+        let column = (fine[lane] & DIGIT) >> 1;
+        let row = ((fine[lane] >> BITS) & DIGIT) >> 1;
+        let face = fine[lane] >> (2 * BITS);
+        coarse[lane] = face << (2 * BITS - 2) | row << (BITS - 1) | column;
+    }
+    coarse
 }
 
 /// Where a line between cells runs on a face, -1 to 1.
@@ -192,6 +209,27 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn coarse_cells_are_those_of_a_coarse_cube(
+            ways in prop::collection::vec(prop::array::uniform3(-4.0..4.0f64), LANES),
+            flat in 0..4usize,
+        ) {
+            let mut side_by_side = Vectors::ZERO;
+            for (lane, way) in ways.into_iter().enumerate() {
+                let mut way = Vector3::from(way);
+                // Ways along an axis lie on the border of cells.
+                if let Some(part) = way.get_mut(flat).filter(|_| lane % 2 == 0) {
+                    *part = 0.0;
+                }
+                side_by_side.set(lane, &way);
+            }
+            let fine = cells(&side_by_side, FINE);
+            prop_assert_eq!(coarse_cells(&fine), cells(&side_by_side, COARSE));
+        }
+
+    }
+
+    proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
         fn shadows_are_where_the_way_to_the_lamp_is_barred(
@@ -210,7 +248,7 @@ mod tests {
                 (0..).zip(ways).for_each(|(lane, way)| side_by_side.set(lane, way));
                 // Closed ways stay closed.
                 let mut open: [bool; LANES] = std::array::from_fn(|lane| lane % 5 != 4);
-                shadows.darken(&side_by_side, &mut open);
+                shadows.darken(&side_by_side, &cells(&side_by_side, side), &mut open);
                 for (lane, (way, open)) in ways.iter().zip(open).enumerate() {
                     prop_assert_eq!(shadows.on(way), barred(way));
                     prop_assert_eq!(open, lane % 5 != 4 && !barred(way));

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use serde::Deserialize;
 use tagalong_config::ConfigError;
-use tagalong_stats::fingerprint;
+use tagalong_math::fingerprint;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue, ValueDeserializer};
 

@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use crate::daylight::Windows;
 use crate::lanes::{LANES, Lanes, Vectors, dot};
 use crate::material::{Colour, Material};
-use crate::shadow::{self, Shadows};
+use crate::shadow::{self, Shadows, cells, coarse_cells};
 use crate::shape::{Shape, Surface};
 use crate::slice::Slice;
 
@@ -167,28 +167,17 @@ impl World {
     ) -> Hit {
         meet(solids, eye, ray).map_or(Hit::NOTHING, |(t, person, shape)| {
             let (hit, normal) = self.hit(t, person, shape, (eye, ray));
-            self.shown(hit, shape, &normal, (eye, ray))
+            if shape.material.shows_itself() {
+                hit
+            } else {
+                self.beyond(hit, shape, &normal, (eye, ray))
+            }
         })
-    }
-
-    /// Returns what a surface with this normal shows where a ray from an eye meets it: itself, or
-    /// the view in a mirror or through glass.
-    #[inline(always)]
-    pub(crate) fn shown(
-        &self,
-        own: Hit,
-        of: &Shape,
-        normal: &Vector3<f64>,
-        way: (&Point3<f64>, &Vector3<f64>),
-    ) -> Hit {
-        let Material { reflects, passes, .. } = of.material;
-        let shows_itself = reflects == 0.0 && passes == 0.0;
-        if shows_itself { own } else { self.beyond(own, of, normal, way) }
     }
 
     /// Returns the view in a mirror or through glass; glass mirrors a little, too. Mirrors that
     /// are seen in mirrors or through glass show their own surface only.
-    fn beyond(
+    pub(crate) fn beyond(
         &self,
         seen: Hit,
         of: &Shape,
@@ -264,7 +253,12 @@ impl World {
         for (lamp, shadows) in lamps.filter(|(lamp, _)| lit || lamp.is_sun()) {
             let beams = beams(lamp, points, &surface.normal);
             let mut open = std::array::from_fn(|lane| wanted[lane] && beams.lux[lane] != 0.0);
-            shadows.iter().for_each(|shadows| shadows.darken(&beams.ways, &mut open));
+            if open != [false; LANES] {
+                let [stage, people] = shadows;
+                let fine = cells(&beams.ways, shadow::FINE);
+                stage.darken(&beams.ways, &fine, &mut open);
+                people.darken(&beams.ways, &coarse_cells(&fine), &mut open);
+            }
             for lane in 0..LANES {
                 let on = if open[lane] { beams.lux[lane] } else { 0.0 };
                 lux[lane] += on;

@@ -138,7 +138,7 @@ fn dense(method: Method) -> StereoSettings {
 
 #[test]
 fn semi_global_is_no_worse_than_opencv() {
-    let Some(folder) = tagalong_testdata::find("stereo") else { return };
+    let Some(folder) = tagalong_conformance::testdata::find("stereo") else { return };
     for pair in &PAIRS {
         let Judged { bad, .. } = judge(&folder, pair, &dense(Method::SemiGlobal));
         println!("    OpenCV's SGBM: all {:.2?}, visible {:.2?}", pair.sgbm, pair.sgbm_visible);
@@ -150,7 +150,7 @@ fn semi_global_is_no_worse_than_opencv() {
 /// larger window guesses.
 #[test]
 fn windows_fail_nowhere_as_badly_as_opencv_where_it_is_worst() {
-    let Some(folder) = tagalong_testdata::find("stereo") else { return };
+    let Some(folder) = tagalong_conformance::testdata::find("stereo") else { return };
     for pair in &PAIRS {
         let [_, all, ..] = judge(&folder, pair, &dense(Method::Block)).bad;
         println!("    OpenCV's BM: all {:.2?}", pair.bm);
@@ -161,7 +161,7 @@ fn windows_fail_nowhere_as_badly_as_opencv_where_it_is_worst() {
 /// The disparities that the texture test drops are more often wrong than those that it keeps.
 #[test]
 fn of_what_the_defaults_leave_less_is_wrong() {
-    let Some(folder) = tagalong_testdata::find("stereo") else { return };
+    let Some(folder) = tagalong_conformance::testdata::find("stereo") else { return };
     for pair in &PAIRS {
         let all = judge(&folder, pair, &dense(Method::SemiGlobal)).wrong;
         let left = judge(&folder, pair, &StereoSettings::default()).wrong;

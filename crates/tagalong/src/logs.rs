@@ -148,7 +148,9 @@ pub fn sources_of(source: &FrameSource) -> Sources {
 /// Returns the error of a log that does not fit a config: a topic of a wrong kind is shown with the
 /// line that names it.
 pub fn refusal(error: LogError, config: &ResolvedConfig) -> Error {
-    let LogError::WrongTopic { key, .. } = &error else { return error.into() };
+    let (LogError::WrongTopic { key, .. } | LogError::UnknownTopic { key, .. }) = &error else {
+        return error.into();
+    };
     match config.mistake_at(&format!("input.{key}"), &error.to_string()) {
         Some(mistake) => mistake.into(),
         None => error.into(),

@@ -100,7 +100,7 @@ impl Clock {
         if self.periods.len() < MIN_PERIODS {
             return 0.0;
         }
-        tagalong_stats::median(self.periods.iter().copied()).unwrap_or(0.0)
+        tagalong_math::median(self.periods.iter().copied()).unwrap_or(0.0)
     }
 }
 

@@ -24,7 +24,7 @@
 //!
 //! ```
 //! use tagalong_core::*;
-//! use tagalong_filtering::PerPerson;
+//! use tagalong_core::PerPerson;
 //! use tagalong_tracking::{
 //!     DetectorSettings, DetectorSlot, Guarded, Parts, Tracker, TrackerSettings,
 //! };
@@ -59,15 +59,15 @@
 //!     }],
 //!     verifiers: Vec::new(),
 //!     associator: {
-//!         let hungarian = tagalong_associate_hungarian::Hungarian::new(Default::default())?;
+//!         let hungarian = tagalong_associators::hungarian::Hungarian::new(Default::default())?;
 //!         Guarded::new("associate-hungarian", Box::new(hungarian))
 //!     },
 //!     filter: {
-//!         let ekf = tagalong_ekf::Ekf::new(Default::default())?;
+//!         let ekf = tagalong_filters::ekf::Ekf::new(Default::default())?;
 //!         Guarded::new("ekf", Box::new(PerPerson::new(ekf)))
 //!     },
 //!     manager: {
-//!         let counts = tagalong_manage_m_of_n::MOfN::new(Default::default())?;
+//!         let counts = tagalong_track_managers::m_of_n::MOfN::new(Default::default())?;
 //!         Guarded::new("manage-m-of-n", Box::new(counts))
 //!     },
 //!     describer: Describer::default(),

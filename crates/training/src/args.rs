@@ -2,7 +2,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::session::TRAIN_LOGS;
+/// Annotated logs for training.
+pub const TRAIN_LOGS: [&str; 2] = ["filinha", "um"];
+
+///. and one of another room, which is held out.
+pub const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 
 /// Arguments of `tagalong train`.
 #[derive(Args, Debug)]

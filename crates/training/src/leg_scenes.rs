@@ -8,11 +8,11 @@ use tagalong_app::outcome::Failure;
 use tagalong_config::{AnnotatedPerson, Trainer};
 use tagalong_core::{EgoMotion, Frame, Images, LaserScan, Stamp};
 use tagalong_geometry::Camera;
+use tagalong_math::{RandomSource, SplitMix64};
 use tagalong_sim::{
     AtEnd, CameraSettings, Event, FaultSettings, Furniture, FurnitureKind, LaserSettings,
     PersonSettings, RobotSettings, RoomSettings, Scene, Shot, Simulation, Split,
 };
-use tagalong_stats::{RandomSource, SplitMix64};
 
 /// Furniture that has thin parts at the height of legs.
 const PIECES: [FurnitureKind; 8] = [

@@ -35,9 +35,16 @@ use self::session::Session;
 /// Runs `tagalong train`.
 ///
 /// # Errors
-/// A plugin that cannot be trained and wrong settings are exit code 2; files that cannot be read or
+/// A program without trainers, a plugin that cannot be trained and wrong settings are exit code 2; files that cannot be read or
 /// written are 1.
 pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
+    if !registry.has_trainers() {
+        return Err(Failure::usage(format!(
+            "this program was built without trainers, which the first build leaves out; \
+             `cargo run --release --features train -- train {}` builds them",
+            args.plugin
+        )));
+    }
     let session = Session::new(args, registry)?;
     // Its samples come from the truth and not from proposals, so it skips the rounds below.
     let data = registry.training_offer(&args.plugin).data;

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use tagalong_app::outcome::Failure;
 use tagalong_config::Example;
+use tagalong_conformance::testdata::find;
 use tagalong_core::{Detection, Frame, GreyImage};
 use tagalong_learn::{CALIBRATION, Use, use_of};
-use tagalong_testdata::find;
 
 use super::faces;
 use super::photos::{Photo, Take, mean_cells, photos, to_unit_length};

@@ -11,7 +11,7 @@ use tagalong_config::Example;
 use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images, Stamp};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
-use tagalong_stats::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64};
 
 /// Squares cut from a photograph without people.
 const SQUARES: usize = 2;

@@ -2,11 +2,11 @@
 //! all other tests, each with its own seeds.
 
 use tagalong_config::ConfigError;
+use tagalong_math::{RandomSource, SplitMix64};
 use tagalong_sim::{
     AtEnd, CameraKind, CameraSettings, FaultSettings, Floor, Furniture, FurnitureKind,
     LightSettings, PersonSettings, RobotSettings, RoomSettings, Scene, Split, Variant,
 };
-use tagalong_stats::{RandomSource, SplitMix64};
 
 /// Furniture with the silhouette of a person.
 const LOOK_ALIKES: [FurnitureKind; 6] = [

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use nalgebra::Point2;
 use tagalong_app::outcome::Failure;
+use tagalong_app::scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
 use tagalong_core::{Detection, Frame, Funnel};
 use tagalong_eval::{Role, Truth};
 use tagalong_geometry::Rect;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
-use tagalong_scoring::{Shot as LogShot, Shots, TruthFile, TruthOptions};
 use tagalong_sim::Scene;
 use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::Draw;

@@ -12,7 +12,7 @@ use tagalong_sim::{CameraKind, Scene, Split, Variant};
 use toml::Spanned;
 use toml::de::DeTable;
 
-use super::args::TrainArgs;
+use super::args::{TEST_LOGS, TRAIN_LOGS, TrainArgs};
 use super::card::CandidateCounts;
 use super::held_out::{Comparison, Effect, Tally};
 use super::in_use::{InUse, pipeline};
@@ -24,11 +24,6 @@ use super::{rooms, seen};
 
 /// Margin below which a judgement is unsure: log-odds.
 const UNSURE: f64 = 1.0;
-
-/// Annotated logs for training ...
-pub const TRAIN_LOGS: [&str; 2] = ["filinha", "um"];
-/// ... and one of another room, which is held out.
-const TEST_LOGS: [&str; 1] = ["lab2-camera2"];
 
 /// State of one training.
 pub struct Session<'a> {

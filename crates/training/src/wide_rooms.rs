@@ -2,11 +2,11 @@
 //! above head height, any furniture anywhere, people near and far, cut by the image and seated.
 
 use tagalong_config::ConfigError;
+use tagalong_math::{RandomSource, SplitMix64};
 use tagalong_sim::{
     AtEnd, CameraSettings, FaultSettings, Furniture, FurnitureKind, PersonSettings, Posture,
     RobotSettings, RoomSettings, Scene, Split,
 };
-use tagalong_stats::{RandomSource, SplitMix64};
 
 use super::rooms::ImageTiming;
 

@@ -1,24 +1,26 @@
 //! The log of the runs, passed once: images, laser scans, trails and the times of all frames.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry2;
 use tagalong_app::config_file::OuterSettings;
 use tagalong_app::outcome::Failure;
 use tagalong_app::progress::Progress;
+use tagalong_app::scoring::{Shot, Shots};
 use tagalong_geometry::Camera;
+use tagalong_log::write::BoxedPart;
 use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
 use tagalong_page::data::{FrameData, RunData};
-use tagalong_page::frame::{add_trails, scan_points, view_edges};
+use tagalong_page::frame::{add_trails, add_whole_people, scan_points, view_edges};
 use tagalong_render::background;
-use tagalong_scoring::{Shot, Shots};
 
 use crate::pictures::Pictures;
 use crate::recording::Recording;
 
-/// Frames of a trail.
-const TRAIL_FRAMES: usize = 40;
+/// Time that a trail reaches back, ns.
+const TRAIL_NS: u64 = 2_000_000_000;
 
 /// Parts of the page that come from the log.
 pub struct Film {
@@ -30,6 +32,8 @@ pub struct Film {
     pub view_rad: Option<[f64; 2]>,
     /// Times and poses of the frames.
     pub shots: Shots,
+    /// Part of people that the boxes of each run enclose.
+    boxes: Vec<BoxedPart>,
 }
 
 /// Opens the log of a run if it is the same file that the run read.
@@ -80,12 +84,18 @@ fn outer_settings(run: &Recording) -> OuterSettings {
     toml::Value::Table(tables).try_into().unwrap_or_default()
 }
 
+/// Returns the part of people that the boxes of a run enclose.
+fn boxes_of(run: &Recording) -> BoxedPart {
+    outer_settings(run).output.boxes
+}
+
 impl Film {
     /// Passes the log once; fills the trails of the runs on the way.
     pub fn of(
         mut source: FrameSource,
         stamps: &[u64],
         runs: &mut [RunData],
+        recordings: &[Recording],
         image_bytes: usize,
     ) -> Self {
         let positions: BTreeMap<u64, usize> =
@@ -95,19 +105,20 @@ impl Film {
             scans: vec![Vec::new(); stamps.len()],
             view_rad: None,
             shots: Shots::default(),
+            boxes: recordings.iter().map(boxes_of).collect(),
         };
         let progress = Progress::titled("images");
         while let Some(item) = source.next_frame() {
             film.shots.push(Shot::of(&item));
             progress.advance(source.progress(), item.frame.index);
             if let Some(at) = positions.get(&item.frame.stamp.nanos()) {
-                film.take(*at, &item, runs);
+                film.take(*at, &item, runs, stamps);
             }
         }
         film
     }
 
-    fn take(&mut self, at: usize, item: &LogFrame, runs: &mut [RunData]) {
+    fn take(&mut self, at: usize, item: &LogFrame, runs: &mut [RunData], stamps: &[u64]) {
         let frame = &item.frame;
         if let Some(image) = background(&frame.images()) {
             self.pictures.add(at, &image);
@@ -121,8 +132,13 @@ impl Film {
         if self.view_rad.is_none() && frame.camera.panorama().is_none() {
             self.view_rad = Some(view_edges(&frame.camera));
         }
-        for run in runs {
-            add_trails_at(&mut run.frames, at, &frame.camera, &item.odom_from_robot);
+        let oldest_ns = frame.stamp.nanos().saturating_sub(TRAIL_NS);
+        let from = stamps.partition_point(|stamp| *stamp < oldest_ns);
+        for (run, boxes) in runs.iter_mut().zip(&self.boxes) {
+            add_trails_at(&mut run.frames, from..at, &frame.camera, &item.odom_from_robot);
+            if let (BoxedPart::Full, Some(Some(shown))) = (boxes, run.frames.get_mut(at)) {
+                add_whole_people(shown, &frame.camera, &item.odom_from_robot);
+            }
         }
     }
 
@@ -135,14 +151,13 @@ impl Film {
 /// Adds the trails of one frame of a run.
 fn add_trails_at(
     frames: &mut [Option<FrameData>],
-    at: usize,
+    trail: Range<usize>,
     camera: &Camera,
     odom_from_robot: &Isometry2<f64>,
 ) {
-    let (past, rest) = frames.split_at_mut(at);
+    let (past, rest) = frames.split_at_mut(trail.end);
     let Some(Some(frame)) = rest.first_mut() else { return };
-    let from = past.len().saturating_sub(TRAIL_FRAMES);
-    let before: Vec<&FrameData> = past[from..].iter().flatten().collect();
+    let before: Vec<&FrameData> = past[trail.start..].iter().flatten().collect();
     add_trails(&before, frame, camera, odom_from_robot);
 }
 
@@ -165,11 +180,11 @@ mod tests {
         let person = |at| TrackData { id: 1, state: "seen", at, z: 1.6, ..TrackData::default() };
         let frame = |at| Some(FrameData { tracks: vec![person(at)], ..FrameData::default() });
         let mut frames = vec![frame([4.0, 0.0]), None, frame([4.0, 0.5])];
-        add_trails_at(&mut frames, 2, &camera(), &Isometry2::identity());
+        add_trails_at(&mut frames, 0..2, &camera(), &Isometry2::identity());
         assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [320, 240], "straight ahead");
         // Turned to the left, the place is to the right in the image.
         let turned = Isometry2::new(Vector2::zeros(), 0.1);
-        add_trails_at(&mut frames, 2, &camera(), &turned);
+        add_trails_at(&mut frames, 0..2, &camera(), &turned);
         assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [370, 240]);
     }
 }

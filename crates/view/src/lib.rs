@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
 use tagalong_app::remedies::Remedies;
+use tagalong_app::scoring::TruthFile;
 use tagalong_config::Registry;
 use tagalong_page::data::{PageData, RunData};
 use tagalong_page::html::{Heading, html};
-use tagalong_scoring::TruthFile;
 
 use crate::assemble::{run_data, stamps, times};
 use crate::film::Film;
@@ -237,7 +237,7 @@ fn add_log(
         }
     };
     let log = source.facts().path.clone();
-    let film = Film::of(source, stamps, &mut data.runs, image_bytes);
+    let film = Film::of(source, stamps, &mut data.runs, runs, image_bytes);
     notes.extend(film.pictures.summary());
     data.scans = film.scans();
     data.view_rad = film.view_rad;

@@ -5,12 +5,12 @@ use std::path::Path;
 
 use nalgebra::{Isometry2, Point2};
 use tagalong_app::outcome::Failure;
+use tagalong_app::scoring::{Shots, TruthFile, TruthOptions, comparable, comparison};
 use tagalong_eval::{
     Clear, Event, EventKind, Frame, Prepared, Region, Report, Role, Sequence, Similarity, Truth,
     events,
 };
 use tagalong_geometry::Rect;
-use tagalong_scoring::{Shots, TruthFile, TruthOptions, comparable, comparison};
 
 use tagalong_page::data::{EventData, FrameData, RunData, TruthBox};
 
@@ -123,7 +123,7 @@ fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
         let dy = track.at[1] - frame.robot[1];
         Report {
             id: i64::from(track.id),
-            region: (inside.area() > 0.0).then(|| tagalong_scoring::region(&inside)),
+            region: (inside.area() > 0.0).then(|| tagalong_app::scoring::region(&inside)),
             floor_m: Some([cos * dx + sin * dy, cos * dy - sin * dx]),
             score: track.p,
         }
@@ -180,7 +180,7 @@ mod tests {
         std::fs::write(&path, "1,1,10,10,40,40,1\n2,1,10,10,40,40,1\n3,1,10,10,40,40,1\n").unwrap();
         let mut shots = Shots::default();
         for number in 1..4 {
-            shots.push(tagalong_scoring::Shot {
+            shots.push(tagalong_app::scoring::Shot {
                 number,
                 stamp_ns: u64::from(number) * 100_000_000,
                 camera: Arc::new(tagalong_geometry::Camera {

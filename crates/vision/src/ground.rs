@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Point2, Point3, Unit, Vector3};
 use tagalong_core::DepthImage;
 use tagalong_geometry::Camera;
-use tagalong_stats::{RandomSource, XorShift64};
+use tagalong_math::{RandomSource, XorShift64};
 
 /// Settings of the ground estimation.
 #[derive(Clone, Debug, PartialEq)]
@@ -137,7 +137,7 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     let farthest = (0..ratios.len()).rev().find(|at| within(*at) * 10 >= most * 7)?;
     let floor = ratios[farthest] - 0.5 * ONE_FLOOR;
     let around = ratios.iter().filter(|ratio| (*ratio - floor).abs() <= 1.5 * ONE_FLOOR);
-    let floor = tagalong_stats::median(around.copied())?;
+    let floor = tagalong_math::median(around.copied())?;
     let is_seen = within(farthest) as f64 >= LEAST_FLOOR * ratios.len() as f64;
     let below = ratios.len() - ratios.partition_point(|ratio| *ratio <= floor + 4.0 * ONE_FLOOR);
     let is_lowest = below as f64 <= MOST_BELOW * ratios.len() as f64;

@@ -9,6 +9,7 @@ mod gallery;
 pub mod ground;
 mod integral;
 mod islands;
+pub mod odometry;
 mod panorama;
 pub mod quality;
 pub mod registration;

@@ -4,6 +4,7 @@
 //! likewise that of `cargo xtask faults`. `<!-- begin: excerpt PAGE TITLE -->` repeats the table of
 //! another page that is titled so, in bold, with its notes, and `<!-- begin: rows PAGE ROW; ROW -->`
 //! repeats the rows of tables of another page that begin so, below their head.
+//! `<!-- begin: accuracy PAGE NAME NAME -->` prints pipelines as shipped beside left out.
 //! `<!-- begin: source FILE -->` repeats a file of code, such as an example, without the comment at its
 //! head, and `<!-- begin: source FILE NAME -->` one function of it.
 //! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
@@ -15,6 +16,7 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
 
+use crate::accuracy;
 use crate::faults;
 use crate::program::Name;
 use crate::workspace::{Workspace, output};
@@ -27,6 +29,13 @@ const EXCERPT: &str = "excerpt ";
 
 /// Beginning of a command that repeats rows of the tables of another page.
 const ROWS: &str = "rows ";
+
+/// Beginning of a command that prints pipelines as shipped beside left out, from a page and by names.
+const ACCURACY: &str = "accuracy ";
+
+/// Title of the table with both.
+const LEFT_OUT_TABLE: &str =
+    "Chosen without the room that is scored, and with all: means over the rooms";
 
 /// Beginning of a command that repeats code.
 const SOURCE: &str = "source ";
@@ -200,6 +209,13 @@ fn printed(workspace: &Workspace, command: &str) -> Result<String> {
             source.split_once(' ').context("an excerpt names a page and a title")?;
         return excerpt(&workspace.read(page)?, title)
             .with_context(|| format!("{page} has no table `{title}`"));
+    }
+    if let Some(source) = command.strip_prefix(ACCURACY) {
+        let (page, names) =
+            source.split_once(' ').context("accuracy names a page and pipelines")?;
+        let table = excerpt(&workspace.read(page)?, LEFT_OUT_TABLE)
+            .with_context(|| format!("{page} has no table `{LEFT_OUT_TABLE}`"))?;
+        return accuracy::markdown(&table, names).with_context(|| format!("in {page}"));
     }
     if let Some(source) = command.strip_prefix(ROWS) {
         let (page, names) = source.split_once(' ').context("rows name a page and a row")?;

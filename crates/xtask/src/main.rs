@@ -1,5 +1,7 @@
 //! Commands for developers of Tagalong: `cargo xtask --help`.
 
+mod accuracy;
+mod api;
 mod ci;
 mod docs;
 mod faults;
@@ -69,6 +71,12 @@ enum Command {
         #[arg(long)]
         run: bool,
     },
+    /// Compares the public items of the library's crates with the committed lists in `tests/api`
+    Api {
+        /// Write the lists instead.
+        #[arg(long)]
+        write: bool,
+    },
     /// Runs everything that the server runs (`.ci/run`)
     Ci,
 }
@@ -116,6 +124,7 @@ fn run(command: Command) -> Result<()> {
         Command::Record { file, program } => record::record(&workspace, &file, program),
         Command::Rehearse => rehearse::rehearse(&workspace),
         Command::Package { run } => package::try_out(&workspace, run),
+        Command::Api { write } => api::check(&workspace, write),
         Command::Ci => ci::ci(&workspace),
     }
 }

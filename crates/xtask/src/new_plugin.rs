@@ -7,6 +7,7 @@ use std::process::Command;
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::ValueEnum;
 
+use crate::tidy::plugins;
 use crate::workspace::{Workspace, succeed};
 
 /// The six kinds of plugin.
@@ -61,16 +62,6 @@ impl Kind {
             Self::Controller => template!("controller", "control"),
         }
     }
-
-    /// Returns the manifest: filters have a crate of shared parts.
-    fn manifest(self) -> String {
-        let core = "tagalong-core.workspace = true\n";
-        let filtering = "tagalong-filtering.workspace = true\n";
-        match self {
-            Self::Filter => MANIFEST.replace(core, &format!("{core}{filtering}")),
-            _ => MANIFEST.to_owned(),
-        }
-    }
 }
 
 /// Writes the crate, its lines in the workspace and the catalog, and a config.
@@ -83,7 +74,7 @@ pub fn create(workspace: &Workspace, kind: Kind, name: &str) -> Result<()> {
     let fill = |text: &str| fill(text, name);
     let folder = format!("plugins/{name}");
     let (verb, verb_text) = template.verb;
-    workspace.write(format!("{folder}/Cargo.toml"), &fill(&kind.manifest()))?;
+    workspace.write(format!("{folder}/Cargo.toml"), &fill(MANIFEST))?;
     workspace.write(format!("{folder}/README.md"), &fill(template.readme))?;
     workspace.write(format!("{folder}/src/lib.rs"), &fill(template.lib))?;
     workspace.write(format!("{folder}/src/config.rs"), &fill(template.config))?;
@@ -125,6 +116,9 @@ fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
         !taken.contains(name),
         "`{name}` is the name of a crate or command of the workspace: choose another"
     );
+    // Some plugins share a crate, so that no folder has their name.
+    let plugins = plugins::registered(workspace).unwrap_or_default();
+    ensure!(!plugins.contains(name), "`{name}` is a plugin already: choose another name");
     for path in [format!("plugins/{name}"), format!("configs/{name}.toml")] {
         if workspace.root().join(&path).exists() {
             bail!("{path} exists already: choose another name, or remove it first");

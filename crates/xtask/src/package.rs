@@ -20,7 +20,9 @@ const RUNNABLE: &[&str] = &["own_arrays", "own_detector"];
 const LIBRARY: &str = "tagalong";
 
 /// Packages every crate and unpacks the packages into a folder outside of the repository. There a
-/// crate checks the examples of the library against them; with `run`, it builds and runs them.
+/// crate that depends on all of them checks the examples of the library, and with them every
+/// package: `cargo package` would build each of them for itself. With `run`, the examples are built
+/// and run.
 ///
 /// # Errors
 /// A crate that cannot be packaged, and a package that lacks a part of its crate.
@@ -71,7 +73,7 @@ fn build(
             cargo(&["run", "--quiet", "--bin", example])?;
         }
     }
-    eprintln!("package: the examples of the library build from its packages");
+    eprintln!("package: the packages compile, and so do the examples of the library");
     Ok(())
 }
 
@@ -97,8 +99,12 @@ fn unpack(packages: &Path, into: &Path) -> Result<Vec<(String, PathBuf)>> {
 fn write_stranger(unpacked: &[(String, PathBuf)], stranger: &Path) -> Result<()> {
     let mut manifest = String::from(
         "[workspace]\n\n[package]\nname = \"stranger\"\nversion = \"0.0.0\"\nedition = \"2024\"\n\n\
-         [dependencies]\ntagalong = \"*\"\n\n[patch.crates-io]\n",
+         [dependencies]\n",
     );
+    for (name, _) in unpacked.iter().filter(|(_, folder)| folder.join("src/lib.rs").is_file()) {
+        manifest += &format!("{name} = \"*\"\n");
+    }
+    manifest += "\n[patch.crates-io]\n";
     for (name, folder) in unpacked {
         manifest += &format!("{name} = {{ path = {:?} }}\n", folder.display().to_string());
     }
@@ -135,10 +141,17 @@ mod tests {
         }
         let core =
             (String::from("tagalong-core"), folder.path().join("packages/tagalong-core-0.2.0"));
-        let unpacked = [(String::from("tagalong"), library), core];
+        for (_, root) in [(String::from("tagalong"), library.clone()), core.clone()] {
+            fs::create_dir_all(root.join("src")).unwrap();
+            fs::write(root.join("src/lib.rs"), "").unwrap();
+        }
+        let program = (String::from("tagalong-program"), folder.path().join("packages/program"));
+        let unpacked = [(String::from("tagalong"), library), core, program];
         write_stranger(&unpacked, folder.path()).unwrap();
         let manifest = fs::read_to_string(folder.path().join("Cargo.toml")).unwrap();
         assert!(manifest.contains("tagalong-core = { path = \""), "{manifest}");
+        assert!(manifest.contains("tagalong-core = \"*\"\n"), "{manifest}");
+        assert!(!manifest.contains("tagalong-program = \"*\""), "a program is no dependency");
         assert!(folder.path().join("src/bin/own_detector.rs").is_file());
         assert!(write_stranger(&unpacked[1..], folder.path()).is_err(), "there is no library");
     }

@@ -48,10 +48,16 @@ struct Built {
 }
 
 impl Program {
+    /// The program whose trainers are a feature, which is on where the whole workspace is built.
+    const WITH_TRAINERS: Name = Name::Tagalong;
+
     /// Builds it as the tests do, which have built it already.
     pub fn built(workspace: &Workspace, name: Name) -> Result<Self> {
         let mut cargo = Command::new("cargo");
         cargo.args(["build", "--quiet", "--package", name.package(), "--bin", name.as_str()]);
+        if name == Self::WITH_TRAINERS {
+            cargo.args(["--features", "train"]);
+        }
         cargo.args(["--message-format", "json"]);
         let said = output(cargo.current_dir(workspace.root()))?;
         let built = said.lines().filter_map(|line| serde_json::from_str::<Built>(line).ok());

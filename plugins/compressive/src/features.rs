@@ -1,7 +1,7 @@
 //! Signed rectangles: the sparse random projection of P2, eqs 1 to 3.
 
 use tagalong_core::GreyImage;
-use tagalong_stats::{ChaCha, RandomSource};
+use tagalong_math::{ChaCha, RandomSource};
 use tagalong_vision::Integral;
 
 /// A rectangle in a box of size 1 by 1, with its weight.

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 use tagalong_config::Registry;
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
-use tagalong_stats::{RandomSource, XorShift64};
+use tagalong_math::{RandomSource, XorShift64};
 
 use crate::{
     Cascade, Feature, Hit, Level, Next, Node, Part, PassedWindow, Scanner, Split, Stage, grouped,

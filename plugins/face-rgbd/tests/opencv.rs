@@ -22,7 +22,7 @@ const OFF_PX: f64 = 8.0;
 const UNPAIRED: f64 = 0.1;
 
 fn data(file: &str) -> Option<PathBuf> {
-    tagalong_testdata::find(&format!("opencv/{file}"))
+    tagalong_conformance::testdata::find(&format!("opencv/{file}"))
 }
 
 fn text(path: &Path) -> String {

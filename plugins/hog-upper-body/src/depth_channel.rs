@@ -7,8 +7,7 @@
 use tagalong_core::DepthImage;
 use tagalong_geometry::Rect;
 
-use crate::model::{Coverage, SIDE};
-use crate::scan::window_of;
+use crate::coverage::{Coverage, SIDE, window_of};
 use crate::trees::{self, Tree, Trees};
 
 /// Number of cells along a side of a window.

@@ -2,8 +2,9 @@
 
 use crate::Spans;
 use crate::channels::{Channels, DEPTH, Planes};
+use crate::coverage::SIDE;
 use crate::hog::{BLOCK, Blocks};
-use crate::model::{Machine, Model, SIDE};
+use crate::model::{Machine, Model};
 use crate::trees::{CELLS, ROUND, Tree, Trees};
 
 /// Number of windows or values that are processed at once.

@@ -15,6 +15,7 @@
 
 mod channels;
 mod config;
+mod coverage;
 mod depth_channel;
 mod detect;
 mod gradients;
@@ -33,12 +34,13 @@ mod trees;
 
 pub use channels::Channels;
 pub use config::{Config, Training};
+pub use coverage::{Coverage, window_of};
 pub use depth_channel::DepthTrees;
 pub use detect::HogUpperBody;
 pub use hog::Blocks;
-pub use model::{Coverage, Field, Kind, Layout, Machine, Model, NUMBERS};
+pub use model::{Field, Kind, Layout, Machine, Model, NUMBERS};
 pub use resample::resampled;
-pub use scan::{Grid, Scanner, Wanted, Window, merge, window_numbers, window_of};
+pub use scan::{Grid, Scanner, Wanted, Window, merge, window_numbers};
 pub use spans::Spans;
 use tagalong_config::{Registry, Remedy};
 pub use trees::{ROUND, Tree, Trees};

@@ -2,16 +2,14 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_geometry::{Rect, UPPER_BODY_SIDE_M};
 
 use crate::Spans;
 use crate::channels::Channels;
+use crate::coverage::{Coverage, SIDE};
 use crate::depth_channel::DepthTrees;
 use crate::hog::{BLOCK, Blocks};
 use crate::trees::{self, Trees};
 
-/// Number of blocks along a side of a window, of 64 pixels.
-pub(crate) const SIDE: usize = 7;
 /// Number of values of a window for a linear machine.
 pub const NUMBERS: usize = SIDE * SIDE * BLOCK;
 
@@ -26,45 +24,6 @@ pub enum Kind {
     /// Finer cells and boosted trees: fewer errors.
     #[default]
     Trees,
-}
-
-/// Part of a person that a window shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Coverage {
-    /// Head, trunk and hips: people whose legs are hidden or outside of the image are found.
-    #[default]
-    UpperBody,
-    /// Head to feet: fewer false alarms among people who stand free. For trees only.
-    WholeBody,
-}
-
-impl Coverage {
-    /// Returns the number of rows of cells, of 8 pixels, in a window.
-    pub(crate) const fn rows(self) -> usize {
-        match self {
-            Self::UpperBody => SIDE + 1,
-            // The person is 12 cells tall, with a cell above and one below.
-            Self::WholeBody => 14,
-        }
-    }
-}
-
-/// Height of a standing person in sides of the upper-body square, and width by height.
-const STANDING_SIDES: f64 = 1.7 / UPPER_BODY_SIDE_M;
-const STANDING_WIDTH: f64 = 0.41;
-
-impl Coverage {
-    /// Returns the box of the part of a person by the upper-body square: for whole bodies, a
-    /// standing person of 1.7 m.
-    pub fn person(self, square: &Rect) -> Rect {
-        if self == Self::UpperBody {
-            return *square;
-        }
-        let height = STANDING_SIDES * square.height;
-        let width = STANDING_WIDTH * height;
-        Rect::new(square.centre().x - 0.5 * width, square.y, width, height)
-    }
 }
 
 /// Layout of the values of a window.

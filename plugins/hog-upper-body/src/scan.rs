@@ -6,19 +6,12 @@ use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
 use tagalong_vision::islands;
 
+use crate::coverage::{Coverage, FILLED, SIDE, WINDOW_PX, margins, window_of};
 use crate::hog::CELL;
 use crate::judge::Judge;
-use crate::model::{Coverage, Field, Kind, Layout, Model, SIDE};
+use crate::model::{Field, Kind, Layout, Model};
 use crate::resample::{Resampler, resampled};
 use crate::spans::Spans;
-
-/// Side of a window, pixels of the resampled image.
-pub(crate) const WINDOW_PX: usize = (SIDE + 1) * CELL;
-/// Part of a window's width that the upper-body square fills: arms, hips and the surroundings of a
-/// person carry more information than the outline of head and shoulders alone.
-pub(crate) const FILLED: f64 = 0.5;
-/// Part of a window that is above the square; the square is in the middle of its columns.
-const ABOVE: f64 = 0.1;
 
 /// Returns the number of cells that are resampled around windows: they have a share in the
 /// outermost cells of a window, and for trees in the normalisation there.
@@ -208,27 +201,12 @@ impl Grid {
     }
 }
 
-/// Returns the margins of a window left of and above the upper-body square, pixels of the resampled
-/// image.
-fn margins() -> (f64, f64) {
-    (0.5 * (1.0 - FILLED) * WINDOW_PX as f64, ABOVE * WINDOW_PX as f64)
-}
-
 /// Returns the first cells of the windows with their square in an image of `length` pixels; the
 /// rest of a window may extend beyond it, where the border is continued.
 fn inside(length: f64, margin: f64) -> Range<i64> {
     let cell = CELL as f64;
     let last = (length - margin - FILLED * WINDOW_PX as f64) / cell;
     (-margin / cell).ceil() as i64..last.floor() as i64 + 1
-}
-
-/// Returns the window of an upper-body square, pixels of the image.
-pub fn window_of(square: &Rect, coverage: Coverage) -> Rect {
-    let step = square.width / (FILLED * WINDOW_PX as f64);
-    let (left, above) = margins();
-    let width = WINDOW_PX as f64 * step;
-    let height = (coverage.rows() * CELL) as f64 * step;
-    Rect::new(square.x - left * step, square.y - above * step, width, height)
 }
 
 /// Smallest column and row of windows, and largest ones.

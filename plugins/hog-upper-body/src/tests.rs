@@ -2,12 +2,12 @@ use proptest::prelude::*;
 use tagalong_config::Registry;
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
-use tagalong_stats::{RandomSource, XorShift64};
+use tagalong_math::{RandomSource, XorShift64};
 
 use crate::channels::{self, DEPTH};
+use crate::coverage::SIDE;
+use crate::coverage::WINDOW_PX;
 use crate::hog::{BINS, BLOCK, CELL};
-use crate::model::SIDE;
-use crate::scan::WINDOW_PX;
 use crate::trees::channel_numbers;
 use crate::{
     Blocks, Channels, Coverage, DepthTrees, Grid, Machine, Model, NUMBERS, Scanner, Spans, Tree,

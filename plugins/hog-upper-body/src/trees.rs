@@ -1,7 +1,7 @@
 //! Boosted trees of depth two.
 
 use crate::channels::DEPTH;
-use crate::model::{Coverage, SIDE};
+use crate::coverage::{Coverage, SIDE};
 
 /// Number of cells along a side of a window.
 pub(crate) const CELLS: usize = 2 * (SIDE + 1);

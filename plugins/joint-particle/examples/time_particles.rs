@@ -19,7 +19,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_joint_particle::{Config, JointParticle, LikelihoodMap, Method, PositionPair};
-use tagalong_stats::number_at;
+use tagalong_math::number_at;
 
 const CALLS: usize = 300;
 

@@ -1,7 +1,7 @@
 //! Likelihood maps over the lateral positions of two people (P3, section III).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use tagalong_stats::exp2_of_negative;
+use tagalong_math::exp2_of_negative;
 
 use crate::config::{Config, Method};
 

@@ -1,4 +1,4 @@
-use tagalong_stats::{ChaCha, RandomSource};
+use tagalong_math::{ChaCha, RandomSource};
 
 /// Seeded random numbers with the distributions of a particle filter.
 #[derive(Clone, Debug)]

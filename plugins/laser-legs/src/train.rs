@@ -217,7 +217,7 @@ fn rounded(value: f64) -> toml::Value {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_stats::{RandomSource, SplitMix64};
+    use tagalong_math::{RandomSource, SplitMix64};
 
     use super::*;
 

@@ -12,7 +12,7 @@
 //! gradient of all samples, and all steps are taken.
 
 use nalgebra::{DMatrix, DVector};
-use tagalong_learn::dense::NormalEquations;
+use tagalong_learn::dense::{NormalEquations, transposed_product};
 use tagalong_learn::mix;
 
 use crate::Network;
@@ -106,7 +106,7 @@ impl Fit {
         let part = rate / samples.targets.len().max(1) as f64;
         for _ in 0..self.steps {
             let (jacobian, errors) = linearised(&network, &samples.inputs, &samples.targets);
-            weights -= part * (jacobian.tr_mul(&errors) + samples.decay * &weights);
+            weights -= part * (transposed_product(&jacobian, &errors) + samples.decay * &weights);
             network = with_weights(&network, &weights);
         }
         (samples.cost(&network, &weights), network)
@@ -120,8 +120,8 @@ impl Fit {
         let mut lowest = samples.cost(&network, &weights);
         for _ in 0..self.steps {
             let (jacobian, errors) = linearised(&network, &samples.inputs, &samples.targets);
-            let normal = NormalEquations::new(&jacobian);
-            let gradient = jacobian.tr_mul(&errors) + decay * &weights;
+            let normal = NormalEquations::new(&jacobian, &errors);
+            let gradient = normal.right_side() + decay * &weights;
             let before = lowest;
             for _ in 0..TRIES {
                 let penalties = vec![decay + damping; weights.len()];

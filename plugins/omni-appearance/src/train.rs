@@ -316,7 +316,8 @@ fn ridge(samples: &[Sample], weight: f64) -> Ridge {
     // The constant term is not shrunk: it is the mean distance.
     let mut penalties = [weight * samples.len() as f64; 6];
     penalties[0] = 0.0;
-    let solved = NormalEquations::new(&x).solve(&penalties, &x.tr_mul(&y));
+    let equations = NormalEquations::new(&x, &y);
+    let solved = equations.solve(&penalties, equations.right_side());
     let array = |values: &[f64]| std::array::from_fn(|i| values[i]);
     Ridge {
         weights: std::array::from_fn(|i| solved.as_ref().map_or(0.0, |w| w[i])),

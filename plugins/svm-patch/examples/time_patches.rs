@@ -10,7 +10,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use tagalong_stats::number_at;
+use tagalong_math::number_at;
 use tagalong_svm_patch::{Model, PIXELS, Patch, Sampler, Scaling};
 
 /// Width of the kernel: vectors have length 1.

@@ -1,7 +1,7 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
-use tagalong_stats::exp2_of_negative;
+use tagalong_math::exp2_of_negative;
 
 use crate::patch::{PIXELS, Patch};
 use crate::{Sampler, Scaling};

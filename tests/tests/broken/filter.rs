@@ -3,9 +3,9 @@ use std::collections::BTreeMap;
 use nalgebra::{SMatrix, SVector, Vector2};
 use tagalong_config::Registry;
 use tagalong_core::{
-    Detection, EgoMotion, Estimate, Evidence, Filter, Matched, Person, Result, TrackId, Update,
+    Detection, EgoMotion, Estimate, Evidence, Filter, Matched, PerPerson, Person, PersonFilter,
+    Result, TrackId, Update,
 };
-use tagalong_filtering::{PerPerson, PersonFilter};
 use tagalong_geometry::Camera;
 
 use super::{mood, register_with_fault};

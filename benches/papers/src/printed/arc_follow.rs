@@ -7,8 +7,8 @@ use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{Registry, check_settings};
+use tagalong_controllers::{CommandHistory, coasting_weight, step_s};
 use tagalong_core::{Controller, Result, Scene, Twist, WheelSpeeds};
-use tagalong_steering::{CommandHistory, coasting_weight, step_s};
 
 /// Above this no length or speed on the floor makes sense, whatever the unit.
 const MOST: f64 = 1e6;
@@ -154,8 +154,8 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::{Isometry2, Point2};
-    use tagalong_arc_follow::ArcFollow;
     use tagalong_conformance::target;
+    use tagalong_controllers::arc_follow::ArcFollow;
     use tagalong_core::{DiffDrive, EgoMotion, Frame, Images, Stamp, Track};
     use tagalong_geometry::{Camera, Distortion, Pinhole};
 
@@ -168,7 +168,7 @@ mod tests {
     }
 
     fn corrected() -> ArcFollow {
-        ArcFollow::new(tagalong_arc_follow::Config::default()).unwrap()
+        ArcFollow::new(tagalong_controllers::arc_follow::Config::default()).unwrap()
     }
 
     fn command(controller: &mut dyn Controller, motion: EgoMotion, person: &Track) -> WheelSpeeds {
@@ -232,7 +232,7 @@ mod tests {
         let config = Config { stand_off_m: 0.2, latency_s: 0.0, ..Config::default() };
         let printed = curvature(settled(&mut printed(config), &near));
         assert!((printed - 4.0 * 0.1 / 0.0725).abs() < 1e-9, "{printed}");
-        let config = tagalong_arc_follow::Config {
+        let config = tagalong_controllers::arc_follow::Config {
             bearing_gain_per_s: 0.0,
             max_turn_rate: 10.0,
             latency_s: 0.0,

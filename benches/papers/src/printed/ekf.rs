@@ -9,9 +9,8 @@ use nalgebra::{Matrix2, Matrix3, Matrix5, SMatrix, Vector5};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{Registry, check_settings};
-use tagalong_core::{Detection, EgoMotion, Estimate, Result, Update};
-use tagalong_ekf::{Ekf, State};
-use tagalong_filtering::{PerPerson, PersonFilter};
+use tagalong_core::{Detection, EgoMotion, Estimate, PerPerson, PersonFilter, Result, Update};
+use tagalong_filters::ekf::{Ekf, State};
 use tagalong_geometry::Camera;
 
 /// A coordinate with a larger variance, m², was not measured.
@@ -71,8 +70,10 @@ impl PrintedEkf {
     pub fn new(config: Config) -> Result<Self> {
         check_settings(&config)?;
         let initial_velocity_variance = config.initial_velocity_variance;
-        let settings = tagalong_ekf::Config { initial_velocity_variance, ..Default::default() };
-        let exact = Ekf::new(tagalong_ekf::Config { extra_sigma_m: 0.0, ..settings.clone() })?;
+        let settings =
+            tagalong_filters::ekf::Config { initial_velocity_variance, ..Default::default() };
+        let exact =
+            Ekf::new(tagalong_filters::ekf::Config { extra_sigma_m: 0.0, ..settings.clone() })?;
         Ok(Self { config, corrected: Ekf::new(settings)?, exact })
     }
 
@@ -171,7 +172,7 @@ mod tests {
     use nalgebra::{Isometry2, Point2, Point3, Rotation2, Vector2, Vector3};
     use tagalong_core::DiffDrive;
     use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
-    use tagalong_stats::{RandomSource as _, SplitMix64};
+    use tagalong_math::{RandomSource as _, SplitMix64};
 
     use super::*;
 

@@ -193,7 +193,7 @@ mod tests {
 
     use nalgebra::Matrix3;
     use tagalong_core::{Frame, Images, Matched, Stamp};
-    use tagalong_floor_kalman::{FloorKalman, Form, Measurement};
+    use tagalong_filters::floor_kalman::{FloorKalman, Form, Measurement};
     use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 
     use super::*;
@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn a_walk_is_foreseen_with_too_small_a_covariance() {
-        let settings = tagalong_floor_kalman::Config {
+        let settings = tagalong_filters::floor_kalman::Config {
             form: Form::LastDifference,
             measurement: Measurement::Fixed,
             ..Default::default()

@@ -5,7 +5,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_assignment::{Cost, Fit, PairCost, Pairs};
+use tagalong_associators::{Cost, Fit, PairCost, Pairs};
 use tagalong_config::{Registry, check_settings};
 use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 
@@ -16,7 +16,7 @@ use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 pub struct Config {
     /// Settings of `associate-hungarian`.
     #[serde(flatten)]
-    pub base: tagalong_associate_hungarian::Config,
+    pub base: tagalong_associators::hungarian::Config,
 }
 
 /// The printed associator.
@@ -76,7 +76,7 @@ pub fn register(registry: &mut Registry) {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_associate_hungarian::Hungarian;
+    use tagalong_associators::hungarian::Hungarian;
     use tagalong_conformance::samples::{GATE, detection_in, pairs, track_in};
     use tagalong_geometry::Rect;
 
@@ -89,7 +89,7 @@ mod tests {
         let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(50.0))];
         let seen = [2.0, 51.0].map(|x| detection_in(boxed(x)));
         let base =
-            tagalong_associate_hungarian::Config { cost: Cost::Overlap, ..Default::default() };
+            tagalong_associators::hungarian::Config { cost: Cost::Overlap, ..Default::default() };
         let mut printed = PrintedHungarian::new(&Config { base: base.clone() }).unwrap();
         assert_eq!(pairs(&printed.associate(&tracks, &seen, &GATE)), [(0, 1), (1, 0)]);
         let mut corrected = Hungarian::new(base).unwrap();
@@ -98,7 +98,8 @@ mod tests {
 
     #[test]
     fn an_overlap_of_more_than_one_is_refused() {
-        let base = tagalong_associate_hungarian::Config { min_overlap: 1.1, ..Default::default() };
+        let base =
+            tagalong_associators::hungarian::Config { min_overlap: 1.1, ..Default::default() };
         assert!(PrintedHungarian::new(&Config { base }).is_err());
     }
 }

@@ -13,8 +13,8 @@ use tagalong_config::Registry;
 use tagalong_core::{
     Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Result, TrackId, Update,
 };
+use tagalong_filters::image_kalman::State;
 use tagalong_geometry::Camera;
-use tagalong_image_kalman::State;
 
 /// Settings of the filter `image-kalman-as-printed`: none, all others are those of `image-kalman`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -24,7 +24,7 @@ pub struct Config {}
 /// The printed filter.
 #[derive(Default)]
 pub struct PrintedImageKalman {
-    settings: tagalong_image_kalman::Config,
+    settings: tagalong_filters::image_kalman::Config,
     states: BTreeMap<TrackId, State>,
     /// Time between the last two frames, s.
     step_s: f64,
@@ -103,12 +103,12 @@ mod tests {
     use tagalong_core::{Frame, Images, Matched, Stamp};
     use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 
-    use tagalong_image_kalman::ImageKalman;
+    use tagalong_filters::image_kalman::ImageKalman;
 
     use super::*;
 
     fn corrected() -> ImageKalman {
-        ImageKalman::new(tagalong_image_kalman::Config::default()).unwrap()
+        ImageKalman::new(tagalong_filters::image_kalman::Config::default()).unwrap()
     }
 
     const DT_S: f64 = 1.0 / 23.0;

@@ -5,10 +5,10 @@ use std::str::FromStr;
 use crate::triangulate::Fix;
 use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_app::outcome::Failure;
+use tagalong_app::scoring::{Shot, Shots};
 use tagalong_app::serialize::to_json_line;
 use tagalong_core::Stamp;
 use tagalong_log::{InputSettings, Limits, TruthFrame, TruthPerson};
-use tagalong_scoring::{Shot, Shots};
 
 use super::TriangulateArgs;
 use super::seen::CameraSightings;

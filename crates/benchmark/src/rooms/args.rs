@@ -1,8 +1,8 @@
 use std::path::PathBuf;
 
+use crate::tuning::Objective;
 use clap::{Args, ValueEnum};
 use tagalong_app::format::TableFormat;
-use tagalong_tuning::Objective;
 
 use crate::folder::FolderArgs;
 

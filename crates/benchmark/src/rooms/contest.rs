@@ -1,11 +1,11 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use crate::tuning::candidates;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::outcome::Failure;
 use tagalong_config::Registry;
 use tagalong_pipeline::{ResolvedConfig, Tunable};
-use tagalong_tuning::candidates;
 
 use super::RoomsArgs;
 use crate::plan::{self, Annotated, PlannedConfig, sha256};

@@ -9,15 +9,15 @@ mod work;
 
 use std::path::Path;
 
+use crate::tuning::Rooms;
 pub use args::{HELP, RoomsArgs};
 use contest::{Contestant, Location};
 use report::Report;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
+use tagalong_app::scoring::read_text;
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
-use tagalong_scoring::read_text;
-use tagalong_tuning::Rooms;
 use work::Desk;
 
 use super::plan;

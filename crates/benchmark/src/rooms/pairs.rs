@@ -1,9 +1,9 @@
 //! Pipelines beside the last one that was named, in rooms that had no say in their settings.
 
+use crate::tuning::Figures;
 use serde::Serialize;
+use tagalong_math::{Gain, paired_gain};
 use tagalong_report::{Cell, Row, Table};
-use tagalong_stats::{Gain, paired_gain};
-use tagalong_tuning::Figures;
 
 use super::report::Fitted;
 

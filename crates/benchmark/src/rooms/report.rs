@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use crate::tuning::{Choice, Figures, Objective, leave_one_out, mean};
 use serde::Serialize;
 use tagalong_app::outcome::Failure;
 use tagalong_app::serialize::to_json;
 use tagalong_report::{Cell, Row, Table};
-use tagalong_tuning::{Choice, Figures, Objective, leave_one_out, mean};
 
 use super::RoomsArgs;
 use super::contest::{Contestant, Location};

@@ -5,14 +5,14 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use crate::tuning::Figures;
 use indicatif::ProgressBar;
 use serde::{Deserialize, Serialize};
 use tagalong_app::outcome::Failure;
+use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions};
 use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
 use tagalong_report::TaskResult;
-use tagalong_scoring::{Shot, Shots, TruthFile, TruthOptions};
-use tagalong_tuning::Figures;
 
 use super::contest::{Contestant, Location, Variant};
 use crate::plan::{self, Annotated, version};

@@ -6,14 +6,14 @@ use serde::Serialize;
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::scoring::{
+    Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
+    extents_note,
+};
 use tagalong_app::serialize::{to_json, to_json_line};
 use tagalong_app::suggest::check_log_path;
 use tagalong_eval::formats::mot::Rules;
 use tagalong_eval::{Scores, Sequence, Similarity};
-use tagalong_scoring::{
-    Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
-    extents_note,
-};
 
 /// Arguments of `tagalong eval`.
 #[derive(Args, Debug)]
@@ -225,8 +225,9 @@ fn shots(args: &EvalArgs, truth: &TruthFile, tracks: &Tracks) -> Result<Shots, F
     });
     let Some(log) = found else {
         let shown = args.truth.display();
-        let text =
-            format!("{shown} tells frames by their stamps; name the log with --log LOG.mcap");
+        let text = format!(
+            "{shown} gives stamps instead of frame numbers; name the log with --log LOG.mcap"
+        );
         return if truth.needs_stamps() { Err(Failure::usage(text)) } else { Ok(Shots::default()) };
     };
     let outer = match &args.config {

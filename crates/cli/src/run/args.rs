@@ -1,9 +1,11 @@
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use tagalong_app::format::Format;
 use tagalong_app::input_args::InputArgs;
+use tagalong_log::write::BoxedPart;
+use tagalong_render::OverlayStyle;
 
 /// Arguments of `tagalong run`.
 #[derive(Args, Debug)]
@@ -18,9 +20,17 @@ pub struct RunArgs {
     /// Output folder [default: runs/LOG-CONFIG].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Render a picture of every frame: boxes, ids, trails, and a view from above.
-    #[arg(long)]
-    pub overlay: bool,
+    /// Render a picture of every frame: people with ids, distances and trails, and a view from above;
+    /// `--overlay=debug` adds dropped candidates with their tests, and the state of the filter.
+    #[arg(
+        long,
+        value_enum,
+        value_name = "DETAIL",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "people"
+    )]
+    pub overlay: Option<Overlaid>,
     /// Put the images into tracks.mcap, too, as JPEG, so that one file opens to a whole scene.
     #[arg(long)]
     pub with_images: bool,
@@ -61,6 +71,26 @@ pub struct RunArgs {
     /// Suppresses all output; for commands that consist of runs.
     #[arg(skip)]
     pub quiet: bool,
+}
+
+/// Parts that the pictures of a run show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Overlaid {
+    /// People alone.
+    #[default]
+    People,
+    /// Dropped candidates and the state of the filter, too.
+    Debug,
+}
+
+impl Overlaid {
+    /// Returns the style of the pictures, with boxes as the config sets them.
+    pub fn style(self, boxes: BoxedPart) -> OverlayStyle {
+        match self {
+            Self::People => OverlayStyle { boxes, ..OverlayStyle::default() },
+            Self::Debug => OverlayStyle::debug(boxes),
+        }
+    }
 }
 
 impl RunArgs {

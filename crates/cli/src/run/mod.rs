@@ -14,7 +14,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-pub use args::RunArgs;
+pub use args::{Overlaid, RunArgs};
 use frames::{Frames, Item};
 use pace::Pace;
 use pictures::Pictures;
@@ -81,7 +81,7 @@ pub fn run_until(
     let mut pictures = Pictures::new(desk.overlay.take(), threads);
     let mut frames = Frames::new(job.source, threads);
     let mut pipeline = job.pipeline;
-    pipeline.visualise(args.overlay);
+    pipeline.visualise(args.overlay.is_some());
     let live =
         args.serve.map(|at| serve(at, args, registry, &job.resolved, &job.report)).transpose()?;
     let mut pace = Pace::new(args.realtime);
@@ -126,7 +126,7 @@ impl Job {
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
         let inputs = pipeline.inputs();
         // A picture shows colour, whether or not the pipeline uses it.
-        let wants_pictures = args.overlay || args.with_images || args.serve.is_some();
+        let wants_pictures = args.overlay.is_some() || args.with_images || args.serve.is_some();
         let inputs = if wants_pictures { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
             .map_err(|error| refused_log(error, pipeline.config()))?;
@@ -272,8 +272,13 @@ struct Desk {
 impl Desk {
     fn open(args: &RunArgs, job: &Job) -> Result<Self, Failure> {
         let dir = RunDir::create(&job.folder, args.overwrite, args.log()).map_err(refused)?;
-        let overlay =
-            if args.overlay { Some(Overlay::new(dir.overlay().map_err(refused)?)) } else { None };
+        let overlay = match args.overlay {
+            None => None,
+            Some(overlaid) => {
+                let style = overlaid.style(job.outer.output.boxes);
+                Some(Overlay::new(dir.overlay().map_err(refused)?, style))
+            }
+        };
         let input = &job.outer.input;
         let camera = job.source.facts().camera_frame.clone();
         let names = FrameNames {
@@ -360,7 +365,9 @@ impl Desk {
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,
-            Format::Text => print(&summary::text(&report, &self.timings, &folder, args.overlay))?,
+            Format::Text => {
+                print(&summary::text(&report, &self.timings, &folder, args.overlay.is_some()))?
+            }
         }
         verdict(args, &report, stopped, signals, &self.remedies)
     }

@@ -41,7 +41,10 @@ pub fn text(report: &RunReport, timings: &Timings, folder: &Path, overlay: bool)
 
 fn persons(out: &mut String, report: &RunReport) {
     let _ = match report.persons.len() {
-        0 => writeln!(out, "nobody was found; --overlay shows where each test said no"),
+        0 => writeln!(
+            out,
+            "nobody was found; --overlay=debug shows the test that dropped each candidate"
+        ),
         1 => writeln!(out, "1 person:"),
         many => writeln!(out, "{many} persons:"),
     };

@@ -85,7 +85,7 @@ fn run_real(log: &Path, out: &Path, threads: &str) {
 
 #[test]
 fn the_shipped_config_runs_on_every_real_log_with_depth_and_repeats_to_the_byte() {
-    let Some(logs) = tagalong_testdata::find("logs") else { return };
+    let Some(logs) = tagalong_conformance::testdata::find("logs") else { return };
     let home = tempfile::tempdir().unwrap();
     let names = [
         "um",

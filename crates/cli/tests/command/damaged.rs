@@ -85,7 +85,7 @@ fn seed(name: &str) -> PathBuf {
 
 #[test]
 fn files_of_other_programs_whole_and_damaged_end_in_time_and_memory() {
-    let Some(folder) = tagalong_testdata::find("mcap") else { return };
+    let Some(folder) = tagalong_conformance::testdata::find("mcap") else { return };
     let home = tempfile::tempdir().unwrap();
     let logs = logs_below(&folder);
     assert!(logs.len() > 150, "{} logs", logs.len());

@@ -316,7 +316,7 @@ fn each_test_of_the_funnel_has_its_settings_and_its_pictures() {
 /// pixels are not.
 #[test]
 fn real_logs_are_registered_and_moved_ones_are_not() {
-    let Some(um) = tagalong_testdata::find("logs/um.mcap") else { return };
+    let Some(um) = tagalong_conformance::testdata::find("logs/um.mcap") else { return };
     let home = tempfile::tempdir().unwrap();
     let [start, moved] = ["start.mcap", "moved.mcap"].map(|name| home.path().join(name));
     broken::write(&um, &start, &Changes { first_s: Some(4.0), ..Changes::default() });

@@ -282,7 +282,7 @@ fn tracks_that_go_on_without_a_known_end_are_said() {
 
 #[test]
 fn mot17_figures_equal_those_of_trackeval() {
-    let Some(mot) = tagalong_testdata::find("mot") else { return };
+    let Some(mot) = tagalong_conformance::testdata::find("mot") else { return };
     let expected: Value =
         serde_json::from_slice(&fs::read(mot.join("expected-trackeval.json")).unwrap()).unwrap();
     for (name, figures) in expected["MOT17-train"].as_object().unwrap() {

@@ -46,7 +46,7 @@ impl Ran {
 }
 
 fn field(name: &str) -> Option<PathBuf> {
-    tagalong_testdata::find(&format!("field/{name}"))
+    tagalong_conformance::testdata::find(&format!("field/{name}"))
 }
 
 /// Runs a command on a log, with the config of a text if it is not empty.

@@ -44,7 +44,7 @@ fn pinned() -> Figures {
 
 #[test]
 fn shipped_configs_have_their_pinned_figures_on_real_logs() {
-    let Some(logs) = tagalong_testdata::find("logs") else { return };
+    let Some(logs) = tagalong_conformance::testdata::find("logs") else { return };
     let home = tempfile::tempdir().unwrap();
     let out = home.path().join("out");
     let mut command = tagalong();

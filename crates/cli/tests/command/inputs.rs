@@ -30,7 +30,7 @@ impl Home {
 
     /// A real recording; `None`, with a message, where there is none.
     fn real(log: &str) -> Option<Self> {
-        let log = tagalong_testdata::find(&format!("logs/{log}"))?;
+        let log = tagalong_conformance::testdata::find(&format!("logs/{log}"))?;
         let home = tempfile::tempdir().unwrap();
         // Ten images tell whether depth makes a difference.
         let start = Changes { first_s: Some(5.0), ..Changes::default() };
@@ -138,7 +138,9 @@ fn check_says_what_is_needed_and_what_is_used() {
 #[test]
 fn a_log_of_a_scanner_alone_gets_a_pipeline_by_its_odometry() {
     for (log, expected) in [("laser-moving", "laser-legs"), ("laser-following", "laser-follow")] {
-        let Some(path) = tagalong_testdata::find(&format!("laser/{log}.mcap")) else { return };
+        let Some(path) = tagalong_conformance::testdata::find(&format!("laser/{log}.mcap")) else {
+            return;
+        };
         let home = tempfile::tempdir().unwrap();
         let output =
             tagalong().arg("run").arg(path).args(["-o", "out"]).current_dir(&home).output();
@@ -153,7 +155,9 @@ fn a_log_of_a_scanner_alone_gets_a_pipeline_by_its_odometry() {
 
 #[test]
 fn a_config_that_asks_for_odometry_says_where_there_is_none() {
-    let Some(log) = tagalong_testdata::find("laser/laser-following.mcap") else { return };
+    let Some(log) = tagalong_conformance::testdata::find("laser/laser-following.mcap") else {
+        return;
+    };
     let home = tempfile::tempdir().unwrap();
     let ran = |args: &[&str]| {
         let output = tagalong().args(args).arg(&log).current_dir(&home).output().unwrap();

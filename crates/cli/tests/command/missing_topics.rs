@@ -25,7 +25,9 @@ fn t6_a_topic_that_is_not_there_is_told_with_those_that_are() {
         ("odometry_topic", "/odom", ""),
     ] {
         let (code, told) = run(home.path(), "good.mcap", &format!("{key} = \"{wrong}\""));
-        assert_eq!(code, 1, "{key}: {told}");
+        assert_eq!(code, 2, "{key}: {told}");
+        let line = format!("| {key} = \"{wrong}\"");
+        assert!(told.contains("nearest.toml:") && told.contains(&line), "{key}: {told}");
         assert!(told.contains(&format!("no topic `{wrong}` fit for `{key}`")), "{key}: {told}");
         assert_eq!(told.contains(&format!("did you mean `{near}`?")), !near.is_empty(), "{told}");
         let (_, present) = told.split_once("present:").expect("what is there");

@@ -108,8 +108,12 @@ fn an_installed_network_has_a_name() {
 /// A published network on a street: once installed, it is taken without a config or a threshold.
 #[test]
 fn an_installed_network_tracks_a_recorded_log() {
-    let Some(file) = tagalong_testdata::find("networks/yolox_nano.onnx") else { return };
-    let Some(log) = tagalong_testdata::find("logs/TUD-Stadtmitte.mcap") else { return };
+    let Some(file) = tagalong_conformance::testdata::find("networks/yolox_nano.onnx") else {
+        return;
+    };
+    let Some(log) = tagalong_conformance::testdata::find("logs/TUD-Stadtmitte.mcap") else {
+        return;
+    };
     let home = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
         let mut command = tagalong();

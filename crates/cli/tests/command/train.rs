@@ -36,6 +36,20 @@ fn the_same_seed_makes_the_same_model_and_card_and_the_model_works() {
 }
 
 #[test]
+#[cfg(not(feature = "train"))]
+fn a_program_without_trainers_says_which_command_builds_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = train(folder.path(), &["svm-patch", "--quick"]);
+    assert_eq!(code(&output), 2);
+    let message = text(&output.stderr);
+    assert!(
+        message.contains("cargo run --release --features train -- train svm-patch"),
+        "{message}"
+    );
+}
+
+#[test]
+#[cfg(feature = "train")]
 fn who_cannot_be_trained_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let output = train(folder.path(), &["ekf", "--quick"]);
@@ -44,12 +58,12 @@ fn who_cannot_be_trained_is_told() {
 }
 
 #[test]
+#[cfg(feature = "train")]
 fn wrong_settings_are_named() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("s.toml"), "[training]\nfold = 3\n").unwrap();
     let output = train(folder.path(), &["svm-patch", "--quick", "--settings", "s.toml"]);
     assert_eq!(code(&output), 2);
-    #[cfg(feature = "train")]
     assert!(text(&output.stderr).contains("did you mean `folds`?"), "{}", text(&output.stderr));
 }
 

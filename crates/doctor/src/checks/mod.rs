@@ -26,8 +26,7 @@ mod still;
 mod suits;
 mod topics;
 
-use super::alternatives::Alternative;
-use super::coverage::Coverage;
+use super::coverage::{Alternative, Coverage};
 use super::evidence::Evidence;
 use super::finding::{Finding, Severity};
 

@@ -1,6 +1,5 @@
-use super::super::evidence::Evidence;
+use super::super::evidence::{Evidence, Preparations};
 use super::super::finding::{Finding, Severity};
-use super::super::preparations::Preparations;
 
 /// Gain of the mean probability from which on another preparation is recommended.
 const MIN_GAIN: f64 = 0.1;
@@ -45,7 +44,7 @@ fn judge(tried: &Preparations) -> Finding {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::preparations::Prepared;
+    use super::super::super::evidence::Prepared;
     use super::*;
 
     fn finding(now: (usize, f64), best: Option<(usize, f64)>) -> Finding {

@@ -159,6 +159,15 @@ fn is_explained(blob: Point2<f64>, tracks: &[Placed]) -> bool {
     tracks.iter().any(|track| (track.place - blob).norm() <= EXPLAINS_M)
 }
 
+/// Other setting, and its figures.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Alternative {
+    /// Line of a config, or the name of another config.
+    pub change: String,
+    /// Figures with it.
+    pub coverage: Coverage,
+}
+
 #[cfg(test)]
 mod tests {
     use tagalong_core::Stamp;

@@ -39,7 +39,7 @@ pub(super) enum Presence {
     Appeared,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Cell {
     /// Coordinates: cells far away share a slot.
     tag: (i32, i32),
@@ -56,6 +56,8 @@ pub(super) struct SpaceGrid {
     cells: Vec<Cell>,
     grid_from_robot: Isometry2<f64>,
     now_ms: u32,
+    /// Cells that the last ray went through, step by step.
+    last_ray: Vec<(i32, i32)>,
 }
 
 impl Default for SpaceGrid {
@@ -65,6 +67,7 @@ impl Default for SpaceGrid {
             grid_from_robot: Isometry2::identity(),
             // Not 0, which stands for never.
             now_ms: 2 * FREE_MS,
+            last_ray: Vec::new(),
         }
     }
 }
@@ -93,6 +96,7 @@ impl SpaceGrid {
             self.hit(&at);
         }
         let from = self.grid_from_robot * eye;
+        self.last_ray.clear();
         for end in free_to {
             self.free(&from, &(self.grid_from_robot * end));
         }
@@ -115,40 +119,57 @@ impl SpaceGrid {
         let step = way * (STEP / length.max(STEP));
         let mut at = [parts(start.x), parts(start.y)];
         let step = [parts(step.x), parts(step.y)];
+        let mut last_ray = std::mem::take(&mut self.last_ray);
+        let known = last_ray.len().min(steps);
+        last_ray.resize(last_ray.len().max(steps), (0, 0));
         let mut last = None;
-        for _ in 0..steps {
+        for (number, beside) in last_ray[..steps].iter_mut().enumerate() {
             let place = ((at[0] >> PARTS_BITS) as i32, (at[1] >> PARTS_BITS) as i32);
             at = [at[0] + step[0], at[1] + step[1]];
-            // Steps are shorter than cells.
-            if last == Some(place) {
+            // Steps are shorter than cells, and rays lie close together: most places were just marked.
+            let is_marked = last == Some(place) || (number < known && *beside == place);
+            last = Some(place);
+            *beside = place;
+            if is_marked {
                 continue;
             }
-            last = Some(place);
             let cell = self.cell_of(place);
             if cell.hit_ms != now_ms {
                 cell.free_ms = now_ms;
             }
         }
+        self.last_ray = last_ray;
     }
 
     /// Returns the history of a thing that was met at a place in this frame.
     pub(super) fn presence(&self, at: &Point2<f64>) -> Presence {
         let place = coordinates(&(self.grid_from_robot * at));
         let Some(cell) = self.at(place) else { return Presence::New };
+        // Noise and a wrong angle move the border of a standing thing by a cell. Its new border stands
+        // like the rest of it, however long it has been there.
+        if self.stands(cell) && !cell.appeared || self.is_beside_standing(place) {
+            return Presence::Stands;
+        }
         if self.stands(cell) {
-            let is_parked = cell.appeared && self.now_ms - cell.since_ms <= PARKED_MS;
+            let is_parked = self.now_ms - cell.since_ms <= PARKED_MS;
             return if is_parked { Presence::Parked } else { Presence::Stands };
         }
-        // Noise and a wrong angle move the border of a standing thing by a cell.
+        if cell.appeared { Presence::Appeared } else { Presence::New }
+    }
+
+    /// Returns true if a thing that did not come by itself stands in a cell around one.
+    fn is_beside_standing(&self, (x, y): (i32, i32)) -> bool {
         for dx in -1..=1 {
             for dy in -1..=1 {
-                let beside = self.at((place.0.saturating_add(dx), place.1.saturating_add(dy)));
+                let is_middle = dx == 0 && dy == 0;
+                let beside =
+                    self.at((x.saturating_add(dx), y.saturating_add(dy))).filter(|_| !is_middle);
                 if beside.is_some_and(|cell| self.stands(cell) && !cell.appeared) {
-                    return Presence::Stands;
+                    return true;
                 }
             }
         }
-        if cell.appeared { Presence::Appeared } else { Presence::New }
+        false
     }
 
     fn stands(&self, cell: &Cell) -> bool {
@@ -170,7 +191,8 @@ impl SpaceGrid {
         cell.hit_ms = now_ms;
         // Most readings are of things that were there before: the cells around need no look.
         if is_new {
-            let appeared = was_free && self.is_amid_free(place);
+            // The border of a standing thing wanders with the drift of the odometry, cell by cell.
+            let appeared = was_free && self.is_amid_free(place) && !self.is_beside_standing(place);
             let cell = self.cell_of(place);
             cell.since_ms = now_ms;
             cell.appeared = appeared;
@@ -282,6 +304,80 @@ mod tests {
             look(&mut grid, 0.05, robot_m, None);
         }
         assert_eq!(grid.presence(&Point2::new(3.0 - robot_m, 0.35)), Presence::Stands);
+    }
+
+    /// A post of a door at 3 m, with the opening to its right, as the robot sees it.
+    fn look_at_door(grid: &mut SpaceGrid, left_m: f64) -> Presence {
+        grid.advance(&EgoMotion { left: left_m, ..EgoMotion::at_rest(0.1) });
+        let post = [0.05, 0.15].map(|y| Point2::new(3.05, y));
+        let beyond = (-10..10).filter(|y| !(0..3).contains(y));
+        let beyond = beyond.map(|y| Point2::new(5.05, 0.1 * f64::from(y) + 0.05));
+        let met: Vec<Point2<f64>> = post.into_iter().chain(beyond).collect();
+        grid.add(EYE, met.iter().copied(), met.iter().copied());
+        grid.presence(&Point2::new(3.05, 0.05))
+    }
+
+    #[test]
+    fn the_edge_of_a_door_that_wanders_with_the_odometry_stands() {
+        let mut grid = SpaceGrid::default();
+        for _ in 0..20 {
+            look_at_door(&mut grid, 0.0);
+        }
+        // The odometry drifts, and the post with it: soon none of its cells is one of the first.
+        for drift in 0..5 {
+            for step in 0..15 {
+                let drift_m = if step == 0 { -0.1 } else { 0.0 };
+                assert_eq!(look_at_door(&mut grid, drift_m), Presence::Stands, "{drift} {step}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_person_who_comes_through_a_door_moves() {
+        let mut grid = SpaceGrid::default();
+        for _ in 0..20 {
+            look_at_door(&mut grid, 0.0);
+        }
+        let mut seen = Vec::new();
+        for step in 0..8 {
+            grid.advance(&EgoMotion::at_rest(0.1));
+            // From behind the post into the opening, along it, and on.
+            let y = 0.05 - 0.06 * f64::from(step);
+            let person = [-0.1, 0.0, 0.1].map(|aside| Point2::new(3.05, y + aside));
+            let post = [0.05, 0.15].map(|y| Point2::new(3.05, y));
+            let met: Vec<Point2<f64>> = post.into_iter().chain(person).collect();
+            grid.add(EYE, met.iter().copied(), met.iter().copied());
+            seen.push(grid.presence(&person[0]));
+        }
+        assert!(seen[1..].iter().all(|presence| *presence == Presence::Appeared), "{seen:?}");
+    }
+
+    #[test]
+    fn rays_side_by_side_free_the_same_places_as_one_at_a_time() {
+        let eye = Point2::new(0.2, -0.1);
+        // Rays of very different lengths beside each other.
+        let end = |ray: u32| {
+            let angle = f64::from(ray) * 0.0087;
+            let length_m = 0.3 + f64::from(ray * 37 % 101) * 0.09;
+            eye + length_m * nalgebra::Vector2::new(angle.cos(), angle.sin())
+        };
+        let mut together = SpaceGrid::default();
+        let mut single = SpaceGrid::default();
+        for step in 0..3 {
+            for grid in [&mut together, &mut single] {
+                grid.advance(&EgoMotion { forward: 0.3, turn: 0.4, ..EgoMotion::at_rest(0.1) });
+            }
+            let met = || (0..720).filter(|ray| ray % 3 == step).map(end);
+            together.add(eye, met(), (0..720).map(end));
+            single.add(eye, met(), std::iter::empty());
+            for ray in 0..720 {
+                single.add(eye, std::iter::empty(), std::iter::once(end(ray)));
+            }
+        }
+        assert!(
+            together.cells.iter().filter(|cell| cell.free_ms == together.now_ms).count() > 3000
+        );
+        assert!(together.cells == single.cells);
     }
 
     #[test]

@@ -184,19 +184,22 @@ fn a_floor_and_the_followed_person_do_not_change_and_are_no_contradiction() {
 
 #[test]
 fn depth_in_few_columns_stops_and_in_half_of_them_slows() {
-    for (every, expected) in [(8, 0.0), (1, f64::INFINITY)] {
+    let share = |is_lit: fn(usize) -> bool| {
         let mut monitor = settled();
         let seen = depth_at(20, 0.0, 0.0);
-        let depth =
-            DepthImage::from_fn(
-                160,
-                120,
-                |u, v| if u % every == 0 { seen.row(v)[u] } else { f32::NAN },
-            );
+        let lit = |u, v| if is_lit(u) { seen.row(v)[u] } else { f32::NAN };
+        let depth = DepthImage::from_fn(160, 120, lit);
         let frame = frame(20, EgoMotion::at_rest(0.1), Some(depth), None);
         monitor.update(&frame, &frame.motion, &[], None);
-        assert_eq!(speed(&monitor), expected, "one column in {every}");
-    }
+        // By the share alone: an object that hides columns would stop the robot, too.
+        (monitor.by_coverage(AHEAD, 0.9, &BRAKING), speed(&monitor))
+    };
+    let (few, speed_mps) = share(|u| u % 8 == 0);
+    assert_eq!((few.most, few.stops, speed_mps), (0.0, Reason::Unknown, 0.0));
+    let (half, _) = share(|u| u % 2 == 0);
+    assert!(half.most > 0.1 && half.most < 0.8, "{half:?}");
+    assert_eq!(half.slower, Reason::Unclear);
+    assert_eq!(share(|_| true), (Allowance::FREE, f64::INFINITY));
 }
 
 #[test]
@@ -299,23 +302,27 @@ fn what_is_nearer_than_a_scanner_measures_is_there() {
     assert_eq!(speed(&monitor), 0.0);
 }
 
-/// A thing a metre and a half beside the robot stands there since long, or has just appeared.
+/// A thing a metre and a half beside the robot stands there since long, came a while ago, or has just
+/// appeared.
 #[test]
 fn what_appears_in_a_free_place_needs_more_room_than_what_stands() {
-    let moving = |moves: bool| {
+    let since = |first: usize| {
         let mut monitor = monitor();
         for index in 0..24 {
-            let is_there = !moves || index >= 22;
-            let thing = |deg: i32| (is_there && (80..100).contains(&deg)).then_some(1.2);
+            let thing = |deg: i32| (index >= first && (80..100).contains(&deg)).then_some(1.2);
             let frame =
                 frame(index, EgoMotion::at_rest(0.1), None, Some(scan_at(index, 0.0, 0.0, thing)));
             monitor.update(&frame, &frame.motion, &[], None);
         }
         monitor.allowance(AHEAD, 0.9, &BRAKING)
     };
-    assert_eq!(moving(false), Allowance::FREE);
-    let slower = moving(true);
-    assert!(slower.most < 0.3 && slower.slower == Reason::Near, "{slower:?}");
+    assert_eq!(since(0), Allowance::FREE);
+    let appeared = since(22);
+    assert!(appeared.most < 0.3 && appeared.slower == Reason::Near, "{appeared:?}");
+    // A person who came and stands may walk on.
+    let parked = since(8);
+    assert!(parked.most > appeared.most && parked.most < 0.9, "{parked:?}");
+    assert_eq!(parked.slower, Reason::Near);
 }
 
 #[test]

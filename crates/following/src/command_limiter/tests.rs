@@ -440,6 +440,55 @@ fn odometry_that_is_old_or_no_number_and_late_images_stop() {
     }
 }
 
+/// Drives with a wish of `wished_mps`, less every other one and a half seconds, on a base that responds
+/// so many frames late, or not at all; returns the limiter and the last command.
+fn driven(wished_mps: f64, frames: u64, late: Option<usize>) -> (CommandLimiter, Command) {
+    let mut limiter = limiter();
+    limiter.set_driving(true);
+    let mut commands: Vec<Command> = Vec::new();
+    for index in 1..=frames {
+        let sent = late.and_then(|late| commands.len().checked_sub(1 + late));
+        let mps = sent.map_or(0.0, |sent| commands[sent].twist.linear_mps);
+        let motion = EgoMotion { forward: mps * PERIOD_S, ..EgoMotion::at_rest(PERIOD_S) };
+        // A delay shows only while the speed changes.
+        let part = if index / 15 % 2 == 0 { 1.0 } else { 0.5 };
+        let wish = wish(index, part * wished_mps, part * wished_mps);
+        let mut frame = moved(motion);
+        frame.stamp = wish.stamp;
+        limiter.check_motion(&frame);
+        commands.push(limiter.limit(&wish, free));
+    }
+    let last = commands[commands.len() - 1];
+    (limiter, last)
+}
+
+#[test]
+fn a_base_that_does_not_do_as_it_is_told_is_a_fault() {
+    let (obeys, command) = driven(0.8, 74, Some(0));
+    assert_eq!((obeys.fault(), command.reason), (None, Reason::Follow));
+    let (stuck, command) = driven(0.8, 60, None);
+    assert_eq!(stuck.fault(), Some("the base does not move as it is commanded"));
+    assert_eq!((command.reason, command.wheels), (Reason::Fault, WheelSpeeds::STOP));
+    // So slow that noise explains it for a while.
+    let (creeping, command) = driven(0.08, 100, None);
+    assert_eq!(
+        creeping.fault(),
+        Some("the odometry stands still while the robot is commanded to move")
+    );
+    assert_eq!(command.reason, Reason::Fault);
+}
+
+#[test]
+fn a_base_that_responds_late_is_slower_and_one_that_is_much_too_late_is_a_fault() {
+    let (late, command) = driven(0.8, 74, Some(5));
+    assert_eq!(late.fault(), None);
+    assert!(late.reaction_s > 0.55, "{}", late.reaction_s);
+    assert!(command.twist.linear_mps < 0.46, "{command:?}");
+    assert_eq!(command.reason, Reason::Slow);
+    let (too_late, _) = driven(0.8, 74, Some(12));
+    assert_eq!(too_late.fault(), Some("the base responds too late to its commands"));
+}
+
 #[test]
 fn of_several_limits_the_lowest_holds_and_is_named() {
     let command = |aim, pause_s, at_m| {

@@ -17,7 +17,7 @@ use rusqlite::{Connection, OpenFlags};
 use tempfile::TempDir;
 
 use crate::Limits;
-use crate::mcap::NotMcap;
+use crate::error::NotMcap;
 
 /// Start of the header of a rollback journal, and end of one that belongs to several databases.
 const JOURNAL_MAGIC: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];

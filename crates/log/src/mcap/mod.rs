@@ -3,6 +3,11 @@
 //! The records of a chunk are delivered only after all of it was decompressed and its checksum
 //! verified.
 //!
+//! The crate `mcap` parses schemas, channels and messages. The way from record to record is not that
+//! of its `sans_io::LinearReader`: this ends at the first record beyond its limit and at the first
+//! damaged chunk, without the place where the next record begins, and one limit holds for records
+//! and chunks. Here such a part is counted, with its place, and the walk goes on behind it.
+//!
 //! Source: the MCAP specification, version 0, sections "Records" and "Chunk".
 
 mod chunk;
@@ -14,16 +19,14 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use chunk::ChunkFault;
+use mcap::records::{Record, op};
+use mcap::{MAGIC, parse_record};
 use record::Opcode;
 
 use crate::bag;
+use crate::error::NotMcap;
 use crate::msgs::ROS1_MARK;
 use crate::walk::{Channel, Located, Walk};
-
-/// Error for a file that is no container of messages: a sentence without its name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct NotMcap(pub String);
 
 /// Findings in an MCAP file that other containers do not have.
 #[derive(Default)]
@@ -38,7 +41,7 @@ impl Mcap {
     /// # Errors
     /// [`NotMcap`] if they are not the magic of MCAP.
     pub(crate) fn behind(magic: &[u8]) -> Result<Self, NotMcap> {
-        if magic == record::MAGIC {
+        if magic == MAGIC {
             return Ok(Self::default());
         }
         Err(NotMcap(format!("not an MCAP file: {}", describe_start(magic))))
@@ -53,7 +56,7 @@ impl Mcap {
         match walk.source.fill(&mut head) {
             9 => {}
             // The closing magic in place of a record: there is no footer.
-            8 if head[..8] == record::MAGIC => {
+            8 if head[..8] == *MAGIC => {
                 return walk.end_truncated("before its index is complete");
             }
             0 => return walk.end_truncated("without its closing records"),
@@ -91,7 +94,7 @@ impl Mcap {
             return;
         }
         let mut magic = [0; 8];
-        if walk.source.fill(&mut magic) < 8 || magic != record::MAGIC {
+        if walk.source.fill(&mut magic) < 8 || magic[..] != *MAGIC {
             walk.end_truncated("without its closing magic");
         }
         let delivered = walk.counters.get("messages").copied().unwrap_or(0);
@@ -143,20 +146,27 @@ impl Mcap {
     }
 
     fn learn_schema<R: Read>(&mut self, walk: &mut Walk<R>, body: Range<usize>) -> Option<()> {
-        let too_long = body.len() as u64 > walk.limits.schema_bytes;
-        let schema = record::schema(&walk.buffer[body])?;
-        if too_long {
+        let is_too_long = body.len() as u64 > walk.limits.schema_bytes;
+        let Ok(Record::Schema { header, data }) = parse_record(op::SCHEMA, &walk.buffer[body])
+        else {
+            return None;
+        };
+        // The number 0 stands for no schema.
+        if is_too_long || header.id == 0 {
             return None;
         }
+        // Definitions in other languages are no text.
+        let definition = Arc::from(std::str::from_utf8(&data).unwrap_or_default());
+        let known = (header.name, header.encoding, definition);
         // The first definition is kept; later ones repeat it.
-        let definition = Arc::from(schema.definition);
-        let known = (schema.name, schema.encoding, definition);
-        self.schemas.entry(schema.id).or_insert(known);
+        self.schemas.entry(header.id).or_insert(known);
         Some(())
     }
 
     fn learn_channel<R: Read>(&mut self, walk: &mut Walk<R>, body: Range<usize>) -> Option<()> {
-        let read = record::channel(&walk.buffer[body])?;
+        let Ok(Record::Channel(read)) = parse_record(op::CHANNEL, &walk.buffer[body]) else {
+            return None;
+        };
         let schema = self.schemas.get(&read.schema_id).cloned();
         if schema.is_none() && read.schema_id != 0 {
             walk.count("channels_without_schema");
@@ -167,7 +177,7 @@ impl Mcap {
             topic: read.topic,
             schema_name,
             schema_encoding,
-            encoding: read.encoding,
+            encoding: read.message_encoding,
             definition,
         };
         walk.learn(channel);
@@ -227,19 +237,22 @@ fn take_data_end<R: Read>(walk: &mut Walk<R>, length: u64, crc: u32) {
 }
 
 fn locate_message<R: Read>(walk: &mut Walk<R>, body: Range<usize>) -> Option<()> {
-    let head = walk.buffer.get(body.clone())?.get(..record::MESSAGE_HEAD)?;
-    let id = u32::from(record::u16_at(head, 0));
-    let sequence = record::u32_at(head, 2);
-    let log_time = record::u64_at(head, 6);
-    let publish_time = record::u64_at(head, 14);
-    if let Some(channel) = walk.channel_of(id) {
+    let record = parse_record(op::MESSAGE, &walk.buffer[body.clone()]);
+    let Ok(Record::Message { header, .. }) = record else { return None };
+    if let Some(channel) = walk.channel_of(u32::from(header.channel_id)) {
         let mut data = body.start + record::MESSAGE_HEAD..body.end;
         if channel.encoding == bag::ENCODING {
             // The mark takes the place of the last bytes of the head, which was read.
             data.start -= ROS1_MARK.len();
             walk.buffer[data.start..][..ROS1_MARK.len()].copy_from_slice(&ROS1_MARK);
         }
-        walk.deliver(Located { channel, log_time, publish_time, sequence, data });
+        walk.deliver(Located {
+            channel,
+            log_time: header.log_time,
+            publish_time: header.publish_time,
+            sequence: header.sequence,
+            data,
+        });
     }
     Some(())
 }

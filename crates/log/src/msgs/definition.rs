@@ -368,7 +368,7 @@ mod tests {
     use super::*;
     use crate::msgs::{Detection2DArray, Header, Message, Odometry, encode, encode_big_endian};
     use tagalong_core::Stamp;
-    use tagalong_stats::RandomSource;
+    use tagalong_math::RandomSource;
 
     #[test]
     fn what_serde_writes_is_read_by_the_definition_in_either_byte_order() {
@@ -434,7 +434,7 @@ mod tests {
     fn mutated_definitions_and_messages_end_in_a_value_or_an_error() {
         let message = encode(&Detection2DArray::default());
         let text = Detection2DArray::DEFINITION.as_bytes();
-        let mut random = tagalong_stats::XorShift64::new(7);
+        let mut random = tagalong_math::XorShift64::new(7);
         let mut read = 0_u64;
         for _ in 0..trials() {
             let mut text = text.to_vec();

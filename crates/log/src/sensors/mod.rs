@@ -18,14 +18,15 @@ pub(crate) mod laser;
 use std::sync::Arc;
 
 use nalgebra::Isometry2;
+use tagalong_config::check_settings;
 use tagalong_core::{Input, Sensors, Stamp};
 use tagalong_geometry::Camera;
 
-use crate::InputSettings;
 use crate::msgs::{CdrError, Header};
 use crate::tally::Tally;
 use crate::tf::TfBuffer;
 use crate::walk::Message;
+use crate::{InputSettings, LogError};
 
 /// The table of all sensors beside the images.
 pub(crate) const SENSORS: &[SensorType] = &[laser::ENTRY, detections::ENTRY];
@@ -135,6 +136,28 @@ pub(crate) fn is_type(schema: &str, wanted: &str) -> bool {
         Some((package.to_owned(), rest.rsplit('/').next()?.to_owned()))
     };
     ends(schema).is_some() && ends(schema) == ends(wanted)
+}
+
+impl InputSettings {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// [`LogError::Settings`], which names the key.
+    pub fn check(&self) -> Result<(), LogError> {
+        check_settings(self).map_err(|error| LogError::Settings(error.to_string()))?;
+        self.topics.keys().try_for_each(|name| check_sensor(name))
+    }
+}
+
+/// Checks that the table of sensors has one of this name whose topic has no key of its own.
+fn check_sensor(name: &str) -> Result<(), LogError> {
+    let keys: Vec<String> = SENSORS.iter().map(SensorType::key).collect();
+    let wanted = format!("topics.{name}");
+    if keys.contains(&wanted) {
+        return Ok(());
+    }
+    let hint = keys.join(", ");
+    Err(LogError::Settings(format!("`{wanted}`: no sensor of that name is read; sensors: {hint}")))
 }
 
 #[cfg(test)]

@@ -441,7 +441,13 @@ fn named(
     }
     let near = nearest(name, fitting.map(|(name, _)| name.as_str()));
     let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
-    Err(missing(scan, format!("topic `{name}` fit for `{key}` of [input]"), hint))
+    Err(LogError::UnknownTopic {
+        path: scan.path.clone(),
+        key: key.to_owned(),
+        topic: name.to_owned(),
+        hint: hint.into_boxed_str(),
+        present: scan.listing(),
+    })
 }
 
 /// Returns the topic with the highest rank of those in `names` that are no further sources of

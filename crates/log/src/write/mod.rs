@@ -7,6 +7,7 @@
 //! than that. The contents do not depend on the time of day: the same frames give the same bytes.
 
 mod body;
+mod colours;
 mod csv;
 mod error;
 mod mcap_tracks;
@@ -25,6 +26,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+pub use colours::{TRACK_COLOURS, track_colour};
 pub use csv::METRES_HEADER;
 pub use error::WriteError;
 pub use mcap_tracks::FrameNames;

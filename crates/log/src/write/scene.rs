@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tagalong_core::Track;
 use tagalong_geometry::Lens;
 
+use super::colours::track_colour;
 use super::messages::{CROWN_ABOVE_HEAD_M, MIN_HEADING_SPEED_MPS, odom_from_person};
 use super::record::{BoxedPart, FrameRecord};
 use crate::msgs::{
@@ -21,18 +22,6 @@ const TEXT_M: f64 = 0.25;
 
 /// Width of the arrow, m.
 const ARROW_WIDTH_M: f64 = 0.06;
-
-/// Colours of tracks: neighbours in number are far apart in hue.
-const COLOURS: [[u8; 3]; 8] = [
-    [98, 176, 255],
-    [255, 156, 87],
-    [67, 207, 155],
-    [213, 152, 240],
-    [255, 143, 163],
-    [195, 212, 82],
-    [79, 207, 224],
-    [189, 182, 196],
-];
 
 /// Opacity of a person that is seen, and of one that is predicted only.
 const OPACITY: (f64, f64) = (0.8, 0.3);
@@ -78,7 +67,7 @@ impl Figure {
 }
 
 fn colour_of(track: &Track) -> Color {
-    let [r, g, b] = COLOURS[track.id.0 as usize % COLOURS.len()].map(|v| f64::from(v) / 255.0);
+    let [r, g, b] = track_colour(track.id).map(|v| f64::from(v) / 255.0);
     Color { r, g, b, a: if track.seen { OPACITY.0 } else { OPACITY.1 } }
 }
 

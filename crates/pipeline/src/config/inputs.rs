@@ -5,7 +5,7 @@ use std::ops::Range;
 use tagalong_config::ConfigError;
 use tagalong_core::{Input, Inputs};
 use tagalong_following::ObstacleSource;
-use tagalong_odometry::MotionSource;
+use tagalong_vision::odometry::MotionSource;
 
 use super::PipelineSettings;
 

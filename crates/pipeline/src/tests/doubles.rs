@@ -10,10 +10,9 @@ use tagalong_config::Registry;
 use tagalong_core::{
     Association, Associations, Associator, Capabilities, Controller, Detection, Detector,
     EgoMotion, Error, Estimate, Evidence, Filter, FilterRequirements, Frame, Funnel, Gate, Images,
-    Input, Inputs, LaserScan, Likelihood, Person, Query, Result, Scene, Stamp, Track, TrackId,
-    Twist, Update, Verifier, WheelSpeeds,
+    Input, Inputs, LaserScan, Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene,
+    Stamp, Track, TrackId, Twist, Update, Verifier, WheelSpeeds,
 };
-use tagalong_filtering::{PerPerson, PersonFilter};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
 
 use crate::{FrameReport, Pipeline};
@@ -99,9 +98,9 @@ impl World {
         });
         registry.verifier("choosy", "doubts some", |config: Config, _| Ok(Choosy(config)));
         let world = self.clone();
-        tagalong_associate_hungarian::register(&mut registry);
-        tagalong_image_kalman::register(&mut registry);
-        tagalong_manage_m_of_n::register(&mut registry);
+        tagalong_associators::hungarian::register(&mut registry);
+        tagalong_filters::image_kalman::register(&mut registry);
+        tagalong_track_managers::m_of_n::register(&mut registry);
         registry.filter("steady", "believes what it saw", move |_: Config, _| {
             Ok(PerPerson::new(Steady(world.clone())))
         });

@@ -26,6 +26,14 @@ pub fn series_class(index: usize) -> String {
     format!("s{}", index % SERIES)
 }
 
+/// Colours of tracks, which are others than those of pipelines.
+const TRACK_COLOURS: i64 = 10;
+
+/// Returns the class that colours a track, as pictures and pages of runs colour it.
+pub fn track_class(id: i64) -> String {
+    format!("t{}", id.rem_euclid(TRACK_COLOURS))
+}
+
 /// Returns the dashes of a series; a second round of colours gets other dashes.
 pub fn dashes(index: usize) -> &'static str {
     ["none", "7 3", "2 3", "9 3 2 3"][(index + index / SERIES) % 4]

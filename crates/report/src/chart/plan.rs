@@ -1,8 +1,6 @@
 use maud::{Markup, html};
 
-use super::{
-    Axis, Plot, Scale, Words, axes, dashes, hint, mark, picture, points, px, series_class,
-};
+use super::{Axis, Plot, Scale, Words, axes, dashes, hint, mark, picture, points, px, track_class};
 use crate::model::Trajectory;
 
 /// Part of the floor that is drawn: a square, in metres.
@@ -86,7 +84,7 @@ fn track_lines(index: usize, track: &Trajectory, lines: &[Vec<(f64, f64)>]) -> M
     let end_anchored = end.0 > PLOT.right - 24.0;
     let (dx, anchor) = if end_anchored { (-7.0, "end") } else { (7.0, "start") };
     html! {
-        g.(series_class(index)) {
+        g.(track_class(track.id)) {
             @for line in lines {
                 polyline class="stroke" points=(points(line.iter().copied()))
                     stroke-dasharray=(dashes(index)) {}

@@ -6,6 +6,9 @@ use super::{MOST_DRAWN, Page, amount, cell, column, number, table};
 use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan, series_class};
 use crate::model::TaskResult;
 
+/// Logs up to which all plans are open: of more the page would be long.
+const OPEN_PLANS: usize = 2;
+
 impl Page<'_> {
     pub(super) fn miss_rates(&self) -> Option<Markup> {
         let charts: Vec<Markup> =
@@ -75,9 +78,9 @@ impl Page<'_> {
         // One extent for all pipelines, so that their plans can be compared at sight.
         let extent = Extent::around(tasks.iter().flat_map(|t| t.truth.iter().chain(&t.tracks)))?;
         Some(html! {
-            details class="print" open {
+            details class="print" open[self.view.logs.len() <= OPEN_PLANS] {
                 summary { (log) }
-                div class="charts" { @for task in &tasks { (plan_of(task, extent, self.series(&task.pipeline))) } }
+                div class="charts plans" { @for task in &tasks { (plan_of(task, extent, self.series(&task.pipeline))) } }
             }
         })
     }
@@ -87,7 +90,7 @@ impl Page<'_> {
             self.view.pipelines.iter().filter_map(|p| self.funnel(p)).collect();
         (!tables.is_empty()).then(|| html! {
             p { "Each test in its order and how many candidates it dropped, over all logs. When somebody is never found, look here first." }
-            div class="funnels" { @for table in &tables { (table) } }
+            details class="print" { summary { "Tests of each pipeline" } div class="funnels" { @for table in &tables { (table) } } }
         })
     }
 

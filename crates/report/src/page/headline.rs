@@ -57,6 +57,7 @@ impl Page<'_> {
                 "These logs do not tell the two apart (" (p_of(pair)) ", "
                 (amount(pair.logs as usize, "log")) " in common; it takes at least six)."
             } @else { "No log in common tells the two apart." }
+            @if let Some(why) = self.why_of_pair(&first.0.pipeline, &second.0.pipeline) { " " (why) "." }
         })
     }
 
@@ -125,7 +126,7 @@ impl Page<'_> {
                     @if estimate.best { "★ " } (number(estimate.mean, figure.decimals))
                     @if estimate.best { span class="unseen" { " best" } }
                 }
-                @if let Some(ends) = estimate.interval { " " (ends_of(ends, figure.decimals)) }
+                @if let Some(ends) = estimate.interval.filter(informs) { " " (ends_of(ends, figure.decimals)) }
                 @if estimate.logs < most { span class="fewer" { (amount(estimate.logs as usize, "log")) " only" } }
                 @if let Some(picture) = picture { (picture) }
             },
@@ -216,15 +217,22 @@ fn done_cell(summary: &PipelineSummary, most: u64) -> Markup {
 
 fn people_cell(summary: &PipelineSummary) -> Markup {
     let Some(found) = summary.people_found else { return no_cell() };
-    // The summary keeps the share; the count is recovered from it.
-    let count = (found.estimate * summary.people as f64).round() as u64;
+    let count = summary.people_found_count().unwrap_or_default();
     cell(
         found.estimate,
         &html! {
             span class="value" { (count) " of " (summary.people) }
-            @if let Some(ends) = found.ends() { " " (ends_of(ends, 2)) }
+            @if let Some(ends) = found.ends().filter(informs) { " " (ends_of(ends, 2)) }
         },
     )
+}
+
+/// Least part of the range from 0 to 1 that an interval leaves out to be worth its place in a cell.
+const LEAST_INFORMATION: f64 = 0.05;
+
+/// Returns false for an interval that covers all that a share can be.
+fn informs(ends: &[f64; 2]) -> bool {
+    ends[0] > LEAST_INFORMATION || ends[1] < 1.0 - LEAST_INFORMATION
 }
 
 pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {

@@ -18,7 +18,7 @@ const MOST_MOMENTS: usize = 24;
 const SAME_IOU: f64 = 0.5;
 
 /// Name of the row of people without a recorded candidate.
-const NO_CANDIDATE: &str = "no candidate";
+pub(super) const NO_CANDIDATE: &str = "no candidate";
 
 /// Box in pixels: left, top, width, height.
 type Box = [f64; 4];
@@ -50,7 +50,7 @@ impl Page<'_> {
                     em { (NO_CANDIDATE) } ": nothing that was recorded was dropped there; the detector did not look, "
                     "or dropped so many places that not all were recorded."
                 }
-                (self.missed_by_test())
+                details class="print" { summary { "Missed people by test" } (self.missed_by_test()) }
                 @if !self.moments.is_empty() {
                     p {
                         "Moments in the middle of the longest misses: white and dashed the people, in colour the "
@@ -76,7 +76,7 @@ impl Page<'_> {
         // The test that costs most comes first.
         tests.sort_by_key(|(test, of)| (std::cmp::Reverse(of.values().sum::<u64>()), *test));
         let head = html! {
-            (column("Test", None)) (column("Decided by", Some("As the first pipeline has it that has the test")))
+            (column("Test", None)) (column("Why", Some("With the settings of the first pipeline that has the test")))
             @for (rank, p) in self.view.pipelines.iter().enumerate() { (self.column_of(rank, p)) }
         };
         let body = html! {
@@ -106,7 +106,8 @@ impl Page<'_> {
 
     fn deciding_anywhere(&self, test: &str) -> Markup {
         let tasks = self.view.pipelines.iter().flat_map(|p| self.view.done(p));
-        lines(tasks.filter_map(|task| task.deciding.get(test)).next())
+        let why = tasks.filter_map(|task| task.reasons.get(test)).next();
+        html! { @if let Some(why) = why { span class="why" { (why) } } }
     }
 
     fn moment(&self, moment: &Moment) -> Markup {
@@ -178,7 +179,7 @@ impl Page<'_> {
             match miss {
                 Some((task, miss)) => html! {
                     strong class="bad" { "✕ " (miss.test.as_deref().unwrap_or(NO_CANDIDATE)) }
-                    (lines(miss.test.as_ref().and_then(|test| task.deciding.get(test))))
+                    @if let Some(why) = miss.test.as_ref().and_then(|test| task.reasons.get(test)) { span class="why" { (why) } }
                 },
                 None => match track_on(moment, pipeline, id) {
                     Some(track) => html! { "● track " (track) },
@@ -203,11 +204,6 @@ impl Page<'_> {
             &body,
         )
     }
-}
-
-/// Renders the lines of a config that decide a test.
-fn lines(all: Option<&Vec<String>>) -> Markup {
-    html! { @for line in all.into_iter().flatten() { code class="line" { (line) } } }
 }
 
 fn outline([x, y, width, height]: &Box, class: &str, stroke: f64) -> Markup {

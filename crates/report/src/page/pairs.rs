@@ -1,7 +1,10 @@
+use std::collections::BTreeMap;
+
 use maud::{Markup, html};
 
 use super::events::{event_id, kind};
 use super::headline::{ends_of, place_where};
+use super::moments::NO_CANDIDATE;
 use super::{Page, amount, cell, column, no_cell, number, signed, table};
 use crate::chart::key;
 use crate::compare::{Difference, SAME_EVENT_S, compare_in};
@@ -25,8 +28,7 @@ impl Page<'_> {
         Some(html! {
             p {
                 "Each pair is compared on the logs that both finished, log by log, so that a hard log counts "
-                "the same for both. p is how often a difference this large comes about if neither is better: of all ways to "
-                "give the difference of each log the one sign or the other, the part whose mean is as far from zero. "
+                "the same for both. p is that of the exact sign-flip permutation test over logs. "
                 strong { "Clear" } " means p below 0.05, which takes six logs at least"
                 @if self.view.pipelines.len() > 2 {
                     ", after Holm's correction for all pairs that are compared by the same figure: "
@@ -41,6 +43,40 @@ impl Page<'_> {
                 p { "Described is the best pipeline against the next ones; all pairs are in report.json." }
             }
         })
+    }
+
+    /// Says in one line in what a pair differs: people found, and the test that costs the worse one
+    /// most.
+    pub(super) fn why_of_pair(&self, a: &str, b: &str) -> Option<String> {
+        let found = |name: &str| self.summary.pipeline(name)?.people_found_count();
+        let [mut better, mut worse] =
+            [a, b].map(|name| (self.misses_by_test(name), found(name), name));
+        let worse_by_misses = worse.0.values().sum::<u64>() < better.0.values().sum::<u64>();
+        if worse.1 > better.1 || (worse.1 == better.1 && worse_by_misses) {
+            std::mem::swap(&mut better, &mut worse);
+        }
+        let people = self.summary.pipeline(worse.2)?.people;
+        let mut line = format!(
+            "{} found {} of {people} people, {} {}",
+            better.2, better.1?, worse.2, worse.1?
+        );
+        let all: u64 = worse.0.values().sum();
+        let costly = worse.0.iter().max_by_key(|(test, count)| (**count, std::cmp::Reverse(*test)));
+        if let Some((test, count)) = costly {
+            line += &format!("; {count} of the {all} misses of {} by {test}", worse.2);
+        }
+        Some(line)
+    }
+
+    /// Returns the missed people in frames of a pipeline by test, over the runs that are drawn.
+    fn misses_by_test(&self, pipeline: &str) -> BTreeMap<&str, u64> {
+        let mut counts = BTreeMap::new();
+        for task in self.view.logs.iter().filter_map(|log| self.view.drawn(pipeline, log)) {
+            for missed in &task.missed {
+                *counts.entry(missed.test.as_deref().unwrap_or(NO_CANDIDATE)).or_default() += 1;
+            }
+        }
+        counts
     }
 
     /// Returns the pairs that are described, each in the order of the names.
@@ -108,7 +144,8 @@ impl Page<'_> {
         let clear = rows.iter().filter(|p| p.is_clear()).count();
         let differences = compare_in(&self.view, a, b);
         html! {
-            details class="pair print" open[self.view.pipelines.len() == 2] {
+            @if let Some(why) = self.why_of_pair(a, b) { p class="pair-why" { (why) "." } }
+            details class="pair print" {
                 summary {
                     (key(self.series(a), a)) " against " (key(self.series(b), b))
                     span class="aside" {

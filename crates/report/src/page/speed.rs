@@ -150,5 +150,5 @@ fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
 /// Returns the mean of the finite values.
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    tagalong_stats::mean(&finite)
+    tagalong_math::mean(&finite)
 }

@@ -81,6 +81,13 @@ fn task(pipeline: &str, log: &str, level: f64, seed: u64, place: u64) -> TaskRes
             vec!["[[verifiers]] config.least_margin = 0.2".to_owned()],
         )]
         .into(),
+        reasons: [(
+            "margin".to_owned(),
+            "the test \"margin\" dropped the candidate (faces away); decided by \
+             [[verifiers]] config.least_margin = 0.2"
+                .to_owned(),
+        )]
+        .into(),
         ..TaskResult::default()
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry2, Isometry3, UnitQuaternion, Vector2, Vector3};
 use tagalong_core::{DepthImage, Images};
 use tagalong_geometry::{Camera, Lens};
-use tagalong_stats::number_at;
+use tagalong_math::number_at;
 
 use super::{Event, OdometryReading, Shot};
 use crate::faults::{FaultKind, ScheduledFault};

@@ -1,7 +1,7 @@
 use super::*;
 use crate::obstacle_sensors::SensorData;
 use crate::ramp::Ramp;
-use crate::scene::RoomSettings;
+use crate::room_settings::RoomSettings;
 use crate::world;
 
 const SMALL: &str = "seed = 4\nduration_s = 1.0\n[camera]\nwidth = 96\nheight = 72\n\

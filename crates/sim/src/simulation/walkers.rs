@@ -3,10 +3,12 @@
 use nalgebra::{Point2, Vector2};
 
 use crate::approach::ApproachBy;
-use crate::behaviour::{Obstacle, Walker};
+use crate::behaviour::Walker;
+use crate::obstacle::Obstacle;
 use crate::person::Person;
+use crate::posture::Posture;
 use crate::random::Random;
-use crate::scene::{AtEnd, PersonSettings, Posture, Scene};
+use crate::scene::{AtEnd, PersonSettings, Scene};
 use crate::split::{SUBJECTS, Split};
 
 /// So many of a crowd come as two.

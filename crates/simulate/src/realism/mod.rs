@@ -187,11 +187,11 @@ fn depth(frame: &Frame) -> Option<&DepthImage> {
 }
 
 fn mean(values: &[f64]) -> f64 {
-    tagalong_stats::mean(values).unwrap_or(0.0)
+    tagalong_math::mean(values).unwrap_or(0.0)
 }
 
 fn deviation(values: &[f64]) -> f64 {
-    tagalong_stats::mean_and_deviation(values).map_or(0.0, |(_, deviation)| deviation)
+    tagalong_math::mean_and_deviation(values).map_or(0.0, |(_, deviation)| deviation)
 }
 
 #[cfg(test)]

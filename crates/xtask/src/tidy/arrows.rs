@@ -8,37 +8,30 @@ use crate::workspace::Workspace;
 /// Allowed dependencies between the folders of `crates/`, apart from dev-dependencies. The table in
 /// `crates/README.md` says why.
 const ARROWS: &[(&str, &[&str])] = &[
-    ("stats", &[]),
-    ("matching", &[]),
+    ("math", &[]),
     ("geometry", &[]),
     ("core", &[]),
     ("config", &[]),
     ("vision", &[]),
     ("learn", &[]),
     ("network", &[]),
-    ("filtering", &[]),
-    ("steering", &[]),
     ("stereo", &["vision"]),
-    ("odometry", &[]),
-    ("assignment", &["matching"]),
     ("tracking", &["vision"]),
     ("following", &["tracking", "vision"]),
-    ("pipeline", &["stereo", "odometry", "tracking", "following", "network", "vision", "catalog"]),
+    ("pipeline", &["stereo", "tracking", "following", "network", "vision", "catalog"]),
     ("log", &["vision"]),
     // The library for other programs: it wires the parts and is what they see.
     ("tagalong", &["pipeline", "log", "tracking"]),
     ("sim", &[]),
     ("serve", &[]),
-    ("eval", &["matching"]),
+    ("eval", &[]),
     ("report", &["eval"]),
     ("trials", &["vision", "stereo", "pipeline", "sim", "eval"]),
-    ("tuning", &["pipeline", "eval"]),
     ("conformance", &[]),
     ("catalog", &["plugins"]),
-    ("app", &["tagalong", "pipeline", "log", "network"]),
-    ("render", &["pipeline", "vision"]),
-    ("scoring", &["app", "log", "eval"]),
-    ("page", &["app", "report", "pipeline"]),
+    ("app", &["tagalong", "pipeline", "log", "network", "eval"]),
+    ("render", &["pipeline", "log", "vision"]),
+    ("page", &["app", "report", "log", "pipeline"]),
     ("live", &["app", "page", "render", "pipeline", "serve"]),
     (
         "simulate",
@@ -46,17 +39,16 @@ const ARROWS: &[(&str, &[&str])] = &[
     ),
     ("doctor", &["tagalong", "app", "render", "vision", "pipeline", "log"]),
     ("annotate", &["app", "render", "log", "eval", "pipeline", "serve"]),
-    ("view", &["app", "scoring", "page", "render", "log", "eval", "pipeline"]),
-    ("training", &["app", "scoring", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
-    ("benchmark", &["app", "scoring", "render", "pipeline", "log", "eval", "report", "tuning"]),
-    ("import", &["app", "log", "eval"]),
+    ("view", &["app", "page", "render", "log", "eval", "pipeline"]),
+    ("training", &["app", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
     (
-        "experiments",
+        "benchmark",
         &[
             "app", "simulate", "pipeline", "render", "log", "sim", "eval", "trials", "report",
-            "learn", "tuning",
+            "learn",
         ],
     ),
+    ("import", &["app", "log", "eval"]),
     (
         "cli",
         &[
@@ -66,14 +58,12 @@ const ARROWS: &[(&str, &[&str])] = &[
             "catalog",
             "doctor",
             "eval",
-            "experiments",
             "import",
             "live",
             "log",
             "network",
             "pipeline",
             "render",
-            "scoring",
             "sim",
             "simulate",
             "tagalong",
@@ -81,21 +71,19 @@ const ARROWS: &[(&str, &[&str])] = &[
             "view",
         ],
     ),
-    ("testdata", &[]),
     ("fuzz", &["log", "eval", "import", "pipeline", "sim", "catalog", "plugins"]),
     ("xtask", &[]),
 ];
 
 /// The words of the project, from the ground up: each may use those before it, and every other
 /// crate may use all of them.
-const WORDS: &[&str] = &["stats", "geometry", "core", "config"];
+const WORDS: &[&str] = &["math", "geometry", "core", "config"];
 
 /// Crates that a plugin may depend on.
-const OF_PLUGINS: &[&str] = &["vision", "learn", "network", "assignment", "filtering", "steering"];
+const OF_PLUGINS: &[&str] = &["vision", "learn", "network"];
 
 /// Crates that the tests of any crate may depend on in addition.
-const FOR_TESTS: &[&str] =
-    &["vision", "learn", "filtering", "sim", "conformance", "testdata", "catalog", "plugins"];
+const FOR_TESTS: &[&str] = &["vision", "learn", "sim", "conformance", "catalog", "plugins"];
 
 /// Complains about every wrong arrow.
 pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> {
@@ -182,20 +170,20 @@ mod tests {
 
     #[test]
     fn arrows_point_from_plugins_to_the_words() {
-        assert!(!wrong("plugins/ekf", "crates/core", false));
-        assert!(!wrong("plugins/ekf", "crates/conformance", true));
-        assert!(!wrong("crates/catalog", "plugins/ekf", false));
-        assert!(!wrong("tests", "plugins/ekf", false));
+        assert!(!wrong("plugins/filters", "crates/core", false));
+        assert!(!wrong("plugins/filters", "crates/conformance", true));
+        assert!(!wrong("crates/catalog", "plugins/filters", false));
+        assert!(!wrong("tests", "plugins/filters", false));
         assert!(!wrong("benches/papers", "crates/cli", false));
-        assert!(wrong("plugins/ekf", "crates/conformance", false));
-        assert!(wrong("plugins/ekf", "plugins/depth-template", true));
-        assert!(wrong("plugins/ekf", "crates/pipeline", true));
+        assert!(wrong("plugins/filters", "crates/conformance", false));
+        assert!(wrong("plugins/filters", "plugins/depth-template", true));
+        assert!(wrong("plugins/filters", "crates/pipeline", true));
         assert!(wrong("crates/core", "crates/vision", false));
         assert!(!wrong("crates/core", "crates/geometry", false));
         assert!(wrong("crates/core", "crates/config", false));
         assert!(wrong("crates/geometry", "crates/core", false));
-        assert!(wrong("crates/pipeline", "plugins/ekf", false));
-        assert!(wrong("crates/cli", "plugins/ekf", false));
+        assert!(wrong("crates/pipeline", "plugins/filters", false));
+        assert!(wrong("crates/cli", "plugins/filters", false));
         assert!(!wrong("crates/cli", "crates/doctor", false));
         assert!(wrong("crates/app", "crates/doctor", false));
         assert!(wrong("crates/doctor", "crates/training", false));

@@ -2,12 +2,13 @@
 //! plugins, documents without stale parts, plain words in comments.
 
 mod arrows;
+mod circles;
 mod commands;
 mod files;
 mod licences;
 mod names;
 mod paths;
-mod plugins;
+pub mod plugins;
 mod words;
 
 use anyhow::{Result, bail};
@@ -22,6 +23,7 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     let mut complaints = arrows::check(workspace, &metadata)?;
     complaints.extend(plugins::check(workspace, &metadata)?);
     complaints.extend(licences::check(workspace, &metadata)?);
+    complaints.extend(circles::check(workspace)?);
     complaints.extend(files::check(workspace)?);
     complaints.extend(names::check(workspace)?);
     complaints.extend(words::check(workspace)?);

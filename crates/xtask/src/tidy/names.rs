@@ -1,5 +1,6 @@
 use anyhow::Result;
 
+use crate::tidy::plugins;
 use crate::workspace::Workspace;
 
 /// Crates that know plugins: the list of all, the fuzzer of their models, and this one.
@@ -22,7 +23,7 @@ const MAY_NAME: &[(&str, &str)] = &[
 /// Complains about code of `crates/` that knows a plugin by its name: what a plugin offers is
 /// registered by itself.
 pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
-    let plugins = workspace.folders("plugins")?;
+    let plugins = plugins::registered(workspace)?;
     let mut complaints = Vec::new();
     for path in workspace.files()? {
         let file = path.display().to_string().replace('\\', "/");
@@ -84,7 +85,7 @@ mod tests {
             "crates/cli/tests/command/run.rs",
             "crates/pipeline/src/config/tests.rs",
             "crates/cli/examples/legs.toml",
-            "plugins/ekf/src/lib.rs",
+            "plugins/filters/src/lib.rs",
         ] {
             assert!(!is_shared_code(file), "{file}");
         }

@@ -1,4 +1,4 @@
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Context as _, Result};
 
@@ -17,6 +17,12 @@ const PLACEHOLDERS: &[&str] = &[
 
 /// The call that checks a plugin against the promises of its kind.
 const CONFORMANCE: &str = "check_all(";
+
+/// Page that lists all registered plugins with their settings.
+const LIST: &str = "docs/reference/config-keys.md";
+
+/// Plugins that are described on the page of another one of their crate.
+const DESCRIBED_WITH: &[(&str, &str)] = &[("depth-net-verifier", "depth-net")];
 
 /// Plugins that a config has without naming them.
 const DEFAULTS: &[&str] = &["associate-hungarian", "manage-m-of-n"];
@@ -38,15 +44,63 @@ pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> 
         if !list.contains(&call) || !catalog.dependencies.iter().any(|d| d.name == package.name) {
             complaints.push(format!("{folder} is not listed in crates/catalog"));
         }
-        if !used.contains(&name) && !DEFAULTS.contains(&name.as_str()) {
-            complaints.push(format!("no config in configs/ uses the plugin `{name}`"));
-        }
         if !tests_conformance(workspace, &folder)? {
             complaints.push(format!("no test of {folder} calls {CONFORMANCE}"));
         }
-        complaints.extend(readme_gaps(workspace, &folder));
+        if !workspace.root().join(&folder).join("README.md").exists() {
+            complaints.push(format!("{folder} has no README.md"));
+        }
+    }
+    let pages = pages(workspace)?;
+    for name in registered(workspace)? {
+        if !used.contains(&name) && !DEFAULTS.contains(&name.as_str()) {
+            complaints.push(format!("no config in configs/ uses the plugin `{name}`"));
+        }
+        match pages.get(page_of(&name)) {
+            Some((file, text)) => {
+                complaints.extend(gaps(text).into_iter().map(|gap| format!("{file} {gap}")));
+            }
+            None => complaints.push(format!(
+                "no README.md below plugins/ has the heading `# {}`",
+                page_of(&name)
+            )),
+        }
     }
     Ok(complaints)
+}
+
+/// Returns the names of all plugins, as the generated page of their settings lists them.
+///
+/// # Errors
+/// The page cannot be read.
+pub fn registered(workspace: &Workspace) -> Result<BTreeSet<String>> {
+    Ok(headed(&workspace.read(LIST)?).map(String::from).collect())
+}
+
+/// Returns the names in the headings "### `name` (kind)".
+fn headed(page: &str) -> impl Iterator<Item = &str> {
+    let headings = page.lines().filter_map(|line| line.strip_prefix("### `"));
+    headings.filter_map(|heading| heading.split_once("` (")).map(|(name, _)| name)
+}
+
+/// Returns the plugin on whose page this one is described.
+fn page_of(name: &str) -> &str {
+    DESCRIBED_WITH.iter().find(|(plugin, _)| *plugin == name).map_or(name, |(_, page)| page)
+}
+
+/// Returns file and text of each README of the plugins, by its heading.
+fn pages(workspace: &Workspace) -> Result<BTreeMap<String, (String, String)>> {
+    let mut pages = BTreeMap::new();
+    for path in workspace.files()? {
+        if path.starts_with("plugins") && path.ends_with("README.md") {
+            let text = workspace.read(&path)?;
+            let heading = text.lines().next().and_then(|line| line.strip_prefix("# "));
+            if let Some(heading) = heading.map(str::to_owned) {
+                pages.insert(heading, (path.display().to_string(), text));
+            }
+        }
+    }
+    Ok(pages)
 }
 
 /// Says whether a file of the plugin runs the checks of its kind.
@@ -61,13 +115,6 @@ fn tests_conformance(workspace: &Workspace, folder: &str) -> Result<bool> {
         }
     }
     Ok(false)
-}
-
-fn readme_gaps(workspace: &Workspace, folder: &str) -> Vec<String> {
-    let Ok(text) = workspace.read(format!("{folder}/README.md")) else {
-        return vec![format!("{folder} has no README.md")];
-    };
-    gaps(&text).into_iter().map(|gap| format!("{folder}/README.md {gap}")).collect()
 }
 
 /// Returns the parts that a README lacks, and the lines of the template that it still has.
@@ -125,6 +172,13 @@ mod tests {
         let filled = PLACEHOLDERS.iter().fold(readmes[0].clone(), |text, p| text.replace(p, "x"));
         assert!(gaps(&filled).is_empty());
         assert_eq!(gaps("**Source**: us\n**Needs**: a camera\n").len(), 1);
+    }
+
+    #[test]
+    fn plugins_are_those_of_the_generated_page() {
+        let page = "## Detectors\n\n### `a-b` (detector)\n\n### `c` (filter)\n### other\n";
+        assert_eq!(headed(page).collect::<Vec<_>>(), ["a-b", "c"]);
+        assert_eq!([page_of("depth-net-verifier"), page_of("ekf")], ["depth-net", "ekf"]);
     }
 
     #[test]

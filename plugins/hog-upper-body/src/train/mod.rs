@@ -23,7 +23,7 @@ use tagalong_learn::{
     CALIBRATION, Line, Use, accepted, area, mirrored, mix, platt, shifted, use_of,
 };
 
-use crate::scan::FILLED;
+use crate::coverage::FILLED;
 use crate::{
     Coverage, Grid, Kind, Layout, Machine, Model, Scanner, Training, Trees, Wanted, merge,
     window_numbers, window_of,

@@ -1,0 +1,134 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::outcome::Failure;
+use serde::Deserialize;
+use tagalong_eval::Report;
+use tagalong_eval::formats::{Timeline, kitti, metres, mot};
+
+use super::{Reports, odd_labels, read_text, without_area};
+
+/// Tracks as a tracker wrote them.
+#[derive(Clone, Debug, Default)]
+pub struct Tracks {
+    /// Reports by the number of the frame.
+    pub reports: Reports,
+    /// Name of the log of a run, if the tracks are those of a run.
+    pub log_name: Option<String>,
+    /// True if positions are in the robot frame.
+    pub in_robot_frame: bool,
+    /// Notes on lines that may have been read in another way than intended.
+    pub notes: Vec<String>,
+}
+
+/// Part of a run's `report.json` that is used.
+#[derive(Deserialize)]
+struct RunFacts {
+    log: LogName,
+}
+
+#[derive(Deserialize)]
+struct LogName {
+    name: String,
+}
+
+impl Tracks {
+    /// Reads tracks: MOTChallenge or KITTI text, `tracks-metres.csv`, or the folder of a run;
+    /// `length` is the number of frames in the sequence, if that is known.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or that TrackEval would refuse; names the file and the line.
+    pub fn read(path: &Path, length: Option<u32>) -> Result<Self, Failure> {
+        if path.is_dir() {
+            return Self::of_run(path, length);
+        }
+        let text = read_text(path)?;
+        let name = path.display().to_string();
+        let first = text.lines().next().unwrap_or_default();
+        // Of all formats, only `tracks-metres.csv` begins with this column.
+        if first.starts_with("stamp_ns") {
+            let reports = places(&text, &name, length)?;
+            return Ok(Self { reports, in_robot_frame: true, ..Self::default() });
+        }
+        if is_kitti(first) {
+            Self::of_kitti(&text, &name)
+        } else {
+            Self::of_boxes(&text, &name, length)
+        }
+    }
+
+    fn of_boxes(text: &str, name: &str, length: Option<u32>) -> Result<Self, Failure> {
+        let rows = mot::parse_tracks(text, name).map_err(Failure::failed)?;
+        if let Some(length) = length {
+            mot::check_length(&rows, name, length).map_err(Failure::failed)?;
+        }
+        let notes = without_area(name, rows.iter().map(|row| (row.line, &row.region)));
+        let reports = gather(rows.iter().map(mot::Row::report));
+        Ok(Self { reports, notes: notes.into_iter().collect(), ..Self::default() })
+    }
+
+    /// Reads KITTI labels. Their frames count from 0, those of all other formats from 1.
+    fn of_kitti(text: &str, name: &str) -> Result<Self, Failure> {
+        let labels = kitti::parse(text, name).map_err(Failure::failed)?;
+        let mut timeline = Timeline::new();
+        kitti::add_reports(&mut timeline, &labels);
+        let frames = timeline.into_frames().into_iter();
+        let reports = frames.map(|(number, frame)| (number + 1, frame.reports)).collect();
+        let notes = odd_labels(name, &labels);
+        Ok(Self { reports, notes, ..Self::default() })
+    }
+
+    fn of_run(folder: &Path, length: Option<u32>) -> Result<Self, Failure> {
+        let file = |name: &str| -> Result<(String, String), Failure> {
+            let path: PathBuf = folder.join(name);
+            Ok((read_text(&path)?, path.display().to_string()))
+        };
+        let (text, name) = file("tracks.csv")?;
+        let mut tracks = Self::of_boxes(&text, &name, length)?;
+        let (text, name) = file("tracks-metres.csv")?;
+        merge(&mut tracks.reports, places(&text, &name, length)?);
+        let (text, name) = file("report.json")?;
+        let facts: RunFacts = serde_json::from_str(&text)
+            .map_err(|error| Failure::failed(format!("{name}: {error}")))?;
+        Ok(Self { log_name: Some(facts.log.name), in_robot_frame: true, ..tracks })
+    }
+}
+
+fn is_kitti(first: &str) -> bool {
+    // The third field of KITTI is a class name, where MOTChallenge has a number.
+    let class = first.split_whitespace().nth(2);
+    !first.contains(',') && class.is_some_and(|field| field.parse::<f64>().is_err())
+}
+
+fn gather(rows: impl IntoIterator<Item = (u32, Report)>) -> Reports {
+    let mut reports = Reports::new();
+    for (number, report) in rows {
+        reports.entry(number).or_default().push(report);
+    }
+    reports
+}
+
+/// Returns the positions of the seen tracks: `tracks.csv` has boxes of these alone.
+fn places(text: &str, name: &str, length: Option<u32>) -> Result<Reports, Failure> {
+    let rows = metres::parse(text, name).map_err(Failure::failed)?;
+    if let Some(length) = length {
+        metres::check_length(&rows, name, length).map_err(Failure::failed)?;
+    }
+    let seen = rows.iter().filter(|row| row.seen);
+    Ok(gather(seen.map(|row| row.report(metres::Floor::Robot))))
+}
+
+/// Adds the positions to the boxes, and tracks that have a position but no box.
+fn merge(reports: &mut Reports, places: Reports) {
+    for (number, places) in places {
+        let frame = reports.entry(number).or_default();
+        let mut by_id: BTreeMap<i64, usize> =
+            frame.iter().enumerate().map(|(index, report)| (report.id, index)).collect();
+        for place in places {
+            match by_id.remove(&place.id) {
+                Some(index) => frame[index].floor_m = place.floor_m,
+                None => frame.push(place),
+            }
+        }
+    }
+}

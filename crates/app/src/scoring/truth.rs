@@ -1,0 +1,428 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::outcome::Failure;
+use clap::ValueEnum;
+use nalgebra::{Isometry3, Point3};
+use tagalong_eval::formats::mot::{self, SequenceInfo};
+use tagalong_eval::formats::{Timeline, floor, kitti, people};
+use tagalong_eval::{Region, Role, Truth};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
+use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
+
+use super::{Shots, odd_labels, read_text, region, without_area};
+
+/// Largest difference between the stamps of an image and its truth in a log, ns.
+const SAME_MOMENT_NS: u64 = 5_000_000;
+
+/// Assumed height of a person in a whole-body box, m.
+const STANDING_HEIGHT_M: f64 = 1.7;
+
+/// People in a frame, and its regions without annotation.
+pub type People = (Vec<Truth>, Vec<Region>);
+
+/// Rules for reading MOTChallenge truth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum RulesChoice {
+    /// MOT17 if all boxes have a class of it, MOT15 if none has; a mixture is refused.
+    #[default]
+    Auto,
+    /// No classes; confidence 0 does not count.
+    Mot15,
+    /// Pedestrians count, distractors are ignored.
+    Mot17,
+    /// As MOT17, and bicycles are ignored, too.
+    Mot20,
+}
+
+/// Options for reading truth.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TruthOptions {
+    /// Rules of MOTChallenge text.
+    pub rules: RulesChoice,
+    /// True if boxes are of whole people: their upper bodies are compared.
+    pub upper_body: bool,
+}
+
+/// Position of a person, as far as the file has one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum TruthPosition {
+    Unknown,
+    /// Surface of the head in the colour optical frame, m.
+    HeadInCamera([f64; 3]),
+    /// On the floor in the frame of the tracks, m.
+    Floor([f64; 2]),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Mot,
+    People,
+    /// People annotated in laser scans.
+    Floor,
+    Kitti,
+    Log,
+    /// Messages of a log's truth channel, as text lines.
+    Lines,
+}
+
+/// Frame as annotated; the key of the map is its number, or its stamp.
+#[derive(Clone, Debug, Default)]
+struct Annotated {
+    people: Vec<(Truth, TruthPosition)>,
+    ignore_regions: Vec<Region>,
+}
+
+/// File of truth.
+#[derive(Clone, Debug)]
+pub struct TruthFile {
+    kind: Kind,
+    frames: BTreeMap<u64, Annotated>,
+    /// True if its boxes are cut to upper bodies.
+    whole_bodies: bool,
+    /// The `seqinfo.ini` beside it.
+    pub info: Option<SequenceInfo>,
+    /// Rules that its rows were read with, if it is MOTChallenge text.
+    pub rules: Option<mot::Rules>,
+    /// Notes on lines that may have been read in another way than intended.
+    pub notes: Vec<String>,
+}
+
+impl TruthFile {
+    /// Finds the file with the truth of a log, beside it or the log itself; the flag is true if its
+    /// boxes are of whole people.
+    ///
+    /// # Errors
+    /// A log without a file beside it that cannot be read.
+    pub fn beside(log: &Path) -> Result<Option<(PathBuf, bool)>, Failure> {
+        let file = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
+        // Files beside the log take precedence, so that they can replace the log's own truth.
+        let people = file("people.csv").or_else(|| file("truth.jsonl"));
+        Ok(match (people, file("boxes.csv")) {
+            (Some(people), _) => Some((people, false)),
+            (None, Some(boxes)) => Some((boxes, true)),
+            (None, None) => read_truth(log, &Limits::default())?.map(|_| (log.to_owned(), false)),
+        })
+    }
+
+    /// Reads truth of any format.
+    ///
+    /// # Errors
+    /// A file that cannot be read; names the file and the line.
+    pub fn read(path: &Path, options: TruthOptions) -> Result<Self, Failure> {
+        let mut truth = match kind_of(path)? {
+            Kind::Log => Self::of_log(path)?,
+            Kind::Lines => Self::of_frames(Kind::Lines, read_truth_lines(path)?),
+            Kind::People => Self::of_people(path)?,
+            Kind::Floor => Self::of_floor(path)?,
+            Kind::Kitti => Self::of_kitti(path)?,
+            Kind::Mot => Self::of_mot(path, options.rules)?,
+        };
+        truth.whole_bodies = options.upper_body;
+        Ok(truth)
+    }
+
+    fn empty(kind: Kind) -> Self {
+        let frames = BTreeMap::new();
+        let notes = Vec::new();
+        Self { kind, frames, whole_bodies: false, info: None, rules: None, notes }
+    }
+
+    fn add(&mut self, key: u64, truth: Truth, place: TruthPosition) {
+        self.frames.entry(key).or_default().people.push((truth, place));
+    }
+
+    fn of_mot(path: &Path, rules: RulesChoice) -> Result<Self, Failure> {
+        let text = read_text(path)?;
+        let name = path.display().to_string();
+        let rules = match rules {
+            RulesChoice::Auto => mot::Rules::of_truth(&text, &name).map_err(|error| {
+                // Rows that no rules can read are refused by the same function.
+                let is_of_rules = error.why.contains("rules");
+                let hint = if is_of_rules { " (--rules mot15, mot17 or mot20)" } else { "" };
+                Failure::failed(format!("{error}{hint}"))
+            })?,
+            RulesChoice::Mot15 => mot::Rules::Mot15,
+            RulesChoice::Mot17 => mot::Rules::Mot17,
+            RulesChoice::Mot20 => mot::Rules::Mot20,
+        };
+        let mut file = Self::empty(Kind::Mot);
+        file.rules = Some(rules);
+        file.info = sequence_info(path)?;
+        let rows = mot::parse_truth(&text, &name, rules).map_err(Failure::failed)?;
+        if let Some(info) = &file.info {
+            mot::check_length(&rows, &name, info.length).map_err(Failure::failed)?;
+        }
+        file.notes.extend(without_area(&name, rows.iter().map(|row| (row.line, &row.region))));
+        for (number, truth) in rows.iter().map(|row| row.truth(rules)) {
+            file.add(u64::from(number), truth, TruthPosition::Unknown);
+        }
+        Ok(file)
+    }
+
+    fn of_people(path: &Path) -> Result<Self, Failure> {
+        let text = read_text(path)?;
+        let rows = people::parse(&text, &path.display().to_string()).map_err(Failure::failed)?;
+        let mut file = Self::empty(Kind::People);
+        for row in rows {
+            let (number, truth) = row.truth(|_| None);
+            let head = row.head_in_camera_m;
+            let position = head.map_or(TruthPosition::Unknown, TruthPosition::HeadInCamera);
+            file.add(u64::from(number), truth, position);
+        }
+        Ok(file)
+    }
+
+    /// Reads people in laser scans. Scans count from 0, frames from 1.
+    fn of_floor(path: &Path) -> Result<Self, Failure> {
+        let text = read_text(path)?;
+        let rows = floor::parse(&text, &path.display().to_string()).map_err(Failure::failed)?;
+        let mut file = Self::empty(Kind::Floor);
+        for row in rows {
+            let role = if row.ignore { Role::Ignored } else { Role::Counts };
+            let truth = Truth { id: row.person.id, role, ..Truth::default() };
+            // A run takes a scanner that tf does not place to be at the robot's origin.
+            let place = TruthPosition::Floor(row.robot_m.unwrap_or(row.person.at_m));
+            file.add(u64::from(row.scan) + 1, truth, place);
+        }
+        Ok(file)
+    }
+
+    /// Reads KITTI labels. Their frames count from 0, those of all other formats from 1.
+    fn of_kitti(path: &Path) -> Result<Self, Failure> {
+        let text = read_text(path)?;
+        let name = path.display().to_string();
+        let labels = kitti::parse(&text, &name).map_err(Failure::failed)?;
+        let mut timeline = Timeline::new();
+        kitti::add_truths(&mut timeline, &labels);
+        let mut file = Self::empty(Kind::Kitti);
+        file.notes = odd_labels(&name, &labels);
+        for (number, frame) in timeline.into_frames() {
+            let annotated = file.frames.entry(u64::from(number) + 1).or_default();
+            annotated.ignore_regions = frame.ignore_regions;
+            annotated.people = frame
+                .truths
+                .into_iter()
+                .map(|truth| {
+                    (truth, truth.floor_m.map_or(TruthPosition::Unknown, TruthPosition::Floor))
+                })
+                .collect();
+        }
+        Ok(file)
+    }
+
+    fn of_log(path: &Path) -> Result<Self, Failure> {
+        let frames = read_truth(path, &Limits::default())?.ok_or_else(|| {
+            Failure::failed(format!("{} has no truth: no channel {TRUTH_TOPIC}", path.display()))
+        })?;
+        Ok(Self::of_frames(Kind::Log, frames))
+    }
+
+    fn of_frames(kind: Kind, frames: Vec<TruthFrame>) -> Self {
+        let mut file = Self::empty(kind);
+        for frame in frames {
+            let annotated = file.frames.entry(frame.stamp_ns).or_default();
+            annotated.people = frame.people.iter().map(of_person).collect();
+        }
+        file
+    }
+
+    /// Makes the people of these frames neither missed nor found: their boxes become regions
+    /// without annotation.
+    #[must_use]
+    pub fn without_judging(mut self, frames: &[u32]) -> Self {
+        for number in frames {
+            let Some(frame) = self.frames.get_mut(&u64::from(*number)) else { continue };
+            let people = frame.people.drain(..);
+            frame.ignore_regions.extend(people.filter_map(|(truth, _)| truth.region));
+        }
+        self
+    }
+
+    /// Returns true if the rules of KITTI apply.
+    pub fn is_kitti(&self) -> bool {
+        self.kind == Kind::Kitti
+    }
+
+    /// Returns true if floor positions need the camera's pose.
+    pub fn needs_pose(&self) -> bool {
+        let mut people = self.frames.values().flat_map(|frame| &frame.people);
+        people.any(|(_, place)| matches!(place, TruthPosition::HeadInCamera(_)))
+    }
+
+    /// Returns true if frames are identified by stamps: only the log knows their numbers.
+    pub fn needs_stamps(&self) -> bool {
+        matches!(self.kind, Kind::Log | Kind::Lines)
+    }
+
+    /// Returns true if the file of truth is the log itself.
+    pub fn is_in_log(&self) -> bool {
+        self.kind == Kind::Log
+    }
+
+    /// Returns the number of the last frame that is known to exist.
+    pub fn last(&self, shots: &Shots) -> u32 {
+        let stated = self.info.as_ref().map_or(0, |info| info.length);
+        let annotated = self.frames.keys().filter_map(|key| self.number(*key, shots)).max();
+        stated.max(annotated.unwrap_or(0))
+    }
+
+    /// Returns the number of annotated moments without an image of the log.
+    pub fn without_image(&self, shots: &Shots) -> usize {
+        self.frames.keys().filter(|key| self.number(**key, shots).is_none()).count()
+    }
+
+    fn number(&self, key: u64, shots: &Shots) -> Option<u32> {
+        match self.kind {
+            Kind::Log | Kind::Lines => shots.near(key, SAME_MOMENT_NS).map(|shot| shot.number),
+            _ => u32::try_from(key).ok(),
+        }
+    }
+
+    /// Returns the box of a person that is compared with those of tracks. The upper body of a
+    /// person whose feet are in the image is where the floor says, crouching or upright; that of
+    /// others is that of a standing person.
+    fn compared(&self, annotated: Region, camera: Option<&Camera>) -> Region {
+        if !self.whole_bodies {
+            return annotated;
+        }
+        let Region { x, y, width, height } = annotated;
+        let whole = Rect::new(x, y, width, height);
+        let on_floor = camera.and_then(|camera| {
+            let head = camera.head_above_floor(&whole)?;
+            Some(camera.upper_body(&head))
+        });
+        region(&on_floor.unwrap_or_else(|| whole.upper_body_of_standing(STANDING_HEIGHT_M)))
+    }
+
+    /// Returns the people by the number of the frame, on the floor where that is possible.
+    pub fn frames(&self, shots: &Shots) -> BTreeMap<u32, People> {
+        let mut all = BTreeMap::new();
+        for (key, frame) in &self.frames {
+            let Some(number) = self.number(*key, shots) else { continue };
+            let camera = shots.at(number).map(|shot| &*shot.camera);
+            let pose = camera.map(|camera| &camera.robot_from_camera);
+            let people = frame.people.iter().map(|(truth, place)| Truth {
+                floor_m: place.on_floor(pose),
+                region: truth.region.map(|region| self.compared(region, camera)),
+                ..*truth
+            });
+            all.insert(number, (people.collect(), frame.ignore_regions.clone()));
+        }
+        all
+    }
+}
+
+impl TruthPosition {
+    /// Returns the position in the robot frame; heads are moved from their surface to their centre.
+    fn on_floor(self, robot_from_camera: Option<&Isometry3<f64>>) -> Option<[f64; 2]> {
+        match self {
+            Self::Unknown => None,
+            Self::Floor(place) => Some(place),
+            Self::HeadInCamera(surface) => {
+                let surface = Point3::from(surface);
+                let ray = surface.coords.try_normalize(1e-6)?;
+                // Depth sees the surface; tracks estimate the centre of the head.
+                let centre = surface + ray * HEAD_RADIUS_M;
+                let head = robot_from_camera? * centre;
+                Some([head.x, head.y])
+            }
+        }
+    }
+}
+
+fn of_person(person: &TruthPerson) -> (Truth, TruthPosition) {
+    let truth = Truth {
+        id: person.id,
+        region: person.upper_body_px.map(|[x, y, width, height]| Region { x, y, width, height }),
+        role: if person.ignore { Role::Ignored } else { Role::Counts },
+        ..Truth::default()
+    };
+    (
+        truth,
+        person
+            .head_in_robot_m
+            .map_or(TruthPosition::Unknown, |[x, y, _]| TruthPosition::Floor([x, y])),
+    )
+}
+
+/// Distinguishes formats by their first line.
+fn kind_of(path: &Path) -> Result<Kind, Failure> {
+    match path.extension().and_then(|extension| extension.to_str()) {
+        // A log is binary, so its ending decides; the text formats have no reliable ending.
+        Some("mcap") => return Ok(Kind::Log),
+        Some("jsonl") => return Ok(Kind::Lines),
+        _ => {}
+    }
+    let text = read_text(path)?;
+    let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let blank_separated: Vec<&str> = first.split_whitespace().collect();
+    let has_class = |fields: &[&str]| fields.get(2).is_some_and(|f| f.parse::<f64>().is_err());
+    Ok(match first {
+        _ if first.contains("x_laser_m") => Kind::Floor,
+        _ if first.contains("ub_x") || first.contains("head_x") => Kind::People,
+        _ if !first.contains(',') && has_class(&blank_separated) => Kind::Kitti,
+        _ => Kind::Mot,
+    })
+}
+
+/// Returns the `seqinfo.ini` of a MOTChallenge folder: beside `gt.txt` or above `gt`.
+fn sequence_info(truth: &Path) -> Result<Option<SequenceInfo>, Failure> {
+    let folders = truth.ancestors().skip(1).take(2);
+    let Some(path) = folders.map(|f| f.join("seqinfo.ini")).find(|path| path.is_file()) else {
+        return Ok(None);
+    };
+    let text = read_text(&path)?;
+    mot::parse_info(&text, &path.display().to_string()).map(Some).map_err(Failure::failed)
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_geometry::{Distortion, Pinhole};
+
+    use super::*;
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.0, 0.0, 0.0)
+    }
+
+    #[test]
+    fn the_upper_body_of_a_person_who_crouches_is_as_large_as_that_of_one_upright() {
+        let file = TruthFile { whole_bodies: true, ..TruthFile::empty(Kind::Mot) };
+        let whole = |top: f64| {
+            let [feet, head] =
+                [0.0, top].map(|z| camera().project(&Point3::new(3.0, 0.0, z)).unwrap().y);
+            Region { x: 280.0, y: head, width: 80.0, height: feet - head }
+        };
+        let [upright, crouching] =
+            [1.75, 1.1].map(|top| file.compared(whole(top), Some(&camera())));
+        assert!((upright.width - crouching.width).abs() < 1.0, "{upright:?} {crouching:?}");
+        // Without a camera it is that of a small person upright.
+        let guessed = file.compared(whole(1.1), None);
+        assert!(guessed.width < 0.7 * crouching.width, "{guessed:?} {crouching:?}");
+        // Upright the two rules agree.
+        let guessed = file.compared(whole(1.7), None);
+        let on_floor = file.compared(whole(1.7), Some(&camera()));
+        assert!((guessed.width / on_floor.width - 1.0).abs() < 0.06, "{guessed:?} {on_floor:?}");
+    }
+
+    #[test]
+    fn people_of_frames_that_are_not_judged_are_regions_without_annotation() {
+        let mut file = TruthFile::empty(Kind::Mot);
+        let region = Region { x: 1.0, y: 2.0, width: 3.0, height: 4.0 };
+        let person = Truth { region: Some(region), ..Truth::default() };
+        (1..=3).for_each(|number| file.add(number, person, TruthPosition::Unknown));
+        let frames = file.without_judging(&[2, 9]).frames(&Shots::default());
+        assert_eq!(frames[&1], (vec![person], vec![]));
+        assert_eq!(frames[&2], (vec![], vec![region]));
+        assert_eq!(frames[&3].0.len(), 1);
+    }
+
+    #[test]
+    fn boxes_of_upper_bodies_stay_as_they_are() {
+        let region = Region { x: 1.0, y: 2.0, width: 3.0, height: 4.0 };
+        assert_eq!(TruthFile::empty(Kind::Mot).compared(region, Some(&camera())), region);
+    }
+}

@@ -1,0 +1,382 @@
+//! `tagalong boxes`: association alone, on the boxes of another detector.
+//!
+//! Every tracker gets the very same boxes, in memory and without images, so that a setting of
+//! association is tried on thousands of frames in less than a second.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use crate::tuning::{Choice, Figures, Objective, candidates, leave_one_out, mean};
+use clap::{Args, ValueEnum};
+use tagalong_app::config_file::ConfigFile;
+use tagalong_app::format::TableFormat;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
+use tagalong_app::serialize::to_json;
+use tagalong_app::threads::threads;
+use tagalong_config::Registry;
+use tagalong_eval::Tally;
+use tagalong_pipeline::{Tunable, with_values};
+use tagalong_report::{Cell, Row, Table};
+use tagalong_trials::{Contender, GivenSequence, GivenTracks, for_given_boxes, in_order};
+
+/// The config that is run where none is named.
+const RECORDED: &str = "configs/recorded.toml";
+/// Columns of the tables: means over sequences, and all boxes together.
+const COLUMNS: [&str; 8] = [
+    "HOTA, mean",
+    "IDF1, mean",
+    "MOTA, mean",
+    "switches",
+    "HOTA, all",
+    "IDF1, all",
+    "MOTA, all",
+    "frames/s",
+];
+
+/// Text of `--help` after the arguments.
+pub const HELP: &str = "\
+A sequence is a folder with seqinfo.ini and gt/gt.txt, as the MOTChallenge has them; its boxes are
+those of det/det.txt beside, or of BOXES/NAME/det.txt or BOXES/NAME.txt. No image is read.
+
+With --leave-one-out the settings in `[tune]` of a config are chosen by all other sequences, and
+scored in this one. Sequences of one place, whose names agree up to the first hyphen, are left out
+together.
+
+Examples:
+  tagalong boxes MOT17/train
+  tagalong boxes gt/MOT15-train --boxes sort-detections --configs configs/recorded*.toml -o out
+  tagalong boxes gt/MOT15-train --boxes sort-detections --leave-one-out --budget 1000";
+
+/// Arguments of `tagalong boxes`.
+#[derive(Args, Debug)]
+pub struct BoxesArgs {
+    /// Folder of the sequences.
+    pub sequences: PathBuf,
+    /// Folder of the boxes [default: det/det.txt beside the truth].
+    #[arg(long, value_name = "DIR")]
+    pub boxes: Option<PathBuf>,
+    /// The pipelines [default: configs/recorded.toml].
+    #[arg(long, num_args = 1.., value_name = "CONFIG")]
+    pub configs: Vec<PathBuf>,
+    /// Chooses settings by the other sequences.
+    #[arg(long)]
+    pub leave_one_out: bool,
+    /// The objective: the mean of this figure over the places is maximised.
+    #[arg(long, value_enum, default_value_t)]
+    pub objective: BoxesObjective,
+    /// Most settings that are tried for a pipeline, its own among them: all combinations where they
+    /// are so few, otherwise a sample.
+    #[arg(long, value_name = "N", default_value_t = 100,
+          value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    pub budget: u16,
+    /// Seed of the sample.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Runs at once; the results are the same [default: as many as there are cores].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub jobs: Option<u8>,
+    /// Writes the tracks to CONFIG/SEQUENCE.txt in this folder; those with the settings that the
+    /// other sequences chose to CONFIG-left-out/SEQUENCE.txt.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Output format.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: TableFormat,
+}
+
+/// Figure to maximise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum BoxesObjective {
+    /// The mean of HOTA and IDF1.
+    #[default]
+    #[value(name = "both")]
+    Both,
+    /// Detection and association, with equal weight.
+    #[value(name = "HOTA")]
+    Hota,
+    /// Association.
+    #[value(name = "IDF1")]
+    Idf1,
+    /// Detection, with few false positives.
+    #[value(name = "MOTA")]
+    Mota,
+}
+
+impl From<BoxesObjective> for Objective {
+    fn from(choice: BoxesObjective) -> Self {
+        match choice {
+            BoxesObjective::Both => Self::HotaAndIdf1,
+            BoxesObjective::Hota => Self::Hota,
+            BoxesObjective::Idf1 => Self::Idf1,
+            BoxesObjective::Mota => Self::Mota,
+        }
+    }
+}
+
+/// A config with the settings that are tried.
+struct Contestant {
+    name: String,
+    tunables: Vec<Tunable>,
+    /// Values and their contenders, the shipped ones first.
+    settings: Vec<(Vec<toml::Value>, Contender)>,
+}
+
+/// Result on one sequence.
+struct Tracked {
+    tracks: GivenTracks,
+    tally: Tally,
+    frames: usize,
+}
+
+/// Tracks the boxes and prints the tables.
+///
+/// # Errors
+/// Configs that cannot be used are exit code 2; files that cannot be read are 1.
+pub fn boxes(args: &BoxesArgs, registry: &Registry) -> Outcome {
+    let contestants = contestants(args, registry)?;
+    let sequences =
+        GivenSequence::read_all(&args.sequences, args.boxes.as_deref()).map_err(Failure::failed)?;
+    let bench = Bench { args, registry, sequences: &sequences, places: places(&sequences) };
+    let mut rows = Vec::new();
+    let mut notes = Vec::new();
+    let mut details = Vec::new();
+    for contestant in &contestants {
+        let mut add = |name: String, tracked: Vec<Tracked>| -> Result<(), Failure> {
+            bench.write(&name, &tracked)?;
+            rows.push(Row::ours(&name, cells(&tracked)));
+            details.push((name, tracked));
+            Ok(())
+        };
+        let shipped = vec![0; sequences.len()];
+        add(contestant.name.clone(), bench.track(contestant, &shipped)?)?;
+        if args.leave_one_out {
+            let (choice, figures) = bench.choose(contestant)?;
+            let without: Vec<usize> =
+                bench.places.iter().map(|place| choice.without[*place]).collect();
+            add(format!("{}-left-out", contestant.name), bench.track(contestant, &without)?)?;
+            let with_all = vec![choice.with_all; sequences.len()];
+            add(format!("{}-with-all", contestant.name), bench.track(contestant, &with_all)?)?;
+            notes.push(format!("{}: {figures} settings tried.", contestant.name));
+            notes.extend(bench.words(contestant, &choice));
+        }
+    }
+    let title = format!("Given boxes, {} sequences", sequences.len());
+    let columns = COLUMNS.map(String::from).to_vec();
+    let summary = Table { title, columns, rows, notes };
+    show(&[summary, bench.details(&details)], args.format)?;
+    Ok(Ended::Well)
+}
+
+/// Sequences, and the place of each by its number.
+struct Bench<'a> {
+    args: &'a BoxesArgs,
+    registry: &'a Registry,
+    sequences: &'a [GivenSequence],
+    places: Vec<usize>,
+}
+
+impl Bench<'_> {
+    /// Tracks each sequence with one of the settings.
+    fn track(&self, contestant: &Contestant, settings: &[usize]) -> Result<Vec<Tracked>, Failure> {
+        let things: Vec<(&GivenSequence, usize)> =
+            self.sequences.iter().zip(settings.iter().copied()).collect();
+        in_order(
+            &things,
+            threads(self.args.jobs),
+            |(sequence, setting)| {
+                let tracks = sequence.track(&contestant.settings[*setting].1, self.registry)?;
+                let tally = sequence.tally(&tracks)?;
+                Ok(Tracked { tracks, tally, frames: sequence.len() })
+            },
+            |_| {},
+        )
+        .map_err(Failure::failed)
+    }
+
+    /// Runs all settings on all sequences; returns which are chosen, and the number of those tried.
+    fn choose(&self, contestant: &Contestant) -> Result<(Choice, usize), Failure> {
+        let places = self.places.iter().max().map_or(0, |last| last + 1);
+        if places < 2 {
+            let message = "one sequence is left out, so two are needed for --leave-one-out";
+            return Err(Failure::usage(message));
+        }
+        let figures = in_order(
+            &contestant.settings,
+            threads(self.args.jobs),
+            |(_, contender)| {
+                let mut by_place: Vec<Vec<Figures>> = vec![Vec::new(); places];
+                for (sequence, place) in self.sequences.iter().zip(&self.places) {
+                    let tracks = sequence.track(contender, self.registry)?;
+                    let scores = sequence.tally(&tracks)?.scores();
+                    by_place[*place].extend(Figures::of(&scores));
+                }
+                Ok(by_place.iter().map(mean).collect())
+            },
+            |done| say_progress(done, contestant.settings.len()),
+        )
+        .map_err(Failure::failed)?;
+        Ok((leave_one_out(&figures, self.args.objective.into()), figures.len()))
+    }
+
+    /// Returns the chosen settings as text.
+    fn words(&self, contestant: &Contestant, choice: &Choice) -> Vec<String> {
+        let mut without: BTreeMap<usize, Vec<&str>> = BTreeMap::new();
+        for (sequence, place) in self.sequences.iter().zip(&self.places) {
+            without.entry(choice.without[*place]).or_default().push(&sequence.info.name);
+        }
+        let all = format!("With all: {}.", contestant.words(choice.with_all));
+        let one = |(setting, names): (&usize, &Vec<&str>)| {
+            format!("Without {}: {}.", names.join(", "), contestant.words(*setting))
+        };
+        std::iter::once(all).chain(without.iter().map(one)).collect()
+    }
+
+    fn write(&self, name: &str, tracked: &[Tracked]) -> Result<(), Failure> {
+        let Some(folder) = &self.args.output else { return Ok(()) };
+        let folder = folder.join(name);
+        make_folder(&folder)?;
+        for (sequence, tracked) in self.sequences.iter().zip(tracked) {
+            let path = folder.join(format!("{}.txt", sequence.info.name));
+            write_file(&path, tracked.tracks.text())?;
+        }
+        Ok(())
+    }
+
+    /// Returns HOTA and IDF1 by sequence.
+    fn details(&self, all: &[(String, Vec<Tracked>)]) -> Table {
+        let columns = all
+            .iter()
+            .flat_map(|(name, _)| ["HOTA", "IDF1"].map(|figure| format!("{figure}, {name}")));
+        let row = |(at, sequence): (usize, &GivenSequence)| {
+            let cells = all.iter().flat_map(|(_, tracked)| {
+                let scores = tracked[at].tally.scores();
+                [percent(scores.hota), percent(scores.idf1)]
+            });
+            Row::ours(&sequence.info.name, cells.collect())
+        };
+        Table {
+            title: "By sequence, %".into(),
+            columns: columns.collect(),
+            rows: self.sequences.iter().enumerate().map(row).collect(),
+            notes: Vec::new(),
+        }
+    }
+}
+
+impl Contestant {
+    fn new(file: &ConfigFile, args: &BoxesArgs, registry: &Registry) -> Result<Self, Failure> {
+        let (pipeline, settings) = file.pipeline(registry, None)?;
+        let resolved = for_given_boxes(&pipeline.resolved()).map_err(Failure::usage)?;
+        let tunables = if args.leave_one_out { settings.tune } else { Vec::new() };
+        let tried = candidates(&tunables, args.budget.into(), args.seed);
+        let contender = |values: Vec<toml::Value>| -> Result<_, Failure> {
+            let keys = tunables.iter().map(|tunable| tunable.key.as_str());
+            let named: Vec<(&str, &toml::Value)> = keys.zip(&values).collect();
+            let text = with_values(&resolved, &named).map_err(|e| Failure::usage(e.message))?;
+            let folder = file.folder().to_owned();
+            Ok((values, Contender { folder, ..Contender::new(file.stem(), text) }))
+        };
+        let mut settings = tried.into_iter().map(contender).collect::<Result<Vec<_>, _>>()?;
+        if args.leave_one_out {
+            file.check_tuning(registry)?;
+        }
+        // Each value is allowed, so that a refusal is of a combination that contradicts itself.
+        settings.retain(|(_, contender)| contender.pipeline(registry, 1).is_ok());
+        Ok(Self { name: file.stem(), tunables, settings })
+    }
+
+    fn words(&self, setting: usize) -> String {
+        let words: Vec<String> = self
+            .tunables
+            .iter()
+            .zip(&self.settings[setting].0)
+            .map(|(tunable, value)| format!("`{}` = {}", tunable.key, shown(value)))
+            .collect();
+        if setting == 0 { "as shipped".to_owned() } else { words.join(", ") }
+    }
+}
+
+/// Formats a value without the digits that come from dividing a range.
+fn shown(value: &toml::Value) -> String {
+    match value {
+        toml::Value::Float(number) => format!("{:?}", (number * 1e9).round() / 1e9),
+        other => other.to_string(),
+    }
+}
+
+fn contestants(args: &BoxesArgs, registry: &Registry) -> Result<Vec<Contestant>, Failure> {
+    let default = [PathBuf::from(RECORDED)];
+    let named = if args.configs.is_empty() { &default[..] } else { &args.configs };
+    let read = |path: &PathBuf| Contestant::new(&ConfigFile::read(path)?, args, registry);
+    named.iter().map(read).collect()
+}
+
+/// Returns the number of the place of each sequence: names that agree up to the first hyphen are of
+/// one place, unless all of them do.
+fn places(sequences: &[GivenSequence]) -> Vec<usize> {
+    let names: Vec<&str> = sequences.iter().map(|sequence| sequence.info.name.as_str()).collect();
+    numbered(&names)
+}
+
+fn numbered(names: &[&str]) -> Vec<usize> {
+    let place = |name: &str| name.split('-').next().unwrap_or_default().to_owned();
+    let mut numbers: BTreeMap<String, usize> = BTreeMap::new();
+    for name in names {
+        let next = numbers.len();
+        numbers.entry(place(name)).or_insert(next);
+    }
+    if numbers.len() < 2 {
+        return (0..names.len()).collect();
+    }
+    names.iter().map(|name| numbers[&place(name)]).collect()
+}
+
+fn cells(tracked: &[Tracked]) -> Vec<Cell> {
+    let figures: Vec<Figures> =
+        tracked.iter().filter_map(|one| Figures::of(&one.tally.scores())).collect();
+    let means = mean(&figures);
+    let all = Tally::combine(tracked.iter().map(|one| &one.tally)).scores();
+    let frames: usize = tracked.iter().map(|one| one.frames).sum();
+    let worked_ms: f64 = tracked.iter().map(|one| one.tracks.worked_ms).sum();
+    vec![
+        percent(Some(means.hota)),
+        percent(Some(means.idf1)),
+        percent(Some(means.mota)),
+        Cell::number(all.idsw as f64, 0),
+        percent(all.hota),
+        percent(all.idf1),
+        percent(all.mota),
+        Cell::number(1e3 * frames as f64 / worked_ms, 0),
+    ]
+}
+
+fn percent(value: Option<f64>) -> Cell {
+    Cell::number(value.unwrap_or(f64::NAN), 4).percent()
+}
+
+fn say_progress(done: usize, of: usize) {
+    if done.is_multiple_of(100) {
+        say(&format!("{done} of {of} settings"));
+    }
+}
+
+fn show(tables: &[Table], format: TableFormat) -> Result<(), Failure> {
+    match format {
+        TableFormat::Text => tables.iter().try_for_each(|t| print(&format!("{}\n", t.text()))),
+        TableFormat::Markdown => {
+            tables.iter().try_for_each(|t| print(&format!("{}\n", t.markdown())))
+        }
+        TableFormat::Json => print(&to_json("the tables", tables)?),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sequences_of_one_place_are_left_out_together() {
+        assert_eq!(numbered(&["ETH-A", "TUD-B", "ETH-C"]), [0, 1, 0]);
+        assert_eq!(numbered(&["MOT17-02", "MOT17-04"]), [0, 1], "or each alone");
+    }
+}

@@ -1,0 +1,353 @@
+//! `tagalong follow`: a pipeline steers the simulated robot through scenes.
+
+mod approaches;
+mod fit;
+mod log;
+mod story;
+mod table;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+pub use approaches::{ApproachFaults, ApproachLaser};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use log::RideLog;
+use serde::Serialize;
+use tagalong_app::config_file::ConfigFile;
+use tagalong_app::format::TableFormat;
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, spare, write_file};
+use tagalong_app::serialize::to_json;
+use tagalong_app::signals::Signals;
+use tagalong_app::threads::threads;
+use tagalong_config::Registry;
+use tagalong_pipeline::LooksSettings;
+use tagalong_report::Table;
+use tagalong_sim::{InjectedFault, Scene, ScheduledFault, Seeds, Split, Variant};
+use tagalong_simulate::scenes;
+use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
+
+use crate::experiments::contender::contender;
+
+/// Folder and name prefix of the default scenes.
+const SCENES: (&str, &str) = ("configs/scenes", "follow-");
+
+/// Arguments of `tagalong follow`.
+#[derive(Args, Debug)]
+pub struct FollowArgs {
+    /// The pipeline; it needs a `[controller]`.
+    #[arg(default_value = "configs/follow-depth.toml")]
+    pub config: PathBuf,
+    /// The scenes; their first person is the one to follow [default: all
+    /// follow-*.toml of configs/scenes].
+    pub scenes: Vec<PathBuf>,
+    /// More pipelines, which ride the same scenes.
+    #[arg(long, num_args = 1.., value_name = "CONFIG")]
+    pub against: Vec<PathBuf>,
+    /// Ride each scene with this many seeds ...
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub seeds: u64,
+    /// ... starting with this one of the split.
+    #[arg(long, alias = "seed", value_name = "N", default_value_t = 0)]
+    pub first_seed: u64,
+    /// The split that the seeds belong to; settings are chosen on `validation`.
+    #[arg(long, value_name = "SPLIT", default_value = "test")]
+    pub split: Split,
+    /// Delay from a command to the motion of the wheels, ms, instead of the scene's.
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u16).range(0..=2000))]
+    pub latency_ms: Option<u16>,
+    /// Lose this fraction of the images, instead of the scene's.
+    #[arg(long, value_name = "FRACTION", value_parser = fraction)]
+    pub drop: Option<f64>,
+    /// Inject a fault, repeatable: a kind like `freeze-depth`, or `random`, from AT seconds on, for
+    /// LASTS seconds; the seed draws what is left out.
+    #[arg(long, value_name = "KIND[@AT[+LASTS]]")]
+    pub inject: Vec<InjectedFault>,
+    /// Replace a value in each scene: a dotted key, like `crowd=5`.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = tagalong_simulate::key_and_value)]
+    pub set: Vec<(String, String)>,
+    /// Ride each scene with each of these values instead of one, a row each:
+    /// `camera.height_m=0.3,0.5`.
+    #[arg(long, value_name = "KEY=VALUES", value_parser = tagalong_simulate::key_and_value)]
+    pub sweep: Option<(String, String)>,
+    /// Rides at once; the results are the same [default: as many as there are
+    /// cores].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub jobs: Option<u8>,
+    /// Write the log of every ride (images, truth, commands, reasons), and the
+    /// tables, to this folder.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Replace the files of earlier rides in that folder.
+    #[arg(long, requires = "output")]
+    pub overwrite: bool,
+    /// Write a picture of every frame of every ride beside its log, too: boxes, ids, target, plan.
+    #[arg(long, requires = "output")]
+    pub overlay: bool,
+    /// Print the settings [target.looks] that fit these rides best; use the split `train`.
+    #[arg(long)]
+    pub fit: bool,
+    /// Ride this many random approaches instead: a person or a trolley comes at the robot from any
+    /// side and does not avoid it. Prints the contacts while the robot moves; with -o each of them
+    /// leaves its log. The scenes are those with a table `[approach]` [default: approach.toml].
+    #[arg(long, value_name = "N", conflicts_with_all = ["seeds", "fit"],
+          value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    pub approaches: Option<u64>,
+    /// Ride the approach with this seed again, and tell its course; with -o it leaves its log.
+    #[arg(long, value_name = "SEED",
+          conflicts_with_all = ["approaches", "seeds", "first_seed", "split", "fit"])]
+    pub replay: Option<u64>,
+    /// Inject a fault into each approach: at a time, and of a kind, that its seed draws.
+    #[arg(long, value_enum, default_value_t)]
+    pub faults: ApproachFaults,
+    /// Approaches to a robot with a laser scanner.
+    #[arg(long, value_enum, default_value_t)]
+    pub laser: ApproachLaser,
+    /// Output format.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: TableFormat,
+}
+
+fn fraction(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("{text} is no number"))?;
+    if (0.0..=1.0).contains(&value) { Ok(value) } else { Err("must be in 0 to 1".into()) }
+}
+
+/// One pipeline on one random variant of a scene.
+struct Job {
+    suite: String,
+    swept: Option<String>,
+    scene: Scene,
+    contender: Contender,
+}
+
+/// Result of a job.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Followed {
+    /// Name of the scene, with the value of the sweep.
+    pub suite: String,
+    /// Value of the sweep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub swept: Option<String>,
+    /// Name of the pipeline.
+    pub pipeline: String,
+    /// Faults that were injected.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<ScheduledFault>,
+    /// Scores of the ride.
+    #[serde(flatten)]
+    pub ridden: Ridden,
+    /// Time for each frame, ms.
+    #[serde(skip)]
+    pub took_ms: Vec<f64>,
+    /// Events of the ride, as text.
+    #[serde(skip)]
+    pub story: Vec<String>,
+}
+
+/// Content of the JSON output.
+#[derive(Serialize)]
+struct Findings<'a> {
+    seeds: Seeds,
+    tables: &'a [Table],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    looks: Option<&'a LooksSettings>,
+    rides: &'a [Followed],
+}
+
+/// Runs the rides and prints the scores.
+///
+/// # Errors
+/// Scenes and configs that cannot be used are exit code 2; plugins that fail and files that cannot
+/// be written are 1.
+pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
+    if args.approaches.is_some() || args.replay.is_some() {
+        return approaches::approaches(args, registry);
+    }
+    if args.faults != ApproachFaults::None || args.laser != ApproachLaser::Half {
+        let message = "--faults and --laser are for --approaches: add it, or leave them out";
+        return Err(Failure::usage(message));
+    }
+    let signals = Signals::listen()?;
+    let seeds = args.split.seeds(args.first_seed, args.seeds).map_err(Failure::usage)?;
+    let jobs = jobs(args, seeds, registry)?;
+    if let Some(folder) = &args.output {
+        for job in &jobs {
+            spare(&log_file(folder, job), args.overwrite)?;
+        }
+        make_folder(folder)?;
+    }
+    let bar = bar(jobs.len());
+    let threads = threads(args.jobs);
+    let ride = |job: &Job| ride(job, args, registry, &signals);
+    let results = in_order(&jobs, threads, ride, |_| bar.inc(1)).map_err(failure)?;
+    bar.finish_and_clear();
+    if let Some(signal) = signals.received() {
+        say("stopped; the logs that were written are whole, but end early");
+        return Ok(Ended::BySignal(signal));
+    }
+    report(args, seeds, &results)?;
+    Ok(Ended::Well)
+}
+
+fn failure(error: TrialError) -> Failure {
+    match error {
+        TrialError::Config(_) => Failure::usage(error),
+        _ => Failure::failed(error),
+    }
+}
+
+/// Returns every pipeline on every seed of every scene.
+fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>, Failure> {
+    let mut jobs = Vec::new();
+    let contenders = contenders(args, registry)?;
+    for path in scenes(args)? {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        for value in swept(args) {
+            let swept = value.as_ref().map(|(_, value)| value.clone());
+            let suite = std::iter::once(&name).chain(&swept);
+            let suite = suite.map(String::as_str).collect::<Vec<_>>().join(" ");
+            for contender in &contenders {
+                for seed in seeds.numbers() {
+                    let mut variant = variant(args, seed);
+                    variant.set.extend(value.clone());
+                    let mut scene = tagalong_simulate::read(&path, &variant)?;
+                    scene.faults.inject.extend(args.inject.iter().cloned());
+                    scene.check_faults().map_err(Failure::usage)?;
+                    let suite = suite.clone();
+                    let swept = swept.clone();
+                    jobs.push(Job { suite, swept, scene, contender: contender.clone() });
+                }
+            }
+        }
+    }
+    Ok(jobs)
+}
+
+/// Returns the values of `--sweep` with their key; `None` once without it.
+fn swept(args: &FollowArgs) -> Vec<Option<(String, String)>> {
+    let Some((key, values)) = &args.sweep else { return vec![None] };
+    values.split(',').map(|value| Some((key.clone(), value.trim().to_owned()))).collect()
+}
+
+fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, Failure> {
+    let read = |path: &PathBuf| {
+        let file = ConfigFile::read(path)?;
+        let (pipeline, _) = file.pipeline(registry, None)?;
+        if pipeline.has_controller() {
+            return Ok(contender(&file));
+        }
+        let shown = path.display();
+        Err(Failure::usage(format!("{shown} has no [controller]: it steers no robot")))
+    };
+    std::iter::once(&args.config).chain(&args.against).map(read).collect()
+}
+
+/// Returns the named scenes, or all default ones.
+fn scenes(args: &FollowArgs) -> Result<Vec<PathBuf>, Failure> {
+    if !args.scenes.is_empty() {
+        return Ok(args.scenes.clone());
+    }
+    let (folder, prefix) = SCENES;
+    // Outside of a clone the same scenes are built in.
+    let Ok(found) = fs::read_dir(folder) else { return Ok(scenes::beginning_with(prefix)) };
+    let mut paths: Vec<PathBuf> = found
+        .flatten()
+        .filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix))
+        .map(|entry| entry.path())
+        .collect();
+    paths.sort();
+    Ok(paths)
+}
+
+fn variant(args: &FollowArgs, seed: u64) -> Variant {
+    let latency = args.latency_ms.map(|ms| f64::from(ms) * 1e-3);
+    let faults = [("robot.latency_s", latency), ("faults.dropped", args.drop)];
+    let faults = faults
+        .into_iter()
+        // Debug formatting keeps the point of whole numbers, which TOML needs for a float.
+        .filter_map(|(key, value)| Some((key.to_owned(), format!("{:?}", value?))));
+    let set = args.set.iter().cloned().chain(faults).collect();
+    Variant { seed: Some(seed), split: Some(args.split), set }
+}
+
+fn ride(
+    job: &Job,
+    args: &FollowArgs,
+    registry: &Registry,
+    signals: &Signals,
+) -> Result<Followed, TrialError> {
+    let Job { suite, swept, scene, contender } = job;
+    // A ride that a signal came before leaves no log.
+    let folder = args.output.as_deref().filter(|_| signals.received().is_none());
+    let file = folder.map(|folder| log_file(folder, job));
+    let mut log = RideLog::new(file.as_deref(), scene, signals.clone());
+    if let Some(file) = file.filter(|_| args.overlay) {
+        log = log.with_overlay(&overlay_folder(&file))?;
+    }
+    let ride = Ride::new(scene, contender, registry, &mut log)?;
+    log.finish()?;
+    Ok(Followed {
+        suite: suite.clone(),
+        swept: swept.clone(),
+        pipeline: contender.name.clone(),
+        ridden: RideJudge::default().judge(&ride),
+        story: story::story(&ride),
+        faults: ride.faults,
+        took_ms: ride.took_ms,
+    })
+}
+
+fn log_file(folder: &Path, job: &Job) -> PathBuf {
+    let suite = job.suite.replace(' ', "-");
+    folder.join(format!("{suite}-{}-{}.mcap", job.contender.name, job.scene.seed))
+}
+
+/// Returns the folder of a ride's pictures: that of its log, with `-overlay` at its end.
+fn overlay_folder(log: &Path) -> PathBuf {
+    let stem = log.file_stem().unwrap_or_default().to_string_lossy();
+    log.with_file_name(format!("{stem}-overlay"))
+}
+
+fn bar(rides: usize) -> ProgressBar {
+    let bar = ProgressBar::new(rides as u64);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} rides {eta}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), Failure> {
+    let tables = table::tables(results, seeds);
+    let looks = args.fit.then(|| fit::looks(results));
+    let findings = Findings { seeds, tables: &tables, looks: looks.as_ref(), rides: results };
+    let json = to_json("the scores of the rides", &findings)?;
+    let joined = |show: fn(&Table) -> String| -> String {
+        tables.iter().map(show).collect::<Vec<_>>().join("\n")
+    };
+    match args.format {
+        TableFormat::Json => print(&json)?,
+        TableFormat::Markdown => print(&joined(Table::markdown))?,
+        TableFormat::Text => {
+            // The course of events is readable for a single ride only.
+            if let [one] = results {
+                print(&(one.story.join("\n") + "\n\n"))?;
+            }
+            print(&joined(Table::text))?;
+        }
+    }
+    if let Some(looks) = looks.filter(|_| args.format != TableFormat::Json) {
+        print(&fit::toml(&looks)?)?;
+    }
+    let Some(folder) = &args.output else { return Ok(()) };
+    let markdown = joined(Table::markdown);
+    let likeness = table::likeness_csv(results);
+    for (name, text) in
+        [("follow.json", &json), ("follow.md", &markdown), ("likeness.csv", &likeness)]
+    {
+        write_file(&folder.join(name), text)?;
+    }
+    say(&format!("the logs and tables are in {}", folder.display()));
+    Ok(())
+}

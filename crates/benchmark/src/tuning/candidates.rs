@@ -1,0 +1,139 @@
+use std::collections::BTreeSet;
+
+use tagalong_math::{ChaCha, RandomSource};
+use tagalong_pipeline::Tunable;
+
+/// One value for each tunable setting, in their order.
+pub type Candidate = Vec<toml::Value>;
+
+/// Largest number of new deals for a candidate that is not there yet.
+const ROUNDS: usize = 64;
+
+/// Returns the settings to be tried, at most `budget`, as they are in the config first. All
+/// combinations where they are few enough; otherwise a sample of them in which each value
+/// of a setting comes equally often (in the manner of a Latin hypercube: McKay, Beckman and
+/// Conover, Technometrics 1979), the same for the same seed.
+pub fn candidates(tunables: &[Tunable], budget: usize, seed: u64) -> Vec<Candidate> {
+    let shipped: Candidate = tunables.iter().map(|tunable| tunable.now.clone()).collect();
+    let others = budget.saturating_sub(1);
+    let chosen = match grid(tunables, &shipped, others) {
+        Some(all) => all,
+        None => sample(tunables, &shipped, others, seed),
+    };
+    std::iter::once(shipped).chain(chosen).collect()
+}
+
+/// All combinations but the one of the config, unless they are more than `most`.
+fn grid(tunables: &[Tunable], shipped: &Candidate, most: usize) -> Option<Vec<Candidate>> {
+    let mut all: Vec<Candidate> = vec![Vec::new()];
+    for Tunable { values, .. } in tunables {
+        // One more than `most`, in case that of the config is among them.
+        if all.len() * values.len() > most + 1 {
+            return None;
+        }
+        let with = |begun: &Candidate| {
+            let begun = begun.clone();
+            values.iter().map(move |value| [begun.as_slice(), std::slice::from_ref(value)].concat())
+        };
+        all = all.iter().flat_map(with).collect();
+    }
+    all.retain(|candidate| candidate != shipped);
+    (all.len() <= most).then_some(all)
+}
+
+/// Returns settings dealt in blocks, so that a larger budget adds to those of a smaller one.
+fn sample(tunables: &[Tunable], shipped: &Candidate, count: usize, seed: u64) -> Vec<Candidate> {
+    let mut random = ChaCha::new(seed, 0);
+    let mut seen = BTreeSet::from([shown(shipped)]);
+    let mut chosen = Vec::new();
+    let block = tunables.iter().map(|tunable| tunable.values.len()).max().unwrap_or(0);
+    for _ in 0..ROUNDS * count {
+        let columns: Vec<Candidate> =
+            tunables.iter().map(|tunable| dealt(&tunable.values, block, &mut random)).collect();
+        for row in 0..block {
+            let candidate: Candidate = columns.iter().map(|column| column[row].clone()).collect();
+            if chosen.len() < count && seen.insert(shown(&candidate)) {
+                chosen.push(candidate);
+            }
+        }
+    }
+    chosen
+}
+
+/// So many values in random order, each as often as the others, or once more.
+fn dealt(values: &[toml::Value], count: usize, random: &mut ChaCha) -> Candidate {
+    let order = shuffled(values.to_vec(), random);
+    shuffled(order.into_iter().cycle().take(count).collect(), random)
+}
+
+/// Returns the values in random order.
+fn shuffled(mut values: Candidate, random: &mut ChaCha) -> Candidate {
+    random.shuffle(&mut values);
+    values
+}
+
+fn shown(candidate: &Candidate) -> String {
+    format!("{candidate:?}")
+}
+
+#[cfg(test)]
+mod tests {
+    use toml::Value;
+
+    use super::*;
+
+    fn tunable(key: &str, now: i64, values: &[i64]) -> Tunable {
+        let values = values.iter().copied().map(Value::Integer).collect();
+        Tunable { key: key.into(), now: Value::Integer(now), values, places: Vec::new() }
+    }
+
+    fn three() -> [Tunable; 3] {
+        ["a", "b", "c"].map(|key| tunable(key, 2, &[1, 2, 3, 4]))
+    }
+
+    #[test]
+    fn few_combinations_are_all_tried() {
+        let tunables = [tunable("a", 2, &[1, 2]), tunable("b", 9, &[5, 6, 7])];
+        let all = candidates(&tunables, 7, 1);
+        let numbers: Vec<Vec<i64>> =
+            all.iter().map(|c| c.iter().filter_map(Value::as_integer).collect()).collect();
+        let expected = [[2, 9], [1, 5], [1, 6], [1, 7], [2, 5], [2, 6], [2, 7]];
+        assert_eq!(numbers, expected);
+        assert_eq!(candidates(&tunables[..1], 2, 1).len(), 2, "its own value is one of the two");
+        assert_eq!(candidates(&[], 9, 1), [Vec::<Value>::new()]);
+    }
+
+    #[test]
+    fn of_many_a_balanced_sample_is_tried() {
+        let all = candidates(&three(), 21, 1);
+        assert_eq!(all.len(), 21);
+        assert_eq!(all.iter().map(shown).collect::<BTreeSet<_>>().len(), 21, "none twice");
+        for setting in 0..3 {
+            for value in 1..=4 {
+                let with = |c: &&Candidate| c[setting] == Value::Integer(value);
+                let count = all[1..].iter().filter(with).count();
+                assert!((3..=7).contains(&count), "{setting} is {value} in {count} of 20");
+            }
+        }
+    }
+
+    #[test]
+    fn a_seed_says_which() {
+        assert_eq!(candidates(&three(), 21, 1), candidates(&three(), 21, 1));
+        assert_ne!(candidates(&three(), 21, 1), candidates(&three(), 21, 2));
+        assert_eq!(candidates(&three(), 21, 1)[0], candidates(&three(), 21, 2)[0]);
+    }
+
+    #[test]
+    fn a_larger_budget_adds_to_a_smaller_one() {
+        assert_eq!(candidates(&three(), 9, 1), candidates(&three(), 30, 1)[..9]);
+    }
+
+    #[test]
+    fn the_budget_is_kept() {
+        for budget in 1..=70 {
+            let count = candidates(&three(), budget, 1).len();
+            assert!(count <= budget.min(64) && count + 1 >= budget.min(64), "{count} of {budget}");
+        }
+    }
+}

@@ -1,0 +1,210 @@
+use serde::{Deserialize, Serialize};
+use tagalong_eval::Scores;
+
+/// The figures of a pipeline on one log, or a mean of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// HOTA.
+    #[serde(rename = "HOTA")]
+    pub hota: f64,
+    /// IDF1.
+    #[serde(rename = "IDF1")]
+    pub idf1: f64,
+    /// MOTA.
+    #[serde(rename = "MOTA")]
+    pub mota: f64,
+    /// False people in a frame.
+    #[serde(rename = "FP_per_frame")]
+    pub false_a_frame: f64,
+    /// Fraction of the people that were found.
+    pub recall: f64,
+    /// The same of people within 5 m of whom at least 90 % shows, where that is annotated.
+    pub recall_free: Option<f64>,
+    /// The same of those of whom 60 to 90 % shows.
+    pub recall_partly_hidden: Option<f64>,
+    /// Mean distance of a track from its person, m, where places are annotated.
+    pub position_error_m: Option<f64>,
+}
+
+/// Figure to maximise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub enum Objective {
+    /// HOTA.
+    #[default]
+    #[serde(rename = "HOTA")]
+    Hota,
+    /// The mean of HOTA and IDF1.
+    #[serde(rename = "HOTA and IDF1")]
+    HotaAndIdf1,
+    /// IDF1.
+    #[serde(rename = "IDF1")]
+    Idf1,
+    /// MOTA.
+    #[serde(rename = "MOTA")]
+    Mota,
+}
+
+/// Which candidates are best, by their place in the list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// For each room the one that is best in the other rooms.
+    pub without: Vec<usize>,
+    /// The one that is best in all rooms.
+    pub with_all: usize,
+}
+
+impl Figures {
+    /// Takes the figures of a log; `None` if it has no people.
+    pub fn of(scores: &Scores) -> Option<Self> {
+        Some(Self {
+            hota: scores.hota?,
+            idf1: scores.idf1?,
+            mota: scores.mota?,
+            false_a_frame: scores.fp_per_frame?,
+            recall: scores.recall?,
+            recall_free: scores.recall_free,
+            recall_partly_hidden: scores.recall_partly_hidden,
+            position_error_m: scores.position_error_mean_m,
+        })
+    }
+}
+
+impl Objective {
+    fn of(self, figures: &Figures) -> f64 {
+        match self {
+            Self::Hota => figures.hota,
+            Self::HotaAndIdf1 => 0.5 * (figures.hota + figures.idf1),
+            Self::Idf1 => figures.idf1,
+            Self::Mota => figures.mota,
+        }
+    }
+}
+
+/// Returns the mean of figures, each of the same weight; zeros of none. Where some lack a figure,
+/// its mean is that of the others.
+pub fn mean<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Figures {
+    let all: Vec<&Figures> = figures.into_iter().collect();
+    let part = |figure: fn(&Figures) -> Option<f64>| {
+        let values: Vec<f64> = all.iter().filter_map(|figures| figure(figures)).collect();
+        tagalong_math::mean(&values)
+    };
+    Figures {
+        hota: part(|f| Some(f.hota)).unwrap_or(0.0),
+        idf1: part(|f| Some(f.idf1)).unwrap_or(0.0),
+        mota: part(|f| Some(f.mota)).unwrap_or(0.0),
+        false_a_frame: part(|f| Some(f.false_a_frame)).unwrap_or(0.0),
+        recall: part(|f| Some(f.recall)).unwrap_or(0.0),
+        recall_free: part(|f| f.recall_free),
+        recall_partly_hidden: part(|f| f.recall_partly_hidden),
+        position_error_m: part(|f| f.position_error_m),
+    }
+}
+
+/// Returns the choice without each room, and the one with all. `figures` has those of each
+/// candidate in each room, of which there are two at least. Of equally good candidates the first is
+/// taken, so that a setting stays as it is where nothing is better.
+pub fn leave_one_out(figures: &[Vec<Figures>], objective: Objective) -> Choice {
+    let rooms = figures.first().map_or(0, Vec::len);
+    Choice {
+        without: (0..rooms).map(|room| best(figures, objective, |other| other != room)).collect(),
+        with_all: best(figures, objective, |_| true),
+    }
+}
+
+fn best(figures: &[Vec<Figures>], objective: Objective, counts: impl Fn(usize) -> bool) -> usize {
+    let worth = |rooms: &Vec<Figures>| {
+        let counting = rooms.iter().enumerate().filter(|(room, _)| counts(*room));
+        objective.of(&mean(counting.map(|(_, figures)| figures)))
+    };
+    let mut best = (0, f64::NEG_INFINITY);
+    for (at, rooms) in figures.iter().enumerate() {
+        let worth = worth(rooms);
+        if worth > best.1 {
+            best = (at, worth);
+        }
+    }
+    best.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(hota: f64) -> Figures {
+        Figures {
+            hota,
+            idf1: 1.0 - hota,
+            mota: -hota,
+            false_a_frame: hota,
+            recall: 0.5,
+            ..Figures::default()
+        }
+    }
+
+    fn all(figures: &Figures) -> [f64; 5] {
+        let Figures { hota, idf1, mota, false_a_frame, recall, .. } = *figures;
+        [hota, idf1, mota, false_a_frame, recall]
+    }
+
+    fn table(rows: &[[f64; 3]]) -> Vec<Vec<Figures>> {
+        rows.iter().map(|row| row.iter().copied().map(of).collect()).collect()
+    }
+
+    #[test]
+    fn a_room_has_no_say_in_what_is_chosen_without_it() {
+        let figures = [[0.5, 0.5, 0.5], [0.9, 0.4, 0.4], [0.2, 0.6, 0.6]];
+        let choice = leave_one_out(&table(&figures), Objective::Hota);
+        assert_eq!(choice, Choice { without: vec![2, 1, 1], with_all: 1 });
+        for value in [0.0, 0.3, 1.0] {
+            let other = figures.map(|[_, b, c]| [value * b, b, c]);
+            assert_eq!(leave_one_out(&table(&other), Objective::Hota).without[0], 2);
+        }
+    }
+
+    #[test]
+    fn a_figure_that_some_lack_is_the_mean_of_the_others() {
+        let some = Figures { recall_free: Some(0.5), position_error_m: Some(0.1), ..of(0.2) };
+        let other = Figures { recall_free: Some(1.0), ..of(0.4) };
+        let mean = mean([&some, &other, &of(0.6)]);
+        assert!((mean.hota - 0.4).abs() < 1e-12);
+        assert_eq!((mean.recall_free, mean.position_error_m), (Some(0.75), Some(0.1)));
+        assert_eq!(mean.recall_partly_hidden, None);
+    }
+
+    #[test]
+    fn the_objective_says_what_is_better() {
+        let figures = table(&[[0.5, 0.5, 0.5], [0.9, 0.9, 0.9]]);
+        assert_eq!(leave_one_out(&figures, Objective::Hota).with_all, 1);
+        assert_eq!(leave_one_out(&figures, Objective::Idf1).with_all, 0);
+        assert_eq!(leave_one_out(&figures, Objective::Mota).with_all, 0);
+    }
+
+    #[test]
+    fn nothing_changes_without_a_gain() {
+        let figures = table(&[[0.5, 0.6, 0.7], [0.7, 0.6, 0.5], [0.5, 0.6, 0.7]]);
+        assert_eq!(leave_one_out(&figures, Objective::Hota).with_all, 0);
+    }
+
+    #[test]
+    fn means_weigh_equally() {
+        let m = mean(&[of(0.2), of(0.4)]);
+        let expected = [0.3, 0.7, -0.3, 0.3, 0.5];
+        assert!(all(&m).iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{m:?}");
+        assert_eq!(mean(&[]), Figures::default());
+    }
+
+    #[test]
+    fn a_log_without_people_has_no_figures() {
+        let scores = Scores {
+            hota: Some(0.1),
+            idf1: Some(0.2),
+            mota: Some(0.3),
+            fp_per_frame: Some(0.4),
+            recall: Some(0.5),
+            ..Scores::default()
+        };
+        let figures = Figures::of(&scores).map(|figures| all(&figures));
+        assert_eq!(figures, Some([0.1, 0.2, 0.3, 0.4, 0.5]));
+        assert_eq!(Figures::of(&Scores { hota: None, ..scores }), None);
+    }
+}

@@ -1,0 +1,48 @@
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use tagalong_app::format::Format;
+use tagalong_app::input_args::InputArgs;
+
+/// Arguments of `tagalong doctor`.
+#[derive(Args, Debug)]
+#[command(allow_missing_positional = true)]
+pub struct DoctorArgs {
+    /// The pipeline, a TOML file or the name of a built-in one [default: the recommended ones that
+    /// fit the log, one after the other].
+    pub config: Option<PathBuf>,
+    /// The log: MCAP, `.db3`, `.bag`, or the folder of a bag.
+    #[arg(required = true)]
+    pub log: PathBuf,
+    /// Write pictures into this folder: frames with their tracks, and the candidates that each test
+    /// dropped.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Replace the pictures of an earlier visit in the same folder.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Number of frames to examine, from the first one on.
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..))]
+    pub frames: u64,
+    /// Try other settings on this log, and print what each would have changed.
+    #[arg(long, value_enum, default_value_t)]
+    pub settings: Trying,
+    /// Output format.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+    /// Way in which the log is read.
+    #[command(flatten)]
+    pub input: InputArgs,
+}
+
+/// Occasion for trying other settings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Trying {
+    /// Where tracks and things that come and go do not agree.
+    #[default]
+    Auto,
+    /// Always.
+    Always,
+    /// Never: a log is passed once.
+    Never,
+}

@@ -1,0 +1,30 @@
+//! Random numbers, statistics and exact assignment, in one place for the whole workspace.
+//!
+//! * [`SplitMix64`], [`ChaCha`], [`XorShift64`]: seeded generators with the same numbers on every
+//!   machine; [`RandomSource`] has the distributions. [`mix`] and [`number_at`] turn keys into
+//!   numbers without a state, for threads that work in any order; [`fingerprint`] turns bytes into
+//!   one.
+//! * [`mean`], [`mean_and_deviation`], [`median`], [`percentile`]: summaries of values.
+//! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`],
+//!   [`exact_upper_bound`]: how far a figure can be trusted; [`paired_gain`], [`sign_flip`],
+//!   [`holm`]: how far a difference can.
+//! * [`matching`]: the assignment of rows to columns with the greatest weight, for metrics and for
+//!   associators.
+//! * [`exp2_of_negative`]: an exponential function for loops over many numbers.
+//!
+//! There is no clock and no global generator: the same seed gives the same bytes.
+
+mod intervals;
+pub mod matching;
+mod power;
+mod random;
+mod significance;
+mod summary;
+
+pub use intervals::{
+    CONFIDENCE, Interval, clustered_share, draws_interval, exact_upper_bound, mean_interval, wilson,
+};
+pub use power::exp2_of_negative;
+pub use random::{ChaCha, RandomSource, SplitMix64, XorShift64, fingerprint, mix, number_at};
+pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};
+pub use summary::{mean, mean_and_deviation, median, percentile};

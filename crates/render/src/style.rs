@@ -1,0 +1,50 @@
+use tagalong_geometry::Rect;
+use tagalong_log::write::BoxedPart;
+
+use super::OverlayData;
+use tagalong_core::Track;
+
+/// Content of the pictures of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OverlayStyle {
+    /// Parts that are shown beside people and their trails.
+    pub detail: Detail,
+    /// Part of a person that boxes enclose.
+    pub boxes: BoxedPart,
+}
+
+/// Parts that a picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Detail {
+    /// Confirmed people alone: box, ID, distance, trail, silhouette.
+    #[default]
+    People,
+    /// Dropped candidates with their tests, tentative tracks and the state of the filter, too.
+    Debug,
+}
+
+impl OverlayStyle {
+    /// Returns the style that shows dropped candidates and the state of the filter.
+    pub fn debug(boxes: BoxedPart) -> Self {
+        Self { detail: Detail::Debug, boxes }
+    }
+
+    pub(super) fn is_debug(self) -> bool {
+        self.detail == Detail::Debug
+    }
+
+    /// Returns the tracks that the style shows, nearest first.
+    pub(super) fn tracks(self, scene: &OverlayData) -> impl DoubleEndedIterator<Item = &Track> {
+        scene.report.tracks.iter().filter(move |track| track.confirmed || self.is_debug())
+    }
+
+    /// Returns the box of a track in the image, pixels.
+    pub(super) fn region(self, scene: &OverlayData, track: &Track) -> Rect {
+        match self.boxes {
+            BoxedPart::Upper => track.estimate.region,
+            BoxedPart::Full => {
+                scene.camera.whole_body(&track.estimate.region, &track.estimate.person.position)
+            }
+        }
+    }
+}

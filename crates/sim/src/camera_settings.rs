@@ -1,0 +1,83 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::mirror::MirrorSettings;
+
+/// Images of the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CameraKind {
+    /// Colour and registered depth of a structured-light camera.
+    Rgbd,
+    /// A rectified pair of grey images.
+    Stereo,
+    /// The circular colour image of a camera that looks up into a conical
+    /// mirror, of which `width`, `height`, `rate_hz`, `height_m` and `mirror` hold.
+    Panorama,
+}
+
+/// The camera on the robot. Where a scene leaves them out, width, height, field
+/// of view and baseline are those of the kind: 640x480, 58 degrees and 0.075 m
+/// of `rgbd`; 512x384, 100 degrees and 0.12 m of `stereo`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CameraSettings {
+    /// Images that it delivers.
+    pub kind: CameraKind,
+    /// Without it an `rgbd` camera delivers depth only, and images are drawn
+    /// several times faster.
+    pub colour: bool,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Horizontal field of view, degrees.
+    pub field_of_view_deg: f64,
+    /// Images per second.
+    pub rate_hz: f64,
+    /// Height above the floor, m.
+    pub height_m: f64,
+    /// Looks this far down, degrees.
+    pub pitch_down_deg: f64,
+    /// Distance of the two cameras, or of camera and projector, m.
+    pub baseline_m: f64,
+    /// Nearest depth that is measured, m.
+    pub min_depth_m: f64,
+    /// Farthest depth that is measured, m.
+    pub max_depth_m: f64,
+    /// Exposure time, s.
+    pub exposure_s: f64,
+    /// From the first row to the last, s; 0 takes all rows at once. The stamp is
+    /// that of the middle row, and people stand still meanwhile. Not for mirrors.
+    pub rolling_shutter_s: f64,
+    /// The depth of an `rgbd` camera with colour is taken this much later than
+    /// the colour, s; its stamp says so.
+    pub depth_offset_s: f64,
+    /// Typical error of the mount as stated in the log, degrees and (in hundredths) metres.
+    pub mount_error_deg: f64,
+    /// The mirror of a panorama camera.
+    pub mirror: MirrorSettings,
+}
+
+impl Default for CameraSettings {
+    fn default() -> Self {
+        Self {
+            kind: CameraKind::Rgbd,
+            colour: true,
+            width: 640,
+            height: 480,
+            field_of_view_deg: 58.0,
+            rate_hz: 10.0,
+            height_m: 1.2,
+            pitch_down_deg: 0.0,
+            baseline_m: 0.075,
+            min_depth_m: 0.5,
+            max_depth_m: 8.0,
+            exposure_s: 0.012,
+            rolling_shutter_s: 0.0,
+            depth_offset_s: 0.0,
+            mount_error_deg: 0.4,
+            mirror: MirrorSettings::default(),
+        }
+    }
+}

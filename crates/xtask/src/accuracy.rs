@@ -1,0 +1,82 @@
+//! The table of pipelines as shipped and with settings that the other rooms chose, from the table of
+//! a leave-one-room-out test.
+
+use anyhow::{Context, Result};
+
+/// Figures of the table: the head of their columns in the test, and here.
+const FIGURES: [(&str, &str); 5] = [
+    ("HOTA", "HOTA"),
+    ("IDF1", "IDF1"),
+    ("MOTA", "MOTA"),
+    ("false", "FP/frame"),
+    ("recall", "recall"),
+];
+
+/// Figure of a pipeline, as shipped and left out.
+struct Pair<'a> {
+    shipped: &'a str,
+    left_out: &'a str,
+}
+
+/// Returns two rows for each pipeline of `names`, in their order.
+///
+/// # Errors
+/// A table without the pipeline or without one of the figures.
+pub fn markdown(table: &str, names: &str) -> Result<String> {
+    let mut rows = table.lines().filter(|line| line.starts_with('|')).map(cells);
+    let head = rows.next().context("there is no table")?;
+    let rows: Vec<Vec<&str>> = rows.collect();
+    let titles = FIGURES.map(|(_, title)| title).join(" | ");
+    let mut out = format!("| pipeline | | {titles} |\n|---|---|{}\n", "---|".repeat(FIGURES.len()));
+    for name in names.split_whitespace() {
+        let row = rows.iter().find(|row| row.first() == Some(&name));
+        let row = row.with_context(|| format!("there is no row `{name}`"))?;
+        let mut shipped = Vec::new();
+        let mut left_out = Vec::new();
+        for (figure, _) in FIGURES {
+            let pair = pair_of(&head, row, figure)
+                .with_context(|| format!("there is no figure `{figure}`"))?;
+            shipped.push(pair.shipped);
+            left_out.push(pair.left_out);
+        }
+        out += &format!("| `{name}` | as shipped | {} |\n", shipped.join(" | "));
+        out += &format!("| | left out | {} |\n", left_out.join(" | "));
+    }
+    Ok(out)
+}
+
+fn cells(line: &str) -> Vec<&str> {
+    line.trim().trim_matches('|').split('|').map(str::trim).collect()
+}
+
+/// Returns a figure of a row: its columns begin with the one without the room, and that of the shipped
+/// settings is the next `as is`.
+fn pair_of<'a>(head: &[&str], row: &[&'a str], figure: &str) -> Option<Pair<'a>> {
+    let first = head.iter().position(|title| *title == format!("{figure} w/o"))?;
+    let as_is = first + head[first..].iter().position(|title| *title == "as is")?;
+    Some(Pair { shipped: row.get(as_is)?, left_out: row.get(first)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TABLE: &str = "**means**\n\n\
+        |  | rooms | HOTA w/o | all | gap | as is | IDF1 w/o | all | as is | MOTA w/o | all | as is | false w/o | all | as is | recall w/o | all | as is |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n\
+        | a | 4 | 0.1 | 0.2 | 0.3 | 0.4 | 1.1 | 1.2 | 1.3 | 2.1 | 2.2 | 2.3 | 3.1 | 3.2 | 3.3 | 4.1 | 4.2 | 4.3 |\n\n* note\n";
+
+    #[test]
+    fn both_figures_stand_below_each_other() {
+        let shown = markdown(TABLE, "a").unwrap();
+        let rows: Vec<&str> = shown.lines().collect();
+        assert_eq!(rows[2], "| `a` | as shipped | 0.4 | 1.3 | 2.3 | 3.3 | 4.3 |");
+        assert_eq!(rows[3], "| | left out | 0.1 | 1.1 | 2.1 | 3.1 | 4.1 |");
+    }
+
+    #[test]
+    fn a_pipeline_that_was_not_tested_is_named() {
+        let error = markdown(TABLE, "a b").unwrap_err().to_string();
+        assert!(error.contains("no row `b`"), "{error}");
+    }
+}

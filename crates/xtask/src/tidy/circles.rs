@@ -1,0 +1,296 @@
+//! Circles of files: files of a crate that all use each other, directly or through others.
+//!
+//! A module and the files of its own folder may do so, because they are one piece. Otherwise shared
+//! types lie below and checks above, so that a reader can begin somewhere.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::Result;
+
+use crate::workspace::Workspace;
+
+/// Most files in a circle that are not of one module.
+const MOST: usize = 3;
+
+/// Crates with a circle that is still to be cut.
+const KNOWN: &[&str] = &["crates/render"];
+
+/// Re-exports that are followed one after the other, at most.
+const DEPTH: usize = 6;
+
+/// Names from the root of a crate to a module or an item.
+type Names = Vec<String>;
+
+/// Paths that a module names, and whether it exports them.
+type Uses = Vec<(bool, Names)>;
+
+/// Complains about circles of files.
+pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
+    let mut crates: BTreeMap<String, BTreeMap<Names, Uses>> = BTreeMap::new();
+    for path in workspace.files()? {
+        let file = path.display().to_string().replace('\\', "/");
+        let Some((folder, module)) = place(&file) else { continue };
+        let uses = uses(&workspace.read(&path)?);
+        crates.entry(folder.to_owned()).or_default().insert(module, uses);
+    }
+    let mut complaints = Vec::new();
+    for (folder, modules) in &crates {
+        for circle in circles(modules) {
+            let is_known = KNOWN.contains(&folder.as_str());
+            if circle.len() > MOST && !is_one_module(&circle) && !is_known {
+                let names: Vec<String> = circle.iter().map(|module| module.join("::")).collect();
+                complaints.push(format!(
+                    "{folder}: {} files use each other in a circle: {}; move the types that they \
+                     share below them",
+                    circle.len(),
+                    names.join(", ")
+                ));
+            }
+        }
+    }
+    Ok(complaints)
+}
+
+/// Returns the folder of the crate of a source file, and its module; `None` for tests and others.
+fn place(file: &str) -> Option<(&str, Names)> {
+    let (folder, rest) = file.split_once("/src/")?;
+    let module = rest.strip_suffix(".rs")?;
+    let in_product = folder.starts_with("crates/") || folder.starts_with("plugins/");
+    let mut names: Names = module.split('/').map(String::from).collect();
+    if !in_product || names[0] == "bin" || names.iter().any(|name| name == "tests") {
+        return None;
+    }
+    if names.last().is_some_and(|name| ["lib", "main", "mod"].contains(&name.as_str())) {
+        names.pop();
+    }
+    Some((folder, names))
+}
+
+/// Returns the paths that a file names before its tests.
+fn uses(text: &str) -> Uses {
+    let code = text.lines().take_while(|line| line.trim() != "#[cfg(test)]");
+    let code: Vec<&str> = code.filter(|line| !line.trim_start().starts_with("//")).collect();
+    let mut uses = Vec::new();
+    for statement in code.join("\n").split_inclusive([';', '}']) {
+        add_paths(statement, &mut uses);
+    }
+    for (is_exported, tree) in imports(&code) {
+        for names in expanded(&[], &tree) {
+            uses.push((is_exported, names));
+        }
+    }
+    uses
+}
+
+/// Returns the trees of `use`, and whether they are exported.
+fn imports(code: &[&str]) -> Vec<(bool, String)> {
+    let mut imports = Vec::new();
+    let mut lines = code.iter();
+    while let Some(line) = lines.next() {
+        let Some((before, tree)) = line.trim_start().split_once("use ") else { continue };
+        if !before.is_empty() && !before.starts_with("pub") {
+            continue;
+        }
+        let mut tree = tree.to_owned();
+        while !tree.contains(';') {
+            let Some(more) = lines.next() else { break };
+            tree += more.trim();
+        }
+        imports.push((!before.is_empty(), tree.split(';').next().unwrap_or_default().to_owned()));
+    }
+    imports
+}
+
+/// Returns the paths of a tree such as `a::{b, c::d}`.
+fn expanded(before: &[String], tree: &str) -> Vec<Names> {
+    let Some((head, rest)) = tree.split_once('{') else {
+        let path = tree.split(" as ").next().unwrap_or_default();
+        return vec![[before, &names(path)].concat()];
+    };
+    let inner = rest.trim_end().strip_suffix('}').unwrap_or(rest);
+    let before = [before, &names(head)].concat();
+    let mut paths = Vec::new();
+    let mut depth = 0;
+    let mut start = 0;
+    for (at, c) in inner.char_indices().chain([(inner.len(), ',')]) {
+        match c {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            ',' if depth == 0 => {
+                let branch = inner[start..at].trim();
+                if !branch.is_empty() {
+                    paths.extend(expanded(&before, branch));
+                }
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+    paths
+}
+
+fn names(path: &str) -> Names {
+    path.split("::").map(str::trim).filter(|name| !name.is_empty()).map(String::from).collect()
+}
+
+fn is_import(line: &str) -> bool {
+    let line = line.trim_start();
+    line.starts_with("use ") || (line.starts_with("pub") && line.contains(" use "))
+}
+
+/// Adds the paths of several names in a piece of code that is no `use`.
+fn add_paths(code: &str, uses: &mut Uses) {
+    if code.lines().any(is_import) {
+        return;
+    }
+    let in_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+    for word in code.split(|c| !in_path(c)) {
+        if word.contains("::") {
+            uses.push((false, names(word)));
+        }
+    }
+}
+
+/// Returns the circles of the modules of a crate.
+fn circles(modules: &BTreeMap<Names, Uses>) -> Vec<BTreeSet<&Names>> {
+    let arrows: BTreeMap<&Names, BTreeSet<&Names>> =
+        modules.keys().map(|module| (module, arrows(module, modules))).collect();
+    let reached: BTreeMap<&Names, BTreeSet<&Names>> =
+        modules.keys().map(|module| (module, reached(module, &arrows))).collect();
+    let mut circles: Vec<BTreeSet<&Names>> = Vec::new();
+    for module in modules.keys() {
+        if circles.iter().any(|circle| circle.contains(module)) {
+            continue;
+        }
+        let mutual = reached[module].iter().filter(|other| reached[**other].contains(module));
+        let circle: BTreeSet<&Names> = mutual.copied().collect();
+        if circle.len() > 1 {
+            circles.push(circle);
+        }
+    }
+    circles
+}
+
+/// Returns all modules to which arrows lead from one.
+fn reached<'a>(
+    from: &'a Names,
+    arrows: &BTreeMap<&'a Names, BTreeSet<&'a Names>>,
+) -> BTreeSet<&'a Names> {
+    let mut reached = BTreeSet::new();
+    let mut open = vec![from];
+    while let Some(module) = open.pop() {
+        for next in &arrows[module] {
+            if reached.insert(*next) {
+                open.push(next);
+            }
+        }
+    }
+    reached
+}
+
+/// Returns the modules that a module uses; to export from below is no use.
+fn arrows<'a>(module: &Names, modules: &'a BTreeMap<Names, Uses>) -> BTreeSet<&'a Names> {
+    let mut arrows = BTreeSet::new();
+    for (is_exported, path) in &modules[module] {
+        let target = absolute(module, path, modules).and_then(|path| defining(&path, modules, 0));
+        let Some(target) = target else { continue };
+        let is_below = target.starts_with(module);
+        if target != module && !(*is_exported && is_below) {
+            arrows.insert(target);
+        }
+    }
+    arrows
+}
+
+/// Returns a path from the root of the crate; `None` for those of other crates.
+fn absolute(module: &Names, path: &[String], modules: &BTreeMap<Names, Uses>) -> Option<Names> {
+    let (first, rest) = path.split_first()?;
+    match first.as_str() {
+        "crate" => Some(rest.to_vec()),
+        "self" => Some([module, rest].concat()),
+        "super" => {
+            let ups = path.iter().take_while(|name| *name == "super").count();
+            let above = module.get(..module.len().checked_sub(ups)?)?;
+            Some([above, &path[ups..]].concat())
+        }
+        _ => {
+            let inside = [module.as_slice(), path].concat();
+            modules.contains_key(&inside[..module.len() + 1]).then_some(inside)
+        }
+    }
+}
+
+/// Returns the module in which a path ends, through re-exports.
+fn defining<'a>(
+    path: &[String],
+    modules: &'a BTreeMap<Names, Uses>,
+    depth: usize,
+) -> Option<&'a Names> {
+    let known = (0..=path.len()).rev().find_map(|end| modules.get_key_value(&path[..end]));
+    let (module, uses) = known?;
+    let rest = &path[module.len()..];
+    let Some(item) = rest.first().filter(|_| depth < DEPTH) else { return Some(module) };
+    let export = uses.iter().find(|(is_exported, used)| *is_exported && used.last() == Some(item));
+    let origin = export.and_then(|(_, used)| absolute(module, used, modules));
+    match origin {
+        Some(origin) if origin != path => {
+            defining(&[&origin, &rest[1..]].concat(), modules, depth + 1)
+        }
+        _ => Some(module),
+    }
+}
+
+/// Returns true for files of one module below the root, which may know each other.
+fn is_one_module(circle: &BTreeSet<&Names>) -> bool {
+    let Some(first) = circle.first().and_then(|module| module.first()) else { return false };
+    circle.iter().all(|module| module.first() == Some(first))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn circle(files: &[(&str, &str)]) -> Vec<Vec<String>> {
+        let placed = files.iter().map(|(file, text)| {
+            let file = format!("crates/a/src/{file}.rs");
+            (place(&file).unwrap().1, uses(text))
+        });
+        let modules = placed.collect();
+        let named = |circle: BTreeSet<&Names>| circle.iter().map(|m| m.join("::")).collect();
+        circles(&modules).into_iter().map(named).collect()
+    }
+
+    #[test]
+    fn files_that_use_each_other_are_a_circle() {
+        let lib = ("lib", "mod a;\nmod b;\nmod c;\npub use c::C;");
+        let a = ("a", "use crate::b::{self, B};");
+        let b = ("b", "fn f() { crate::c::f(); }");
+        assert_eq!(circle(&[lib, a, b, ("c", "use super::a::A;")]), [["a", "b", "c"]]);
+        assert!(circle(&[lib, a, b, ("c", "// use super::a::A;")]).is_empty());
+        assert!(
+            circle(&[lib, a, b, ("c", "#[cfg(test)]\nmod tests { use super::a; }")]).is_empty()
+        );
+    }
+
+    /// An item of the root that is only exported there is one of the file below.
+    #[test]
+    fn exports_lead_to_the_file_of_the_item() {
+        let lib = ("lib", "mod a;\nmod b;\npub use a::{A, f};\npub use b::B;\nfn g() {}");
+        let a = ("a", "use crate::B;");
+        assert_eq!(circle(&[lib, a, ("b", "use crate::A;")]), [["a", "b"]]);
+        assert_eq!(circle(&[("lib", "mod a;\nuse a::A;"), ("a", "use crate::g;")]), [["", "a"]]);
+        assert!(circle(&[lib, a, ("b", "")]).is_empty());
+        let nested = ("lib", "mod a;\npub use a::{b::{C}, A};");
+        assert!(circle(&[nested, ("a", "fn f() { crate::g(); }")]).is_empty());
+    }
+
+    #[test]
+    fn a_folder_is_one_module() {
+        let [root, a, b] = ["", "a", "a::b"].map(names);
+        assert!(is_one_module(&BTreeSet::from([&a, &b])));
+        assert!(!is_one_module(&BTreeSet::from([&root, &a, &b])));
+        assert_eq!(place("crates/x/src/a/mod.rs"), Some(("crates/x", names("a"))));
+        assert_eq!(place("crates/x/src/a/tests.rs"), None);
+        assert_eq!(place("benches/src/a.rs"), None);
+    }
+}

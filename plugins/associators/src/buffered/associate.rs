@@ -1,0 +1,272 @@
+use crate::{ObservationMemory, Staged, buffered_iou};
+use tagalong_config::check_settings;
+use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
+use tagalong_geometry::Rect;
+
+use crate::buffered::{Config, Motion};
+
+/// The associator.
+pub struct Buffered {
+    config: Config,
+    memory: ObservationMemory,
+}
+
+/// Enlargement of boxes, and the overlap that they need.
+#[derive(Clone, Copy)]
+struct Reach {
+    buffer: f64,
+    min_overlap: f64,
+}
+
+impl Buffered {
+    /// Creates the associator.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        check_settings(&config)?;
+        let memory = ObservationMemory::new(config.motion_frames);
+        Ok(Self { config, memory })
+    }
+
+    fn is_strong(&self, detection: &Detection) -> bool {
+        self.config.priority.is_strong(detection)
+    }
+
+    /// Returns the box at which a track is expected.
+    fn expected(&self, track: &Track) -> Rect {
+        let observed = match self.config.motion {
+            Motion::Observed => self.memory.expected(track.id),
+            Motion::Predicted => None,
+        };
+        observed.unwrap_or(track.estimate.region)
+    }
+
+    fn first(&self) -> Reach {
+        Reach { buffer: self.config.buffer, min_overlap: self.config.min_overlap }
+    }
+
+    fn second(&self) -> Reach {
+        Reach { buffer: self.config.second_buffer, min_overlap: self.config.second_overlap }
+    }
+
+    fn weak(&self) -> Reach {
+        Reach { buffer: self.config.second_buffer, min_overlap: self.config.weak_overlap }
+    }
+
+    /// Returns the overlap of the enlarged boxes, if it is enough.
+    fn overlap(&self, track: &Track, detection: &Detection, reach: Reach) -> Option<f64> {
+        let overlap = buffered_iou(&self.expected(track), &detection.rect()?, reach.buffer);
+        (overlap >= reach.min_overlap).then_some(overlap)
+    }
+}
+
+impl Associator for Buffered {
+    fn fits(&self, track: &Track, detection: &Detection, _: &Gate) -> bool {
+        let fits = |reach| self.overlap(track, detection, reach).is_some();
+        if self.is_strong(detection) {
+            fits(self.first()) || fits(self.second())
+        } else {
+            fits(self.weak())
+        }
+    }
+
+    fn associate(
+        &mut self,
+        tracks: &[Track],
+        detections: &[Detection],
+        gate: &Gate,
+    ) -> Associations {
+        self.memory.begin(tracks, gate.dt_s);
+        let this = &*self;
+        let strong = |at: usize| this.is_strong(&detections[at]);
+        let similarity = |reach: Reach| {
+            move |row: usize, column: usize| {
+                let track = &tracks[row];
+                let detection = &detections[column];
+                let overlap = this.overlap(track, detection, reach)?;
+                let log_ratio = gate.appearance_of(row, column);
+                let overlap = this.config.appearance().similarity(overlap, log_ratio);
+                let counted = this.config.priority.weighed(overlap, detection);
+                gate.admits(track, detection).then_some(counted)
+            }
+        };
+        let mut staged = Staged::new(tracks.len(), detections.len());
+        for confirmed in [true, false] {
+            let confirmed_first = this.config.priority.confirmed_first;
+            let turn = |at: usize| !confirmed_first || tracks[at].confirmed == confirmed;
+            staged.assign(&staged.open(turn, strong), similarity(this.first()));
+            staged.assign(&staged.open(turn, strong), similarity(this.second()));
+            staged.assign(&staged.open(turn, |at| !strong(at)), similarity(this.weak()));
+        }
+        let spent = staged.left(|at| !strong(at));
+        for (track, given) in tracks.iter().zip(staged.given()) {
+            if let Some(region) = given.and_then(|given| detections[given].rect()) {
+                self.memory.record(track.id, region);
+            }
+        }
+        Associations { spent, ..Associations::one_to_one(staged.given().iter().copied()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Fusion, PrioritySettings};
+    use tagalong_conformance::samples::{GATE, detection_in, pairs, track_in};
+
+    use super::*;
+
+    fn at(x: f64) -> Rect {
+        Rect::new(x, 0.0, 20.0, 40.0)
+    }
+
+    fn detection(x: f64, score: f64) -> Detection {
+        Detection { score, ..detection_in(at(x)) }
+    }
+
+    fn track(id: u32, x: f64) -> Track {
+        track_in(id, at(x))
+    }
+
+    fn answer(config: &Config, tracks: &[Track], found: &[Detection]) -> Associations {
+        Buffered::new(config.clone()).unwrap().associate(tracks, found, &GATE)
+    }
+
+    /// The boxes touch no more; enlarged by 0.6 widths on each side they share 22 of 66 pixels.
+    #[test]
+    fn boxes_that_do_not_overlap_are_enlarged() {
+        let with = |buffer: f64| {
+            let config = Config { buffer, second_buffer: buffer, ..Config::default() };
+            pairs(&answer(&config, &[track(1, 0.0)], &[detection(21.0, 3.0)]))
+        };
+        assert_eq!((with(0.1), with(0.6)), (vec![], vec![(0, 0)]));
+    }
+
+    /// Both detections are within reach of the first track in the second stage; the nearer one goes
+    /// to it in the first stage, the farther one to the other track.
+    #[test]
+    fn the_wider_stage_gets_those_that_are_left() {
+        let config = Config { buffer: 0.1, second_buffer: 0.8, ..Config::default() };
+        let tracks = [track(1, 0.0), track(2, 60.0)];
+        let found = [detection(3.0, 3.0), detection(38.0, 3.0)];
+        assert_eq!(pairs(&answer(&config, &tracks, &found)), [(0, 0), (1, 1)]);
+        let one = Config { second_overlap: 1.5, ..config };
+        assert_eq!(pairs(&answer(&one, &tracks, &found)), [(0, 0)]);
+    }
+
+    #[test]
+    fn a_detection_within_the_wider_reach_fits() {
+        let config = Config { buffer: 0.0, second_buffer: 0.8, ..Config::default() };
+        let associator = Buffered::new(config).unwrap();
+        assert!(associator.fits(&track(1, 0.0), &detection(22.0, 3.0), &GATE));
+        assert!(!associator.fits(&track(1, 0.0), &detection(90.0, 3.0), &GATE));
+    }
+
+    /// The farther detection looks like the track.
+    #[test]
+    fn the_better_of_overlap_and_appearance_counts() {
+        let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
+        let with = |appearance: &[Vec<f64>]| {
+            let gate = Gate { appearance, ..GATE };
+            let mut associator = Buffered::new(Config::default()).unwrap();
+            pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
+        };
+        assert_eq!((with(&[]), with(&[vec![0.0, 6.0]])), (vec![(0, 0)], vec![(0, 1)]));
+    }
+
+    /// The nearer detection looks like another person.
+    #[test]
+    fn a_sum_lets_the_appearance_speak_against_a_pair() {
+        let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
+        let with = |fusion: Fusion| {
+            let appearance = [vec![-6.0, 0.0]];
+            let gate = Gate { appearance: &appearance, ..GATE };
+            let config = Config { fusion, ..Config::default() };
+            let mut associator = Buffered::new(config).unwrap();
+            pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
+        };
+        assert_eq!((with(Fusion::Minimum), with(Fusion::Sum)), (vec![(0, 0)], vec![(0, 1)]));
+    }
+
+    #[test]
+    fn the_appearance_counts_for_boxes_that_overlap_enough() {
+        let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
+        let with = |fusion_gate: f64| {
+            let appearance = [vec![0.0, 6.0]];
+            let gate = Gate { appearance: &appearance, ..GATE };
+            let config = Config { fusion_gate, ..Config::default() };
+            let mut associator = Buffered::new(config).unwrap();
+            pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
+        };
+        assert_eq!((with(0.5), with(0.9)), (vec![(0, 1)], vec![(0, 0)]));
+    }
+
+    /// The track goes 8 pixels a frame; the filter has not noticed.
+    #[test]
+    fn a_track_is_expected_by_the_mean_velocity_of_its_observations() {
+        let after = |motion: Motion| {
+            let config = Config { motion, buffer: 0.0, second_buffer: 0.0, ..Config::default() };
+            let mut associator = Buffered::new(config).unwrap();
+            for frame in 1..=3 {
+                let x = 8.0 * f64::from(frame);
+                associator.associate(&[track(1, x - 8.0)], &[detection(x, 3.0)], &GATE);
+            }
+            associator.associate(&[track(1, 0.0)], &[], &GATE);
+            pairs(&associator.associate(&[track(1, 0.0)], &[detection(40.0, 3.0)], &GATE))
+        };
+        assert_eq!(after(Motion::Observed), [(0, 0)]);
+        assert_eq!(after(Motion::Predicted), []);
+    }
+
+    #[test]
+    fn a_weak_detection_continues_a_track_and_starts_none() {
+        let found = [detection(1.0, 0.1), detection(90.0, 0.1)];
+        let with = |weak_overlap: f64| {
+            let config = Config { weak_overlap, ..Config::default() };
+            let answer = answer(&config, &[track(1, 0.0)], &found);
+            (pairs(&answer), answer.spent)
+        };
+        assert_eq!(with(0.5), (vec![(0, 0)], vec![1]));
+        assert_eq!(with(1.5), (vec![], vec![0, 1]));
+    }
+
+    #[test]
+    fn confirmed_tracks_may_go_first() {
+        let tracks = [track(1, 6.0), Track { confirmed: false, ..track(2, 0.0) }];
+        let with = |confirmed_first: bool| {
+            let priority = PrioritySettings { confirmed_first, ..PrioritySettings::default() };
+            let config = Config { priority, ..Config::default() };
+            pairs(&answer(&config, &tracks, &[detection(0.0, 3.0)]))
+        };
+        assert_eq!((with(false), with(true)), (vec![(1, 0)], vec![(0, 0)]));
+    }
+
+    #[test]
+    fn overlap_may_count_by_the_score() {
+        let found = [detection(0.0, 0.5), detection(2.0, 5.0)];
+        let with = |weigh_by_score: bool| {
+            let priority = PrioritySettings { weigh_by_score, ..PrioritySettings::default() };
+            let config = Config { priority, ..Config::default() };
+            pairs(&answer(&config, &[track(1, 0.0)], &found))
+        };
+        assert_eq!((with(false), with(true)), (vec![(0, 0)], vec![(0, 1)]));
+    }
+
+    #[test]
+    fn settings_that_cannot_work_are_refused() {
+        let undefined =
+            PrioritySettings { strong_log_odds: f64::NAN, ..PrioritySettings::default() };
+        for config in [
+            Config { buffer: -0.1, ..Config::default() },
+            Config { min_overlap: 0.0, ..Config::default() },
+            Config { second_buffer: f64::NAN, ..Config::default() },
+            Config { second_overlap: 3.0, ..Config::default() },
+            Config { motion_frames: 0, ..Config::default() },
+            Config { priority: undefined, ..Config::default() },
+            Config { weak_overlap: 0.0, ..Config::default() },
+            Config { fusion_gate: -0.1, ..Config::default() },
+        ] {
+            assert!(Buffered::new(config.clone()).is_err(), "{config:?}");
+        }
+    }
+}

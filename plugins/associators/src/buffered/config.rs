@@ -1,0 +1,76 @@
+use crate::{AppearanceFusion, Fusion, PrioritySettings};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Source of the box at which a track is expected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Motion {
+    /// The last observation, moved on with the mean velocity of the last ones.
+    #[default]
+    Observed,
+    /// The filter's prediction.
+    Predicted,
+}
+
+/// Settings of the associator `associate-buffered`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// In the first stage each side of a box is enlarged by this fraction of it ...
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub buffer: f64,
+    /// ... and the overlap (IoU) of the enlarged boxes is at least this.
+    #[schemars(range(min = 1e-6, max = 1.0))]
+    pub min_overlap: f64,
+    /// The fraction in the second stage, for tracks and detections that are left ...
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub second_buffer: f64,
+    /// ... and the smallest overlap there; above 1 there is no such stage.
+    #[schemars(range(min = 1e-6, max = 2.0))]
+    pub second_overlap: f64,
+    /// Source of the box at which a track is expected.
+    pub motion: Motion,
+    /// Age of the oldest observation of which the mean velocity is taken, frames.
+    #[schemars(range(min = 1, max = 1000))]
+    pub motion_frames: u32,
+    /// Smallest overlap of a weak detection and a track that is left, with the second buffer; above
+    /// 1 weak detections are not used.
+    #[schemars(range(min = 1e-6, max = 2.0))]
+    pub weak_overlap: f64,
+    /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
+    /// place (`sum`), or the better of both counts (`minimum`).
+    pub fusion: Fusion,
+    /// `minimum`: the appearance counts for pairs whose places are at least so similar: the
+    /// overlap of the boxes, enlarged as in their stage.
+    /// BoT-SORT has 0.5.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub fusion_gate: f64,
+    /// Order of detections and tracks.
+    #[serde(flatten)]
+    pub priority: PrioritySettings,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            buffer: 0.3,
+            min_overlap: 0.3,
+            second_buffer: 0.4,
+            second_overlap: 0.3,
+            motion: Motion::Observed,
+            motion_frames: 5,
+            weak_overlap: 0.5,
+            fusion: Fusion::Minimum,
+            fusion_gate: 0.0,
+            priority: PrioritySettings::default(),
+        }
+    }
+}
+
+impl Config {
+    /// Returns the part of the appearance.
+    pub(crate) fn appearance(&self) -> AppearanceFusion {
+        AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate }
+    }
+}

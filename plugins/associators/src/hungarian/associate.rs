@@ -1,0 +1,140 @@
+use crate::{Fit, Pairs};
+use tagalong_config::check_settings;
+use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
+
+use crate::hungarian::Config;
+
+/// The associator: the assignment of all tracks and detections of a frame with the least sum
+/// of costs.
+pub struct Hungarian {
+    config: Config,
+}
+
+impl Hungarian {
+    /// Creates the associator.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        check_settings(&config)?;
+        Ok(Self { config })
+    }
+
+    fn fit(&self, track: &Track, detection: &Detection, gate: &Gate) -> Option<Fit> {
+        self.config.pair_cost().fit(track, detection, gate.dt_s)
+    }
+}
+
+impl Associator for Hungarian {
+    fn fits(&self, track: &Track, detection: &Detection, gate: &Gate) -> bool {
+        self.fit(track, detection, gate).is_some()
+    }
+
+    fn associate(
+        &mut self,
+        tracks: &[Track],
+        detections: &[Detection],
+        gate: &Gate,
+    ) -> Associations {
+        let pair_cost = self.config.pair_cost();
+        let pairs = Pairs { tracks, detections, gate };
+        let rows = pairs.rows();
+        let columns = pairs.columns();
+        let given =
+            pairs.assigned(&rows, &columns, &pair_cost, self.config.miss_factor, |track, found| {
+                self.fit(track, found, gate)
+            });
+        Associations::one_to_one(given)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Cost, Fusion};
+    use tagalong_conformance::samples::{
+        GATE, detection_at, detection_in, pairs, track_at, track_in, with_variance,
+    };
+    use tagalong_geometry::Rect;
+
+    use super::*;
+
+    fn track(x: f64, y: f64, variance_m2: f64) -> Track {
+        with_variance(track_at(1, x, y), variance_m2)
+    }
+
+    #[test]
+    fn pairs_that_are_probably_no_person_are_not_formed() {
+        let mut hungarian = Hungarian::new(Config::default()).unwrap();
+        let doubtful = Detection { score: -2.0, ..detection_at(3.0, 0.0) };
+        let at = track(3.0, 0.0, 0.01);
+        let mut pairs = |score: f64| {
+            let track = Track { score, ..at.clone() };
+            hungarian.associate(&[track], std::slice::from_ref(&doubtful), &GATE).pairs.len()
+        };
+        assert_eq!((pairs(1.9), pairs(2.1)), (0, 1), "log-odds add up");
+    }
+
+    #[test]
+    fn appearance_decides_between_detections_that_fit_equally_well() {
+        let mut hungarian = Hungarian::new(Config::default()).unwrap();
+        let tracks = [0.1, -0.1].map(|y| track(3.0, y, 0.02));
+        let seen = [detection_at(3.0, 0.11), detection_at(3.0, -0.11)];
+        let mut given = |appearance: &[Vec<f64>]| {
+            let answer = hungarian.associate(&tracks, &seen, &Gate { appearance, ..GATE });
+            pairs(&answer).into_iter().map(|(_, detection)| detection).collect::<Vec<_>>()
+        };
+        assert_eq!(given(&[]), [0, 1]);
+        assert_eq!(given(&[vec![-4.0, 4.0], vec![4.0, -4.0]]), [1, 0]);
+        assert_eq!(given(&[vec![-0.1, 0.1], vec![0.1, -0.1]]), [0, 1], "places still count");
+    }
+
+    /// Both detections are near the first track, and the farther one looks like it. The second track
+    /// looks like nothing that is seen.
+    #[test]
+    fn the_better_of_place_and_appearance_counts_where_the_settings_say_so() {
+        let boxed = |x: f64| Rect::new(x, 0.0, 20.0, 40.0);
+        let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(2.0))];
+        let seen = [1.0, 4.0].map(|x| detection_in(boxed(x)));
+        let looks = [vec![-3.0, 6.0], vec![-3.0, -3.0]];
+        let given = |fusion: Fusion, fusion_gate: f64| {
+            let config = Config { cost: Cost::Overlap, fusion, fusion_gate, ..Config::default() };
+            let gate = Gate { appearance: &looks, ..GATE };
+            pairs(&Hungarian::new(config).unwrap().associate(&tracks, &seen, &gate))
+        };
+        assert_eq!(given(Fusion::Minimum, 0.5), [(0, 1), (1, 0)]);
+        assert_eq!(given(Fusion::Minimum, 0.9), [(0, 0), (1, 1)], "too little overlap");
+        assert_eq!(given(Fusion::Sum, 0.5), [(0, 1)], "other looks speak against the second pair");
+    }
+
+    #[test]
+    fn settings_that_cannot_work_are_refused() {
+        for config in [
+            Config { gate: 0.0, ..Config::default() },
+            Config { gate_m: f64::NAN, ..Config::default() },
+            Config { gate_speed_mps: -1.0, ..Config::default() },
+            Config { min_overlap: 1.1, ..Config::default() },
+            Config { miss_factor: f64::INFINITY, ..Config::default() },
+            Config { fusion_gate: 1.1, ..Config::default() },
+        ] {
+            assert!(Hungarian::new(config.clone()).is_err(), "{config:?}");
+        }
+    }
+
+    #[test]
+    fn a_pair_fits_within_the_gate_alone() {
+        let hungarian = Hungarian::new(Config::default()).unwrap();
+        let track = track(3.0, 0.0, 0.01);
+        assert!(hungarian.fits(&track, &detection_at(3.0, 0.1), &GATE));
+        assert!(!hungarian.fits(&track, &detection_at(3.0, 4.0), &GATE));
+    }
+
+    #[test]
+    fn a_track_is_given_the_detection_that_overlaps() {
+        let boxed = |x: f64| Rect::new(x, 0.0, 10.0, 10.0);
+        let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(50.0))];
+        let seen = [2.0, 51.0].map(|x| detection_in(boxed(x)));
+        let settings = Config { cost: Cost::Overlap, ..Config::default() };
+        let given = Hungarian::new(settings).unwrap().associate(&tracks, &seen, &GATE);
+        assert_eq!(pairs(&given), [(0, 0), (1, 1)]);
+    }
+}

@@ -1,0 +1,297 @@
+use std::f64::consts::PI;
+
+use crate::{ObservationMemory, Staged, buffered_iou, probability};
+use tagalong_config::check_settings;
+use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
+use tagalong_geometry::Rect;
+
+use crate::observation_centric::Config;
+
+/// The associator.
+pub struct ObservationCentric {
+    config: Config,
+    memory: ObservationMemory,
+}
+
+/// Tracks and detections of one frame.
+struct Scene<'a> {
+    tracks: &'a [Track],
+    detections: &'a [Detection],
+    gate: &'a Gate<'a>,
+}
+
+impl ObservationCentric {
+    /// Creates the associator.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::Settings`] for numbers that cannot work.
+    pub fn new(config: Config) -> Result<Self> {
+        check_settings(&config)?;
+        let memory = ObservationMemory::new(config.direction_frames);
+        Ok(Self { config, memory })
+    }
+
+    /// Returns the overlap of the predicted box and a detection, if it is enough.
+    fn overlap(&self, track: &Track, detection: &Detection) -> Option<f64> {
+        let strong = self.config.priority.is_strong(detection);
+        let least = if strong { self.config.min_overlap } else { self.config.weak_overlap };
+        let overlap = track.estimate.region.iou(&detection.rect()?);
+        (overlap >= least).then_some(overlap)
+    }
+
+    /// Returns the overlap of the last observation and a strong detection, if it is enough.
+    fn recovered(&self, track: &Track, detection: &Detection) -> Option<f64> {
+        if !self.config.priority.is_strong(detection) {
+            return None;
+        }
+        let last = self.memory.last(track.id)?;
+        let overlap = buffered_iou(&last.region, &detection.rect()?, self.config.recovery_buffer);
+        (overlap >= self.config.recovery_overlap).then_some(overlap)
+    }
+
+    /// Returns the consistency of the direction toward a detection with that in which the track
+    /// moved between its observations (OCM): 0.5 - Δθ / π, 0 for an unknown direction.
+    fn consistency(&self, track: &Track, seen: &Rect) -> f64 {
+        let Some((from, moved)) = self.memory.direction(track.id) else { return 0.0 };
+        let way = seen.centre() - from.centre();
+        let Some(toward) = way.try_normalize(1e-9) else { return 0.0 };
+        0.5 - moved.dot(&toward).clamp(-1.0, 1.0).acos() / PI
+    }
+
+    /// Returns the similarity of a pair by the predicted box, in the first stages.
+    fn similarity(&self, scene: &Scene<'_>, row: usize, column: usize) -> Option<f64> {
+        let (track, detection) = scene.pair(row, column)?;
+        let overlap = self.overlap(track, detection)?;
+        let log_ratio = scene.gate.appearance_of(row, column);
+        let overlap = self.config.appearance().similarity(overlap, log_ratio);
+        let consistency = self.consistency(track, &detection.rect()?);
+        let bonus = self.config.direction_weight * probability(detection.score) * consistency;
+        Some(self.config.priority.weighed(overlap, detection) + bonus)
+    }
+}
+
+impl<'a> Scene<'a> {
+    /// Returns a track and a detection, unless the pair is probably no person.
+    fn pair(&self, row: usize, column: usize) -> Option<(&'a Track, &'a Detection)> {
+        let track = &self.tracks[row];
+        let detection = &self.detections[column];
+        self.gate.admits(track, detection).then_some((track, detection))
+    }
+}
+
+impl Associator for ObservationCentric {
+    fn fits(&self, track: &Track, detection: &Detection, _: &Gate) -> bool {
+        self.overlap(track, detection).or_else(|| self.recovered(track, detection)).is_some()
+    }
+
+    fn associate(
+        &mut self,
+        tracks: &[Track],
+        detections: &[Detection],
+        gate: &Gate,
+    ) -> Associations {
+        self.memory.begin(tracks, gate.dt_s);
+        let scene = Scene { tracks, detections, gate };
+        let priority = self.config.priority;
+        let strong = |at: usize| priority.is_strong(&detections[at]);
+        let early = |at: usize| tracks[at].confirmed || !priority.confirmed_first;
+        let by_prediction = |row, column| self.similarity(&scene, row, column);
+        let mut staged = Staged::new(tracks.len(), detections.len());
+        staged.assign(&staged.open(early, strong), by_prediction);
+        staged.assign(&staged.open(early, |at| !strong(at)), by_prediction);
+        staged.assign(&staged.open(early, strong), |row, column| {
+            let (track, detection) = scene.pair(row, column)?;
+            self.recovered(track, detection)
+        });
+        staged.assign(&staged.open(|_| true, strong), by_prediction);
+        for (track, given) in tracks.iter().zip(staged.given()) {
+            if let Some(region) = given.and_then(|given| detections[given].rect()) {
+                self.memory.record(track.id, region);
+            }
+        }
+        let spent = staged.left(|at| !strong(at));
+        Associations { spent, ..Associations::one_to_one(staged.given().iter().copied()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Fusion, PrioritySettings};
+    use tagalong_conformance::samples::{GATE, detection_in, pairs, track_in};
+
+    use super::*;
+
+    fn at(x: f64, y: f64) -> Rect {
+        Rect::new(x, y, 20.0, 40.0)
+    }
+
+    fn detection(region: Rect, score: f64) -> Detection {
+        Detection { score, ..detection_in(region) }
+    }
+
+    fn associator(config: Config) -> ObservationCentric {
+        ObservationCentric::new(config).unwrap()
+    }
+
+    /// Takes an associator over three frames in which a track goes 4 pixels to the right in each.
+    fn walking(config: Config) -> ObservationCentric {
+        let mut associator = associator(config);
+        for frame in 1..=3 {
+            let region = at(4.0 * f64::from(frame), 0.0);
+            associator.associate(&[track_in(1, region)], &[detection(region, 3.0)], &GATE);
+        }
+        associator
+    }
+
+    /// The detection beside the way of the track overlaps its predicted box a little more.
+    #[test]
+    fn a_detection_straight_ahead_goes_before_one_beside_the_way() {
+        let detections = [detection(at(14.0, 10.0), 3.0), detection(at(23.0, 0.0), 3.0)];
+        let with = |direction_weight: f64| {
+            let mut associator = walking(Config { direction_weight, ..Config::default() });
+            pairs(&associator.associate(&[track_in(1, at(16.0, 0.0))], &detections, &GATE))
+        };
+        assert_eq!(with(0.0), [(0, 0)]);
+        assert_eq!(with(0.2), [(0, 1)]);
+    }
+
+    /// The direction speaks for the left one of equal overlap only as far as the detection is sure.
+    #[test]
+    fn the_direction_counts_by_the_certainty_of_the_detection() {
+        let ahead = |score: f64| [detection(at(14.0, 6.0), 3.0), detection(at(21.0, 0.0), score)];
+        let with = |score: f64| {
+            let priority =
+                PrioritySettings { strong_log_odds: -9.0, ..PrioritySettings::default() };
+            let config = Config { priority, direction_weight: 0.35, ..Config::default() };
+            let track = [track_in(1, at(16.0, 0.0))];
+            pairs(&walking(config).associate(&track, &ahead(score), &GATE))
+        };
+        assert_eq!((with(3.0), with(-2.0)), (vec![(0, 1)], vec![(0, 0)]));
+    }
+
+    #[test]
+    fn a_tentative_track_gets_what_the_confirmed_ones_leave() {
+        let priority = PrioritySettings { confirmed_first: true, ..PrioritySettings::default() };
+        let config = Config { priority, ..Config::default() };
+        let tentative = Track { confirmed: false, ..track_in(1, at(0.0, 0.0)) };
+        let mut associator = associator(config);
+        let found = [detection(at(1.0, 0.0), 3.0)];
+        assert_eq!(pairs(&associator.associate(&[tentative], &found, &GATE)), [(0, 0)]);
+    }
+
+    #[test]
+    fn a_weak_detection_does_not_recover_a_track() {
+        let associator = walking(Config::default());
+        let lost = track_in(1, at(60.0, 0.0));
+        let there = at(12.0, 0.0);
+        assert!(associator.fits(&lost, &detection(there, 3.0), &GATE));
+        assert!(!associator.fits(&lost, &detection(there, -3.0), &GATE));
+    }
+
+    #[test]
+    fn directions_are_compared_as_the_paper_has_them() {
+        let associator = walking(Config::default());
+        let toward = |x: f64, y: f64| associator.consistency(&track_in(1, at(0.0, 0.0)), &at(x, y));
+        // The direction is taken from the observation three frames ago, at x = 4.
+        assert!((toward(14.0, 0.0) - 0.5).abs() < 1e-9, "straight ahead");
+        assert!((toward(-6.0, 0.0) + 0.5).abs() < 1e-9, "straight behind");
+        assert!(toward(4.0, 10.0).abs() < 1e-9, "across");
+        assert_eq!(toward(4.0, 0.0), 0.0, "from where it was there is no direction");
+        assert_eq!(associator.consistency(&track_in(2, at(0.0, 0.0)), &at(9.0, 0.0)), 0.0);
+    }
+
+    /// The prediction ran on, but the person stopped.
+    #[test]
+    fn a_track_that_no_detection_overlaps_is_found_where_it_was_last_observed() {
+        let there = [detection(at(12.0, 0.0), 3.0)];
+        let answer = |config: Config| {
+            pairs(&walking(config).associate(&[track_in(1, at(60.0, 0.0))], &there, &GATE))
+        };
+        assert_eq!(answer(Config::default()), [(0, 0)]);
+        assert_eq!(answer(Config { recovery_overlap: 1.5, ..Config::default() }), []);
+        let near = [detection(at(36.0, 0.0), 3.0)];
+        let answer = |recovery_buffer: f64| {
+            let mut associator = walking(Config { recovery_buffer, ..Config::default() });
+            pairs(&associator.associate(&[track_in(1, at(80.0, 0.0))], &near, &GATE))
+        };
+        assert_eq!((answer(0.0), answer(1.0)), (vec![], vec![(0, 0)]));
+    }
+
+    #[test]
+    fn a_weak_detection_continues_a_track_and_starts_none() {
+        let weak = [detection(at(13.0, 0.0), 0.1), detection(at(90.0, 0.0), 0.1)];
+        let answer = |weak_overlap: f64| {
+            let config = Config { weak_overlap, ..Config::default() };
+            let answer = walking(config).associate(&[track_in(1, at(12.0, 0.0))], &weak, &GATE);
+            (pairs(&answer), answer.spent)
+        };
+        assert_eq!(answer(0.5), (vec![(0, 0)], vec![1]));
+        assert_eq!(answer(1.5), (vec![], vec![0, 1]));
+    }
+
+    #[test]
+    fn confirmed_tracks_may_go_first() {
+        let tracks =
+            [track_in(1, at(6.0, 0.0)), Track { confirmed: false, ..track_in(2, at(0.0, 0.0)) }];
+        let found = [detection(at(0.0, 0.0), 3.0)];
+        let answer = |confirmed_first: bool| {
+            let priority = PrioritySettings { confirmed_first, ..PrioritySettings::default() };
+            let config = Config { priority, ..Config::default() };
+            pairs(&associator(config).associate(&tracks, &found, &GATE))
+        };
+        assert_eq!((answer(false), answer(true)), (vec![(1, 0)], vec![(0, 0)]));
+    }
+
+    #[test]
+    fn overlap_may_count_by_the_score() {
+        let found = [detection(at(0.0, 0.0), 0.5), detection(at(2.0, 0.0), 5.0)];
+        let answer = |weigh_by_score: bool| {
+            let priority = PrioritySettings { weigh_by_score, ..PrioritySettings::default() };
+            let config = Config { priority, ..Config::default() };
+            pairs(&associator(config).associate(&[track_in(1, at(0.0, 0.0))], &found, &GATE))
+        };
+        assert_eq!((answer(false), answer(true)), (vec![(0, 0)], vec![(0, 1)]));
+    }
+
+    #[test]
+    fn appearance_helps_a_pair_within_the_gate() {
+        let found = [detection(at(0.0, 0.0), 3.0), detection(at(5.0, 0.0), 3.0)];
+        let appearance = [vec![-2.0, 4.0]];
+        let answer = |gate: &Gate| {
+            let mut associator = associator(Config::default());
+            pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, gate))
+        };
+        assert_eq!(answer(&GATE), [(0, 0)]);
+        assert_eq!(answer(&Gate { appearance: &appearance, ..GATE }), [(0, 1)]);
+    }
+
+    #[test]
+    fn a_sum_lets_the_appearance_speak_against_a_pair() {
+        let found = [detection(at(0.0, 0.0), 3.0), detection(at(5.0, 0.0), 3.0)];
+        let appearance = [vec![-4.0, 0.0]];
+        let answer = |fusion: Fusion| {
+            let mut associator = associator(Config { fusion, ..Config::default() });
+            let gate = Gate { appearance: &appearance, ..GATE };
+            pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, &gate))
+        };
+        assert_eq!((answer(Fusion::Minimum), answer(Fusion::Sum)), (vec![(0, 0)], vec![(0, 1)]));
+    }
+
+    #[test]
+    fn settings_that_cannot_work_are_refused() {
+        let undefined =
+            PrioritySettings { strong_log_odds: f64::NAN, ..PrioritySettings::default() };
+        for config in [
+            Config { min_overlap: 0.0, ..Config::default() },
+            Config { direction_weight: -0.1, ..Config::default() },
+            Config { direction_frames: 0, ..Config::default() },
+            Config { recovery_overlap: f64::NAN, ..Config::default() },
+            Config { recovery_buffer: -0.1, ..Config::default() },
+            Config { priority: undefined, ..Config::default() },
+            Config { weak_overlap: 3.0, ..Config::default() },
+            Config { fusion_gate: 2.0, ..Config::default() },
+        ] {
+            assert!(ObservationCentric::new(config.clone()).is_err(), "{config:?}");
+        }
+    }
+}

@@ -1,0 +1,24 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::hungarian;
+
+/// Settings of the associator `associate-two-stage`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// The settings of `associate-hungarian`.
+    #[serde(flatten)]
+    pub pairs: hungarian::Config,
+    /// Detections from these log-odds on are strong.
+    pub strong_log_odds: f64,
+    /// A weak detection continues a track only within this part of the gate, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub weak_gate: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { pairs: hungarian::Config::default(), strong_log_odds: 0.5, weak_gate: 0.5 }
+    }
+}

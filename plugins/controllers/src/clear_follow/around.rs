@@ -1,0 +1,167 @@
+use std::f64::consts::TAU;
+
+use nalgebra::Point2;
+use tagalong_core::{DepthImage, EgoMotion};
+use tagalong_geometry::Camera;
+
+/// Directions around the robot.
+const DIRECTIONS: usize = 90;
+/// Columns and rows of the image that are looked at.
+const COLUMNS: usize = 90;
+const ROWS: usize = 60;
+/// Nothing farther away is remembered, m.
+const RANGE_M: f64 = 4.0;
+
+/// The nearest thing in each direction around the robot, seen or remembered.
+#[derive(Clone, Debug)]
+pub(crate) struct NearestObstacles {
+    things: Vec<Option<Obstacle>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Obstacle {
+    /// Robot frame, m.
+    at: Point2<f64>,
+    age_s: f64,
+}
+
+impl NearestObstacles {
+    pub(crate) fn new() -> Self {
+        Self { things: vec![None; DIRECTIONS] }
+    }
+
+    /// The places of all things, robot frame, m.
+    pub(crate) fn places(&self) -> impl Iterator<Item = Point2<f64>> {
+        self.things.iter().flatten().map(|thing| thing.at)
+    }
+
+    /// Moves the memory along with the robot; points older than `memory_s` are forgotten.
+    pub(crate) fn move_along(&mut self, motion: &EgoMotion, memory_s: f64) {
+        let before = std::mem::replace(&mut self.things, vec![None; DIRECTIONS]);
+        for thing in before.into_iter().flatten() {
+            let age_s = thing.age_s + motion.dt;
+            if age_s <= memory_s {
+                self.add(Obstacle { at: motion.apply_to_point(thing.at), age_s });
+            }
+        }
+    }
+
+    /// Adds a depth image: its points replace those remembered in the same directions. Points
+    /// between the `heights`, m, count for which `is_thing` returns true.
+    pub(crate) fn look(
+        &mut self,
+        camera: &Camera,
+        depth: &DepthImage,
+        heights: [f64; 2],
+        is_thing: impl Fn(&Point2<f64>) -> bool,
+    ) {
+        // A grid of pixels is enough: an obstacle of some size covers many.
+        let across = depth.width().div_ceil(COLUMNS).max(1);
+        let down = depth.height().div_ceil(ROWS).max(1);
+        let mut seen = vec![None; DIRECTIONS];
+        let mut looked = [false; DIRECTIONS];
+        for y in (0..depth.height()).step_by(down) {
+            let row = depth.row(y);
+            for x in (0..depth.width()).step_by(across) {
+                let z = f64::from(row[x]);
+                if !(z > 0.0 && z.is_finite()) {
+                    continue;
+                }
+                let point = camera.back_project(Point2::new(x as f64, y as f64), z);
+                let at = point.xy();
+                let Some(direction) = direction(&at) else { continue };
+                looked[direction] = true;
+                if (heights[0]..heights[1]).contains(&point.z) && is_thing(&at) {
+                    keep_nearer(&mut seen[direction], Obstacle { at, age_s: 0.0 });
+                }
+            }
+        }
+        // Directions that the image did not show keep their memory.
+        for (direction, thing) in seen.into_iter().enumerate().filter(|(d, _)| looked[*d]) {
+            self.things[direction] = thing;
+        }
+    }
+
+    fn add(&mut self, thing: Obstacle) {
+        if let Some(direction) = direction(&thing.at) {
+            keep_nearer(&mut self.things[direction], thing);
+        }
+    }
+}
+
+fn keep_nearer(place: &mut Option<Obstacle>, thing: Obstacle) {
+    let range = |thing: &Obstacle| thing.at.coords.norm_squared();
+    if place.is_none_or(|known| range(&thing) < range(&known)) {
+        *place = Some(thing);
+    }
+}
+
+/// Returns the direction of a place; `None` for a place that is far away or not a number.
+fn direction(at: &Point2<f64>) -> Option<usize> {
+    // Most points of an image are far away, and the angle costs more than the distance.
+    let is_near = at.coords.norm() < RANGE_M;
+    if !is_near {
+        return None;
+    }
+    let part = at.y.atan2(at.x).rem_euclid(TAU) / TAU;
+    Some((part * DIRECTIONS as f64) as usize % DIRECTIONS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn things_stay_where_they_are_while_the_robot_moves_and_are_forgotten() {
+        let mut around = NearestObstacles::new();
+        around.add(Obstacle { at: Point2::new(1.0, 0.5), age_s: 0.0 });
+        let step = EgoMotion { forward: 0.5, ..EgoMotion::at_rest(1.0) };
+        around.move_along(&step, 2.5);
+        let places: Vec<_> = around.places().collect();
+        assert_eq!(places, [Point2::new(0.5, 0.5)]);
+        around.move_along(&step, 2.5);
+        around.move_along(&step, 2.5);
+        assert_eq!(around.places().count(), 0);
+    }
+
+    #[test]
+    fn the_nearer_of_two_things_in_a_direction_counts() {
+        let mut around = NearestObstacles::new();
+        for x in [2.0, 1.0, 3.0, f64::NAN, 9.0] {
+            around.add(Obstacle { at: Point2::new(x, 0.01 * x), age_s: 0.0 });
+        }
+        assert_eq!(around.places().map(|p| p.x).collect::<Vec<_>>(), [1.0]);
+    }
+
+    #[test]
+    fn each_thing_has_its_direction_all_around() {
+        let all = [(1.0, 0.01), (0.01, 1.0), (-1.0, 0.01), (-0.01, -1.0), (1.0, -0.01)];
+        let found = all.map(|(x, y)| direction(&Point2::new(x, y)));
+        assert_eq!(found, [Some(0), Some(22), Some(44), Some(67), Some(89)]);
+        assert_eq!(direction(&Point2::new(2.0, 3.0)), Some(14));
+        assert_eq!(direction(&Point2::new(2.4, 3.3)), None, "too far away");
+    }
+
+    /// A camera 1 m above the floor that sees a board 1 m ahead, to the left.
+    #[test]
+    fn what_is_looked_at_replaces_what_was_remembered_there() {
+        use tagalong_geometry::{Distortion, Pinhole};
+        let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0);
+        let board =
+            |to: usize| DepthImage::from_fn(40, 30, move |x, _| if x < to { 1.0 } else { 3.0 });
+        let mut around = NearestObstacles::new();
+        let mut least = |depth: &DepthImage, heights, is_thing: &dyn Fn(&Point2<f64>) -> bool| {
+            around.look(&camera, depth, heights, is_thing);
+            around.places().map(|at| at.coords.norm()).fold(9.0, f64::min)
+        };
+        let all = |_: &Point2<f64>| true;
+        assert!((least(&board(10), [0.1, 1.5], &all) - 1.0_f64.hypot(0.35)).abs() < 0.1);
+        assert!((least(&board(0), [0.1, 1.5], &all) - 3.0).abs() < 0.1, "the board is gone");
+        let unknown = DepthImage::filled(40, 30, f32::NAN);
+        assert!((least(&board(10), [0.1, 1.5], &all) - 1.0_f64.hypot(0.35)).abs() < 0.1);
+        assert!(least(&unknown, [0.1, 1.5], &all) < 1.2, "nothing is seen, so it is still there");
+        assert_eq!(least(&DepthImage::filled(40, 30, 1.0), [1.6, 1.9], &all), 9.0, "overhead");
+        assert_eq!(least(&DepthImage::filled(40, 30, 1.0), [0.1, 1.5], &|_| false), 9.0, "people");
+    }
+}

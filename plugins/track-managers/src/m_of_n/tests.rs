@@ -1,0 +1,276 @@
+use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+use tagalong_core::{
+    Detection, EgoMotion, Estimate, Initiation, Observation, ObservedTrack, Person, Track,
+    TrackChanges, TrackId, TrackManager, Unassociated,
+};
+use tagalong_geometry::{ImageBox, Rect};
+
+use crate::m_of_n::{Config, MOfN};
+
+/// A person at a place on the floor, whose head is 1.6 m high.
+pub(crate) fn person(x: f64, y: f64) -> Detection {
+    Detection {
+        image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
+        position: Point3::new(x, y, 1.6),
+        covariance: Matrix3::identity() * 0.01,
+        score: 1.0,
+        source: "test",
+    }
+}
+
+pub(crate) fn scored(score: f64, detection: Detection) -> Detection {
+    Detection { score, ..detection }
+}
+
+/// A manager with the bookkeeping that the tracker does for it.
+struct Rig {
+    manager: MOfN,
+    tracks: Vec<Track>,
+    started: u32,
+}
+
+const DETECTED: Observation = Observation::Detected { log_odds: 1.0 };
+
+impl Rig {
+    fn new(config: Config) -> Self {
+        Self { manager: MOfN::new(config).unwrap(), tracks: Vec::new(), started: 0 }
+    }
+
+    fn start(&mut self, score: f64, y: f64) -> TrackId {
+        let detection = scored(score, person(3.0, y));
+        let id = TrackId(self.started + 1);
+        let new =
+            Unassociated { detection: &detection, detector_log_odds: score, discovered: true };
+        let Initiation::Start(health) = self.manager.initiate(id, &new) else {
+            panic!("{score} starts no track")
+        };
+        self.started += 1;
+        let person = Person { position: detection.position, velocity: Vector2::zeros() };
+        let estimate =
+            Estimate { person, covariance: SMatrix::identity(), region: detection.rect().unwrap() };
+        self.tracks.push(Track {
+            id,
+            estimate,
+            seen: true,
+            occluded: false,
+            confirmed: health.confirmed,
+            age: 0,
+            unseen_s: 0.0,
+            score: health.log_odds,
+        });
+        id
+    }
+
+    /// An eighth of a second passes, and each track is observed.
+    fn step(&mut self, observations: &[Observation]) -> TrackChanges {
+        self.manager.predict(&EgoMotion::at_rest(0.125));
+        for (track, observation) in self.tracks.iter_mut().zip(observations) {
+            track.unseen_s += 0.125;
+            if observation.is_supported() {
+                track.unseen_s = 0.0;
+            }
+        }
+        self.manage(observations)
+    }
+
+    fn manage(&mut self, observations: &[Observation]) -> TrackChanges {
+        let pairs = self.tracks.iter().zip(observations);
+        let observed: Vec<ObservedTrack<'_>> = pairs
+            .map(|(track, observation)| ObservedTrack { track, observation: *observation })
+            .collect();
+        let changes = self.manager.manage(&observed);
+        for (id, health) in &changes.health {
+            for track in self.tracks.iter_mut().filter(|track| track.id == *id) {
+                (track.confirmed, track.score) = (health.confirmed, health.log_odds);
+            }
+        }
+        changes
+    }
+}
+
+/// One track of a score: the track afterwards, and the tests by which it would have ended.
+fn live(config: Config, score: f64, observations: &[Observation]) -> (Track, Vec<&'static str>) {
+    let mut rig = Rig::new(config);
+    rig.start(score, 0.0);
+    let ends = observations.iter().flat_map(|one| rig.step(&[*one]).ends).map(|(_, test)| test);
+    let ends = ends.collect();
+    (rig.tracks[0].clone(), ends)
+}
+
+fn confirmed(config: Config, score: f64, observations: &[Observation]) -> bool {
+    live(config, score, observations).0.confirmed
+}
+
+#[test]
+fn hits_confirm_only_if_they_are_close_to_each_other() {
+    use Observation::{Missed, NotSearched, Occluded, OutOfView};
+    let config =
+        || Config { confirm_hits: 3, confirm_within: 5, tentative_misses: 9, ..Config::default() };
+    let hits = |observations: &[Observation]| confirmed(config(), 1.0, observations);
+    assert!(!hits(&[DETECTED]) && hits(&[DETECTED, DETECTED]), "the first detection counts");
+    assert!(hits(&[Missed, DETECTED, Missed, DETECTED]), "three of five");
+    assert!(!hits(&[Missed, Missed, DETECTED, Missed, DETECTED]), "of six");
+    let hidden = [Occluded, OutOfView, NotSearched, Occluded];
+    assert!(hits(&[&hidden[..], &[DETECTED, DETECTED]].concat()), "hidden is not missed");
+    assert!(confirmed(Config { confirm_hits: 1, ..config() }, 1.0, &[]));
+}
+
+#[test]
+fn two_hits_in_a_row_confirm_where_images_are_far_apart() {
+    use Observation::{Missed, Occluded};
+    // The frames of the rig are an eighth of a second apart.
+    let hits = |confirm_apart_s: f64, observations: &[Observation]| {
+        let config = Config { confirm_hits: 4, confirm_within: 5, ..Config::default() };
+        confirmed(Config { confirm_apart_s, ..config }, 1.0, observations)
+    };
+    assert!(hits(0.125, &[DETECTED]) && hits(0.125, &[Occluded, DETECTED]));
+    assert!(!hits(0.125, &[Missed, DETECTED]), "not in a row");
+    assert!(!hits(0.126, &[DETECTED; 2]) && !hits(0.0, &[DETECTED; 2]));
+    let doubtful = Observation::Detected { log_odds: -5.0 };
+    assert!(!hits(0.125, &[doubtful]), "hits that are likely people");
+}
+
+#[test]
+fn hits_that_are_probably_no_person_confirm_no_track() {
+    let doubtful = Observation::Detected { log_odds: -0.5 };
+    let config = || Config { drop_score: -9.0, ..Config::default() };
+    assert!(!confirmed(config(), 0.1, &[doubtful; 6]));
+    assert!(confirmed(config(), 0.1, &[Observation::Updated; 2]), "no score, no doubt");
+    let sure = Observation::Detected { log_odds: 4.0 };
+    assert!(confirmed(config(), 0.1, &[sure]), "at once");
+    assert!(confirmed(config(), 4.0, &[]), "at once");
+    let many = Config { confirm_hits: 3, ..config() };
+    assert!(confirmed(many, 4.0, &[DETECTED]), "and for good");
+}
+
+#[test]
+fn scores_are_smoothed_and_misses_speak_against_a_person() {
+    use Observation::{Missed, NotSearched, Occluded, OutOfView, Updated};
+    let score = |observations: &[Observation]| live(Config::default(), 1.0, observations).0.score;
+    let sure = Observation::Detected { log_odds: 3.0 };
+    assert!((score(&[sure]) - 1.6).abs() < 1e-12, "0.3 of the way");
+    assert!((score(&[Missed]) - 0.4).abs() < 1e-12, "0.3 of the way to -1");
+    assert_eq!(score(&[Updated, Occluded, OutOfView, NotSearched]), 1.0);
+    let config = Config { tentative_misses: 99, start_score: -2.0, ..Config::default() };
+    assert_eq!(live(config, -1.5, &[Missed]).0.score, -1.5, "a miss never speaks for a person");
+}
+
+#[test]
+fn a_track_ends_by_its_score_only_below_the_limit() {
+    let ends = |log_odds: f64| {
+        let config = Config { score_weight: 1.0, ..Config::default() };
+        live(config, 5.0, &[Observation::Detected { log_odds }]).1
+    };
+    assert_eq!((ends(-2.0), ends(-2.1)), (vec![], vec!["track: score"]));
+}
+
+#[test]
+fn a_track_that_is_not_confirmed_ends_at_its_second_miss() {
+    let after =
+        |score, misses| live(Config::default(), score, &vec![Observation::Missed; misses]).1;
+    assert_eq!(after(0.5, 1), Vec::<&str>::new());
+    assert_eq!(after(0.5, 2), ["track: not confirmed"]);
+    assert_eq!(after(5.0, 2), Vec::<&str>::new());
+}
+
+#[test]
+fn a_hidden_track_is_kept_longer_than_one_that_should_be_seen() {
+    let after = |one, frames| live(Config::default(), 5.0, &vec![one; frames]).1;
+    assert_eq!(after(Observation::Missed, 8), Vec::<&str>::new());
+    assert_eq!(after(Observation::Missed, 9), ["track: not seen"]);
+    assert_eq!(after(Observation::OutOfView, 16), Vec::<&str>::new());
+    assert_eq!(after(Observation::OutOfView, 17), ["track: left the image"]);
+    assert_eq!(after(Observation::Occluded, 24), Vec::<&str>::new());
+    assert_eq!(after(Observation::Occluded, 25), ["track: hidden too long"]);
+    assert_eq!(after(Observation::NotSearched, 99), Vec::<&str>::new(), "it was not missed");
+}
+
+#[test]
+fn misses_before_an_occlusion_are_cleared() {
+    let misses = vec![Observation::Missed; 8];
+    let observations = [&misses[..], &[Observation::Occluded], &misses].concat();
+    assert_eq!(live(Config::default(), 5.0, &observations).1, Vec::<&str>::new());
+    let unbroken = vec![Observation::Missed; 9];
+    assert_eq!(live(Config::default(), 5.0, &unbroken).1, ["track: not seen"]);
+}
+
+#[test]
+fn time_without_a_search_counts_once_there_are_misses() {
+    use Observation::{Missed, NotSearched};
+    let few = [&[Missed; 2][..], &[NotSearched; 20]].concat();
+    assert_eq!(live(Config::default(), 5.0, &few).1, Vec::<&str>::new(), "three are needed");
+    let enough = [&[Missed; 2][..], &[NotSearched; 9], &[Missed]].concat();
+    assert_eq!(live(Config::default(), 5.0, &enough).1, ["track: not seen"]);
+}
+
+#[test]
+fn candidates_are_dropped_by_the_test_that_they_fail() {
+    let test = |score: f64, detector_log_odds: f64, discovered: bool| {
+        let mut manager = MOfN::new(Config { doubt_s: 3.0, ..Config::default() }).unwrap();
+        let seen = scored(score, person(3.0, 0.0));
+        let new = Unassociated { detection: &seen, detector_log_odds, discovered };
+        match manager.initiate(TrackId(1), &new) {
+            Initiation::Start(_) => "started",
+            Initiation::Drop(test) => test,
+        }
+    };
+    assert_eq!(test(1.0, 1.0, true), "started");
+    assert_eq!(test(-1.0, -1.0, true), "score");
+    assert_eq!(test(-1.0, 1.0, true), "verifier");
+    assert_eq!(test(1.0, 1.0, false), "no track fits");
+    // The bound itself is enough.
+    assert_eq!(test(0.0, 0.0, true), "started");
+    assert_eq!(test(-1.0, 0.0, true), "verifier");
+    let manager = MOfN::new(Config { start_score: 0.5, ..Config::default() }).unwrap();
+    assert_eq!(manager.start_log_odds(), 0.5);
+}
+
+#[test]
+fn a_place_that_was_rejected_is_doubted_until_a_reset() {
+    let mut manager = MOfN::new(Config { doubt_s: 3.0, ..Config::default() }).unwrap();
+    let initiate = |manager: &mut MOfN, score: f64| {
+        let seen = scored(score, person(3.0, 0.0));
+        let new = Unassociated { detection: &seen, detector_log_odds: 5.0, discovered: true };
+        manager.initiate(TrackId(1), &new)
+    };
+    assert_eq!(initiate(&mut manager, -4.0), Initiation::Drop("verifier"));
+    assert_eq!(initiate(&mut manager, 1.0), Initiation::Drop("doubt"));
+    assert_eq!(initiate(&mut manager, 0.0), Initiation::Drop("doubt"));
+    manager.reset();
+    assert!(matches!(initiate(&mut manager, 1.0), Initiation::Start(_)));
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused() {
+    let refusal = |config: Config| MOfN::new(config).err().map(|error| error.to_string());
+    let default = Config::default;
+    assert_eq!(refusal(default()), None);
+    for (config, key) in [
+        (Config { confirm_hits: 9, ..default() }, "`confirm_within` must be at least 9"),
+        (Config { confirm_within: 40, ..default() }, "`confirm_within`"),
+        (Config { confirm_hits: 0, ..default() }, "`confirm_hits`"),
+        (Config { confirm_apart_s: -0.1, ..default() }, "`confirm_apart_s`"),
+        (Config { miss_score: f64::NEG_INFINITY, ..default() }, "`miss_score`"),
+        (Config { drop_score: 0.1, ..default() }, "`drop_score` must be at most 0"),
+        (Config { drop_score: f64::NAN, ..default() }, "`drop_score`"),
+        (Config { confirm_score: f64::NAN, ..default() }, "`confirm_score`"),
+        (Config { confirm_score: f64::INFINITY, ..default() }, "`confirm_score`"),
+    ] {
+        let message = refusal(config).unwrap_or_default();
+        assert!(message.contains(key), "{key}: {message}");
+    }
+    assert_eq!(refusal(Config { confirm_hits: 3, confirm_within: 3, ..default() }), None);
+    let lenient = Config { drop_score: -1e9, confirm_score: 1e9, ..default() };
+    assert_eq!(refusal(lenient), None);
+}
+
+#[test]
+fn the_older_of_two_takes_over_the_confirmation() {
+    let mut rig = Rig::new(Config::default());
+    let older = rig.start(1.0, 0.0);
+    let younger = rig.start(4.5, 0.0);
+    assert!(!rig.tracks[0].confirmed && rig.tracks[1].confirmed);
+    assert!(rig.manager.merge(older, younger).unwrap().confirmed);
+    rig.manager.stop(younger);
+    assert_eq!(rig.manager.merge(older, younger), None);
+}
