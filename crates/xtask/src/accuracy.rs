@@ -45,6 +45,39 @@ pub fn markdown(table: &str, names: &str) -> Result<String> {
     Ok(out)
 }
 
+/// Returns what to expect of one pipeline in a single room, and how far off the people are that it
+/// finds, with the settings and models of the other rooms. `rooms` has a row for each room.
+///
+/// # Errors
+/// A table without the pipeline, without rooms or without one of the figures.
+pub fn sentence(name: &str, means: &str, rooms: &str) -> Result<String> {
+    let hota = column(rooms, "HOTA w/o")?;
+    let single: Vec<f64> =
+        hota.iter().filter(|(row, _)| *row != "mean").map(|(_, value)| *value).collect();
+    let least = single.iter().copied().reduce(f64::min).context("there is no room")?;
+    let most = single.iter().copied().reduce(f64::max).context("there is no room")?;
+    let off = column(means, "off m w/o")?;
+    let (_, off_m) = off
+        .iter()
+        .find(|(row, _)| *row == name)
+        .with_context(|| format!("there is no row `{name}`"))?;
+    Ok(format!(
+        "In single rooms, left out, the HOTA of `{name}` is {least:.3} to {most:.3}. The people that \
+         it finds are {:.0} mm off on average.",
+        1e3 * off_m
+    ))
+}
+
+/// Returns the figures of a column by the first cells of their rows, without those that are missing.
+fn column<'a>(table: &'a str, title: &str) -> Result<Vec<(&'a str, f64)>> {
+    let mut rows = table.lines().filter(|line| line.starts_with('|')).map(cells);
+    let head = rows.next().context("there is no table")?;
+    let at = head.iter().position(|cell| *cell == title);
+    let at = at.with_context(|| format!("there is no figure `{title}`"))?;
+    let figures = rows.filter_map(|row| Some((*row.first()?, row.get(at)?.parse().ok()?)));
+    Ok(figures.collect())
+}
+
 fn cells(line: &str) -> Vec<&str> {
     line.trim().trim_matches('|').split('|').map(str::trim).collect()
 }
@@ -72,6 +105,19 @@ mod tests {
         let rows: Vec<&str> = shown.lines().collect();
         assert_eq!(rows[2], "| `a` | as shipped | 0.4 | 1.3 | 2.3 | 3.3 | 4.3 |");
         assert_eq!(rows[3], "| | left out | 0.1 | 1.1 | 2.1 | 3.1 | 4.1 |");
+    }
+
+    #[test]
+    fn a_sentence_has_the_range_over_rooms_and_the_mean_distance() {
+        let means = "|  | HOTA w/o | off m w/o |\n|---|---|---|\n| a | 0.5 | 0.0371 |\n";
+        let rooms = "|  | HOTA w/o |\n|---|---|\n| A | 0.7 |\n| B | - |\n| C | 0.4 |\n\
+                     | mean | 0.9 |\n";
+        assert_eq!(
+            sentence("a", means, rooms).unwrap(),
+            "In single rooms, left out, the HOTA of `a` is 0.400 to 0.700. The people that it finds \
+             are 37 mm off on average."
+        );
+        assert!(sentence("b", means, rooms).unwrap_err().to_string().contains("no row `b`"));
     }
 
     #[test]

@@ -120,6 +120,11 @@ fn filled(
     Ok(out + rest)
 }
 
+/// Returns the table of a page that is titled so, with its notes.
+fn titled(text: &str, page: &str, title: &str) -> Result<String> {
+    excerpt(text, title).with_context(|| format!("{page} has no table `{title}`"))
+}
+
 /// Returns the table of a page that has this title, in bold, and everything up to the next title.
 fn excerpt(page: &str, title: &str) -> Option<String> {
     let bold = format!("**{title}**");
@@ -207,15 +212,18 @@ fn printed(workspace: &Workspace, command: &str) -> Result<String> {
     if let Some(source) = command.strip_prefix(EXCERPT) {
         let (page, title) =
             source.split_once(' ').context("an excerpt names a page and a title")?;
-        return excerpt(&workspace.read(page)?, title)
-            .with_context(|| format!("{page} has no table `{title}`"));
+        return titled(&workspace.read(page)?, page, title);
     }
     if let Some(source) = command.strip_prefix(ACCURACY) {
         let (page, names) =
             source.split_once(' ').context("accuracy names a page and pipelines")?;
-        let table = excerpt(&workspace.read(page)?, LEFT_OUT_TABLE)
-            .with_context(|| format!("{page} has no table `{LEFT_OUT_TABLE}`"))?;
-        return accuracy::markdown(&table, names).with_context(|| format!("in {page}"));
+        let text = workspace.read(page)?;
+        let first = names.split_whitespace().next().unwrap_or_default();
+        let means = titled(&text, page, LEFT_OUT_TABLE)?;
+        let rows = accuracy::markdown(&means, names).with_context(|| format!("in {page}"))?;
+        let sentence = accuracy::sentence(first, &means, &titled(&text, page, first)?)
+            .with_context(|| format!("in {page}"))?;
+        return Ok(format!("{rows}\n{sentence}\n"));
     }
     if let Some(source) = command.strip_prefix(ROWS) {
         let (page, names) = source.split_once(' ').context("rows name a page and a row")?;
