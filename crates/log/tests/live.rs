@@ -160,8 +160,9 @@ fn what_is_missing_is_named_until_it_comes() {
     replay(&log, |topic, _, data| listening.take(topic, data));
     assert!(listening.start().is_ok());
     let named = InputSettings { odometry_topic: Some("/odometry".into()), ..input };
-    let text = missing(&listen(&log, &named, DEPTH));
-    assert!(text.contains("did you mean `/odom`?"), "{text}");
+    let error = listen(&log, &named, DEPTH).start().err().unwrap();
+    assert!(matches!(error, LogError::UnknownTopic { .. }), "{error}");
+    assert!(error.to_string().contains("did you mean `/odom`?"), "{error}");
 }
 
 #[test]

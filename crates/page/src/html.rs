@@ -287,7 +287,7 @@ mod tests {
         let data: serde_json::Value = serde_json::from_str(&page[start..end]).unwrap();
         assert_eq!(data["runs"][0]["name"], HOSTILE);
         assert_eq!(data["runs"][0]["frames"][0]["found"][0]["test"], HOSTILE);
-        assert_eq!(data["runs"][0]["tests"][HOSTILE]["look"], HOSTILE);
+        assert_eq!(data["runs"][0]["tests"][HOSTILE]["why"], HOSTILE);
     }
 
     #[test]

@@ -58,7 +58,7 @@ fn a_log_without_boxes_is_refused_with_the_name_of_the_topic() {
     let mut run = tagalong();
     let output = run.current_dir(folder.path()).arg("run").arg(shipped()).arg("walk.mcap");
     let output = output.output().unwrap();
-    assert_eq!(code(&output), 1);
+    assert_eq!(code(&output), 2);
     let told = text(&output.stderr);
     assert!(told.contains("/detections") && told.contains("detections_topic"), "{told}");
 }

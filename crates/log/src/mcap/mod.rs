@@ -147,8 +147,9 @@ impl Mcap {
 
     fn learn_schema<R: Read>(&mut self, walk: &mut Walk<R>, body: Range<usize>) -> Option<()> {
         let is_too_long = body.len() as u64 > walk.limits.schema_bytes;
-        let Ok(Record::Schema { header, data }) = parse_record(op::SCHEMA, &walk.buffer[body])
-        else {
+        let record = &walk.buffer[body];
+        record::end_of_fields(record, record::SCHEMA_HEAD, 3)?;
+        let Ok(Record::Schema { header, data }) = parse_record(op::SCHEMA, record) else {
             return None;
         };
         // The number 0 stands for no schema.
@@ -164,9 +165,11 @@ impl Mcap {
     }
 
     fn learn_channel<R: Read>(&mut self, walk: &mut Walk<R>, body: Range<usize>) -> Option<()> {
-        let Ok(Record::Channel(read)) = parse_record(op::CHANNEL, &walk.buffer[body]) else {
-            return None;
-        };
+        let record = &walk.buffer[body];
+        // Without its metadata, which nothing here reads and which need not be text.
+        let end = record::end_of_fields(record, record::CHANNEL_HEAD, 2)?;
+        let plain = [&record[..end], &record::NO_METADATA].concat();
+        let Ok(Record::Channel(read)) = parse_record(op::CHANNEL, &plain) else { return None };
         let schema = self.schemas.get(&read.schema_id).cloned();
         if schema.is_none() && read.schema_id != 0 {
             walk.count("channels_without_schema");

@@ -2,6 +2,15 @@
 
 use mcap::records::op;
 
+/// Length of a schema record before its name, encoding and definition, bytes.
+pub(super) const SCHEMA_HEAD: usize = 2;
+
+/// Length of a channel record before its topic and encoding, bytes.
+pub(super) const CHANNEL_HEAD: usize = 4;
+
+/// Metadata of a channel that has none.
+pub(super) const NO_METADATA: [u8; 4] = [0; 4];
+
 /// Length of a message record before its payload, bytes.
 pub(super) const MESSAGE_HEAD: usize = 22;
 
@@ -56,4 +65,33 @@ pub(crate) fn u32_at(bytes: &[u8], at: usize) -> u32 {
 /// Returns the 64-bit number; see [`u16_at`].
 pub(crate) fn u64_at(bytes: &[u8], at: usize) -> u64 {
     u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
+}
+
+/// Returns where the last of `count` fields ends that begin at `at` and are led by their lengths;
+/// `None` if one reaches beyond the record. The crate `mcap` reserves as much memory as a length says
+/// before it looks for the bytes.
+pub(super) fn end_of_fields(body: &[u8], at: usize, count: usize) -> Option<usize> {
+    let mut end = at;
+    for _ in 0..count {
+        let length = body.get(end..)?.first_chunk::<4>()?;
+        end = end.checked_add(4)?.checked_add(u32::from_le_bytes(*length) as usize)?;
+        body.get(..end)?;
+    }
+    Some(end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_that_reach_beyond_the_record_are_refused() {
+        let body = [9, 9, 1, 0, 0, 0, b'a', 2, 0, 0, 0, b'b', b'c'];
+        assert_eq!([1, 2].map(|count| end_of_fields(&body, 2, count)), [Some(7), Some(13)]);
+        assert_eq!(end_of_fields(&body, 2, 3), None, "there is no third");
+        assert_eq!(end_of_fields(&body[..12], 2, 2), None, "cut short");
+        let lies = [0xff, 0xff, 0xff, 0xff, b'a'];
+        assert_eq!(end_of_fields(&lies, 0, 1), None);
+        assert_eq!(end_of_fields(&body, 99, 1), None);
+    }
 }
