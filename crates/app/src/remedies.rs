@@ -365,10 +365,13 @@ mod tests {
     #[test]
     fn a_sentence_names_the_test_its_meaning_and_two_settings_at_most() {
         let mut registry = Registry::default();
-        let settings = &["a", "b", "c"];
         registry.remedies(
             "own",
-            &[tagalong_config::Remedy { test: "too blue", settings, look: "the sky" }],
+            &[tagalong_config::Remedy {
+                test: "too blue",
+                settings: &["a", "b", "c"],
+                look: "the sky",
+            }],
         );
         let remedies = Remedies::new(&registry);
         let config = "[[detectors]]\nplugin = 'own'\nconfig = { a = 1, b = 2, c = 3 }\n";

@@ -57,7 +57,7 @@ fn a_trainer_is_found_under_the_name_of_its_plugin() {
 #[test]
 fn a_model_is_trained_as_its_plugin_says_and_else_as_is_usual_for_its_kind() {
     let mut registry = registry();
-    assert!(registry.has_trainers() && !Registry::new().has_trainers());
+    assert!(registry.has_trainers() && !Registry::default().has_trainers());
     let usual = registry.training_offer("counting");
     assert_eq!((usual.data, usual.quick_settings), (TrainingData::Candidates, ""));
     let offer = TrainingOffer { data: TrainingData::LaserScans, quick_settings: "trees = 1" };
