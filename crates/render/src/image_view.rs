@@ -5,10 +5,11 @@ use tagalong_pipeline::Fate;
 use tagalong_vision::{Sketch, SketchMap, SketchPoint};
 
 use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
+use super::data::OverlayData;
 use super::enlarge::{enlarge, factor};
 use super::labels::Labels;
+use super::style::{OverlayStyle, colour, colour_of};
 use super::trails::Trails;
-use super::{OverlayData, OverlayStyle, colour, colour_of};
 
 /// Depth at which the shading of depth images is darkest, m.
 const FAR_M: f32 = 8.0;

@@ -3,9 +3,10 @@ use tagalong_geometry::Rect;
 use tagalong_vision::Sketch;
 
 use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
+use super::data::OverlayData;
 use super::image_view::{DROPPED, draw_box};
+use super::style::{OverlayStyle, TENTATIVE};
 use super::trails::Trails;
-use super::{OverlayData, OverlayStyle, TENTATIVE};
 
 /// Returns the height of the strip under image and plan, pixels: the same for all frames, so that
 /// pictures make a video.

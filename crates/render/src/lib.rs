@@ -8,6 +8,7 @@
 
 mod animation;
 pub mod canvas;
+mod data;
 mod enlarge;
 mod image_view;
 mod jpeg;
@@ -20,45 +21,16 @@ mod trails;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 pub use animation::Animation;
 
-use self::canvas::{Canvas, Ink};
+use self::canvas::Canvas;
+pub use data::OverlayData;
 pub use image_view::background;
 pub use jpeg::jpeg;
-use nalgebra::{Isometry2, Point2};
 pub use style::{Detail, OverlayStyle};
-use tagalong_core::{Frame, Images, RgbImage, Track, TrackId};
-use tagalong_geometry::Camera;
-use tagalong_log::write::track_colour;
-use tagalong_pipeline::FrameReport;
+use tagalong_core::RgbImage;
 use trails::Trails;
-
-/// Data that a picture of one frame shows.
-pub struct OverlayData {
-    /// Camera of the frame.
-    pub camera: Arc<Camera>,
-    /// Images of the frame; shared, not copied.
-    pub images: Images,
-    /// Points of the laser scan in the robot frame, m.
-    pub scan: Vec<Point2<f64>>,
-    /// Pose of the robot in the odometry frame.
-    pub odom_from_robot: Isometry2<f64>,
-    /// Report of the pipeline.
-    pub report: FrameReport,
-}
-
-impl OverlayData {
-    /// Returns the data of a frame.
-    pub fn of(frame: &Frame, odom_from_robot: Isometry2<f64>, report: FrameReport) -> Self {
-        let points = frame.scan().map_or(&[][..], |scan| &scan.points);
-        let scan = points.iter().map(|point| point.xy()).collect();
-        let camera = frame.camera.clone();
-        let images = frame.images();
-        Self { camera, images, scan, odom_from_robot, report }
-    }
-}
 
 /// Renderer of the pictures of a run, into a folder.
 pub struct Overlay {
@@ -91,8 +63,6 @@ const LEAST_ROWS: usize = 360;
 /// Rows of the plan where there is no image: it is as wide as an image then.
 const ROWS_ALONE: usize = 800;
 
-const TENTATIVE: Ink = Ink::solid([190, 190, 190]);
-
 fn picture(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> RgbImage {
     let image = image_view::draw(scene, trails, style).into_image();
     // Even, because most video formats ask for it.
@@ -104,15 +74,6 @@ fn picture(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> RgbImag
     canvas.paste(&image, 0, 0);
     legend::draw(&mut canvas, rows, scene, trails, style);
     canvas.into_image()
-}
-
-/// Returns the colour of a track: grey until it is confirmed.
-fn colour(track: &Track) -> Ink {
-    if track.confirmed { colour_of(track.id) } else { TENTATIVE }
-}
-
-fn colour_of(id: TrackId) -> Ink {
-    Ink::solid(track_colour(id))
 }
 
 /// Writes a picture.

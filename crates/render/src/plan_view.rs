@@ -3,9 +3,10 @@ use tagalong_core::Track;
 use tagalong_geometry::Rect;
 
 use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
+use super::data::OverlayData;
 use super::labels::Labels;
+use super::style::{OverlayStyle, colour, colour_of};
 use super::trails::Trails;
-use super::{OverlayData, OverlayStyle, colour, colour_of};
 
 /// Reach of the view ahead of the robot, m.
 const AHEAD_M: f64 = 8.0;

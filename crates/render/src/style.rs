@@ -1,8 +1,9 @@
+use tagalong_core::{Track, TrackId};
 use tagalong_geometry::Rect;
-use tagalong_log::write::BoxedPart;
+use tagalong_log::write::{BoxedPart, track_colour};
 
-use super::OverlayData;
-use tagalong_core::Track;
+use super::canvas::Ink;
+use super::data::OverlayData;
 
 /// Content of the pictures of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,4 +48,17 @@ impl OverlayStyle {
             }
         }
     }
+}
+
+/// Colour of what is not a confirmed track.
+pub(crate) const TENTATIVE: Ink = Ink::solid([190, 190, 190]);
+
+/// Returns the colour of a track: grey until it is confirmed.
+pub(crate) fn colour(track: &Track) -> Ink {
+    if track.confirmed { colour_of(track.id) } else { TENTATIVE }
+}
+
+/// Returns the colour of the tracks of an ID.
+pub(crate) fn colour_of(id: TrackId) -> Ink {
+    Ink::solid(track_colour(id))
 }

@@ -1,10 +1,11 @@
 use std::ops::Range;
+use std::sync::Arc;
 
-use nalgebra::{Point3, SMatrix, Vector2};
-use tagalong_core::{DepthImage, Detection, Estimate, Person, Stamp, Track, TrackId};
-use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
+use nalgebra::{Isometry2, Point2, Point3, SMatrix, Vector2};
+use tagalong_core::{DepthImage, Detection, Estimate, Images, Person, Stamp, Track, TrackId};
+use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 use tagalong_log::write::BoxedPart;
-use tagalong_pipeline::{Candidate, Fate};
+use tagalong_pipeline::{Candidate, Fate, FrameReport};
 use tagalong_vision::{Silhouette, Sketch, SketchMap, SketchPoint};
 
 use super::canvas::LINE_PX;

@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, VecDeque};
 use nalgebra::Point3;
 use tagalong_core::{Stamp, TrackId};
 
-use super::OverlayData;
+use super::data::OverlayData;
 
 /// Time that a trail reaches back, s.
 const LENGTH_S: f64 = 2.0;

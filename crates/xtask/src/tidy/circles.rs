@@ -12,9 +12,6 @@ use crate::workspace::Workspace;
 /// Most files in a circle that are not of one module.
 const MOST: usize = 3;
 
-/// Crates with a circle that is still to be cut.
-const KNOWN: &[&str] = &["crates/render"];
-
 /// Re-exports that are followed one after the other, at most.
 const DEPTH: usize = 6;
 
@@ -36,8 +33,7 @@ pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
     let mut complaints = Vec::new();
     for (folder, modules) in &crates {
         for circle in circles(modules) {
-            let is_known = KNOWN.contains(&folder.as_str());
-            if circle.len() > MOST && !is_one_module(&circle) && !is_known {
+            if circle.len() > MOST && !is_one_module(&circle) {
                 let names: Vec<String> = circle.iter().map(|module| module.join("::")).collect();
                 complaints.push(format!(
                     "{folder}: {} files use each other in a circle: {}; move the types that they \
