@@ -240,7 +240,7 @@ fn printed(workspace: &Workspace, command: &str) -> Result<String> {
         bail!("`{command}` is no command of tagalong or tagalong-papers");
     };
     let mut cargo = Command::new("cargo");
-    cargo.args(["run", "--quiet", "--package", program.package()]);
+    cargo.args(["run", "--quiet"]).args(program.cargo_args());
     // Figures of slow commands take hours without optimisation.
     if is_slow(command) {
         cargo.arg("--release");

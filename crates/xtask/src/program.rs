@@ -36,6 +36,15 @@ impl Name {
             Self::Papers => "tagalong-papers",
         }
     }
+
+    /// Returns the arguments of cargo that build it as the tests do, which have built it already: the
+    /// trainers are a feature that is on where the whole workspace is built.
+    pub fn cargo_args(self) -> &'static [&'static str] {
+        match self {
+            Self::Tagalong => &["--package", "tagalong-cli", "--features", "train"],
+            Self::Papers => &["--package", "tagalong-papers"],
+        }
+    }
 }
 
 /// The built program.
@@ -48,16 +57,10 @@ struct Built {
 }
 
 impl Program {
-    /// The program whose trainers are a feature, which is on where the whole workspace is built.
-    const WITH_TRAINERS: Name = Name::Tagalong;
-
-    /// Builds it as the tests do, which have built it already.
+    /// Builds it.
     pub fn built(workspace: &Workspace, name: Name) -> Result<Self> {
         let mut cargo = Command::new("cargo");
-        cargo.args(["build", "--quiet", "--package", name.package(), "--bin", name.as_str()]);
-        if name == Self::WITH_TRAINERS {
-            cargo.args(["--features", "train"]);
-        }
+        cargo.args(["build", "--quiet", "--bin", name.as_str()]).args(name.cargo_args());
         cargo.args(["--message-format", "json"]);
         let said = output(cargo.current_dir(workspace.root()))?;
         let built = said.lines().filter_map(|line| serde_json::from_str::<Built>(line).ok());
