@@ -106,7 +106,7 @@ impl<'a> Surface<'a> {
         let pixels = rows.positions().flat_map(move |y| columns.positions().map(move |x| (x, y)));
         pixels.filter_map(move |(x, y)| {
             let depth_m = f64::from(self.depth.row(y)[x]);
-            // What is clearly of something else, or no reading, is spared the arithmetic.
+            // Points of other things and missing readings are left out before the arithmetic.
             let is_near = (depth_m - near_m).abs() <= SAME_PERSON_M;
             if !is_near {
                 return None;
