@@ -11,7 +11,9 @@ use tagalong_app::format::Format;
 use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Outcome};
 use tagalong_app::signals::Signals;
-use tagalong_cli::{EvalArgs, Overlaid, RunArgs, SimilarityChoice, eval_json, main_from, run_until};
+use tagalong_cli::{
+    EvalArgs, Overlaid, RunArgs, SimilarityChoice, eval_json, main_from, run_until,
+};
 
 use crate::errors::{failed, raised, wrong};
 
