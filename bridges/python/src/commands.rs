@@ -100,7 +100,7 @@ fn interruptible(py: Python<'_>, args: RunArgs) -> PyResult<Outcome> {
 
 /// Compares tracks with truth; returns the figures of `tagalong eval` as JSON.
 #[pyfunction]
-#[pyo3(signature = (truth, tracks, *, similarity, log, rate, upper_body))]
+#[pyo3(signature = (truth, tracks, *, similarity, log, rate, upper_body, repairs))]
 pub fn scores(
     py: Python<'_>,
     truth: PathBuf,
@@ -109,6 +109,7 @@ pub fn scores(
     log: Option<PathBuf>,
     rate: Option<f64>,
     upper_body: bool,
+    repairs: bool,
 ) -> PyResult<String> {
     let similarity = match similarity {
         "iou" => SimilarityChoice::Iou,
@@ -125,6 +126,7 @@ pub fn scores(
         config: None,
         rules: Default::default(),
         upper_body,
+        repairs,
         rate,
         format: Format::default(),
     };

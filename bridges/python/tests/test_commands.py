@@ -43,6 +43,8 @@ def test_figures_are_those_of_the_program(log, run, program):
     assert done.returncode == 0, done.stderr
     assert tagalong.eval(log, run) == json.loads(done.stdout)
     assert tagalong.eval(log, run, similarity="metres")["HOTA"] > 0.1
+    repaired = tagalong.eval(log, run, repairs=True)["repairs"]
+    assert [row["repair"] for row in repaired][:2] == ["identities", "false-reports"]
     with pytest.raises(ValueError, match="similarity"):
         tagalong.eval(log, run, similarity="feet")
     with pytest.raises(tagalong.TagalongError, match="nowhere"):

@@ -8,8 +8,8 @@ use tagalong_app::scoring::{
 use tagalong_app::timings::{StageTimes, Timings, WHOLE_FRAME};
 use tagalong_core::{Funnel, Track};
 use tagalong_eval::{
-    Clear, Consistency, Event, Prepared, Role, Scores, Sequence, SetDistance, Similarity, Tally,
-    events,
+    Clear, Consistency, Event, Prepared, Repaired, Role, Scores, Sequence, SetDistance, Similarity,
+    Tally, events, repairs,
 };
 use tagalong_log::LogFrame;
 use tagalong_pipeline::FrameReport;
@@ -166,6 +166,21 @@ fn score(
     let happened = image.or(metres).map(|(_, events)| events).unwrap_or_default();
     result.events = happened.iter().map(|event| EventRow::new(event, 0)).collect();
     Ok(())
+}
+
+/// Returns the figures with one kind of error repaired, by boxes if the truth has them, otherwise by
+/// positions; empty if it has neither.
+///
+/// # Errors
+/// Truth that contradicts itself, in a sentence.
+pub fn repaired(sequence: &Sequence, truth: &TruthFile) -> Result<Vec<Repaired>, String> {
+    for similarity in [Similarity::Iou, Similarity::Metres] {
+        if let Some(sequence) = comparable(sequence, similarity) {
+            return repairs(&sequence, &comparison(truth, similarity))
+                .map_err(|error| error.to_string());
+        }
+    }
+    Ok(Vec::new())
 }
 
 /// Judges the values with the most frequent number of degrees of freedom.

@@ -19,7 +19,7 @@ use super::args::{RunArgs, Shard};
 use super::pictures::Wanted;
 use super::plan::{PlannedConfig, Task, reread, version};
 use super::store::{Store, Stored, StoredTiming};
-use super::watch::Watch;
+use super::watch::{Watch, repaired};
 
 /// Summary of the tasks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -321,7 +321,11 @@ impl Lane {
         let timing = self.watch.timing();
         let timing = StoredTiming { hash, machine: machine(), timing };
         let blank = TaskResult { data_lost: lost, ..blank(task) };
-        match self.watch.score(truth, shots, blank) {
+        let scored = self.watch.score(truth, shots, blank).and_then(|(result, recording)| {
+            let repairs = repaired(&recording.sequence, truth)?;
+            Ok((TaskResult { repairs, ..result }, recording))
+        });
+        match scored {
             Ok((result, recording)) => {
                 let deciding = deciding(&self.pipeline, &result, remedies);
                 let reasons = reasons(&self.pipeline, &result, remedies);

@@ -282,9 +282,14 @@ prints one flat object. Of MOTChallenge text is refused, with its line, what Tra
 class that is none in truth, tracks of other classes than people, ids below 0, frames beyond
 seqLength. Boxes without an area match nobody, and are counted.
 
+--repairs prints what HOTA, MOTA and IDF1 would be if one kind of error were gone and all else stayed:
+the largest gain tells what to work on. Reports and people whose boxes overlap by a tenth count as
+pairs there, so that a badly placed box is no false report beside a missed person.
+
 Examples:
   tagalong eval --truth robot.people.csv --tracks runs/robot-depth-ekf
   tagalong eval --truth robot.people.csv --tracks runs/robot-depth-ekf --similarity metres
+  tagalong eval --truth robot.people.csv --tracks runs/robot-depth-ekf --repairs
   tagalong eval --truth MOT17-04/gt/gt.txt --tracks MOT17-04.txt --format json | jq .HOTA";
 
 const SIMULATE_HELP: &str = "\

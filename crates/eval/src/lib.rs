@@ -28,6 +28,7 @@
 //! * [`PositionError`], [`Times`], [`Following`]: figures that matter to a robot.
 //! * [`FloorClear`]: CLEAR on the floor with a cut in metres, as benchmarks of leg trackers count.
 //! * [`events`]: when and where it went wrong, for a list to look through.
+//! * [`repairs`]: HOTA, MOTA and IDF1 if one kind of error were repaired: where work pays.
 //! * [`Consistency`]: whether the covariance of a filter agrees with its errors.
 //! * [`draws_interval`], [`mean_interval`], [`wilson`], [`clustered_share`]: the uncertainty of a
 //!   figure; [`paired_gain`], [`holm`]: that of a difference.
@@ -51,6 +52,7 @@ mod missrate;
 mod pairs;
 mod position;
 mod prepare;
+mod repairs;
 mod scores;
 mod sets;
 mod times;
@@ -68,6 +70,7 @@ pub use missrate::{CurvePoint, DetectionTally, PrecisionRecall, REFERENCE_FPPI, 
 pub use pairs::PairTable;
 pub use position::{PositionError, position_errors_m};
 pub use prepare::{Comparison, Prepared, PreparedFrame};
+pub use repairs::{PAIRED_SIMILARITY, Repair, Repaired, repairs};
 pub use scores::{Scores, Tally};
 pub use sets::{FrameDistance, GospaParts, SetDistance, SetTally};
 pub use tagalong_math::matching::{Edge, Matcher};

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use tagalong_eval::{Consistency, CurvePoint, Event, EventKind, Scores};
+use tagalong_eval::{Consistency, CurvePoint, Event, EventKind, Repaired, Scores};
 
 /// Results of a benchmark: pipelines x logs x seeds.
 ///
@@ -100,6 +100,9 @@ pub struct TaskResult {
     /// People missed in the image, by frame.
     #[serde(default)]
     pub missed: Vec<MissedPerson>,
+    /// Figures with one kind of error repaired, by boxes if the truth has them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub repairs: Vec<Repaired>,
     /// Lines of the config that decide the tests that dropped missed people, by test.
     #[serde(default)]
     pub deciding: BTreeMap<String, Vec<String>>,

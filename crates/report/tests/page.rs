@@ -109,6 +109,20 @@ fn small_and_odd_benchmarks_make_a_page() {
 }
 
 #[test]
+fn the_largest_gain_of_a_repair_stands_out() {
+    let page = html(&two_by_three(), None);
+    let section = page.split("id=\"repairs\"").nth(1).unwrap().split("</section>").next().unwrap();
+    assert_eq!(section.matches("<strong>+0.210</strong>").count(), 6, "{section}");
+    assert_eq!(section.matches("<strong>").count(), 6);
+    for name in ["IDs right", "no misses", "places exact", "boxes right sideways"] {
+        assert!(section.contains(name), "{name}");
+    }
+    let mut without = two_by_three();
+    without.tasks.iter_mut().for_each(|task| task.repairs.clear());
+    assert!(!html(&without, None).contains("id=\"repairs\""), "results of an older program");
+}
+
+#[test]
 fn what_is_no_number_is_left_out() {
     let mut benchmark = two_by_three();
     let mut timings = common::timings(&benchmark);

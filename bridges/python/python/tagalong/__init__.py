@@ -105,16 +105,25 @@ def run(
         return _json.load(file)
 
 
-def eval(truth, tracks, *, similarity="iou", log=None, rate=None, upper_body=False):
+def eval(
+    truth, tracks, *, similarity="iou", log=None, rate=None, upper_body=False, repairs=False
+):
     """Compare tracks with truth, as `tagalong eval`, and return the figures as a dict.
 
     truth: MOTChallenge text, people.csv, KITTI labels, or a log with truth. tracks: the folder of a
     run, tracks-metres.csv, MOTChallenge text or KITTI labels. similarity: "iou" of boxes, or
-    "metres" on the floor. log: the log of the truth, for its stamps.
+    "metres" on the floor. log: the log of the truth, for its stamps. repairs: also return, as
+    "repairs", HOTA, MOTA and IDF1 if one kind of error were repaired.
     """
     return _json.loads(
         _tagalong.scores(
-            truth, tracks, similarity=similarity, log=log, rate=rate, upper_body=upper_body
+            truth,
+            tracks,
+            similarity=similarity,
+            log=log,
+            rate=rate,
+            upper_body=upper_body,
+            repairs=repairs,
         )
     )
 

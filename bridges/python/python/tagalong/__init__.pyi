@@ -40,5 +40,6 @@ def eval(
     log: Optional[_Path] = None,
     rate: Optional[float] = None,
     upper_body: bool = False,
+    repairs: bool = False,
 ) -> dict[str, Any]: ...
 def read_tracks(path: _Path) -> dict[str, NDArray[Any]]: ...

@@ -195,4 +195,5 @@ def scores(
     log: Optional[_Path],
     rate: Optional[float],
     upper_body: bool,
+    repairs: bool,
 ) -> str: ...

@@ -13,7 +13,7 @@ use tagalong_app::scoring::{
 use tagalong_app::serialize::{to_json, to_json_line};
 use tagalong_app::suggest::check_log_path;
 use tagalong_eval::formats::mot::Rules;
-use tagalong_eval::{Scores, Sequence, Similarity};
+use tagalong_eval::{EvalError, Repaired, Scores, Sequence, Similarity, repairs};
 
 /// Arguments of `tagalong eval`.
 #[derive(Args, Debug)]
@@ -41,6 +41,10 @@ pub struct EvalArgs {
     /// The truth's boxes are whole bodies; compare the upper bodies of them.
     #[arg(long)]
     pub upper_body: bool,
+    /// Also print HOTA, MOTA and IDF1 if one kind of error were repaired: IDs, false reports, misses,
+    /// and where the boxes are.
+    #[arg(long)]
+    pub repairs: bool,
     /// Frames per second where no file states them [default: 30; KITTI 10].
     #[arg(long, value_name = "HZ")]
     pub rate: Option<f64>,
@@ -92,13 +96,15 @@ pub fn eval_json(args: &EvalArgs) -> Result<String, Failure> {
 /// Figures of a report, with the rules and the notes.
 struct Scored {
     scores: Scores,
+    repairs: Option<Vec<Repaired>>,
     rules: Option<&'static str>,
     notes: Vec<String>,
 }
 
 impl Scored {
     fn said(&self) -> Said<'_> {
-        Said { scores: &self.scores, rules: self.rules, notes: &self.notes }
+        let repairs = self.repairs.as_deref();
+        Said { scores: &self.scores, repairs, rules: self.rules, notes: &self.notes }
     }
 
     fn json(&self) -> Result<String, Failure> {
@@ -112,15 +118,21 @@ fn scored(args: &EvalArgs) -> Result<Scored, Failure> {
     let Some(sequence) = comparable(&sequence, similarity) else {
         return Err(no_place(args, &truth));
     };
-    let scores = Scores::measure(&sequence, comparison(&truth, similarity))
-        .map_err(|error| Failure::failed(format!("{}: {error}", args.tracks.display())))?;
+    let comparison = comparison(&truth, similarity);
+    let scores = Scores::measure(&sequence, comparison).map_err(|error| refused(args, &error))?;
+    let repairs = args.repairs.then(|| repairs(&sequence, &comparison));
+    let repairs = repairs.transpose().map_err(|error| refused(args, &error))?;
     if similarity == Similarity::Iou {
         notes.extend(extents_note(&sequence, scores.recall));
     }
     if scores.has_constant_scores() {
         notes.push(format!("{}: {CONSTANT_SCORES}", args.tracks.display()));
     }
-    Ok(Scored { rules: rules(&truth), scores, notes })
+    Ok(Scored { rules: rules(&truth), scores, repairs, notes })
+}
+
+fn refused(args: &EvalArgs, error: &EvalError) -> Failure {
+    Failure::failed(format!("{}: {error}", args.tracks.display()))
 }
 
 /// Note on tracks for which LAMR and AP are meaningless.
@@ -132,6 +144,9 @@ const CONSTANT_SCORES: &str = "all reports have the same score; LAMR and AP mean
 struct Said<'a> {
     #[serde(flatten)]
     scores: &'a Scores,
+    /// Figures with one kind of error repaired, where they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    repairs: Option<&'a [Repaired]>,
     /// Name of the rules for reading the truth, where several are in use.
     rules: Option<&'static str>,
     notes: &'a [String],
@@ -277,8 +292,24 @@ fn as_text(said: &Said<'_>) -> Result<String, Failure> {
     if let Some(rules) = said.rules {
         let _ = writeln!(out, "{:<24} {rules:>10}", "rules");
     }
+    if let Some(repairs) = said.repairs {
+        add_repairs(&mut out, said.scores, repairs);
+    }
     for note in said.notes {
         let _ = writeln!(out, "note: {note}");
     }
     Ok(out)
+}
+
+/// Adds a table of the figures as they are, and with one kind of error repaired.
+fn add_repairs(out: &mut String, scores: &Scores, repairs: &[Repaired]) {
+    let _ =
+        writeln!(out, "\n{:<24} {:>10} {:>10} {:>10}", "repaired alone", "HOTA", "MOTA", "IDF1");
+    let as_is = ("as it is", [scores.hota, scores.mota, scores.idf1]);
+    let repaired = repairs.iter().map(|r| (r.repair.describe(), [r.hota, r.mota, r.idf1]));
+    for (name, figures) in std::iter::once(as_is).chain(repaired) {
+        let [hota, mota, idf1] =
+            figures.map(|figure| figure.map_or_else(|| "-".to_owned(), |f| format!("{f:.4}")));
+        let _ = writeln!(out, "{name:<24} {hota:>10} {mota:>10} {idf1:>10}");
+    }
 }

@@ -52,6 +52,40 @@ fn a_run_is_scored_in_the_image_and_on_the_floor() {
     assert!(floor.as_object().unwrap().values().all(|value| !value.is_object()), "one flat object");
 }
 
+/// In the truth there is a second person, whom the run never reports.
+#[test]
+fn repairs_show_what_each_kind_of_error_costs() {
+    let folder = home();
+    let mut truth = String::new();
+    for (number, line) in crate::common::people(20).lines().enumerate() {
+        truth += &format!("{line}\n");
+        let mut fields: Vec<&str> = line.split(',').collect();
+        // Person 2, with the left edges of the boxes and the head elsewhere.
+        for (column, value) in [(1, "2"), (2, "10"), (6, "10"), (10, "-1.3")] {
+            fields[column] = value;
+        }
+        if number > 0 {
+            truth += &format!("{}\n", fields.join(","));
+        }
+    }
+    fs::write(folder.path().join("walk.people.csv"), truth).unwrap();
+    let files = ["--truth", "walk.people.csv", "--tracks", "out", "--repairs"];
+    let scores = json(&in_home(folder.path(), &[&files[..], &["--format", "json"]].concat()));
+    let repairs = scores["repairs"].as_array().unwrap();
+    let hota = |name: &str| {
+        let row = repairs.iter().find(|row| row["repair"] == name);
+        row.and_then(|row| row["HOTA"].as_f64()).unwrap_or_else(|| panic!("{name}: {scores}"))
+    };
+    let as_is = scores["HOTA"].as_f64().unwrap();
+    assert!(as_is < 0.9 && hota("misses") > as_is + 0.1, "{scores}");
+    assert_eq!([hota("identities"), hota("false-reports")], [as_is; 2], "{scores}");
+    let printed = in_home(folder.path(), &files);
+    let printed = text(&printed.stdout);
+    let line = printed.lines().find(|line| line.starts_with("no misses")).unwrap();
+    assert!(line.contains(&format!("{:.4}", hota("misses"))), "{printed}");
+    assert!(!text(&in_home(folder.path(), &files[..4]).stdout).contains("no misses"));
+}
+
 #[test]
 fn truth_that_is_named_after_another_log_is_noted() {
     let folder = home();

@@ -6,6 +6,7 @@ mod explain;
 mod headline;
 mod moments;
 mod pairs;
+mod repairs;
 mod speed;
 mod tasks;
 
@@ -124,6 +125,7 @@ impl Page<'_> {
             ),
             some("failed", "Failed and skipped", self.failed()),
             some("missed", "Missed people, and why", self.missed()),
+            some("repairs", "Where work pays", self.repairs()),
             some("pairs", "Pipelines side by side", self.pairs()),
             later,
             some("miss-rate", "Miss rate", self.miss_rates()),

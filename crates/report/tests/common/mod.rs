@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use tagalong_eval::{Consistency, CurvePoint, Scores};
+use tagalong_eval::{Consistency, CurvePoint, Repair, Repaired, Scores};
 use tagalong_report::{
     Benchmark, Dropped, EventRow, MissedPerson, Moment, Outcome, StageTiming, TaskResult,
     TaskTiming, Timings, Trajectory,
@@ -68,6 +68,7 @@ fn task(pipeline: &str, log: &str, level: f64, seed: u64, place: u64) -> TaskRes
         image: Some(scores(&mut wobble, level)),
         metres: Some(scores(&mut wobble, level - 0.04)),
         lamr_curve: curve(level),
+        repairs: repairs(level),
         nis: Consistency::of(&[1.4, 2.2, 3.0, 0.7, 2.9], 2, 0.95),
         funnel: [("boundary test", 183_204), ("size", 20_411), ("margin", 902), ("gate", 4_077)]
             .map(|(test, count)| Dropped { test: test.into(), count })
@@ -90,6 +91,19 @@ fn task(pipeline: &str, log: &str, level: f64, seed: u64, place: u64) -> TaskRes
         .into(),
         ..TaskResult::default()
     }
+}
+
+fn repairs(level: f64) -> Vec<Repaired> {
+    let gains = [0.05, 0.0, 0.01, 0.21, 0.11, 0.04, 0.02];
+    let gained = |gain: f64| Some(level + gain);
+    let rows = Repair::ALL.into_iter().zip(gains);
+    rows.map(|(repair, gain)| Repaired {
+        repair,
+        hota: gained(gain),
+        mota: gained(gain - 0.1),
+        idf1: gained(gain),
+    })
+    .collect()
 }
 
 fn scores(wobble: &mut Wobble, level: f64) -> Scores {

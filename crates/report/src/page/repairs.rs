@@ -1,0 +1,58 @@
+use maud::{Markup, html};
+use tagalong_eval::{Repair, Repaired};
+
+use super::{Page, cell, column, no_cell, optional_cell, signed, table};
+use crate::chart::key;
+use crate::model::TaskResult;
+
+/// Most rows that are shown without being asked for.
+const MOST_OPEN: usize = 12;
+
+impl Page<'_> {
+    /// Renders the HOTA of each task, and the gain by repairing one kind of error alone.
+    pub(super) fn repairs(&self) -> Option<Markup> {
+        let has_repairs = |task: &&&TaskResult| !task.repairs.is_empty();
+        let tasks: Vec<&TaskResult> = self.view.tasks.iter().filter(has_repairs).copied().collect();
+        if tasks.is_empty() {
+            return None;
+        }
+        let head = html! {
+            (column("Pipeline", None)) (column("Log", None)) (column("HOTA", None))
+            @for repair in Repair::ALL { (column(repair.describe(), None)) }
+        };
+        let body = html! { @for task in &tasks { (self.repair_row(task)) } };
+        let caption = html! {
+            "HOTA as it is, and the gain if the truth repaired one kind of error alone; the largest gain in bold."
+        };
+        Some(html! {
+            p { "The largest gain of a row tells what to work on: who is who, false tracks, missed people, or where the boxes are." }
+            details class="print" open[tasks.len() <= MOST_OPEN] {
+                summary { "One row per pipeline, log and seed" }
+                (table("Gain by repairs", &caption, &head, &body))
+            }
+        })
+    }
+
+    fn repair_row(&self, task: &TaskResult) -> Markup {
+        let hota = task.image.or(task.metres).and_then(|scores| scores.hota);
+        let gain = |row: &Repaired| Some(row.hota? - hota?);
+        let largest = task.repairs.iter().filter_map(gain).fold(0.0, f64::max);
+        html! {
+            tr {
+                th scope="row" { (key(self.series(&task.pipeline), &task.pipeline)) }
+                td class="log" { (task.log) }
+                (optional_cell(hota, 3))
+                @for repair in Repair::ALL {
+                    @let row = task.repairs.iter().find(|row| row.repair == repair);
+                    @match row.and_then(gain) {
+                        Some(gain) if gain > 0.0 && gain == largest => {
+                            (cell(gain, &html! { strong { (signed(gain, 3)) } }))
+                        }
+                        Some(gain) => (cell(gain, &html! { (signed(gain, 3)) })),
+                        None => (no_cell()),
+                    }
+                }
+            }
+        }
+    }
+}
