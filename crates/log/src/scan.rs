@@ -9,12 +9,13 @@ use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
 use crate::images::{
-    Codec, Content, content_of_encoding, content_of_format, may_be_disparity, size_of_compressed,
+    CloudAxes, CloudCamera, Codec, Content, camera_of_cloud, content_of_encoding,
+    content_of_format, may_be_disparity, size_of_compressed,
 };
 use crate::log_files::LogFiles;
 use crate::msgs::{
-    CameraInfo, CompressedImage, DisparityImage, Float32Msg, Header, Image, Odometry, TFMessage,
-    TransformStamped, decode,
+    CameraInfo, CompressedImage, DisparityImage, Float32Msg, Header, Image, Odometry, PointCloud2,
+    TFMessage, TransformStamped, decode,
 };
 use crate::packed::LogFile;
 use crate::sensors::SensorType;
@@ -33,6 +34,7 @@ pub(crate) enum Type {
     Image,
     CompressedImage,
     DisparityImage,
+    PointCloud,
     CameraInfo,
     Tf,
     Odometry,
@@ -51,6 +53,7 @@ impl Type {
             ("sensor_msgs", "Image") => Self::Image,
             ("sensor_msgs", "CompressedImage") => Self::CompressedImage,
             ("stereo_msgs", "DisparityImage") => Self::DisparityImage,
+            ("sensor_msgs", "PointCloud2") => Self::PointCloud,
             ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
             ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Self::Tf,
             ("nav_msgs", "Odometry") => Self::Odometry,
@@ -83,6 +86,9 @@ pub(crate) struct Topic {
     pub(crate) is_jpeg_depth: bool,
     /// Columns and rows of the first image.
     pub(crate) size: Option<(u32, u32)>,
+    /// Camera of a point cloud in rows and columns, and the reason for which there is none.
+    pub(crate) cloud: Option<CloudCamera>,
+    pub(crate) cloud_fault: Option<String>,
     pub(crate) frame_id: Option<String>,
     pub(crate) stamps: Vec<Stamp>,
     /// Times at which the messages with these stamps were recorded.
@@ -315,7 +321,7 @@ impl Gathering {
 
     /// Returns true once an image has arrived.
     pub(crate) fn has_image(&self) -> bool {
-        self.topics.values().any(|topic| topic.pixels.is_some())
+        self.topics.values().any(|topic| topic.pixels.is_some() && topic.cloud_fault.is_none())
     }
 
     /// Returns a topic; adds it if it is new.
@@ -335,6 +341,8 @@ impl Gathering {
             is_deep_grey: false,
             is_jpeg_depth: false,
             size: None,
+            cloud: None,
+            cloud_fault: None,
             frame_id: None,
             stamps: Vec::new(),
             recorded: Vec::new(),
@@ -352,6 +360,7 @@ impl Gathering {
             Type::Image => topic.take_image(&channel.topic, message.data, unit),
             Type::CompressedImage => topic.take_compressed(&channel.topic, message.data),
             Type::DisparityImage => topic.take_disparity(message.data),
+            Type::PointCloud => self.take_cloud(&channel.topic, message.data),
             Type::Odometry => topic.take_odometry(message.data),
             Type::Sensor => topic.take_sensor(message.data),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
@@ -376,6 +385,31 @@ impl Gathering {
         let info: CameraInfo = decode(data).ok()?;
         self.topic(topic, "", "").frame_id = Some(info.header.frame_id.clone());
         self.infos.insert(topic.to_owned(), info);
+        Some(())
+    }
+
+    /// Takes in a cloud. The first one with enough points tells the camera, and so is its calibration.
+    fn take_cloud(&mut self, name: &str, data: &[u8]) -> Option<()> {
+        let topic = self.topic(name, "", "");
+        let cloud: PointCloud2<'_> = decode(data).ok()?;
+        if topic.cloud.is_none() {
+            let camera = camera_of_cloud(&cloud, &Limits::default());
+            topic.size = Some((cloud.width, cloud.height));
+            if camera != Ok(None) {
+                topic.pixels = Some("points".to_owned());
+            }
+            match camera {
+                Ok(None) => {}
+                Ok(Some(camera)) => topic.take_camera(camera, &cloud.header.frame_id),
+                Err(error) => topic.cloud_fault = Some(error.to_string()),
+            }
+        }
+        topic.take_header(cloud.header.clone());
+        if let Some(camera) = topic.cloud.filter(|_| topic.content == Content::Depth) {
+            let size = (cloud.width as usize, cloud.height as usize);
+            let info = || CameraInfo::of_lens(&cloud.header, &camera.lens, size, 0.0);
+            self.infos.entry(calibration_by_points(name)).or_insert_with(info);
+        }
         Some(())
     }
 
@@ -514,6 +548,22 @@ impl Topic {
         Some(())
     }
 
+    /// Takes in the camera of a cloud. Points with x ahead are those of a camera only where the frame is
+    /// called optical all the same, as by a simulator; elsewhere the frame is not that of its images.
+    fn take_camera(&mut self, camera: CloudCamera, frame: &str) {
+        let is_usable = camera.axes == CloudAxes::Optical || frame.contains("optical");
+        self.cloud = Some(camera);
+        if is_usable {
+            self.content = Content::Depth;
+            self.cloud_fault = None;
+        } else {
+            self.cloud_fault = Some(format!(
+                "its points have x ahead (frame `{frame}`), and those of an optical frame, with z \
+                 ahead, are read: record the depth images of that camera"
+            ));
+        }
+    }
+
     fn take_odometry(&mut self, data: &[u8]) -> Option<()> {
         let odometry: Odometry = decode(data).ok()?;
         self.take_header(odometry.header);
@@ -537,6 +587,11 @@ impl Topic {
         }
         self.frame_id.get_or_insert(header.frame_id);
     }
+}
+
+/// Returns the name of the calibration that the points of a cloud tell.
+pub(crate) fn calibration_by_points(topic: &str) -> String {
+    format!("{topic} (by its points)")
 }
 
 /// Returns true if the name of a topic says that its images are depth.

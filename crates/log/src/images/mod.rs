@@ -5,6 +5,7 @@
 //! infinities a meaning of their own, which no detector here uses).
 
 mod bayer;
+mod cloud;
 mod compressed;
 mod deep_png;
 mod disparity;
@@ -13,6 +14,7 @@ mod rvl;
 mod video;
 mod yuv;
 
+pub use cloud::{CloudAxes, CloudCamera, camera_of_cloud, decode_cloud, size_of_cloud};
 pub(crate) use compressed::Codec;
 pub use compressed::{decode_compressed, encode_rvl, size_of_compressed};
 pub(crate) use disparity::may_be_disparity;
@@ -99,6 +101,9 @@ pub enum ImageError {
     /// `step` or the length of the data contradict the size.
     #[error("{0}")]
     Layout(String),
+    /// Points that are not those of an image.
+    #[error("{0}")]
+    Cloud(String),
     /// The compressed bytes are damaged or of an unknown kind.
     #[error("{0}")]
     Codec(String),
@@ -114,6 +119,7 @@ impl ImageError {
             Self::Geometry { .. } => "disparity_without_geometry",
             Self::TooLarge { .. } => "images_too_large",
             Self::Layout(_) => "images_of_wrong_layout",
+            Self::Cloud(_) => "point_clouds_that_are_no_images",
             Self::Codec(_) => "images_undecodable",
         }
     }

@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use super::{Header, message};
@@ -179,7 +181,7 @@ message!(JointState, "sensor_msgs/msg/JointState", "JointState.msg");
 
 /// `sensor_msgs/PointCloud2`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PointCloud2 {
+pub struct PointCloud2<'a> {
     /// Time and frame.
     pub header: Header,
     /// Number of rows; 1 for points without an order.
@@ -195,12 +197,13 @@ pub struct PointCloud2 {
     /// Number of bytes of a row.
     pub row_step: u32,
     /// Points, `row_step * height` bytes.
-    pub data: Vec<u8>,
+    #[serde(with = "serde_bytes", borrow)]
+    pub data: Cow<'a, [u8]>,
     /// True if all points are finite.
     pub is_dense: bool,
 }
 
-message!(PointCloud2, "sensor_msgs/msg/PointCloud2", "PointCloud2.msg");
+message!(PointCloud2<'_>, "sensor_msgs/msg/PointCloud2", "PointCloud2.msg");
 
 /// `sensor_msgs/PointField`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -16,10 +16,11 @@ use super::mount::robot_frame;
 use super::plan::Plan;
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size};
 use crate::images::{
-    DepthFromDisparity, ImageError, Pixels, decode_compressed, decode_compressed_disparity,
-    decode_disparity, decode_plain_disparity, decode_raw, size_of_compressed, size_of_raw,
+    CloudAxes, DepthFromDisparity, ImageError, Pixels, decode_cloud, decode_compressed,
+    decode_compressed_disparity, decode_disparity, decode_plain_disparity, decode_raw,
+    size_of_cloud, size_of_compressed, size_of_raw,
 };
-use crate::msgs::{CompressedImage, DisparityImage, Image, LaserScan, decode};
+use crate::msgs::{CompressedImage, DisparityImage, Image, LaserScan, PointCloud2, decode};
 use crate::obstacles::DepthFormat;
 use crate::odometry::PoseAt;
 use crate::pairing::Payload;
@@ -548,10 +549,13 @@ fn pixels(plan: &Plan, topic: &str, image: &Payload, tally: &mut Tally) -> Optio
     let is_depth = plan.chosen.depth.as_deref() == Some(topic);
     let unit = if is_depth { plan.depth_unit_m } else { plan.input.depth_unit_m };
     let limits = &plan.limits;
+    let cloud = plan.scan.topics.get(topic).and_then(|topic| topic.cloud);
+    let axes = cloud.map_or(CloudAxes::Optical, |camera| camera.axes);
     let of = |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => decode_raw(&image, unit, limits),
         AnyImage::Compressed(image) => decode_compressed(&image, unit, limits),
         AnyImage::Disparity(image) => Err(ImageError::Encoding(image.image.encoding)),
+        AnyImage::Cloud(cloud) => decode_cloud(&cloud, axes, limits).map(Pixels::Depth),
     };
     read(plan, topic, image, tally, of)
 }
@@ -580,6 +584,7 @@ fn depth_of_disparity(
         AnyImage::Compressed(image) => {
             decode_compressed_disparity(&image, stereo.clone()?, unit_px, limits)
         }
+        AnyImage::Cloud(_) => Err(ImageError::NoDisparity("points".into())),
     };
     let DepthFromDisparity { depth, invalid } = read(plan, topic, image, tally, of)?;
     tally.add("disparity_pixels", depth.pixels().len() as u64);
@@ -593,6 +598,7 @@ fn size_without_pixels(plan: &Plan, image: &Payload, tally: &mut Tally) -> Optio
         AnyImage::Raw(image) => size_of_raw(&image, &plan.limits),
         AnyImage::Compressed(image) => size_of_compressed(&image, &plan.limits),
         AnyImage::Disparity(image) => size_of_raw(&image.image, &plan.limits),
+        AnyImage::Cloud(cloud) => size_of_cloud(&cloud, &plan.limits),
     };
     read(plan, plan.primary(), image, tally, of)
 }
@@ -602,6 +608,7 @@ enum AnyImage<'a> {
     Raw(Image<'a>),
     Compressed(CompressedImage<'a>),
     Disparity(DisparityImage<'a>),
+    Cloud(PointCloud2<'a>),
 }
 
 /// Reads an image message with `of`; a failure is counted as lost.
@@ -616,6 +623,7 @@ fn read<T>(
     let message = match kind {
         Some(Type::Image) => decode(&image.data).map(AnyImage::Raw),
         Some(Type::DisparityImage) => decode(&image.data).map(AnyImage::Disparity),
+        Some(Type::PointCloud) => decode(&image.data).map(AnyImage::Cloud),
         _ => decode(&image.data).map(AnyImage::Compressed),
     };
     message

@@ -5,7 +5,9 @@ use tagalong_core::{Stamp, planar_pose};
 use super::changes::CameraWatch;
 use super::plan::Plan;
 use super::restamp::restamp;
-use crate::msgs::{CdrError, CompressedImage, DisparityImage, Image, Odometry, TFMessage, decode};
+use crate::msgs::{
+    CdrError, CompressedImage, DisparityImage, Image, Odometry, PointCloud2, TFMessage, decode,
+};
 use crate::obstacles::ObstacleReader;
 use crate::odometry::PoseBuffer;
 use crate::pairing::{Arrival, Payload, Popped, Reorder, Waiting};
@@ -264,6 +266,7 @@ fn payload(message: &Message<'_>) -> Result<Payload, CdrError> {
         Type::Image => decode::<Image<'_>>(message.data)?.header,
         Type::CompressedImage => decode::<CompressedImage<'_>>(message.data)?.header,
         Type::DisparityImage => decode::<DisparityImage<'_>>(message.data)?.header,
+        Type::PointCloud => decode::<PointCloud2<'_>>(message.data)?.header,
         _ => decode(message.data)?,
     };
     Ok(Payload::new(header, message.data))

@@ -273,6 +273,9 @@ fn depth_unit_m(
     if input.depth_unit_m.is_some() || is_float || is_disparity_image(topic) {
         return input.depth_unit_m;
     }
+    if topic.kind == Type::PointCloud {
+        return None;
+    }
     let told = scan.depth_units.iter().next();
     if topic.is_deep_grey {
         let kind = kind_of(topic);
@@ -327,7 +330,10 @@ fn note_unread_images(plan: &Plan, tally: &mut Tally) {
         return;
     }
     for (name, topic) in &plan.scan.topics {
-        if let Some(why) = unreadable(topic) {
+        // Points of lidars are nothing that the pipeline would use in place of colour.
+        if topic.kind != Type::PointCloud
+            && let Some(why) = unreadable(topic)
+        {
             tally.add("messages_not_read", topic.count);
             tally.note(format!("{name} is not read: {why}"));
         }
@@ -466,7 +472,8 @@ const SAME_FACTOR: f64 = 1.1;
 fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogError> {
     let is_set = plan.input.depth_unit_m.is_some() || plan.input.disparity.is_some();
     let topic = plan.chosen.depth.as_ref().and_then(|topic| plan.scan.topics.get(topic));
-    let Some(topic) = topic.filter(|topic| !is_set && !is_disparity_image(topic)) else {
+    let has_unit = |topic: &&Topic| is_disparity_image(topic) || topic.kind == Type::PointCloud;
+    let Some(topic) = topic.filter(|topic| !is_set && !has_unit(topic)) else {
         return Ok(None);
     };
     // Every other source of the pose is measured by depth, or a guess.

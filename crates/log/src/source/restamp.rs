@@ -15,6 +15,7 @@ pub(super) fn restamp(message: &Message<'_>) -> Option<Vec<u8>> {
         Type::Image
         | Type::CompressedImage
         | Type::DisparityImage
+        | Type::PointCloud
         | Type::CameraInfo
         | Type::Odometry
         | Type::Sensor => true,

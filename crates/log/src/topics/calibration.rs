@@ -2,7 +2,7 @@
 
 use super::name::TopicName;
 use crate::camera_info::{CalibrationError, Intrinsics, intrinsics};
-use crate::scan::{Scan, Type};
+use crate::scan::{Scan, Type, calibration_by_points};
 
 /// Relation of a calibration to the images that it was taken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +67,9 @@ fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibrat
     // Disparities are those of the left camera, and its calibration stands beside its images.
     if is_disparity || kind == Some(Type::DisparityImage) {
         add(&format!("{folder}/left/camera_info"), Relation::Own);
+    }
+    if kind == Some(Type::PointCloud) {
+        add(&calibration_by_points(image), Relation::Own);
     }
     let name = TopicName::of(image);
     let mut others: Vec<(usize, &String)> =

@@ -9,9 +9,9 @@ pub(super) fn is_picture(topic: &Topic) -> bool {
     matches!(topic.kind, Type::Image | Type::CompressedImage)
 }
 
-/// Returns true for images, of disparity included.
+/// Returns true for images, those of disparity and the points of depth cameras included.
 pub(super) fn is_image(topic: &Topic) -> bool {
-    is_picture(topic) || topic.kind == Type::DisparityImage
+    is_picture(topic) || matches!(topic.kind, Type::DisparityImage | Type::PointCloud)
 }
 
 /// Returns true for pictures that can be read, as far as that is known before the first one.
@@ -72,6 +72,7 @@ pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
         return Some(VIDEO_REMEDY.to_owned());
     }
     match (&topic.pixels, topic.kind) {
+        (_, Type::PointCloud) => topic.cloud_fault.clone(),
         (Some(_), _) if topic.is_jpeg_depth => Some(JPEG_REMEDY.to_owned()),
         (Some(_), _) if topic.is_deep_grey && topic.content == Content::Unknown => {
             Some(DEEP_REMEDY.to_owned())
@@ -134,6 +135,8 @@ pub(super) fn depth_rank(name: &str, topic: &Topic) -> Option<i32> {
     rank += 4 * i32::from(name.contains("depth"));
     rank -= 6 * i32::from(has(name, &["infra", "/ir", "confidence", "debug", "disparity"]));
     rank += i32::from(topic.kind == Type::Image);
+    // The points are those of the images, in many times the bytes.
+    rank -= 10 * i32::from(topic.kind == Type::PointCloud);
     Some(rank)
 }
 

@@ -45,7 +45,7 @@ impl Body {
     }
 
     /// Returns the cloud in the frame of the person; empty for a track that has ended.
-    pub(super) fn cloud(&self, at: Stamp, frame: &str) -> PointCloud2 {
+    pub(super) fn cloud(&self, at: Stamp, frame: &str) -> PointCloud2<'static> {
         cloud(&self.head_m.map(points).unwrap_or_default(), at, frame)
     }
 }
@@ -70,7 +70,7 @@ fn points(head_m: f64) -> Vec<Vector3<f64>> {
     out
 }
 
-fn cloud(points: &[Vector3<f64>], at: Stamp, frame: &str) -> PointCloud2 {
+fn cloud(points: &[Vector3<f64>], at: Stamp, frame: &str) -> PointCloud2<'static> {
     let field = |(name, offset): (&str, u32)| PointField {
         name: name.to_owned(),
         offset,
@@ -88,7 +88,7 @@ fn cloud(points: &[Vector3<f64>], at: Stamp, frame: &str) -> PointCloud2 {
         is_bigendian: false,
         point_step: step,
         row_step: step * width,
-        data: data.flat_map(|value| (value as f32).to_le_bytes()).collect(),
+        data: data.flat_map(|value| (value as f32).to_le_bytes()).collect::<Vec<u8>>().into(),
         is_dense: true,
     }
 }

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 mod cameras;
+mod clouds;
 #[path = "../common/mod.rs"]
 mod common;
 mod obstacles;
@@ -11,7 +12,7 @@ mod topics;
 use common::{LogWriter, SavedLog, at, camera, info_of, level_pose};
 use mcap::WriteOptions;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
-use tagalong_core::DepthImage;
+use tagalong_core::{DepthImage, Stamp};
 use tagalong_geometry::Camera;
 use tagalong_log::msgs::{
     CameraInfo, CompressedImage, DisparityImage, Header, Image, LaserScan, Message,

@@ -1,0 +1,125 @@
+//! Points of depth cameras in place of depth images.
+
+use std::borrow::Cow;
+
+use tagalong_geometry::Lens;
+use tagalong_log::inspect;
+use tagalong_log::msgs::{PointCloud2, PointField};
+
+use super::*;
+
+const SIZE: (u32, u32) = (24, 16);
+const FOCAL_PX: f64 = 20.0;
+
+/// Returns points of a wall, in the rows and columns of a camera; x ahead if `is_body`.
+fn wall(frame: &str, stamp: Stamp, is_body: bool) -> PointCloud2<'static> {
+    let lens = camera(SIZE.0 as usize, SIZE.1 as usize, FOCAL_PX);
+    let mut data = Vec::new();
+    for row in 0..SIZE.1 {
+        for column in 0..SIZE.0 {
+            let ahead = 2.0 + 0.05 * f64::from(column);
+            let ray = lens.ray(Point2::new(column.into(), row.into())) * ahead;
+            let point = if is_body { [ray.z, -ray.x, -ray.y] } else { [ray.x, ray.y, ray.z] };
+            data.extend(point.iter().flat_map(|value| (*value as f32).to_le_bytes()));
+        }
+    }
+    let field = |(name, offset): (&str, u32)| PointField {
+        name: name.into(),
+        offset,
+        datatype: PointField::FLOAT32,
+        count: 1,
+    };
+    PointCloud2 {
+        header: Header::new(stamp, frame),
+        height: SIZE.1,
+        width: SIZE.0,
+        fields: [("x", 0), ("y", 4), ("z", 8)].map(field).to_vec(),
+        point_step: 12,
+        row_step: 12 * SIZE.0,
+        data: Cow::Owned(data),
+        ..PointCloud2::default()
+    }
+}
+
+fn log_with(cloud: &PointCloud2<'_>) -> LogWriter {
+    let mut log = LogWriter::plain();
+    log.fixed("base_link", &cloud.header.frame_id, &level_pose());
+    log.message("/camera/points", at(0.1), cloud);
+    log
+}
+
+fn opened(log: LogWriter) -> Result<(FrameSource, LogFrame), String> {
+    let saved = log.save();
+    let inputs = Inputs::ANY.require(Input::Depth);
+    let source =
+        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), inputs);
+    let mut source = source.map_err(|error| error.to_string())?;
+    let frame = source.next_frame().ok_or_else(|| format!("{:?}", source.notes()))?;
+    Ok((source, frame))
+}
+
+#[test]
+fn ordered_points_are_depth_and_tell_their_own_lens() {
+    // Simulators call a frame optical whose points have x ahead.
+    for is_body in [false, true] {
+        let (source, found) =
+            opened(log_with(&wall("camera_optical_frame", at(0.1), is_body))).unwrap();
+        let depth = found.frame.depth().unwrap();
+        assert_eq!((depth.width(), depth.height()), (24, 16));
+        assert!((depth.get(10, 3).unwrap() - 2.5).abs() < 1e-6);
+        let Lens::Pinhole(lens) = &found.frame.camera.lens else { panic!("a pinhole") };
+        assert!((lens.fx - FOCAL_PX).abs() < 1e-3 && (lens.cx - 11.5).abs() < 1e-3, "{lens:?}");
+        assert_eq!(
+            source.facts().calibration_topic.as_deref(),
+            Some("/camera/points (by its points)")
+        );
+    }
+}
+
+#[test]
+fn depth_images_are_taken_before_points() {
+    let mut log = log_with(&wall("colour", at(0.1), false));
+    log.info("/camera/depth/camera_info", "colour", &camera(16, 12, 14.0));
+    log.depth(at(0.1), "colour", 3.0);
+    let (_, found) = opened(log).unwrap();
+    assert_eq!(found.frame.depth().unwrap().get(3, 3), Some(3.0));
+}
+
+#[test]
+fn points_that_are_no_image_are_refused_with_the_reason() {
+    let mut lidar = wall("lidar", at(0.1), false);
+    (lidar.width, lidar.height, lidar.row_step) = (24 * 16, 1, 12 * 24 * 16);
+    let error = opened(log_with(&lidar)).err().unwrap();
+    assert!(error.contains("/camera/points") && error.contains("height 1"), "{error}");
+    let body = wall("camera_link", at(0.1), true);
+    let error = opened(log_with(&body)).err().unwrap();
+    assert!(error.contains("x ahead (frame `camera_link`)"), "{error}");
+    // The account names them too, and a log whose depth is an image is not blamed for them.
+    let mut log = log_with(&lidar);
+    log.info("/camera/depth/camera_info", "lidar", &camera(16, 12, 14.0));
+    log.depth(at(0.1), "lidar", 3.0);
+    let saved = log.save();
+    let told = inspect(&saved.path, &InputSettings::default(), &Limits::default()).unwrap();
+    let entry = told.inputs.topics.iter().find(|entry| entry.topic == "/camera/points").unwrap();
+    assert!(entry.used_as.is_none() && entry.to_string().contains("height 1"), "{entry}");
+    let (source, _) = opened({
+        let mut log = log_with(&lidar);
+        log.info("/camera/depth/camera_info", "lidar", &camera(16, 12, 14.0));
+        log.depth(at(0.1), "lidar", 3.0);
+        log
+    })
+    .unwrap();
+    assert_eq!(count(&source, "messages_not_read"), 0);
+}
+
+#[test]
+fn damaged_points_are_counted_and_the_others_are_read() {
+    let mut log = log_with(&wall("camera_optical_frame", at(0.1), false));
+    let mut damaged = wall("camera_optical_frame", at(0.2), false);
+    damaged.data.to_mut().truncate(100);
+    log.message("/camera/points", at(0.2), &damaged);
+    log.message("/camera/points", at(0.3), &wall("camera_optical_frame", at(0.3), false));
+    let (mut source, _) = opened(log).unwrap();
+    let frames = std::iter::from_fn(|| source.next_frame()).count();
+    assert_eq!((frames, count(&source, "images_of_wrong_layout")), (1, 1));
+}
