@@ -402,7 +402,7 @@ const UNREADABLE: &str = ", because no topic is read for it: a program that adds
 const COLOUR: &str = "sensor_msgs/Image with colour, mono, bayer or yuv pixels of 8 bits, or \
                       sensor_msgs/CompressedImage with jpeg or png";
 const DEPTH: &str = "sensor_msgs/Image with 16UC1 or 32FC1, sensor_msgs/CompressedImage with \
-                     compressedDepth, or stereo_msgs/DisparityImage";
+                     compressedDepth, stereo_msgs/DisparityImage, or sensor_msgs/PointCloud2 in rows and columns";
 
 const DEPTH_REMEDY: &str = "; name a topic that has them as `depth_topic` under [input], or take \
                             a config without depth";
