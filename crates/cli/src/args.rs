@@ -15,7 +15,7 @@ use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
 use tagalong_view::{HELP as VIEW_HELP, ViewArgs};
 
-use crate::commands::{EvalArgs, ModelArgs};
+use crate::commands::{BlurArgs, EvalArgs, ModelArgs};
 use crate::demo::DemoArgs;
 use crate::run::RunArgs;
 
@@ -129,6 +129,9 @@ pub enum Command {
     /// Says what a neural network in an ONNX file is, and how to use it
     #[command(after_help = MODEL_HELP)]
     Model(ModelArgs),
+    /// Copies a log with the heads of its people blurred, to share it
+    #[command(after_help = BLUR_HELP)]
+    Blur(BlurArgs),
     /// Lists the contents of a log, and the inputs that a pipeline could use
     #[command(after_help = INSPECT_HELP)]
     Inspect {
@@ -145,6 +148,20 @@ pub enum Command {
         format: Format,
     },
 }
+
+const BLUR_HELP: &str = "\
+People are found by a run, and their heads are blurred in the images that it used, also half a second
+before and after. All else is copied message by message, depth included; images and coloured points in
+which nobody was looked for are left out, and listed. A head that the run did not find is not
+blurred: look through the copy before you share it. The copy is an MCAP file without the attachments
+of the log; pictures and pages of a run over it show the blurred images. Exit code 3: images could not
+be decoded, and are left out.
+
+Examples:
+  tagalong blur robot.mcap
+  tagalong blur robot.mcap -o shared/robot.mcap
+  tagalong run depth-verified robot.mcap -o runs/robot && tagalong blur robot.mcap --run runs/robot
+  tagalong run robot-blurred.mcap --overlay      # pictures in which nobody is recognised";
 
 const MODEL_HELP: &str = "\
 Prints inputs and outputs of the file, the family of detectors that its outputs have the shapes of,

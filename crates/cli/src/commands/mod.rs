@@ -1,5 +1,6 @@
 //! Subcommands that answer a question.
 
+mod blur;
 mod check;
 mod config;
 mod eval;
@@ -11,6 +12,7 @@ mod model;
 mod networks;
 mod shell;
 
+pub use blur::{BlurArgs, blur};
 pub use check::check;
 pub use config::{config, schema};
 pub use eval::{EvalArgs, SimilarityChoice, eval, eval_json};

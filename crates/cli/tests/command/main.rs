@@ -8,6 +8,7 @@ mod annotate;
 mod answers;
 mod bad_input;
 mod bench;
+mod blur;
 #[cfg(unix)]
 mod damaged;
 mod demo;

@@ -10,6 +10,7 @@ use tagalong_core::Stamp;
 
 use super::WriteError;
 use crate::msgs::{Message, StringMsg, encode};
+use crate::walk::{Channel, Message as LoggedMessage};
 use crate::{TRUTH_TOPIC, TruthFrame};
 
 /// Writer of any ROS 2 messages to an MCAP file, as a robot's recorder would do it. The file has a
@@ -83,6 +84,59 @@ impl MessageLog {
             .map_err(|why| io::Error::other(format!("a message of {topic} as JSON: {why}")))
             .map_err(WriteError::io(&self.path))?;
         self.send(topic, captured, &StringMsg { data })
+    }
+
+    /// Writes a message of another log as it is, with its topic, its type and its times.
+    ///
+    /// # Errors
+    /// [`WriteError::Mcap`].
+    pub fn copy(&mut self, message: &LoggedMessage<'_>) -> Result<(), WriteError> {
+        let channel = message.channel;
+        let channel_id = match self.channels.get(&channel.topic) {
+            Some(id) => *id,
+            None => self.open_like(channel)?,
+        };
+        self.put_like(channel_id, message, message.data)
+    }
+
+    /// Writes a message in place of one of another log, with its topic and its times.
+    ///
+    /// # Errors
+    /// [`WriteError::Mcap`].
+    pub fn send_like<M: Message + Serialize>(
+        &mut self,
+        replaced: &LoggedMessage<'_>,
+        message: &M,
+    ) -> Result<(), WriteError> {
+        let channel_id = match self.channels.get(&replaced.channel.topic) {
+            Some(id) => *id,
+            None => self.open::<M>(&replaced.channel.topic)?,
+        };
+        self.put_like(channel_id, replaced, &encode(message))
+    }
+
+    fn put_like(
+        &mut self,
+        channel_id: u16,
+        like: &LoggedMessage<'_>,
+        data: &[u8],
+    ) -> Result<(), WriteError> {
+        let LoggedMessage { sequence, log_time, publish_time, .. } = *like;
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time };
+        let written = self.writer.write_to_known_channel(&header, data);
+        written.map_err(WriteError::mcap(&self.partial))
+    }
+
+    fn open_like(&mut self, channel: &Channel) -> Result<u16, WriteError> {
+        let definition = channel.definition.as_bytes();
+        let schema =
+            self.writer.add_schema(&channel.schema_name, &channel.schema_encoding, definition);
+        let schema = schema.map_err(WriteError::mcap(&self.partial))?;
+        let added =
+            self.writer.add_channel(schema, &channel.topic, &channel.encoding, &BTreeMap::new());
+        let id = added.map_err(WriteError::mcap(&self.partial))?;
+        self.channels.insert(channel.topic.clone(), id);
+        Ok(id)
     }
 
     fn put(&mut self, channel_id: u16, at: Stamp, data: &[u8]) -> Result<(), WriteError> {
