@@ -66,15 +66,14 @@ fn the_topics_of_the_foxglove_layout_are_in_the_file_of_a_run() {
     simulate.current_dir(folder.path()).args(["simulate", "s.toml", "-o", "s.mcap"]);
     assert_eq!(code(&simulate.output().unwrap()), 0);
     let mut run = tagalong();
-    run.current_dir(folder.path()).args(["run", "-c", config, "s.mcap", "-o", "run"]);
+    run.current_dir(folder.path()).args(["run", config, "s.mcap", "-o", "run"]);
     let output = run.arg("--with-images").output().unwrap();
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let bytes = fs::read(folder.path().join("run/tracks.mcap")).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     let written: BTreeSet<String> =
         summary.channels.values().map(|channel| channel.topic.clone()).collect();
-    let layout =
-        concat!(env!("CARGO_MANIFEST_DIR"), "/../../bridges/ros2/foxglove/tagalong.json");
+    let layout = concat!(env!("CARGO_MANIFEST_DIR"), "/../../bridges/ros2/foxglove/tagalong.json");
     let layout = serde_json::from_str(&fs::read_to_string(layout).unwrap()).unwrap();
     let mut shown = BTreeSet::new();
     add_topics(&layout, &mut shown);
