@@ -214,6 +214,83 @@ class Detection3DArray(IdlStruct, typename="vision_msgs::msg::dds_::Detection3DA
     detections: t.sequence[Detection3D]
 
 
+@dataclass
+class ColorRGBA(IdlStruct, typename="std_msgs::msg::dds_::ColorRGBA_"):
+    r: t.float32
+    g: t.float32
+    b: t.float32
+    a: t.float32
+
+
+@dataclass
+class Duration(IdlStruct, typename="builtin_interfaces::msg::dds_::Duration_"):
+    sec: t.int32
+    nanosec: t.uint32
+
+
+@dataclass
+class Point(IdlStruct, typename="geometry_msgs::msg::dds_::Point_"):
+    x: t.float64
+    y: t.float64
+    z: t.float64
+
+
+@dataclass
+class UVCoordinate(IdlStruct, typename="visualization_msgs::msg::dds_::UVCoordinate_"):
+    u: t.float32
+    v: t.float32
+
+
+@dataclass
+class MeshFile(IdlStruct, typename="visualization_msgs::msg::dds_::MeshFile_"):
+    filename: str
+    data: t.sequence[t.uint8]
+
+
+@dataclass
+class Marker(IdlStruct, typename="visualization_msgs::msg::dds_::Marker_"):
+    header: Header
+    ns: str
+    id: t.int32
+    type: t.int32
+    action: t.int32
+    pose: Pose
+    scale: Vector3
+    color: ColorRGBA
+    lifetime: Duration
+    frame_locked: bool
+    points: t.sequence[Point]
+    colors: t.sequence[ColorRGBA]
+    texture_resource: str
+    texture: CompressedImage
+    uv_coordinates: t.sequence[UVCoordinate]
+    text: str
+    mesh_resource: str
+    mesh_file: MeshFile
+    mesh_use_embedded_materials: bool
+
+
+@dataclass
+class MarkerArray(IdlStruct, typename="visualization_msgs::msg::dds_::MarkerArray_"):
+    markers: t.sequence[Marker]
+
+
+@dataclass
+class Person(IdlStruct, typename="people_msgs::msg::dds_::Person_"):
+    name: str
+    position: Point
+    velocity: Point
+    reliability: t.float64
+    tagnames: t.sequence[str]
+    tags: t.sequence[str]
+
+
+@dataclass
+class People(IdlStruct, typename="people_msgs::msg::dds_::People_"):
+    header: Header
+    people: t.sequence[Person]
+
+
 # Services as rmw_cyclonedds carries them: the caller's number goes before the request, and comes back
 # before the answer.
 @dataclass
@@ -488,6 +565,60 @@ class OldEnable:
         del self.writer, self.participant
 
 
+CYLINDER, LINE_LIST, TEXT, DELETE_ALL = 3, 5, 9, 3
+
+
+class Viewer:
+    """Hears what RViz draws, and what a planner with a social cost map reads."""
+
+    def __init__(self, participant):
+        self.markers = Listener(participant, "rt/people/markers", MarkerArray)
+        self.transforms = Listener(participant, "rt/tf", TFMessage)
+        self.people = Listener(participant, "rt/people", People)
+
+    def check(self, tracks):
+        """Checks that markers, transforms and people tell of the same people as the tracks."""
+
+        def same_stamp():
+            by_stamp = {
+                (m.header.stamp.sec, m.header.stamp.nanosec): m
+                for m in tracks.since(0)
+                if m.detections
+            }
+            for array in reversed(self.markers.since(0)):
+                stamp = array.markers[0].header.stamp
+                found = by_stamp.get((stamp.sec, stamp.nanosec))
+                kinds = {marker.type for marker in array.markers[1:]}
+                if found and {CYLINDER, TEXT, LINE_LIST} <= kinds:
+                    return array.markers, found
+            return None
+
+        markers, array = wait_for(same_stamp, 5, "markers have a body, a text and a trail")
+        ids = sorted(int(detection.id) for detection in array.detections)
+        bodies = [m for m in markers if m.ns == "people"]
+        check(sorted(m.id for m in bodies) == ids, f"the markers are of the people {ids}")
+        check(markers[0].action == DELETE_ALL, "markers of people who are gone are removed")
+        check(all(m.lifetime.sec == 1 for m in markers[1:]), "and end by themselves after 1 s")
+        check({m.header.frame_id for m in markers} == {"odom"}, "they are in the frame odom")
+        texts = [m.text for m in markers if m.type == TEXT]
+        check(all(text.endswith(" m") for text in texts), f"with ID and distance: {texts}")
+        check(all(1.4 < m.scale.z < 2.1 for m in bodies), "as high as people are")
+
+        moved = [t for m in self.transforms.since(0) for t in m.transforms]
+        wanted = {f"person_{n}" for n in ids}
+        check(wanted <= {t.child_frame_id for t in moved}, f"transforms to {sorted(wanted)}")
+        heads = [t.transform.translation.z for t in moved]
+        check(all(1.0 < z < 2.1 for z in heads), "at the height of their heads")
+
+        people = [m for m in self.people.since(0) if m.people]
+        check(people[-1].header.frame_id == "odom", "people_msgs/People are in the frame odom")
+        known = [person for m in people for person in m.people]
+        check({str(n) for n in ids} <= {person.name for person in known}, "of the same names")
+        check(all(0.0 < person.reliability <= 1.0 for person in known), "with a reliability")
+        speeds = [(p.velocity.x**2 + p.velocity.y**2) ** 0.5 for p in known]
+        check(max(speeds) < 3.0, f"and a velocity, at most {max(speeds):.2f} m/s")
+
+
 class Http:
     """The HTTP client."""
 
@@ -531,10 +662,12 @@ def run(checks, path, domain, port, command):
         commands = Listener(listeners, "rt/cmd_vel", TwistStamped)
         states = Listener(listeners, "rt/people/state", String)
         tracks = Listener(listeners, "rt/people/tracks", Detection3DArray)
+        viewer = Viewer(listeners)
         threading.Thread(target=robot.play, daemon=True).start()
         http = Http(port)
         if checks == "all":
             converse(domain, http, commands, states, tracks, early)
+            viewer.check(tracks)
         else:
             early.close()
             hand = Hand(DomainParticipant(domain))
@@ -546,6 +679,9 @@ def run(checks, path, domain, port, command):
         time.sleep(0.3)
         last = commands.since(0)[-1]
         check(not moves([last]), "the last command is zero")
+        if checks == "all":
+            last = viewer.markers.since(0)[-1].markers
+            check([m.action for m in last] == [DELETE_ALL], "the last markers remove all people")
     except Exception:
         print("the bridge said:\n" + "".join(said), file=sys.stderr)
         raise

@@ -2,18 +2,30 @@
 
     ros2 launch ./bridges/ros2/launch/follow.launch.py config:=configs/follow-depth.toml
 
-The bridge is a program, not a ROS package: `program` is its path. With `nav2:=true` its commands go to
+`program` is the path of the bridge; in a workspace that colcon built, that of the workspace is found:
+
+    ros2 launch tagalong_ros2 follow.launch.py config:=my-robot.toml
+
+With `nav2:=true` its commands go to
 `cmd_vel_nav`, for Nav2's collision monitor or a multiplexer to pass on.
 """
+
+from pathlib import Path
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess
 from launch.conditions import IfCondition, UnlessCondition
 from launch.substitutions import LaunchConfiguration
 
+# This file is share/tagalong_ros2/launch/follow.launch.py where colcon installed it.
+SHARE = Path(__file__).resolve().parents[1]
+INSTALLED = SHARE.parents[1] / "lib" / "tagalong_ros2" / "tagalong-ros2"
+PROGRAM = str(INSTALLED) if INSTALLED.exists() else "tagalong-ros2"
+CONFIGS = SHARE / "configs" if INSTALLED.exists() else Path("configs")
+
 ARGUMENTS = {
-    "program": ("tagalong-ros2", "path of the program"),
-    "config": ("configs/follow-depth.toml", "config of the pipeline"),
+    "program": (PROGRAM, "path of the program"),
+    "config": (str(CONFIGS / "follow-depth.toml"), "config of the pipeline"),
     "namespace": ("/", "namespace of the robot"),
     "command_type": ("twist-stamped", "twist-stamped (Jazzy), or twist (Humble)"),
     "http": ("127.0.0.1:8080", "address of HTTP with JSON on this computer"),

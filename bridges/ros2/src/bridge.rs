@@ -6,11 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use ros2_client::Publisher;
 use tagalong::config::Registry;
 use tagalong::core::Stamp;
-use tagalong::log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg};
-use tagalong::log::write::{self, FrameRecord};
+use tagalong::log::msgs::Header;
+use tagalong::log::write::FrameRecord;
 use tagalong::log::{Input, Listening, LiveSource, LogFrame};
 use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline};
 use tagalong_live::Live;
@@ -28,8 +27,10 @@ use crate::stamps::{StampClock, system_time};
 use crate::wheels::{CommandCounts, Wheels};
 use crate::{BridgeError, Options};
 
+mod out;
 mod wheels;
 
+use out::Out;
 use wheels::{drive, sources, take_enable, tell_untimely};
 
 /// Longest wait for messages before the stop flag is checked.
@@ -272,14 +273,6 @@ impl Gates {
     }
 }
 
-/// Publishers of the results.
-struct Out {
-    tracks: Publisher<Detection3DArray>,
-    target: Publisher<PoseStamped>,
-    state: Publisher<StringMsg>,
-    heartbeat: Publisher<Header>,
-}
-
 impl Bridge {
     fn new(
         options: &Options,
@@ -291,12 +284,7 @@ impl Bridge {
         callers: Callers,
     ) -> Result<Self, BridgeError> {
         let base_frame = source.facts().robot_frame;
-        let out = Out {
-            tracks: network.publisher(&options.tracks)?,
-            target: network.publisher(&options.target)?,
-            state: network.publisher(&options.state)?,
-            heartbeat: network.publisher_of(&options.heartbeat, "std_msgs/msg/Header")?,
-        };
+        let out = Out::new(options, &mut network)?;
         let switch = setup.pipeline.enable_switch();
         let gates = Gates::new(switch.map_or(EnableSwitch::CEILING, |switch| switch.timeout()));
         let wheels = match switch {
@@ -459,7 +447,7 @@ impl Bridge {
         }
         self.callers.desk.turn(permission, self.pipeline.fault());
         let header = Header::new(self.clock.now(), "tagalong");
-        let _lost = self.out.heartbeat.publish(header);
+        self.out.beat(header);
         self.diagnostics.update(Status {
             frames: self.frames,
             frame_since: None,
@@ -574,8 +562,10 @@ impl Bridge {
         }
     }
 
-    /// Publishes the results. Subscribers are not waited for, so a message may be lost.
-    fn publish(&self, found: &LogFrame, report: &FrameReport) {
+    /// Publishes the results.
+    fn publish(&mut self, found: &LogFrame, report: &FrameReport) {
+        // Without odometry the frame `odom` does not exist, and a viewer could place nobody in it.
+        let world = if self.source.has_odometry() { &self.odom_frame } else { &self.base_frame };
         let record = FrameRecord {
             index: report.index,
             stamp: report.stamp,
@@ -586,18 +576,7 @@ impl Bridge {
             target: report.target,
             command: report.command.map(|command| command.wheels),
         };
-        let _lost = self.out.tracks.publish(write::detections(&record, &self.base_frame));
-        let target = report.tracks.iter().find(|track| Some(track.id) == report.target);
-        if let Some(track) = target {
-            let _lost = self.out.target.publish(write::pose(&record, track, &self.odom_frame));
-        }
-        if let (Some(command), Some(lock)) = (&report.command, &report.lock) {
-            let reason = command.reason.name();
-            let state = lock.state.name();
-            let why = lock.why;
-            let data = format!("{reason}; {state}: {why}");
-            let _lost = self.out.state.publish(StringMsg { data });
-        }
+        self.out.publish(&record, report, &self.base_frame, world);
     }
 
     /// Clears stops and faults that are not newer than the message; not while the enable has more than
@@ -691,6 +670,7 @@ impl Bridge {
 
     /// Stops the robot; returns the counts and the network, which must outlast the last command.
     fn finish(self) -> (Summary, Network) {
+        self.out.clear();
         let summary = self.summary();
         let told = self.wheels.map(Wheels::finish).unwrap_or_default();
         (Summary { told, ..summary }, self.network)

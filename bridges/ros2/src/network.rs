@@ -9,7 +9,7 @@ use futures::future::{AbortHandle, Abortable, ready};
 use ros2_client::dds::rustdds::{QosPolicies, RTPSEntity};
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
-    Context, ContextOptions, MessageInfo, MessageTypeName, Name, Node, NodeName, NodeOptions,
+    Context, ContextOptions, Gid, MessageInfo, MessageTypeName, Name, Node, NodeName, NodeOptions,
     Publisher, QosProfile, Server, ServiceMapping, ServiceTypeName, Subscription,
 };
 use serde::Serialize;
@@ -294,7 +294,10 @@ impl Network {
     ) -> Result<Ear, BridgeError> {
         let inbox = Arc::clone(inbox);
         let name = topic.to_owned();
+        let ours = participant_of(Gid::from(self.context.domain_participant().guid()));
         let put = move |message: Option<(M, MessageInfo)>| match message {
+            // The transforms that this node publishes itself are no input.
+            Some((_, info)) if participant_of(info.publisher_gid()) == ours => {}
             Some((message, _)) => inbox.push(&name, encode(message), room),
             None => inbox.count_malformed(&name),
         };
@@ -368,6 +371,11 @@ impl Network {
     }
 }
 
+/// Returns the part of an identity that all publishers of a participant share.
+fn participant_of(publisher: Gid) -> Vec<u8> {
+    publisher.to_bytes16()[..12].to_vec()
+}
+
 /// Returns the name of a topic, which lies in the namespace unless it begins with a slash.
 /// (ros2-client by itself doubles the slash in the namespace `/`.)
 fn name(namespace: &str, topic: &str) -> Result<Name, BridgeError> {
@@ -397,6 +405,8 @@ impl Drop for Network {
 
 #[cfg(test)]
 mod tests {
+    use tagalong::log::msgs::TransformStamped;
+
     use super::*;
 
     #[test]
@@ -434,5 +444,38 @@ mod tests {
         // DDS fills messages up to a multiple of four bytes.
         assert!(heard.message.starts_with(&[0, 1, 0, 0, 2, 1]), "{:?}", heard.message);
         assert!(heard.arrival_ns > 0);
+    }
+
+    #[test]
+    fn a_node_does_not_hear_itself() {
+        let domain = 30 - (std::process::id() % 20) as u16;
+        let mut other = Network::join(domain, "/").unwrap();
+        let mut bridge = Network::join(domain, "/").unwrap();
+        let inbox = Arc::new(Inbox::default());
+        let own: Publisher<TFMessage> = bridge.publisher("/tf").unwrap();
+        let _ear = bridge.plain::<TFMessage>("/tf", sensor(OTHERS), &inbox).unwrap();
+        let theirs: Publisher<TFMessage> = other.publisher("/tf").unwrap();
+        let named = |child: &str| {
+            let child_frame_id = child.to_owned();
+            TFMessage {
+                transforms: vec![TransformStamped { child_frame_id, ..Default::default() }],
+            }
+        };
+        let mut heard = Vec::new();
+        for _ in 0..100 {
+            let _full = own.publish(named("person_1"));
+            let _full = theirs.publish(named("base_link"));
+            heard.extend(inbox.take(std::time::Duration::from_millis(100)));
+            if heard.len() > 5 {
+                break;
+            }
+        }
+        if heard.is_empty() {
+            eprintln!("skipped: two participants do not hear each other here (no multicast?)");
+        }
+        for arrival in heard {
+            let tf: TFMessage = tagalong::log::msgs::decode(&arrival.message).unwrap();
+            assert_eq!(tf.transforms[0].child_frame_id, "base_link");
+        }
     }
 }

@@ -69,6 +69,15 @@ pub struct Options {
     /// Topic of the bridge's state (diagnostic_msgs/DiagnosticArray).
     #[arg(long, value_name = "TOPIC", default_value = "/diagnostics")]
     pub diagnostics: String,
+    /// Topic of shapes that RViz draws (visualization_msgs/MarkerArray); empty for none.
+    #[arg(long, value_name = "TOPIC", default_value = "people/markers")]
+    pub markers: String,
+    /// Topic of a transform for each person, `person_ID` (tf2_msgs/TFMessage); empty for none.
+    #[arg(long, value_name = "TOPIC", default_value = "/tf")]
+    pub transforms: String,
+    /// Topic of people for planners with a social cost map (people_msgs/People); empty for none.
+    #[arg(long, value_name = "TOPIC", default_value = "people")]
+    pub people: String,
     /// Topic of commands.
     #[arg(long, value_name = "TOPIC", default_value = "cmd_vel")]
     pub command: String,

@@ -91,7 +91,7 @@ fn run_args(folder: &Path, name: &str, config: PathBuf, log: &Path) -> RunArgs {
         config: Some(config),
         log: Some(log.to_owned()),
         output: Some(folder.join(name)),
-        with_images: false,
+        with_images: true,
         overlay: Some(Overlaid::People),
         overwrite: true,
         strict: false,
@@ -116,6 +116,8 @@ Look at:
   {shown}/report/report.html: which pipeline is better, and every mistake with a picture
   {shown}/depth-ekf/overlay/: boxes, ids, trails and a plan, one picture a frame
   {shown}/naive/overlay/: the same, with ids that change whenever somebody is hidden
+  {shown}/depth-ekf/tracks.mcap: people in space and in the image, in Foxglove; import the layout
+      bridges/ros2/foxglove/tagalong.json
 
 Try next:
   tagalong view {shown}/depth-ekf {shown}/naive

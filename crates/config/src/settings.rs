@@ -303,14 +303,19 @@ fn names_in<T: Settings>(path: &[String]) -> String {
     quoted.join(", ")
 }
 
-/// Adds "did you mean" to serde's "unknown field `a`, expected one of `b`, `c`".
+/// Puts "did you mean" into serde's "unknown field `a`, expected one of `b`, `c`", before the names.
 fn with_suggestion(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     // The unknown name is quoted first, then the valid ones.
     let unknown = if message.starts_with("unknown ") { quoted.next() } else { None };
-    match unknown.and_then(|name| nearest(name, quoted)) {
-        Some(better) => format!("{message}; did you mean `{better}`?"),
-        None => message.to_owned(),
+    let better = unknown.and_then(|name| nearest(name, quoted));
+    match (better, message.split_once("`, expected ")) {
+        // A reader of a long list would not see what comes after it.
+        (Some(better), Some((wrong, expected))) => {
+            format!("{wrong}`; did you mean `{better}`? expected {expected}")
+        }
+        (Some(better), None) => format!("{message}; did you mean `{better}`?"),
+        (None, _) => message.to_owned(),
     }
 }
 
@@ -527,8 +532,9 @@ mod tests {
         assert_eq!((read.own, read.shared.height_m), (2, 1.0));
         let shown = |text| parse(text).unwrap_err().render("a.toml", text);
         let unknown = shown("{ own = 2, hight_m = 1.0 }");
-        assert!(unknown.contains("a.toml:1:12: unknown field `hight_m`, expected one of `own`"));
-        assert!(unknown.contains("did you mean `height_m`?\n"), "{unknown}");
+        let nearest_first =
+            "unknown field `hight_m`; did you mean `height_m`? expected one of `own`";
+        assert!(unknown.contains(&format!("a.toml:1:12: {nearest_first}")), "{unknown}");
         assert!(unknown.ends_with("           ^^^^^^^"), "{unknown}");
         let kind = shown("{ own = 2, height_m = 'tall' }");
         assert!(kind.contains("a.toml:1:23: invalid type: string \"tall\""), "{kind}");
@@ -556,8 +562,9 @@ mod tests {
             parse_settings::<Outer>(Some(value)).unwrap_err().render("a.toml", &text)
         };
         let unknown = shown("hight_m = 1.0");
-        assert!(unknown.contains("a.toml:5:1: unknown field `hight_m`, expected one of `own`"));
-        assert!(unknown.contains("did you mean `height_m`?\n"), "{unknown}");
+        let nearest_first =
+            "unknown field `hight_m`; did you mean `height_m`? expected one of `own`";
+        assert!(unknown.contains(&format!("a.toml:5:1: {nearest_first}")), "{unknown}");
         let kind = shown("height_m = 'tall'");
         assert!(kind.contains("a.toml:5:12: invalid type: string \"tall\""), "{kind}");
         let range = shown("height_m = 4.0");

@@ -29,7 +29,7 @@ enum Edit {
 const END_OF_FN: &str = "\n    }\n";
 
 /// All walk-throughs.
-pub const GUIDES: [Guide; 3] = [
+pub const GUIDES: [Guide; 4] = [
     Guide {
         page: "plugins/README.md",
         kind: Kind::Verifier,
@@ -57,6 +57,28 @@ pub const GUIDES: [Guide; 3] = [
             Edit::Replace { file: "config.rs", from: "impl Default for Config {", to: "\n}\n" },
             Edit::Replace { file: "filter.rs", from: "    fn correct(", to: END_OF_FN },
             Edit::Append { file: "filter.rs" },
+        ],
+    },
+    Guide {
+        page: "docs/walk-through-detector.md",
+        kind: Kind::Detector,
+        name: "shoulders",
+        edits: &[
+            Edit::Replace {
+                file: "config.rs",
+                from: "    /// Candidates with a lower score",
+                to: "}\n",
+            },
+            Edit::Replace { file: "config.rs", from: "impl Default for Config {", to: "\n}\n" },
+            Edit::Replace {
+                file: "detect.rs",
+                from: "use tagalong_core::{",
+                to: "use crate::Config;\n",
+            },
+            Edit::Replace { file: "detect.rs", from: "    config: Config,\n", to: END_OF_FN },
+            Edit::Replace { file: "detect.rs", from: "    /// Everything that could", to: END_OF_FN },
+            Edit::Replace { file: "detect.rs", from: "    fn detect(", to: END_OF_FN },
+            Edit::Append { file: "detect.rs" },
         ],
     },
     Guide {

@@ -18,7 +18,8 @@ use peers::*;
 use tagalong::config::NoSettings;
 use tagalong::core::{Controller, Twist};
 use tagalong::log::msgs::{
-    Detection3DArray, Header, Message, Odometry, PoseStamped, StringMsg, TwistStamped,
+    Detection3DArray, Header, Marker, MarkerArray, Message, Odometry, People, PoseStamped,
+    StringMsg, TFMessage, TwistStamped,
 };
 use tagalong_ros2::{Options, run};
 use tagalong_sim::{Event, Simulation};
@@ -33,6 +34,9 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     let tracks = robot.peer.collect::<Detection3DArray>("/people/tracks", &heard_all);
     let poses = robot.peer.collect::<PoseStamped>("/people/target_pose", &heard_all);
     let states = robot.peer.collect::<StringMsg>("/people/state", &heard_all);
+    let drawn = robot.peer.collect::<MarkerArray>("/people/markers", &heard_all);
+    let frames = robot.peer.collect::<TFMessage>("/tf", &heard_all);
+    let people = robot.peer.collect::<People>("/people", &heard_all);
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
     let (bridge, said) = bridge(domain(0), &stop);
     let hand = Hand::new(domain(0), &stop);
@@ -50,6 +54,7 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     let tracks = tracks.finish();
     let poses = poses.finish();
     let states = states.finish();
+    check_viewers(&drawn.finish(), &frames.finish(), &people.finish());
     let commands = commands.finish();
     eprintln!("{summary}");
 
@@ -76,6 +81,37 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     assert!(silent_s > 0.3, "zeros cease so that others may drive: {silent_s} s");
     let farewell = commands.last().unwrap();
     assert!(farewell.0 > stopped && !moves(&farewell.1), "the last command is zero");
+}
+
+/// Checks what viewers and planners are told about the one person of the scene.
+fn check_viewers(
+    drawn: &[(Instant, MarkerArray)],
+    frames: &[(Instant, TFMessage)],
+    people: &[(Instant, People)],
+) {
+    let full = drawn.iter().filter(|(_, array)| array.markers.len() > 3);
+    assert!(full.clone().count() > 20, "{} of {}", full.count(), drawn.len());
+    let markers = &drawn.iter().rev().find(|(_, array)| array.markers.len() > 3).unwrap().1.markers;
+    assert_eq!(markers[0].action, Marker::DELETE_ALL);
+    let body = &markers[1];
+    assert_eq!((body.shape, body.header.frame_id.as_str()), (Marker::CYLINDER, "odom"));
+    let text = &markers[2].text;
+    assert!(text.ends_with(" m") && text.starts_with(&body.id.to_string()), "{text}");
+    assert!(markers.iter().any(|marker| marker.shape == Marker::LINE_LIST), "a trail");
+    let last = &drawn.last().unwrap().1.markers;
+    assert_eq!((last.len(), last[0].action), (1, Marker::DELETE_ALL), "removed at the end");
+
+    assert!(frames.len() > 20, "{} transforms", frames.len());
+    let frame = &frames[0].1.transforms[0];
+    assert_eq!((frame.header.frame_id.as_str(), &*frame.child_frame_id), ("odom", "person_1"));
+    let head = frame.transform.translation;
+    assert!((1.5..3.5).contains(&head.x) && head.y.abs() < 0.5, "{head:?}");
+
+    let known = people.iter().filter_map(|(_, array)| array.people.first());
+    assert!(known.clone().count() > 20);
+    let person = known.last().unwrap();
+    assert_eq!((person.name.as_str(), person.position.z), ("1", 0.0));
+    assert!((0.5..=1.0).contains(&person.reliability), "{person:?}");
 }
 
 #[test]
@@ -229,6 +265,7 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     let told = robot.peer.collect_of::<DiagnosticArray>("/diagnostics", array, &heard_all);
     let beats =
         robot.peer.collect_of::<Header>("/people/heartbeat", "std_msgs/msg/Header", &heard_all);
+    let drawn = robot.peer.collect::<MarkerArray>("/people/markers", &heard_all);
     let is_stuck = Arc::new(AtomicBool::new(false));
     let mut registry = tagalong::builtin_registry();
     let flag = Arc::clone(&is_stuck);
@@ -243,7 +280,8 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     std::fs::write(&config, text).unwrap();
     let address = format!("127.0.0.1:{}", 40_000 + std::process::id() % 20_000);
     let http = Some(address.parse().unwrap());
-    let options = Options { config: config.clone(), http, ..options(domain(5), "20") };
+    let markers = String::new();
+    let options = Options { config: config.clone(), http, markers, ..options(domain(5), "20") };
     let (bridge, said) = bridge_with(options, registry, &stop);
     let hand = Hand::new(domain(5), &stop);
     let junk = robot.peer.publisher_of::<u8>("/odom", Odometry::TYPE, reliable());
@@ -289,6 +327,7 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     assert_eq!(summary.traffic["/odom"].malformed, 1, "{summary}");
     assert!(summary.to_string().contains("1 malformed"), "{summary}");
     heard_all.store(true, Ordering::Relaxed);
+    assert!(drawn.finish().is_empty(), "no topic, no markers");
     drop(playing.join().unwrap());
     std::fs::remove_file(config).unwrap();
 }

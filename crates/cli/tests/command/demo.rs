@@ -1,5 +1,6 @@
 //! `tagalong demo` and `tagalong trials`: their refusals, and their output.
 
+use std::collections::BTreeSet;
 use std::fs;
 
 use crate::common::{code, tagalong, text};
@@ -39,4 +40,44 @@ fn trials_print_the_same_table_on_any_number_of_jobs() {
         (2, &3.into())
     );
     assert_eq!(table["gains"][0]["idf1"]["difference"]["estimate"], 0.0);
+}
+
+/// Adds all topics that a Foxglove layout names: keys and values that begin with a slash.
+fn add_topics(value: &serde_json::Value, topics: &mut BTreeSet<String>) {
+    match value {
+        serde_json::Value::Object(fields) => {
+            topics.extend(fields.keys().filter(|key| key.starts_with('/')).cloned());
+            fields.values().for_each(|field| add_topics(field, topics));
+        }
+        serde_json::Value::Array(items) => items.iter().for_each(|item| add_topics(item, topics)),
+        serde_json::Value::String(text) if text.starts_with('/') => {
+            topics.insert(text.clone());
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn the_topics_of_the_foxglove_layout_are_in_the_file_of_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+    let config = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/depth-ekf.toml");
+    let mut simulate = tagalong();
+    simulate.current_dir(folder.path()).args(["simulate", "s.toml", "-o", "s.mcap"]);
+    assert_eq!(code(&simulate.output().unwrap()), 0);
+    let mut run = tagalong();
+    run.current_dir(folder.path()).args(["run", config, "s.mcap", "-o", "run"]);
+    let output = run.arg("--with-images").output().unwrap();
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let bytes = fs::read(folder.path().join("run/tracks.mcap")).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let written: BTreeSet<String> =
+        summary.channels.values().map(|channel| channel.topic.clone()).collect();
+    let layout = concat!(env!("CARGO_MANIFEST_DIR"), "/../../bridges/ros2/foxglove/tagalong.json");
+    let layout = serde_json::from_str(&fs::read_to_string(layout).unwrap()).unwrap();
+    let mut shown = BTreeSet::new();
+    add_topics(&layout, &mut shown);
+    assert!(shown.len() >= 6, "{shown:?}");
+    let missing: Vec<_> = shown.difference(&written).collect();
+    assert!(missing.is_empty(), "{missing:?} of the layout are not in {written:?}");
 }

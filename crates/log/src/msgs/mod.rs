@@ -11,6 +11,7 @@ mod common;
 mod contact;
 mod definition;
 mod geometry;
+mod people;
 mod ros1;
 mod scene;
 mod sensor;
@@ -23,11 +24,12 @@ pub use geometry::{
     Odometry, Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TFMessage,
     Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
 };
+pub use people::{People, PersonMsg};
 use re_cdr::{BigEndian, LittleEndian};
 pub use scene::{
-    ArrowPrimitive, Color, ColorRgba, CylinderPrimitive, ImageAnnotations, Marker, MarkerArray,
-    Pixel, PointsAnnotation, SceneEntity, SceneEntityDeletion, SceneUpdate, TextAnnotation,
-    TextPrimitive,
+    ArrowPrimitive, Color, ColorRgba, CylinderPrimitive, ImageAnnotations, LinePrimitive, Marker,
+    MarkerArray, Pixel, PointsAnnotation, SceneEntity, SceneEntityDeletion, SceneUpdate,
+    TextAnnotation, TextPrimitive,
 };
 pub use sensor::{
     CameraInfo, CompressedImage, DisparityImage, Image, JointState, LaserScan, PointCloud2,

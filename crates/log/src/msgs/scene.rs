@@ -71,7 +71,7 @@ pub struct Marker {
     pub lifetime: Duration,
     /// True if it moves with its frame.
     pub frame_locked: bool,
-    /// Tail and tip of an arrow.
+    /// Tail and tip of an arrow, or the ends of lines.
     pub points: Vec<Point>,
     /// Colours of points.
     pub colors: Empty,
@@ -98,6 +98,8 @@ impl Marker {
     pub const ARROW: i32 = 0;
     /// Upright cylinder.
     pub const CYLINDER: i32 = 3;
+    /// Lines, each from a point to the next one of a pair.
+    pub const LINE_LIST: i32 = 5;
     /// Text that faces the viewer.
     pub const TEXT: i32 = 9;
     /// Adds or replaces the marker.
@@ -163,6 +165,32 @@ pub struct CylinderPrimitive {
     pub color: Color,
 }
 
+/// `foxglove_msgs/LinePrimitive`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LinePrimitive {
+    /// 2 for lines, each from a point to the next one of a pair.
+    pub shape: u8,
+    /// Pose of the origin of the points.
+    pub pose: Pose,
+    /// Width, m.
+    pub thickness: f64,
+    /// True if the width is in pixels of the screen.
+    pub scale_invariant: bool,
+    /// Ends of the lines.
+    pub points: Vec<Point>,
+    /// Colour.
+    pub color: Color,
+    /// Colours of points.
+    pub colors: Empty,
+    /// Order of the points.
+    pub indices: Empty,
+}
+
+impl LinePrimitive {
+    /// Shape of lines, each from a point to the next one of a pair.
+    pub const LINE_LIST: u8 = 2;
+}
+
 /// `foxglove_msgs/TextPrimitive`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TextPrimitive {
@@ -204,7 +232,7 @@ pub struct SceneEntity {
     /// Cylinders.
     pub cylinders: Vec<CylinderPrimitive>,
     /// Lines.
-    pub lines: Empty,
+    pub lines: Vec<LinePrimitive>,
     /// Triangles.
     pub triangles: Empty,
     /// Texts.

@@ -10,6 +10,7 @@ use super::body::Body;
 use super::messages;
 use super::record::{BoxedPart, FrameRecord};
 use super::scene;
+use super::trails::Trails;
 use crate::msgs::{
     CameraInfo, CompressedImage, Detection3DArray, Header, ImageAnnotations, MarkerArray, Message,
     PointCloud2, PoseStamped, SceneUpdate, StringMsg, TFMessage, encode,
@@ -46,6 +47,7 @@ pub(super) struct McapTracks<W: Write + Seek> {
     images: Option<Channel>,
     target: Option<Channel>,
     people: BTreeMap<TrackId, Person>,
+    trails: Trails,
     texts: BTreeMap<String, Channel>,
 }
 
@@ -101,6 +103,7 @@ impl<W: Write + Seek> McapTracks<W> {
             images: None,
             target: None,
             people: BTreeMap::new(),
+            trails: Trails::default(),
             texts: BTreeMap::new(),
         })
     }
@@ -126,9 +129,10 @@ impl<W: Write + Seek> McapTracks<W> {
     /// Writes what viewers draw by themselves.
     fn write_scene(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {
         let at = record.stamp;
-        let markers = encode(&scene::markers(record, &self.frames.odom));
+        self.trails.follow(at, record.tracks, record.odom_from_robot);
+        let markers = encode(&scene::markers(record, &self.trails, &self.frames.odom));
         self.markers.send(&mut self.writer, at, &markers)?;
-        let update = encode(&scene::scene(record, &self.frames.odom));
+        let update = encode(&scene::scene(record, &self.trails, &self.frames.odom));
         self.scene.send(&mut self.writer, at, &update)?;
         let annotations = encode(&scene::annotations(record, self.boxes));
         self.annotations.send(&mut self.writer, at, &annotations)?;

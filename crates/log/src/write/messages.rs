@@ -8,8 +8,8 @@ use super::mcap_tracks::FrameNames;
 use super::record::{FrameRecord, probability};
 use crate::msgs::{
     BoundingBox3D, Detection3D, Detection3DArray, Header, ObjectHypothesis,
-    ObjectHypothesisWithPose, Point, Pose, PoseStamped, PoseWithCovariance, TFMessage,
-    TransformStamped,
+    ObjectHypothesisWithPose, People, PersonMsg, Point, Pose, PoseStamped, PoseWithCovariance,
+    TFMessage, TransformStamped,
 };
 
 /// Variance of unknown quantities: above 99,999, by the convention of `spencer_tracking_msgs`.
@@ -98,12 +98,11 @@ pub(super) fn odom_from_person(record: &FrameRecord<'_>, track: &Track) -> Isome
 /// Returns the transforms of the robot and all confirmed people in the odometry frame, and of the
 /// camera in that of the robot.
 pub(super) fn transforms(record: &FrameRecord<'_>, frames: &FrameNames) -> TFMessage {
-    let stamped = |child: String, pose: &Isometry3<f64>| TransformStamped {
+    let mut transforms = vec![TransformStamped {
         header: Header::new(record.stamp, frames.odom.as_str()),
-        child_frame_id: child,
-        transform: pose.into(),
-    };
-    let mut transforms = vec![stamped(frames.base.clone(), &record.odom_from_robot())];
+        child_frame_id: frames.base.clone(),
+        transform: (&record.odom_from_robot()).into(),
+    }];
     if !record.camera.is_blind() {
         transforms.push(TransformStamped {
             header: Header::new(record.stamp, frames.base.as_str()),
@@ -111,12 +110,39 @@ pub(super) fn transforms(record: &FrameRecord<'_>, frames: &FrameNames) -> TFMes
             transform: (&record.camera.robot_from_camera).into(),
         });
     }
-    transforms.extend(
-        record
-            .confirmed()
-            .map(|track| stamped(format!("person_{}", track.id), &odom_from_person(record, track))),
-    );
+    transforms.extend(person_transforms(record, &frames.odom).transforms);
     TFMessage { transforms }
+}
+
+/// Returns the transforms of all confirmed people in the odometry frame: `person_12` is at the head
+/// of the person with this ID, X along the direction of walking.
+pub fn person_transforms(record: &FrameRecord<'_>, odom_frame: &str) -> TFMessage {
+    let header = Header::new(record.stamp, odom_frame);
+    let transforms = record.confirmed().map(|track| TransformStamped {
+        header: header.clone(),
+        child_frame_id: format!("person_{}", track.id),
+        transform: (&odom_from_person(record, track)).into(),
+    });
+    TFMessage { transforms: transforms.collect() }
+}
+
+/// Returns the confirmed people on the floor of the odometry frame, as planners with a social cost map
+/// read them. The name is the ID of the track, the reliability the probability that it is a person.
+pub fn people(record: &FrameRecord<'_>, odom_frame: &str) -> People {
+    let odom_from_robot = record.odom_from_robot();
+    let people = record.confirmed().map(|track| {
+        let head = record.head_in_odom(track);
+        let speed = track.estimate.person.velocity;
+        let velocity = odom_from_robot * Vector3::new(speed.x, speed.y, 0.0);
+        PersonMsg {
+            name: track.id.to_string(),
+            position: Point { x: head.x, y: head.y, z: 0.0 },
+            velocity: Point { x: velocity.x, y: velocity.y, z: 0.0 },
+            reliability: probability(track.score),
+            ..PersonMsg::default()
+        }
+    });
+    People { header: Header::new(record.stamp, odom_frame), people: people.collect() }
 }
 
 /// Data without a field in the standard messages, one object per frame.

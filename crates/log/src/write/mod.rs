@@ -20,6 +20,7 @@ mod scene;
 mod testing;
 #[cfg(test)]
 mod tests;
+mod trails;
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -32,11 +33,13 @@ pub use error::WriteError;
 pub use mcap_tracks::FrameNames;
 use mcap_tracks::McapTracks;
 pub use message_log::MessageLog;
-pub use messages::{detections, pose};
+pub use messages::{detections, people, person_transforms, pose};
 pub use record::{BoxedPart, FrameRecord, OutputSettings};
 pub use run_dir::RunDir;
+pub use scene::{markers, no_markers};
 use serde::Serialize;
 use tagalong_core::Stamp;
+pub use trails::Trails;
 
 /// Log time after which everything written is flushed, s.
 const FLUSH_EVERY_S: f64 = 1.0;

@@ -1,17 +1,19 @@
-//! People of one frame as shapes that viewers draw by themselves: an upright cylinder with the
-//! number above it and an arrow to the place in one second, and boxes in the image.
+//! People of one frame as shapes that viewers draw by themselves: an upright cylinder with the ID and
+//! the distance above it, an arrow to the place in one second and the trail on the floor, and boxes
+//! in the image.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use tagalong_core::Track;
+use tagalong_core::{Stamp, Track};
 use tagalong_geometry::Lens;
 
 use super::colours::track_colour;
 use super::messages::{CROWN_ABOVE_HEAD_M, MIN_HEADING_SPEED_MPS, odom_from_person};
 use super::record::{BoxedPart, FrameRecord};
+use super::trails::Trails;
 use crate::msgs::{
     ArrowPrimitive, CameraInfo, Color, ColorRgba, CylinderPrimitive, Header, ImageAnnotations,
-    Marker, MarkerArray, Pixel, Point, PointsAnnotation, Pose, SceneEntity, SceneEntityDeletion,
-    SceneUpdate, TextAnnotation, TextPrimitive,
+    LinePrimitive, Marker, MarkerArray, Pixel, Point, PointsAnnotation, Pose, SceneEntity,
+    SceneEntityDeletion, SceneUpdate, TextAnnotation, TextPrimitive, Time,
 };
 
 /// Diameter of a person, m.
@@ -22,6 +24,13 @@ const TEXT_M: f64 = 0.25;
 
 /// Width of the arrow, m.
 const ARROW_WIDTH_M: f64 = 0.06;
+
+/// Width of the trail, and its height above the floor, m.
+const TRAIL_M: f64 = 0.03;
+
+/// Time after which shapes disappear by themselves: a viewer that misses the last message must not
+/// show people who are gone.
+const LIFETIME: Time = Time { sec: 1, nanosec: 0 };
 
 /// Opacity of a person that is seen, and of one that is predicted only.
 const OPACITY: (f64, f64) = (0.8, 0.3);
@@ -36,11 +45,15 @@ struct Figure {
     top: Isometry3<f64>,
     /// Pose of the arrow's tail along the direction of walking, and its length; none at rest.
     arrow: Option<(Isometry3<f64>, f64)>,
+    /// Ends of the lines of the trail, in pairs; none while the person is not seen.
+    trail: Vec<Point>,
+    /// ID and distance.
+    label: String,
     colour: Color,
 }
 
 impl Figure {
-    fn of(record: &FrameRecord<'_>, track: &Track) -> Self {
+    fn of(record: &FrameRecord<'_>, track: &Track, trails: &Trails) -> Self {
         let head = odom_from_person(record, track);
         let at = head.translation.vector;
         // A head far too low must not give a cylinder of negative height.
@@ -57,6 +70,8 @@ impl Figure {
             height_m,
             top: upright(height_m + TEXT_M),
             arrow: walks.then_some((tail, speed)),
+            trail: if track.seen { trail_lines(trails, track) } else { Vec::new() },
+            label: label(track),
             colour: colour_of(track),
         }
     }
@@ -71,16 +86,40 @@ fn colour_of(track: &Track) -> Color {
     Color { r, g, b, a: if track.seen { OPACITY.0 } else { OPACITY.1 } }
 }
 
-fn figures(record: &FrameRecord<'_>) -> Vec<Figure> {
-    record.confirmed().map(|track| Figure::of(record, track)).collect()
+/// Returns the ID of a track and its distance from the robot.
+fn label(track: &Track) -> String {
+    format!("{} {:.1} m", track.id, track.estimate.person.position.xy().coords.norm())
 }
 
-/// Returns the confirmed people as markers; those of the frame before are removed first.
-pub(super) fn markers(record: &FrameRecord<'_>, odom_frame: &str) -> MarkerArray {
+/// Returns the ends of the lines of a trail on the floor, in pairs.
+fn trail_lines(trails: &Trails, track: &Track) -> Vec<Point> {
+    let pieces = trails.pieces(track.id);
+    let lines = pieces.iter().flat_map(|piece| piece.windows(2)).flatten();
+    lines.map(|place| point(&Point3::new(place.x, place.y, TRAIL_M))).collect()
+}
+
+fn figures(record: &FrameRecord<'_>, trails: &Trails) -> Vec<Figure> {
+    record.confirmed().map(|track| Figure::of(record, track, trails)).collect()
+}
+
+/// Returns the confirmed people as markers in the odometry frame; those of the frame before are
+/// removed first, and all disappear by themselves after a second.
+pub fn markers(record: &FrameRecord<'_>, trails: &Trails, odom_frame: &str) -> MarkerArray {
     let header = Header::new(record.stamp, odom_frame);
-    let clear = Marker { header: header.clone(), action: Marker::DELETE_ALL, ..Marker::default() };
-    let people = figures(record).into_iter().flat_map(|figure| figure_markers(&figure, &header));
-    MarkerArray { markers: std::iter::once(clear).chain(people).collect() }
+    let mut markers = vec![clear_marker(&header)];
+    for figure in figures(record, trails) {
+        markers.extend(figure_markers(&figure, &header));
+    }
+    MarkerArray { markers }
+}
+
+/// Returns the markers that remove all people from a viewer.
+pub fn no_markers(at: Stamp, odom_frame: &str) -> MarkerArray {
+    MarkerArray { markers: vec![clear_marker(&Header::new(at, odom_frame))] }
+}
+
+fn clear_marker(header: &Header) -> Marker {
+    Marker { header: header.clone(), action: Marker::DELETE_ALL, ..Marker::default() }
 }
 
 fn figure_markers(figure: &Figure, header: &Header) -> Vec<Marker> {
@@ -95,6 +134,7 @@ fn figure_markers(figure: &Figure, header: &Header) -> Vec<Marker> {
         action: Marker::ADD,
         pose: pose.into(),
         color: opaque,
+        lifetime: LIFETIME,
         ..Marker::default()
     };
     let color = ColorRgba { a: a as f32, ..opaque };
@@ -105,7 +145,7 @@ fn figure_markers(figure: &Figure, header: &Header) -> Vec<Marker> {
     };
     let text = Marker {
         scale: Point { z: TEXT_M, ..Point::default() },
-        text: figure.id.to_string(),
+        text: figure.label.clone(),
         ..marker("numbers", Marker::TEXT, &figure.top)
     };
     let arrow = figure.arrow.map(|(tail, length)| Marker {
@@ -114,7 +154,14 @@ fn figure_markers(figure: &Figure, header: &Header) -> Vec<Marker> {
         scale: Point { x: ARROW_WIDTH_M, y: 2.0 * ARROW_WIDTH_M, z: 0.0 },
         ..marker("velocities", Marker::ARROW, &Isometry3::identity())
     });
-    [Some(body), Some(text), arrow].into_iter().flatten().collect()
+    // Viewers report lines without points as faulty.
+    let trail = (!figure.trail.is_empty()).then(|| Marker {
+        points: figure.trail.clone(),
+        // The width of the lines.
+        scale: Point { x: TRAIL_M, ..Point::default() },
+        ..marker("trails", Marker::LINE_LIST, &Isometry3::identity())
+    });
+    [Some(body), Some(text), arrow, trail].into_iter().flatten().collect()
 }
 
 fn tip(tail: &Isometry3<f64>, length: f64) -> Point {
@@ -128,7 +175,7 @@ fn point(at: &Point3<f64>) -> Point {
 }
 
 /// Returns the confirmed people as a scene; those of the frame before are removed first.
-pub(super) fn scene(record: &FrameRecord<'_>, odom_frame: &str) -> SceneUpdate {
+pub(super) fn scene(record: &FrameRecord<'_>, trails: &Trails, odom_frame: &str) -> SceneUpdate {
     let timestamp = record.stamp.into();
     let clear =
         SceneEntityDeletion { timestamp, extent: SceneEntityDeletion::ALL, id: String::new() };
@@ -136,6 +183,7 @@ pub(super) fn scene(record: &FrameRecord<'_>, odom_frame: &str) -> SceneUpdate {
         timestamp,
         frame_id: odom_frame.to_owned(),
         id: format!("person_{}", figure.id),
+        lifetime: LIFETIME,
         arrows: figure.arrow.iter().map(|(tail, length)| arrow(tail, *length, &figure)).collect(),
         cylinders: vec![CylinderPrimitive {
             pose: (&figure.middle).into(),
@@ -150,13 +198,14 @@ pub(super) fn scene(record: &FrameRecord<'_>, odom_frame: &str) -> SceneUpdate {
             font_size: TEXT_M,
             scale_invariant: false,
             color: Color { a: 1.0, ..figure.colour },
-            text: figure.id.to_string(),
+            text: figure.label.clone(),
         }],
+        lines: trail(&figure).into_iter().collect(),
         ..SceneEntity::default()
     };
     SceneUpdate {
         deletions: vec![clear],
-        entities: figures(record).into_iter().map(entity).collect(),
+        entities: figures(record, trails).into_iter().map(entity).collect(),
     }
 }
 
@@ -171,6 +220,21 @@ fn arrow(tail: &Isometry3<f64>, length: f64, figure: &Figure) -> ArrowPrimitive 
         head_diameter: 2.0 * ARROW_WIDTH_M,
         color: Color { a: 1.0, ..figure.colour },
     }
+}
+
+/// Returns the trail of a figure; `None` without one.
+fn trail(figure: &Figure) -> Option<LinePrimitive> {
+    if figure.trail.is_empty() {
+        return None;
+    }
+    Some(LinePrimitive {
+        shape: LinePrimitive::LINE_LIST,
+        pose: Pose::from(&Isometry3::identity()),
+        thickness: TRAIL_M,
+        points: figure.trail.clone(),
+        color: Color { a: 1.0, ..figure.colour },
+        ..LinePrimitive::default()
+    })
 }
 
 /// Returns the boxes of the confirmed people as annotations of the image.
@@ -193,11 +257,10 @@ pub(super) fn annotations(record: &FrameRecord<'_>, part: BoxedPart) -> ImageAnn
             thickness: if track.seen { 3.0 } else { 1.0 },
             ..PointsAnnotation::default()
         });
-        let distance = track.estimate.person.position.xy().coords.norm();
         out.texts.push(TextAnnotation {
             timestamp,
             position: Pixel { x: left, y: top },
-            text: format!("{} {distance:.1} m", track.id),
+            text: label(track),
             font_size: 16.0,
             text_color: colour,
             background_color: Color { r: 0.0, g: 0.0, b: 0.0, a: 0.7 },

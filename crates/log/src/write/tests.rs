@@ -95,19 +95,24 @@ fn the_log_carries_what_viewers_draw() {
     let markers: MarkerArray = decode(&read(&bytes, "/people/markers")[1]).unwrap();
     let shapes: Vec<i32> = markers.markers.iter().map(|marker| marker.shape).collect();
     assert_eq!(markers.markers[0].action, Marker::DELETE_ALL);
-    assert_eq!(shapes[1..], [Marker::CYLINDER, Marker::TEXT, Marker::ARROW]);
+    let drawn = [Marker::CYLINDER, Marker::TEXT, Marker::ARROW, Marker::LINE_LIST];
+    assert_eq!(shapes[1..], drawn);
+    assert!(markers.markers[1..].iter().all(|marker| marker.lifetime.sec == 1));
     let body = &markers.markers[1];
     assert_eq!((body.header.frame_id.as_str(), body.id), ("odom", 12));
     // The robot is at 0.2 m, the head 3 m ahead of it and 1.6 m high.
     assert_eq!((body.pose.position.x, body.scale.z), (3.2, 1.715));
-    assert_eq!(markers.markers[2].text, "12");
+    assert_eq!(markers.markers[2].text, "12 3.0 m");
     let tip = markers.markers[3].points[1];
     assert_eq!((tip.x, tip.y), (3.7, 0.25), "where the person is in a second");
+    let trail = &markers.markers[4].points;
+    assert_eq!(trail.iter().map(|at| at.x).collect::<Vec<_>>(), [3.1, 3.2], "of two frames");
     let scene: SceneUpdate = decode(&read(&bytes, "/people/scene")[1]).unwrap();
     assert_eq!(scene.deletions[0].extent, SceneEntityDeletion::ALL);
     let [person] = &scene.entities[..] else { panic!("tentative tracks are not drawn") };
-    assert_eq!((person.id.as_str(), person.texts[0].text.as_str()), ("person_12", "12"));
+    assert_eq!((person.id.as_str(), person.texts[0].text.as_str()), ("person_12", "12 3.0 m"));
     assert_eq!((person.cylinders.len(), person.arrows.len()), (1, 1));
+    assert_eq!((person.lines.len(), person.lines[0].points.len()), (1, 2));
     let drawn: ImageAnnotations = decode(&read(&bytes, "/people/annotations")[1]).unwrap();
     assert_eq!((drawn.points[0].points.len(), drawn.texts[0].text.as_str()), (4, "12 3.0 m"));
     let bodies = read(&bytes, "/people/person_12/body");
@@ -116,6 +121,34 @@ fn the_log_carries_what_viewers_draw() {
     assert_eq!((body.header.frame_id.as_str(), body.width > 100), ("person_12", true));
     let info: CameraInfo = decode(&read(&bytes, "/camera/camera_info")[1]).unwrap();
     assert_eq!((info.header.frame_id.as_str(), info.width, info.k[0]), ("eye", 640, 525.0));
+}
+
+#[test]
+fn people_of_planners_are_on_the_floor_with_their_velocity_over_ground() {
+    let at = Stamp::from_nanos(7);
+    let mut tentative = track(13);
+    tentative.confirmed = false;
+    let record = FrameRecord {
+        index: 1,
+        stamp: at,
+        camera: &camera(),
+        // The robot looks along Y.
+        odom_from_robot: &Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2),
+        is_odom_known: true,
+        tracks: &[track(12), tentative],
+        target: None,
+        command: None,
+    };
+    let array = people(&record, "odom");
+    assert_eq!((array.header.frame_id.as_str(), array.header.stamp()), ("odom", at));
+    let [person] = &array.people[..] else { panic!("tentative tracks are not people") };
+    assert_eq!((person.name.as_str(), person.position.z), ("12", 0.0));
+    assert!((person.position.x - 0.5).abs() < 1e-9 && (person.position.y - 3.0).abs() < 1e-9);
+    assert!((person.velocity.x - 0.25).abs() < 1e-9 && (person.velocity.y - 0.5).abs() < 1e-9);
+    assert!((person.reliability - 1.0 / (1.0 + (-2.0_f64).exp())).abs() < 1e-12);
+    let frames = person_transforms(&record, "odom").transforms;
+    assert_eq!((frames.len(), frames[0].child_frame_id.as_str()), (1, "person_12"));
+    assert_eq!(no_markers(at, "odom").markers[0].action, Marker::DELETE_ALL);
 }
 
 #[test]

@@ -1,0 +1,100 @@
+//! Results that go out, for programs and for viewers.
+
+use ros2_client::Publisher;
+use tagalong::core::Stamp;
+use tagalong::log::msgs::{
+    Detection3DArray, Header, MarkerArray, People, PoseStamped, StringMsg, TFMessage,
+};
+use tagalong::log::write::{self, FrameRecord, Trails};
+use tagalong::pipeline::FrameReport;
+
+use crate::network::Network;
+use crate::{BridgeError, Options};
+
+/// Publishers of the results. Subscribers are not waited for, so a message may be lost.
+pub(super) struct Out {
+    tracks: Publisher<Detection3DArray>,
+    target: Publisher<PoseStamped>,
+    state: Publisher<StringMsg>,
+    heartbeat: Publisher<Header>,
+    people: Option<Publisher<People>>,
+    transforms: Option<Publisher<TFMessage>>,
+    markers: Option<Publisher<MarkerArray>>,
+    trails: Trails,
+    /// Time and frame of the last markers.
+    drawn: Option<(Stamp, String)>,
+}
+
+impl Out {
+    /// Creates the publishers that the options ask for.
+    pub(super) fn new(options: &Options, network: &mut Network) -> Result<Self, BridgeError> {
+        let named = |topic: &str| (!topic.is_empty()).then(|| topic.to_owned());
+        Ok(Self {
+            tracks: network.publisher(&options.tracks)?,
+            target: network.publisher(&options.target)?,
+            state: network.publisher(&options.state)?,
+            heartbeat: network.publisher_of(&options.heartbeat, "std_msgs/msg/Header")?,
+            people: named(&options.people).map(|topic| network.publisher(&topic)).transpose()?,
+            transforms: named(&options.transforms)
+                .map(|topic| network.publisher(&topic))
+                .transpose()?,
+            markers: named(&options.markers).map(|topic| network.publisher(&topic)).transpose()?,
+            trails: Trails::default(),
+            drawn: None,
+        })
+    }
+
+    /// Publishes the results of a frame; `world` is the frame in which people walk, that of the
+    /// odometry if there is one.
+    pub(super) fn publish(
+        &mut self,
+        record: &FrameRecord<'_>,
+        report: &FrameReport,
+        base_frame: &str,
+        world: &str,
+    ) {
+        let _lost = self.tracks.publish(write::detections(record, base_frame));
+        let target = report.tracks.iter().find(|track| Some(track.id) == report.target);
+        if let Some(track) = target {
+            let _lost = self.target.publish(write::pose(record, track, world));
+        }
+        if let (Some(command), Some(lock)) = (&report.command, &report.lock) {
+            let reason = command.reason.name();
+            let state = lock.state.name();
+            let why = lock.why;
+            let data = format!("{reason}; {state}: {why}");
+            let _lost = self.state.publish(StringMsg { data });
+        }
+        if let Some(people) = &self.people {
+            let _lost = people.publish(write::people(record, world));
+        }
+        self.draw(record, world);
+    }
+
+    /// Publishes the shapes of people and the transforms to them.
+    fn draw(&mut self, record: &FrameRecord<'_>, world: &str) {
+        if let Some(publisher) = &self.transforms {
+            let transforms = write::person_transforms(record, world);
+            // Listeners expect at least one transform in a message.
+            if !transforms.transforms.is_empty() {
+                let _lost = publisher.publish(transforms);
+            }
+        }
+        let Some(publisher) = &self.markers else { return };
+        self.trails.follow(record.stamp, record.tracks, record.odom_from_robot);
+        let _lost = publisher.publish(write::markers(record, &self.trails, world));
+        self.drawn = Some((record.stamp, world.to_owned()));
+    }
+
+    /// Publishes the heartbeat.
+    pub(super) fn beat(&self, header: Header) {
+        let _lost = self.heartbeat.publish(header);
+    }
+
+    /// Removes all people from viewers.
+    pub(super) fn clear(&self) {
+        if let (Some(publisher), Some((at, world))) = (&self.markers, &self.drawn) {
+            let _lost = publisher.publish(write::no_markers(*at, world));
+        }
+    }
+}
