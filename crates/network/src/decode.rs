@@ -374,6 +374,7 @@ mod tests {
     use super::*;
 
     const INPUT: InputSize = InputSize { width: 64, height: 64, channels_last: false };
+    const WIDE: InputSize = InputSize { width: 64, height: 32, channels_last: false };
     const PEOPLE: Wanted<'_> = Wanted { classes: &[0], min_score: 0.5 };
 
     fn tensor(shape: &[usize], values: &[f32]) -> Tensor {
@@ -441,6 +442,8 @@ mod tests {
         let found = rf_detr(&boxes, &logits, INPUT, Wanted { classes: &[1], min_score: 0.5 });
         assert_eq!(rects(&found), [[24.0, 16.0, 16.0, 32.0]]);
         assert!((found[0].score - 0.75).abs() < 1e-6);
+        let found = rf_detr(&boxes, &logits, WIDE, Wanted { classes: &[1], min_score: 0.5 });
+        assert_eq!(rects(&found), [[24.0, 8.0, 16.0, 16.0]], "fractions of each side");
     }
 
     #[test]

@@ -56,6 +56,7 @@ mod mirror;
 mod obstacle;
 mod obstacle_sensors;
 mod parallel;
+mod path_variation;
 mod person;
 mod posture;
 mod ramp;
@@ -88,6 +89,7 @@ pub use mirror::MirrorSettings;
 pub use obstacle_sensors::{
     BumperSettings, RangeKind, RangeSettings, ScannerSettings, SensorData, SensorReading,
 };
+pub use path_variation::PathVariation;
 pub use person::Extra;
 pub use posture::Posture;
 pub use ramp::Ramp;

@@ -16,6 +16,7 @@ use crate::footprint;
 use crate::furniture::Furniture;
 use crate::laser::LaserSettings;
 use crate::obstacle_sensors::{self, BumperSettings, RangeSettings, ScannerSettings};
+use crate::path_variation::PathVariation;
 use crate::person::Extra;
 use crate::ramp::Ramp;
 use crate::split::{SUBJECTS, Split};
@@ -65,6 +66,9 @@ pub struct Scene {
     pub people: Vec<PersonSettings>,
     /// A person or a trolley that comes at the robot; none if left out.
     pub approach: Option<ApproachSettings>,
+    /// Variation of the path of the first person by the seed; without it the path is the same for all.
+    #[serde(skip_serializing_if = "PathVariation::is_off")]
+    pub variation: PathVariation,
 }
 
 impl Default for Scene {
@@ -87,6 +91,7 @@ impl Default for Scene {
             furniture: Vec::new(),
             people: Vec::new(),
             approach: None,
+            variation: PathVariation::default(),
         }
     }
 }
@@ -124,7 +129,7 @@ impl Scene {
             Ok(Self { seed, ..scene })
         })?;
         scene.check()?;
-        Ok(scene)
+        Ok(scene.with_varied_paths())
     }
 
     /// Returns the number of people, companions and crowd included.
@@ -246,7 +251,9 @@ impl Scene {
         let day = self.light.day.iter().flat_map(|day| day.rules(&self.room));
         let approach = self.approach.iter().flat_map(ApproachSettings::rules);
         let outline = footprint::rules(&self.robot.footprint);
+        let variation = self.variation.rules(self);
         let parts = webcams.chain(laser).chain(ramp).chain(day).chain(approach).chain(outline);
+        let parts = parts.chain(variation);
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
