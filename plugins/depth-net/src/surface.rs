@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use tagalong_core::DepthImage;
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
+use tagalong_geometry::{Camera, HALF_HEAD_M, HEAD_RADIUS_M, Rect};
 
 /// Half the width of the column around the expected head whose points are taken, m.
 const COLUMN_M: f64 = 0.22;
@@ -20,8 +20,6 @@ const DEEP_LAYERS: usize = 6;
 const HEAD_M: f64 = 0.22;
 /// Largest number of rows, and of columns, that are read.
 const MOST_SAMPLES: usize = 48;
-/// Distance from the centre of a head to its top, m.
-const HALF_HEAD_M: f64 = 0.115;
 /// A head that is nearer to the camera than this is not measured, m.
 const NEAREST_M: f64 = 0.3;
 /// Largest difference in depth between the points of a head and its expected surface, m.
