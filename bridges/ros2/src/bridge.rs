@@ -13,7 +13,7 @@ use tagalong::log::msgs::{Detection3DArray, Header, PoseStamped, StringMsg};
 use tagalong::log::write::{self, FrameRecord};
 use tagalong::log::{Input, Listening, LiveSource, LogFrame};
 use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline};
-use tagalong_live::Live;
+use tagalong_view::Live;
 
 use crate::diagnostics::{Diagnostics, Status};
 use crate::http::HttpServer;

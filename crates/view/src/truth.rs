@@ -12,7 +12,7 @@ use tagalong_eval::{
 };
 use tagalong_geometry::Rect;
 
-use tagalong_page::data::{EventData, FrameData, RunData, TruthBox};
+use crate::page::data::{EventData, FrameData, RunData, TruthBox};
 
 /// Truth by frame of the page.
 pub struct PageTruth {
@@ -116,7 +116,7 @@ fn shown(truth: &Truth, odom_from_robot: &Isometry2<f64>) -> TruthBox {
 fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
     let (sin, cos) = frame.robot[2].sin_cos();
     let seen = frame.tracks.iter().filter(|track| track.state == "seen");
-    let report = |track: &tagalong_page::data::TrackData| {
+    let report = |track: &crate::page::data::TrackData| {
         let [x, y, width, height] = track.box_px;
         let inside = Rect::new(x, y, width, height).clipped(size[0], size[1]);
         let dx = track.at[0] - frame.robot[0];
@@ -162,7 +162,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use tagalong_page::data::TrackData;
+    use crate::page::data::TrackData;
 
     fn run(boxes: &[Option<[f64; 4]>]) -> RunData {
         let frame = |box_px: &Option<[f64; 4]>| {

@@ -33,12 +33,12 @@ use tagalong_app::suggest::check_log_path;
 use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
-use tagalong_live::Live;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input, InputAccount};
 use tagalong_pipeline::{FrameReport, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
+use tagalong_view::Live;
 
 /// Runs a pipeline over a log, until a signal comes.
 ///

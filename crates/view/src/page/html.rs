@@ -5,7 +5,7 @@ use tagalong_core::TrackId;
 use tagalong_log::write::{TRACK_COLOURS, track_colour};
 use tagalong_report::COLOURS;
 
-use crate::data::PageData;
+use crate::page::data::PageData;
 
 // Inlined, so that the page is one file.
 const STYLE: &str = concat!(include_str!("page.css"), "\n");
@@ -244,7 +244,7 @@ fn columns(id: &str, names: &[&str]) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::{CandidateData, FrameData, RunData, TestData};
+    use crate::page::data::{CandidateData, FrameData, RunData, TestData};
 
     const HOSTILE: &str = "</script><img src=x onerror=alert(1)>&\u{2028}\"'";
 
