@@ -36,7 +36,7 @@ const ARROWS: &[(&str, &[&str])] = &[
         &["app", "eval", "render", "vision", "stereo", "pipeline", "log", "sim", "trials"],
     ),
     ("doctor", &["tagalong", "app", "render", "vision", "pipeline", "log"]),
-    ("annotate", &["app", "render", "log", "eval", "pipeline", "serve"]),
+    ("annotate", &["app", "render", "report", "log", "eval", "pipeline", "serve"]),
     ("view", &["app", "report", "render", "log", "eval", "pipeline", "serve"]),
     ("training", &["app", "stereo", "pipeline", "log", "sim", "eval", "trials"]),
     (
