@@ -209,8 +209,8 @@ impl View {
         if !image.contains(point) {
             return Err(EnrollmentError::OutsideImage { x, y, width, height });
         }
-        let shows = |track: &&Track| track.seen && standing(track).contains(point);
-        let there = self.tracks.iter().filter(shows);
+        let there =
+            self.tracks.iter().filter(|track| track.seen && standing(track).contains(point));
         let nearest = there.min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
         nearest.ok_or_else(|| EnrollmentError::NoPersonAt { x, y, known: self.known() })
     }

@@ -133,7 +133,6 @@ fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
 
 /// Describes an event of the comparison; people found again are told by the run itself.
 fn described(event: &Event) -> Option<EventData> {
-    let number = |id: i64| u32::try_from(id).ok();
     let (kind, person, track, text) = match event.kind {
         EventKind::Miss { person, track } => {
             let had = track.map(|id| format!(", who was track {id}")).unwrap_or_default();
@@ -154,7 +153,7 @@ fn described(event: &Event) -> Option<EventData> {
         EventKind::Found { .. } => return None,
     };
     let i = event.frame.saturating_sub(1);
-    Some(EventData { i, kind, track: track.and_then(number), person, text })
+    Some(EventData { i, kind, track: track.and_then(|id| u32::try_from(id).ok()), person, text })
 }
 
 #[cfg(test)]

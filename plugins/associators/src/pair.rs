@@ -206,15 +206,16 @@ impl Pairs<'_> {
         // Most pairs are too far apart along one axis, which is seen soonest in a list of places.
         let reach = 1.01 * pair_cost.reach_m(self.gate.dt_s);
         let places: Vec<_> = columns.iter().map(|i| self.detections[*i].position.xy()).collect();
-        let fits_of = |row: &usize| {
-            let own = self.tracks[*row].estimate.person.position.xy();
-            let each = columns.iter().zip(&places).map(|(column, place)| {
-                let is_far = (place - own).amax() > reach;
-                if is_far { None } else { pair(*row, *column) }
-            });
-            each.collect()
-        };
-        rows.iter().map(fits_of).collect()
+        rows.iter()
+            .map(|row| {
+                let own = self.tracks[*row].estimate.person.position.xy();
+                let each = columns.iter().zip(&places).map(|(column, place)| {
+                    let is_far = (place - own).amax() > reach;
+                    if is_far { None } else { pair(*row, *column) }
+                });
+                each.collect()
+            })
+            .collect()
     }
 
     /// Assigns these detections to these tracks, by their numbers, with the least sum of costs:

@@ -548,12 +548,11 @@ fn pixels(plan: &Plan, topic: &str, image: &Payload, tally: &mut Tally) -> Optio
     let is_depth = plan.chosen.depth.as_deref() == Some(topic);
     let unit = if is_depth { plan.depth_unit_m } else { plan.input.depth_unit_m };
     let limits = &plan.limits;
-    let of = |image: AnyImage<'_>| match image {
+    read(plan, topic, image, tally, |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => decode_raw(&image, unit, limits),
         AnyImage::Compressed(image) => decode_compressed(&image, unit, limits),
         AnyImage::Disparity(image) => Err(ImageError::Encoding(image.image.encoding)),
-    };
-    read(plan, topic, image, tally, of)
+    })
 }
 
 /// Returns true for the depth topic if its images are disparities.
@@ -589,12 +588,11 @@ fn depth_of_disparity(
 
 /// Returns the size of an image that makes a frame, from its header; a failure is counted as lost.
 fn size_without_pixels(plan: &Plan, image: &Payload, tally: &mut Tally) -> Option<(usize, usize)> {
-    let of = |image: AnyImage<'_>| match image {
+    read(plan, plan.primary(), image, tally, |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => size_of_raw(&image, &plan.limits),
         AnyImage::Compressed(image) => size_of_compressed(&image, &plan.limits),
         AnyImage::Disparity(image) => size_of_raw(&image.image, &plan.limits),
-    };
-    read(plan, plan.primary(), image, tally, of)
+    })
 }
 
 /// Image message of one of the types.

@@ -184,13 +184,12 @@ impl Newest {
     }
 
     fn wait_for(&self, after: u64) -> (Option<Arc<Shot>>, Vec<LiveEvent>, Option<String>) {
-        let is_old = |state: &mut State| {
-            let newest = state.shot.as_ref().map_or(0, |shot| shot.seq);
-            newest <= after && state.ended.is_none()
-        };
         let mut state = self.lock();
         state.asked = Some(Instant::now());
-        let waited = self.changed.wait_timeout_while(state, WAIT, is_old);
+        let waited = self.changed.wait_timeout_while(state, WAIT, |state: &mut State| {
+            let newest = state.shot.as_ref().map_or(0, |shot| shot.seq);
+            newest <= after && state.ended.is_none()
+        });
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         state.farewells += usize::from(state.ended.is_some());
         let shot = state.shot.clone().filter(|shot| shot.seq > after);
