@@ -135,8 +135,7 @@ fn chosen(system: &System, only: &[String]) -> Result<Vec<&'static Experiment>, 
     if let Some(name) = only.iter().find(|name| !is_there(name)) {
         return Err(unknown(name, all.iter().map(|experiment| experiment.name)));
     }
-    let asked = |e: &&Experiment| only.is_empty() || only.iter().any(|name| name == e.name);
-    Ok(all.iter().filter(asked).collect())
+    Ok(all.iter().filter(|e| only.is_empty() || only.iter().any(|name| name == e.name)).collect())
 }
 
 fn unknown(name: &str, known: impl Iterator<Item = &'static str>) -> Failure {

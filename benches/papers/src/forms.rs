@@ -195,13 +195,12 @@ impl Forms {
         let real = if self.has_real { self.real_logs(lab)? } else { Vec::new() };
         let scenes = (self.scenes)(lab)?;
         let contenders = (self.contenders)(lab, &self.configs)?;
-        let keep = |trial: Trial| {
+        let simulated = lab.trials(self.scene, &scenes, &contenders, |trial: Trial| {
             let mut forms = self.judged(&trial)?;
             let headlines = (self.headline.of)(trial)?;
             forms.iter_mut().zip(headlines).for_each(|(form, of)| form.headline = of);
             Ok(forms)
-        };
-        let simulated = lab.trials(self.scene, &scenes, &contenders, keep)?;
+        })?;
         Ok(self.table(&real, &simulated).into())
     }
 

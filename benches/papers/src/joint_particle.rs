@@ -465,10 +465,9 @@ fn pixels_apart(camera: &Camera, a: &Point3<f64>, b: &Point3<f64>) -> Option<f64
 /// Returns true if two people's upper-body squares overlap.
 fn overlaps(moment: &Moment) -> bool {
     let squares: Vec<_> = moment.truth.iter().filter_map(|truth| truth.upper_body).collect();
-    let meets = |(at, square): (usize, &tagalong_geometry::Rect)| {
+    squares.iter().enumerate().any(|(at, square)| {
         squares[at + 1..].iter().any(|other| square.intersection(other).area() > 0.0)
-    };
-    squares.iter().enumerate().any(meets)
+    })
 }
 
 fn cost(report: &FrameReport) -> [f64; 3] {

@@ -191,8 +191,7 @@ impl Lab<'_> {
         keep: impl Fn(Trial) -> Result<T, TrialError> + Sync,
     ) -> Result<Vec<T>, ReproduceError> {
         self.progress.begin(scenes.len(), what);
-        let done = |_| self.progress.step();
-        Ok(each(scenes, contenders, self.registry, self.jobs, keep, done)?)
+        Ok(each(scenes, contenders, self.registry, self.jobs, keep, |_| self.progress.step())?)
     }
 }
 
@@ -219,11 +218,10 @@ impl Lab<'_> {
 }
 
 pub(crate) fn read(path: &Path) -> Result<String, ReproduceError> {
-    let unreadable = |error: std::io::Error| ReproduceError::Unreadable {
+    read_text(path, FileLimit::Table).map_err(|error| ReproduceError::Unreadable {
         path: path.display().to_string(),
         why: error.to_string(),
-    };
-    read_text(path, FileLimit::Table).map_err(unreadable)
+    })
 }
 
 #[cfg(test)]

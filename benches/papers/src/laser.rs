@@ -322,12 +322,6 @@ impl Log {
 
     /// Returns the table of recall by person, and of the rate of false positives.
     fn people(&self, Tracked { config, clear, .. }: &Tracked) -> Table {
-        let person = |(id, [found, of]): (&i64, &[u64; 2])| {
-            Row::ours(
-                format!("person {id}"),
-                vec![Cell::number(*of as f64, 0), Cell::share(*found, *of, 0)],
-            )
-        };
         let rate = clear.false_per_minute(BLOCK, self.scan_s);
         let rate = rate.map_or_else(String::new, |rate| match rate.ends() {
             Some([low, high]) => format!("{:.1} a minute [{low:.1}, {high:.1}]", rate.estimate),
@@ -336,7 +330,12 @@ impl Log {
         Table {
             title: format!("Recall by person (`{config}` on {})", self.name),
             columns: vec!["objects".into(), "recall, %".into()],
-            rows: clear.people.iter().map(person).collect(),
+            rows: clear.people.iter().map(|(id, [found, of])| {
+            Row::ours(
+                format!("person {id}"),
+                vec![Cell::number(*of as f64, 0), Cell::share(*found, *of, 0)],
+            )
+        }).collect(),
             notes: vec![
                 format!("False positives: {rate}; the interval is over blocks of {BLOCK} scans."),
                 "1000 and 1001 stand, the others walk. Intervals by person are Wilson's, too narrow \

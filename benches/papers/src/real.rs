@@ -81,9 +81,8 @@ pub(crate) fn trial(
         moments.push(moment(&item.frame, known));
         camera = Some((*item.frame.camera).clone());
     }
-    let whole = |camera| Trial { seed: 0, camera, furniture: Vec::new(), moments, runs };
     // An empty log has no camera, and is no trial.
-    Ok(camera.map(whole))
+    Ok(camera.map(|camera| Trial { seed: 0, camera, furniture: Vec::new(), moments, runs }))
 }
 
 /// Returns the annotations of a frame. The poses of the robot are not used.

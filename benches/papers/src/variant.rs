@@ -41,8 +41,8 @@ pub(crate) fn with_values(
         let value = text.parse().map_err(|error: toml::de::Error| fails(error.message()))?;
         *slot(&mut config, key).ok_or_else(|| fails("there is no such place"))? = value;
     }
-    let fails = |error| ReproduceError::Other(format!("{name}: {error}"));
-    let config = toml::to_string(&config).map_err(fails)?;
+    let config = toml::to_string(&config)
+        .map_err(|error| ReproduceError::Other(format!("{name}: {error}")))?;
     Ok(Contender { name: name.to_owned(), config, ..contender.clone() })
 }
 

@@ -12,7 +12,7 @@ use tagalong::log::msgs::Header;
 use tagalong::log::write::FrameRecord;
 use tagalong::log::{Input, Listening, LiveSource, LogFrame};
 use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline};
-use tagalong_live::Live;
+use tagalong_view::Live;
 
 use crate::diagnostics::{Diagnostics, Status};
 use crate::http::HttpServer;

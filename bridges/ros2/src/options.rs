@@ -109,7 +109,7 @@ pub struct Options {
         num_args = 0..=1,
         require_equals = true,
         default_missing_value = "0",
-        value_parser = tagalong_live::parse_address
+        value_parser = tagalong_view::parse_address
     )]
     pub serve: Option<SocketAddr>,
     /// Clock for the age of a frame.

@@ -134,8 +134,8 @@ impl Document {
         let before: Step = touched.iter().map(|id| (*id, self.people.get(id).cloned())).collect();
         self.perform(change);
         self.people.retain(|_, person| !person.is_empty());
-        let differs = |(id, old): &(i64, Option<Person>)| self.people.get(id) != old.as_ref();
-        let step: Step = before.into_iter().filter(differs).collect();
+        let step: Step =
+            before.into_iter().filter(|(id, old)| self.people.get(id) != old.as_ref()).collect();
         let changed: BTreeSet<i64> = step.keys().copied().collect();
         if !step.is_empty() {
             self.redo.clear();

@@ -156,14 +156,13 @@ fn default_output(log: &Path) -> PathBuf {
 fn check_writable(output: &Path) -> Result<(), Failure> {
     make_room_for(output)?;
     let shown = output.display();
-    let refused = |error| {
-        Failure::usage(format!("cannot write {shown}: {error}; choose another file with -o"))
-    };
     if output.is_dir() {
         return Err(Failure::usage(format!("{shown} is a folder; name a file with -o")));
     }
     let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
-    tempfile::tempfile_in(folder.unwrap_or(Path::new("."))).map_err(refused)?;
+    tempfile::tempfile_in(folder.unwrap_or(Path::new("."))).map_err(|error| {
+        Failure::usage(format!("cannot write {shown}: {error}; choose another file with -o"))
+    })?;
     Ok(())
 }
 

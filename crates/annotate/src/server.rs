@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::Serialize;
+use tagalong_report::BASE_STYLE;
 use tagalong_serve::{Request, Response, Site};
 
 use crate::document::Change;
@@ -35,7 +36,9 @@ impl Site for App {
         match (request.is_read(), path) {
             (true, "") => Response::ok("text/html; charset=utf-8", PAGE),
             (true, "page.js") => Response::ok("text/javascript; charset=utf-8", SCRIPT),
-            (true, "page.css") => Response::ok("text/css; charset=utf-8", STYLE),
+            (true, "page.css") => {
+                Response::ok("text/css; charset=utf-8", [BASE_STYLE, STYLE].concat())
+            }
             (true, "icon.svg") => Response::ok("image/svg+xml", ICON),
             (true, "state") => self.state(),
             (true, image) if image.starts_with("frame/") => self.image(image),

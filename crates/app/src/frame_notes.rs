@@ -103,13 +103,16 @@ impl FrameNotes {
     /// Extracts the notes from the report of a frame.
     pub fn of(report: &FrameReport, camera: &Camera, odom_from_robot: &Isometry2<f64>) -> Self {
         let at = odom_from_robot.translation;
-        let note = |candidate: &Candidate| CandidateNote::of(candidate, camera, odom_from_robot);
         Self {
             frame: report.index,
             stamp_ns: report.stamp.nanos(),
             image_px: [camera.width, camera.height],
             robot_odom: [at.x, at.y, odom_from_robot.rotation.angle()].map(|v| rounded(v, 1e4)),
-            candidates: report.candidates.iter().map(note).collect(),
+            candidates: report
+                .candidates
+                .iter()
+                .map(|candidate| CandidateNote::of(candidate, camera, odom_from_robot))
+                .collect(),
             dropped: dropped(&report.funnel),
             ended: report.ended.iter().map(|id| id.0).collect(),
             drive: DriveNote::of(report),
@@ -155,13 +158,16 @@ impl CandidateNote {
 }
 
 fn dropped(funnel: &Funnel) -> Vec<DroppedNote> {
-    let note = |entry: &tagalong_core::Dropped| DroppedNote {
-        test: entry.test.to_owned(),
-        count: entry.count,
-        // A region without an area says nothing about the place.
-        boxes_px: entry.places.iter().filter(|rect| rect.area() > 0.0).map(corners).collect(),
-    };
-    funnel.entries().iter().map(note).collect()
+    funnel
+        .entries()
+        .iter()
+        .map(|entry| DroppedNote {
+            test: entry.test.to_owned(),
+            count: entry.count,
+            // A region without an area says nothing about the place.
+            boxes_px: entry.places.iter().filter(|rect| rect.area() > 0.0).map(corners).collect(),
+        })
+        .collect()
 }
 
 fn corners(rect: &Rect) -> [f64; 4] {

@@ -53,8 +53,8 @@ type Group = Vec<Ready>;
 pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally, Failure> {
     let signals = Signals::listen()?;
     let asked = asked(args, store)?;
-    let due = |task: &&Task| is_due(args, store, task);
-    let pending: Vec<Task> = asked.iter().filter(due).cloned().collect();
+    let pending: Vec<Task> =
+        asked.iter().filter(|task| is_due(args, store, task)).cloned().collect();
     let ran = pending.len();
     let jobs = jobs(args);
     let groups = groups(pending, registry, args.timing, jobs)?;

@@ -74,8 +74,8 @@ fn batches_agree(subject: &Subject<'_>) -> Verdict {
         let one_by_one: Result<Vec<f64>, String> =
             people.chunks(2).map(|scene| weigh(likelihood, &frame, scene)).collect();
         let one_by_one = one_by_one?;
-        let alike = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * b.abs().max(1.0);
-        let agree = many.len() == 3 && many.iter().zip(&one_by_one).all(alike);
+        let agree = many.len() == 3
+            && many.iter().zip(&one_by_one).all(|(a, b)| (a - b).abs() <= 1e-9 * b.abs().max(1.0));
         demand(agree, || format!("together {many:?}, one by one {one_by_one:?}"))
     })
 }

@@ -260,8 +260,8 @@ impl Frame {
     /// are shared, not copied.
     pub fn restricted_to(&self, inputs: &Inputs) -> Option<Self> {
         // The new frame starts without derived data, which may stem from the withheld inputs.
-        let restricted = || self.of_same_moment(self.sensors.restricted_to(inputs));
-        (!self.sensors.are_within(inputs)).then(restricted)
+        (!self.sensors.are_within(inputs))
+            .then(|| self.of_same_moment(self.sensors.restricted_to(inputs)))
     }
 
     /// Returns the images of the log.

@@ -97,8 +97,8 @@ impl FloorTally {
         // An estimate near an ignored person is neither right nor wrong.
         let is_free = |index: usize| pairs.iter().all(|(_, estimate)| *estimate != index);
         let is_false = |(index, estimate): &(usize, &FloorPoint)| {
-            let near = |point: &FloorPoint| apart(point, estimate) <= self.cut_m;
-            is_free(*index) && !scan.ignored.iter().any(near)
+            is_free(*index)
+                && !scan.ignored.iter().any(|point| apart(point, estimate) <= self.cut_m)
         };
         let false_positives = scan.estimates.iter().enumerate().filter(is_false).count() as u64;
         let objects = scan.people.len() as u64;

@@ -3,13 +3,10 @@
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{Stamp, Track, TrackId};
-use tagalong_geometry::{Camera, Rect};
+use tagalong_geometry::{Camera, HALF_HEAD_M, Rect};
 
 use crate::target_lock::{bearing_deg, distance_m, nearest_in_front};
 use crate::{ChoiceRule, LockReport, LockState, TargetSettings};
-
-/// Height of the top of the head above its centre, m.
-const HALF_HEAD_M: f64 = 0.12;
 
 /// Person to follow, in a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -212,8 +209,8 @@ impl View {
         if !image.contains(point) {
             return Err(EnrollmentError::OutsideImage { x, y, width, height });
         }
-        let shows = |track: &&Track| track.seen && standing(track).contains(point);
-        let there = self.tracks.iter().filter(shows);
+        let there =
+            self.tracks.iter().filter(|track| track.seen && standing(track).contains(point));
         let nearest = there.min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
         nearest.ok_or_else(|| EnrollmentError::NoPersonAt { x, y, known: self.known() })
     }

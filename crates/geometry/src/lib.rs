@@ -26,6 +26,9 @@ pub const HEAD_RADIUS_M: f64 = 0.08;
 /// template of Jafari et al., ICRA 2014, spans the same 0.57 m).
 pub const UPPER_BODY_SIDE_M: f64 = 0.57;
 
+/// Distance from the centre of a head to its top, in metres.
+pub const HALF_HEAD_M: f64 = 0.115;
+
 /// Distance of the head centre below the upper edge of the upper-body square, in metres (2.5 cm of
 /// air and half a head).
 pub const HEAD_BELOW_TOP_M: f64 = 0.14;

@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix3, Point2, Point3};
 
-use crate::rect::HALF_HEAD_M;
-use crate::{Camera, HEAD_RADIUS_M, Lens, Rect, UPPER_BODY_SIDE_M};
+use crate::{Camera, HALF_HEAD_M, HEAD_RADIUS_M, Lens, Rect, UPPER_BODY_SIDE_M};
 
 /// Height of a person whose feet are not known, m.
 const STANDING_M: f64 = 1.7;

@@ -1,13 +1,10 @@
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-use crate::{HEAD_BELOW_TOP_M, UPPER_BODY_SIDE_M};
+use crate::{HALF_HEAD_M, HEAD_BELOW_TOP_M, UPPER_BODY_SIDE_M};
 
 /// Height of a box, in its widths, from which it is that of a whole person.
 const WHOLE_ASPECT: f64 = 1.5;
-
-/// Distance from the centre of a head to its top, m.
-pub(crate) const HALF_HEAD_M: f64 = 0.115;
 
 /// An upright rectangle in an image, in pixels. `x`, `y` is the upper left
 /// corner; it may lie outside the image.

@@ -151,11 +151,10 @@ fn track(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
 fn image(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
     let frame = frame_of(node, "id")?;
     for shape in boxes(node) {
-        let none = || {
+        let id = id_of(&shape)?.ok_or_else(|| {
             let why = "a box without a number: give it an attribute `id`, or a group";
             at(&shape, why)
-        };
-        let id = id_of(&shape)?.ok_or_else(none)?;
+        })?;
         rows.push(row(&shape, &shape, frame, id, true)?);
     }
     Ok(())
@@ -166,14 +165,13 @@ fn id_of(shape: &Node<'_, '_>) -> Result<Option<i64>, String> {
     let own = attribute(shape, "id").or_else(|| attribute(shape, "track_id"));
     let group = shape.attribute("group_id").filter(|group| *group != "0");
     let Some(text) = own.or(group) else { return Ok(None) };
-    let wrong = || {
+    let id = text.trim().parse().ok().filter(|id| (1..=MOST_ID).contains(id));
+    id.map(Some).ok_or_else(|| {
         at(
             shape,
             &format!("the number of a person is `{text}`, expected 1 or more, up to {MOST_ID}"),
         )
-    };
-    let id = text.trim().parse().ok().filter(|id| (1..=MOST_ID).contains(id));
-    id.map(Some).ok_or_else(wrong)
+    })
 }
 
 /// Returns an attribute that the annotator gave a box.

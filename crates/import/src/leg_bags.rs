@@ -162,8 +162,7 @@ impl Scan {
     }
 
     fn points_near(&self, [x, y]: [f64; 2]) -> usize {
-        let near = |point: &&[f64; 2]| (point[0] - x).hypot(point[1] - y) <= NEAR_M;
-        self.points_m.iter().filter(near).count()
+        self.points_m.iter().filter(|point| (point[0] - x).hypot(point[1] - y) <= NEAR_M).count()
     }
 }
 

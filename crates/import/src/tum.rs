@@ -117,8 +117,8 @@ fn images(
 }
 
 fn stamp(word: &str, path: &Path, line: usize) -> Result<Stamp, Failure> {
-    let wrong = || Failure::failed(format!("{}:{line}: `{word}` is no time", path.display()));
-    seconds(word).ok_or_else(wrong)
+    seconds(word)
+        .ok_or_else(|| Failure::failed(format!("{}:{line}: `{word}` is no time", path.display())))
 }
 
 /// Returns the poses of the robot: the point on the floor below the camera, heading where it looks.

@@ -280,8 +280,7 @@ impl Scan {
 
 /// Returns the files of a log, of whose channels nothing is known yet.
 fn unread(files: &LogFiles) -> Vec<LogPart> {
-    let part = |path: &PathBuf| LogPart { path: path.clone(), channels: Vec::new() };
-    files.parts().iter().map(part).collect()
+    files.parts().iter().map(|path| LogPart { path: path.clone(), channels: Vec::new() }).collect()
 }
 
 /// Contents that are gathered message by message.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tagalong_config::{ConfigError, Context, Registry, Settings, Value, nearest, parse_settings};
 use tagalong_core::{Associator, Filter, TrackManager, Verifier};
-use tagalong_stereo::{StereoDepth, StereoSettings};
+use tagalong_stereo::StereoDepth;
 use tagalong_tracking::Guarded;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -151,11 +151,14 @@ impl Pipeline {
             values,
             foreign: options.foreign.clone(),
         };
-        let on_threads = |stereo: &StereoSettings| match options.threads {
-            Some(most) => StereoDepth::new(stereo.on_threads(most)),
-            None => StereoDepth::new(stereo.clone()),
-        };
-        let stereo = settings.stereo.as_ref().map(on_threads).transpose();
+        let stereo = settings
+            .stereo
+            .as_ref()
+            .map(|stereo| match options.threads {
+                Some(most) => StereoDepth::new(stereo.on_threads(most)),
+                None => StereoDepth::new(stereo.clone()),
+            })
+            .transpose();
         let stereo = stereo.map_err(|error| ConfigError::new(error.to_string()))?;
         let preprocessors = preprocessors(stereo, settings.odometry.clone());
         let parts = Parts {
@@ -261,8 +264,10 @@ impl<'a, T: Settings> Section<'a, T> {
 impl<'a> Section<'a, PluginSettings> {
     /// Splits a section that may be left out, or name no plugin.
     fn or_default(name: &str, value: Option<Value<'a>>, plugin: &str) -> Result<Self, ConfigError> {
-        let empty = || Spanned::new(0..0, DeValue::Table(DeTable::new()));
-        let mut section = Self::new(name, value.unwrap_or_else(empty))?;
+        let mut section = Self::new(
+            name,
+            value.unwrap_or_else(|| Spanned::new(0..0, DeValue::Table(DeTable::new()))),
+        )?;
         if section.settings.plugin.is_empty() {
             section.settings.plugin = plugin.to_owned();
         }

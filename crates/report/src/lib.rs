@@ -36,6 +36,6 @@ pub use model::{
     Benchmark, Dropped, EventRow, MissedPerson, Moment, Outcome, StageTiming, TaskResult,
     TaskTiming, Timings, Trajectory,
 };
-pub use page::{COLOURS, html};
+pub use page::{BASE_STYLE, document, html};
 pub use summary::{Estimate, PairSummary, PipelineSummary, Summary};
 pub use table::{Cell, Row, Table};

@@ -294,8 +294,8 @@ pub(crate) fn problem(scene: &Scene) -> Option<String> {
     }
     let mut known = BTreeSet::new();
     for name in names {
-        let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-        let is_named = !name.is_empty() && name.chars().all(is_word);
+        let is_named =
+            !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
         if !is_named {
             let needed = "each of ranges, bumpers and lasers needs a name of letters, digits and _";
             return Some(format!("{needed}, not `{name}`"));

@@ -48,8 +48,8 @@ pub fn before<'a>(
         let nearest = forward.dot(&way) - shape.extent(&-forward);
         SightedSolid { number, person, shape, seen: shape.seen_from(eye), nearest, way, eye: *eye }
     };
-    let ahead = |sight: &SightedSolid| sight.reaches(forward);
-    let mut sights: Vec<_> = (0..).zip(solids).map(sight).filter(ahead).collect();
+    let mut sights: Vec<_> =
+        (0..).zip(solids).map(sight).filter(|sight| sight.reaches(forward)).collect();
     sights.sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
     sights
 }

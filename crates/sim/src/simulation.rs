@@ -432,9 +432,8 @@ impl Simulation {
             CameraKind::Stereo => self.stereo(&world, &seen),
             CameraKind::Panorama => self.circle(&seen),
         };
-        let measured =
-            |laser: &LaserSettings| laser.measure(&world, &pose, self.moment(0, 1.0).seed);
-        let laser = self.laser().map(measured);
+        let laser =
+            self.laser().map(|laser| laser.measure(&world, &pose, self.moment(0, 1.0).seed));
         let (captured_ns, world_from_robot) = (self.now_ns, self.robot.pose);
         Shot {
             captured_ns,

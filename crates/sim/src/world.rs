@@ -366,9 +366,8 @@ impl Lamp {
     /// Illuminance of a point with this normal, lx.
     fn on(&self, shadows: [&Shadows; 2], at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
         let (way, lux) = self.beam(&at.coords, normal);
-        let is_shut = |windows: &Windows| !windows.are_open(&self.at, &way);
         let dark = lux == 0.0
-            || self.windows.as_ref().is_some_and(is_shut)
+            || self.windows.as_ref().is_some_and(|windows| !windows.are_open(&self.at, &way))
             || shadows.iter().any(|shadows| shadows.on(&way));
         if dark { 0.0 } else { lux }
     }

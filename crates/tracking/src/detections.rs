@@ -54,12 +54,14 @@ impl DetectionSet {
 
     /// Returns the detections with their tracks, for the filter.
     pub(crate) fn matched(&self) -> Vec<Matched<'_>> {
-        let matched = |(id, index, weight): &(TrackId, usize, f64)| Matched {
-            id: *id,
-            detection: &self.all[*index].detection,
-            weight: *weight,
-        };
-        self.pairs.iter().map(matched).collect()
+        self.pairs
+            .iter()
+            .map(|(id, index, weight)| Matched {
+                id: *id,
+                detection: &self.all[*index].detection,
+                weight: *weight,
+            })
+            .collect()
     }
 
     /// Returns the most probable detection of a track that the filter accepted.
@@ -189,14 +191,16 @@ impl DetectionSet {
 
     /// Returns the candidates of the report, and counts dropped ones.
     pub(crate) fn into_candidates(self, funnel: &mut Funnel) -> Vec<Candidate> {
-        let candidate = |pending: PendingDetection| {
-            let fate = pending.fate.unwrap_or(Fate::Dropped("score"));
-            if let Fate::Dropped(test) = fate {
-                funnel.drop_detection(test, &pending.detection);
-            }
-            Candidate { detection: pending.detection, fate }
-        };
-        self.all.into_iter().map(candidate).collect()
+        self.all
+            .into_iter()
+            .map(|pending| {
+                let fate = pending.fate.unwrap_or(Fate::Dropped("score"));
+                if let Fate::Dropped(test) = fate {
+                    funnel.drop_detection(test, &pending.detection);
+                }
+                Candidate { detection: pending.detection, fate }
+            })
+            .collect()
     }
 
     fn score(&self, index: usize) -> f64 {

@@ -150,8 +150,9 @@ fn count(region: &Rect, image: &Rect, in_front: &[&Occluder], camera: &Camera) -
         let near = |x: f64| Point2::new(camera.column_near(point.x, x), point.y);
         if image.contains(near(image.centre().x)) {
             inside += 1;
-            let hides = |c: &&Occluder| is_on_body(&c.region, near(c.region.centre().x));
-            visible += u32::from(!in_front.iter().any(hides));
+            visible += u32::from(
+                !in_front.iter().any(|c| is_on_body(&c.region, near(c.region.centre().x))),
+            );
         }
     }
     Shown { all, inside, visible }

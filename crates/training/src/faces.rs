@@ -55,14 +55,14 @@ pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let text = read_text(&table, FileLimit::Table).map_err(|error| wrong(error.to_string()))?;
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let column = |name: &str| names.iter().position(|n| *n == name);
-    let columns = ["file", "major_r", "minor_r", "cx", "cy"].map(column);
+    let columns = ["file", "major_r", "minor_r", "cx", "cy"]
+        .map(|name| names.iter().position(|n| *n == name));
     let mut faces: Vec<(&str, Rect)> = Vec::new();
     for line in lines {
         let words: Vec<&str> = line.split(',').collect();
         let [file, major, minor, x, y] = columns.map(|at| at.and_then(|at| words.get(at)));
-        let number = |word: Option<&&str>| word.and_then(|word| word.parse::<f64>().ok());
-        let numbers = [major, minor, x, y].map(number);
+        let numbers =
+            [major, minor, x, y].map(|word| word.and_then(|word| word.parse::<f64>().ok()));
         let (Some(file), [Some(major), Some(minor), Some(x), Some(y)]) = (file, numbers) else {
             return Err(wrong(format!("cannot read `{line}`")));
         };

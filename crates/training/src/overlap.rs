@@ -56,12 +56,11 @@ fn most_alike(shown: &[(Use, Vec<f32>)]) -> f32 {
 
 /// Returns the same for photographs of some kind.
 fn most_alike_photos(data: &Path, kind: impl Fn(&Photo) -> bool) -> f32 {
-    let visit = |take: Take<'_>| {
+    most_alike(&with_people(|take: Take<'_>| {
         let all = [photos(data, false), photos(data, true)];
         let mut people = all.into_iter().flatten().filter(kind);
         people.try_for_each(|photo| photo.visit(0, take))
-    };
-    most_alike(&with_people(visit))
+    }))
 }
 
 #[test]

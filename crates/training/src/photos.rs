@@ -94,11 +94,11 @@ fn runs(crops: &[PathBuf]) -> Vec<u64> {
     let taken: BTreeSet<(String, u64)> = crops.iter().map(numbered).collect();
     let first = |crop: &PathBuf| {
         let (series, number) = numbered(crop);
-        let before = |number: &u64| {
+        let first = std::iter::successors(Some(number), |number: &u64| {
             let before = number.checked_sub(1)?;
             taken.contains(&(series.clone(), before)).then_some(before)
-        };
-        let first = std::iter::successors(Some(number), before).last();
+        })
+        .last();
         fingerprint(&format!("{series}{}", first.unwrap_or(number)))
     };
     crops.iter().map(first).collect()

@@ -131,14 +131,13 @@ fn track_at(trial: &Trial, report: &FrameReport, index: usize, person: u16) -> O
         (track.estimate.person.position - truth.head_in_robot).xy().norm()
     };
     let own = truth(trial, index, person)?;
-    let is_own = |track: &&tagalong_core::Track| {
-        moment.truth.iter().all(|other| distance(own, track) <= distance(other, track))
-    };
     report
         .tracks
         .iter()
         .filter(|track| track.confirmed && track.seen && distance(own, track) <= NEAR_M)
-        .filter(is_own)
+        .filter(|track| {
+            moment.truth.iter().all(|other| distance(own, track) <= distance(other, track))
+        })
         .min_by(|a, b| distance(own, a).total_cmp(&distance(own, b)))
         .map(|track| track.id)
 }

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::page::data::RunData;
+use crate::page::events;
+use crate::page::frame::{frame_data, tests};
+use crate::page::moment::Moment;
 use tagalong_app::remedies::Remedies;
-use tagalong_page::data::RunData;
-use tagalong_page::events;
-use tagalong_page::frame::{frame_data, tests};
-use tagalong_page::moment::Moment;
 
 use crate::recording::Recording;
 

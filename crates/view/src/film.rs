@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use crate::page::data::{FrameData, RunData};
+use crate::page::frame::{add_trails, add_whole_people, scan_points, view_edges};
 use nalgebra::Isometry2;
 use tagalong_app::config_file::OuterSettings;
 use tagalong_app::outcome::Failure;
@@ -12,8 +14,6 @@ use tagalong_app::scoring::{Shot, Shots};
 use tagalong_geometry::Camera;
 use tagalong_log::write::BoxedPart;
 use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
-use tagalong_page::data::{FrameData, RunData};
-use tagalong_page::frame::{add_trails, add_whole_people, scan_points, view_edges};
 use tagalong_render::background;
 
 use crate::pictures::Pictures;
@@ -163,9 +163,9 @@ fn add_trails_at(
 
 #[cfg(test)]
 mod tests {
+    use crate::page::data::TrackData;
     use nalgebra::Vector2;
     use tagalong_geometry::{Distortion, Pinhole};
-    use tagalong_page::data::TrackData;
 
     use super::*;
 

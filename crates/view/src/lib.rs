@@ -1,31 +1,35 @@
-//! `tagalong view`: one run, or two side by side, as one page that needs no network and no server.
+//! `tagalong view`: one run, or two side by side, as one page that needs no network and no server;
+//! and [`Live`], the server of the same page of a run that happens now.
 //!
 //! A `recording` is read from the folder of a run; `assemble` puts runs on one list of times;
 //! `film` passes the log once for images, laser scans and trails; `truth` says which annotated
-//! people a run has missed. The page's script shows the data as it is: nothing is computed a second
-//! time in the browser but the answer to a click.
+//! people a run has missed; `page` has the markup, the style, the script and the data of the page.
 
 mod assemble;
 mod clip;
 mod film;
+mod live;
+mod page;
 mod pictures;
 mod recording;
 mod truth;
 
 use std::path::{Path, PathBuf};
 
+use crate::page::data::{PageData, RunData};
+use crate::page::html::{Heading, html};
 use clap::Args;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
 use tagalong_app::remedies::Remedies;
 use tagalong_app::scoring::TruthFile;
 use tagalong_config::Registry;
-use tagalong_page::data::{PageData, RunData};
-use tagalong_page::html::{Heading, html};
 
 use crate::assemble::{run_data, stamps, times};
 use crate::film::Film;
 use crate::recording::{Recording, Span, Window};
 use crate::truth::PageTruth;
+
+pub use crate::live::{Live, parse_address};
 
 /// Arguments of `tagalong view`.
 #[derive(Args, Debug)]

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::page::moment::{Moment, TrackState};
 use serde::Deserialize;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
@@ -9,7 +10,6 @@ use tagalong_app::outcome::Failure;
 use tagalong_config::{FileLimit, read_text};
 use tagalong_log::msgs::{StringMsg, decode};
 use tagalong_log::{Limits, LogFile, LogWalker, read_attachment};
-use tagalong_page::moment::{Moment, TrackState};
 use toml::Table;
 
 /// Topic of the tracks as JSON in `tracks.mcap`.

@@ -12,7 +12,7 @@ use tagalong_eval::{
 };
 use tagalong_geometry::Rect;
 
-use tagalong_page::data::{EventData, FrameData, RunData, TruthBox};
+use crate::page::data::{EventData, FrameData, RunData, TruthBox};
 
 /// Truth by frame of the page.
 pub struct PageTruth {
@@ -116,7 +116,7 @@ fn shown(truth: &Truth, odom_from_robot: &Isometry2<f64>) -> TruthBox {
 fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
     let (sin, cos) = frame.robot[2].sin_cos();
     let seen = frame.tracks.iter().filter(|track| track.state == "seen");
-    let report = |track: &tagalong_page::data::TrackData| {
+    let report = |track: &crate::page::data::TrackData| {
         let [x, y, width, height] = track.box_px;
         let inside = Rect::new(x, y, width, height).clipped(size[0], size[1]);
         let dx = track.at[0] - frame.robot[0];
@@ -133,7 +133,6 @@ fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
 
 /// Describes an event of the comparison; people found again are told by the run itself.
 fn described(event: &Event) -> Option<EventData> {
-    let number = |id: i64| u32::try_from(id).ok();
     let (kind, person, track, text) = match event.kind {
         EventKind::Miss { person, track } => {
             let had = track.map(|id| format!(", who was track {id}")).unwrap_or_default();
@@ -154,7 +153,7 @@ fn described(event: &Event) -> Option<EventData> {
         EventKind::Found { .. } => return None,
     };
     let i = event.frame.saturating_sub(1);
-    Some(EventData { i, kind, track: track.and_then(number), person, text })
+    Some(EventData { i, kind, track: track.and_then(|id| u32::try_from(id).ok()), person, text })
 }
 
 #[cfg(test)]
@@ -162,7 +161,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use tagalong_page::data::TrackData;
+    use crate::page::data::TrackData;
 
     fn run(boxes: &[Option<[f64; 4]>]) -> RunData {
         let frame = |box_px: &Option<[f64; 4]>| {

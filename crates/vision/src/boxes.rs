@@ -159,8 +159,8 @@ impl BoxSettings {
 
 /// Returns true if some of the detection's box is in the image, and all its numbers are sane.
 pub fn is_shown(camera: &Camera, detection: &Detection) -> bool {
-    let clipped = |rect: Rect| rect.clipped(camera.width, camera.height).area() > 0.0;
-    detection.rect().is_some_and(clipped) && detection.is_sane()
+    detection.rect().is_some_and(|rect| rect.clipped(camera.width, camera.height).area() > 0.0)
+        && detection.is_sane()
 }
 
 /// Returns the log-odds of a probability, which are finite for 0 and 1, too.

@@ -214,8 +214,7 @@ fn unwrapped<P: Blend>(
     panorama: &Panorama,
     raw: &Image<P>,
 ) -> Result<Arc<Image<P>>> {
-    let fits = |known: &(Panorama, Unwrapper<P>)| known.0 == *panorama;
-    let mut known = match kept.take().filter(fits) {
+    let mut known = match kept.take().filter(|known| known.0 == *panorama) {
         Some(known) => known,
         None => (*panorama, Unwrapper::new(panorama, raw.width(), raw.height())?),
     };

@@ -12,13 +12,12 @@
 //! request.
 
 use std::path::PathBuf;
-use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
 
 use crate::accuracy;
 use crate::faults;
-use crate::program::Name;
+use crate::program::{Name, Program};
 use crate::workspace::{Workspace, output};
 
 const BEGIN: &str = "<!-- begin: ";
@@ -55,8 +54,10 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
         Some(part) => command.contains(part),
         None => !is_slow(command),
     };
+    let mut programs = Programs::default();
     for document in documents(workspace)? {
-        let filled = filled(&document.text, wanted, |command| printed(workspace, command))
+        let print = |command: &str| printed(workspace, &mut programs, command);
+        let filled = filled(&document.text, wanted, print)
             .with_context(|| format!("in {}", document.path.display()))?;
         if filled != document.text {
             workspace.write(&document.path, &filled)?;
@@ -69,10 +70,12 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
 /// Complains about fast parts that are stale.
 pub fn stale(workspace: &Workspace) -> Result<Vec<String>> {
     let mut complaints = Vec::new();
+    let mut programs = Programs::default();
     for document in documents(workspace)? {
         // Slow parts are compared only when they are filled.
         let wanted = |command: &str| !is_slow(command);
-        let filled = filled(&document.text, wanted, |command| printed(workspace, command))
+        let print = |command: &str| printed(workspace, &mut programs, command);
+        let filled = filled(&document.text, wanted, print)
             .with_context(|| format!("in {}", document.path.display()))?;
         if filled != document.text {
             let name = document.path.display();
@@ -100,7 +103,7 @@ fn documents(workspace: &Workspace) -> Result<Vec<Document>> {
 fn filled(
     text: &str,
     wanted: impl Fn(&str) -> bool,
-    print: impl Fn(&str) -> Result<String>,
+    mut print: impl FnMut(&str) -> Result<String>,
 ) -> Result<String> {
     let mut out = String::new();
     let mut rest = text;
@@ -205,7 +208,7 @@ fn is_head(line: &str) -> bool {
 
 /// Returns the output of the command, with the program of this workspace; the table of faults is
 /// this program's own.
-fn printed(workspace: &Workspace, command: &str) -> Result<String> {
+fn printed(workspace: &Workspace, programs: &mut Programs, command: &str) -> Result<String> {
     if let Some(rows) = command.strip_prefix(faults::COMMAND) {
         return faults::markdown(workspace, &rows.split_whitespace().collect::<Vec<_>>());
     }
@@ -239,13 +242,37 @@ fn printed(workspace: &Workspace, command: &str) -> Result<String> {
     let Some(program) = Name::ALL.into_iter().find(|name| name.as_str() == first) else {
         bail!("`{command}` is no command of tagalong or tagalong-papers");
     };
-    let mut cargo = Command::new("cargo");
-    cargo.args(["run", "--quiet"]).args(program.cargo_args());
     // Figures of slow commands take hours without optimisation.
-    if is_slow(command) {
-        cargo.arg("--release");
+    let program = programs.built(workspace, program, is_slow(command))?;
+    output(program.call(&[]).args(words).current_dir(workspace.root()))
+}
+
+/// Programs that print parts of documents.
+#[derive(Default)]
+struct Programs(Vec<Built>);
+
+/// A program that was built.
+struct Built {
+    name: Name,
+    is_optimised: bool,
+    program: Program,
+}
+
+impl Programs {
+    /// Returns a program, which is built on the first use.
+    fn built(&mut self, workspace: &Workspace, name: Name, is_optimised: bool) -> Result<&Program> {
+        let known = self.0.iter().position(|it| it.name == name && it.is_optimised == is_optimised);
+        let at = known.unwrap_or(self.0.len());
+        if known.is_none() {
+            let program = if is_optimised {
+                Program::optimised(workspace, name)?
+            } else {
+                Program::built(workspace, name)?
+            };
+            self.0.push(Built { name, is_optimised, program });
+        }
+        Ok(&self.0[at].program)
     }
-    output(cargo.arg("--").args(words).current_dir(workspace.root()))
 }
 
 #[cfg(test)]

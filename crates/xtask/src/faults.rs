@@ -58,8 +58,7 @@ fn shown(test: &str) -> String {
 /// # Errors
 /// A table that cannot be read.
 pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
-    let read = |file: &str| workspace.read(file).ok();
-    Ok(complaints(&table(workspace)?, read))
+    Ok(complaints(&table(workspace)?, |file: &str| workspace.read(file).ok()))
 }
 
 fn complaints(table: &Table, read: impl Fn(&str) -> Option<String>) -> Vec<String> {

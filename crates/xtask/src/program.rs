@@ -39,7 +39,7 @@ impl Name {
 
     /// Returns the arguments of cargo that build it as the tests do, which have built it already: the
     /// trainers are a feature that is on where the whole workspace is built.
-    pub fn cargo_args(self) -> &'static [&'static str] {
+    fn cargo_args(self) -> &'static [&'static str] {
         match self {
             Self::Tagalong => &["--package", "tagalong-cli", "--features", "train"],
             Self::Papers => &["--package", "tagalong-papers"],
@@ -57,10 +57,20 @@ struct Built {
 }
 
 impl Program {
-    /// Builds it.
+    /// Builds it as the tests do.
     pub fn built(workspace: &Workspace, name: Name) -> Result<Self> {
+        Self::with_arguments(workspace, name, &[])
+    }
+
+    /// Builds it with optimisation.
+    pub fn optimised(workspace: &Workspace, name: Name) -> Result<Self> {
+        Self::with_arguments(workspace, name, &["--release"])
+    }
+
+    fn with_arguments(workspace: &Workspace, name: Name, arguments: &[&str]) -> Result<Self> {
         let mut cargo = Command::new("cargo");
         cargo.args(["build", "--quiet", "--bin", name.as_str()]).args(name.cargo_args());
+        cargo.args(arguments);
         cargo.args(["--message-format", "json"]);
         let said = output(cargo.current_dir(workspace.root()))?;
         let built = said.lines().filter_map(|line| serde_json::from_str::<Built>(line).ok());

@@ -64,9 +64,9 @@ pub fn rehearse(workspace: &Workspace) -> Result<()> {
     let stage = workspace.root().join(STAGE);
     remove_folder(&stage)?;
     let props = stage.join("props");
-    let is_config =
-        |file: &Path| file.starts_with("configs") || file.starts_with("benches/papers/configs");
-    workspace.copy_to(&props, is_config)?;
+    workspace.copy_to(&props, |file: &Path| {
+        file.starts_with("configs") || file.starts_with("benches/papers/configs")
+    })?;
     for line in PROPS {
         output(program.call(&words(line)).current_dir(&props))?;
     }

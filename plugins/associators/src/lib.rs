@@ -17,8 +17,8 @@ pub mod two_stage;
 pub use assign::assign;
 pub use fusion::{AppearanceFusion, Fusion};
 pub use observations::{ObservationMemory, Observed};
-pub use pair::{Cost, Fit, Overlap, PairCost, Pairs, assign_fits};
-pub use similarity::{PrioritySettings, Stage, Staged, buffered_iou, probability};
+pub use pair::{Cost, Fit, GateSettings, Overlap, PairCost, Pairs, assign_fits};
+pub use similarity::{Stage, StageSettings, Staged, buffered_iou, probability};
 use tagalong_config::Registry;
 
 /// Registers all associators.

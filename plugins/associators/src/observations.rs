@@ -45,11 +45,13 @@ impl ObservationMemory {
         self.frame += 1;
         let mut old = std::mem::take(&mut self.tracks);
         for Track { id, estimate, .. } in tracks {
-            let new = || {
-                let (time_s, frame) = before;
-                VecDeque::from([Observed { region: estimate.region, time_s, frame }])
-            };
-            self.tracks.insert(*id, old.remove(id).unwrap_or_else(new));
+            self.tracks.insert(
+                *id,
+                old.remove(id).unwrap_or_else(|| {
+                    let (time_s, frame) = before;
+                    VecDeque::from([Observed { region: estimate.region, time_s, frame }])
+                }),
+            );
         }
     }
 

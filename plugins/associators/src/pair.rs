@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::{Detection, Gate, Track};
 use tagalong_geometry::Rect;
 
-use crate::{AppearanceFusion, assign};
+use crate::{AppearanceFusion, Fusion, Stage, assign};
 
 /// Measure of the fit of a detection and a track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -27,6 +27,59 @@ pub enum Overlap {
     Iou,
     /// Twice the intersection over the sum of the areas.
     Dice,
+}
+
+/// Settings of the gate of a pair in metres and of the part of its appearance; flattened into those of
+/// associators.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct GateSettings {
+    /// Largest squared Mahalanobis distance. 11.34 is the 99 % point of chi-squared with 3 degrees
+    /// of freedom.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub gate: f64,
+    /// Mahalanobis: largest distance on the floor, m, between frames that are close in time ...
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub gate_m: f64,
+    /// ... and by how much it grows with the time between them, m/s.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub gate_speed_mps: f64,
+    /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
+    /// place (`sum`), or the better of both counts (`minimum`).
+    pub fusion: Fusion,
+    /// `minimum`: the appearance counts for pairs whose places are at least so similar:
+    /// exp(-d²/2) with the Mahalanobis distance d, or the overlap where that is the cost.
+    /// BoT-SORT has 0.5.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub fusion_gate: f64,
+}
+
+impl Default for GateSettings {
+    fn default() -> Self {
+        Self {
+            gate: 11.34,
+            gate_m: 1.0,
+            gate_speed_mps: 1.5,
+            fusion: Fusion::Sum,
+            fusion_gate: 0.0,
+        }
+    }
+}
+
+impl GateSettings {
+    /// Returns the fit by distances in metres.
+    pub fn pair_cost(&self) -> PairCost {
+        let Self { gate, gate_m, gate_speed_mps, fusion, fusion_gate } = *self;
+        PairCost {
+            cost: Cost::Mahalanobis,
+            gate,
+            gate_m,
+            gate_speed_mps,
+            min_overlap: 1.0,
+            overlap: Overlap::Iou,
+            fusion: AppearanceFusion { fusion, gate: fusion_gate },
+        }
+    }
 }
 
 /// Measure of the fit of a pair, with its gate.
@@ -125,14 +178,12 @@ pub struct Pairs<'a> {
 }
 
 impl Pairs<'_> {
-    /// Returns the numbers of all tracks.
-    pub fn rows(&self) -> Vec<usize> {
-        (0..self.tracks.len()).collect()
-    }
-
-    /// Returns the numbers of all detections.
-    pub fn columns(&self) -> Vec<usize> {
-        (0..self.detections.len()).collect()
+    /// Returns the numbers of all tracks and of all detections.
+    pub fn all(&self) -> Stage {
+        Stage {
+            rows: (0..self.tracks.len()).collect(),
+            columns: (0..self.detections.len()).collect(),
+        }
     }
 
     /// Returns the fits of these tracks and detections, by their numbers, with a row for each
@@ -140,11 +191,11 @@ impl Pairs<'_> {
     /// within the gate of `pair_cost`, gives none. The appearance of a pair takes part as `pair_cost` weighs it.
     pub fn fits(
         &self,
-        rows: &[usize],
-        columns: &[usize],
+        stage: &Stage,
         pair_cost: &PairCost,
         fit: impl Fn(&Track, &Detection) -> Option<Fit>,
     ) -> Vec<Vec<Option<Fit>>> {
+        let Stage { rows, columns } = stage;
         let pair = |row: usize, column: usize| {
             let track = &self.tracks[row];
             let detection = &self.detections[column];
@@ -155,28 +206,29 @@ impl Pairs<'_> {
         // Most pairs are too far apart along one axis, which is seen soonest in a list of places.
         let reach = 1.01 * pair_cost.reach_m(self.gate.dt_s);
         let places: Vec<_> = columns.iter().map(|i| self.detections[*i].position.xy()).collect();
-        let fits_of = |row: &usize| {
-            let own = self.tracks[*row].estimate.person.position.xy();
-            let each = columns.iter().zip(&places).map(|(column, place)| {
-                let is_far = (place - own).amax() > reach;
-                if is_far { None } else { pair(*row, *column) }
-            });
-            each.collect()
-        };
-        rows.iter().map(fits_of).collect()
+        rows.iter()
+            .map(|row| {
+                let own = self.tracks[*row].estimate.person.position.xy();
+                let each = columns.iter().zip(&places).map(|(column, place)| {
+                    let is_far = (place - own).amax() > reach;
+                    if is_far { None } else { pair(*row, *column) }
+                });
+                each.collect()
+            })
+            .collect()
     }
 
     /// Assigns these detections to these tracks, by their numbers, with the least sum of costs:
     /// [`assign_fits`] of their [`Pairs::fits`]. Returns the number of the detection of each track.
     pub fn assigned(
         &self,
-        rows: &[usize],
-        columns: &[usize],
+        stage: &Stage,
         pair_cost: &PairCost,
         miss_factor: f64,
         fit: impl Fn(&Track, &Detection) -> Option<Fit>,
     ) -> Vec<Option<usize>> {
-        let fits = self.fits(rows, columns, pair_cost, fit);
+        let fits = self.fits(stage, pair_cost, fit);
+        let columns = &stage.columns;
         let given = assign_fits(&fits, columns.len(), pair_cost.at_gate(), miss_factor);
         given.into_iter().map(|column| column.map(|column| columns[column])).collect()
     }
@@ -221,7 +273,6 @@ mod tests {
     use tagalong_geometry::ImageBox;
 
     use super::*;
-    use crate::Fusion;
 
     const DEFAULT: PairCost = PairCost {
         cost: Cost::Mahalanobis,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::Detection;
 use tagalong_geometry::Rect;
 
-use crate::assign;
+use crate::{AppearanceFusion, Fusion, assign};
 
 /// Tracks and detections that a stage may pair, by their numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -86,34 +86,51 @@ pub fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
-/// Order of detections and tracks in associators of boxes, by score and confirmation; flattened into
-/// their settings.
+/// Order of detections and tracks, by score and confirmation, and the part of the appearance in
+/// associators of boxes; flattened into their settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
-pub struct PrioritySettings {
+pub struct StageSettings {
     /// Detections from these log-odds on are strong; 0.405 is a probability of 0.6.
     pub strong_log_odds: f64,
     /// Tracks that are not confirmed get the detections that confirmed ones leave.
     pub confirmed_first: bool,
     /// The overlap counts by the probability of the detection.
     pub weigh_by_score: bool,
+    /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
+    /// place (`sum`), or the better of both counts (`minimum`).
+    pub fusion: Fusion,
+    /// `minimum`: the appearance counts for pairs whose places are at least so similar: the
+    /// overlap of the boxes, enlarged as in their stage.
+    /// BoT-SORT has 0.5.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub fusion_gate: f64,
 }
 
-impl Default for PrioritySettings {
+impl Default for StageSettings {
     fn default() -> Self {
-        Self { strong_log_odds: 0.405, confirmed_first: false, weigh_by_score: false }
+        Self {
+            strong_log_odds: 0.405,
+            confirmed_first: false,
+            weigh_by_score: false,
+            fusion: Fusion::Minimum,
+            fusion_gate: 0.0,
+        }
     }
 }
 
-impl PrioritySettings {
+impl StageSettings {
     /// Returns true for a strong detection.
     pub fn is_strong(&self, detection: &Detection) -> bool {
         detection.score >= self.strong_log_odds
     }
 
-    /// Returns an overlap with a detection as it counts.
-    pub fn weighed(&self, overlap: f64, detection: &Detection) -> f64 {
-        if self.weigh_by_score { overlap * probability(detection.score) } else { overlap }
+    /// Returns the similarity of a track and a detection from the overlap of their boxes and the
+    /// log-likelihood ratio of their appearances.
+    pub fn similarity(&self, overlap: f64, detection: &Detection, log_ratio: f64) -> f64 {
+        let appearance = AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate };
+        let similarity = appearance.similarity(overlap, log_ratio);
+        if self.weigh_by_score { similarity * probability(detection.score) } else { similarity }
     }
 }
 

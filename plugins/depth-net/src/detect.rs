@@ -26,9 +26,15 @@ impl DepthNet {
         Ok(Self { config, model })
     }
 
-    fn detection(&self, camera: &Camera, surface: &Surface<'_>, peak: &Peak) -> Option<Detection> {
+    /// Makes a detection of a peak, with its head measured on the surface if that is given.
+    fn detection(
+        &self,
+        camera: &Camera,
+        surface: Option<&Surface<'_>>,
+        peak: &Peak,
+    ) -> Option<Detection> {
         let config = &self.config;
-        let measured = if config.measure_heads { surface.head(&peak.head) } else { None };
+        let measured = surface.and_then(|surface| surface.head(&peak.head));
         let sigma_height_m = if measured.is_some() {
             config.sigma_measured_height_m
         } else if is_in_image(camera, peak) {
@@ -95,18 +101,19 @@ impl Detector for DepthNet {
             all.into_iter().partition(|peak| self.model.log_odds(peak.logit) >= least);
         funnel.drop_many("peak: score", low.len() as u64);
         let camera = &*frame.camera;
-        let surface = Surface::new(frame.depth()?, camera);
+        let surface = if self.config.measure_heads { Some(Surface::new(frame)?) } else { None };
+        let surface = surface.as_ref();
         Ok(match search {
             Query::Track(track) => self
                 .near(track, &found)
-                .and_then(|peak| self.detection(camera, &surface, peak))
+                .and_then(|peak| self.detection(camera, surface, peak))
                 .into_iter()
                 .collect(),
             Query::Discover { .. } => {
                 // People who are tracked already would be discovered twice.
                 let free =
                     found.iter().filter(|peak| !search.is_occupied(&peak.head, separation_m));
-                free.filter_map(|peak| self.detection(camera, &surface, peak)).collect()
+                free.filter_map(|peak| self.detection(camera, surface, peak)).collect()
             }
         })
     }

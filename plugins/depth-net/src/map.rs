@@ -189,8 +189,7 @@ fn widened(cells: &[bool]) -> Vec<bool> {
     let side = FloorMap::CELLS;
     let near = |at: usize| at.saturating_sub(BESIDE)..(at + BESIDE + 1).min(side);
     let spread = |cells: &[bool], get: &dyn Fn(usize, usize) -> usize| -> Vec<bool> {
-        let is_near = |k: usize| near(k % side).any(|other| cells[get(k / side, other)]);
-        (0..side * side).map(is_near).collect()
+        (0..side * side).map(|k| near(k % side).any(|other| cells[get(k / side, other)])).collect()
     };
     let along = spread(cells, &|row, column| row * side + column);
     let across = spread(&along, &|column, row| row * side + column);

@@ -1,8 +1,10 @@
 //! Place and height of a head from the depth image around it.
 
+use std::sync::Arc;
+
 use nalgebra::{Point2, Point3, Vector2, Vector3};
-use tagalong_core::DepthImage;
-use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
+use tagalong_core::{DepthImage, Derived, Frame, Result};
+use tagalong_geometry::{Camera, HALF_HEAD_M, HEAD_RADIUS_M, Rect};
 
 /// Half the width of the column around the expected head whose points are taken, m.
 const COLUMN_M: f64 = 0.22;
@@ -20,8 +22,6 @@ const DEEP_LAYERS: usize = 6;
 const HEAD_M: f64 = 0.22;
 /// Largest number of rows, and of columns, that are read.
 const MOST_SAMPLES: usize = 48;
-/// Distance from the centre of a head to its top, m.
-const HALF_HEAD_M: f64 = 0.115;
 /// A head that is nearer to the camera than this is not measured, m.
 const NEAREST_M: f64 = 0.3;
 /// Largest difference in depth between the points of a head and its expected surface, m.
@@ -29,17 +29,19 @@ const SAME_PERSON_M: f64 = 0.5;
 /// A head nearer than this to where the readings of the image end may be cut off, m.
 const BORDER_M: f64 = 0.04;
 
-/// Depth image, and the part of it that has readings: registration to a colour image leaves borders
-/// without any.
-pub(crate) struct Surface<'a> {
-    depth: &'a DepthImage,
-    camera: &'a Camera,
-    readings: Rect,
+/// Part of a depth image that has readings: registration to a colour image leaves borders without
+/// any. It is the same for all queries about a frame.
+pub(crate) struct Readings(Rect);
+
+impl Derived for Readings {
+    fn derive(frame: &Frame) -> Result<Self> {
+        Ok(Self::new(frame.depth()?))
+    }
 }
 
-impl<'a> Surface<'a> {
+impl Readings {
     /// Finds the borders of the readings.
-    pub(crate) fn new(depth: &'a DepthImage, camera: &'a Camera) -> Self {
+    fn new(depth: &DepthImage) -> Self {
         let is_row = |y: &usize| {
             let step = depth.width() / MOST_SAMPLES + 1;
             has_readings(depth.row(*y).iter().step_by(step))
@@ -51,13 +53,30 @@ impl<'a> Surface<'a> {
         let top = (0..depth.height()).find(is_row).unwrap_or(depth.height());
         let left = (0..depth.width()).find(is_column).unwrap_or(depth.width());
         let right = (left..depth.width()).rfind(is_column).unwrap_or(left);
-        let readings = Rect::new(
+        Self(Rect::new(
             left as f64,
             top as f64,
             (right - left) as f64,
             (depth.height() - top) as f64,
-        );
-        Self { depth, camera, readings }
+        ))
+    }
+}
+
+/// Depth image of a frame, with the part of it that has readings.
+pub(crate) struct Surface<'a> {
+    depth: &'a DepthImage,
+    camera: &'a Camera,
+    readings: Arc<Readings>,
+}
+
+impl<'a> Surface<'a> {
+    /// Takes the depth image of a frame.
+    ///
+    /// # Errors
+    /// [`tagalong_core::Error::MissingImage`] for a frame without depth.
+    pub(crate) fn new(frame: &'a Frame) -> Result<Self> {
+        let readings = frame.derived::<Readings>()?;
+        Ok(Self { depth: frame.depth()?, camera: &frame.camera, readings })
     }
 
     /// Measures the head of a person near `expected`, the centre of the head in the robot frame, m:
@@ -142,7 +161,7 @@ impl<'a> Surface<'a> {
     /// Returns true if the image could have readings above a head.
     fn shows_top(&self, head: &Point3<f64>) -> bool {
         let above = head + Vector3::new(0.0, 0.0, HALF_HEAD_M + BORDER_M);
-        self.camera.project(&above).is_some_and(|at| at.y >= self.readings.y)
+        self.camera.project(&above).is_some_and(|at| at.y >= self.readings.0.y)
     }
 
     /// Returns true if the image could have readings on both sides of a head.
@@ -151,7 +170,7 @@ impl<'a> Surface<'a> {
         let half_px =
             (HALF_HEAD_M + BORDER_M) * self.camera.focal_px() / self.camera.depth_of(&head);
         self.camera.project(&head).is_some_and(|at| {
-            at.x - half_px >= self.readings.x && at.x + half_px <= self.readings.right()
+            at.x - half_px >= self.readings.0.x && at.x + half_px <= self.readings.0.right()
         })
     }
 }
@@ -283,7 +302,8 @@ mod tests {
     }
 
     fn measured(expected: Point3<f64>, depth: &DepthImage) -> Option<Point3<f64>> {
-        Surface::new(depth, &camera()).head(&expected)
+        let readings = Arc::new(Readings::new(depth));
+        Surface { depth, camera: &camera(), readings }.head(&expected)
     }
 
     #[test]

@@ -98,8 +98,7 @@ impl MetricImage {
         let scale = rows.scale() as f64;
         let mut view = Self { camera, scale, columns, geometry: Vec::new() };
         let up = view.camera.robot_from_camera.rotation.inverse() * Vector3::z();
-        let cell = |i: usize| (i % columns * 2, i / columns * 2);
-        let cells = (0..columns * lines).map(cell);
+        let cells = (0..columns * lines).map(|i| (i % columns * 2, i / columns * 2));
         view.geometry = cells.map(|(x, y)| view.geometry_of(x as f64, y as f64, &up)).collect();
         view
     }

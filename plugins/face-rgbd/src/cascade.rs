@@ -149,12 +149,11 @@ impl Cascade {
         }
         match trees.flat_map(|tree| tree.iter().enumerate().map(move |n| (n, tree.len()))).find(
             |((at, node), nodes)| {
-                let ends = |next: &Next| match next {
+                !node.next.iter().all(|next| match next {
                     // A target behind its node cannot form a loop.
                     Next::Node(to) => to > at && to < nodes,
                     Next::Leaf(value) => value.is_finite(),
-                };
-                !node.next.iter().all(ends) || !self.is_asked(node)
+                }) || !self.is_asked(node)
             },
         ) {
             Some(_) => Err("one of its trees is broken".into()),

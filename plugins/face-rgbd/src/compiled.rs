@@ -129,14 +129,11 @@ impl Compiled {
             Feature::Tilted(parts) => {
                 WindowFeature::Haar(rectangles(parts, |part| tilted_corners(part, level)))
             }
-            Feature::Binary(part) => {
-                let at = |k: usize| {
-                    let x = part.x + k % 4 * part.width;
-                    let y = part.y + k / 4 * part.height;
-                    level.offset(x, y) as u32
-                };
-                WindowFeature::Binary(std::array::from_fn(at))
-            }
+            Feature::Binary(part) => WindowFeature::Binary(std::array::from_fn(|k: usize| {
+                let x = part.x + k % 4 * part.width;
+                let y = part.y + k / 4 * part.height;
+                level.offset(x, y) as u32
+            })),
         };
         let looks: Vec<WindowFeature> = cascade.features.iter().map(look).collect();
         let weak = |tree: &Tree| Weak::new(tree, &looks);

@@ -21,13 +21,6 @@ fn main() {
     let mut scanner = Scanner::new(&model);
     let mut windows = Vec::new();
     // OpenCV does not scan windows that extend beyond the image.
-    let is_inside = |square: &Rect| {
-        let window = window_of(square, model.coverage);
-        let is_inside = window.x.min(window.y) >= 0.0
-            && window.right() <= width as f64
-            && window.bottom() <= height as f64;
-        is_inside.then_some(None)
-    };
     for _ in 0..runs {
         // Windows are at least 64 pixels wide, and twice as wide as the upper body.
         let most = 0.5 * width.min(height) as f64;
@@ -35,8 +28,15 @@ fn main() {
         let least = model.sum_at(0.0);
         let sides = sides.take_while(|side| *side <= most);
         windows.clear();
-        let propose =
-            |grid: &Grid, wanted: &mut Vec<Wanted>| wanted.extend(grid.windows(is_inside));
+        let propose = |grid: &Grid, wanted: &mut Vec<Wanted>| {
+            wanted.extend(grid.windows(|square: &Rect| {
+                let window = window_of(square, model.coverage);
+                let is_inside = window.x.min(window.y) >= 0.0
+                    && window.right() <= width as f64
+                    && window.bottom() <= height as f64;
+                is_inside.then_some(None)
+            }))
+        };
         scanner.scan(&image, sides, least, propose, &mut windows);
         merge(&mut windows, model.coverage, 0.4, 0.4);
     }

@@ -70,8 +70,8 @@ impl Lattice {
         self.readings.clear();
         for y in rows {
             let row = if y < depth.height() { depth.row(y) } else { &[] };
-            let reading = |x: &usize| row.get(*x).copied().unwrap_or(f32::NAN);
-            self.readings.extend(self.columns.iter().map(reading));
+            self.readings
+                .extend(self.columns.iter().map(|x| row.get(*x).copied().unwrap_or(f32::NAN)));
         }
     }
 
@@ -148,8 +148,7 @@ fn median(readings: [f32; TAPS * TAPS]) -> f32 {
 /// Returns true if there are enough readings, and the median (of an even number the farther one) is
 /// neither before the range nor behind it.
 fn is_middle_within(counts: Counts) -> bool {
-    let of = |kind: u32| counts >> (kind * BITS) & ((1 << BITS) - 1);
-    let [all, before, behind] = [0, 1, 2].map(of);
+    let [all, before, behind] = [0, 1, 2].map(|kind| counts >> (kind * BITS) & ((1 << BITS) - 1));
     let middle = all / 2;
     all >= LEAST_READINGS && before <= middle && behind < all - middle
 }

@@ -41,13 +41,12 @@ impl Tree {
     }
 
     fn from_bytes(bytes: &[u8]) -> Self {
-        let short = |k: usize| u16::from_le_bytes([bytes[2 * k], bytes[2 * k + 1]]);
         let long = |k: usize| {
             let at = 6 + 4 * k;
             f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
         };
         Self {
-            numbers: [0, 1, 2].map(short),
+            numbers: [0, 1, 2].map(|k| u16::from_le_bytes([bytes[2 * k], bytes[2 * k + 1]])),
             below: [0, 1, 2].map(long),
             values: [3, 4, 5, 6].map(long),
         }

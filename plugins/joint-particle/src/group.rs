@@ -140,8 +140,8 @@ impl Group {
 
     /// Returns the heaviest row.
     pub(crate) fn best(&self) -> usize {
-        let heavier = |a: usize, b: usize| if self.weights[b] > self.weights[a] { b } else { a };
-        (1..self.rows()).fold(0, heavier)
+        (1..self.rows())
+            .fold(0, |a: usize, b: usize| if self.weights[b] > self.weights[a] { b } else { a })
     }
 
     /// Returns the weights of the particles of one person, and the particles.

@@ -109,14 +109,13 @@ impl Model {
 
 /// Returns true if every way through a tree leads forward, to nodes and features that exist.
 fn is_sound(tree: &Tree) -> bool {
-    let is_node = |(index, node): (usize, &Node)| {
-        let leads_on = |next: &usize| *next == 0 || (index < *next && *next < tree.len());
-        let numbers = [node.below, node.leaves[0], node.leaves[1]];
-        node.feature < COUNT
-            && node.next.iter().all(leads_on)
-            && numbers.iter().all(|n| n.is_finite())
-    };
-    !tree.is_empty() && tree.iter().enumerate().all(is_node)
+    !tree.is_empty()
+        && tree.iter().enumerate().all(|(index, node)| {
+            let numbers = [node.below, node.leaves[0], node.leaves[1]];
+            node.feature < COUNT
+                && node.next.iter().all(|next| *next == 0 || (index < *next && *next < tree.len()))
+                && numbers.iter().all(|n| n.is_finite())
+        })
 }
 
 /// Returns the value of the leaf that some features lead to.

@@ -196,11 +196,10 @@ fn calibrated(trial: &Trial) -> Vec<(f64, bool)> {
 fn tree(questions: &[Question]) -> Tree {
     let short = |value: f32| (value * 1e4).round() / 1e4;
     let node = |question: &Question| {
-        let way = |next: &Next| match *next {
+        let [(first, low), (second, high)] = question.next.each_ref().map(|next| match *next {
             Next::Question(index) => (index, 0.0),
             Next::Leaf(value) => (0, short(value)),
-        };
-        let [(first, low), (second, high)] = question.next.each_ref().map(way);
+        });
         Node {
             feature: question.feature,
             below: short(question.below),

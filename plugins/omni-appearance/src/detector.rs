@@ -3,14 +3,12 @@ use tagalong_config::Context;
 use tagalong_core::{
     Capabilities, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Query, Result, Track,
 };
-use tagalong_geometry::{Camera, ImageBox};
+use tagalong_geometry::{Camera, HALF_HEAD_M, ImageBox};
 
 use crate::{Blob, Config, Distance, Eyes, Geometry, Model, NAME, PanoramaGeometry};
 
 /// Model that is compiled into the program.
 const BUILT_IN: &str = include_str!("../models/omni-distance.toml");
-/// Distance from the centre of a head to its top, m.
-const HALF_HEAD_M: f64 = 0.115;
 /// Score of a person of usual height.
 const SURE: f64 = 3.0;
 /// Usual height of a head above the floor and its standard deviation, m, by which the score falls.

@@ -141,8 +141,7 @@ fn shares(expected: &Expected, run: Run, width: usize) -> bool {
 fn owner(column: usize, width: usize, inside: &[Expected]) -> usize {
     let off = |who: usize| inside[who].off(column, width).abs();
     let covering = (0..inside.len()).find(|who| inside[*who].is_near(column, width, 1.0));
-    let nearest = || (0..inside.len()).min_by(|a, b| off(*a).total_cmp(&off(*b)));
-    covering.or_else(nearest).unwrap_or(0)
+    covering.or_else(|| (0..inside.len()).min_by(|a, b| off(*a).total_cmp(&off(*b)))).unwrap_or(0)
 }
 
 #[cfg(test)]

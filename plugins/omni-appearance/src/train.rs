@@ -270,16 +270,15 @@ impl Sample {
 impl Head {
     /// Sets the standard deviations from the errors of these distances.
     fn believe(&mut self, samples: &[Sample], answers: &[Answers]) {
-        let line = |way: usize| {
-            spread(samples.iter().zip(answers).map(|(s, said)| (said[way], s.distance_m)))
-        };
         [
             self.network_sigma,
             self.printed_sigma,
             self.rich_sigma,
             self.ridge_sigma,
             self.analytic_sigma,
-        ] = std::array::from_fn(line);
+        ] = std::array::from_fn(|way: usize| {
+            spread(samples.iter().zip(answers).map(|(s, said)| (said[way], s.distance_m)))
+        });
     }
 }
 

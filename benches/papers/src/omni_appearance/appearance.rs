@@ -105,11 +105,10 @@ fn room(lab: &Lab, scene: &Scene, shipped: &[Shipped; 2]) -> Result<Room, Reprod
     let mut collectors = [collector(&shipped[0])?, collector(&shipped[1])?];
     let mut draw = Draw::new(scene, lab.jobs);
     while let Some(simulated) = draw.next_frame() {
-        let seen = |truth: &&Truth| !truth.ignore;
         let people: Vec<_> = simulated
             .truth
             .iter()
-            .filter(seen)
+            .filter(|truth| !truth.ignore)
             .map(|truth| (u64::from(truth.id), truth.head_in_robot))
             .collect();
         for collector in &mut collectors {
@@ -291,8 +290,8 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 
 fn bearings(rooms: &[Room]) -> Table {
     let row = |name: &str, eye: Eye| {
-        let off = |s: &Sample| s.bearing_error_rad().to_degrees();
-        let of_room = |room: &Room| room.of(eye).iter().map(off).collect();
+        let of_room =
+            |room: &Room| room.of(eye).iter().map(|s| s.bearing_error_rad().to_degrees()).collect();
         let draws: Vec<Vec<f64>> = rooms.iter().map(of_room).collect();
         Row::ours(name, vec![over_draws(&draws, 2)])
     };

@@ -84,9 +84,9 @@ pub(super) fn kalman(lab: &Lab) -> Result<Findings, ReproduceError> {
         contenders.extend(FILTERS.iter().map(of));
     }
     contenders.push(lab.contender(PRINTED)?);
-    let step =
-        |(name, detector, filter): &(&str, &str, &str)| contender(name, config(detector, filter));
-    contenders.extend(STEPS.iter().map(step));
+    contenders.extend(
+        STEPS.iter().map(|(name, detector, filter)| contender(name, config(detector, filter))),
+    );
     contenders.extend(lab.contenders(&BEYOND)?);
     let walks = lab.trials("walking about rooms", &scenes, &contenders, walk)?;
     let tables = DISTANCES.iter().enumerate();
@@ -117,10 +117,8 @@ fn the_person(moment: &Moment) -> Option<&Truth> {
 /// Returns the least error of the tracks that are seen in a frame, m.
 fn error_m(run: &Run, frame: usize, truth: &Truth) -> Option<f64> {
     let seen = run.reports[frame].tracks.iter().filter(|track| track.seen);
-    let off = |track: &tagalong_core::Track| {
-        (track.estimate.person.position - truth.head_in_robot).xy().norm()
-    };
-    seen.map(off).min_by(f64::total_cmp)
+    seen.map(|track| (track.estimate.person.position - truth.head_in_robot).xy().norm())
+        .min_by(f64::total_cmp)
 }
 
 fn config(detector: &str, filter: &str) -> String {

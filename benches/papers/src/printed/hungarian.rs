@@ -12,7 +12,9 @@ use tagalong_core::{Associations, Associator, Detection, Gate, Result, Track};
 /// Settings of the associator `associate-hungarian-as-printed`: those of `associate-hungarian`. The
 /// misprint is that of the cost by overlap.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+// Unknown keys are refused by the flattened struct: of its keys it leaves those in place that it
+// flattens itself, and serde would refuse them here.
+#[serde(default)]
 pub struct Config {
     /// Settings of `associate-hungarian`.
     #[serde(flatten)]
@@ -55,12 +57,10 @@ impl Associator for PrintedHungarian {
         gate: &Gate,
     ) -> Associations {
         let pairs = Pairs { tracks, detections, gate };
-        let rows = pairs.rows();
-        let columns = pairs.columns();
-        let given =
-            pairs.assigned(&rows, &columns, &self.pair_cost, self.miss_factor, |track, found| {
-                self.fit(track, found, gate)
-            });
+        let all = pairs.all();
+        let given = pairs.assigned(&all, &self.pair_cost, self.miss_factor, |track, found| {
+            self.fit(track, found, gate)
+        });
         Associations::one_to_one(given)
     }
 }

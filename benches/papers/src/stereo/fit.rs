@@ -152,8 +152,8 @@ fn fitted(
         lab.progress.begin(walks.len(), variant.name);
         let judge = |walk: &Walk| scores(walk.trial(&all, lab)?);
         let of_walks = in_order(walks, lab.jobs, judge, |_| lab.progress.step())?;
-        let of = |at: usize| Score::of_all(of_walks.iter().map(|walk| &walk[at]));
-        let scores: Vec<Score> = (0..all.len()).map(of).collect();
+        let scores: Vec<Score> =
+            (0..all.len()).map(|at| Score::of_all(of_walks.iter().map(|walk| &walk[at]))).collect();
         let best = best(&scores, step.goal);
         for (at, (keys, score)) in step.tried.iter().zip(&scores).enumerate() {
             let chosen = if at == best { ", chosen" } else { "" };
@@ -228,12 +228,11 @@ impl Walk {
             let motion = frame.motion;
             let frame = Frame::new(frame.index, frame.stamp, camera, motion, images);
             for (pipeline, run) in pipelines.iter_mut().zip(&mut runs) {
-                let failed = |error| TrialError::Step {
+                let report = pipeline.step(&frame).map_err(|error| TrialError::Step {
                     pipeline: run.pipeline.clone(),
                     seed: self.seed,
                     error,
-                };
-                let report = pipeline.step(&frame).map_err(failed)?;
+                })?;
                 run.reports.push(report);
             }
         }
@@ -251,10 +250,9 @@ fn best(scores: &[Score], goal: Goal) -> usize {
         Goal::Sightings => -mota(at),
     };
     let known = (0..scores.len()).filter(|at| loss(*at).is_finite());
-    let order = |a: &usize, b: &usize| {
-        loss(*a).total_cmp(&loss(*b)).then_with(|| mota(*b).total_cmp(&mota(*a)))
-    };
-    known.min_by(order).unwrap_or(0)
+    known
+        .min_by(|a, b| loss(*a).total_cmp(&loss(*b)).then_with(|| mota(*b).total_cmp(&mota(*a))))
+        .unwrap_or(0)
 }
 
 /// Scores the positions of the followed person, predicted ones included, and the detections of all

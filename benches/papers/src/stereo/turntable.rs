@@ -152,8 +152,7 @@ fn detector(lab: &Lab, directions: &[&str]) -> Result<Contender, ReproduceError>
 }
 
 fn of_trial(trial: Trial) -> Result<Vec<TurntableImage>, TrialError> {
-    let look = |at: usize| look(&trial, at);
-    Ok((0..trial.moments.len()).filter_map(look).collect())
+    Ok((0..trial.moments.len()).filter_map(|at| look(&trial, at)).collect())
 }
 
 fn look(trial: &Trial, at: usize) -> Option<TurntableImage> {

@@ -101,8 +101,7 @@ impl Variant {
 /// # Errors
 /// A config that is not TOML.
 pub fn table(contender: &Contender) -> Result<Table, ReproduceError> {
-    let wrong = |e: toml::de::Error| ReproduceError::Other(format!("{}: {e}", contender.name));
-    contender.config.parse().map_err(wrong)
+    contender.config.parse().map_err(|e| ReproduceError::Other(format!("{}: {e}", contender.name)))
 }
 
 /// Returns the settings of the stereo matching of a config.
@@ -111,8 +110,7 @@ pub fn table(contender: &Contender) -> Result<Table, ReproduceError> {
 /// A config that is not TOML, or has invalid settings.
 pub fn stereo_settings(contender: &Contender) -> Result<StereoSettings, ReproduceError> {
     let settings = table(contender)?.remove("stereo").unwrap_or_else(|| Table::new().into());
-    let wrong = |e: toml::de::Error| ReproduceError::Other(format!("{}: {e}", contender.name));
-    settings.try_into().map_err(wrong)
+    settings.try_into().map_err(|e| ReproduceError::Other(format!("{}: {e}", contender.name)))
 }
 
 /// Returns the contender with numbers replaced.

@@ -61,12 +61,11 @@ impl Cameras {
         let mut sights = sights.to_vec();
         let mut best = fix(&sights);
         while !best.as_ref().is_some_and(fits) && sights.len() > 2 {
-            let without = |left_out: usize| {
+            let misfit = |s: &[Sight]| fix(s).map_or(f64::INFINITY, |fix| fix.misfit_rad);
+            let ways = (0..sights.len()).map(|left_out| {
                 let others = |at: usize| (at != left_out).then_some(sights[at]);
                 (0..sights.len()).filter_map(others).collect::<Vec<Sight>>()
-            };
-            let misfit = |s: &[Sight]| fix(s).map_or(f64::INFINITY, |fix| fix.misfit_rad);
-            let ways = (0..sights.len()).map(without);
+            });
             let fittest = ways.min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
             sights = fittest.unwrap_or_default();
             best = fix(&sights);
@@ -100,20 +99,15 @@ pub fn triangulate(stations: &[Station], sights: &[Sight], sigma_rad: f64) -> Op
     }
     let (normal, _) = equations(&seen, &place);
     let covariance = normal.try_inverse()? * (sigma_rad * sigma_rad);
-    let misfit =
-        |(from, bearing): &(&Station, f64)| wrapped(bearing - from.towards(&place)).powi(2);
-    let squares: f64 = seen.iter().map(misfit).sum();
-    let ahead = |(from, bearing): &(&Station, f64)| {
-        wrapped(bearing - from.towards(&place)).abs() < std::f64::consts::FRAC_PI_2
-    };
+    let squares: f64 =
+        seen.iter().map(|(from, bearing)| wrapped(bearing - from.towards(&place)).powi(2)).sum();
     let finite = place.iter().chain(covariance.iter()).all(|v| v.is_finite());
     let misfit_rad = (squares / seen.len() as f64).sqrt();
-    (finite && seen.iter().all(ahead)).then_some(Fix {
-        place,
-        covariance,
-        misfit_rad,
-        cameras: seen.len(),
-    })
+    (finite
+        && seen.iter().all(|(from, bearing)| {
+            wrapped(bearing - from.towards(&place)).abs() < std::f64::consts::FRAC_PI_2
+        }))
+    .then_some(Fix { place, covariance, misfit_rad, cameras: seen.len() })
 }
 
 /// Where the lines of all directions come nearest to each other.

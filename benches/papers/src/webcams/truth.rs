@@ -89,8 +89,7 @@ fn at(stamp: Stamp, fixes: &[(Stamp, Fix)]) -> Option<(Point2<f64>, bool)> {
 
 /// Returns one line of JSON for each image.
 pub(super) fn lines(frames: &[TruthFrame]) -> Result<String, Failure> {
-    let line = |frame: &TruthFrame| to_json_line("the truth of an image", frame);
-    frames.iter().map(line).collect()
+    frames.iter().map(|frame| to_json_line("the truth of an image", frame)).collect()
 }
 
 #[cfg(test)]

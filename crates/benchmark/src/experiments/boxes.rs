@@ -307,8 +307,7 @@ fn shown(value: &toml::Value) -> String {
 fn contestants(args: &BoxesArgs, registry: &Registry) -> Result<Vec<Contestant>, Failure> {
     let default = [PathBuf::from(RECORDED)];
     let named = if args.configs.is_empty() { &default[..] } else { &args.configs };
-    let read = |path: &PathBuf| Contestant::new(&ConfigFile::read(path)?, args, registry);
-    named.iter().map(read).collect()
+    named.iter().map(|path| Contestant::new(&ConfigFile::read(path)?, args, registry)).collect()
 }
 
 /// Returns the number of the place of each sequence: names that agree up to the first hyphen are of

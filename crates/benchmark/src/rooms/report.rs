@@ -275,8 +275,8 @@ impl Scorer<'_> {
     }
 
     fn room(&self, setting: usize, unseen: bool, logs: &[usize]) -> Result<Figures, Failure> {
-        let of = |log: &usize| self.log(setting, unseen, *log);
-        let figures: Vec<Figures> = logs.iter().map(of).collect::<Result<_, _>>()?;
+        let figures: Vec<Figures> =
+            logs.iter().map(|log| self.log(setting, unseen, *log)).collect::<Result<_, _>>()?;
         Ok(mean(&figures))
     }
 

@@ -49,13 +49,14 @@ impl Detector for Legs {
         let legs = ends.filter(|(first, last)| within(self.leg_m, apart(first, last)));
         let legs: Vec<Point3<f64>> = legs.map(|(first, last)| center(&first, &last)).collect();
         let pairs = legs.windows(2).filter(|p| within(self.stride_m, apart(&p[0], &p[1])));
-        let detection = |pair: &[Point3<f64>]| {
-            let at = center(&pair[0], &pair[1]);
-            // Legs contain no information on a person's height.
-            let covariance = Matrix3::from_diagonal(&[0.01, 0.01, 1e3].into());
-            let position = Point3::new(at.x, at.y, 1.6);
-            Detection { image: None, position, covariance, score: 1.5, source: "legs" }
-        };
-        Ok(pairs.map(detection).collect())
+        Ok(pairs
+            .map(|pair| {
+                let at = center(&pair[0], &pair[1]);
+                // Legs contain no information on a person's height.
+                let covariance = Matrix3::from_diagonal(&[0.01, 0.01, 1e3].into());
+                let position = Point3::new(at.x, at.y, 1.6);
+                Detection { image: None, position, covariance, score: 1.5, source: "legs" }
+            })
+            .collect())
     }
 }

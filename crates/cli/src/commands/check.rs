@@ -121,8 +121,9 @@ fn told_zone(zone: &BlindZone) -> String {
 fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit, Failure> {
     check_log_path(log)?;
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
-    let missing = |why| Failure::failed(format!("`{}`: {why}", log.display()));
-    pipeline.check_sources(sources_of(&source)).map_err(missing)?;
+    pipeline
+        .check_sources(sources_of(&source))
+        .map_err(|why| Failure::failed(format!("`{}`: {why}", log.display())))?;
     let mut tried = 0;
     let mut blind_zone = None;
     while tried < FRAMES

@@ -63,10 +63,11 @@ fn card_of(file: &Path) -> PathBuf {
 fn as_json(sample: &[NamedTensor]) -> Value {
     let part = |is_input: bool| -> Map<String, Value> {
         let tensors = sample.iter().filter(|tensor| tensor.is_input == is_input);
-        let entry = |tensor: &NamedTensor| {
-            (tensor.name.to_owned(), json!({ "shape": tensor.shape, "values": tensor.values }))
-        };
-        tensors.map(entry).collect()
+        tensors
+            .map(|tensor| {
+                (tensor.name.to_owned(), json!({ "shape": tensor.shape, "values": tensor.values }))
+            })
+            .collect()
     };
     json!({ "inputs": part(true), "outputs": part(false) })
 }

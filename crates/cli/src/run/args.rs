@@ -56,7 +56,7 @@ pub struct RunArgs {
         num_args = 0..=1,
         require_equals = true,
         default_missing_value = "0",
-        value_parser = tagalong_live::parse_address
+        value_parser = tagalong_view::parse_address
     )]
     pub serve: Option<SocketAddr>,
     /// Take frames no faster than they were recorded, to watch the run with --serve.

@@ -83,8 +83,9 @@ impl Frames {
         if !reader.is_finished() {
             return Ok(None);
         }
-        let broken = |_| Failure::failed("the log reader failed; please report this with the log");
-        reader.join().map_err(broken)
+        reader
+            .join()
+            .map_err(|_| Failure::failed("the log reader failed; please report this with the log"))
     }
 }
 

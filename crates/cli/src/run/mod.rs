@@ -33,12 +33,12 @@ use tagalong_app::suggest::check_log_path;
 use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
 use tagalong_config::Registry;
-use tagalong_live::Live;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input, InputAccount};
 use tagalong_pipeline::{FrameReport, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
+use tagalong_view::Live;
 
 /// Runs a pipeline over a log, until a signal comes.
 ///
@@ -130,10 +130,11 @@ impl Job {
         let inputs = if wants_pictures { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
             .map_err(|error| refused_log(error, pipeline.config()))?;
-        let missing = |why| Failure::failed(format!("`{}`: {why}", args.log().display()));
         // A config that the program chose is for the tracks alone; no robot follows its commands.
         if is_named {
-            pipeline.check_sources(sources_of(&source)).map_err(missing)?;
+            pipeline
+                .check_sources(sources_of(&source))
+                .map_err(|why| Failure::failed(format!("`{}`: {why}", args.log().display())))?;
         }
         let resolved = outer.resolved_with(pipeline.config())?;
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };

@@ -125,8 +125,8 @@ impl Coverage {
             Example { frame: moment.index, range_m, bearing_deg, top_m: blob.top_m }
         });
         // The nearest one is the easiest to see in the picture of its frame.
-        let nearer = |a: &Example, b: &Example| a.range_m.total_cmp(&b.range_m);
-        self.example = self.example.into_iter().chain(examples).min_by(nearer);
+        self.example =
+            self.example.into_iter().chain(examples).min_by(|a, b| a.range_m.total_cmp(&b.range_m));
         missed.len()
     }
 

@@ -61,8 +61,7 @@ pub fn read(
     let set = format!("{benchmark}-train");
     let (_, map) = file(files, format!("gt/mot_challenge/seqmaps/{set}.txt"))?;
     let names = map.lines().skip(1).map(str::trim).filter(|name| !name.is_empty());
-    let one = |name| read_sequence(files, &set, tracker, name, rules);
-    names.map(one).collect()
+    names.map(|name| read_sequence(files, &set, tracker, name, rules)).collect()
 }
 
 fn read_sequence(

@@ -71,12 +71,11 @@ pub(crate) fn nearest_in_front<'a>(
     settings: &TargetSettings,
     tracks: &'a [Track],
 ) -> Option<&'a Track> {
-    let fits = |track: &&Track| {
+    nearest(tracks.iter().filter(|track| {
         track.confirmed
             && bearing_deg(track).abs() <= settings.choose_within_deg
             && distance_m(track) <= settings.choose_within_m
-    };
-    nearest(tracks.iter().filter(fits))
+    }))
 }
 
 fn nearest<'a>(tracks: impl Iterator<Item = &'a Track>) -> Option<&'a Track> {
@@ -128,8 +127,8 @@ impl Chooser {
         if !by_rule || self.chosen_s > settings.reconsider_s {
             return None;
         }
-        let is_nearer = |track: &&Track| distance_m(track) < distance_m(chosen) - NEARER_M;
-        let nearer = nearest_in_front(settings, tracks).filter(is_nearer)?;
+        let nearer = nearest_in_front(settings, tracks)
+            .filter(|track| distance_m(track) < distance_m(chosen) - NEARER_M)?;
         // A person walking past between the robot and the chosen one is nearer, too.
         let walks_past = across_mps(nearer) >= CROSSES_MPS;
         let was_overlooked = nearer.seen && distance_m(nearer) <= OVERLOOKED_M;

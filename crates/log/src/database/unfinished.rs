@@ -166,13 +166,12 @@ fn open_copy(
     let copy = folder.path().join(COPY);
     copy_file(path, &copy).map_err(|why| no_room(&why))?;
     copy_file(&beside(path, ending), &beside(&copy, ending)).map_err(|why| no_room(&why))?;
-    let failed = |why: rusqlite::Error| {
+    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let connection = Connection::open_with_flags(&copy, flags).map_err(|why| {
         NotMcap(format!(
             "a rosbag2 database that its recorder did not finish, nor can SQLite: {why}"
         ))
-    };
-    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let connection = Connection::open_with_flags(&copy, flags).map_err(failed)?;
+    })?;
     // The header is that of before the transactions in a write-ahead log.
     let tells_size = ending != "-wal";
     Ok(Opened { connection, path: copy, left_out, tells_size, _copy: Some(folder) })

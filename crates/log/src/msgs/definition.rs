@@ -128,8 +128,8 @@ impl Definition {
                 let Kind::Type(name) = &mut field.kind else { continue };
                 let near = format!("{package}/{name}");
                 let found = names.iter().find(|known| *known == name || **known == near);
-                let by_end = || names.iter().find(|known| known.ends_with(&format!("/{name}")));
-                let found = found.or_else(by_end);
+                let found = found
+                    .or_else(|| names.iter().find(|known| known.ends_with(&format!("/{name}"))));
                 *name = found.ok_or_else(|| format!("no definition of `{name}`"))?.clone();
             }
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 use tagalong_core::{ExternalDetection, ExternalDetections, Input, Sensors, Stamp};
-use tagalong_geometry::Rect;
+use tagalong_geometry::{HALF_HEAD_M, Rect};
 
 use super::{Moment, SensorReader, SensorType, is_type};
 use crate::InputSettings;
@@ -28,9 +28,6 @@ pub(super) const ENTRY: SensorType = SensorType {
     fault: |_| None,
     reader: |schema, input| Box::new(Recorded::new(schema, input)),
 };
-
-/// Height of the crown above the centre of the head, m.
-const CROWN_ABOVE_HEAD_M: f64 = 0.115;
 
 /// Names of classes that are people.
 const PEOPLE: [&str; 12] = [
@@ -289,7 +286,7 @@ fn head_of(detection: &Value, robot_from_message: &Isometry3<f64>) -> Option<Poi
     let up = pose.rotation.to_rotation_matrix().matrix().row(2).abs();
     let height = up[0] * size.x + up[1] * size.y + up[2] * size.z;
     let at = pose.translation.vector;
-    let head = Point3::new(at.x, at.y, at.z + 0.5 * height - CROWN_ABOVE_HEAD_M);
+    let head = Point3::new(at.x, at.y, at.z + 0.5 * height - HALF_HEAD_M);
     head.iter().all(|v| v.is_finite()).then_some(head)
 }
 

@@ -551,13 +551,12 @@ fn pixels(plan: &Plan, topic: &str, image: &Payload, tally: &mut Tally) -> Optio
     let limits = &plan.limits;
     let cloud = plan.scan.topics.get(topic).and_then(|topic| topic.cloud);
     let axes = cloud.map_or(CloudAxes::Optical, |camera| camera.axes);
-    let of = |image: AnyImage<'_>| match image {
+    read(plan, topic, image, tally, |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => decode_raw(&image, unit, limits),
         AnyImage::Compressed(image) => decode_compressed(&image, unit, limits),
         AnyImage::Disparity(image) => Err(ImageError::Encoding(image.image.encoding)),
         AnyImage::Cloud(cloud) => decode_cloud(&cloud, axes, limits).map(Pixels::Depth),
-    };
-    read(plan, topic, image, tally, of)
+    })
 }
 
 /// Returns true for the depth topic if its images are disparities.
@@ -594,13 +593,12 @@ fn depth_of_disparity(
 
 /// Returns the size of an image that makes a frame, from its header; a failure is counted as lost.
 fn size_without_pixels(plan: &Plan, image: &Payload, tally: &mut Tally) -> Option<(usize, usize)> {
-    let of = |image: AnyImage<'_>| match image {
+    read(plan, plan.primary(), image, tally, |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => size_of_raw(&image, &plan.limits),
         AnyImage::Compressed(image) => size_of_compressed(&image, &plan.limits),
         AnyImage::Disparity(image) => size_of_raw(&image.image, &plan.limits),
         AnyImage::Cloud(cloud) => size_of_cloud(&cloud, &plan.limits),
-    };
-    read(plan, plan.primary(), image, tally, of)
+    })
 }
 
 /// Image message of one of the types.

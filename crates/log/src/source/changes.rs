@@ -89,8 +89,7 @@ impl CameraWatch {
 
     /// Returns the static parts of the watched mounts, in their order.
     pub(super) fn mounts(&self, tf: &TfBuffer) -> Vec<Option<Isometry3<f64>>> {
-        let of = |mount: &WatchedMount| tf.static_pose(&mount.target, &mount.source);
-        self.mounts.iter().map(of).collect()
+        self.mounts.iter().map(|mount| tf.static_pose(&mount.target, &mount.source)).collect()
     }
 
     /// Compares the static parts of the mounts with those from `before`; returns true if one has

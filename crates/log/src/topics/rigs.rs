@@ -179,14 +179,13 @@ impl Rig {
     /// of the device.
     pub(super) fn is_called(&self, name: &str) -> bool {
         let wanted = name.trim_matches('/');
-        let is_below = |topic: &String| {
-            let topic = topic.trim_matches('/');
-            topic == wanted || topic.starts_with(&format!("{wanted}/"))
-        };
         let words = TopicName::of(name).device;
         let is_device = |topic: &String| !words.is_empty() && TopicName::of(topic).device == words;
         self.label.trim_matches('/') == wanted
-            || self.topics.iter().any(is_below)
+            || self.topics.iter().any(|topic| {
+                let topic = topic.trim_matches('/');
+                topic == wanted || topic.starts_with(&format!("{wanted}/"))
+            })
             || self.topics.iter().any(is_device)
     }
 

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 use tagalong_core::Stamp;
+use tagalong_geometry::HALF_HEAD_M;
 
-use super::messages::CROWN_ABOVE_HEAD_M;
 use crate::msgs::{Header, PointCloud2, PointField};
 
 /// Radii of trunk and head, m.
@@ -65,7 +65,7 @@ fn points(head_m: f64) -> Vec<Vector3<f64>> {
         z += RING_APART_M;
     }
     for part in [-0.9_f64, -0.45, 0.0, 0.45, 0.9] {
-        ring(HEAD_M * (1.0 - part * part).sqrt(), part * CROWN_ABOVE_HEAD_M);
+        ring(HEAD_M * (1.0 - part * part).sqrt(), part * HALF_HEAD_M);
     }
     out
 }
@@ -103,7 +103,7 @@ mod tests {
         let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         assert!((lowest + 1.6).abs() < 1e-9, "{lowest}");
-        assert!((highest - 0.9 * CROWN_ABOVE_HEAD_M).abs() < 1e-9, "{highest}");
+        assert!((highest - 0.9 * HALF_HEAD_M).abs() < 1e-9, "{highest}");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Point3, SMatrix, UnitQuaternion, Vector3};
 use serde::Serialize;
 use tagalong_core::{Track, WheelSpeeds};
+use tagalong_geometry::HALF_HEAD_M;
 
 use super::mcap_tracks::FrameNames;
 use super::record::{FrameRecord, probability};
@@ -20,9 +21,6 @@ pub(super) const MIN_HEADING_SPEED_MPS: f64 = 0.2;
 
 /// Width and depth of the box around a person, m.
 const PERSON_WIDTH_M: f64 = 0.6;
-
-/// Height of the crown above the centre of the head, m.
-pub(super) const CROWN_ABOVE_HEAD_M: f64 = 0.115;
 
 /// Returns the confirmed tracks in the robot frame, most certain first, as
 /// `vision_msgs/Detection3DArray` asks.
@@ -54,7 +52,7 @@ fn detection(track: &Track, header: &Header) -> Detection3D {
 /// Returns the box from the floor to the crown.
 fn standing_box(head: &Point3<f64>) -> BoundingBox3D {
     // A head far too low must not give a box of negative height.
-    let height = (head.z + CROWN_ABOVE_HEAD_M).max(0.1);
+    let height = (head.z + HALF_HEAD_M).max(0.1);
     let centre = Point3::new(head.x, head.y, 0.5 * height);
     BoundingBox3D {
         center: Pose::from(&Isometry3::from(centre)),

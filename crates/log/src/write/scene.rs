@@ -4,10 +4,10 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tagalong_core::{Stamp, Track};
-use tagalong_geometry::Lens;
+use tagalong_geometry::{HALF_HEAD_M, Lens};
 
 use super::colours::track_colour;
-use super::messages::{CROWN_ABOVE_HEAD_M, MIN_HEADING_SPEED_MPS, odom_from_person};
+use super::messages::{MIN_HEADING_SPEED_MPS, odom_from_person};
 use super::record::{BoxedPart, FrameRecord};
 use super::trails::Trails;
 use crate::msgs::{
@@ -57,7 +57,7 @@ impl Figure {
         let head = odom_from_person(record, track);
         let at = head.translation.vector;
         // A head far too low must not give a cylinder of negative height.
-        let height_m = (at.z + CROWN_ABOVE_HEAD_M).max(0.1);
+        let height_m = (at.z + HALF_HEAD_M).max(0.1);
         let upright = |z: f64| {
             Isometry3::from_parts(Vector3::new(at.x, at.y, z).into(), UnitQuaternion::identity())
         };

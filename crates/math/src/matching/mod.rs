@@ -227,10 +227,10 @@ fn number(local: &mut u32, node: u32, list: &mut Vec<u32>) {
 
 /// The heaviest edge of a group, the first of several.
 fn heaviest(edges: &[Edge], group: &[u32]) -> Option<u32> {
-    let better = |a: u32, b: u32| {
-        if edges[b as usize].weight > edges[a as usize].weight { b } else { a }
-    };
-    group.iter().copied().reduce(better)
+    group
+        .iter()
+        .copied()
+        .reduce(|a, b| if edges[b as usize].weight > edges[a as usize].weight { b } else { a })
 }
 
 /// Dense assignment of every row to a column of its own at least total cost: the columns that are

@@ -48,8 +48,7 @@ pub(super) fn read(
     let mut named = Vec::new();
     flatten(String::new(), table, &mut named);
     let leaves = leaves_of(resolved);
-    let read_one = |(key, value): (Named, Value<'_>)| tunable(key, value, &leaves);
-    named.into_iter().map(read_one).collect()
+    named.into_iter().map(|(key, value)| tunable(key, value, &leaves)).collect()
 }
 
 impl Pipeline {
@@ -102,8 +101,10 @@ pub(super) fn values_replaced(
             toml::Value::Array(items) => items.get_mut(part.parse::<usize>().ok()?),
             inner => inner.get_mut(part),
         });
-        let unknown = || ConfigError::new(format!("the config has no setting `{key}`"));
-        *place.ok_or_else(unknown)? = (*value).clone();
+        let Some(place) = place else {
+            return Err(ConfigError::new(format!("the config has no setting `{key}`")));
+        };
+        *place = (*value).clone();
     }
     toml::to_string(&root).map_err(|error| ConfigError::new(error.to_string()))
 }
@@ -224,9 +225,8 @@ fn spread(
     if !(2..=MAX_VALUES).contains(&steps) {
         return Err(at(format!("`{key}`: `steps` must be from 2 to {MAX_VALUES}, not {steps}")));
     }
-    let step = |i: usize| low + (high - low) * i as f64 / (steps - 1) as f64;
     let mut values: Vec<toml::Value> = Vec::new();
-    for value in (0..steps).map(step) {
+    for value in (0..steps).map(|i| low + (high - low) * i as f64 / (steps - 1) as f64) {
         let value = match now {
             toml::Value::Integer(_) => toml::Value::Integer(value.round() as i64),
             _ => as_now(key, toml::Value::Float(value), now).map_err(|e| at(e.message))?,

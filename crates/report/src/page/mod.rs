@@ -17,12 +17,14 @@ use crate::model::{Benchmark, Moment, Outcome, Timings};
 use crate::summary::Summary;
 use crate::view::OrderedBenchmark;
 
-/// Colours of the pages as CSS variables, for light and dark.
-pub const COLOURS: &str = include_str!("colours.css");
+/// Style that all pages have in common: colours as CSS variables, for light and dark, letters, tables.
+pub const BASE_STYLE: &str = include_str!("base.css");
 
 // Inlined, so that the page is one file.
-const STYLE: &str = concat!(include_str!("colours.css"), include_str!("page.css"));
+const STYLE: &str = concat!(include_str!("base.css"), include_str!("page.css"));
 const SCRIPT: &str = include_str!("page.js");
+
+const TITLE: &str = "Tagalong benchmark";
 
 /// Most pipelines that are told apart in one chart or image; of more the best ones are shown.
 const MOST_DRAWN: usize = 8;
@@ -39,6 +41,26 @@ struct Page<'a> {
     timings: Option<&'a Timings>,
     /// True if there are times but the machine was busy.
     timings_left_out: bool,
+}
+
+/// Returns a page with a link to its element `main` for the keyboard, which has the text `skip`.
+pub fn document(title: &str, style: &Markup, skip: &str, body: &Markup) -> Markup {
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                (style)
+            }
+            body {
+                a class="skip" href="#main" { (skip) }
+                (body)
+            }
+        }
+    }
 }
 
 /// Returns the report as one HTML page without any reference to another file.
@@ -71,38 +93,27 @@ struct Section {
 impl Page<'_> {
     fn whole(&self) -> Markup {
         let sections = self.sections();
-        html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta name="color-scheme" content="light dark";
-                    title { "Tagalong benchmark" }
-                    style { (PreEscaped(STYLE)) }
-                }
-                body {
-                    a class="skip" href="#main" { "Skip to the results" }
-                    header class="top" {
-                        h1 { "Tagalong benchmark" }
-                        p class="facts" { (self.facts()) }
-                        nav aria-label="Sections" {
-                            ul { @for s in &sections { li { a href=(format!("#{}", s.anchor)) { (s.heading) } } } }
-                        }
-                    }
-                    main id="main" tabindex="-1" {
-                        @for section in &sections {
-                            section id=(section.anchor) aria-labelledby=(format!("h-{}", section.anchor)) {
-                                h2 id=(format!("h-{}", section.anchor)) { (section.heading) }
-                                (section.body)
-                            }
-                        }
-                    }
-                    footer { p { "Made by Tagalong " (self.view.version) "." } }
-                    script { (PreEscaped(SCRIPT)) }
+        let style = html! { style { (PreEscaped(STYLE)) } };
+        let body = html! {
+            header class="top" {
+                h1 { (TITLE) }
+                p class="facts" { (self.facts()) }
+                nav aria-label="Sections" {
+                    ul { @for s in &sections { li { a href=(format!("#{}", s.anchor)) { (s.heading) } } } }
                 }
             }
-        }
+            main id="main" tabindex="-1" {
+                @for section in &sections {
+                    section id=(section.anchor) aria-labelledby=(format!("h-{}", section.anchor)) {
+                        h2 id=(format!("h-{}", section.anchor)) { (section.heading) }
+                        (section.body)
+                    }
+                }
+            }
+            footer { p { "Made by Tagalong " (self.view.version) "." } }
+            script { (PreEscaped(SCRIPT)) }
+        };
+        document(TITLE, &style, "Skip to the results", &body)
     }
 
     fn sections(&self) -> Vec<Section> {

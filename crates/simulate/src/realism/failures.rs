@@ -30,8 +30,8 @@ fn ekf() -> Contender {
 
 /// Returns the number of accepted detections in rooms without people, per image.
 fn false_alarms(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
-    let short = |scene| Scene { duration_s: 6.0, ..scene };
-    let scenes: Vec<Scene> = scenes(EMPTY, seeds).into_iter().map(short).collect();
+    let scenes: Vec<Scene> =
+        scenes(EMPTY, seeds).into_iter().map(|scene| Scene { duration_s: 6.0, ..scene }).collect();
     let count = |trial: Trial| {
         let reports = &trial.runs[0].reports;
         let believed = reports.iter().flat_map(|r| &r.candidates).filter(|c| is_believed(c));

@@ -67,8 +67,7 @@ struct Wall {
 
 pub fn checks(rig: &Rig) -> Result<Vec<Check>, TrialError> {
     let group = rig.group;
-    let seen = |range: &f64| measure(rig, *range, true);
-    let walls: Vec<Wall> = RANGES_M.iter().filter_map(seen).collect();
+    let walls: Vec<Wall> = RANGES_M.iter().filter_map(|range| measure(rig, *range, true)).collect();
     if walls.len() < RANGES_M.len() {
         return Ok(vec![Check::skipped(group, "a wall has no depth at all")]);
     }

@@ -120,19 +120,20 @@ impl Reidentifier {
             let most = self.settings.max_difference;
             difference.map_or(0.0, |difference| weight * evidence.log_ratio(difference, most))
         };
-        let row = |track: &Track| {
-            let known = self.tracks.get(&track.id);
-            seen.iter().map(|seen| ratio(known, seen)).collect()
-        };
-        Ok(tracks.iter().map(row).collect())
+        Ok(tracks
+            .iter()
+            .map(|track| {
+                let known = self.tracks.get(&track.id);
+                seen.iter().map(|seen| ratio(known, seen)).collect()
+            })
+            .collect())
     }
 
     /// Returns the appearance of a detection; `None` without a box that shows one.
     fn describe(&self, frame: &Frame, detection: &Detection) -> Result<Option<Appearance>> {
         let Some(image) = &detection.image else { return Ok(None) };
         let is_shown = image.extent == Extent::UpperBody || self.describer.takes_whole_people();
-        let describe = || self.describer.at(&image.rect, &detection.position, frame);
-        is_shown.then(describe).transpose()
+        is_shown.then(|| self.describer.at(&image.rect, &detection.position, frame)).transpose()
     }
 
     /// Takes in a jump of the clock, which ended all tracks.
@@ -171,8 +172,7 @@ impl Reidentifier {
     /// Notes new tracks, and which tracks may change over.
     fn note_rivals(&mut self, tracks: &[Track]) {
         for track in tracks {
-            let new = || Identity::new(track.id, place(track));
-            self.tracks.entry(track.id).or_insert_with(new);
+            self.tracks.entry(track.id).or_insert_with(|| Identity::new(track.id, place(track)));
         }
         for (index, a) in tracks.iter().enumerate() {
             for b in &tracks[index + 1..] {

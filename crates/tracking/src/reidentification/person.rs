@@ -67,8 +67,10 @@ impl Person {
 
     /// Returns the mean difference of appearances from those of the person.
     pub(crate) fn difference(&self, appearances: &[Appearance]) -> Option<f64> {
-        let one = |appearance| self.gallery.nearest(appearance)?.mean();
-        let all: Vec<f64> = appearances.iter().filter_map(one).collect();
+        let all: Vec<f64> = appearances
+            .iter()
+            .filter_map(|appearance| self.gallery.nearest(appearance)?.mean())
+            .collect();
         (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
     }
 

@@ -302,8 +302,7 @@ impl Witness for ApproachWatch<'_> {
         if touched(tick).is_some() {
             self.ends_s = self.ends_s.min(tick.at_s + AFTER_CONTACT_S);
         }
-        let stands = |state: ApproachState| state.speed_mps == 0.0;
-        if tick.approach.is_some_and(stands) {
+        if tick.approach.is_some_and(|state| state.speed_mps == 0.0) {
             self.ends_s = self.ends_s.min(tick.at_s + AFTER_STAND_S);
         }
         self.over |= tick.at_s >= self.ends_s;

@@ -6,9 +6,9 @@ mod text;
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 
 use self::crate_items::CrateItems;
 use crate::workspace::Workspace;
@@ -34,7 +34,7 @@ pub fn check(workspace: &Workspace, write: bool) -> Result<()> {
             fs::write(&list, items.join("\n") + "\n")?;
             continue;
         }
-        let known = fs::read_to_string(&list).unwrap_or_default();
+        let known = read_list(&list)?;
         complaints
             .extend(differences(&known, &items).map(|difference| format!("{name}:\n{difference}")));
     }
@@ -45,6 +45,17 @@ pub fn check(workspace: &Workspace, write: bool) -> Result<()> {
         "public items differ from tests/api; `cargo xtask api --write` writes them anew:\n{}",
         complaints.join("\n")
     )
+}
+
+/// Reads a list of public items.
+///
+/// # Errors
+/// A list that cannot be read: as an empty one it would report each item as added.
+fn read_list(path: &Path) -> Result<String> {
+    fs::read_to_string(path).with_context(|| {
+        let path = path.display();
+        format!("cannot read {path}; `cargo xtask api --write` writes it anew")
+    })
 }
 
 fn list(workspace: &Workspace, name: &str) -> PathBuf {
@@ -63,8 +74,6 @@ fn differences(known: &str, items: &[String]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
 
     fn write(folder: &Path, file: &str, text: &str) {
@@ -112,6 +121,16 @@ mod tests {
             "pub use other::Thing",
         ];
         assert_eq!(public(&files), expected);
+    }
+
+    #[test]
+    fn a_list_that_cannot_be_read_is_an_error_with_its_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("core.txt");
+        let error = format!("{:#}", read_list(&path).unwrap_err());
+        assert!(error.contains("core.txt") && error.contains("No such file"), "{error}");
+        fs::write(&path, "pub mod a\n").unwrap();
+        assert_eq!(read_list(&path).unwrap(), "pub mod a\n");
     }
 
     #[test]

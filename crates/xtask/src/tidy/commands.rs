@@ -44,8 +44,7 @@ fn calls(line: &str) -> Vec<Call<'_>> {
 }
 
 fn calls_of_part(part: &str) -> Vec<Call<'_>> {
-    let settings = |word: &&str| word.contains('=');
-    let all: Vec<&str> = part.split_whitespace().skip_while(settings).collect();
+    let all: Vec<&str> = part.split_whitespace().skip_while(|word| word.contains('=')).collect();
     // Redirections and pipes belong to the shell, not to the program.
     let words = all.split(|word| matches!(*word, ">" | "|")).next().unwrap_or_default();
     match words {
@@ -83,11 +82,10 @@ impl Known {
         let list = output(Command::new("cargo").arg("--list"))?;
         let cargo = list.lines().skip(1).filter_map(|line| line.split_whitespace().next());
         let members = metadata.members(workspace.root());
-        let has_program = |name: &Name| {
-            members.values().any(|package| package.name == name.package() && package.is_program())
-        };
         let cargo = cargo.chain(INSTALLED.iter().copied()).map(str::to_owned).collect();
-        let programs = Name::ALL.into_iter().filter(has_program);
+        let programs = Name::ALL.into_iter().filter(|name| {
+            members.values().any(|package| package.name == name.package() && package.is_program())
+        });
         let programs = programs.map(|name| Ok((name, Program::built(workspace, name)?)));
         Ok(Self { cargo, programs: programs.collect::<Result<_>>()? })
     }

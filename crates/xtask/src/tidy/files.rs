@@ -84,8 +84,7 @@ fn names_path(line: &str, path: &str) -> bool {
     line.match_indices(path).any(|(at, _)| {
         let before = line[..at].chars().next_back();
         let after = line[at + path.len()..].chars().next();
-        let inside = |c: char| c.is_alphanumeric() || "._-/<>}*~".contains(c);
-        !before.is_some_and(inside)
+        !before.is_some_and(|c| c.is_alphanumeric() || "._-/<>}*~".contains(c))
             && !after.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '-')
     })
 }

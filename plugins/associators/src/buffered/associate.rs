@@ -30,7 +30,7 @@ impl Buffered {
     }
 
     fn is_strong(&self, detection: &Detection) -> bool {
-        self.config.priority.is_strong(detection)
+        self.config.stages.is_strong(detection)
     }
 
     /// Returns the box at which a track is expected.
@@ -86,14 +86,13 @@ impl Associator for Buffered {
                 let detection = &detections[column];
                 let overlap = this.overlap(track, detection, reach)?;
                 let log_ratio = gate.appearance_of(row, column);
-                let overlap = this.config.appearance().similarity(overlap, log_ratio);
-                let counted = this.config.priority.weighed(overlap, detection);
+                let counted = this.config.stages.similarity(overlap, detection, log_ratio);
                 gate.admits(track, detection).then_some(counted)
             }
         };
         let mut staged = Staged::new(tracks.len(), detections.len());
         for confirmed in [true, false] {
-            let confirmed_first = this.config.priority.confirmed_first;
+            let confirmed_first = this.config.stages.confirmed_first;
             let turn = |at: usize| !confirmed_first || tracks[at].confirmed == confirmed;
             staged.assign(&staged.open(turn, strong), similarity(this.first()));
             staged.assign(&staged.open(turn, strong), similarity(this.second()));
@@ -111,7 +110,7 @@ impl Associator for Buffered {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Fusion, PrioritySettings};
+    use crate::{Fusion, StageSettings};
     use tagalong_conformance::samples::{GATE, detection_in, pairs, track_in};
 
     use super::*;
@@ -181,7 +180,8 @@ mod tests {
         let with = |fusion: Fusion| {
             let appearance = [vec![-6.0, 0.0]];
             let gate = Gate { appearance: &appearance, ..GATE };
-            let config = Config { fusion, ..Config::default() };
+            let stages = StageSettings { fusion, ..StageSettings::default() };
+            let config = Config { stages, ..Config::default() };
             let mut associator = Buffered::new(config).unwrap();
             pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
         };
@@ -194,7 +194,8 @@ mod tests {
         let with = |fusion_gate: f64| {
             let appearance = [vec![0.0, 6.0]];
             let gate = Gate { appearance: &appearance, ..GATE };
-            let config = Config { fusion_gate, ..Config::default() };
+            let stages = StageSettings { fusion_gate, ..StageSettings::default() };
+            let config = Config { stages, ..Config::default() };
             let mut associator = Buffered::new(config).unwrap();
             pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
         };
@@ -234,8 +235,8 @@ mod tests {
     fn confirmed_tracks_may_go_first() {
         let tracks = [track(1, 6.0), Track { confirmed: false, ..track(2, 0.0) }];
         let with = |confirmed_first: bool| {
-            let priority = PrioritySettings { confirmed_first, ..PrioritySettings::default() };
-            let config = Config { priority, ..Config::default() };
+            let stages = StageSettings { confirmed_first, ..StageSettings::default() };
+            let config = Config { stages, ..Config::default() };
             pairs(&answer(&config, &tracks, &[detection(0.0, 3.0)]))
         };
         assert_eq!((with(false), with(true)), (vec![(1, 0)], vec![(0, 0)]));
@@ -245,8 +246,8 @@ mod tests {
     fn overlap_may_count_by_the_score() {
         let found = [detection(0.0, 0.5), detection(2.0, 5.0)];
         let with = |weigh_by_score: bool| {
-            let priority = PrioritySettings { weigh_by_score, ..PrioritySettings::default() };
-            let config = Config { priority, ..Config::default() };
+            let stages = StageSettings { weigh_by_score, ..StageSettings::default() };
+            let config = Config { stages, ..Config::default() };
             pairs(&answer(&config, &[track(1, 0.0)], &found))
         };
         assert_eq!((with(false), with(true)), (vec![(0, 0)], vec![(0, 1)]));
@@ -254,17 +255,17 @@ mod tests {
 
     #[test]
     fn settings_that_cannot_work_are_refused() {
-        let undefined =
-            PrioritySettings { strong_log_odds: f64::NAN, ..PrioritySettings::default() };
+        let undefined = StageSettings { strong_log_odds: f64::NAN, ..StageSettings::default() };
+        let negative = StageSettings { fusion_gate: -0.1, ..StageSettings::default() };
         for config in [
             Config { buffer: -0.1, ..Config::default() },
             Config { min_overlap: 0.0, ..Config::default() },
             Config { second_buffer: f64::NAN, ..Config::default() },
             Config { second_overlap: 3.0, ..Config::default() },
             Config { motion_frames: 0, ..Config::default() },
-            Config { priority: undefined, ..Config::default() },
+            Config { stages: undefined, ..Config::default() },
             Config { weak_overlap: 0.0, ..Config::default() },
-            Config { fusion_gate: -0.1, ..Config::default() },
+            Config { stages: negative, ..Config::default() },
         ] {
             assert!(Buffered::new(config.clone()).is_err(), "{config:?}");
         }

@@ -1,4 +1,4 @@
-use crate::{AppearanceFusion, Fusion, PrioritySettings};
+use crate::StageSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -38,17 +38,9 @@ pub struct Config {
     /// 1 weak detections are not used.
     #[schemars(range(min = 1e-6, max = 2.0))]
     pub weak_overlap: f64,
-    /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
-    /// place (`sum`), or the better of both counts (`minimum`).
-    pub fusion: Fusion,
-    /// `minimum`: the appearance counts for pairs whose places are at least so similar: the
-    /// overlap of the boxes, enlarged as in their stage.
-    /// BoT-SORT has 0.5.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub fusion_gate: f64,
-    /// Order of detections and tracks.
+    /// Order of detections and tracks, and the part of the appearance.
     #[serde(flatten)]
-    pub priority: PrioritySettings,
+    pub stages: StageSettings,
 }
 
 impl Default for Config {
@@ -61,16 +53,7 @@ impl Default for Config {
             motion: Motion::Observed,
             motion_frames: 5,
             weak_overlap: 0.5,
-            fusion: Fusion::Minimum,
-            fusion_gate: 0.0,
-            priority: PrioritySettings::default(),
+            stages: StageSettings::default(),
         }
-    }
-}
-
-impl Config {
-    /// Returns the part of the appearance.
-    pub(crate) fn appearance(&self) -> AppearanceFusion {
-        AppearanceFusion { fusion: self.fusion, gate: self.fusion_gate }
     }
 }

@@ -38,19 +38,17 @@ impl Associator for Hungarian {
     ) -> Associations {
         let pair_cost = self.config.pair_cost();
         let pairs = Pairs { tracks, detections, gate };
-        let rows = pairs.rows();
-        let columns = pairs.columns();
-        let given =
-            pairs.assigned(&rows, &columns, &pair_cost, self.config.miss_factor, |track, found| {
-                self.fit(track, found, gate)
-            });
+        let miss_factor = self.config.miss_factor;
+        let given = pairs.assigned(&pairs.all(), &pair_cost, miss_factor, |track, found| {
+            self.fit(track, found, gate)
+        });
         Associations::one_to_one(given)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::{Cost, Fusion};
+    use crate::{Cost, Fusion, GateSettings};
     use tagalong_conformance::samples::{
         GATE, detection_at, detection_in, pairs, track_at, track_in, with_variance,
     };
@@ -97,7 +95,8 @@ mod tests {
         let seen = [1.0, 4.0].map(|x| detection_in(boxed(x)));
         let looks = [vec![-3.0, 6.0], vec![-3.0, -3.0]];
         let given = |fusion: Fusion, fusion_gate: f64| {
-            let config = Config { cost: Cost::Overlap, fusion, fusion_gate, ..Config::default() };
+            let gating = GateSettings { fusion, fusion_gate, ..GateSettings::default() };
+            let config = Config { cost: Cost::Overlap, gating, ..Config::default() };
             let gate = Gate { appearance: &looks, ..GATE };
             pairs(&Hungarian::new(config).unwrap().associate(&tracks, &seen, &gate))
         };
@@ -108,14 +107,19 @@ mod tests {
 
     #[test]
     fn settings_that_cannot_work_are_refused() {
-        for config in [
-            Config { gate: 0.0, ..Config::default() },
-            Config { gate_m: f64::NAN, ..Config::default() },
-            Config { gate_speed_mps: -1.0, ..Config::default() },
+        let mut wrong = vec![
             Config { min_overlap: 1.1, ..Config::default() },
             Config { miss_factor: f64::INFINITY, ..Config::default() },
-            Config { fusion_gate: 1.1, ..Config::default() },
+        ];
+        for gating in [
+            GateSettings { gate: 0.0, ..GateSettings::default() },
+            GateSettings { gate_m: f64::NAN, ..GateSettings::default() },
+            GateSettings { gate_speed_mps: -1.0, ..GateSettings::default() },
+            GateSettings { fusion_gate: 1.1, ..GateSettings::default() },
         ] {
+            wrong.push(Config { gating, ..Config::default() });
+        }
+        for config in wrong {
             assert!(Hungarian::new(config.clone()).is_err(), "{config:?}");
         }
     }

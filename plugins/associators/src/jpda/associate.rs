@@ -67,7 +67,7 @@ impl Jpda {
 
 impl Associator for Jpda {
     fn fits(&self, track: &Track, detection: &Detection, gate: &Gate) -> bool {
-        self.config.pair_cost().fit(track, detection, gate.dt_s).is_some()
+        self.config.gating.pair_cost().fit(track, detection, gate.dt_s).is_some()
     }
 
     fn associate(
@@ -76,11 +76,10 @@ impl Associator for Jpda {
         detections: &[Detection],
         gate: &Gate,
     ) -> Associations {
-        let pair_cost = self.config.pair_cost();
+        let pair_cost = self.config.gating.pair_cost();
         let pairs = Pairs { tracks, detections, gate };
-        let fits = pairs.fits(&pairs.rows(), &pairs.columns(), &pair_cost, |track, found| {
-            pair_cost.fit(track, found, gate.dt_s)
-        });
+        let fits = pairs
+            .fits(&pairs.all(), &pair_cost, |track, found| pair_cost.fit(track, found, gate.dt_s));
         let ratio = |fit: Option<Fit>| fit.map_or(0.0, |fit| self.likelihood_ratio(&fit));
         let ratios: Vec<Vec<f64>> =
             fits.into_iter().map(|row| row.into_iter().map(ratio).collect()).collect();
@@ -92,7 +91,7 @@ impl Associator for Jpda {
 
 #[cfg(test)]
 mod tests {
-    use crate::Fusion;
+    use crate::{Fusion, GateSettings};
     use tagalong_conformance::samples::{GATE, detection_at, track_at};
 
     use super::*;
@@ -139,7 +138,8 @@ mod tests {
     fn an_appearance_may_help_a_pair_and_not_harm_the_other() {
         let tracks = [track(1, -0.2), track(2, 0.2)];
         let weights = |looks: [f64; 2]| {
-            let config = Config { fusion: Fusion::Minimum, ..Config::default() };
+            let gating = GateSettings { fusion: Fusion::Minimum, ..GateSettings::default() };
+            let config = Config { gating, ..Config::default() };
             let looks = looks.map(|look| vec![look]);
             let gate = Gate { appearance: &looks, ..GATE };
             let answer = Jpda::new(config).unwrap().associate(&tracks, &[detection(0.0)], &gate);
@@ -170,10 +170,11 @@ mod tests {
 
     #[test]
     fn settings_that_cannot_work_are_refused() {
+        let gating = GateSettings { fusion_gate: 1.5, ..GateSettings::default() };
         for config in [
             Config { detection_probability: 1.0, ..Config::default() },
             Config { clutter_per_m3: 0.0, ..Config::default() },
-            Config { fusion_gate: 1.5, ..Config::default() },
+            Config { gating, ..Config::default() },
             Config { max_detections: 17, ..Config::default() },
         ] {
             assert!(Jpda::new(config.clone()).is_err(), "{config:?}");

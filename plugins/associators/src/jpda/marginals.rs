@@ -16,8 +16,9 @@ pub(crate) fn marginals(likelihoods: &[Vec<f64>], detections: usize) -> Vec<Vec<
         let events = (0..=full).filter(|set| set & bit == 0).map(|set| used[set] * free(set));
         likelihoods[track][detection] * events.sum::<f64>() / total
     };
-    let row = |track| (0..detections).map(|detection| weight(track, detection)).collect();
-    (0..likelihoods.len()).map(row).collect()
+    (0..likelihoods.len())
+        .map(|track| (0..detections).map(|detection| weight(track, detection)).collect())
+        .collect()
 }
 
 /// Returns, for 0, 1, ... tracks in this order, the sum of the weights of all events of these

@@ -33,7 +33,7 @@ impl ObservationCentric {
 
     /// Returns the overlap of the predicted box and a detection, if it is enough.
     fn overlap(&self, track: &Track, detection: &Detection) -> Option<f64> {
-        let strong = self.config.priority.is_strong(detection);
+        let strong = self.config.stages.is_strong(detection);
         let least = if strong { self.config.min_overlap } else { self.config.weak_overlap };
         let overlap = track.estimate.region.iou(&detection.rect()?);
         (overlap >= least).then_some(overlap)
@@ -41,7 +41,7 @@ impl ObservationCentric {
 
     /// Returns the overlap of the last observation and a strong detection, if it is enough.
     fn recovered(&self, track: &Track, detection: &Detection) -> Option<f64> {
-        if !self.config.priority.is_strong(detection) {
+        if !self.config.stages.is_strong(detection) {
             return None;
         }
         let last = self.memory.last(track.id)?;
@@ -63,10 +63,10 @@ impl ObservationCentric {
         let (track, detection) = scene.pair(row, column)?;
         let overlap = self.overlap(track, detection)?;
         let log_ratio = scene.gate.appearance_of(row, column);
-        let overlap = self.config.appearance().similarity(overlap, log_ratio);
+        let similarity = self.config.stages.similarity(overlap, detection, log_ratio);
         let consistency = self.consistency(track, &detection.rect()?);
         let bonus = self.config.direction_weight * probability(detection.score) * consistency;
-        Some(self.config.priority.weighed(overlap, detection) + bonus)
+        Some(similarity + bonus)
     }
 }
 
@@ -92,9 +92,9 @@ impl Associator for ObservationCentric {
     ) -> Associations {
         self.memory.begin(tracks, gate.dt_s);
         let scene = Scene { tracks, detections, gate };
-        let priority = self.config.priority;
-        let strong = |at: usize| priority.is_strong(&detections[at]);
-        let early = |at: usize| tracks[at].confirmed || !priority.confirmed_first;
+        let stages = self.config.stages;
+        let strong = |at: usize| stages.is_strong(&detections[at]);
+        let early = |at: usize| tracks[at].confirmed || !stages.confirmed_first;
         let by_prediction = |row, column| self.similarity(&scene, row, column);
         let mut staged = Staged::new(tracks.len(), detections.len());
         staged.assign(&staged.open(early, strong), by_prediction);
@@ -116,7 +116,7 @@ impl Associator for ObservationCentric {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Fusion, PrioritySettings};
+    use crate::{Fusion, StageSettings};
     use tagalong_conformance::samples::{GATE, detection_in, pairs, track_in};
 
     use super::*;
@@ -160,9 +160,8 @@ mod tests {
     fn the_direction_counts_by_the_certainty_of_the_detection() {
         let ahead = |score: f64| [detection(at(14.0, 6.0), 3.0), detection(at(21.0, 0.0), score)];
         let with = |score: f64| {
-            let priority =
-                PrioritySettings { strong_log_odds: -9.0, ..PrioritySettings::default() };
-            let config = Config { priority, direction_weight: 0.35, ..Config::default() };
+            let stages = StageSettings { strong_log_odds: -9.0, ..StageSettings::default() };
+            let config = Config { stages, direction_weight: 0.35, ..Config::default() };
             let track = [track_in(1, at(16.0, 0.0))];
             pairs(&walking(config).associate(&track, &ahead(score), &GATE))
         };
@@ -171,8 +170,8 @@ mod tests {
 
     #[test]
     fn a_tentative_track_gets_what_the_confirmed_ones_leave() {
-        let priority = PrioritySettings { confirmed_first: true, ..PrioritySettings::default() };
-        let config = Config { priority, ..Config::default() };
+        let stages = StageSettings { confirmed_first: true, ..StageSettings::default() };
+        let config = Config { stages, ..Config::default() };
         let tentative = Track { confirmed: false, ..track_in(1, at(0.0, 0.0)) };
         let mut associator = associator(config);
         let found = [detection(at(1.0, 0.0), 3.0)];
@@ -235,8 +234,8 @@ mod tests {
             [track_in(1, at(6.0, 0.0)), Track { confirmed: false, ..track_in(2, at(0.0, 0.0)) }];
         let found = [detection(at(0.0, 0.0), 3.0)];
         let answer = |confirmed_first: bool| {
-            let priority = PrioritySettings { confirmed_first, ..PrioritySettings::default() };
-            let config = Config { priority, ..Config::default() };
+            let stages = StageSettings { confirmed_first, ..StageSettings::default() };
+            let config = Config { stages, ..Config::default() };
             pairs(&associator(config).associate(&tracks, &found, &GATE))
         };
         assert_eq!((answer(false), answer(true)), (vec![(1, 0)], vec![(0, 0)]));
@@ -246,8 +245,8 @@ mod tests {
     fn overlap_may_count_by_the_score() {
         let found = [detection(at(0.0, 0.0), 0.5), detection(at(2.0, 0.0), 5.0)];
         let answer = |weigh_by_score: bool| {
-            let priority = PrioritySettings { weigh_by_score, ..PrioritySettings::default() };
-            let config = Config { priority, ..Config::default() };
+            let stages = StageSettings { weigh_by_score, ..StageSettings::default() };
+            let config = Config { stages, ..Config::default() };
             pairs(&associator(config).associate(&[track_in(1, at(0.0, 0.0))], &found, &GATE))
         };
         assert_eq!((answer(false), answer(true)), (vec![(0, 0)], vec![(0, 1)]));
@@ -270,7 +269,8 @@ mod tests {
         let found = [detection(at(0.0, 0.0), 3.0), detection(at(5.0, 0.0), 3.0)];
         let appearance = [vec![-4.0, 0.0]];
         let answer = |fusion: Fusion| {
-            let mut associator = associator(Config { fusion, ..Config::default() });
+            let stages = StageSettings { fusion, ..StageSettings::default() };
+            let mut associator = associator(Config { stages, ..Config::default() });
             let gate = Gate { appearance: &appearance, ..GATE };
             pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, &gate))
         };
@@ -279,17 +279,17 @@ mod tests {
 
     #[test]
     fn settings_that_cannot_work_are_refused() {
-        let undefined =
-            PrioritySettings { strong_log_odds: f64::NAN, ..PrioritySettings::default() };
+        let undefined = StageSettings { strong_log_odds: f64::NAN, ..StageSettings::default() };
+        let beyond = StageSettings { fusion_gate: 2.0, ..StageSettings::default() };
         for config in [
             Config { min_overlap: 0.0, ..Config::default() },
             Config { direction_weight: -0.1, ..Config::default() },
             Config { direction_frames: 0, ..Config::default() },
             Config { recovery_overlap: f64::NAN, ..Config::default() },
             Config { recovery_buffer: -0.1, ..Config::default() },
-            Config { priority: undefined, ..Config::default() },
+            Config { stages: undefined, ..Config::default() },
             Config { weak_overlap: 3.0, ..Config::default() },
-            Config { fusion_gate: 2.0, ..Config::default() },
+            Config { stages: beyond, ..Config::default() },
         ] {
             assert!(ObservationCentric::new(config.clone()).is_err(), "{config:?}");
         }

@@ -40,16 +40,15 @@ impl TwoStage {
         strong: bool,
         given: &mut [Option<usize>],
     ) {
-        let rows: Vec<usize> = (0..tracks.len()).filter(|i| given[*i].is_none()).collect();
-        let columns: Vec<usize> =
-            (0..detections.len()).filter(|i| self.is_strong(&detections[*i]) == strong).collect();
-        let pair_cost = self.config.pairs.pair_cost();
         let pairs = Pairs { tracks, detections, gate };
+        let mut stage = pairs.all();
+        stage.rows.retain(|row| given[*row].is_none());
+        stage.columns.retain(|column| self.is_strong(&detections[*column]) == strong);
+        let pair_cost = self.config.pairs.pair_cost();
         let miss_factor = self.config.pairs.miss_factor;
-        let assigned = pairs.assigned(&rows, &columns, &pair_cost, miss_factor, |track, found| {
-            self.fit(track, found, gate)
-        });
-        for (row, detection) in rows.into_iter().zip(assigned) {
+        let assigned = pairs
+            .assigned(&stage, &pair_cost, miss_factor, |track, found| self.fit(track, found, gate));
+        for (row, detection) in stage.rows.into_iter().zip(assigned) {
             given[row] = detection;
         }
     }
@@ -81,7 +80,7 @@ mod tests {
     use tagalong_conformance::samples::{GATE, detection_at, pairs, track_at};
 
     use super::*;
-    use crate::{Fusion, hungarian};
+    use crate::{Fusion, GateSettings, hungarian};
 
     fn detection(y: f64, score: f64) -> Detection {
         Detection { score, ..detection_at(3.0, y) }
@@ -126,11 +125,9 @@ mod tests {
         let found = [detection(0.13, 3.0), detection(0.07, 3.0)];
         let looks = [vec![4.0, -4.0], vec![-4.0, 4.0]];
         let given = |appearance, fusion_gate: f64| {
-            let settings = hungarian::Config {
-                fusion: Fusion::Minimum,
-                fusion_gate,
-                ..hungarian::Config::default()
-            };
+            let fusion = Fusion::Minimum;
+            let gating = GateSettings { fusion, fusion_gate, ..GateSettings::default() };
+            let settings = hungarian::Config { gating, ..hungarian::Config::default() };
             let config = Config { pairs: settings, ..Config::default() };
             let gate = Gate { appearance, ..GATE };
             pairs(&TwoStage::new(config).unwrap().associate(&tracks, &found, &gate))
@@ -142,7 +139,8 @@ mod tests {
 
     #[test]
     fn settings_that_cannot_work_are_refused() {
-        let settings = hungarian::Config { gate: 0.0, ..hungarian::Config::default() };
+        let gating = GateSettings { gate: 0.0, ..GateSettings::default() };
+        let settings = hungarian::Config { gating, ..hungarian::Config::default() };
         for config in [
             Config { weak_gate: 1.5, ..Config::default() },
             Config { strong_log_odds: f64::NAN, ..Config::default() },

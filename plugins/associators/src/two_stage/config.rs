@@ -5,7 +5,9 @@ use crate::hungarian;
 
 /// Settings of the associator `associate-two-stage`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+// Unknown keys are refused by the flattened struct: of its keys it leaves those in place that it
+// flattens itself, and serde would refuse them here.
+#[serde(default)]
 pub struct Config {
     /// The settings of `associate-hungarian`.
     #[serde(flatten)]

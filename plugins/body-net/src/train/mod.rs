@@ -105,8 +105,8 @@ impl NetTrainer {
         let mut said = Vec::new();
         let mut pass = Pass::default();
         for fold in 0..folds {
-            let is_out = |k: &usize| parts.get(&self.examples[*k].group) == Some(&fold);
-            let (out, rest): (Vec<usize>, _) = (0..self.examples.len()).partition(is_out);
+            let (out, rest): (Vec<usize>, _) = (0..self.examples.len())
+                .partition(|k| parts.get(&self.examples[*k].group) == Some(&fold));
             let net =
                 self.network(&rest, &mut |part| progress((fold as f64 + part) / folds as f64))?;
             let look = |k: usize, pass: &mut Pass| f64::from(net.look(&self.views[k], pass));

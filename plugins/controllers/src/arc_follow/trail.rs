@@ -24,8 +24,7 @@ impl Trail {
         }
         self.points.iter_mut().for_each(|point| *point = motion.apply_to_point(*point));
         // Points closer together would be the noise of a standing person.
-        let is_new = |last: &Point2<f64>| distance(last, &place) >= APART_M;
-        if self.points.back().is_none_or(is_new) {
+        if self.points.back().is_none_or(|last| distance(last, &place) >= APART_M) {
             self.points.push_back(place);
         }
         self.points.retain(|point| point.iter().all(|v| v.is_finite()));

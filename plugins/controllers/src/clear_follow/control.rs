@@ -31,9 +31,10 @@ impl Controller for ClearFollow {
         self.history.age(dt);
         self.look(scene);
         let twist = self.steer(scene, dt);
-        let wheels = |twist| scene.wheels.wheels_within(twist, scene.max_speed_mps);
         // A drive with impossible dimensions has no wheel speeds, not even at rest.
-        self.history.add(twist.map_or(WheelSpeeds::STOP, wheels));
+        self.history.add(twist.map_or(WheelSpeeds::STOP, |twist| {
+            scene.wheels.wheels_within(twist, scene.max_speed_mps)
+        }));
         twist.unwrap_or_else(|| {
             self.speed_mps = 0.0;
             Twist::STOP

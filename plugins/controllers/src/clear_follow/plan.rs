@@ -100,15 +100,18 @@ fn hidden(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
         |walker: &Walker| pose.inverse_transform_point(&walker.after(config.horizon_s)).coords;
     let person = seen(&around.person);
     let Some(sight) = person.try_normalize(1e-6) else { return 0.0 };
-    let before = |other: &Walker| {
-        let at = seen(other);
-        let along = at.dot(&sight);
-        let aside = at.perp(&sight).abs();
-        // A person behind the target, or behind the robot, hides nothing.
-        let between = along > 0.0 && along < person.norm() - PERSON_M;
-        if between { (1.0 - aside / SIGHT_M).max(0.0) } else { 0.0 }
-    };
-    around.others.iter().map(before).fold(0.0, f64::max)
+    around
+        .others
+        .iter()
+        .map(|other| {
+            let at = seen(other);
+            let along = at.dot(&sight);
+            let aside = at.perp(&sight).abs();
+            // A person behind the target, or behind the robot, hides nothing.
+            let between = along > 0.0 && along < person.norm() - PERSON_M;
+            if between { (1.0 - aside / SIGHT_M).max(0.0) } else { 0.0 }
+        })
+        .fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -128,12 +128,11 @@ fn degrade(depth: &mut DepthImage, draws: &mut Draws) {
     let height = depth.height();
     if draws.chance(0.3) {
         let share = draws.between(0.0, 0.4);
-        let lost = |metres: &mut f32| {
+        depth.pixels_mut().iter_mut().for_each(|metres| {
             if draws.chance(share) {
                 *metres = f32::NAN
             }
-        };
-        depth.pixels_mut().iter_mut().for_each(lost);
+        });
     }
     if draws.chance(0.3) {
         for _ in 0..1 + draws.below(5) {

@@ -49,8 +49,8 @@ impl Targets {
         let surfaces = surfaces_m2(people, camera, depth);
         let mut cells = vec![Target::Empty; FloorMap::CELLS * FloorMap::CELLS];
         // People to be found are written last, because they may stand beside ignored ones.
-        let has_to = |k: &usize| people[*k].counts && surfaces[*k] > SURFACE_M2;
-        let (found, ignored): (Vec<usize>, Vec<usize>) = (0..people.len()).partition(has_to);
+        let (found, ignored): (Vec<usize>, Vec<usize>) =
+            (0..people.len()).partition(|k| people[*k].counts && surfaces[*k] > SURFACE_M2);
         for k in ignored {
             around(&people[k], &mut cells, |_, m| (m < IGNORED_M).then_some(Target::Any));
         }
@@ -73,8 +73,7 @@ impl Targets {
     #[cfg(test)]
     pub(super) fn places(&self) -> Vec<[f64; 2]> {
         let side = FloorMap::CELLS;
-        let is_person = |k: &usize| matches!(self.cells[*k], Target::Person(_));
-        let people = (0..side * side).filter(is_person);
+        let people = (0..side * side).filter(|k| matches!(self.cells[*k], Target::Person(_)));
         people.map(|k| [(k / side) as f64, (k % side) as f64]).collect()
     }
 

@@ -53,8 +53,10 @@ impl Filter for ImageKalman {
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
-        let estimate = |(id, models): (&TrackId, &Models)| Some((*id, models.estimate(camera)?));
-        self.states.iter().filter_map(estimate).collect()
+        self.states
+            .iter()
+            .filter_map(|(id, models)| Some((*id, models.estimate(camera)?)))
+            .collect()
     }
 
     fn stop(&mut self, id: TrackId) {

@@ -41,12 +41,16 @@ impl Models {
     /// Initialises the models, all alike probable, from the first detection.
     pub(crate) fn start(configs: &[Config], seen: &Detection, camera: &Camera) -> Self {
         let weight = 1.0 / configs.len() as f64;
-        let one = |config: &Config| {
-            let state = State::start(config, seen, camera);
-            let gap = config.reupdate.then(|| Gap::new(&state, seen));
-            Model { state, weight, gap }
-        };
-        Self(configs.iter().map(one).collect())
+        Self(
+            configs
+                .iter()
+                .map(|config| {
+                    let state = State::start(config, seen, camera);
+                    let gap = config.reupdate.then(|| Gap::new(&state, seen));
+                    Model { state, weight, gap }
+                })
+                .collect(),
+        )
     }
 
     /// Predicts all models, after each has taken over the states of the others by the probability

@@ -200,8 +200,8 @@ impl Table {
     /// Returns a note on suites that a pipeline solves, which are too easy.
     fn perfection(&self) -> String {
         // Prints as 1.000.
-        let perfect = |row: &&Row| row.mota.is_some_and(|mota| mota.estimate >= 0.9995);
-        let named = self.rows.iter().filter(perfect);
+        let named =
+            self.rows.iter().filter(|row| row.mota.is_some_and(|mota| mota.estimate >= 0.9995));
         let all: Vec<String> =
             named.map(|row| format!("{} on {}", row.pipeline, row.suite)).collect();
         if all.is_empty() {

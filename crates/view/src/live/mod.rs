@@ -15,17 +15,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use crate::page::html::Heading;
 use nalgebra::Isometry2;
 use tagalong_app::remedies::Remedies;
 use tagalong_config::Registry;
 use tagalong_core::Frame;
-use tagalong_page::html::Heading;
 use tagalong_pipeline::FrameReport;
 use tagalong_serve::{Access, Server};
 use toml::Table;
 
-use crate::newest::Newest;
-use crate::site::Page;
+use crate::live::newest::Newest;
+use crate::live::site::Page;
 
 /// Time after the end for which browsers are told of it.
 const FAREWELL: Duration = Duration::from_millis(400);

@@ -4,6 +4,10 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::page::data::{FrameData, TestData};
+use crate::page::events::Watch;
+use crate::page::frame::{add_trails, frame_data, scan_points, tests, view_edges};
+use crate::page::moment::Moment;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::{Isometry2, Point3};
@@ -11,10 +15,6 @@ use serde::Serialize;
 use tagalong_app::remedies::Remedies;
 use tagalong_core::{Frame, Images, Stamp};
 use tagalong_geometry::Camera;
-use tagalong_page::data::{FrameData, TestData};
-use tagalong_page::events::Watch;
-use tagalong_page::frame::{add_trails, frame_data, scan_points, tests, view_edges};
-use tagalong_page::moment::Moment;
 use tagalong_pipeline::FrameReport;
 use tagalong_render::{background, jpeg};
 use toml::Table;
@@ -184,13 +184,12 @@ impl Newest {
     }
 
     fn wait_for(&self, after: u64) -> (Option<Arc<Shot>>, Vec<LiveEvent>, Option<String>) {
-        let is_old = |state: &mut State| {
-            let newest = state.shot.as_ref().map_or(0, |shot| shot.seq);
-            newest <= after && state.ended.is_none()
-        };
         let mut state = self.lock();
         state.asked = Some(Instant::now());
-        let waited = self.changed.wait_timeout_while(state, WAIT, is_old);
+        let waited = self.changed.wait_timeout_while(state, WAIT, |state: &mut State| {
+            let newest = state.shot.as_ref().map_or(0, |shot| shot.seq);
+            newest <= after && state.ended.is_none()
+        });
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         state.farewells += usize::from(state.ended.is_some());
         let shot = state.shot.clone().filter(|shot| shot.seq > after);

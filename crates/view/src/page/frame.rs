@@ -8,8 +8,8 @@ use tagalong_app::remedies::Remedies;
 use tagalong_geometry::{Camera, Rect};
 use toml::Table;
 
-use crate::data::{CandidateData, DriveData, DroppedData, FrameData, TestData, TrackData};
-use crate::moment::{Moment, TrackState};
+use crate::page::data::{CandidateData, DriveData, DroppedData, FrameData, TestData, TrackData};
+use crate::page::moment::{Moment, TrackState};
 
 /// Points kept of a laser scan.
 const SCAN_POINTS: usize = 240;

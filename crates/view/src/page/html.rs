@@ -1,11 +1,11 @@
 //! HTML of the page: its frame, with data, and with style and script inlined or beside it.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 use tagalong_core::TrackId;
 use tagalong_log::write::{TRACK_COLOURS, track_colour};
-use tagalong_report::COLOURS;
+use tagalong_report::{BASE_STYLE, document};
 
-use crate::data::PageData;
+use crate::page::data::PageData;
 
 // Inlined, so that the page is one file.
 const STYLE: &str = concat!(include_str!("page.css"), "\n");
@@ -58,7 +58,7 @@ pub fn live_html(heading: &Heading, data: &PageData) -> serde_json::Result<Strin
 
 /// Returns the style of [`live_html`].
 pub fn style() -> String {
-    let mut text = [COLOURS, STYLE].concat();
+    let mut text = [BASE_STYLE, STYLE].concat();
     for id in 0..TRACK_COLOURS {
         text += &format!(".c{id} {{ --c: {}; }}\n", hex(track_colour(TrackId(id))));
     }
@@ -82,32 +82,21 @@ fn whole(
 ) -> serde_json::Result<String> {
     let json = script_safe(&serde_json::to_string(data)?);
     let names: Vec<&str> = data.runs.iter().map(|run| run.name.as_str()).collect();
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { (format!("{} - Tagalong", heading.log)) }
-                (style)
-            }
-            body {
-                a class="skip" href="#main" { "Skip to the images" }
-                (top(heading))
-                main id="main" tabindex="-1" {
-                    noscript { p { "This page needs JavaScript, which is inside it." } }
-                    @if data.live { p id="alive" class="alive" role="status" { "Waiting for the first frame." } }
-                    (stage(&names))
-                    (time_line(names.len()))
-                    (answers(&names))
-                }
-                footer { p { "Made by Tagalong " (env!("CARGO_PKG_VERSION")) "." } }
-                script type="application/json" id="data" { (PreEscaped(json)) }
-                (scripts)
-            }
+    let body = html! {
+        (top(heading))
+        main id="main" tabindex="-1" {
+            noscript { p { "This page needs JavaScript, which is inside it." } }
+            @if data.live { p id="alive" class="alive" role="status" { "Waiting for the first frame." } }
+            (stage(&names))
+            (time_line(names.len()))
+            (answers(&names))
         }
+        footer { p { "Made by Tagalong " (env!("CARGO_PKG_VERSION")) "." } }
+        script type="application/json" id="data" { (PreEscaped(json)) }
+        (scripts)
     };
+    let title = format!("{} - Tagalong", heading.log);
+    let page = document(&title, style, "Skip to the images", &body);
     Ok(page.into_string())
 }
 
@@ -244,7 +233,7 @@ fn columns(id: &str, names: &[&str]) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::{CandidateData, FrameData, RunData, TestData};
+    use crate::page::data::{CandidateData, FrameData, RunData, TestData};
 
     const HOSTILE: &str = "</script><img src=x onerror=alert(1)>&\u{2028}\"'";
 
@@ -298,7 +287,7 @@ mod tests {
             let colour = hex(track_colour(TrackId(id)));
             assert!(page.contains(&format!(".c{id} {{ --c: {colour}; }}")), "{id}");
             // Plans of a report have the same.
-            assert!(COLOURS.contains(&format!("--t{id}: {colour};")), "{id}");
+            assert!(BASE_STYLE.contains(&format!("--t{id}: {colour};")), "{id}");
         }
     }
 

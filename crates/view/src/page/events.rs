@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::data::EventData;
-use crate::moment::Moment;
+use crate::page::data::EventData;
+use crate::page::moment::Moment;
 
 /// Time without evidence from which on a person counts as lost, s.
 const LOST_AFTER_S: f64 = 0.5;
@@ -140,7 +140,7 @@ mod tests {
     use tagalong_app::frame_notes::DriveNote;
 
     use super::*;
-    use crate::moment::TrackState;
+    use crate::page::moment::TrackState;
 
     fn moment(tracks: &[(u32, bool)]) -> Moment {
         let state = |&(id, seen): &(u32, bool)| TrackState {

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use tagalong_page::data::{PageData, RunData};
-use tagalong_page::html::{Heading, live_html, scripts, style};
+use crate::page::data::{PageData, RunData};
+use crate::page::html::{Heading, live_html, scripts, style};
 use tagalong_serve::{Request, Response, Site};
 
-use crate::newest::Newest;
+use crate::live::newest::Newest;
 
 /// The page and what it asks for.
 pub struct Page {
