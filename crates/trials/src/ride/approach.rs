@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use tagalong_core::Reason;
 use tagalong_pipeline::FrameReport;
-use tagalong_sim::{ApproachBy, ApproachInView, ApproachState, Event, Scene, ScheduledFault};
+use tagalong_sim::{ApproachBy, ApproachInView, Event, Scene, ScheduledFault};
 
 use super::{Ride, Tick, Witness};
 use crate::SimulatedFrame;
