@@ -321,6 +321,8 @@ impl Witness for ApproachWatch<'_> {
 mod tests {
     use tagalong_sim::{ApproachSettings, Clearance};
 
+    use tagalong_sim::ApproachState;
+
     use super::*;
 
     const GAPS_M: [f64; 6] = [3.0, 1.5, 0.8, 0.3, -0.01, -0.02];
