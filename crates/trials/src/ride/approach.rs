@@ -319,9 +319,7 @@ impl Witness for ApproachWatch<'_> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_sim::{ApproachSettings, Clearance};
-
-    use tagalong_sim::ApproachState;
+    use tagalong_sim::{ApproachSettings, ApproachState, Clearance};
 
     use super::*;
 
