@@ -1,7 +1,8 @@
 //! Prints how long the frames of a log take with each config that is named, in milliseconds of
 //! processor time, on one thread and without reading: median, 95 % and 99 % of the frames are
 //! faster, the slowest frame by the median, its index and its longest stage. Each frame counts with
-//! the least time of several runs, because other programs only ever make one longer.
+//! the least time of five runs, because other programs only ever make one longer, or, after
+//! `--once`, with the time of one run.
 //!
 //! ```sh
 //! cargo run --release -p tagalong-benches --example time_frames -- LOG configs/depth-ekf.toml
@@ -21,14 +22,19 @@ const RUNS: usize = 5;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut paths = std::env::args().skip(1);
-    let log = paths.next().ok_or("expected: LOG CONFIG...")?;
+    let mut log = paths.next().ok_or("expected: [--once] LOG CONFIG...")?;
+    let is_once = log == "--once";
+    if is_once {
+        log = paths.next().ok_or("expected: --once LOG CONFIG...")?;
+    }
+    let runs = if is_once { 1 } else { RUNS };
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
     println!("| config | log | p50 [ms] | p95 | p99 | slowest | slowest / p50 | frame | stage |");
     println!("|---|---|---|---|---|---|---|---|---|");
     for config in paths {
         let first = run(&log, &config, &registry)?;
-        let frames = (1..RUNS).try_fold(first, |best, _| {
+        let frames = (1..runs).try_fold(first, |best, _| {
             Ok::<_, Box<dyn Error>>(least(best, run(&log, &config, &registry)?))
         })?;
         print_row(&log, &config, &frames);

@@ -1,5 +1,5 @@
 //! Prints the time of a frame of the whole tracker with given detections, for each number of people
-//! that is named: the median, in microseconds. Everyone stands 1.1 m from the next, before a camera.
+//! that is named: the median processor time, in microseconds. Everyone stands 1.1 m from the next, before a camera.
 //!
 //! ```sh
 //! cargo run --release -p tagalong-benches --example time_tracker -- 5 20 100
@@ -7,18 +7,19 @@
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a program for developers")]
 
 use std::sync::Arc;
-use std::time::Instant;
 
+use cpu_time::ThreadTime;
 use nalgebra::{Matrix3, Point3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_benches::timing::statistic_us;
 use tagalong_config::Registry;
 use tagalong_core::{
     Capabilities, Detection, Detector, EgoMotion, Frame, Funnel, Images, Inputs, Query, Result,
     Stamp,
 };
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
-use tagalong_math::{RandomSource, SplitMix64, median};
+use tagalong_math::{RandomSource, SplitMix64};
 use tagalong_pipeline::Pipeline;
 
 /// Frames until all tracks are confirmed, and those that are timed.
@@ -90,7 +91,7 @@ fn median_us(people: usize) -> f64 {
         let motion = EgoMotion::at_rest(0.1);
         let images = Images::default();
         let frame = Frame::new(index, stamp, Arc::clone(&camera), motion, images);
-        let start = Instant::now();
+        let start = ThreadTime::now();
         let report = pipeline.step(&frame).expect("nothing fails");
         let us = 1e6 * start.elapsed().as_secs_f64();
         if index >= FIRST {
@@ -98,5 +99,5 @@ fn median_us(people: usize) -> f64 {
             times.push(us);
         }
     }
-    median(times).expect("some were timed")
+    statistic_us(&times)
 }

@@ -2,20 +2,18 @@
 
 Usage: python benches/peers/kernels.py   (benches/peers/run.sh installs all that it needs)
 
-Ours and theirs take turns. In each round the fastest call of each counts, because other
-programs on the machine only ever make one longer; the ratio is the median over the rounds of
-the other's time by ours, so above 1 ours is faster. The answers are compared, too: a sum of
-costs that differs from that of scipy ends the script.
+Ours and theirs take turns. A time is the median of calls in processor time of their thread, for
+each program alike (`timing.py`), and the median of the rounds; the ratio is the median over the
+rounds of the other's time by ours, so above 1 ours is faster. The answers are compared, too: a sum
+of costs that differs from that of scipy ends the script.
 """
 
 import contextlib
 import io
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
-import time
 
 import cv2
 import lap
@@ -26,14 +24,29 @@ from filterpy.kalman import KalmanFilter
 from mot17_trackeval import once, tree
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import gaussian_kde
+from timing import median_s, rows, statistic, time_once
 
 ROUNDS = 7
 SIZES = (5, 20, 100, 500)
 PAIR_SIZE, DISPARITIES = (512, 384), 64
 
 
-def built(package, example):
-    command = ["cargo", "build", "-q", "--release", "-p", package, "--example", example]
+# What the other program is written in; all but the `mcap` crate are called from Python.
+LANGUAGES = {
+    "scipy": "C++", "lap": "C++", "numpy": "C", "KCF": "C++", "MOSSE": "C++", "OpenCV": "C++",
+    "filterpy": "Python", "SORT": "Python", "ByteTrack": "Python", "TrackEval": "Python",
+    "`mcap` crate": "Rust", "ours": "Rust",
+}
+
+
+def language(peer):
+    """Returns the language of a peer by the longest name that is in it."""
+    names = [name for name in LANGUAGES if name in peer]
+    return LANGUAGES[max(names, key=len)]
+
+
+def built(example):
+    command = ["cargo", "build", "-q", "--release", "-p", "tagalong-benches", "--example", example]
     subprocess.run(command, check=True)
     folder = os.environ.get("CARGO_TARGET_DIR", "target")
     return os.path.join(folder, "release", "examples", example)
@@ -42,15 +55,6 @@ def built(package, example):
 def lines(*command):
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return [line.split() for line in done.stdout.splitlines()]
-
-
-def fastest(call, calls):
-    def once():
-        start = time.perf_counter()
-        call()
-        return time.perf_counter() - start
-
-    return min(once() for _ in range(calls))
 
 
 def mixed(count):
@@ -65,7 +69,7 @@ class Assignment:
     """Tracks to as many detections, every pair allowed."""
 
     def __init__(self):
-        self.program = built("tagalong-associators", "time_assignment")
+        self.program = built("time_assignment")
         self.costs = {n: mixed(n * n).reshape(n, n) for n in SIZES}
 
     def ours(self):
@@ -80,10 +84,9 @@ class Assignment:
 
     def theirs(self):
         for n, costs in self.costs.items():
-            calls = max(10, min(5000, 2_000_000 // n**2))
             job = f"assignment, n = {n}"
-            yield job, "scipy", fastest(lambda: linear_sum_assignment(costs), calls)
-            yield job, "lap", fastest(lambda: lap.lapjv(costs), calls)
+            yield job, "scipy", median_s(lambda: linear_sum_assignment(costs))
+            yield job, "lap", median_s(lambda: lap.lapjv(costs))
 
 
 def splitmix(index):
@@ -102,7 +105,7 @@ class Particles:
     STEP, MAP = "a frame of 625 particles", "sum of 50 kernels at 625 places"
 
     def __init__(self):
-        self.program = built("tagalong-joint-particle", "time_particles")
+        self.program = built("time_particles")
         values = splitmix(np.arange(2 * 675)).reshape(675, 2) - 0.5
         places = values * [0.6, 1.8]
         self.places, self.at = places[:50], places[50:]
@@ -119,9 +122,9 @@ class Particles:
 
     def theirs(self):
         kernels = gaussian_kde(self.places.T, weights=self.known)
-        yield self.MAP, "scipy", fastest(lambda: kernels(self.at.T), 30)
+        yield self.MAP, "scipy", median_s(lambda: kernels(self.at.T))
         self.states = np.zeros((625, 5)) + [3.0, 0.0, 1.6, 0.0, 0.0]
-        yield self.STEP, "numpy, all sampled", fastest(self.step, 300)
+        yield self.STEP, "numpy, all sampled", median_s(self.step)
 
     def step(self):
         """Predicts, weighs and resamples (systematically) particles that have no covariances."""
@@ -144,7 +147,7 @@ class Patches:
     ONE, MANY = "SVM of 100 vectors, a patch", "SVM of 100 vectors, 1000 patches"
 
     def __init__(self):
-        self.program = built("tagalong-svm-patch", "time_patches")
+        self.program = built("time_patches")
         vectors = splitmix(np.arange(1100 * 400)).reshape(1100, 400).astype(np.float32) - np.float32(0.5)
         vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
         self.support, self.patches = vectors[:100], vectors[100:]
@@ -171,8 +174,8 @@ class Patches:
     def theirs(self):
         raw = cv2.ml.STAT_MODEL_RAW_OUTPUT
         one = self.patches[:1]
-        yield self.ONE, "OpenCV", fastest(lambda: self.machine.predict(one, None, raw), 1000)
-        yield self.MANY, "OpenCV", fastest(lambda: self.machine.predict(self.patches, None, raw), 5)
+        yield self.ONE, "OpenCV", median_s(lambda: self.machine.predict(one, None, raw))
+        yield self.MANY, "OpenCV", median_s(lambda: self.machine.predict(self.patches, None, raw))
 
 
 class Filters:
@@ -181,7 +184,7 @@ class Filters:
     JOB = "Kalman filter of a person"
 
     def __init__(self):
-        self.program = built("tagalong-filters", "time_filter")
+        self.program = built("time_filter")
         moves, sees = np.eye(5), np.eye(3, 5)
         moves[0, 3] = moves[1, 4] = 0.1
         self.seen = np.array([[3.0], [0.0], [1.6]])
@@ -199,8 +202,8 @@ class Filters:
         return {self.JOB: float(us) * 1e-6}
 
     def theirs(self):
-        yield self.JOB, "OpenCV, called from Python", fastest(self.step_opencv, 3000)
-        yield self.JOB, "filterpy", fastest(self.step_filterpy, 1000)
+        yield self.JOB, "OpenCV", median_s(self.step_opencv)
+        yield self.JOB, "filterpy", median_s(self.step_filterpy)
 
     def step_opencv(self):
         self.opencv.predict()
@@ -219,7 +222,7 @@ class Trackers:
     SIZES = (5, 20, 100)
 
     def __init__(self):
-        self.program = built("tagalong-benches", "time_tracker")
+        self.program = built("time_tracker")
 
     def ours(self):
         rows = lines(self.program, *map(str, self.SIZES))
@@ -240,10 +243,8 @@ class Trackers:
             found = supervision.Detections(xyxy=boxes + random.normal(0, 1, boxes.shape),
                                            confidence=np.full(len(boxes), 0.9),
                                            class_id=np.zeros(len(boxes), int))
-            start = time.perf_counter()
-            tracker.update(found)
-            times.append(time.perf_counter() - start)
-        return statistics.median(times[frames // 2 :])
+            times.append(time_once(lambda: tracker.update(found)))
+        return statistic(times[frames // 2 :])
 
     @staticmethod
     def job(people):
@@ -260,7 +261,7 @@ class Images:
     }
 
     def __init__(self, folder):
-        self.program = built("tagalong-log", "time_images")
+        self.program = built("time_images")
         y, x = np.mgrid[:480, :640].astype(np.float64)
         random = np.random.default_rng(1)
         noise = random.normal(size=(480, 640))
@@ -289,8 +290,8 @@ class Images:
             return cv2.imdecode(data, cv2.IMREAD_UNCHANGED).astype(np.float32) * np.float32(1e-3)
 
         for job, data in depths:
-            yield job, "OpenCV", fastest(lambda: metres(data), 30)
-        yield colour[0], "OpenCV", fastest(lambda: cv2.imdecode(colour[1], cv2.IMREAD_COLOR), 30)
+            yield job, "OpenCV", median_s(lambda: metres(data))
+        yield colour[0], "OpenCV", median_s(lambda: cv2.imdecode(colour[1], cv2.IMREAD_COLOR))
 
 
 class Logs:
@@ -300,7 +301,7 @@ class Logs:
     PEERS = ("`mcap` crate", "`mcap` crate, file in memory")
 
     def __init__(self):
-        self.program = built("tagalong-log", "time_mcap")
+        self.program = built("time_mcap")
 
     def ours(self):
         rows = lines(self.program)
@@ -324,7 +325,7 @@ class Metrics:
     FRAMES, PEOPLE, NAME = 1000, 20, "MOT17-02-FRCNN"
 
     def __init__(self, folder):
-        self.program = built("tagalong-eval", "time_metrics")
+        self.program = built("time_metrics")
         mot, self.root = os.path.join(folder, "mot"), os.path.join(folder, "trackeval")
         sequence = os.path.join(mot, "gt", "MOT17-train", self.NAME)
         tracker = os.path.join(mot, "tracker-output", "MOT17-train")
@@ -354,7 +355,7 @@ class Metrics:
 
     def theirs(self):
         with contextlib.redirect_stdout(io.StringIO()):
-            seconds = min(once(self.root) for _ in range(2))
+            seconds = statistic([once(self.root) for _ in range(3)])
         yield self.JOB, "TrackEval", seconds
 
 
@@ -365,7 +366,7 @@ class Stereo:
     JOBS = {"block": "block matching", "semi-global": "semi-global matching"}
 
     def __init__(self, folder):
-        self.program = built("tagalong-stereo", "time_pair")
+        self.program = built("time_pair")
         width, height = PAIR_SIZE
         noise = np.random.default_rng(2).integers(0, 256, (height, width + 64)).astype(np.float32)
         texture = cv2.GaussianBlur(noise, (3, 3), 0)
@@ -393,11 +394,11 @@ class Stereo:
     def theirs(self):
         block, semi = (f"{job}, 512x384, 64" for job in self.JOBS.values())
         bm = cv2.StereoBM_create(DISPARITIES, 15)
-        yield block, "OpenCV BM", fastest(lambda: bm.compute(*self.pair), 10)
+        yield block, "OpenCV BM", median_s(lambda: bm.compute(*self.pair))
         sgbm = (0, DISPARITIES, 5, 200, 800, 1, 0, 10, 100, 2)
         for name, mode in (("SGBM", cv2.STEREO_SGBM_MODE_SGBM), ("3WAY", cv2.STEREO_SGBM_MODE_SGBM_3WAY)):
             matcher = cv2.StereoSGBM_create(*sgbm, mode)
-            yield semi, f"OpenCV {name}", fastest(lambda: matcher.compute(*self.pair), 3)
+            yield semi, f"OpenCV {name}", median_s(lambda: matcher.compute(*self.pair))
         for job, seconds in self.own.items():
             yield job, "ours, one thread", seconds
 
@@ -424,7 +425,7 @@ class Scenes:
         for name, job in self.NAMES.items():
             scenes = self.scenes[name]
             calls = 3000 // len(scenes)
-            yield job, "numpy and OpenCV", fastest(lambda: [self.weigh(scene) for scene in scenes], calls)
+            yield job, "numpy and OpenCV", median_s(lambda: [self.weigh(scene) for scene in scenes])
 
     def weigh(self, scene):
         boxes = []
@@ -444,7 +445,8 @@ class Scenes:
 
 
 class Appearance:
-    """One person found again in a grey image, and learnt."""
+    """One person found again in a colour image, and learnt: the same images as `time_stages`, whose grey
+    and integral images count as those of the peers do."""
 
     NAMES = {"compressive": "compressive tracking, a person and frame"}
     PEERS = {"KCF": cv2.TrackerKCF_create, "MOSSE": cv2.legacy.TrackerMOSSE_create}
@@ -465,10 +467,8 @@ class Appearance:
             tracker, times = create(), []
             tracker.init(self.images[0], (270, 170, 100, 100))
             for image in self.images[1:]:
-                start = time.perf_counter()
-                tracker.update(image)
-                times.append(time.perf_counter() - start)
-            yield job, name, statistics.median(times)
+                times.append(time_once(lambda: tracker.update(image)))
+            yield job, name, statistic(times)
 
 
 class Wheels:
@@ -480,7 +480,7 @@ class Wheels:
     SCENE, CONFIG = "configs/scenes/stereo-follow-passing.toml", "configs/stereo-ekf.toml"
 
     def __init__(self, folder, stereo):
-        self.program, self.pair = built("tagalong-benches", "time_frames"), stereo.pair
+        self.program, self.pair = built("time_frames"), stereo.pair
         self.log = os.path.join(folder, "pairs.mcap")
         simulate = ["simulate", self.SCENE, "-o", self.log, "--set", "duration_s=4"]
         subprocess.run(["cargo", "run", "-q", "--release", "--", *simulate], check=True, capture_output=True)
@@ -497,7 +497,7 @@ class Wheels:
 
     def ours(self):
         def median_ms(config):
-            return float(lines(self.program, self.log, config)[-1][5])
+            return float(lines(self.program, "--once", self.log, config)[-1][5])
 
         return {job: 1e-3 * median_ms(self.configs[method]) for method, job in self.JOBS.items()}
 
@@ -507,7 +507,7 @@ class Wheels:
         for job, matcher in zip(self.JOBS.values(), (block, semi)):
             for part, size in ((2, "half"), (1, "full")):
                 name = f"the same parts of OpenCV, templates of {size} size"
-                yield job, name, fastest(lambda: self.steer(matcher, part), 3)
+                yield job, name, median_s(lambda: self.steer(matcher, part))
 
     def steer(self, matcher, part):
         disparity = matcher.compute(*self.pair)[::part, ::part].astype(np.float32) / 16
@@ -525,7 +525,7 @@ class Stages:
     """What one call of `time_stages` times."""
 
     def __init__(self):
-        self.program = built("tagalong-benches", "time_stages")
+        self.program = built("time_stages")
         self.peers = (Scenes(), Appearance())
 
     def ours(self):
@@ -553,12 +553,11 @@ def main():
                 ours = group.ours()
                 for job, peer, seconds in group.theirs():
                     rounds.setdefault((job, peer), []).append((ours[job], seconds))
-    print("| job | peer | ours | peer's | ratio |")
-    print("|---|---|---|---|---|")
-    for (job, peer), times in rounds.items():
-        ours, theirs = (statistics.median(side) for side in zip(*times))
-        ratio = statistics.median(their / our for our, their in times)
-        print(f"| {job} | {peer} | {measured(ours)} | {measured(theirs)} | {ratio:.2f} |")
+    print("| job | peer | its language | ours | peer's | ratio |")
+    print("|---|---|---|---|---|---|")
+    for (job, peer), (ours, theirs, ratio) in rows(rounds).items():
+        times = f"{measured(ours)} | {measured(theirs)} | {ratio:.2f}"
+        print(f"| {job} | {peer} | {language(peer)} | {times} |")
 
 
 if len(sys.argv) != 1:

@@ -2,7 +2,7 @@
 
 Usage: python benches/peers/mot17_trackeval.py ../shared/data/mot
 Needs `pip install trackeval`. Prints seconds for reading and scoring with
-CLEAR, Identity and HOTA, on one core, the best of three.
+CLEAR, Identity and HOTA, on one core, the median of three in processor time.
 """
 
 import contextlib
@@ -11,9 +11,9 @@ import os
 import shutil
 import sys
 import tempfile
-import time
 
 import numpy
+from timing import statistic, time_once
 
 # TrackEval was written for numpy 1, which had these names for Python's types.
 numpy.float, numpy.int = float, int
@@ -36,7 +36,7 @@ def tree(mot, root):
 
 
 def once(root):
-    """Seconds of one evaluation."""
+    """Processor time of one evaluation, s."""
     dataset = trackeval.datasets.MotChallenge2DBox({
         **trackeval.datasets.MotChallenge2DBox.get_default_dataset_config(),
         "BENCHMARK": "MOT17", "PRINT_CONFIG": False,
@@ -51,9 +51,7 @@ def once(root):
     })
     metrics = [trackeval.metrics.HOTA(), trackeval.metrics.CLEAR({"PRINT_CONFIG": False}),
                trackeval.metrics.Identity({"PRINT_CONFIG": False})]
-    start = time.perf_counter()
-    evaluator.evaluate([dataset], metrics)
-    return time.perf_counter() - start
+    return time_once(lambda: evaluator.evaluate([dataset], metrics))
 
 
 def main(mot):
@@ -61,7 +59,7 @@ def main(mot):
         tree(mot, root)
         with contextlib.redirect_stdout(io.StringIO()):
             seconds = [once(root) for _ in range(3)]
-        print(f"TrackEval, reading and scoring: {min(seconds):.2f} s")
+        print(f"TrackEval, reading and scoring: {statistic(seconds):.2f} s")
 
 
 if __name__ == "__main__":

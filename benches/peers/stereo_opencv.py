@@ -5,17 +5,17 @@ Needs `pip install opencv-python-headless`. The pair is brought to 512x384; 64
 disparities. Ours does all that it does by default: left-right check, uniqueness,
 texture and speckle tests, holes, refinement. So does OpenCV's SGBM here, but for the
 refinement and the holes; StereoBM is timed as it comes, without left-right check and
-speckle filter, and with both ("tested"). Each time is that of the fastest of all calls,
-which take turns: other programs only ever make one longer.
+speckle filter, and with both ("tested"). Each time is the median of calls in processor time, and
+the median of rounds, in which the programs take turns (`timing.py`).
 """
 
 import os
 import subprocess
 import sys
 import tempfile
-import time
 
 import cv2
+from timing import statistic, time_once
 
 ROUNDS, RUNS, DISPARITIES, SIZE = 20, 10, 64, (512, 384)
 
@@ -35,12 +35,7 @@ def opencv():
 
 
 def opencv_ms(matcher, left, right):
-    def once():
-        start = time.perf_counter()
-        matcher.compute(left, right)
-        return 1e3 * (time.perf_counter() - start)
-
-    return min(once() for _ in range(RUNS))
+    return 1e3 * statistic([time_once(lambda: matcher.compute(left, right)) for _ in range(RUNS)])
 
 
 def ours_ms(program, method, paths):
@@ -56,7 +51,7 @@ def read(path):
 
 
 def built():
-    example = ["-q", "--release", "-p", "tagalong-stereo", "--example", "time_pair"]
+    example = ["-q", "--release", "-p", "tagalong-benches", "--example", "time_pair"]
     subprocess.run(["cargo", "build", *example], check=True)
     folder = os.environ.get("CARGO_TARGET_DIR", "target")
     return os.path.join(folder, "release", "examples", "time_pair")
@@ -66,7 +61,7 @@ def main(left, right):
     cv2.setNumThreads(1)
     program = built()
     pair = [cv2.resize(read(path), SIZE, interpolation=cv2.INTER_AREA) for path in (left, right)]
-    best = {}
+    rounds = {}
     with tempfile.TemporaryDirectory() as folder:
         paths = [os.path.join(folder, name) for name in ("left.png", "right.png")]
         for path, image in zip(paths, pair):
@@ -74,12 +69,14 @@ def main(left, right):
         for _ in range(ROUNDS):
             times = {name: opencv_ms(m, *pair) for name, m in opencv().items()}
             times |= {name: ours_ms(program, name, paths) for name in ("block", "semi-global")}
-            best = {name: min(ms, best.get(name, ms)) for name, ms in times.items()}
-    for name, ms in best.items():
+            for name, ms in times.items():
+                rounds.setdefault(name, []).append(ms)
+    medians = {name: statistic(times) for name, times in rounds.items()}
+    for name, ms in medians.items():
         print(f"{name:16} {ms:7.2f} ms")
-    print(f"StereoBM / block: {best['StereoBM'] / best['block']:.2f}")
-    print(f"StereoBM, tested / block: {best['StereoBM, tested'] / best['block']:.2f}")
-    print(f"SGBM_3WAY / semi-global: {best['SGBM_3WAY'] / best['semi-global']:.2f}")
+    print(f"StereoBM / block: {medians['StereoBM'] / medians['block']:.2f}")
+    print(f"StereoBM, tested / block: {medians['StereoBM, tested'] / medians['block']:.2f}")
+    print(f"SGBM_3WAY / semi-global: {medians['SGBM_3WAY'] / medians['semi-global']:.2f}")
 
 
 if len(sys.argv) != 3:

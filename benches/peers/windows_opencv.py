@@ -8,7 +8,7 @@ blocks, in sizes 15 % apart, and the linear machine has weights by chance in Ope
 what is found differs, the work does not. With a log of colour and depth images the
 detectors look at its frames, too, where depth allows a person; OpenCV, which cannot
 do that, looks at all windows of these frames. Times are of the processor, not of the
-clock on the wall, for one picture, and each is the least of several rounds. Prints
+clock on the wall, for one picture, and each is the median of several rounds. Prints
 rows of the table of `run.sh`.
 """
 
@@ -22,9 +22,10 @@ import time
 
 import cv2
 import numpy as np
+from timing import rows
 
 ROUNDS, RUNS, SIZE = 5, 10, (640, 480)
-LOG_ROUNDS, LOG_RUNS = 2, 4
+LOG_ROUNDS, LOG_RUNS = 3, 4
 MODELS = "configs/models/"
 # The sizes that OpenCV looks at.
 FACES = ["face-rgbd", "scale_step=1.1", "min_neighbours=3", "min_side_px=20", "max_side=1"]
@@ -81,15 +82,14 @@ def built(package, example):
 
 def compare(title, peers, ours, rounds):
     """Both take turns; `peers` and `ours` tell their time by name."""
-    best = {}
+    times = {}
     for _ in range(rounds):
-        times = {"OpenCV " + name: ms() for name, ms in peers.items()}
-        times |= {"our " + name: ms() for name, ms in ours.items()}
-        best = {name: min(ms, best.get(name, ms)) for name, ms in times.items()}
-    for name in ours:
-        own, peer = best["our " + name], best["OpenCV " + PEERS[name]]
+        theirs = {name: ms() for name, ms in peers.items()}
+        for name, ms in ours.items():
+            times.setdefault(name, []).append((ms(), theirs[PEERS[name]]))
+    for name, (own, peer, ratio) in rows(times).items():
         job = f"{JOBS[name]}, {title}"
-        print(f"| {job} | OpenCV, all windows | {own:.2f} ms | {peer:.2f} ms | {peer / own:.2f} |")
+        print(f"| {job} | OpenCV, all windows | C++ | {own:.2f} ms | {peer:.2f} ms | {ratio:.2f} |")
 
 
 def all_windows(picture, folder):

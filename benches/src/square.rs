@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{
-    DepthImage, EgoMotion, Estimate, Frame, GreyImage, Images, Person, Stamp, Track, TrackId,
+    DepthImage, EgoMotion, Estimate, Frame, GreyImage, Images, Person, RgbImage, Stamp, Track,
+    TrackId,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 
@@ -24,6 +25,20 @@ pub fn frame(camera: &Arc<Camera>, of: Rect, index: u64, face_m: f32) -> Frame {
     let depth = DepthImage::from_fn(640, 480, |x, y| if inside(x, y) { face_m } else { 6.0 });
     let images =
         Images { grey: Some(Arc::new(grey)), depth: Some(Arc::new(depth)), ..Images::default() };
+    let stamp = Stamp::default().plus_seconds(index as f64 * 0.04);
+    Frame::new(index, stamp, Arc::clone(camera), EgoMotion::at_rest(0.04), images)
+}
+
+/// Returns the colour image of the patterned square before the patterned wall, without depth.
+pub fn coloured_frame(camera: &Arc<Camera>, of: Rect, index: u64) -> Frame {
+    let colour = RgbImage::from_fn(640, 480, |x, y| {
+        let is_inside = of.contains(nalgebra::Point2::new(x as f64, y as f64));
+        let along = if is_inside { 2 * x.saturating_sub(of.x as usize) } else { x };
+        let down = if is_inside { 7 * y } else { 21 * y };
+        let least = if is_inside { 90 } else { 20 };
+        [((along * along / 64 + down) % 120 + least) as u8; 3]
+    });
+    let images = Images { colour: Some(Arc::new(colour)), ..Images::default() };
     let stamp = Stamp::default().plus_seconds(index as f64 * 0.04);
     Frame::new(index, stamp, Arc::clone(camera), EgoMotion::at_rest(0.04), images)
 }

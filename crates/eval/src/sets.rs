@@ -172,3 +172,22 @@ fn floor_distances(of: &Frame, frame: &PreparedFrame) -> Vec<Edge> {
     }
     edges
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(n: f64) -> FrameDistance {
+        let parts = GospaParts { location: 3.0 * n, missed: 4.0 * n, false_: 5.0 * n };
+        FrameDistance { ospa: n, gospa: 2.0 * n, parts }
+    }
+
+    #[test]
+    fn frames_add_up_field_by_field() {
+        let mut tally = SetTally::default();
+        tally.add(&frame(1.0));
+        tally.add(&frame(2.0));
+        let parts = GospaParts { location: 9.0, missed: 12.0, false_: 15.0 };
+        assert_eq!(tally, SetTally { ospa_sum: 3.0, gospa_sum: 6.0, parts, frames: 2 });
+    }
+}

@@ -326,6 +326,16 @@ mod tests {
         ids.iter().map(track).collect()
     }
 
+    #[test]
+    fn the_least_likely_of_too_many_detections_are_dropped() {
+        let mut set = DetectionSet::default();
+        let scored = [2.0, 0.5, 3.0].map(|score| Detection { score, ..person(2.0 + score, 0.0) });
+        set.add(scored.map(|detection| PendingDetection::new(detection, 0, true)));
+        set.limit(2);
+        let kept: Vec<f64> = set.undecided().into_iter().map(|index| set.score(index)).collect();
+        assert_eq!(kept, [2.0, 3.0]);
+    }
+
     /// Track 7 has two alternatives; track 9 shares the second one, and the third is spent.
     #[test]
     fn a_detection_goes_to_the_track_that_it_is_most_probably_of() {

@@ -156,3 +156,84 @@ impl SearchStage {
 
 /// Name of the test that the weaker of two detections of one track fails.
 const NOT_BEST: &str = "not the best sighting";
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
+    use tagalong_core::{
+        Capabilities, Detection, EgoMotion, Estimate, Images, Inputs, Person, Result, Stamp,
+        TrackId,
+    };
+    use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+
+    use super::*;
+
+    /// Finds people with these scores.
+    struct Scored(Vec<f64>);
+
+    impl Detector for Scored {
+        fn capabilities(&self) -> Capabilities {
+            Capabilities { inputs: Inputs::NONE, discovers: false, tracks: true, weighs: false }
+        }
+
+        fn detect(&mut self, _: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
+            let detection = |score: &f64| Detection {
+                image: None,
+                position: Point3::new(3.0, 0.0, 1.6),
+                covariance: Matrix3::identity() * 0.01,
+                score: *score,
+                source: "test",
+            };
+            Ok(self.0.iter().map(detection).collect())
+        }
+    }
+
+    fn slot(scores: &[f64]) -> DetectorSlot {
+        let plugin: Box<dyn Detector> = Box::new(Scored(scores.to_vec()));
+        DetectorSlot {
+            settings: DetectorSettings { roles: vec![Role::Track], ..DetectorSettings::default() },
+            plugin: Guarded::new("scored", plugin),
+        }
+    }
+
+    fn track() -> Track {
+        let person = Person { position: Point3::new(3.0, 0.0, 1.6), velocity: Vector2::zeros() };
+        let covariance = SMatrix::identity();
+        Track {
+            id: TrackId(1),
+            estimate: Estimate { person, covariance, region: Rect::default() },
+            seen: true,
+            occluded: false,
+            confirmed: true,
+            age: 1,
+            unseen_s: 0.0,
+            score: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_track_gets_the_best_detection_that_passes_and_the_rest_say_why_not() {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
+        let motion = EgoMotion::at_rest(0.1);
+        let frame = Frame::new(1, Stamp::default(), camera, motion, Images::default());
+        let mut stage = SearchStage {
+            detectors: vec![slot(&[1.0, 3.0]), slot(&[2.0, 9.0])],
+            verifiers: Vec::new(),
+            requires_box: false,
+            shared: None,
+        };
+        let too_sure =
+            |found: &PendingDetection| Ok((found.detection.score > 8.0).then_some("sure"));
+        let (best, dropped) =
+            stage.find_track(&frame, &[0, 1], &track(), too_sure, &mut Funnel::default()).unwrap();
+        assert_eq!(best.unwrap().detection.score, 3.0);
+        let dropped: Vec<(f64, Option<Fate>)> =
+            dropped.into_iter().map(|one| (one.detection.score, one.fate)).collect();
+        let not_best = Some(Fate::Dropped(NOT_BEST));
+        assert_eq!(dropped, [(1.0, not_best), (2.0, not_best), (9.0, Some(Fate::Dropped("sure")))]);
+    }
+}

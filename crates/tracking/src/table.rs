@@ -149,6 +149,16 @@ mod tests {
     }
 
     #[test]
+    fn tentative_tracks_are_those_that_are_not_confirmed() {
+        let mut table = TrackTable::default();
+        for confirmed in [false, true, false] {
+            let id = table.next_id().unwrap();
+            table.start(id, TrackHealth { confirmed, ..HEALTH }, 0);
+        }
+        assert_eq!(table.tentative_ids(), [TrackId(1), TrackId(3)]);
+    }
+
+    #[test]
     fn the_lowest_scores_are_too_many_and_of_equals_the_youngest() {
         let mut table = TrackTable::default();
         for log_odds in [1.0, 3.0, 1.0, 2.0] {

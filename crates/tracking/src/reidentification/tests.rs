@@ -217,3 +217,15 @@ fn the_evidence_of_the_appearance_is_that_of_the_settings() {
     assert!(same[0][0] > 4.0 && same[1][1] > 4.0, "{same:?}");
     assert_eq!([same[0][1], same[1][0]], [0.0; 2], "other clothes say nothing");
 }
+
+#[test]
+fn the_nearer_person_covers_the_farther_one() {
+    let near = track(1, 0.0, 1.6);
+    let mut far = track(2, 0.0, 1.6);
+    far.estimate.person.position.x = 4.0;
+    assert!(covers(&near, &far) && !covers(&far, &near));
+    let same = Track { id: TrackId(1), ..far.clone() };
+    assert!(!covers(&near, &same), "nobody covers themselves");
+    far.estimate.region.x += 2.0 * far.estimate.region.width;
+    assert!(!covers(&near, &far), "beside each other in the image");
+}

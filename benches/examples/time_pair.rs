@@ -1,15 +1,15 @@
-//! Matches a pair of image files several times and prints the time of the fastest run, ms, and
-//! the least processor time of the thread that asks, which does its share of the work and all that is
-//! not shared. Used by `benches/peers/stereo_opencv.py` and `benches/peers/kernels.py`.
+//! Matches a pair of image files several times and prints the median processor time of a
+//! run, ms, of all threads and of the thread that asks, which does its share of the work and all that
+//! is not shared. Used by `benches/peers/stereo_opencv.py` and `benches/peers/kernels.py`.
 //!
-//! `cargo run --release -p tagalong-stereo --example time_pair METHOD LEFT RIGHT DISPARITIES RUNS THREADS`
+//! `cargo run --release -p tagalong-benches --example time_pair METHOD LEFT RIGHT DISPARITIES RUNS THREADS`
 
 #![allow(clippy::print_stdout, reason = "its output is what it is for")]
 
 use std::error::Error;
-use std::time::{Duration, Instant};
 
-use cpu_time::ThreadTime;
+use cpu_time::{ProcessTime, ThreadTime};
+use tagalong_benches::timing::statistic_us;
 use tagalong_core::GreyImage;
 use tagalong_stereo::{Matcher, Method, StereoSettings};
 
@@ -36,15 +36,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let threads = threads.parse()?;
     let settings = StereoSettings { method, threads, ..StereoSettings::default() };
     let mut matcher = Matcher::new(settings)?;
-    let mut best = Duration::MAX;
-    let mut own = Duration::MAX;
+    let mut all = Vec::new();
+    let mut own = Vec::new();
     for _ in 0..runs {
-        let start = Instant::now();
+        let start = ProcessTime::now();
         let own_start = ThreadTime::now();
         matcher.disparities(&left, &right, disparities.saturating_sub(1))?;
-        best = best.min(start.elapsed());
-        own = own.min(own_start.elapsed());
+        all.push(1e3 * start.elapsed().as_secs_f64());
+        own.push(1e3 * own_start.elapsed().as_secs_f64());
     }
-    println!("{:.3} {:.3}", best.as_secs_f64() * 1e3, own.as_secs_f64() * 1e3);
+    println!("{:.3} {:.3}", statistic_us(&all), statistic_us(&own));
     Ok(())
 }

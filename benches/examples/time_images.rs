@@ -1,22 +1,18 @@
 //! Prints the time of decoding each of some compressed images as a log has them, PNG or JPEG: the
-//! fastest of some calls, in milliseconds. `benches/peers/kernels.py` compares it with OpenCV.
+//! median of some calls, in milliseconds. `benches/peers/kernels.py` compares it with OpenCV.
 //!
 //! ```text
-//! cargo run --release -p tagalong-log --example time_images -- depth.png colour.jpg
+//! cargo run --release -p tagalong-benches --example time_images -- depth.png colour.jpg
 //! ```
 #![allow(clippy::print_stdout, reason = "an example answers on the terminal")]
 
 use std::error::Error;
-use std::hint::black_box;
-use std::time::Instant;
 
+use tagalong_benches::timing::median_us;
 use tagalong_core::Stamp;
 use tagalong_log::Limits;
 use tagalong_log::images::decode_compressed;
 use tagalong_log::msgs::{CompressedImage, Header};
-
-/// Calls, of which the fastest counts.
-const CALLS: usize = 30;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let limits = Limits::default();
@@ -24,13 +20,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let data = std::fs::read(&path)?;
         let header = Header::new(Stamp::default(), "camera");
         let image = CompressedImage { header, format: String::new(), data: &data };
-        let mut best = f64::INFINITY;
-        for _ in 0..CALLS {
-            let start = Instant::now();
-            black_box(decode_compressed(&image, None, &limits)?);
-            best = best.min(1e3 * start.elapsed().as_secs_f64());
-        }
-        println!("{best:.4}");
+        decode_compressed(&image, None, &limits)?;
+        let us = median_us(|| decode_compressed(&image, None, &limits).is_ok());
+        println!("{:.4}", 1e-3 * us);
     }
     Ok(())
 }

@@ -1,24 +1,25 @@
 //! Prints the time of reading all messages of an MCAP file, without compression and with each: ours,
 //! that of the `mcap` crate, which reads the whole file into memory first, and that of the crate with
-//! the file in memory already: the fastest of calls that take turns, in milliseconds. The file has a
+//! the file in memory already: the median of calls that take turns, in milliseconds. The file has a
 //! hundred depth images of 640x480. `benches/peers/kernels.py` shows the ratios.
 //!
 //! ```sh
-//! cargo run --release -p tagalong-log --example time_mcap
+//! cargo run --release -p tagalong-benches --example time_mcap
 //! ```
 #![allow(clippy::print_stdout, reason = "an example answers on the terminal")]
 
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::Path;
-use std::time::Instant;
 
+use cpu_time::ThreadTime;
 use mcap::records::MessageHeader;
 use mcap::{Compression, MessageStream, WriteOptions};
+use tagalong_benches::timing::statistic_us;
 use tagalong_log::{Limits, LogWalker};
 use tagalong_math::{RandomSource, SplitMix64};
 
-/// Calls, of which the fastest counts.
+/// Calls, of which the median counts.
 const CALLS: usize = 9;
 const IMAGES: u32 = 100;
 const FORMS: [(&str, Option<Compression>); 3] =
@@ -30,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let path = folder.path().join(name).with_extension("mcap");
         write(&path, compression)?;
         let bytes = std::fs::read(&path)?;
-        let mut best = [f64::INFINITY; 3];
+        let mut times = [const { Vec::new() }; 3];
         for _ in 0..CALLS {
             let (ours, ours_ms) = timed(|| sum_of_ours(&path))?;
             let (read, read_ms) = timed(|| sum_of_theirs(&std::fs::read(&path)?))?;
@@ -38,16 +39,18 @@ fn main() -> Result<(), Box<dyn Error>> {
             if ours != read || ours != held {
                 return Err(format!("{name}: {ours:?} instead of {held:?}").into());
             }
-            let times = best.iter_mut().zip([ours_ms, read_ms, held_ms]);
-            times.for_each(|(best, ms)| *best = best.min(ms));
+            for (times, ms) in times.iter_mut().zip([ours_ms, read_ms, held_ms]) {
+                times.push(ms);
+            }
         }
-        println!("{name} {:.3} {:.3} {:.3}", best[0], best[1], best[2]);
+        let [ours_ms, read_ms, held_ms] = times.map(|times| statistic_us(&times));
+        println!("{name} {ours_ms:.3} {read_ms:.3} {held_ms:.3}");
     }
     Ok(())
 }
 
 fn timed<T>(call: impl Fn() -> Result<T, Box<dyn Error>>) -> Result<(T, f64), Box<dyn Error>> {
-    let start = Instant::now();
+    let start = ThreadTime::now();
     let answer = call()?;
     Ok((answer, 1e3 * start.elapsed().as_secs_f64()))
 }

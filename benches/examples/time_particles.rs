@@ -4,15 +4,15 @@
 //! `benches/peers/kernels.py` compares both with numpy and scipy.
 //!
 //! ```sh
-//! cargo run --release -p tagalong-joint-particle --example time_particles
+//! cargo run --release -p tagalong-benches --example time_particles
 //! ```
 #![allow(clippy::print_stdout, reason = "an example answers on the terminal")]
 
 use std::hint::black_box;
 use std::sync::Arc;
-use std::time::Instant;
 
 use nalgebra::{Matrix3, Point3};
+use tagalong_benches::timing::median_us;
 use tagalong_core::{
     Detection, EgoMotion, Evidence, Filter, Frame, Images, Likelihood, Person, Result, Stamp,
     TrackId,
@@ -20,8 +20,6 @@ use tagalong_core::{
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_joint_particle::{Config, JointParticle, LikelihoodMap, Method, PositionPair};
 use tagalong_math::number_at;
-
-const CALLS: usize = 300;
 
 fn main() -> Result<()> {
     println!("step {:.3}", step()?);
@@ -40,7 +38,7 @@ impl Likelihood for Wide {
     }
 }
 
-/// Returns the time of the fastest frame: prediction, weighing, resampling where it is due, and the
+/// Returns the median time of a frame, us: prediction, weighing, resampling where it is due, and the
 /// estimate.
 fn step() -> Result<f64> {
     let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
@@ -59,30 +57,20 @@ fn step() -> Result<f64> {
     filter.start(TrackId(1), &first, &camera);
     let likelihood: Option<&dyn Likelihood> = Some(&Wide);
     let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
-    let mut best = f64::INFINITY;
-    for _ in 0..CALLS {
-        let start = Instant::now();
+    filter.update(&evidence)?;
+    Ok(median_us(|| {
         filter.predict(&motion, &camera);
-        black_box(filter.update(&evidence)?);
-        black_box(filter.estimates(&camera));
-        best = best.min(1e6 * start.elapsed().as_secs_f64());
-    }
-    Ok(best)
+        black_box(filter.update(&evidence).is_ok());
+        filter.estimates(&camera)
+    }))
 }
 
-/// Returns the time of the fastest call, and the sum of what was found.
+/// Returns the median time of a call, us, and the sum of what was found.
 fn look_up() -> (f64, f64) {
     let known = (0..50).map(|k| 0.5 + uniform(2000 + k)).collect();
     let map = LikelihoodMap::new(Method::Kde, places(0, 50), known, &Config::default());
     let at = places(50, 625);
-    let mut best = f64::INFINITY;
-    let mut found = Vec::new();
-    for _ in 0..CALLS {
-        let start = Instant::now();
-        found = black_box(map.at_all(&at));
-        best = best.min(1e6 * start.elapsed().as_secs_f64());
-    }
-    (best, found.iter().sum())
+    (median_us(|| map.at_all(&at)), map.at_all(&at).iter().sum())
 }
 
 /// Returns places of two people within the reach of the filter's table.

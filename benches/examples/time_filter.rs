@@ -1,25 +1,21 @@
-//! Prints the time of a prediction and an update of one person, in microseconds: the fastest of many
-//! rounds of a thousand. `benches/peers/kernels.py` compares it with OpenCV's and filterpy's filters.
+//! Prints the time of a prediction and an update of one person, in microseconds: the median of
+//! many. `benches/peers/kernels.py` compares it with OpenCV's and filterpy's filters.
 //!
 //! ```sh
-//! cargo run --release -p tagalong-filters --example time_filter
+//! cargo run --release -p tagalong-benches --example time_filter
 //! ```
 #![allow(clippy::print_stdout, reason = "an example answers on the terminal")]
 
-use std::hint::black_box;
 use std::sync::Arc;
-use std::time::Instant;
 
 use nalgebra::{Matrix3, Point3};
+use tagalong_benches::timing::median_us;
 use tagalong_core::{
     Detection, EgoMotion, Evidence, Filter, Frame, Images, Matched, PerPerson, Result, Stamp,
     TrackId,
 };
 use tagalong_filters::ekf::{Config, Ekf};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
-
-const ROUNDS: usize = 100;
-const CALLS: usize = 1000;
 
 fn main() -> Result<()> {
     let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
@@ -37,15 +33,11 @@ fn main() -> Result<()> {
     filter.start(TrackId(1), &seen, &camera);
     let matched = [Matched::certain(TrackId(1), &seen)];
     let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
-    let mut best = f64::INFINITY;
-    for _ in 0..ROUNDS {
-        let start = Instant::now();
-        for _ in 0..CALLS {
-            filter.predict(&motion, &camera);
-            black_box(filter.update(&evidence)?);
-        }
-        best = best.min(1e6 * start.elapsed().as_secs_f64() / CALLS as f64);
-    }
-    println!("{best:.4}");
+    filter.update(&evidence)?;
+    let us = median_us(|| {
+        filter.predict(&motion, &camera);
+        filter.update(&evidence).is_ok()
+    });
+    println!("{us:.4}");
     Ok(())
 }

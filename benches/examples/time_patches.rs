@@ -3,19 +3,16 @@
 //! `benches/peers/kernels.py` compares them with OpenCV's machine.
 //!
 //! ```sh
-//! cargo run --release -p tagalong-svm-patch --example time_patches -- 100 1000
+//! cargo run --release -p tagalong-benches --example time_patches -- 100 1000
 //! ```
 #![allow(clippy::print_stdout, reason = "an example answers on the terminal")]
 
-use std::hint::black_box;
-use std::time::Instant;
-
+use tagalong_benches::timing::median_us;
 use tagalong_math::number_at;
 use tagalong_svm_patch::{Model, PIXELS, Patch, Sampler, Scaling};
 
 /// Width of the kernel: vectors have length 1.
 const GAMMA: f64 = 0.5;
-const CALLS: usize = 30;
 
 fn main() -> Result<(), std::num::ParseIntError> {
     let mut counts = std::env::args().skip(1).map(|text| text.parse());
@@ -26,9 +23,8 @@ fn main() -> Result<(), std::num::ParseIntError> {
     let sampler = Sampler { grow: 0.0, scaling: Scaling::Unit };
     let model = Model::new(sampler, GAMMA, 0.0, support.iter().zip(weights));
     let patches = patches_from(vectors, patches);
-    let all = || patches.iter().map(|patch| model.decision(patch)).sum();
-    let (us, sum) = fastest(all);
-    println!("{:.3} {sum:.6}", us / patches.len() as f64);
+    let all = || patches.iter().map(|patch| model.decision(patch)).sum::<f64>();
+    println!("{:.3} {:.6}", median_us(all) / patches.len() as f64, all());
     Ok(())
 }
 
@@ -44,16 +40,4 @@ fn patches_from(first: usize, count: usize) -> Vec<Patch> {
         patch
     };
     (first..first + count).map(patch).collect()
-}
-
-/// Returns the time of the fastest call, us, and its answer.
-fn fastest(call: impl Fn() -> f64) -> (f64, f64) {
-    let timed = |_| {
-        let start = Instant::now();
-        let answer = black_box(call());
-        (1e6 * start.elapsed().as_secs_f64(), answer)
-    };
-    (0..CALLS)
-        .map(timed)
-        .fold((f64::INFINITY, 0.0), |best, now| if now.0 < best.0 { now } else { best })
 }
