@@ -40,11 +40,10 @@ fn camera() -> Arc<Camera> {
 
 /// Returns the depth of an empty room: the floor, and a wall 6 m away.
 fn empty_room(camera: &Camera) -> DepthImage {
-    let seen = |_: usize, y: usize| {
+    DepthImage::from_fn(camera.width, camera.height, |_: usize, y: usize| {
         let below = (y as f64 - 59.5) / 80.0;
         if below > 0.0 { (1.2 / below).min(6.0) as f32 } else { 6.0 }
-    };
-    DepthImage::from_fn(camera.width, camera.height, seen)
+    })
 }
 
 #[test]

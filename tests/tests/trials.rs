@@ -71,8 +71,8 @@ fn camera_and_laser_together_lose_fewer_people_than_each_alone() {
     let scenes: Vec<Scene> =
         [1, 2].map(|seed| Scene::parse_with(&text, &variant(seed)).unwrap()).into();
     let all = judged(&["depth-laser", "depth-ekf", "laser-follow"], &scenes, 2);
-    let idf1 = |at: usize| Tally::combine(all.iter().map(|t| &t[at])).scores().idf1.unwrap_or(0.0);
-    let [both, camera, laser] = [0, 1, 2].map(idf1);
+    let [both, camera, laser] =
+        [0, 1, 2].map(|at| Tally::combine(all.iter().map(|t| &t[at])).scores().idf1.unwrap_or(0.0));
     assert!(both > camera.max(laser) + 0.05, "{both} {camera} {laser}");
 }
 

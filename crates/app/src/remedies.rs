@@ -310,8 +310,8 @@ mod tests {
     }
 
     fn keys(text: &str) -> impl Iterator<Item = String> {
-        let bare = |line: &str| Some(line.trim_start_matches("# ").split_once(" =")?.0.to_owned());
-        text.lines().filter_map(bare)
+        text.lines()
+            .filter_map(|line| Some(line.trim_start_matches("# ").split_once(" =")?.0.to_owned()))
     }
 
     #[test]

@@ -29,12 +29,12 @@ impl Images {
     /// stereo pair is its copy beside it.
     pub fn taken_by(self, camera: &Arc<Camera>) -> Sensors {
         let Self { colour, grey, depth, right } = self;
-        let taken = |sensors: Sensors| match right {
+        let sensors = with_image(Sensors::default(), colour, camera);
+        let sensors = with_image(with_image(sensors, grey, camera), depth, camera);
+        match right {
             Some(image) => sensors.with(CameraImage { camera: beside(camera, &image), image }),
             None => sensors,
-        };
-        let sensors = with_image(Sensors::default(), colour, camera);
-        taken(with_image(with_image(sensors, grey, camera), depth, camera))
+        }
     }
 }
 

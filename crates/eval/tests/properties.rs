@@ -107,15 +107,15 @@ fn tally(sequence: &Sequence, similarity: Similarity) -> Tally {
 /// apart: two in one place cannot be told apart.
 fn with_perfect_tracker(mut sequence: Sequence) -> Sequence {
     for frame in &mut sequence.frames {
-        let report =
-            |t: &Truth| Report { id: 100 - t.id, region: t.region, floor_m: t.floor_m, score: 1.0 };
         for truth in &mut frame.truths {
             let apart = truth.id as f64;
             truth.region = truth.region.map(|r| Region { y: r.y + 100.0 * apart, ..r });
             truth.floor_m = truth.floor_m.map(|[x, y]| [x, y + 10.0 * apart]);
         }
         let counts = frame.truths.iter().filter(|t| t.role == Role::Counts);
-        frame.reports = counts.map(report).collect();
+        frame.reports = counts
+            .map(|t| Report { id: 100 - t.id, region: t.region, floor_m: t.floor_m, score: 1.0 })
+            .collect();
     }
     sequence
 }

@@ -327,13 +327,12 @@ mod tests {
                 Some(at) if timed[at].1 == Enable::Reset => at + 1..timed.len(),
                 _ => 0..0,
             };
-            let is_press = |at: usize| {
+            let is_pressed = after_reset.clone().any(|at| {
                 let earlier = timed[..at].iter().rev();
                 let held = earlier.take_while(|(_, event)| *event != Enable::Off);
                 let mut ons = held.filter(|(_, event)| *event == Enable::On);
                 ons.all(|(then, _)| timed[at].0 - then > TIMEOUT_MS)
-            };
-            let is_pressed = after_reset.clone().any(is_press);
+            });
             let newest = after_reset.last().map(|at| timed[at].0);
             let is_young = newest.is_some_and(|at| now - at <= TIMEOUT_MS);
             prop_assert_eq!(after(&timed, now).is_granted(), is_pressed && is_young);

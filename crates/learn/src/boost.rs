@@ -278,8 +278,8 @@ mod tests {
         let classes = [false, true].map(|c| truth.iter().filter(|is| **is == c).count() as f64);
         let error = |below: f32| {
             let side = |left: bool| {
-                let of = |i: &usize| (numbers[*i] < below) == left;
-                let all: Vec<usize> = (0..numbers.len()).filter(of).collect();
+                let all: Vec<usize> =
+                    (0..numbers.len()).filter(|i| (numbers[*i] < below) == left).collect();
                 let weight = |i: &usize| 0.5 / classes[usize::from(truth[*i])];
                 let sign = |i: &usize| if truth[*i] { 1.0 } else { -1.0 };
                 let total: f64 = all.iter().map(weight).sum();

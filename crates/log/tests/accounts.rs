@@ -305,8 +305,8 @@ fn depth_at_other_times_is_told_with_the_offset() {
         log.fixed("base_link", "optical", &level_pose());
         info(&mut log, "/cam/camera_info", "optical", (16, 12));
         Stream { count: 1, ..colour("/cam/color", "optical") }.write(&mut log, recorded);
-        let late = |index| recorded(index).plus_seconds(offset_s);
-        Stream { count: 1, ..depth("/cam/depth", "optical") }.write(&mut log, late);
+        Stream { count: 1, ..depth("/cam/depth", "optical") }
+            .write(&mut log, |index| recorded(index).plus_seconds(offset_s));
         let bytes = log.finish();
         let saved = SavedLog::new(&bytes);
         let open = |stamps| {

@@ -385,8 +385,8 @@ fn f13_schemas_are_not_parsed() {
     let cyclic = format!(
         "a/A a\n{rule}\nMSG: a/A\nstd_msgs/String a\n{rule}\nMSG: std_msgs/String\na/A a\n"
     );
-    let part = |n: usize| format!("a/A{} a\n{rule}\nMSG: a/A{}\n", n + 1, n + 1);
-    let deep: String = (0..5000).map(part).collect();
+    let deep: String =
+        (0..5000).map(|n| format!("a/A{} a\n{rule}\nMSG: a/A{}\n", n + 1, n + 1)).collect();
     for definition in [cyclic, deep, "\u{0}[[[".into()] {
         let start = [header(), schema_of(1, &definition), channel_record(1, 1, b"/text")].concat();
         let found = walk(&[start, message_record(1, 0), end()].concat()).unwrap();

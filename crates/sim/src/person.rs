@@ -373,10 +373,9 @@ mod tests {
     fn the_same_subject_is_the_same_person_and_splits_share_nobody() {
         use crate::split::{SUBJECTS, Split};
         assert_eq!(Person::subject(3), Person::subject(3));
-        let of = |split: Split| (0..SUBJECTS).map(move |n| Person::subject(split.subject(n)));
         let sizes: std::collections::BTreeSet<[u64; 2]> = Split::ALL
             .into_iter()
-            .flat_map(of)
+            .flat_map(|split| (0..SUBJECTS).map(move |n| Person::subject(split.subject(n))))
             .map(|p| [p.build.height_m.to_bits(), p.build.breadth.to_bits()])
             .collect();
         assert_eq!(sizes.len() as u64, 3 * SUBJECTS);

@@ -60,11 +60,10 @@ fn every_scene_can_be_drawn_for_every_split_and_camera() {
 #[test]
 fn rooms_that_vary_are_shared_by_no_two_splits() {
     for (name, text) in suites().iter().filter(|(_, text)| text.contains("[vary]")) {
-        let sizes = |split| -> Vec<[f64; 2]> {
+        let [train, validation, test] = Split::ALL.map(|split| -> Vec<[f64; 2]> {
             let scene = |n| Scene::parse_with(text, &Variant::of_split(split, n)).unwrap();
             (0..20).map(|n| scene(n).room.size_m).collect()
-        };
-        let [train, validation, test] = Split::ALL.map(sizes);
+        });
         if name == "turntable" {
             continue;
         }

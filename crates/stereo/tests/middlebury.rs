@@ -76,9 +76,9 @@ fn hidden(truth: &[f32]) -> Vec<bool> {
             nearest[at] = nearest[at].max(*d);
         }
     }
-    let hides =
-        |x: usize| usize::try_from(seen_at(x)).map_or(true, |at| nearest[at] > truth[x] + 1.0);
-    (0..truth.len()).map(hides).collect()
+    (0..truth.len())
+        .map(|x| usize::try_from(seen_at(x)).map_or(true, |at| nearest[at] > truth[x] + 1.0))
+        .collect()
 }
 
 /// Returns the bad pixels, %: of all off by more than 1 and 2 px, and of the visible ones. A pixel

@@ -130,14 +130,14 @@ impl DetectionSet {
         order.sort_by(|a, b| self.score(*b).total_cmp(&self.score(*a)));
         let mut kept: Vec<(usize, Outline)> = Vec::new();
         for index in order {
-            let own = Outline::of(&self.all[index].detection);
-            let detection = |index: usize| &self.all[index].detection;
-            let is_same = |(other, outline): &&(usize, Outline)| {
+            let detection = &self.all[index].detection;
+            let own = Outline::of(detection);
+            let better = kept.iter().find(|(other, outline)| {
                 own.is_at(outline, settings)
                     || own.overlaps(outline, settings)
-                        && may_be_at_one_place(detection(index), detection(*other))
-            };
-            match kept.iter().find(is_same).map(|(better, _)| *better) {
+                        && may_be_at_one_place(detection, &self.all[*other].detection)
+            });
+            match better.map(|(better, _)| *better) {
                 Some(better) => {
                     self.all[better].discovered |= self.all[index].discovered;
                     self.settle(index, Fate::Dropped("same person"));

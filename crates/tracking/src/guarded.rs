@@ -104,13 +104,12 @@ impl<P: ?Sized> Guarded<P> {
         let start = Instant::now();
         let outcome = catch_unwind(AssertUnwindSafe(|| call(&mut self.plugin)));
         self.spent += start.elapsed();
-        let plugin = || self.name.clone();
         match outcome {
             Ok(Ok(value)) => Ok(value),
-            Ok(Err(error)) => Err(StepError::Plugin { plugin: plugin(), frame, error }),
+            Ok(Err(error)) => Err(StepError::Plugin { plugin: self.name.clone(), frame, error }),
             Err(panic) => {
                 let message = panic_message(panic.as_ref());
-                Err(StepError::Panic { plugin: plugin(), frame, message })
+                Err(StepError::Panic { plugin: self.name.clone(), frame, message })
             }
         }
     }

@@ -26,10 +26,10 @@ pub(crate) fn inflate_half_hidden(
     for track in predicted {
         let Estimate { region, person, .. } = &track.estimate;
         let part = part_shown(region, &person.position, &occluders, camera, settings);
-        let inflate = |found: &mut Detection| {
+        let changed = detections.change_of_track(track.id, |found: &mut Detection| {
             found.covariance += lateral_covariance(part, &found.position, camera, settings);
-        };
-        match detections.change_of_track(track.id, inflate) {
+        });
+        match changed {
             Some(found) => occluders.push(occluder_of_detection(found, &track.estimate, frame)),
             // A confirmed track still hides the people behind it when it is missed.
             None => occluders

@@ -87,8 +87,8 @@ pub(crate) fn visibility(
         return Visibility::Visible;
     }
     let Shown { all, inside, visible } = shown(region, position, occluders, camera, settings);
-    let enough = |part: u32| f64::from(part) >= settings.min_visible * f64::from(all);
-    match (all > 0 && enough(inside), enough(visible)) {
+    let least = settings.min_visible * f64::from(all);
+    match (all > 0 && f64::from(inside) >= least, f64::from(visible) >= least) {
         (false, _) => Visibility::Outside,
         (true, false) => Visibility::Hidden,
         (true, true) => Visibility::Visible,
@@ -164,8 +164,7 @@ static ON_BODY: LazyLock<u32> =
 
 /// Returns true for a region so large that rounding moves no sample across the silhouette's edge.
 fn is_plain(region: &Rect) -> bool {
-    let is_coarse = |from: f64, length: f64| length > 1e-6 * (1.0 + from.abs());
-    is_coarse(region.x, region.width) && is_coarse(region.y, region.height)
+    region.width > 1e-6 * (1.0 + region.x.abs()) && region.height > 1e-6 * (1.0 + region.y.abs())
 }
 
 /// Returns true if all samples of a region are inside of the image, with a pixel to spare.
@@ -253,8 +252,7 @@ mod tests {
             let camera = camera();
             let region = |([x, y], side, _): &([f64; 2], f64, f64)| Rect::new(*x, *y, *side, *side);
             let at = |ahead_m: f64| Point3::new(ahead_m, 0.0, 1.2);
-            let occluder = |b| Occluder::new(region(b), &at(b.2), &Matrix3::zeros(), &camera);
-            let occluders: Vec<Occluder> = boxes[1..].iter().map(occluder).collect();
+            let occluders: Vec<Occluder> = boxes[1..].iter().map(|b| Occluder::new(region(b), &at(b.2), &Matrix3::zeros(), &camera)).collect();
             let settings = OcclusionSettings::default();
             let region = region(&boxes[0]);
             let range_m = boxes[0].2;

@@ -75,10 +75,10 @@ impl SearchStage {
         let mut dropped = Vec::new();
         for &index in detectors {
             for found in self.detect(frame, index, &Query::Track(track), funnel)? {
-                let is_better =
-                    |best: &PendingDetection| found.detection.score > best.detection.score;
+                let score = found.detection.score;
+                let is_best = best.as_ref().is_none_or(|best| score > best.detection.score);
                 let test = match failed_test(&found)? {
-                    None if !best.as_ref().is_none_or(is_better) => Some(NOT_BEST),
+                    None if !is_best => Some(NOT_BEST),
                     test => test,
                 };
                 let loser = match test {

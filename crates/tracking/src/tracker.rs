@@ -447,8 +447,10 @@ impl Tracker {
         let places: BTreeMap<TrackId, Point2<f64>> =
             alive.map(|(id, estimate)| (*id, estimate.person.position.xy())).collect();
         let table = &self.table;
-        let is_hidden = |id| table.observation(id) == Some(Observation::Occluded);
-        for (kept, ended) in self.duplicates.find(&places, duplicate_m, is_hidden) {
+        let duplicates = self
+            .duplicates
+            .find(&places, duplicate_m, |id| table.observation(id) == Some(Observation::Occluded));
+        for (kept, ended) in duplicates {
             if let Some(health) = self.manager.ask(frame.index, |m| m.merge(kept, ended))? {
                 self.table.set_health(kept, health);
             }
@@ -476,9 +478,10 @@ impl Tracker {
             .collect();
         for index in detections.undecided() {
             let pending = detections.get(index);
-            let away = |place: &Point3<f64>| (place - pending.detection.position).xy().norm();
-            let is_tracked =
-                updated.iter().any(|place| away(place) < self.settings.merge.duplicate_m);
+            let is_tracked = updated.iter().any(|place| {
+                let away_m = (place - pending.detection.position).xy().norm();
+                away_m < self.settings.merge.duplicate_m
+            });
             let fate = match self.table.next_id() {
                 _ if is_tracked => Fate::Dropped("tracked already"),
                 Some(id) => self.initiate(frame, id, pending)?,

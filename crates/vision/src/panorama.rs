@@ -372,11 +372,10 @@ mod tests {
             seed in 0u32..1000, side in 24usize..90, columns in 8usize..70, rows in 4usize..30,
             dx in -3.0..3.0f64, dy in -3.0..3.0f64,
         ) {
-            let noise = |x: usize, y: usize| {
+            let raw = GreyImage::from_fn(side, side, |x: usize, y: usize| {
                 let mixed = (seed + 7 * x as u32 + 131 * y as u32).wrapping_mul(2_654_435_761);
                 (mixed >> 24) as u8
-            };
-            let raw = GreyImage::from_fn(side, side, noise);
+            });
             let panorama = panorama(side, [dx, dy], columns, rows);
             let mut out = GreyImage::default();
             Unwrapper::new(&panorama, side, side).unwrap().apply(&raw, &mut out).unwrap();

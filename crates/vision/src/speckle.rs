@@ -214,13 +214,11 @@ mod tests {
             values in prop::collection::vec(prop_oneof![Just(0u16), 480u16..620, 950u16..1100], 0..72),
         ) {
             let values = &values[..values.len() / width * width];
-            let is_hole = |row: &&[u16]| one_surface(row[0], row[2]) && row[1] == 0;
-            let is_odd = |row: &&[u16]| {
-                one_surface(row[0], row[2]) && row[1] > 0 && !one_surface(row[0], row[1])
-            };
             let triples = || values.chunks(width).flat_map(|row| row.windows(3));
-            let odd = triples().filter(is_odd).count();
-            let holes = triples().filter(is_hole).count();
+            let odd = triples().filter(|row| {
+                one_surface(row[0], row[2]) && row[1] > 0 && !one_surface(row[0], row[1])
+            }).count();
+            let holes = triples().filter(|row| one_surface(row[0], row[2]) && row[1] == 0).count();
             prop_assert_eq!(Speckles::count(values, width), Speckles { odd, holes });
         }
 

@@ -575,12 +575,10 @@ mod tests {
         let mut target = Target::new(10);
         target.fit_to(&features, &view, &Rect::new(100.0, 80.0, 40.0, 50.0)).unwrap();
         let lead = |others: &[(i64, i64, f32)]| {
-            let scored = |(x, y, confidence): &(i64, i64, f32)| Scored {
-                x: *x,
-                y: *y,
-                confidence: *confidence,
-            };
-            let coarse = others.iter().map(scored).collect();
+            let coarse = others
+                .iter()
+                .map(|(x, y, confidence)| Scored { x: *x, y: *y, confidence: *confidence })
+                .collect();
             let mut scratch = Scratch { coarse, ..Scratch::default() };
             let hunt = Hunt {
                 config: &config,

@@ -254,9 +254,9 @@ mod tests {
 
     fn frame(blocks: &[Block]) -> Frame {
         let at = |x: usize, y: usize| {
-            let shows =
-                |b: &&Block| b.columns.contains(&(x / GRID_PX)) && b.rows.contains(&(y / GRID_PX));
-            blocks.iter().find(shows)
+            blocks
+                .iter()
+                .find(|b| b.columns.contains(&(x / GRID_PX)) && b.rows.contains(&(y / GRID_PX)))
         };
         let depth = DepthImage::from_fn(160, 120, |x, y| at(x, y).map_or(f32::NAN, |b| b.metres));
         let colour = RgbImage::from_fn(160, 120, |x, y| match at(x, y) {

@@ -402,12 +402,9 @@ mod tests {
 
     #[test]
     fn a_wall_goes_on_above_and_a_head_does_not() {
-        let wall = |_: f64| 2.9;
-        assert_eq!(is_head(wall), (false, 1));
-        let head = |above: f64| if above < 0.0 { 2.9 } else { 3.3 };
-        assert_eq!(is_head(head), (true, 0));
-        let unknown_above = |above: f64| if above < 0.0 { 2.9 } else { f32::NAN };
-        assert_eq!(is_head(unknown_above), (true, 0));
+        assert_eq!(is_head(|_: f64| 2.9), (false, 1));
+        assert_eq!(is_head(|above: f64| if above < 0.0 { 2.9 } else { 3.3 }), (true, 0));
+        assert_eq!(is_head(|above: f64| if above < 0.0 { 2.9 } else { f32::NAN }), (true, 0));
     }
 
     /// Only columns of the object above a square count that lie over its middle half.
@@ -451,8 +448,7 @@ mod tests {
         let all = grid.windows(|_| Some(None)).count();
         assert!(wanted.is_empty() || wanted.len() == all, "{side} {metres}");
         assert_eq!(proposer.unfit as usize, all - wanted.len());
-        let is_told = |window: &Wanted| window.depth_m == Some(f64::from(metres as f32));
-        assert!(wanted.iter().all(is_told));
+        assert!(wanted.iter().all(|window| window.depth_m == Some(f64::from(metres as f32))));
         !wanted.is_empty()
     }
 

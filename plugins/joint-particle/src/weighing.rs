@@ -492,8 +492,7 @@ mod tests {
             value in -0.1..0.1f64, sigma in 0.1..0.3f64, part in 0.6..1.5f64,
         ) {
             let spread = (part * sigma).powi(2);
-            let log = |i| -0.5 * (offset(i, sigma) - value).powi(2) / spread;
-            let logs: Vec<f64> = (0..SAMPLES).map(log).collect();
+            let logs: Vec<f64> = (0..SAMPLES).map(|i| -0.5 * (offset(i, sigma) - value).powi(2) / spread).collect();
             let (found, variance) = measurement(&logs, sigma).unwrap();
             prop_assert!((found - value).abs() < 0.03 * sigma + 0.1 * value.abs());
             prop_assert!((variance / spread - 1.0).abs() < 0.15, "{} {}", variance, spread);

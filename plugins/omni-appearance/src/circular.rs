@@ -123,10 +123,8 @@ mod tests {
             let after = runs(&turned, 2);
             prop_assert_eq!(before.len(), after.len());
             if before.len() == 1 && before[0].length < width {
-                let weight = |c: usize| if on[c] { 1.0 } else { 0.0 };
-                let of_turned = |c: usize| if turned[c] { 1.0 } else { 0.0 };
-                let a = mean(&before[0], width, weight);
-                let b = mean(&after[0], width, of_turned);
+                let a = mean(&before[0], width, |c: usize| if on[c] { 1.0 } else { 0.0 });
+                let b = mean(&after[0], width, |c: usize| if turned[c] { 1.0 } else { 0.0 });
                 let off = (a - b - turn as f64).rem_euclid(width as f64);
                 prop_assert!(off < 1e-9 || width as f64 - off < 1e-9, "{a} {b} {turn}");
             }

@@ -255,8 +255,8 @@ mod tests {
         let known = &targets[..100];
         let network = FIT.network(&half, known, 3);
         assert_eq!(network, FIT.network(&half, known, 3));
-        let off = |i: usize| (network.answer(&inputs[i]) - targets[i]).abs();
-        let mean = (100..150).map(off).sum::<f64>() / 50.0;
+        let mean =
+            (100..150).map(|i| (network.answer(&inputs[i]) - targets[i]).abs()).sum::<f64>() / 50.0;
         assert!(mean < 0.03, "{mean}");
     }
 
@@ -265,8 +265,7 @@ mod tests {
         let (inputs, targets) = samples(150);
         let network = |fit: Fit| fit.network(&inputs[..100], &targets[..100], 3);
         let mean = |network: &Network| {
-            let off = |i: usize| (network.answer(&inputs[i]) - targets[i]).abs();
-            (100..150).map(off).sum::<f64>() / 50.0
+            (100..150).map(|i| (network.answer(&inputs[i]) - targets[i]).abs()).sum::<f64>() / 50.0
         };
         let printed = network(PRINTED);
         assert_eq!(printed, network(PRINTED));

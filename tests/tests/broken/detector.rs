@@ -40,8 +40,7 @@ fn points(frame: &Frame) -> Result<Vec<Point3<f64>>> {
 fn heads(frame: &Frame) -> Result<Vec<Point3<f64>>> {
     let mut lumps: Vec<(Vector3<f64>, f64)> = Vec::new();
     for point in points(frame)? {
-        let near = |(sum, n): &&mut (Vector3<f64>, f64)| (*sum / *n - point.coords).norm() < 0.4;
-        match lumps.iter_mut().find(near) {
+        match lumps.iter_mut().find(|(sum, n)| (*sum / *n - point.coords).norm() < 0.4) {
             Some((sum, n)) => {
                 *sum += point.coords;
                 *n += 1.0;

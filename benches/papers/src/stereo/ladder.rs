@@ -88,8 +88,7 @@ mod tests {
     use super::*;
 
     fn draw(errors: [f64; 3]) -> Vec<Judged> {
-        let judged = |error| Judged { errors_in_robot_m: vec![error], ..Judged::default() };
-        errors.map(judged).to_vec()
+        errors.map(|error| Judged { errors_in_robot_m: vec![error], ..Judged::default() }).to_vec()
     }
 
     #[test]

@@ -110,8 +110,7 @@ mod tests {
         assert_eq!(all.iter().map(shown).collect::<BTreeSet<_>>().len(), 21, "none twice");
         for setting in 0..3 {
             for value in 1..=4 {
-                let with = |c: &&Candidate| c[setting] == Value::Integer(value);
-                let count = all[1..].iter().filter(with).count();
+                let count = all[1..].iter().filter(|c| c[setting] == Value::Integer(value)).count();
                 assert!((3..=7).contains(&count), "{setting} is {value} in {count} of 20");
             }
         }

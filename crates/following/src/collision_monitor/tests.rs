@@ -187,8 +187,8 @@ fn depth_in_few_columns_stops_and_in_half_of_them_slows() {
     let share = |is_lit: fn(usize) -> bool| {
         let mut monitor = settled();
         let seen = depth_at(20, 0.0, 0.0);
-        let lit = |u, v| if is_lit(u) { seen.row(v)[u] } else { f32::NAN };
-        let depth = DepthImage::from_fn(160, 120, lit);
+        let depth =
+            DepthImage::from_fn(160, 120, |u, v| if is_lit(u) { seen.row(v)[u] } else { f32::NAN });
         let frame = frame(20, EgoMotion::at_rest(0.1), Some(depth), None);
         monitor.update(&frame, &frame.motion, &[], None);
         // By the share alone: an object that hides columns would stop the robot, too.
@@ -279,10 +279,9 @@ fn what_a_scan_met_holds_until_the_next_one() {
 #[test]
 fn what_is_nearer_than_a_scanner_measures_is_there() {
     let mut monitor = monitor();
-    let near = |deg: i32| (deg.abs() < 20).then_some(0.35);
     let scan = |index| {
         let LaserScan { points, rays, .. } = scan_at(index, 0.0, 0.0, |_| None);
-        let ahead = scan_at(index, 0.0, 0.0, near);
+        let ahead = scan_at(index, 0.0, 0.0, |deg: i32| (deg.abs() < 20).then_some(0.35));
         let unread = ahead.rays.iter().filter(|ray| (160..200).contains(*ray));
         let unread = unread
             .map(|ray| tagalong_core::UnreadRay { ray: *ray, reading: RayReading::TooNear(0.35) });
@@ -424,9 +423,8 @@ fn a_bumper_stops_while_it_is_pressed() {
 
 #[test]
 fn a_second_scanner_and_a_second_camera_see_obstacles() {
-    let thing = |deg: i32| (deg.abs() < 6).then_some(0.9);
     let scanned = with_readings(SourceKind::Scan, 20, |index| {
-        ObstacleData::Scan(scan_at(index, 0.0, 0.0, thing))
+        ObstacleData::Scan(scan_at(index, 0.0, 0.0, |deg: i32| (deg.abs() < 6).then_some(0.9)))
     });
     assert!(speed(&scanned) < 0.5, "{}", speed(&scanned));
     let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
@@ -509,8 +507,8 @@ fn something_in_a_polygon_stops_or_slows_the_robot() {
         let mut monitor = monitor_of(settings.clone());
         for index in 0..20 {
             // Beside the robot.
-            let thing = |deg: i32| met_m.filter(|_| (86..95).contains(&deg));
-            let scan = scan_at(index, 0.0, 0.0, thing);
+            let scan =
+                scan_at(index, 0.0, 0.0, |deg: i32| met_m.filter(|_| (86..95).contains(&deg)));
             let frame = frame(index, EgoMotion::at_rest(0.1), None, Some(scan));
             monitor.update(&frame, &frame.motion, &[], None);
         }

@@ -156,8 +156,8 @@ fn a_clock_that_jumps_back_loses_no_frame() {
         let second: Vec<f64> = first.iter().map(|t| t - back).collect();
         let (mut source, _saved) = run_of(&[first.clone(), second.clone()].concat());
         let found = frames(&mut source);
-        let rounded = |t: &f64| (t * 1000.0).round() / 1000.0;
-        let written: Vec<f64> = first.iter().chain(&second).map(rounded).collect();
+        let written: Vec<f64> =
+            first.iter().chain(&second).map(|t| (t * 1000.0).round() / 1000.0).collect();
         assert_eq!(stamps(&found), written);
         assert_eq!(count(&source, "time_jumps_back"), 1);
         assert!(found.iter().all(|found| found.frame.motion.dt >= 0.0));

@@ -58,12 +58,12 @@ fn vectors_say_whose_detection_it_is_where_places_do_not() {
 /// The numbers of the tracks in the last frame: a person in red left, and a person in `colour`
 /// comes.
 fn returned(colour: [u8; 3]) -> Vec<u32> {
-    let people = |i| match i {
+    let config = config("", "[reidentification]\nremember_s = 30.0");
+    let mut pipeline = World::of((0..60).map(|i| match i {
         0..20 | 40.. => vec![person(3.0, 0.0)],
         _ => vec![],
-    };
-    let config = config("", "[reidentification]\nremember_s = 30.0");
-    let mut pipeline = World::of((0..60).map(people)).pipeline(&config);
+    }))
+    .pipeline(&config);
     let reports = (1..=60).map(|index| {
         let colour = if index <= 20 { RED } else { colour };
         pipeline.step(coloured(index, colour, colour)).unwrap()

@@ -127,11 +127,11 @@ fn a_command_that_is_not_finite_is_a_stop() {
 fn without_a_target_the_robot_stands_and_a_lost_one_is_not_replaced() {
     let empty = World::of([vec![]]).run(&with("", "drive"), 1, 0.1);
     assert_eq!((empty[0].target, commands(&empty)), (None, vec![WheelSpeeds::STOP]));
-    let switch = |i: i32| {
+    let reports = World::of((0..30).map(|i| {
         let first = (i < 3).then(|| scored(5.0, person(2.0, 0.0)));
         first.into_iter().chain([scored(5.0, person(4.0, 0.9))]).collect()
-    };
-    let reports = World::of((0..30).map(switch)).run(&with("", "drive"), 30, 0.1);
+    }))
+    .run(&with("", "drive"), 30, 0.1);
     assert_eq!(reports[0].target.map(|id| id.0), Some(1));
     assert_eq!(reports[29].target, None);
     let last = reports[29].command.unwrap();

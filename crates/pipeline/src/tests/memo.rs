@@ -21,12 +21,11 @@ fn config(around: &str, script: &str) -> String {
 }
 
 fn world() -> World {
-    let walk = |i: u32| {
+    World::of((0..20).map(|i| {
         let aside = 0.05 * f64::from(i);
         let all = [person(3.0, 0.4 + aside), person(2.0, -0.8 - aside), person(4.0, 1.5)];
         all.into_iter().take(if i % 5 == 4 { 1 } else { 3 }).collect()
-    };
-    World::of((0..20).map(walk))
+    }))
 }
 
 /// A report without its times.
@@ -45,8 +44,7 @@ fn together(pipelines: &mut [Pipeline]) -> Vec<Vec<String>> {
 
 fn texts() -> Vec<String> {
     let scripts = ["how = 'picky'", "how = 'picky', script = 1", "how = ''"];
-    let of = |script| CONFIGS.map(|around| config(around, script));
-    scripts.into_iter().flat_map(of).collect()
+    scripts.into_iter().flat_map(|script| CONFIGS.map(|around| config(around, script))).collect()
 }
 
 #[test]

@@ -15,13 +15,12 @@ const BY_WHEELS: &str = "
 /// A frame of a robot that stands before a wall.
 fn wall(index: u64, motion: EgoMotion) -> Frame {
     let plain = frame(index, 0.1 * index as f64);
-    let waves = |x: usize, y: usize| {
-        let x = x as f64;
-        let y = y as f64;
-        (128.0 + 50.0 * (0.13 * x + 0.05 * y).sin() + 50.0 * (0.17 * y - 0.07 * x).sin()) as u8
-    };
     let images = Images {
-        grey: Some(Arc::new(GreyImage::from_fn(640, 480, waves))),
+        grey: Some(Arc::new(GreyImage::from_fn(640, 480, |x: usize, y: usize| {
+            let x = x as f64;
+            let y = y as f64;
+            (128.0 + 50.0 * (0.13 * x + 0.05 * y).sin() + 50.0 * (0.17 * y - 0.07 * x).sin()) as u8
+        }))),
         depth: Some(Arc::new(DepthImage::filled(640, 480, 3.0))),
         ..Images::default()
     };

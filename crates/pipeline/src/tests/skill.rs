@@ -11,12 +11,11 @@ const FOLLOWING: &str = "[controller]\nplugin = 'drive'\n[target]\n";
 /// to 1.5 m and stands.
 fn ride(target: &str) -> Ride {
     let walker = |i: i32| 1.5 + 0.1 * f64::from((45 - i).max(0));
-    let people = |i: i32| {
+    let world = World::of((0..200).map(|i| {
         let mut people = vec![(1.2, 0.9), (3.0, -0.5)];
         people.extend((i >= 20).then(|| (walker(i), 0.2)));
         people.into_iter().map(|(x, y)| scored(5.0, person(x, y))).collect()
-    };
-    let world = World::of((0..200).map(people));
+    }));
     let pipeline = world.pipeline(&format!("{PLAIN}\n{FOLLOWING}{target}"));
     Ride { pipeline, frames: 0 }
 }

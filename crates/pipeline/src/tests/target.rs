@@ -35,8 +35,8 @@ fn followed(report: &FrameReport) -> Option<u32> {
 
 #[test]
 fn the_nearest_in_front_is_chosen_and_known_well_after_some_sightings() {
-    let people = |_| vec![tall(1.6, 4.0, 0.0), tall(1.6, 2.0, 0.3), tall(1.6, 0.5, 1.5)];
-    let reports = ride("", 30, people);
+    let reports =
+        ride("", 30, |_| vec![tall(1.6, 4.0, 0.0), tall(1.6, 2.0, 0.3), tall(1.6, 0.5, 1.5)]);
     let last = &reports[29];
     let target = last.tracks.iter().find(|t| Some(t.id) == last.target).unwrap();
     assert_eq!(target.estimate.person.position.x, 2.0, "the nearest is not in front");
@@ -45,12 +45,11 @@ fn the_nearest_in_front_is_chosen_and_known_well_after_some_sightings() {
 
 #[test]
 fn who_is_nearest_is_chosen_even_if_seen_second() {
-    let people = |i| match i {
-        0..2 => vec![tall(1.6, 4.0, 0.0)],
-        _ => vec![tall(1.6, 4.0, 0.0), tall(1.6, 2.0, 0.3)],
-    };
     for (settings, expected_m) in [("", 4.0), ("choose_after_s = 0.5", 2.0)] {
-        let reports = ride(settings, 20, people);
+        let reports = ride(settings, 20, |i| match i {
+            0..2 => vec![tall(1.6, 4.0, 0.0)],
+            _ => vec![tall(1.6, 4.0, 0.0), tall(1.6, 2.0, 0.3)],
+        });
         let last = &reports[19];
         let target = last.tracks.iter().find(|t| Some(t.id) == last.target).unwrap();
         assert_eq!(target.estimate.person.position.x, expected_m, "{settings}");
@@ -95,12 +94,11 @@ fn somebody_can_be_chosen_by_number() {
 
 #[test]
 fn a_person_who_is_gone_is_lost_and_nobody_else_is_taken() {
-    let people = |i| match i {
+    let reports = ride("", 120, |i| match i {
         0..20 => vec![tall(1.6, 2.0, 0.0)],
         20..35 => vec![],
         _ => vec![tall(1.85, 2.0, 0.0)],
-    };
-    let reports = ride("", 120, people);
+    });
     assert_eq!(reports[119].target, None);
     assert!(reports[119].tracks[0].confirmed, "somebody is there");
     assert_eq!(reports[119].command.unwrap().reason, Reason::NoTarget);
@@ -110,12 +108,11 @@ fn a_person_who_is_gone_is_lost_and_nobody_else_is_taken() {
 
 #[test]
 fn a_person_who_comes_back_is_known_again_after_several_sightings() {
-    let people = |i| match i {
+    let reports = ride("", 90, |i| match i {
         0..20 => vec![tall(1.6, 2.0, 0.0)],
         20..40 => vec![tall(1.85, 4.0, 2.0)],
         _ => vec![tall(1.6, 2.5, 0.5), tall(1.85, 4.0, 2.0)],
-    };
-    let reports = ride("", 90, people);
+    });
     let found = reports.iter().position(|r| r.lock.as_ref().unwrap().state == LockState::Refound);
     assert!((44..50).contains(&found.unwrap()), "{found:?}");
     let last = &reports[89];
@@ -129,13 +126,12 @@ fn a_person_who_comes_back_is_known_again_after_several_sightings() {
 #[test]
 fn what_stood_beside_the_person_is_never_taken_for_them() {
     for (back, is_taken) in [((3.0, -1.5), false), ((3.0, -0.8), true)] {
-        let people = |i| match i {
+        let reports = ride("", 100, |i| match i {
             0..20 => vec![tall(1.6, 2.0, 0.0), tall(1.6, 3.0, -1.5)],
             20..40 => vec![tall(1.6, 3.0, -1.5)],
             40..60 => vec![],
             _ => vec![tall(1.6, back.0, back.1)],
-        };
-        let reports = ride("", 100, people);
+        });
         assert!(reports[..20].iter().all(|r| r.target.is_some()));
         assert!(reports[45..60].iter().all(|r| r.target.is_none()), "{:?}", states(&reports));
         assert_eq!(reports[99].target.is_some(), is_taken, "{:?}", states(&reports));
@@ -145,13 +141,12 @@ fn what_stood_beside_the_person_is_never_taken_for_them() {
 /// Another person walks beside the target, and goes on alone.
 #[test]
 fn who_walked_beside_the_person_is_not_taken_for_them_while_in_sight() {
-    let people = |i| {
+    let reports = ride("", 90, |i| {
         let along_m = 2.0 + 0.05 * f64::from(i);
         let mut seen = vec![tall(1.6, along_m, -1.0)];
         seen.extend((i < 20).then(|| tall(1.6, along_m, 0.5)));
         seen
-    };
-    let reports = ride("", 90, people);
+    });
     assert!(reports[45..].iter().all(|r| r.target.is_none()), "{:?}", states(&reports));
 }
 
@@ -171,31 +166,28 @@ fn nobody_comes_back_from_farther_than_they_can_have_got() {
 #[test]
 fn a_track_that_changes_over_to_somebody_else_is_doubted_and_left() {
     // The other person comes near, and the target is gone.
-    let people = |i| match i {
+    let reports = ride("", 60, |i| match i {
         0..20 => vec![tall(1.6, 3.0, 0.0)],
         20..24 => vec![tall(1.6, 3.0, 0.0), tall(1.9, 3.0, 0.5)],
         _ => vec![tall(1.9, 3.0, 0.1)],
-    };
-    let reports = ride("", 60, people);
+    });
     assert!(reports[30..].iter().all(|r| r.target.is_none()), "{:?}", states(&reports));
 }
 
 #[test]
 fn nobody_came_near_so_it_is_the_same_person_whatever_they_look_like() {
-    let people = |i| vec![tall(if i < 20 { 1.6 } else { 1.3 }, 3.0, 0.0)];
-    let reports = ride("", 60, people);
+    let reports = ride("", 60, |i| vec![tall(if i < 20 { 1.6 } else { 1.3 }, 3.0, 0.0)]);
     assert_eq!(followed(&reports[59]), followed(&reports[0]));
     assert_eq!(states(&reports), [LockState::Training, LockState::Locked]);
 }
 
 #[test]
 fn without_a_memory_a_track_is_followed_while_it_lives() {
-    let people = |i| match i {
+    let reports = ride("remember = false", 80, |i| match i {
         0..20 => vec![tall(1.6, 2.0, 0.0)],
         20..40 => vec![],
         _ => vec![tall(1.6, 2.0, 0.0)],
-    };
-    let reports = ride("remember = false", 80, people);
+    });
     assert_eq!(followed(&reports[10]), Some(1));
     assert!(reports[40..].iter().all(|r| r.target.is_none()));
 }

@@ -99,11 +99,11 @@ fn tracks_are_reported_near_to_far() {
 
 #[test]
 fn two_people_who_cross_keep_their_numbers() {
-    let crossing = |i: i32| {
+    let reports = World::of((0..21).map(|i| {
         let along = 0.1 * f64::from(i) - 1.0;
         vec![person(3.0, along), person(3.5, -along)]
-    };
-    let reports = World::of((0..21).map(crossing)).run(PLAIN, 21, 0.1);
+    }))
+    .run(PLAIN, 21, 0.1);
     let first = &reports[0];
     let last = &reports[20];
     assert_eq!(ids(last), [1, 2]);
@@ -117,7 +117,7 @@ fn two_people_who_cross_keep_their_numbers() {
 
 /// One person stands 2 m ahead; the other walks behind and is not seen there.
 fn behind_somebody(somebody: bool) -> Vec<FrameReport> {
-    let walk = |i: i32| {
+    World::of((0..50).map(|i| {
         let y = 1.3 - 0.05 * f64::from(i);
         let visible = y.abs() > 0.45;
         let mut people: Vec<Detection> = visible.then(|| person(4.0, y)).into_iter().collect();
@@ -125,8 +125,8 @@ fn behind_somebody(somebody: bool) -> Vec<FrameReport> {
             people.insert(0, person(2.0, 0.0));
         }
         people
-    };
-    World::of((0..50).map(walk)).run(PLAIN, 50, 0.1)
+    }))
+    .run(PLAIN, 50, 0.1)
 }
 
 #[test]
@@ -192,9 +192,8 @@ fn a_track_that_was_never_confirmed_dies_after_two_misses() {
 
 #[test]
 fn three_misses_are_needed_however_slow_the_log_is() {
-    let seen = |i: i32| if i < 4 { vec![person(3.0, 0.0)] } else { vec![] };
-    let reports =
-        World::of((0..8).map(seen)).run(&format!("{PLAIN}[clock]\nreset_gap_s = 5.0\n"), 8, 1.0);
+    let reports = World::of((0..8).map(|i| if i < 4 { vec![person(3.0, 0.0)] } else { vec![] }))
+        .run(&format!("{PLAIN}[clock]\nreset_gap_s = 5.0\n"), 8, 1.0);
     let alive: Vec<usize> = reports.iter().map(|r| r.tracks.len()).collect();
     assert_eq!(alive, [1, 1, 1, 1, 1, 1, 0, 0]);
 }
@@ -338,12 +337,11 @@ fn a_search_near_a_track_starts_nobody() {
 
 #[test]
 fn nobody_looks_for_a_person_behind_one_who_was_found() {
-    let people = |i: i32| {
+    let far_config = format!("associator.config.gate = 1e3\n{FOLLOWING}");
+    let world = World::of((0..8).map(|i| {
         let near = person(2.0, 0.0);
         if i < 5 { vec![near, person(4.0, 0.9)] } else { vec![near, person(4.0, 0.1)] }
-    };
-    let far_config = format!("associator.config.gate = 1e3\n{FOLLOWING}");
-    let world = World::of((0..8).map(people));
+    }));
     world.run(&far_config, 8, 0.1);
     let asked = world.asked.lock().unwrap();
     assert!(asked.contains(&(0, 4, Some(TrackId(2)))));
@@ -382,20 +380,20 @@ fn verifiers_are_not_asked_about_the_sightings_of_a_detector_that_goes_without()
 #[test]
 fn a_track_that_is_doubted_again_and_again_ends() {
     let config = format!("{PLAIN}\n[[verifiers]]\nplugin = 'choosy'");
-    let walk = |i: i32| vec![person(3.0, if i < 5 { -0.02 } else { 0.02 })];
-    let reports = World::of((0..25).map(walk)).run(&config, 25, 0.1);
+    let reports = World::of((0..25).map(|i| vec![person(3.0, if i < 5 { -0.02 } else { 0.02 })]))
+        .run(&config, 25, 0.1);
     assert!(reports[4].tracks[0].confirmed);
     assert!(reports[24].tracks.is_empty());
 }
 
 #[test]
 fn two_tracks_of_one_person_become_the_older_one() {
-    let approach = |i: i32| {
+    let config = format!("{PLAIN}\n[merge]\nduplicate_m = 0.3");
+    let reports = World::of((0..12).map(|i| {
         let apart = (0.8 - 0.1 * f64::from(i)).max(0.28);
         vec![person(3.0, 0.0), person(3.0, apart)]
-    };
-    let config = format!("{PLAIN}\n[merge]\nduplicate_m = 0.3");
-    let reports = World::of((0..12).map(approach)).run(&config, 12, 0.1);
+    }))
+    .run(&config, 12, 0.1);
     assert_eq!(ids(&reports[2]), [1, 2]);
     let ended: Vec<u32> = reports.iter().flat_map(|r| &r.ended).map(|id| id.0).collect();
     assert!(ended.contains(&2) && !ended.contains(&1), "{ended:?}");
@@ -426,11 +424,11 @@ fn too_many_detections_and_tracks_are_dropped_lowest_score_first() {
 #[test]
 fn overlap_in_the_image_can_decide_who_is_who() {
     let config = format!("associator.config.cost = 'overlap'\n{PLAIN}");
-    let walk = |i: i32| {
+    let reports = World::of((0..8).map(|i| {
         let y = 0.04 * f64::from(i);
         vec![person(3.0, y - 1.0), person(3.0, y)]
-    };
-    let reports = World::of((0..8).map(walk)).run(&config, 8, 0.1);
+    }))
+    .run(&config, 8, 0.1);
     assert!(reports.iter().all(|r| ids(r) == [1, 2]));
     let jump = World::of([vec![person(3.0, 0.0)], vec![person(3.0, 0.6)]]);
     assert_eq!(ids(&jump.run(&config, 2, 0.1)[1]), [1, 2], "no overlap, no match");

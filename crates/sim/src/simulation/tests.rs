@@ -376,14 +376,13 @@ fn sunlight_makes_images_bright_and_takes_away_depth() {
     // The sky in a window is as bright as it is said to be, and a hole in the depth.
     let day = "seed = 4\nduration_s = 0.2\n[camera]\nwidth = 160\nheight = 120\n\
         [robot]\nstart = [4.5, 2.0]\nheading_deg = 90.0\n[light.day]\nsun_lux = 0.0\nsky_lux = ";
-    let middle = |sky_lux: u32| {
+    let [(dark, _), (bright, hole)] = [0, 5000].map(|sky_lux| {
         let images = shots(&format!("{day}{sky_lux}.0\n"), 1).swap_remove(0).images;
         // Beside the bar in the middle of the window.
         let colour = images.colour.unwrap();
         let depth = images.depth.unwrap();
         (colour.pixels()[at(90, 50)][1], depth.pixels()[at(90, 50)])
-    };
-    let [(dark, _), (bright, hole)] = [0, 5000].map(middle);
+    });
     assert!(dark < 200 && bright > 250 && hole.is_nan(), "{dark} {bright} {hole}");
     // In the shade it measures as before.
     let shade = at(40, 110);

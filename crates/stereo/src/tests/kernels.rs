@@ -354,9 +354,8 @@ fn faint_surfaces_are_neither_too_near_nor_too_far() {
         let left = image(1, 0.0);
         let right = image(2, shift);
         let found = matcher.disparities(&left, &right, 31).unwrap();
-        let inside = |at: &usize| at % 200 > 40 && at % 200 < 190;
         let errors: Vec<f32> = (0..found.values.len())
-            .filter(inside)
+            .filter(|at| at % 200 > 40 && at % 200 < 190)
             .map(|at| found.values[at] - shift)
             .filter(|e| !e.is_nan())
             .collect();

@@ -207,8 +207,7 @@ pub fn supported(row: &[f32], image: &GreyImage, y: usize, least: u32) -> Vec<f3
         let middle = if near - far <= tolerance(far) { 0.5 * (row[a] + row[b]) } else { far };
         (row[x] - middle).abs() <= tolerance(middle)
     };
-    let kept = |x: usize| if is_anchor(&x) || keeps(x) { row[x] } else { f32::NAN };
-    (0..row.len()).map(kept).collect()
+    (0..row.len()).map(|x| if is_anchor(&x) || keeps(x) { row[x] } else { f32::NAN }).collect()
 }
 
 /// Returns brightness and slope of a smoothed row at `x`; its border is continued.
@@ -262,10 +261,9 @@ fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: us
         same.iter().map(|x| equation(pair, *x, y, row[*x].into(), gain)).collect();
     let n = all.len() as f64;
     let (g, q) = all.iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0 / n, sum.1 + e.1 / n));
-    let add = |sum: (f64, f64), e: &(f64, f64)| {
+    all.iter().fold((0.0, 0.0), |sum: (f64, f64), e: &(f64, f64)| {
         (sum.0 + (e.0 - g).powi(2), sum.1 + (e.0 - g) * (e.1 - q))
-    };
-    all.iter().fold((0.0, 0.0), add)
+    })
 }
 
 /// Refines disparities pixel by pixel.

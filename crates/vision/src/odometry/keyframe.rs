@@ -174,12 +174,11 @@ mod tests {
         let lens =
             Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 320, 240, 1.0, 0.4, 0.0);
-        let floor_m = |x: usize, y: usize| {
+        let depth = DepthImage::from_fn(320, 240, |x: usize, y: usize| {
             let eye_m = camera.height_m();
             let drop_m = eye_m - camera.back_project(Point2::new(x as f64, y as f64), 1.0).z;
             if drop_m > 0.0 { (scale * eye_m / drop_m) as f32 } else { f32::NAN }
-        };
-        let depth = DepthImage::from_fn(320, 240, floor_m);
+        });
         let image = GreyImage::from_fn(320, 240, |x, y| ((x / 8 + y / 8) % 2 * 200) as u8);
         let half = GreyImage::from_fn(160, 120, |x, y| ((x / 4 + y / 4) % 2 * 200) as u8);
         Keyframe::new(settings, &camera, &[&image, &half], &depth, people)

@@ -135,8 +135,8 @@ fn what_stands_still_corrects_the_wheels() {
 
 #[test]
 fn a_camera_that_nods_is_no_motion() {
-    let nodding = |step: usize| World { nod: 0.01 * (step as f64).sin(), ..WALLPAPER };
-    let (place, heading) = error(&drive(nodding, true).0);
+    let (place, heading) =
+        error(&drive(|step: usize| World { nod: 0.01 * (step as f64).sin(), ..WALLPAPER }, true).0);
     assert!(place < 0.02 && heading < 0.004, "{place} m, {heading} rad");
 }
 

@@ -49,8 +49,10 @@ impl Jpda {
 
     fn weigh_cluster(&self, cluster: &Cluster, ratios: &[Vec<f64>]) -> Vec<Association> {
         let detections = self.strongest(cluster, ratios);
-        let row = |track: &usize| detections.iter().map(|d| ratios[*track][*d]).collect();
-        let likelihoods: Vec<Vec<f64>> = cluster.tracks.iter().map(row).collect();
+        let mut likelihoods: Vec<Vec<f64>> = Vec::new();
+        for track in &cluster.tracks {
+            likelihoods.push(detections.iter().map(|d| ratios[*track][*d]).collect());
+        }
         let weights = marginals(&likelihoods, detections.len());
         let mut pairs = Vec::new();
         for (track, row) in cluster.tracks.iter().zip(weights) {

@@ -12,8 +12,9 @@ pub(crate) fn marginals(likelihoods: &[Vec<f64>], detections: usize) -> Vec<Vec<
     let weight = |track: usize, detection: usize| {
         let used = &ahead[track];
         let bit = 1 << detection;
-        let free = |set: usize| sum_of_subsets(&behind[track + 1], full & !(set | bit));
-        let events = (0..=full).filter(|set| set & bit == 0).map(|set| used[set] * free(set));
+        let events = (0..=full)
+            .filter(|set| set & bit == 0)
+            .map(|set| used[set] * sum_of_subsets(&behind[track + 1], full & !(set | bit)));
         likelihoods[track][detection] * events.sum::<f64>() / total
     };
     (0..likelihoods.len())

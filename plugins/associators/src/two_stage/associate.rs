@@ -68,9 +68,8 @@ impl Associator for TwoStage {
         let mut given = vec![None; tracks.len()];
         self.assign_stage(tracks, detections, gate, true, &mut given);
         self.assign_stage(tracks, detections, gate, false, &mut given);
-        let taken = |index: &usize| given.contains(&Some(*index));
         let weak = (0..detections.len()).filter(|index| !self.is_strong(&detections[*index]));
-        let spent = weak.filter(|index| !taken(index)).collect();
+        let spent = weak.filter(|index| !given.contains(&Some(*index))).collect();
         Associations { spent, ..Associations::one_to_one(given.iter().copied()) }
     }
 }

@@ -67,8 +67,8 @@ fn it_keeps_the_distance_to_a_person_who_walks() {
 
 #[test]
 fn it_turns_with_a_person_who_walks_around_it() {
-    let around = |t: f64| Point2::new(1.4 * (0.4 * t).cos(), 1.4 * (0.4 * t).sin());
-    let (_, bearing) = ride(prompt(), 12.0, around);
+    let (_, bearing) =
+        ride(prompt(), 12.0, |t: f64| Point2::new(1.4 * (0.4 * t).cos(), 1.4 * (0.4 * t).sin()));
     assert!(bearing.abs() < 0.1, "{bearing}");
     let behind = ride(prompt(), 8.0, |_| Point2::new(-2.0, 0.3));
     assert!(behind.1.abs() < 0.05, "{behind:?}");
@@ -241,8 +241,8 @@ fn what_a_turn_has_moved_out_of_the_image_is_remembered_for_a_while() {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let person = target(4.0, 0.0, Vector2::zeros());
         let still = EgoMotion::at_rest(0.1);
-        let post = |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 };
-        let depth = DepthImage::from_fn(40, 30, post);
+        let depth =
+            DepthImage::from_fn(40, 30, |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 });
         command(&mut controller, still, Some(depth), Some(&person));
         let steps = (0..(seconds / 0.1) as u32)
             .map(|_| command(&mut controller, still, None, Some(&person)));

@@ -414,8 +414,7 @@ mod tests {
     fn a_model_without_a_room_is_calibrated_by_the_others() {
         // Answers that are spread more need a smaller slope.
         let answers = |scale: f64| {
-            let answer = |k: i32| (scale * f64::from(k - 20), k * 7 % 40 < k, 0.0);
-            Score::of((0..40).map(answer).collect())
+            Score::of((0..40).map(|k| (scale * f64::from(k - 20), k * 7 % 40 < k, 0.0)).collect())
         };
         let fold = |room: &str, scale: f64| Fold {
             room: room.into(),

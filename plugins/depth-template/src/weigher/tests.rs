@@ -48,11 +48,10 @@ fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
                     let hidden = cast[..k].iter().any(|p| inside(p.body(line), x));
                     sum += if hidden { 0 } else { pixel.covered };
                 } else if x < edge || end <= x {
-                    let is_rival = |p: &&PlacedPerson| {
-                        p.depth_m < person.depth_m + config.likelihood_tolerance_m
-                    };
                     let others = cast.iter().enumerate().filter(|(i, _)| *i != k);
-                    let mut rivals = others.map(|(_, p)| p).filter(is_rival);
+                    let mut rivals = others
+                        .map(|(_, p)| p)
+                        .filter(|p| p.depth_m < person.depth_m + config.likelihood_tolerance_m);
                     let taken = rivals.any(|p| inside(p.body(line), x));
                     beside[usize::from(x >= end)] += if taken { 0 } else { pixel.beside };
                 }
@@ -253,6 +252,5 @@ fn pixels_that_are_hidden_twice_are_hidden_once() {
     let mut masks = Vec::new();
     union_of(&mut masks, [(5, 9), (1, 3), (2, 6)].into_iter());
     assert_eq!(masks, [(1, 9)]);
-    let length = |(from, to): Span| i32::try_from(to - from).unwrap();
-    assert_eq!(masked(&masks, (2, 12), length), 7);
+    assert_eq!(masked(&masks, (2, 12), |(from, to): Span| i32::try_from(to - from).unwrap()), 7);
 }

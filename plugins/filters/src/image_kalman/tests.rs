@@ -160,8 +160,8 @@ fn the_jacobian_foretells_the_point_in_space() {
 #[test]
 fn a_person_who_came_near_is_not_foreseen_behind_the_camera() {
     let config = Config::default();
-    let at = |i: usize| person(Point3::new(4.0 - 2.0 * DT_S * i as f64, 0.0, 1.4));
-    let sightings: Vec<Detection> = (0..30).map(at).collect();
+    let sightings: Vec<Detection> =
+        (0..30).map(|i| person(Point3::new(4.0 - 2.0 * DT_S * i as f64, 0.0, 1.4))).collect();
     let mut state = fed(config.clone(), &sightings, EgoMotion::at_rest(DT_S));
     let camera = camera();
     for _ in 0..60 {

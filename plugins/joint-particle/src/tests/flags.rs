@@ -62,10 +62,9 @@ fn a_wide_belief_gets_as_many_particles_as_its_spread_asks() {
     let rows = |config: Config| {
         let mut rig = Rig::new(config, 2);
         rig.start(1, [2.0, 0.0, 1.6], [0.02, 0.5, EXACT]);
-        let narrow = |scene: &[Person]| {
+        rig.look(&Formula::new(|scene: &[Person]| {
             scene.iter().map(|p| -0.5 * (p.position.y / 0.15).powi(2)).sum::<f64>()
-        };
-        rig.look(&Formula::new(narrow));
+        }));
         rig.look(&Formula::flat(3.0));
         rig.columns(1).len()
     };

@@ -220,10 +220,10 @@ mod tests {
     fn points_that_move_otherwise_do_not_count() {
         let real = known([0.006, 0.012, 0.01], 1.02);
         let other = known([0.0, -0.03, 0.0], 1.0);
-        let moved = |(i, at): (usize, Vector2<f64>)| {
-            [at, if i % 5 < 2 { other.apply(at) } else { real.apply(at) }]
-        };
-        let pairs: Vec<Pair> = rays().enumerate().map(moved).collect();
+        let pairs: Vec<Pair> = rays()
+            .enumerate()
+            .map(|(i, at)| [at, if i % 5 < 2 { other.apply(at) } else { real.apply(at) }])
+            .collect();
         let found = SwingFit::of_agreeing(&pairs, NEAR, 12).unwrap();
         assert_eq!(found.points, 36);
         assert!((found.swing.zoom - 1.02).abs() < 1e-7, "{found:?}");
