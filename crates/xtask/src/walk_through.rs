@@ -76,7 +76,11 @@ pub const GUIDES: [Guide; 4] = [
                 to: "use crate::Config;\n",
             },
             Edit::Replace { file: "detect.rs", from: "    config: Config,\n", to: END_OF_FN },
-            Edit::Replace { file: "detect.rs", from: "    /// Everything that could", to: END_OF_FN },
+            Edit::Replace {
+                file: "detect.rs",
+                from: "    /// Everything that could",
+                to: END_OF_FN,
+            },
             Edit::Replace { file: "detect.rs", from: "    fn detect(", to: END_OF_FN },
             Edit::Append { file: "detect.rs" },
         ],
