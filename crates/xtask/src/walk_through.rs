@@ -70,11 +70,7 @@ pub const GUIDES: [Guide; 4] = [
                 to: "}\n",
             },
             Edit::Replace { file: "config.rs", from: "impl Default for Config {", to: "\n}\n" },
-            Edit::Replace {
-                file: "detect.rs",
-                from: "use tagalong_core::{",
-                to: "use crate::Config;\n",
-            },
+            Edit::Replace { file: "detect.rs", from: "use tagalong_core::{", to: "Config;\n" },
             Edit::Replace { file: "detect.rs", from: "    config: Config,\n", to: END_OF_FN },
             Edit::Replace {
                 file: "detect.rs",

@@ -107,9 +107,9 @@ fn check_viewers(
     let head = frame.transform.translation;
     assert!((1.5..3.5).contains(&head.x) && head.y.abs() < 0.5, "{head:?}");
 
-    let known = people.iter().filter_map(|(_, array)| array.people.first());
+    let mut known = people.iter().filter_map(|(_, array)| array.people.first());
     assert!(known.clone().count() > 20);
-    let person = known.last().unwrap();
+    let person = known.next_back().unwrap();
     assert_eq!((person.name.as_str(), person.position.z), ("1", 0.0));
     assert!((0.5..=1.0).contains(&person.reliability), "{person:?}");
 }
