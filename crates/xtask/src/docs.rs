@@ -9,7 +9,7 @@
 //! head, and `<!-- begin: source FILE NAME -->` one function of it.
 //! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
 //! become stale. Slow parts, the tables of `tagalong-papers`, `follow` and `bench`, are filled only on
-//! request; what they were printed from is noted (see [`figures`]).
+//! request, and their sources are noted (see [`figures`]).
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -72,17 +72,17 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
     Ok(())
 }
 
-/// Prints a line for each slow table that is older than what it was printed from.
+/// Prints a line for each slow table that is older than its sources.
 pub fn list_stale_tables(workspace: &Workspace) -> Result<()> {
     let stale = stale_tables(workspace)?;
     for sentence in &stale {
         eprintln!("docs: {sentence}");
     }
-    eprintln!("docs: {} tables are older than what they were printed from", stale.len());
+    eprintln!("docs: {} tables are older than their sources", stale.len());
     Ok(())
 }
 
-/// Returns a sentence for each slow table that is older than what it was printed from.
+/// Returns a sentence for each slow table that is older than its sources.
 pub fn stale_tables(workspace: &Workspace) -> Result<Vec<String>> {
     figures::stale(workspace, &slow_parts(workspace)?)
 }

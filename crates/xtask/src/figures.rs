@@ -1,4 +1,4 @@
-//! What the tables of slow commands were printed from.
+//! Sources of the tables of slow commands.
 //!
 //! `benches/figures.toml` has, for each part of a page that takes minutes to hours to print, the
 //! files that its command reads and the version of the simulator, with their hashes at that time.
@@ -15,7 +15,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::workspace::Workspace;
 
-/// File with what the tables were printed from.
+/// File with the sources of the tables.
 const RECORD: &str = "benches/figures.toml";
 /// File with the version of the simulator's figures.
 const SIMULATOR: &str = "crates/sim/src/figures.rs";
@@ -35,15 +35,15 @@ type Sources = BTreeMap<String, String>;
 /// Sources by page and command.
 type Record = BTreeMap<String, BTreeMap<String, Sources>>;
 
-/// A part of a page: the table between its markers, and what prints it.
+/// A part of a page: the table between its markers, and the command that prints it.
 pub struct Part {
     pub page: String,
     pub command: String,
     pub table: String,
 }
 
-/// Notes of the printed ones of all parts that they are printed from what is here now, and drops
-/// parts that pages no longer have.
+/// Notes the present sources of the printed ones of all parts, and drops parts that pages no longer
+/// have.
 pub fn note(workspace: &Workspace, all: &[Part], is_printed: impl Fn(&Part) -> bool) -> Result<()> {
     let files = Files::of(workspace)?;
     let mut record = read(workspace)?;
@@ -84,7 +84,7 @@ pub fn stale(workspace: &Workspace, all: &[Part]) -> Result<Vec<String>> {
     Ok(sentences)
 }
 
-/// Names what differs, has come or has gone.
+/// Names the sources that differ, have come or have gone.
 fn changes(noted: &Sources, now: &Sources) -> String {
     let mut why = Vec::new();
     for (name, hash) in now {
@@ -121,7 +121,7 @@ impl Files {
         Ok(Self { all: workspace.files()?.into_iter().collect(), simulator })
     }
 
-    /// Returns the hashes of all that a part is printed from.
+    /// Returns the hashes of all sources of a part.
     fn sources(&self, workspace: &Workspace, part: &Part) -> Result<Sources> {
         let mut sources = Sources::from([(SIMULATOR_NAME.to_owned(), self.simulator.clone())]);
         let mut open = self.named(part);
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_is_printed_from_what_it_names_and_what_that_reads() {
+    fn the_sources_of_a_table_are_the_configs_that_it_names_and_theirs() {
         let folder = tempfile::tempdir().unwrap();
         let workspace = workspace(&folder);
         let rides = part("tagalong follow configs/best.toml", "| walk: best | 3 |");
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_says_what_it_is_older_than() {
+    fn a_table_names_the_sources_that_it_is_older_than() {
         let folder = tempfile::tempdir().unwrap();
         let workspace = workspace(&folder);
         let parts = [part("tagalong follow configs/best.toml", "| walk: best | 3 |")];

@@ -39,8 +39,8 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     if stale > 0 {
         // No complaint: printing them anew takes hours.
         eprintln!(
-            "tidy: warning: {stale} tables of slow commands are older than what they were printed \
-             from: `cargo xtask docs --stale` lists them"
+            "tidy: warning: {stale} tables of slow commands are older than their sources: \
+             `cargo xtask docs --stale` lists them"
         );
     }
     if complaints.is_empty() {
