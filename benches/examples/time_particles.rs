@@ -1,6 +1,6 @@
 //! Prints, in microseconds, the time of a frame of one person with 625 particles and a likelihood
 //! that takes none, and that of looking up 625 places in a map of two people that is a sum of 50
-//! kernels, with the sum of what is found. Places are numbers that look random.
+//! kernels, with the sum of the values. Places are numbers that look random.
 //! `benches/peers/kernels.py` compares both with numpy and scipy.
 //!
 //! ```sh
@@ -65,7 +65,7 @@ fn step() -> Result<f64> {
     }))
 }
 
-/// Returns the median time of a call, us, and the sum of what was found.
+/// Returns the median time of a call, us, and the sum of the values.
 fn look_up() -> (f64, f64) {
     let known = (0..50).map(|k| 0.5 + uniform(2000 + k)).collect();
     let map = LikelihoodMap::new(Method::Kde, places(0, 50), known, &Config::default());

@@ -402,6 +402,31 @@ mod tests {
         assert_eq!((survey.operators, survey.values), (2, vec!["y".to_owned(), "z".to_owned()]));
     }
 
+    /// A damaged file must not exhaust the stack before its graphs are counted.
+    #[test]
+    fn messages_that_are_nested_too_deep_are_refused() {
+        let nested = |depth: usize| {
+            // Field 5 of an operator is an attribute, field 6 of that another graph.
+            (0..depth)
+                .fold(node("Relu", "x", "y"), |graph, _| field(1, &field(5, &field(6, &graph))))
+        };
+        let check = |depth| check_encoding(&field(7, &nested(depth)), Part::Model, 0);
+        assert!(check(MAX_MESSAGES / 3 - 2).is_ok());
+        let why = check(MAX_MESSAGES / 3 + 2).unwrap_err();
+        assert!(why.contains("nested more than"), "{why}");
+    }
+
+    /// The constant of an operator has no name of its own.
+    #[test]
+    fn the_constant_of_an_operator_is_known_by_its_output() {
+        let raw: Vec<u8> = [1_i64 << 20, 1 << 20].iter().flat_map(|n| n.to_le_bytes()).collect();
+        let tensor = [vec![1 << 3, 2, 2 << 3, 7], field(9, &raw)].concat();
+        let constant = [field(2, b"shape"), field(4, b"Constant"), field(5, &field(5, &tensor))];
+        let graph = [field(1, &constant.concat()), node("ConstantOfShape", "shape", "y")].concat();
+        let why = survey(&graph).unwrap_err();
+        assert!(why.contains("makes a tensor of 1099511627776"), "{why}");
+    }
+
     #[test]
     fn too_many_operators_are_refused() {
         let three = node("Relu", "x", "y").repeat(3);

@@ -9,7 +9,7 @@
 //! head, and `<!-- begin: source FILE NAME -->` one function of it.
 //! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
 //! become stale. Slow parts, the tables of `tagalong-papers`, `follow` and `bench`, are filled only on
-//! request.
+//! request, and their sources are noted (see [`figures`]).
 
 use std::path::PathBuf;
 
@@ -17,6 +17,7 @@ use anyhow::{Context as _, Result, bail};
 
 use crate::accuracy;
 use crate::faults;
+use crate::figures::{self, Part};
 use crate::program::{Name, Program};
 use crate::workspace::{Workspace, output};
 
@@ -64,7 +65,44 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
             eprintln!("docs: {} is filled anew", document.path.display());
         }
     }
+    if let Some(part) = slow {
+        let all = slow_parts(workspace)?;
+        let is_printed = |one: &Part| one.command.contains(part);
+        figures::note(workspace, &all, is_printed)?;
+    }
     Ok(())
+}
+
+/// Prints a line for each slow table that is older than its sources.
+pub fn list_stale_tables(workspace: &Workspace) -> Result<()> {
+    let stale = stale_tables(workspace)?;
+    for sentence in &stale {
+        eprintln!("docs: {sentence}");
+    }
+    eprintln!("docs: {} tables are older than their sources", stale.len());
+    Ok(())
+}
+
+/// Returns a sentence for each slow table that is older than its sources.
+pub fn stale_tables(workspace: &Workspace) -> Result<Vec<String>> {
+    figures::stale(workspace, &slow_parts(workspace)?)
+}
+
+/// Returns the slow parts of all documents.
+fn slow_parts(workspace: &Workspace) -> Result<Vec<Part>> {
+    let mut parts = Vec::new();
+    for document in documents(workspace)? {
+        let page = document.path.to_string_lossy();
+        for after in document.text.split(BEGIN).skip(1) {
+            let Some((command, body)) = after.split_once(" -->") else { continue };
+            let Some((table, _)) = body.split_once(END) else { continue };
+            if is_slow(command) {
+                let page = page.clone().into_owned();
+                parts.push(Part { page, command: command.to_owned(), table: table.to_owned() });
+            }
+        }
+    }
+    Ok(parts)
 }
 
 /// Complains about fast parts that are stale.

@@ -5,6 +5,7 @@ mod api;
 mod ci;
 mod docs;
 mod faults;
+mod figures;
 mod markdown;
 mod metadata;
 mod new_plugin;
@@ -47,6 +48,10 @@ enum Command {
         /// instead of the fast ones.
         #[arg(long, value_name = "PART")]
         slow: Option<String>,
+        /// List the tables of slow commands that are older than a config, a model or the simulator
+        /// that they were printed from, instead.
+        #[arg(long, conflicts_with = "slow")]
+        stale: bool,
     },
     /// Prints the table of faults with the tests that cover them
     Faults {
@@ -114,7 +119,8 @@ fn run(command: Command) -> Result<()> {
             Ok(())
         }
         Command::NewPlugin(_) => try_out::try_out(&workspace),
-        Command::Docs { slow } => docs::fill(&workspace, slow.as_deref()),
+        Command::Docs { stale: true, .. } => docs::list_stale_tables(&workspace),
+        Command::Docs { slow, .. } => docs::fill(&workspace, slow.as_deref()),
         Command::Faults { rows } => {
             let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
             std::io::stdout().write_all(faults::markdown(&workspace, &rows)?.as_bytes())?;

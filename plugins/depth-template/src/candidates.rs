@@ -155,6 +155,27 @@ mod tests {
         boundary(&with_things(things), &Local::upright(50, 40, 3.0, 100.0), &config)
     }
 
+    /// A row 3 m away from column 40 to 60, 100 pixels a metre, with a gap without readings.
+    fn width_with_gap(gap: std::ops::Range<usize>) -> f64 {
+        let depth = DepthImage::from_fn(100, 100, |x, _| {
+            if gap.contains(&x) {
+                0.0
+            } else if (40..=60).contains(&x) {
+                3.0
+            } else {
+                6.0
+            }
+        });
+        head_width_m(&RowSums::new(&depth, 1), &Local::upright(50, 40, 3.0, 100.0))
+    }
+
+    #[test]
+    fn a_head_goes_on_behind_a_gap_of_three_pixels() {
+        assert!((width_with_gap(0..0) - 0.21).abs() < 1e-9);
+        assert!((width_with_gap(54..57) - 0.21).abs() < 1e-9);
+        assert!((width_with_gap(54..58) - 0.14).abs() < 1e-9, "four are its edge");
+    }
+
     #[test]
     fn boundary_points_lie_left_right_and_above_at_their_distance() {
         let [left, right, above] = [(28, 40), (72, 40), (50, 18)];

@@ -35,6 +35,14 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     for complaint in &complaints {
         eprintln!("tidy: {complaint}");
     }
+    let stale = crate::docs::stale_tables(workspace)?.len();
+    if stale > 0 {
+        // No complaint: printing them anew takes hours.
+        eprintln!(
+            "tidy: warning: {stale} tables of slow commands are older than their sources: \
+             `cargo xtask docs --stale` lists them"
+        );
+    }
     if complaints.is_empty() {
         eprintln!("tidy: nothing to complain about");
         return Ok(());
