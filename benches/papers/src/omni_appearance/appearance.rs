@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use tagalong_omni_appearance::train::{Collector, Sample, Training, head};
 use tagalong_omni_appearance::{Config, Distance, Head, Model};
-use tagalong_sim::{Scene, Truth};
+use tagalong_sim::Scene;
 use tagalong_trials::Draw;
 
 use super::splits::Split;

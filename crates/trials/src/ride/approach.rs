@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use tagalong_core::Reason;
 use tagalong_pipeline::FrameReport;
-use tagalong_sim::{ApproachBy, ApproachInView, ApproachState, Event, Scene, ScheduledFault};
+use tagalong_sim::{ApproachBy, ApproachInView, Event, Scene, ScheduledFault};
 
 use super::{Ride, Tick, Witness};
 use crate::SimulatedFrame;
@@ -319,7 +319,7 @@ impl Witness for ApproachWatch<'_> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_sim::{ApproachSettings, Clearance};
+    use tagalong_sim::{ApproachSettings, ApproachState, Clearance};
 
     use super::*;
 
