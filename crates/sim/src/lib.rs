@@ -76,6 +76,7 @@ mod simulation;
 mod slice;
 mod split;
 mod variation;
+mod varied_paths;
 mod webcam;
 mod world;
 

@@ -251,7 +251,8 @@ impl Scene {
         let day = self.light.day.iter().flat_map(|day| day.rules(&self.room));
         let approach = self.approach.iter().flat_map(ApproachSettings::rules);
         let outline = footprint::rules(&self.robot.footprint);
-        let variation = self.variation.rules(self);
+        let has_sides = self.light.day.is_some() || !self.webcams.is_empty();
+        let variation = self.variation.rules(has_sides);
         let parts = webcams.chain(laser).chain(ramp).chain(day).chain(approach).chain(outline);
         let parts = parts.chain(variation);
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);
