@@ -1,4 +1,4 @@
-//! What a tracker would score if one kind of its errors were repaired.
+//! Scores of a tracker with one kind of its errors repaired.
 
 use std::collections::BTreeMap;
 
@@ -83,7 +83,7 @@ pub struct Repaired {
 
 /// Returns the figures of a sequence with each kind of error repaired alone. In each frame, reports
 /// and people are paired one to one so that their similarities, from [`PAIRED_SIMILARITY`] on, have
-/// the largest sum. Annotated people who do not count, and the reports on them, stay as they are.
+/// the largest sum. Ignored people, and the reports on them, stay as they are.
 ///
 /// ```
 /// use tagalong_eval::{Frame, Region, Repair, Report, Sequence, Similarity, Truth, repairs};
@@ -355,7 +355,7 @@ mod tests {
         sequence(vec![(vec![person(1, 0.0)], vec![report(5, region)])])
     }
 
-    /// A missed person gets the track from before; where that is on somebody else, one of its own.
+    /// A missed person gets the track from before; where that is on another person, one of its own.
     #[test]
     fn a_filled_miss_goes_on_with_the_track_of_its_person() {
         let right = [0.0, 0.0, 20.0, 40.0];

@@ -12,8 +12,8 @@ const HALF_WIDTH: f64 = 0.28;
 const ABOVE: f64 = 0.08;
 /// Height of the area in the box: a head ends 0.25 m below the upper edge.
 const BELOW: f64 = 0.58;
-/// Boxes of the frames this near in time count, too: a person who was missed in one image was found in
-/// another, and one who moves is at both places.
+/// Boxes of the frames this near in time count, too: a person missed in one image was found in another,
+/// and a moving one is at both places.
 const WITHIN_NS: u64 = 350_000_000;
 
 /// Boxes of upper bodies by the stamps of their frames.

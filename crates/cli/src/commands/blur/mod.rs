@@ -41,8 +41,8 @@ pub struct BlurArgs {
     /// The copy [default: LOG-blurred.mcap, beside the log].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Folder of a run over this log, whose people are blurred [default: a new run by the pipeline for
-    /// what the log has].
+    /// Folder of a run over this log; its people are blurred [default: a new run by the pipeline for
+    /// the sensors in the log].
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
     /// Replace an earlier copy.
@@ -121,7 +121,7 @@ fn tracks_of_new_run(
         Ok(_) => Tracks::read(&folder, None).map(Ok),
         Err(failure) => Err(failure),
     };
-    // What cannot be removed stays, which harms nobody.
+    // A folder that cannot be removed stays, which does no harm.
     let _ = fs::remove_dir_all(&folder);
     tracks
 }
@@ -158,7 +158,7 @@ struct Copying<'a> {
     counts: Counts,
 }
 
-/// Numbers of what was done.
+/// Numbers of messages by their treatment.
 #[derive(Default)]
 struct Counts {
     /// Images with at least one head.
@@ -294,7 +294,7 @@ impl Copying<'_> {
 }
 
 impl Counts {
-    /// Returns what was done, and what a user has to know before sharing the copy.
+    /// Returns the numbers, and the warning that a user needs before sharing the copy.
     fn summary(&self, copy: &Path) -> String {
         let Self { images, blurred, heads, .. } = self;
         let mut text =

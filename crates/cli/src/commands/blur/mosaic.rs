@@ -3,7 +3,7 @@
 use tagalong_core::Image;
 use tagalong_eval::Region;
 
-/// Blocks along the shorter side of an area: a face of four blocks is nobody's.
+/// Blocks along the shorter side of an area: a face of so few blocks is not recognised.
 const BLOCKS: f64 = 5.0;
 /// Least side of a block, pixels.
 const MIN_BLOCK_PX: usize = 4;

@@ -1,4 +1,4 @@
-//! What becomes of the messages of a topic.
+//! Treatment of the messages of a topic.
 
 use tagalong_log::images::{Content, content_of_encoding, content_of_format};
 use tagalong_log::msgs::{CompressedImage, Image, PointCloud2, decode};
@@ -9,12 +9,12 @@ const BOX_WIDTH_M: f64 = 0.57;
 
 /// Treatment of a message.
 pub(super) enum Treatment {
-    /// It shows nobody, or depth alone.
+    /// It shows no face, or depth alone.
     Copy,
     /// Its heads are blurred; those of a right image are up to this many widths of their boxes farther
     /// to the left.
     Blur { aside: f64 },
-    /// It may show faces, and nobody was looked for in it.
+    /// It may show faces, and the run did not look for people in it.
     LeaveOut(&'static str),
 }
 
@@ -29,12 +29,12 @@ const PICTURES: [&str; 7] = [
     "Thumbnail",
 ];
 
-/// Reason for images in which nobody was looked for.
+/// Reason for images that the run did not use.
 const NOT_SEARCHED: &str = "the run did not look for people in them";
 /// Reason for points with colours.
 const COLOURED: &str = "their colours may show faces";
 
-/// Returns what becomes of a message.
+/// Returns the treatment of a message.
 pub(super) fn treatment(facts: &LogFacts, message: &Message<'_>) -> Treatment {
     let channel = message.channel;
     let name = channel.schema_name.rsplit(['/', '.']).next().unwrap_or_default();
