@@ -48,26 +48,22 @@ pub fn run(
     seed: Option<u64>,
     camera: Option<String>,
 ) -> PyResult<bool> {
+    // A path alone is that of a log or of a config, as on the command line.
     let (config, log) = match config {
         Some(config) => (config, Some(log)),
         None => (log, None),
     };
     let args = RunArgs {
-        config: Some(config),
         log,
-        output: Some(out),
         overlay: overlay.then_some(Overlaid::People),
         with_images,
         overwrite,
         strict,
-        threads: None,
         seed,
-        serve: None,
-        realtime: false,
-        format: Format::default(),
-        quiet: true,
         input: InputArgs { camera, ..InputArgs::default() },
+        ..RunArgs::quiet(Some(config), out)
     };
+
     match interruptible(py, args)?.map_err(raised)? {
         Ended::Well => Ok(false),
         Ended::WithLoss | Ended::WithFindings => Ok(true),

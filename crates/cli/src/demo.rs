@@ -3,8 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use tagalong_app::format::Format;
-use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
@@ -86,20 +84,10 @@ fn put(path: &Path, text: &str) -> Result<PathBuf, Failure> {
 
 fn run_args(folder: &Path, name: &str, config: PathBuf, log: &Path) -> RunArgs {
     RunArgs {
-        serve: None,
-        realtime: false,
-        config: Some(config),
         log: Some(log.to_owned()),
-        output: Some(folder.join(name)),
         with_images: true,
         overlay: Some(Overlaid::People),
-        overwrite: true,
-        strict: false,
-        threads: None,
-        seed: None,
-        format: Format::Text,
-        input: InputArgs::default(),
-        quiet: true,
+        ..RunArgs::quiet(Some(config), folder.join(name))
     }
 }
 

@@ -399,16 +399,17 @@ impl Gathering {
             }
             match camera {
                 Ok(None) => {}
-                Ok(Some(camera)) => topic.take_camera(camera, &cloud.header.frame_id),
+                Ok(Some(camera)) => {
+                    if topic.take_camera(camera, &cloud.header.frame_id) {
+                        let size = (cloud.width as usize, cloud.height as usize);
+                        let info = CameraInfo::of_lens(&cloud.header, &camera.lens, size, 0.0);
+                        self.infos.insert(calibration_by_points(name), info);
+                    }
+                }
                 Err(error) => topic.cloud_fault = Some(error.to_string()),
             }
         }
-        topic.take_header(cloud.header.clone());
-        if let Some(camera) = topic.cloud.filter(|_| topic.content == Content::Depth) {
-            let size = (cloud.width as usize, cloud.height as usize);
-            let info = || CameraInfo::of_lens(&cloud.header, &camera.lens, size, 0.0);
-            self.infos.entry(calibration_by_points(name)).or_insert_with(info);
-        }
+        self.topic(name, "", "").take_header(cloud.header);
         Some(())
     }
 
@@ -547,9 +548,9 @@ impl Topic {
         Some(())
     }
 
-    /// Takes in the camera of a cloud. Points with x ahead are those of a camera only where the frame is
+    /// Takes in the camera of a cloud; returns true if it can be used. Points with x ahead are those of a camera only where the frame is
     /// called optical all the same, as by a simulator; elsewhere the frame is not that of its images.
-    fn take_camera(&mut self, camera: CloudCamera, frame: &str) {
+    fn take_camera(&mut self, camera: CloudCamera, frame: &str) -> bool {
         let is_usable = camera.axes == CloudAxes::Optical || frame.contains("optical");
         self.cloud = Some(camera);
         if is_usable {
@@ -561,6 +562,7 @@ impl Topic {
                  ahead, are read: record the depth images of that camera"
             ));
         }
+        is_usable
     }
 
     fn take_odometry(&mut self, data: &[u8]) -> Option<()> {

@@ -252,7 +252,10 @@ mod tests {
             let camera = camera();
             let region = |([x, y], side, _): &([f64; 2], f64, f64)| Rect::new(*x, *y, *side, *side);
             let at = |ahead_m: f64| Point3::new(ahead_m, 0.0, 1.2);
-            let occluders: Vec<Occluder> = boxes[1..].iter().map(|b| Occluder::new(region(b), &at(b.2), &Matrix3::zeros(), &camera)).collect();
+            let mut occluders: Vec<Occluder> = Vec::new();
+            for b in &boxes[1..] {
+                occluders.push(Occluder::new(region(b), &at(b.2), &Matrix3::zeros(), &camera));
+            }
             let settings = OcclusionSettings::default();
             let region = region(&boxes[0]);
             let range_m = boxes[0].2;

@@ -101,10 +101,14 @@ pub fn what_now(kind: Kind, name: &str) -> String {
     )
 }
 
+fn is_word(text: &str) -> bool {
+    !text.is_empty() && text.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit())
+}
+
 fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
     let well_formed = name.starts_with(|c: char| c.is_ascii_lowercase())
         // Names become parts of crate names, module names and paths.
-        && name.split('-').all(|word| !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit()));
+        && name.split('-').all(is_word);
     ensure!(
         well_formed,
         "`{name}` cannot name a plugin: use lower-case words joined by hyphens, like `leg-width`"

@@ -94,6 +94,27 @@ impl Overlaid {
 }
 
 impl RunArgs {
+    /// Arguments of a run that prints nothing and replaces the files of an earlier one, for commands
+    /// that consist of runs; without a config it is the one for the sensors in the log.
+    pub fn quiet(config: Option<PathBuf>, output: PathBuf) -> Self {
+        Self {
+            config,
+            log: None,
+            output: Some(output),
+            overlay: None,
+            with_images: false,
+            overwrite: true,
+            strict: false,
+            threads: None,
+            seed: None,
+            serve: None,
+            realtime: false,
+            format: Format::default(),
+            input: InputArgs::default(),
+            quiet: true,
+        }
+    }
+
     /// Returns the path of the log.
     pub fn log(&self) -> &Path {
         self.in_order().1.unwrap_or(Path::new(SAMPLE))

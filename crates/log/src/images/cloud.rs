@@ -15,7 +15,7 @@ const MIN_POINTS: usize = 100;
 const MAX_ERROR_PX: f64 = 1.0;
 /// Least share of the points that are in front of the camera.
 const IN_FRONT: f64 = 0.99;
-/// Rows and columns by which the lens is measured are at least this many pixels apart.
+/// Number of pixels along the longer side by which the lens is measured, about.
 const SAMPLES_A_SIDE: usize = 160;
 
 /// Axes of the points of a cloud.

@@ -11,7 +11,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use tagalong_app::format::Format;
 use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, spare};
 use tagalong_app::progress::Progress;
@@ -100,21 +99,11 @@ fn tracks_of_new_run(
 ) -> Result<Result<Tracks, Ended>, Failure> {
     let folder = copy.with_extension("blur-run");
     let run = RunArgs {
-        config: None,
         log: Some(args.log.clone()),
-        output: Some(folder.clone()),
-        overlay: None,
-        with_images: false,
-        overwrite: true,
-        strict: false,
-        threads: None,
-        seed: None,
-        serve: None,
-        realtime: false,
-        format: Format::default(),
         input: args.input.clone(),
-        quiet: true,
+        ..RunArgs::quiet(None, folder.clone())
     };
+
     let ended = run_until(&run, registry, || Ok(signals.clone()));
     let tracks = match ended {
         Ok(ended @ Ended::BySignal(_)) => Ok(Err(ended)),
@@ -146,8 +135,8 @@ fn blurred_name(log: &Path) -> PathBuf {
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {
-    let real = |path: &Path| fs::canonicalize(path).ok();
-    real(a).is_some() && real(a) == real(b)
+    // A copy that does not exist yet is no file at all.
+    fs::canonicalize(a).is_ok_and(|a| fs::canonicalize(b).is_ok_and(|b| a == b))
 }
 
 /// Pass over a log that writes its copy.
