@@ -31,6 +31,58 @@ pub fn platt(values: &[(f64, bool)]) -> Line {
     Line { slope, offset }
 }
 
+/// Fits a rising calibration of probabilities by isotonic regression (Zadrozny and Elkan 2002): the
+/// probabilities are counted in so many steps, neighbouring steps whose shares fall are merged, and
+/// each of the rest becomes a pair of its mean probability and of the share that is true.
+///
+/// ```
+/// let stated = [(0.25, false), (0.25, false), (0.75, true), (0.75, false)];
+/// assert_eq!(tagalong_learn::isotonic(&stated, 2), [[0.25, 0.0], [0.75, 0.5]]);
+/// ```
+pub fn isotonic(stated: &[(f64, bool)], steps: usize) -> Vec<[f64; 2]> {
+    let mut counted = vec![Step::default(); steps.max(1)];
+    let last = counted.len() - 1;
+    for (probability, is_true) in stated {
+        let at = ((probability * steps as f64) as usize).min(last);
+        counted[at].add(Step {
+            count: 1.0,
+            sum: *probability,
+            hits: f64::from(u8::from(*is_true)),
+        });
+    }
+    let mut merged: Vec<Step> = Vec::new();
+    for step in counted.into_iter().filter(|step| step.count > 0.0) {
+        let mut step = step;
+        // The pool-adjacent-violators algorithm: equal shares stay apart.
+        while let Some(before) = merged.pop_if(|before| before.share() > step.share()) {
+            step.add(before);
+        }
+        merged.push(step);
+    }
+    merged.iter().map(|step| [step.sum / step.count, step.share()]).collect()
+}
+
+/// Probabilities within a step of the calibration.
+#[derive(Clone, Copy, Debug, Default)]
+struct Step {
+    count: f64,
+    sum: f64,
+    hits: f64,
+}
+
+impl Step {
+    fn add(&mut self, other: Self) {
+        self.count += other.count;
+        self.sum += other.sum;
+        self.hits += other.hits;
+    }
+
+    /// Returns the share that is true.
+    fn share(&self) -> f64 {
+        self.hits / self.count
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use linfa::ParamGuard as _;
@@ -73,6 +125,25 @@ mod tests {
         assert!((line.slope + found.0).abs() < 1e-3, "{line:?} {found:?}");
         assert!((line.offset + found.1).abs() < 1e-3, "{line:?} {found:?}");
         assert!(line.slope > 0.5, "{line:?}");
+    }
+
+    #[test]
+    fn shares_that_fall_are_merged_with_their_neighbours() {
+        let all = |probability: f64, trues: usize, count: usize| {
+            (0..count).map(move |k| (probability, k < trues))
+        };
+        let stated: Vec<(f64, bool)> = all(0.1, 1, 10)
+            .chain(all(0.4, 6, 10))
+            .chain(all(0.6, 4, 10))
+            .chain(all(1.0, 9, 10))
+            .collect();
+        let pairs = isotonic(&stated, 5);
+        let wanted = [[0.1, 0.1], [0.5, 0.5], [1.0, 0.9]];
+        assert_eq!(pairs.len(), 3, "{pairs:?}");
+        for (pair, wanted) in pairs.iter().zip(wanted) {
+            assert!((pair[0] - wanted[0]).abs() < 1e-9 && (pair[1] - wanted[1]).abs() < 1e-9);
+        }
+        assert_eq!(isotonic(&[], 5), Vec::<[f64; 2]>::new());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Shared parts of the plugins' trainers, so that their model cards can be compared: groups are
 //! dealt out to folds and never split ([`parts`]), held-out values become figures ([`area`],
-//! [`accepted`]) and log-odds ([`platt`], [`logistic`]), and each picture yields variants
+//! [`accepted`]) and log-odds ([`platt`], [`isotonic`], [`logistic`]), and each picture yields variants
 //! ([`mirrored`], [`shifted`]). Boosted trees are grown here, too ([`boost`]), and experiments run
 //! on all cores ([`side_by_side`]). Small convolutional networks are made of the layers of [`conv`],
 //! forwards and backwards, trained by the steps of [`Adam`] and written as a [`NetworkFile`], or as
@@ -25,7 +25,7 @@ mod variants;
 mod weights;
 
 pub use adam::{Adam, pace};
-pub use calibrate::{Line, platt};
+pub use calibrate::{Line, isotonic, platt};
 pub use folds::{CALIBRATION, Use, parts, use_of};
 pub use held_out::{accepted, area};
 pub use logistic::{Example, logistic};

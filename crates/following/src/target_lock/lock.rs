@@ -101,8 +101,10 @@ pub struct LockReport {
 pub struct Likeness {
     /// The track.
     pub track: TrackId,
-    /// Probability that it is the person, by its appearance in this frame alone.
+    /// Probability that it is the person, by its appearance in this frame alone, calibrated.
     pub probability: f64,
+    /// Log-odds of that before the calibration.
+    pub log_odds: f64,
     /// Differences from the remembered appearance that led to it.
     pub differences: Differences,
 }
@@ -224,7 +226,7 @@ impl TargetLock {
         self.move_along(motion);
         let looks = self.looks(frame, tracks)?;
         let likeness = self.likeness(&looks);
-        let log_odds = likeness.iter().map(|(like, odds)| (like.track, *odds)).collect();
+        let log_odds = likeness.iter().map(|like| (like.track, like.log_odds)).collect();
         match self.state {
             LockState::Initial if !may_choose => {}
             LockState::Initial => self.start(tracks, motion.dt),
@@ -239,7 +241,7 @@ impl TargetLock {
             why: self.why,
             since_s: self.since_s,
             belief: self.followed().map(|_| probability(self.belief)),
-            likeness: likeness.into_iter().map(|(like, _)| like).collect(),
+            likeness,
         })
     }
 
@@ -264,14 +266,14 @@ impl TargetLock {
         all.map(|track| Ok((track.id, self.describer.of(&track.estimate, frame)?))).collect()
     }
 
-    /// Returns the similarity of all tracks to the person, with the log-odds.
-    fn likeness(&self, looks: &BTreeMap<TrackId, Appearance>) -> Vec<(Likeness, f64)> {
+    /// Returns the similarity of all tracks to the person.
+    fn likeness(&self, looks: &BTreeMap<TrackId, Appearance>) -> Vec<Likeness> {
         let of = |(track, looks): (&TrackId, &Appearance)| {
             let differences = self.memory.differences(looks)?;
             // The clamp keeps one frame of unusual light from outweighing all others.
-            let odds = differences.log_odds(&self.settings.looks).clamp(-CERTAIN, CERTAIN);
-            let probability = probability(odds);
-            Some((Likeness { track: *track, probability, differences }, odds))
+            let log_odds = differences.log_odds(&self.settings.looks).clamp(-CERTAIN, CERTAIN);
+            let probability = self.settings.looks.calibrated(probability(log_odds));
+            Some(Likeness { track: *track, probability, log_odds, differences })
         };
         looks.iter().filter_map(of).collect()
     }

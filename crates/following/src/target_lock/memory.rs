@@ -132,6 +132,7 @@ mod tests {
             vector: [0.3, 8.0],
             height: [0.1, 20.0],
             rivals: 3.0,
+            calibration: Vec::new(),
         };
         let none = Differences {
             torso: None,

@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::{Error, Result};
 
 use super::ChoiceRule;
 
@@ -127,6 +128,42 @@ pub struct LooksSettings {
     /// Weight of being nearer to the person's appearance than to those of others seen beside them.
     #[schemars(range(min = 0.0))]
     pub rivals: f64,
+    /// Calibration of the reported probability: pairs of the probability by the log-odds above and
+    /// of the share of true matches among detections with it, both rising, with straight lines in
+    /// between. Decisions use the log-odds alone. Without pairs the probability is reported as it is.
+    /// `tagalong follow --fit` prints pairs by isotonic regression.
+    pub calibration: Vec<[f64; 2]>,
+}
+
+impl LooksSettings {
+    /// Returns the calibrated probability for one by the log-odds.
+    pub(crate) fn calibrated(&self, probability: f64) -> f64 {
+        let after = self.calibration.partition_point(|[stated, _]| *stated <= probability);
+        let below = after.checked_sub(1).map(|at| self.calibration[at]);
+        match (below, self.calibration.get(after)) {
+            (Some([x, y]), Some([next_x, next_y])) => {
+                // Pairs rise strictly, so the distance is not 0.
+                y + (probability - x) / (next_x - x) * (next_y - y)
+            }
+            (Some([_, y]), None) | (None, Some(&[_, y])) => y,
+            (None, None) => probability,
+        }
+    }
+
+    /// Refuses a calibration that is none.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] names the key and the remedy.
+    pub fn check(&self) -> Result<()> {
+        let rises = |pair: &[[f64; 2]]| pair[1][0] > pair[0][0] && pair[1][1] >= pair[0][1];
+        let is_share = |value: &f64| (0.0..=1.0).contains(value);
+        let are_shares = self.calibration.as_flattened().iter().all(is_share);
+        if are_shares && self.calibration.windows(2).all(rises) {
+            return Ok(());
+        }
+        let why = "must have pairs of numbers in 0 to 1, both rising from pair to pair";
+        Err(Error::setting("looks.calibration", why))
+    }
 }
 
 impl Default for LooksSettings {
@@ -138,6 +175,7 @@ impl Default for LooksSettings {
             vector: [0.35, 12.0],
             height: [-0.045, 7.009],
             rivals: 5.49,
+            calibration: Vec::new(),
         }
     }
 }
@@ -180,5 +218,39 @@ impl Default for SearchSettings {
             drive_s: 8.0,
             give_up_s: 20.0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(calibration: &[[f64; 2]]) -> LooksSettings {
+        LooksSettings { calibration: calibration.to_vec(), ..LooksSettings::default() }
+    }
+
+    #[test]
+    fn calibrated_probabilities_lie_on_lines_between_the_pairs() {
+        let looks = with(&[[0.1, 0.0], [0.5, 0.2], [0.9, 1.0]]);
+        for (stated, calibrated) in
+            [(0.0, 0.0), (0.1, 0.0), (0.3, 0.1), (0.5, 0.2), (0.7, 0.6), (0.9, 1.0), (1.0, 1.0)]
+        {
+            let found = looks.calibrated(stated);
+            assert!((found - calibrated).abs() < 1e-12, "{stated}: {found}");
+        }
+        assert_eq!(with(&[]).calibrated(0.7), 0.7, "without pairs");
+        assert_eq!(with(&[[0.4, 0.3]]).calibrated(0.7), 0.3);
+    }
+
+    #[test]
+    fn a_calibration_rises() {
+        assert!(with(&[[0.0, 0.0], [0.5, 0.2], [0.6, 0.2]]).check().is_ok());
+        assert!(LooksSettings::default().check().is_ok());
+        for wrong in [[[0.5, 0.2], [0.5, 0.3]], [[0.4, 0.3], [0.5, 0.2]], [[0.4, 0.3], [0.5, 1.2]]]
+        {
+            let error = with(&wrong).check().unwrap_err().to_string();
+            assert!(error.contains("both rising"), "{error}");
+        }
+        assert!(with(&[[f64::NAN, 0.5]]).check().is_err());
     }
 }

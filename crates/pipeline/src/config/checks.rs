@@ -18,6 +18,7 @@ pub(super) fn check(
     let found = [
         ("clock", check_clock(settings)),
         ("target", check_target(settings)),
+        ("target", settings.target.looks.check()),
         ("robot", robot.check()),
         ("command_limiter", command_limiter.check(robot)),
         ("collision_monitor", collision_monitor.check(robot, command_limiter)),

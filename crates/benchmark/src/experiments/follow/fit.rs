@@ -1,10 +1,13 @@
 use tagalong_app::outcome::Failure;
 use tagalong_app::serialize::to_toml;
-use tagalong_learn::{Example, logistic};
+use tagalong_learn::{Example, isotonic, logistic};
 use tagalong_pipeline::{Differences, LooksSettings};
 
 use super::Followed;
+use super::table::uncalibrated;
 
+/// Steps of the calibration.
+const STEPS: usize = 20;
 /// Ridge penalty on the squared weights, equal to one example.
 const RIDGE: f64 = 1.0;
 /// Smallest weight that is divided by.
@@ -49,7 +52,18 @@ pub fn looks(results: &[Followed]) -> LooksSettings {
         vector: known(vector, vector_0, usual.vector),
         height: term(height, height_0),
         rivals: rounded(rivals),
+        // Not that of these weights, which these rides did not use.
+        calibration: Vec::new(),
     }
+}
+
+/// Fits the calibration of the lock's probabilities, with the weights that the rides used, to the
+/// true identities.
+pub fn calibration(results: &[Followed]) -> Vec<[f64; 2]> {
+    let sightings = results.iter().flat_map(|followed| &followed.ridden.likeness);
+    let stated: Vec<(f64, bool)> =
+        sightings.map(|(like, same)| (uncalibrated(like), *same)).collect();
+    isotonic(&stated, STEPS).into_iter().map(|pair| pair.map(rounded)).collect()
 }
 
 /// Returns the features of an example; an unknown difference has no weight and no offset.
@@ -79,9 +93,12 @@ fn rounded(value: f64) -> f64 {
 ///
 /// # Errors
 /// As for [`to_toml`].
-pub fn toml(looks: &LooksSettings) -> Result<String, Failure> {
+pub fn toml(looks: &LooksSettings, calibration: &[[f64; 2]]) -> Result<String, Failure> {
     let body = to_toml("the settings [target.looks]", looks)?;
-    Ok(format!("\n# Fitted to these rides:\n[target.looks]\n{body}"))
+    Ok(format!(
+        "\n# Fitted to these rides:\n[target.looks]\n{body}\n# The calibration that fits these rides \
+         with the weights that they had:\n# calibration = {calibration:?}\n"
+    ))
 }
 
 #[cfg(test)]
@@ -116,7 +133,7 @@ mod tests {
                 rivals: None,
             };
             let people = (20.0 / (1.0 + (-odds).exp())).round() as usize;
-            let like = Likeness { track: TrackId(1), probability: 0.5, differences };
+            let like = Likeness { track: TrackId(1), probability: 0.5, log_odds: 0.0, differences };
             likeness.extend((0..20).map(|n| (like, n < people)));
         }
         let found = looks(&[followed(likeness)]);
@@ -125,8 +142,25 @@ mod tests {
         assert!(found.legs[1].abs() < 0.3 && found.rivals == 0.0, "{found:?}");
         let usual = LooksSettings::default();
         assert_eq!((found.texture, found.vector), (usual.texture, usual.vector), "never visible");
-        let text = toml(&found).unwrap();
+        let text = toml(&found, &[[0.25, 0.5]]).unwrap();
+        assert!(text.contains("# calibration = [[0.25, 0.5]]"), "{text}");
         let read: toml::Table = toml::from_str(&text).unwrap();
         assert!(read["target"]["looks"]["torso"].is_array(), "{text}");
+    }
+
+    /// Sightings with log-odds of 2 are the person in every other case, whatever was reported.
+    #[test]
+    fn the_calibration_is_of_the_log_odds() {
+        let differences = Differences {
+            torso: None,
+            legs: None,
+            texture: None,
+            vector: None,
+            height_m: 0.0,
+            rivals: None,
+        };
+        let like = Likeness { track: TrackId(1), probability: 0.1, log_odds: 2.0, differences };
+        let pairs = calibration(&[followed((0..10).map(|k| (like, k % 2 == 0)).collect())]);
+        assert_eq!(pairs, [[0.881, 0.5]]);
     }
 }

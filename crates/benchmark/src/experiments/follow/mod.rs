@@ -85,7 +85,8 @@ pub struct FollowArgs {
     /// Write a picture of every frame of every ride beside its log, too: boxes, ids, target, plan.
     #[arg(long, requires = "output")]
     pub overlay: bool,
-    /// Print the settings [target.looks] that fit these rides best; use the split `train`.
+    /// Print the settings [target.looks] that fit these rides best, and the calibration of the
+    /// probabilities; use the split `train`.
     #[arg(long)]
     pub fit: bool,
     /// Ride this many random approaches instead: a person or a trolley comes at the robot from any
@@ -338,7 +339,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
         }
     }
     if let Some(looks) = looks.filter(|_| args.format != TableFormat::Json) {
-        print(&fit::toml(&looks)?)?;
+        print(&fit::toml(&looks, &fit::calibration(results))?)?;
     }
     let Some(folder) = &args.output else { return Ok(()) };
     let markdown = joined(Table::markdown);

@@ -1,4 +1,5 @@
 use tagalong_eval::{draws_interval, percentile};
+use tagalong_pipeline::Likeness;
 use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Seeds;
 use tagalong_trials::{Ridden, RideJudge};
@@ -44,7 +45,7 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
         notes: notes(&judge, seeds),
     };
     std::iter::once(following)
-        .chain(pipelines.iter().filter_map(|pipeline| reliability(results, pipeline, seeds)))
+        .chain(pipelines.iter().flat_map(|pipeline| reliabilities(results, pipeline, seeds)))
         .collect()
 }
 
@@ -153,13 +154,43 @@ fn found_after(ride: &Ridden) -> impl Iterator<Item = f64> {
     ride.episodes.iter().filter_map(|episode| Some(episode.found_s? - episode.in_view_s?))
 }
 
-/// Returns the share of true matches among the tracks to which the lock gave some probability.
-fn reliability(results: &[Followed], pipeline: &str, seeds: Seeds) -> Option<Table> {
+/// Returns the reliability of the lock's probabilities and, where they are calibrated, that before
+/// the calibration.
+fn reliabilities(results: &[Followed], pipeline: &str, seeds: Seeds) -> Vec<Table> {
     let of: Vec<&Ridden> =
         results.iter().filter(|r| r.pipeline == pipeline).map(|r| &r.ridden).collect();
+    let all = || of.iter().flat_map(|ride| &ride.likeness).map(|(like, _)| like);
+    if all().next().is_none() {
+        return Vec::new();
+    }
+    let title = format!("How far the lock of {pipeline} can be believed");
+    let mut tables = vec![reliability(title.clone(), &of, |like| like.probability, seeds)];
+    if all().any(|like| (like.probability - uncalibrated(like)).abs() > 1e-9) {
+        tables.push(reliability(
+            format!("{title}: before the calibration"),
+            &of,
+            uncalibrated,
+            seeds,
+        ));
+    }
+    tables
+}
+
+/// Returns the probability of the log-odds.
+pub fn uncalibrated(like: &Likeness) -> f64 {
+    1.0 / (1.0 + (-like.log_odds).exp())
+}
+
+/// Returns the share of true matches among the tracks to which the lock gave some probability.
+fn reliability(
+    title: String,
+    of: &[&Ridden],
+    probability: fn(&Likeness) -> f64,
+    seeds: Seeds,
+) -> Table {
     let bin = |p: f64| ((p * BINS as f64) as usize).min(BINS - 1);
     let within = |ride: &Ridden, at: usize| -> Vec<(f64, bool)> {
-        let all = ride.likeness.iter().map(|(like, same)| (like.probability, *same));
+        let all = ride.likeness.iter().map(|(like, same)| (probability(like), *same));
         all.filter(|(p, _)| bin(*p) == at).collect()
     };
     let row = |at: usize| {
@@ -178,8 +209,8 @@ fn reliability(results: &[Followed], pipeline: &str, seeds: Seeds) -> Option<Tab
         Row::ours(format!("{low:.1} to {:.1}", low + 1.0 / BINS as f64), cells)
     };
     let columns = ["sightings", "mean probability %", "were the person %"];
-    of.iter().any(|ride| !ride.likeness.is_empty()).then(|| Table {
-        title: format!("How far the lock of {pipeline} can be believed"),
+    Table {
+        title,
         columns: columns.map(str::to_owned).to_vec(),
         rows: (0..BINS).map(row).collect(),
         notes: vec![
@@ -188,7 +219,7 @@ fn reliability(results: &[Followed], pipeline: &str, seeds: Seeds) -> Option<Tab
              independent"
                 .into(),
         ],
-    })
+    }
 }
 
 /// Returns each name once, in the order of its first place.
@@ -223,6 +254,8 @@ pub fn likeness_csv(results: &[Followed]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_core::TrackId;
+    use tagalong_pipeline::Differences;
     use tagalong_sim::Split;
     use tagalong_trials::Episode;
 
@@ -242,6 +275,33 @@ mod tests {
         let table = &tables(&[ride], Split::Test.seeds(0, 1).unwrap())[0];
         let at = table.columns.iter().position(|column| column == "after s").unwrap();
         assert_eq!(table.rows[0].cells[at].value, Some(1.5));
+    }
+
+    /// One sighting of the person with this probability by the log-odds, calibrated or not.
+    fn seen(stated: f64, calibrated: f64) -> Followed {
+        let differences = Differences {
+            torso: None,
+            legs: None,
+            texture: None,
+            vector: None,
+            height_m: 0.0,
+            rivals: None,
+        };
+        let log_odds = (stated / (1.0 - stated)).ln();
+        let like = Likeness { track: TrackId(1), probability: calibrated, log_odds, differences };
+        let ridden = Ridden { likeness: vec![(like, true)], ..Ridden::default() };
+        Followed { ridden, ..Followed::default() }
+    }
+
+    #[test]
+    fn calibrated_probabilities_are_shown_beside_those_before() {
+        let seeds = Split::Test.seeds(0, 1).unwrap();
+        let count = |table: &Table, row: usize| table.rows[row].cells[0].value;
+        let both = tables(&[seen(0.75, 0.45)], seeds);
+        assert_eq!([count(&both[1], 4), count(&both[1], 7)], [Some(1.0), Some(0.0)]);
+        assert_eq!([count(&both[2], 4), count(&both[2], 7)], [Some(0.0), Some(1.0)]);
+        assert!(both[2].title.ends_with("before the calibration"));
+        assert_eq!(tables(&[seen(0.75, 0.75)], seeds).len(), 2, "without a calibration");
     }
 
     fn rides(of: &[(&str, Option<&str>)]) -> Vec<Followed> {
