@@ -86,7 +86,9 @@ fn unpack(packages: &Path, into: &Path) -> Result<Vec<(String, PathBuf)>> {
         if path.extension().is_none_or(|extension| extension != "crate") {
             continue;
         }
-        succeed(Command::new("tar").arg("-xzf").arg(&path).arg("-C").arg(into))?;
+        // With the time of now (`m`): cargo dates all files of packages alike, and would take those
+        // of an earlier run in a folder of the same name for unchanged.
+        succeed(Command::new("tar").arg("-xzmf").arg(&path).arg("-C").arg(into))?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let (name, _) = stem.rsplit_once('-').context("a package has a version in its name")?;
         unpacked.push((name.to_owned(), into.join(&stem)));

@@ -177,7 +177,7 @@ impl TargetLock {
         if !self.settings.remember {
             *self = Self::new(self.settings.clone(), self.describer.clone());
         } else if self.state.follows() {
-            self.lose("the clock jumped");
+            self.lose("the stamps jumped");
         }
         self.last = None;
         self.candidates.clear();

@@ -160,7 +160,7 @@ fn what_stood_beside_the_person_is_another_for_a_minute() {
 fn after_a_jump_of_the_clock_the_person_is_lost_or_chosen_anew() {
     let (mut lock, _) = missed(0);
     lock.reset();
-    assert_eq!((lock.state(), lock.why), (LockState::Lost, "the clock jumped"));
+    assert_eq!((lock.state(), lock.why), (LockState::Lost, "the stamps jumped"));
     assert_eq!(lock.last_seen(), None);
     let mut lock = new_lock(TargetSettings { remember: false, ..settings() });
     steps(&mut lock, 3, &tall(1.6));
