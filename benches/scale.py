@@ -68,8 +68,8 @@ def recorded(program, settings, folder):
 
 def main(program="target/release/tagalong", *configs):
     configs = configs or ("configs/depth-ekf.toml", "configs/joint-particle.toml")
-    print("| pipeline | people | image | length [s] | frames | frame p50 [ms] | p99 | worst | read p50 | processor [ms/frame] |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
+    print("| pipeline | frames | frame p50 [ms] | p99 | worst | read p50 | processor [ms/frame] |")
+    print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         for row in ROWS:
             settings = BASE | row
@@ -78,7 +78,11 @@ def main(program="target/release/tagalong", *configs):
                 frame, read, busy_s = tracked(program, config, log, folder)
                 name = os.path.basename(config).removesuffix(".toml")
                 size = f"{settings['width']}x{settings['height']}"
-                cells = (name, settings["people"], size, settings["length"], frame["frames"])
+                people = f"{settings['people']} {'person' if settings['people'] == 1 else 'people'}"
+                row_name = f"{name}, {people}, {size}"
+                if settings["length"] != BASE["length"]:
+                    row_name += f", {settings['length']} s"
+                cells = (row_name, frame["frames"])
                 times = (frame["p50_ms"], frame["p99_ms"], frame["max_ms"], read["p50_ms"])
                 times = [f"{ms:.2f}" for ms in (*times, 1e3 * busy_s / frame["frames"])]
                 print("| " + " | ".join([*map(str, cells), *times]) + " |", flush=True)

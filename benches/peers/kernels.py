@@ -553,11 +553,11 @@ def main():
                 ours = group.ours()
                 for job, peer, seconds in group.theirs():
                     rounds.setdefault((job, peer), []).append((ours[job], seconds))
-    print("| job | peer | its language | ours | peer's | ratio |")
-    print("|---|---|---|---|---|---|")
+    print("| job, peer | its language | ours | peer's | ratio |")
+    print("|---|---|---|---|---|")
     for (job, peer), (ours, theirs, ratio) in rows(rounds).items():
         times = f"{measured(ours)} | {measured(theirs)} | {ratio:.2f}"
-        print(f"| {job} | {peer} | {language(peer)} | {times} |")
+        print(f"| {job}, beside {peer} | {language(peer)} | {times} |")
 
 
 if len(sys.argv) != 1:

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Prints the table of docs/performance.md: our kernels beside those of other programs, which it
+# Prints the table of benches/notes/performance.md: our kernels beside those of other programs, which it
 # installs into target/peers. With a picture of people, and a log of colour and depth images, it adds
 # the detectors that look at windows. Run it on a machine that does nothing else.
 # Usage, from the folder of the workspace: benches/peers/run.sh [PICTURE [LOG]]

@@ -89,7 +89,7 @@ def compare(title, peers, ours, rounds):
             times.setdefault(name, []).append((ms(), theirs[PEERS[name]]))
     for name, (own, peer, ratio) in rows(times).items():
         job = f"{JOBS[name]}, {title}"
-        print(f"| {job} | OpenCV, all windows | C++ | {own:.2f} ms | {peer:.2f} ms | {ratio:.2f} |")
+        print(f"| {job}, beside OpenCV, all windows | C++ | {own:.2f} ms | {peer:.2f} ms | {ratio:.2f} |")
 
 
 def all_windows(picture, folder):
