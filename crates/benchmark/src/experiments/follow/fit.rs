@@ -86,7 +86,7 @@ fn term(weight: f64, offset: f64) -> [f64; 2] {
 }
 
 fn rounded(value: f64) -> f64 {
-    (1e3 * value).round() * 1e-3
+    (1e3 * value).round() / 1e3
 }
 
 /// Returns the settings as lines for a config.
