@@ -95,6 +95,16 @@ pub const STEREO_SVM_EKF: System = System {
             run: turntable::depth,
         },
         Experiment {
+            name: "background",
+            about: "Section II-A: the printed comparison by the percentile of the background",
+            run: turntable::background,
+        },
+        Experiment {
+            name: "boundary-points",
+            about: "Section II-B: time of the search with and without three boundary points",
+            run: times::boundary_points,
+        },
+        Experiment {
             name: "ladder",
             about: "not in the paper: printed, corrected and best on the same scenes",
             run: ladder::ladder,

@@ -121,7 +121,11 @@ pub fn with(contender: &Contender, set: &[(&str, f64)]) -> Result<Contender, Rep
     replaced(contender, set.iter().map(|(key, number)| (*key, Value::from(*number))))
 }
 
-fn replaced<'a>(
+/// Returns the contender with values replaced.
+///
+/// # Errors
+/// As [`Variant::contender`].
+pub fn replaced<'a>(
     contender: &Contender,
     set: impl Iterator<Item = (&'a str, Value)>,
 ) -> Result<Contender, ReproduceError> {
