@@ -1,6 +1,8 @@
 //! Figures of several draws of a scene, with their intervals over draws.
 
-use tagalong_eval::{Scores, Tally, draws_interval, mean_interval, paired_gain};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use tagalong_eval::{Scores, Tally, draws_interval, mean_interval};
+use tagalong_math::{Gain, mean_and_deviation, paired_gain};
 
 use crate::Cell;
 
@@ -30,10 +32,30 @@ pub(crate) fn over_draws(draws: &[Vec<f64>], digits: usize) -> Cell {
 
 /// Returns the mean difference of draws to those of a rival, with its interval over draws.
 pub(crate) fn difference(rival: &[Vec<f64>], draws: &[Vec<f64>], digits: usize) -> Cell {
+    Cell::estimate(paired(rival, draws).map(|gain| gain.difference), digits)
+}
+
+/// Returns the mean difference of draws to those of a rival, with its p-value; `None` without a draw
+/// in which both have values.
+pub(crate) fn paired(rival: &[Vec<f64>], draws: &[Vec<f64>]) -> Option<Gain> {
     let both = rival.iter().zip(draws).filter(|(a, b)| !a.is_empty() && !b.is_empty());
     let (a, b): (Vec<f64>, Vec<f64>) = both.map(|(a, b)| (mean(a), mean(b))).unzip();
-    let gain = paired_gain(&a, &b);
-    Cell::estimate(gain.map(|gain| gain.difference), digits)
+    paired_gain(&a, &b)
+}
+
+/// Returns the two-sided p-value of Student's t-test of two samples with the same variance, which
+/// takes all values to be independent; `None` for fewer than two values or without spread.
+pub(crate) fn unpaired_p(a: &[f64], b: &[f64]) -> Option<f64> {
+    let (mean_a, deviation_a) = mean_and_deviation(a)?;
+    let (mean_b, deviation_b) = mean_and_deviation(b)?;
+    let freedom = (a.len() + b.len()).checked_sub(2).filter(|freedom| *freedom > 0)? as f64;
+    let squares = deviation_a.powi(2) * a.len() as f64 + deviation_b.powi(2) * b.len() as f64;
+    let error = (squares / freedom * (1.0 / a.len() as f64 + 1.0 / b.len() as f64)).sqrt();
+    if error <= 0.0 {
+        return None;
+    }
+    let t = (mean_a - mean_b) / error;
+    Some(2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t.abs()))
 }
 
 /// Returns a score of the tallies of all draws together, with its interval over draws.
@@ -50,6 +72,15 @@ pub(crate) fn pooled(draws: &[&Tally], digits: usize, score: fn(&Scores) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// t = -2.5949 with seven degrees of freedom; p by numerical integration of the density.
+    #[test]
+    fn the_unpaired_test_is_that_of_student() {
+        let p = unpaired_p(&[1.0, 2.0, 3.0, 4.0], &[3.0, 4.0, 6.0, 7.0, 8.0]).unwrap();
+        assert!((p - 0.035_687).abs() < 1e-5, "{p}");
+        assert_eq!(unpaired_p(&[1.0], &[1.0]), None);
+        assert_eq!(unpaired_p(&[1.0, 1.0], &[1.0, 1.0]), None);
+    }
 
     #[test]
     fn draws_count_alike_however_long_they_are() {
