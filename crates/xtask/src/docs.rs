@@ -11,9 +11,11 @@
 //! become stale. Slow parts, the tables of `tagalong-papers`, `follow` and `bench`, are filled only on
 //! request, and their sources are noted (see [`figures`]).
 
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::accuracy;
 use crate::faults;
@@ -71,6 +73,31 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
         figures::note(workspace, &all, is_printed)?;
     }
     Ok(())
+}
+
+/// Fills the one part whose command contains `part` with a file that the command printed elsewhere.
+pub fn fill_from(workspace: &Workspace, part: &str, file: &Path) -> Result<()> {
+    let text = fs::read_to_string(file).with_context(|| file.display().to_string())?;
+    ensure!(text.contains("| --- |"), "{} has no table", file.display());
+    let all = slow_parts(workspace)?;
+    let commands: BTreeSet<&str> =
+        all.iter().map(|one| one.command.as_str()).filter(|it| it.contains(part)).collect();
+    let named: Vec<&str> = commands.into_iter().collect();
+    ensure!(
+        named.len() == 1,
+        "`{part}` is in {} commands, and one is to be filled: {}",
+        named.len(),
+        named.join("; ")
+    );
+    for document in documents(workspace)? {
+        let print = |_: &str| Ok(text.trim().to_owned());
+        let filled = filled(&document.text, |command| command == named[0], print)?;
+        if filled != document.text {
+            workspace.write(&document.path, &filled)?;
+            eprintln!("docs: {} is filled from {}", document.path.display(), file.display());
+        }
+    }
+    figures::note(workspace, &slow_parts(workspace)?, |one| one.command == named[0])
 }
 
 /// Prints a line for each slow table that is older than its sources.

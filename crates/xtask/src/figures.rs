@@ -269,6 +269,25 @@ mod tests {
         assert_eq!(names(&workspace, &printed), all);
     }
 
+    /// A table that another machine printed is filled in, and is as new as its sources.
+    #[test]
+    fn a_table_printed_elsewhere_is_filled_in_and_noted() {
+        let folder = tempfile::tempdir().unwrap();
+        let workspace = workspace(&folder);
+        let begin = "<!-- begin: tagalong follow configs/best.toml -->";
+        workspace.write(PAGE, &format!("a\n{begin}\nold\n<!-- end -->\n")).unwrap();
+        let file = folder.path().join("printed.md");
+        std::fs::write(&file, "nothing\n").unwrap();
+        assert!(crate::docs::fill_from(&workspace, "best", &file).is_err(), "no table");
+        std::fs::write(&file, "| a |\n| --- |\n| walk |\n").unwrap();
+        let error = crate::docs::fill_from(&workspace, "other", &file).unwrap_err().to_string();
+        assert!(error.contains("in 0 commands"), "{error}");
+        crate::docs::fill_from(&workspace, "best", &file).unwrap();
+        let page = workspace.read(PAGE).unwrap();
+        assert!(page.contains("| walk |\n\n<!-- end -->") && !page.contains("old"), "{page}");
+        assert_eq!(crate::docs::stale_tables(&workspace).unwrap(), [""; 0]);
+    }
+
     #[test]
     fn a_table_names_the_sources_that_it_is_older_than() {
         let folder = tempfile::tempdir().unwrap();

@@ -48,6 +48,10 @@ enum Command {
         /// instead of the fast ones.
         #[arg(long, value_name = "PART")]
         slow: Option<String>,
+        /// Fill the one part that `--slow` names with this file, which its command printed
+        /// elsewhere, instead of running the command.
+        #[arg(long, value_name = "FILE", requires = "slow")]
+        printed: Option<PathBuf>,
         /// List the tables of slow commands that are older than a config, a model or the simulator
         /// that they were printed from, instead.
         #[arg(long, conflicts_with = "slow")]
@@ -120,6 +124,9 @@ fn run(command: Command) -> Result<()> {
         }
         Command::NewPlugin(_) => try_out::try_out(&workspace),
         Command::Docs { stale: true, .. } => docs::list_stale_tables(&workspace),
+        Command::Docs { slow: Some(part), printed: Some(file), .. } => {
+            docs::fill_from(&workspace, &part, &file)
+        }
         Command::Docs { slow, .. } => docs::fill(&workspace, slow.as_deref()),
         Command::Faults { rows } => {
             let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
