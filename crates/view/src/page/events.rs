@@ -48,6 +48,7 @@ pub struct Watch {
     courses: BTreeMap<u32, Course>,
     target: Option<u32>,
     lock: Option<String>,
+    motion: Option<String>,
 }
 
 impl Watch {
@@ -72,6 +73,7 @@ impl Watch {
             self.tell(at, "target", moment.target, text);
         }
         self.compare_lock(at, moment);
+        self.compare_motion(at, moment);
     }
 
     /// Tells a change of the target lock's state with its cause.
@@ -81,6 +83,23 @@ impl Watch {
         if before.is_some_and(|before| before != drive.lock) {
             let text = format!("{}: {}; {}", drive.lock, drive.lock_about, drive.why);
             self.tell(at, "lock", moment.target, text);
+        }
+    }
+
+    /// Tells why the robot stands, drives slower, or drives again.
+    fn compare_motion(&mut self, at: usize, moment: &Moment) {
+        let Some(drive) = &moment.notes.drive else { return };
+        let kind = match drive.motion.as_str() {
+            "stands" => "stands",
+            "slower" => "slower",
+            "drives" => "drives",
+            _ => return,
+        };
+        // Two causes in a row for which it stands are two events.
+        let now = if kind == "drives" { kind } else { drive.reason.as_str() };
+        if self.motion.as_deref() != Some(now) {
+            self.motion = Some(now.to_owned());
+            self.tell(at, kind, None, drive.reason_about.clone());
         }
     }
 
@@ -186,6 +205,29 @@ mod tests {
         let expected =
             ["person 1 is tracked", "person 1 is followed from now on", "the target is lost"];
         assert_eq!(texts, expected);
+    }
+
+    #[test]
+    fn the_causes_of_stops_and_slow_downs_are_told_once_each() {
+        let of = |motion: &str, reason: &str| {
+            let mut moment = moment(&[]);
+            let drive =
+                DriveNote { motion: motion.into(), reason: reason.into(), ..DriveNote::default() };
+            moment.notes.drive = Some(drive);
+            moment
+        };
+        let moments = [
+            of("drives", "follow"),
+            of("drives", "limited"),
+            of("slower", "near"),
+            of("stands", "blocked"),
+            of("stands", "blocked"),
+            of("stands", "too-close"),
+        ];
+        let all: Vec<Option<&Moment>> = moments.iter().map(Some).collect();
+        let told = of_run(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5], &all);
+        let kinds: Vec<_> = told.iter().map(|event| (event.i, event.kind)).collect();
+        assert_eq!(kinds, [(0, "drives"), (2, "slower"), (3, "stands"), (5, "stands")]);
     }
 
     #[test]
