@@ -87,7 +87,7 @@ pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
     }
     // Links are relative, so that the folder can be moved; a list elsewhere names the whole path.
     let from = if args.output.is_some() { Some(folder.as_path()) } else { None };
-    write_file(&index, &list(folder, from, &rides))?;
+    write_file(&index, list(folder, from, &rides))?;
     print(&format!(
         "{}: {} rides, the worst first, each with its page\nopen it in a browser; it needs no network\n",
         index.display(),

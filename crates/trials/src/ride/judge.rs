@@ -403,7 +403,7 @@ mod tests {
 
     #[test]
     fn a_steady_speed_has_no_jerk_and_a_sudden_stop_has() {
-        let clearance = tagalong_sim::Clearance { people_m: 1.0, things_m: 1.0 };
+        let clearance = Clearance { people_m: 1.0, things_m: 1.0 };
         let ride = |speed: &dyn Fn(usize) -> f64| -> Vec<Tick> {
             let tick = |i: usize| Tick {
                 at_s: i as f64 * 0.02,

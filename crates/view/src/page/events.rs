@@ -8,6 +8,9 @@ use crate::page::moment::Moment;
 /// Time without evidence from which on a person counts as lost, s.
 const LOST_AFTER_S: f64 = 0.5;
 
+/// Time after which a cause of a stop or of a lower speed that returns is another event, s.
+const SAME_CAUSE_S: f64 = 2.0;
+
 /// Course of one person so far.
 #[derive(Clone, Copy, Debug)]
 struct Course {
@@ -48,7 +51,10 @@ pub struct Watch {
     courses: BTreeMap<u32, Course>,
     target: Option<u32>,
     lock: Option<String>,
-    motion: Option<String>,
+    /// Times at which each cause of a stop or of a lower speed held last, s.
+    causes: BTreeMap<String, f64>,
+    /// True if the robot stood and did not drive since then.
+    stood: bool,
 }
 
 impl Watch {
@@ -73,7 +79,7 @@ impl Watch {
             self.tell(at, "target", moment.target, text);
         }
         self.compare_lock(at, moment);
-        self.compare_motion(at, moment);
+        self.compare_motion(at, t_s, moment);
     }
 
     /// Tells a change of the target lock's state with its cause.
@@ -86,19 +92,21 @@ impl Watch {
         }
     }
 
-    /// Tells why the robot stands, drives slower, or drives again.
-    fn compare_motion(&mut self, at: usize, moment: &Moment) {
+    /// Tells why the robot stands or drives slower, and that it drives again after a stop. A cause that
+    /// comes and goes from frame to frame is told once.
+    fn compare_motion(&mut self, at: usize, t_s: f64, moment: &Moment) {
         let Some(drive) = &moment.notes.drive else { return };
         let kind = match drive.motion.as_str() {
             "stands" => "stands",
             "slower" => "slower",
-            "drives" => "drives",
+            "drives" if std::mem::take(&mut self.stood) => {
+                return self.tell(at, "drives", None, "the robot drives again".to_owned());
+            }
             _ => return,
         };
-        // Two causes in a row for which it stands are two events.
-        let now = if kind == "drives" { kind } else { drive.reason.as_str() };
-        if self.motion.as_deref() != Some(now) {
-            self.motion = Some(now.to_owned());
+        let is_new_stop = kind == "stands" && !std::mem::replace(&mut self.stood, true);
+        let before = self.causes.insert(drive.reason.clone(), t_s);
+        if is_new_stop || before.is_none_or(|before_s| t_s - before_s > SAME_CAUSE_S) {
             self.tell(at, kind, None, drive.reason_about.clone());
         }
     }
@@ -218,16 +226,17 @@ mod tests {
         };
         let moments = [
             of("drives", "follow"),
+            of("slower", "near"),
             of("drives", "limited"),
             of("slower", "near"),
             of("stands", "blocked"),
-            of("stands", "blocked"),
             of("stands", "too-close"),
+            of("drives", "follow"),
         ];
         let all: Vec<Option<&Moment>> = moments.iter().map(Some).collect();
-        let told = of_run(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5], &all);
+        let told = of_run(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6], &all);
         let kinds: Vec<_> = told.iter().map(|event| (event.i, event.kind)).collect();
-        assert_eq!(kinds, [(0, "drives"), (2, "slower"), (3, "stands"), (5, "stands")]);
+        assert_eq!(kinds, [(1, "slower"), (4, "stands"), (5, "stands"), (6, "drives")]);
     }
 
     #[test]

@@ -405,7 +405,7 @@
   // Pixels: the row of one person, and the bar of the command above them.
   const ROW = 13;
   const LEAST_ROW = 4;
-  const LETTERS_ROW = 8;
+  const LETTERS_ROW = 7;
   const COMMAND = 8;
 
   const lifeMarks = (life, number, y, row) => {
@@ -425,7 +425,7 @@
     const rows = Math.max(1, ...lives.map((life) => life.lane + 1));
     const motions = motionsOf(run);
     const top = motions.length ? COMMAND + 2 : 0;
-    const room = (innerHeight < 800 ? 60 : 100) / data.runs.length;
+    const room = (innerHeight < 800 ? 60 : 100) * (data.runs.length > 1 ? 0.75 : 1);
     const row = Math.max(LEAST_ROW, Math.min(ROW, (room - top) / rows));
     const height = top + row * rows + 5;
     target.setAttribute("viewBox", `0 0 ${widths[number]} ${height}`);

@@ -8,7 +8,7 @@ use tagalong_sim::{Event, Scene, Simulation};
 use tagalong_simulate::Recorder;
 use tagalong_trials::{Ridden, SimulatedFrame, Tick, TrialError, Witness};
 
-use super::RideBar;
+use super::ride_bar::RideBar;
 use super::run_files::RunFiles;
 
 /// Writer of a ride's log and of its folder, as far as they are requested; it ends early at a stop

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub use approaches::{ApproachFaults, ApproachLaser};
 use clap::Args;
 use log::RideLog;
-use ride_bar::{RideBar, RidesBar};
+use ride_bar::RidesBar;
 use run_files::{RunFiles, folder_name};
 use serde::Serialize;
 use tagalong_app::config_file::ConfigFile;
