@@ -1,11 +1,13 @@
 //! Notes of a run on one frame: every candidate with its place and its fate, and the tests that
 //! dropped others. They are what a page needs to say why a person was missed.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Isometry2, Point3};
 use serde::{Deserialize, Serialize};
-use tagalong_core::Funnel;
+use tagalong_core::{Funnel, Reason};
 use tagalong_geometry::{Camera, Rect};
-use tagalong_pipeline::{Candidate, Fate, FrameReport};
+use tagalong_pipeline::{Candidate, Fate, FrameReport, ObstaclePoint};
 
 /// Topic of the notes in `tracks.mcap`, one JSON text per frame.
 pub const FRAME_NOTES_TOPIC: &str = "/people/frames_json";
@@ -53,7 +55,19 @@ pub struct DriveNote {
     pub forward_mps: f64,
     /// Commanded rate of turn, to the left, rad/s.
     pub turn_rps: f64,
+    /// `drives` as the controller asks, `slower`, or `stands`; empty in runs of earlier versions.
+    #[serde(default)]
+    pub motion: String,
+    /// Places of things that stand, in the odometry frame, cm, x and y in turn.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub things_cm: Vec<i32>,
+    /// Places of people and of things that move, in the odometry frame, cm, x and y in turn.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub movers_cm: Vec<i32>,
 }
+
+/// Side of the cells in which places of obstacles are noted, cm.
+const CELL_CM: i32 = 10;
 
 /// Detection with its fate.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -115,13 +129,13 @@ impl FrameNotes {
                 .collect(),
             dropped: dropped(&report.funnel),
             ended: report.ended.iter().map(|id| id.0).collect(),
-            drive: DriveNote::of(report),
+            drive: DriveNote::of(report, odom_from_robot),
         }
     }
 }
 
 impl DriveNote {
-    fn of(report: &FrameReport) -> Option<Self> {
+    fn of(report: &FrameReport, odom_from_robot: &Isometry2<f64>) -> Option<Self> {
         let lock = report.lock.as_ref()?;
         let command = report.command?;
         Some(Self {
@@ -134,8 +148,35 @@ impl DriveNote {
             reason_about: command.reason.about().to_owned(),
             forward_mps: rounded(command.twist.linear_mps, 1e3),
             turn_rps: rounded(command.twist.angular_rps, 1e3),
+            motion: motion(command.reason).to_owned(),
+            things_cm: cells_cm(&report.obstacles, false, odom_from_robot),
+            movers_cm: cells_cm(&report.obstacles, true, odom_from_robot),
         })
     }
+}
+
+/// Returns the effect of a command's reason in one word.
+fn motion(reason: Reason) -> &'static str {
+    if !reason.moves() {
+        return "stands";
+    }
+    // Limits of speed and acceleration apply in every ride; they say nothing about its surroundings.
+    if matches!(reason, Reason::Follow | Reason::Limited) { "drives" } else { "slower" }
+}
+
+/// Returns the middles of the cells with obstacles that move, or that stand, each once.
+fn cells_cm(
+    obstacles: &[ObstaclePoint],
+    moves: bool,
+    odom_from_robot: &Isometry2<f64>,
+) -> Vec<i32> {
+    let mut cells = BTreeSet::new();
+    for obstacle in obstacles.iter().filter(|obstacle| obstacle.moves == moves) {
+        let at = odom_from_robot * obstacle.at;
+        let cell = [at.x, at.y].map(|m| (100.0 * m / f64::from(CELL_CM)).floor() as i32);
+        cells.insert(cell);
+    }
+    cells.into_iter().flatten().map(|cell| cell * CELL_CM + CELL_CM / 2).collect()
 }
 
 impl CandidateNote {
@@ -181,7 +222,7 @@ fn rounded(value: f64, parts: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, Vector2};
+    use nalgebra::{Matrix3, Point2, Vector2};
     use tagalong_core::{Detection, Stamp, TrackId};
     use tagalong_geometry::{Distortion, Pinhole};
 
@@ -224,6 +265,21 @@ mod tests {
         assert_eq!(notes.dropped[0].boxes_px, [[1.0, 2.0, 3.0, 4.0]]);
         assert_eq!((notes.dropped[1].count, notes.dropped[1].boxes_px.len()), (5, 0));
         assert_eq!(notes.ended, [2]);
+    }
+
+    #[test]
+    fn obstacles_are_noted_by_cell_in_the_odometry_frame() {
+        let point = |x: f64, moves| ObstaclePoint { at: Point2::new(x, 0.02), moves };
+        let obstacles = [point(1.01, false), point(1.06, false), point(2.0, true)];
+        let turned = Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2);
+        assert_eq!(cells_cm(&obstacles, false, &turned), [95, 105], "two readings of one cell");
+        assert_eq!(cells_cm(&obstacles, true, &turned), [95, 205]);
+    }
+
+    #[test]
+    fn a_command_drives_is_slower_or_stands() {
+        let words = [Reason::Limited, Reason::Near, Reason::Stopping, Reason::Blocked].map(motion);
+        assert_eq!(words, ["drives", "slower", "slower", "stands"]);
     }
 
     #[test]

@@ -32,7 +32,7 @@ mod steering;
 mod target_lock;
 
 pub use collision_monitor::{
-    CollisionMonitorSettings, NoReturn, ObstacleSource, SourceKind, SourceSettings,
+    CollisionMonitorSettings, NoReturn, ObstaclePoint, ObstacleSource, SourceKind, SourceSettings,
 };
 pub use command_limiter::{CommandLimiterSettings, Orders};
 pub use distances::{BlindZone, SafetyDistances};

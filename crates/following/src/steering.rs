@@ -11,7 +11,7 @@ use crate::skill::{View, before_any_frame};
 use crate::target_lock::{Search, TargetLock};
 use crate::{
     Base, ChoiceRule, Enrollment, EnrollmentError, FollowSettings, FollowStatus, LockReport,
-    LockState, Orders, RobotSettings, SearchSettings, TargetSettings,
+    LockState, ObstaclePoint, Orders, RobotSettings, SearchSettings, TargetSettings,
 };
 
 /// Frames that must be processed after a reset before the robot may move.
@@ -43,6 +43,8 @@ pub struct Steered {
     pub target: Option<TrackId>,
     /// The state of the target lock.
     pub lock: LockReport,
+    /// Places that the collision monitor counted.
+    pub obstacles: Vec<ObstaclePoint>,
 }
 
 impl Steering {
@@ -199,7 +201,7 @@ impl Steering {
         let view = View::new(tracks, &frame.camera, frame.stamp);
         self.status = view.status(&lock, target, command.reason.name(), self.fault());
         self.view = Some(view);
-        Ok(Steered { command, target, lock })
+        Ok(Steered { command, target, lock, obstacles: self.monitor.obstacles() })
     }
 
     fn ask(

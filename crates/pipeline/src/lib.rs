@@ -110,9 +110,10 @@ pub use settings::{PipelineSettings, PluginSettings};
 pub use sources::{MissingSource, Sources};
 pub use tagalong_following::{
     Base, BlindZone, Choice, ChoiceRule, CollisionMonitorSettings, CommandLimiterSettings,
-    Differences, Enable, EnableSwitch, Enrollment, EnrollmentError, FollowStatus, Likeness,
-    LockReport, LockState, LooksSettings, ObstacleSource, OdometrySource, Orders, Permission,
-    RobotSettings, SafetyDistances, SearchSettings, SourceKind, SourceSettings, TargetSettings,
+    Differences, Enable, EnableSwitch, Enrollment, EnrollmentError, FollowSettings, FollowStatus,
+    Likeness, LockReport, LockState, LooksSettings, ObstaclePoint, ObstacleSource, OdometrySource,
+    Orders, Permission, RobotSettings, SafetyDistances, SearchSettings, SourceKind, SourceSettings,
+    TargetSettings,
 };
 pub use tagalong_stereo::StereoSettings;
 pub use tagalong_tracking::StepError;

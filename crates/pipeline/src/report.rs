@@ -1,7 +1,7 @@
 use tagalong_core::{Command, EgoMotion, Funnel, Stamp, Track, TrackId, Visualisation};
 use tagalong_tracking::{Candidate, Outcome, TrackingReport, Weighing};
 
-use crate::LockReport;
+use crate::{LockReport, ObstaclePoint};
 
 /// Result of one frame: the [`TrackingReport`] and, where the pipeline has a controller, the target
 /// and the command.
@@ -31,6 +31,9 @@ pub struct FrameReport {
     /// Command for the wheels with its reason, where the pipeline has a controller: its wish within
     /// all limits, zero without a target.
     pub command: Option<Command>,
+    /// Places that the collision monitor counts as obstacles, where the pipeline has a controller;
+    /// those of the followed person are left out.
+    pub obstacles: Vec<ObstaclePoint>,
     /// Normalised innovation squared and its degrees of freedom.
     pub nis: Vec<(TrackId, f64, u32)>,
     /// Likelihood evaluations of the frame.
@@ -70,6 +73,7 @@ impl From<TrackingReport> for FrameReport {
             target: None,
             lock: None,
             command: None,
+            obstacles: Vec::new(),
             nis,
             weighing,
             visualisation,

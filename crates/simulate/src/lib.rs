@@ -14,7 +14,7 @@ use std::thread;
 
 use clap::Args;
 use indicatif::ProgressBar;
-pub use record::Recorder;
+pub use record::{CAMERA_FRAME, Recorder, log_stamp};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_app::signals::Signals;

@@ -23,7 +23,8 @@ use tagalong_sim::{
 /// Start time of every simulated log.
 const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
 const LASER_FRAME: &str = "laser";
-const CAMERA_FRAME: &str = "camera_color_optical_frame";
+/// Frame of the camera.
+pub const CAMERA_FRAME: &str = "camera_color_optical_frame";
 /// Joints of the wheel encoders, left and right.
 const WHEEL_JOINTS: [&str; 2] = ["left_wheel_joint", "right_wheel_joint"];
 /// JPEG quality that cameras of robots use.
@@ -110,7 +111,7 @@ impl Recorder {
         captured_ns: u64,
         report: &T,
     ) -> Result<(), WriteError> {
-        self.log.send_json(PURSUIT_TOPIC, after(captured_ns), report)
+        self.log.send_json(PURSUIT_TOPIC, log_stamp(captured_ns), report)
     }
 
     /// Completes the file.
@@ -122,15 +123,15 @@ impl Recorder {
     }
 
     fn odometry(&mut self, reading: &OdometryReading) -> Result<(), WriteError> {
-        let at = after(reading.at_ns);
+        let at = log_stamp(reading.at_ns);
         self.log.send("/cmd_vel", at, &command(reading))?;
         self.log.send("/joint_states", at, &wheels(reading))?;
         self.log.send("/odom", at, &odometry(reading))
     }
 
     fn shot(&mut self, shot: &Shot) -> Result<(), WriteError> {
-        let captured = after(shot.stamp_ns);
-        let recorded = after(shot.recorded_ns);
+        let captured = log_stamp(shot.stamp_ns);
+        let recorded = log_stamp(shot.recorded_ns);
         let header = Header::new(captured, CAMERA_FRAME);
         self.describe(recorded, &shot.camera)?;
         let images = &shot.images;
@@ -145,8 +146,8 @@ impl Recorder {
         if let Some(depth) = &images.depth {
             // Depth has a capture time of its own, and cannot be recorded before it.
             let offset_ns = shot.depth_ns.saturating_sub(shot.stamp_ns);
-            let recorded = recorded.max(after(shot.captured_ns + offset_ns));
-            let header = Header::new(after(shot.depth_ns), CAMERA_FRAME);
+            let recorded = recorded.max(log_stamp(shot.captured_ns + offset_ns));
+            let header = Header::new(log_stamp(shot.depth_ns), CAMERA_FRAME);
             self.info("aligned_depth_to_color", recorded, &header, 0.0)?;
             self.depth(recorded, &header, depth)?;
         }
@@ -163,8 +164,8 @@ impl Recorder {
     /// Writes a reading of a further sensor of obstacles under the topic of its kind and name.
     fn sensor(&mut self, reading: &SensorReading) -> Result<(), WriteError> {
         let name: &str = &reading.name;
-        let at = after(reading.at_ns);
-        let stamp = after(reading.stamp_ns);
+        let at = log_stamp(reading.at_ns);
+        let stamp = log_stamp(reading.stamp_ns);
         match &reading.data {
             SensorData::Scan { scanner, ranges } => {
                 let message = scan(Header::new(stamp, name), &scanner.laser(), ranges);
@@ -192,7 +193,7 @@ impl Recorder {
 
     fn webcam(&mut self, shot: &WebcamShot) -> Result<(), WriteError> {
         let Some(camera) = self.webcams.get(shot.webcam) else { return Ok(()) };
-        let at = after(shot.captured_ns);
+        let at = log_stamp(shot.captured_ns);
         let header = Header::new(at, webcam_frame(shot.webcam));
         let topic = format!("/webcam_{}", shot.webcam + 1);
         if let Some(info) = info(camera, &header, 0.0) {
@@ -266,7 +267,8 @@ fn webcam_frame(index: usize) -> String {
     format!("webcam_{}_optical_frame", index + 1)
 }
 
-fn after(start_ns: u64) -> Stamp {
+/// Returns the stamp in a simulated log of a time since the start, ns.
+pub fn log_stamp(start_ns: u64) -> Stamp {
     Stamp::from_nanos(EPOCH.nanos() + start_ns)
 }
 
@@ -343,7 +345,7 @@ fn true_robot(captured: Stamp, world_from_robot: &Isometry2<f64>) -> PoseStamped
 
 fn odometry(reading: &OdometryReading) -> Odometry {
     let mut odometry = Odometry {
-        header: Header::new(after(reading.stamp_ns), "odom"),
+        header: Header::new(log_stamp(reading.stamp_ns), "odom"),
         child_frame_id: "base_link".into(),
         ..Odometry::default()
     };
@@ -355,7 +357,7 @@ fn odometry(reading: &OdometryReading) -> Odometry {
 
 fn wheels(reading: &OdometryReading) -> JointState {
     JointState {
-        header: Header::new(after(reading.stamp_ns), "base_link"),
+        header: Header::new(log_stamp(reading.stamp_ns), "base_link"),
         name: WHEEL_JOINTS.map(String::from).to_vec(),
         position: reading.encoders.map(|encoder| encoder.angle_rad).to_vec(),
         velocity: reading.encoders.map(|encoder| encoder.rate_rad_s).to_vec(),
@@ -365,7 +367,7 @@ fn wheels(reading: &OdometryReading) -> JointState {
 
 fn command(reading: &OdometryReading) -> TwistStamped {
     let mut command = TwistStamped {
-        header: Header::new(after(reading.at_ns), "base_link"),
+        header: Header::new(log_stamp(reading.at_ns), "base_link"),
         ..TwistStamped::default()
     };
     command.twist.linear.x = reading.commanded_mps;

@@ -6,6 +6,7 @@ use crate::page::data::RunData;
 use crate::page::events;
 use crate::page::frame::{frame_data, tests};
 use crate::page::moment::Moment;
+use crate::page::robot::robot_data;
 use tagalong_app::remedies::Remedies;
 
 use crate::recording::Recording;
@@ -36,6 +37,7 @@ pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData
         events: events::of_run(&times(stamps), &moments),
         tests: tests(moments.iter().flatten().map(|moment| &moment.notes), &run.config, remedies),
         hits: None,
+        robot: robot_data(&run.config),
     }
 }
 

@@ -12,6 +12,7 @@ mod live;
 mod page;
 mod pictures;
 mod recording;
+mod rides;
 mod truth;
 
 use std::path::{Path, PathBuf};
@@ -26,19 +27,19 @@ use tagalong_config::Registry;
 
 use crate::assemble::{run_data, stamps, times};
 use crate::film::Film;
-use crate::recording::{Recording, Span, Window};
+use crate::recording::{Recording, RideFacts, Span, Window};
 use crate::truth::PageTruth;
 
 pub use crate::live::{Live, parse_address};
 
 /// Arguments of `tagalong view`.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct ViewArgs {
-    /// Folder of the run.
+    /// Folder of the run, of a ride, or of many rides.
     pub run: PathBuf,
     /// Folder of another run over the same log, shown beside the first.
     pub other: Option<PathBuf>,
-    /// The page [default: view.html in the folder of the run].
+    /// The page [default: view.html in the folder of the run; index.html for many rides].
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Replace an existing page.
@@ -57,9 +58,9 @@ pub struct ViewArgs {
     #[arg(long, value_name = "S")]
     pub to: Option<f64>,
     /// Size of the page, in megabytes: images become smaller, and frames are left out evenly where
-    /// that does not suffice.
-    #[arg(long, value_name = "MB", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub max_mb: u32,
+    /// that does not suffice [default: 25; 6 for each of many rides].
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub max_mb: Option<u32>,
     /// Write an animation (GIF) of the pictures of `run --overlay` instead of the page.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["other", "output", "log", "truth"])]
     pub animation: Option<PathBuf>,
@@ -75,14 +76,33 @@ pub struct ViewArgs {
 /// track takes half a kilobyte.
 const FRAMES_PER_MB: usize = 2000;
 
+/// Size of the page of a run, MB.
+const PAGE_MB: u32 = 25;
+
+/// Name of the page in the folder of a run.
+const PAGE: &str = "view.html";
+
 impl ViewArgs {
     fn folders(&self) -> impl Iterator<Item = &PathBuf> {
         [Some(&self.run), self.other.as_ref()].into_iter().flatten()
     }
 
+    /// Reads the runs, which are of one log.
+    fn recordings(&self) -> Result<Vec<Recording>, Failure> {
+        let window = self.window()?;
+        let read = self.folders().map(|folder| Recording::read(folder, &window));
+        let runs: Vec<Recording> = read.collect::<Result<_, _>>()?;
+        check_same_log(&runs)?;
+        Ok(runs)
+    }
+
     fn window(&self) -> Result<Window, Failure> {
         let span = Span { from_s: self.from, to_s: self.to };
-        Window::of(self.folders(), span, self.max_mb as usize * FRAMES_PER_MB)
+        Window::of(self.folders(), span, self.megabytes() * FRAMES_PER_MB)
+    }
+
+    fn megabytes(&self) -> usize {
+        self.max_mb.unwrap_or(PAGE_MB) as usize
     }
 }
 
@@ -96,6 +116,7 @@ Examples:
   tagalong run robot.mcap && tagalong view runs/robot-depth-verified
   tagalong view runs/robot-depth-verified runs/robot-depth-ekf -o compare.html
   tagalong view runs/robot-depth-verified --from 30 --to 60 --max-mb 50
+  tagalong follow configs/follow-depth.toml -o rides && tagalong view rides
   tagalong view runs/robot-depth-verified --log /data/robot.mcap --truth robot.people.csv
   tagalong view runs/robot-depth-verified --from 30 --to 36 --animation clip.gif    (after run --overlay)";
 
@@ -108,13 +129,15 @@ pub fn view(args: &ViewArgs, registry: &Registry) -> Outcome {
     if let Some(file) = &args.animation {
         return clip::write(args, file);
     }
-    let output = args.output.clone().unwrap_or_else(|| args.run.join("view.html"));
-    let window = args.window()?;
-    let runs: Vec<Recording> =
-        args.folders().map(|folder| Recording::read(folder, &window)).collect::<Result<_, _>>()?;
-    check_same_log(&runs)?;
+    let remedies = Remedies::new(registry);
+    if rides::is_folder_of_rides(&args.run) {
+        return rides::view_rides(args, &remedies);
+    }
+    let args = ViewArgs { run: rides::run_of(&args.run), ..args.clone() };
+    let output = args.output.clone().unwrap_or_else(|| args.run.join(PAGE));
+    let runs = args.recordings()?;
     spare(&output, args.overwrite)?;
-    let page = Page::of(&runs, args, &Remedies::new(registry))?;
+    let page = Page::of(&runs, &args, &remedies)?;
     write_file(&output, &page.text)?;
     let shown = output.display();
     let megabytes = page.text.len() as f64 / 1e6;
@@ -150,7 +173,7 @@ impl Page {
         if all.is_empty() {
             return Err(Failure::usage("no frame lies between --from and --to"));
         }
-        let budget = args.max_mb as usize * 1_000_000;
+        let budget = args.megabytes() * 1_000_000;
         let (stamps, run_data) = thinned(runs, all, budget / 2, remedies, &mut notes);
         let mut data = PageData {
             t: times(&stamps),
@@ -176,7 +199,9 @@ fn heading(runs: &[Recording], data: &PageData, notes: &[String]) -> Heading {
         let folder = run.folder.display();
         format!("{name}: {frames} frames, {}, from {folder}", run.report.ended)
     });
-    Heading { log, runs: described.collect(), notes: notes.to_vec() }
+    let rides = runs.iter().filter_map(|run| run.report.ride.as_ref());
+    let lines = described.chain(rides.map(RideFacts::summary)).collect();
+    Heading { log, runs: lines, notes: notes.to_vec() }
 }
 
 /// Returns the frames of the runs, every second or third where all would be too long.

@@ -86,6 +86,66 @@ pub struct ReportFacts {
     pub log: FileFacts,
     /// The config.
     pub config: FileFacts,
+    /// Result of a ride; none for a run over a log.
+    pub ride: Option<RideFacts>,
+}
+
+/// Result of a ride, as `tagalong follow` judges it.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct RideFacts {
+    /// Seed of the scene.
+    pub seed: u64,
+    /// True if the person was followed, or rightly given up, and no other person for long.
+    pub kept: bool,
+    /// Length of the ride, s.
+    pub time_s: f64,
+    /// Time in which the person was in view, s.
+    pub in_view_s: f64,
+    /// Time in which another person or a thing was followed, s.
+    pub wrong_s: f64,
+    /// Time in which the person was followed and walked slowly, s ...
+    pub slow_s: f64,
+    /// ... and the distance was kept, s.
+    pub distance_kept_s: f64,
+    /// Least room to people while the robot moved, m.
+    pub clearance_people_m: Option<f64>,
+    /// Least room to things while the robot moved, m.
+    pub clearance_things_m: Option<f64>,
+    /// Time of the least room, s.
+    pub nearest_s: Option<f64>,
+}
+
+impl RideFacts {
+    /// Returns the least room to anything while the robot moved, m.
+    pub fn room_m(&self) -> Option<f64> {
+        [self.clearance_people_m, self.clearance_things_m].into_iter().flatten().reduce(f64::min)
+    }
+
+    /// Returns true if the robot touched a person or a thing while it moved.
+    pub fn touches(&self) -> bool {
+        self.room_m().is_some_and(|room| room < 0.0)
+    }
+
+    /// Returns the share of the time in which the distance was kept.
+    pub fn distance_share(&self) -> Option<f64> {
+        (self.slow_s > 0.0).then(|| self.distance_kept_s / self.slow_s)
+    }
+
+    /// Returns the result in one line.
+    pub fn summary(&self) -> String {
+        let metres = |room: Option<f64>| room.map_or("-".into(), |room| format!("{room:.2} m"));
+        let share = self.distance_share().map_or("-".into(), |s| format!("{:.0} %", 100.0 * s));
+        format!(
+            "{}{}; least room to people {}, to things {}; distance kept for {share} of the time; \
+             followed another person for {:.1} s",
+            if self.kept { "the person was kept" } else { "the person was not kept" },
+            if self.touches() { "; the robot touched something" } else { "" },
+            metres(self.clearance_people_m),
+            metres(self.clearance_things_m),
+            self.wrong_s
+        )
+    }
 }
 
 /// File of a run.
@@ -149,7 +209,11 @@ fn no_run(folder: &Path) -> Failure {
     })
 }
 
-fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, Failure> {
+/// Reads a JSON file.
+///
+/// # Errors
+/// A file that cannot be read, or holds something else.
+pub fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, Failure> {
     let shown = path.display();
     let text = read_text(path, FileLimit::Table)
         .map_err(|error| Failure::failed(format!("cannot read {shown}: {error}")))?;

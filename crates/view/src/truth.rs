@@ -135,8 +135,8 @@ fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
 fn described(event: &Event) -> Option<EventData> {
     let (kind, person, track, text) = match event.kind {
         EventKind::Miss { person, track } => {
-            let had = track.map(|id| format!(", who was track {id}")).unwrap_or_default();
-            ("missed", Some(person), track, format!("annotated person {person}{had}, is missed"))
+            let had = track.map(|id| format!(", who was track {id},")).unwrap_or_default();
+            ("missed", Some(person), track, format!("annotated person {person}{had} is missed"))
         }
         EventKind::Switch { person, from, to } => {
             let text = format!("annotated person {person} changes from track {from} to {to}");

@@ -119,7 +119,7 @@ fn a_pipeline_that_steers_nothing_is_refused() {
 #[test]
 fn the_pictures_of_a_ride_are_those_of_its_frames() {
     let folder = tempfile::tempdir().unwrap();
-    let pictures = folder.path().join("rides/walk-follow-depth-2000000000-overlay");
+    let pictures = folder.path().join("rides/walk-follow-depth-2000000000/overlay");
     fs::create_dir_all(&pictures).unwrap();
     fs::write(pictures.join("999999.png"), "of a longer ride").unwrap();
     let more = ["-o", "rides", "--overlay", "--format", "json"];
@@ -134,4 +134,67 @@ fn the_pictures_of_a_ride_are_those_of_its_frames() {
     let output = follow(folder.path(), "follow-depth.toml", &["--overlay"]);
     assert_eq!(code(&output), 2);
     assert!(text(&output.stderr).contains("--output"), "{}", text(&output.stderr));
+}
+
+fn view(folder: &Path, arguments: &[&str]) -> Output {
+    tagalong().current_dir(folder).arg("view").args(arguments).output().unwrap()
+}
+
+/// The data of a page.
+fn page_data(page: &Path) -> Value {
+    let page = fs::read_to_string(page).unwrap();
+    let start = page.find("id=\"data\">").unwrap() + "id=\"data\">".len();
+    let end = start + page[start..].find("</script>").unwrap();
+    serde_json::from_str(&page[start..end]).unwrap()
+}
+
+#[test]
+fn a_ride_is_seen_with_its_images_obstacles_zones_and_reasons() {
+    let folder = tempfile::tempdir().unwrap();
+    let narrow = ["-o", "rides", "--format", "json", "--set", "room.size_m=[9.0, 4.0]"];
+    json(&follow(folder.path(), "follow-depth.toml", &narrow));
+    let name = "rides/walk-follow-depth-2000000000";
+    // The log of a ride stands for its folder.
+    let shown = view(folder.path(), &[&format!("{name}.mcap")]);
+    assert_eq!(code(&shown), 0, "{}", text(&shown.stderr));
+    let page = page_data(&folder.path().join(name).join("view.html"));
+    let run = &page["runs"][0];
+    let frames = run["frames"].as_array().unwrap();
+    let last = frames.last().unwrap();
+    assert!(page["images"].as_array().unwrap().iter().all(|image| image != ""), "no images");
+    assert!(page["truth"].is_array(), "the truth of the log");
+    assert_eq!(last["target"], last["tracks"][0]["id"], "{last}");
+    assert!(last["drive"]["v"].as_f64().unwrap() > 0.1, "{last}");
+    let moves = |motion: &str| frames.iter().any(|frame| frame["drive"]["motion"] == motion);
+    assert!(moves("stands") && moves("drives"), "it waits at first, then it follows: {last}");
+    assert!(frames.iter().any(|frame| frame["drive"]["things"].is_array()), "no walls: {last}");
+    assert!(run["robot"]["people"][1].as_f64() > run["robot"]["people"][0].as_f64(), "{run}");
+    let events = run["events"].as_array().unwrap();
+    assert!(events.iter().any(|event| event["kind"] == "stands"), "{events:?}");
+}
+
+#[test]
+fn a_folder_of_rides_has_a_page_for_each_and_a_list_with_the_worst_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--seeds", "2", "-o", "rides", "--format", "json"];
+    let found = json(&follow(folder.path(), "follow-depth.toml", &more));
+    let shown = view(folder.path(), &["rides"]);
+    assert_eq!(code(&shown), 0, "{}", text(&shown.stderr));
+    let list = fs::read_to_string(folder.path().join("rides/index.html")).unwrap();
+    let mut places = Vec::new();
+    for ride in found["rides"].as_array().unwrap() {
+        let name = ride["folder"].as_str().unwrap();
+        assert!(folder.path().join("rides").join(name).join("view.html").exists(), "{name}");
+        let link = format!("href=\"{name}/view.html#t=");
+        let place = list.find(&link).unwrap_or_else(|| panic!("{link}: {list}"));
+        let room = ["clearance_people_m", "clearance_things_m"].map(|key| ride[key].as_f64());
+        let room = room.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        places.push((room, place));
+    }
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert!(places[0].1 < places[1].1, "{places:?}");
+    let again = view(folder.path(), &["rides"]);
+    assert_eq!(code(&again), 2, "pages are not replaced unasked");
+    let truth = view(folder.path(), &["rides", "--truth", "x.csv", "--overwrite"]);
+    assert_eq!(code(&truth), 2, "{}", text(&truth.stderr));
 }

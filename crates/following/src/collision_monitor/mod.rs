@@ -70,6 +70,15 @@ const PREDICTED_S: f64 = 1.0;
 /// Speed that is added to the measured one of a person, m/s: it is that uncertain.
 const UNSURE_MPS: f64 = 0.2;
 
+/// Place of a thing or a person that the collision monitor counts in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObstaclePoint {
+    /// Place in the robot frame, m.
+    pub at: Point2<f64>,
+    /// True for a person, or for a thing that moves.
+    pub moves: bool,
+}
+
 /// Collision monitor; see the [module](self).
 pub(crate) struct CollisionMonitor {
     settings: CollisionMonitorSettings,
@@ -213,6 +222,20 @@ impl CollisionMonitor {
             let is_new = age.update(stamped, motion.dt);
             laser.update(&self.settings, scan.filter(|_| is_new), motion, tracks);
         }
+    }
+
+    /// Returns the places that count in the last frame, but for those of the followed person.
+    pub(crate) fn obstacles(&self) -> Vec<ObstaclePoint> {
+        let mut obstacles = Vec::new();
+        for hazard in self.hazards.all() {
+            let moves = match hazard.kind {
+                HazardKind::Still => false,
+                HazardKind::Moves(_) => true,
+                HazardKind::Followed(_) => continue,
+            };
+            obstacles.push(ObstaclePoint { at: hazard.at, moves });
+        }
+        obstacles
     }
 
     /// Returns the reason for which the robot must stand, if there is one; no sensor may be silent for

@@ -98,8 +98,11 @@ fn who_is_in_the_laser_scan_alone_is_not_driven_into() {
     for (index, laser, reason) in [(21, &shins[..], Reason::Blocked), (22, &[], Reason::Limited)] {
         let frame = frame(index, index as f64 * 0.1)
             .with_laser(Some(tagalong_core::LaserScan::of_points(laser)));
-        let command = pipeline.step(&frame).unwrap().command.unwrap();
+        let report = pipeline.step(&frame).unwrap();
+        let command = report.command.unwrap();
         assert_eq!(command.reason, reason, "{index}");
+        let stands = |x| report.obstacles.iter().any(|o| o.at.x == x && o.at.y == 0.15);
+        assert_eq!(stands(0.5), !laser.is_empty(), "{:?}", report.obstacles);
         let WheelSpeeds { left, right } = command.wheels;
         assert_eq!(left + right > 1e-9, laser.is_empty(), "turning is allowed: {command:?}");
     }

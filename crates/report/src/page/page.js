@@ -2,6 +2,30 @@
 (() => {
   const all = (selector, root = document) => [...root.querySelectorAll(selector)];
 
+  // On a phone each row is a list of its cells with the names of their columns; the roles stay those of
+  // a table.
+  const nameCells = (table) => {
+    const nameOf = (head) => {
+      const copy = head.cloneNode(true);
+      all(".unseen", copy).forEach((part) => part.remove());
+      return copy.textContent.trim();
+    };
+    const names = all("thead th", table).map(nameOf);
+    if (!names.length || table.tHead.rows.length !== 1 || table.querySelector("[colspan], [rowspan]")) return;
+    table.classList.add("cards");
+    table.setAttribute("role", "table");
+    for (const part of [table.tHead, ...table.tBodies]) part.setAttribute("role", "rowgroup");
+    for (const row of table.rows) {
+      row.setAttribute("role", "row");
+      for (const cell of row.cells) {
+        const isHead = row.parentElement === table.tHead;
+        cell.setAttribute("role", isHead ? "columnheader" : cell.tagName === "TH" ? "rowheader" : "cell");
+        if (!isHead) cell.dataset.name = names[cell.cellIndex] || "";
+      }
+    }
+  };
+  all(".scroll > table").forEach(nameCells);
+
   // Tables sort by a click on a heading: once, the other way, and back again.
   const valueOf = (row, column) => {
     const cell = row.cells[column];

@@ -2,7 +2,7 @@ use nalgebra::{Point2, Vector2};
 use serde::Serialize;
 use tagalong_core::Track;
 use tagalong_pipeline::{FrameReport, Likeness};
-use tagalong_sim::Truth;
+use tagalong_sim::{Clearance, Truth};
 
 use super::{Ride, Tick};
 use crate::Moment;
@@ -91,6 +91,8 @@ pub struct Ridden {
     pub clearance_people_m: Option<f64>,
     /// Least room to furniture and walls while the robot moved, m.
     pub clearance_things_m: Option<f64>,
+    /// Time of the least of both, s since the first frame.
+    pub nearest_s: Option<f64>,
     /// Root of the mean square of the forward jerk, m/s³.
     pub jerk_mps3: f64,
     /// Score of the lock for each detection, and whether it was the person.
@@ -137,6 +139,7 @@ impl RideJudge {
         let farther_ms: f64 = looks.iter().filter(|l| slow(l)).filter_map(farther).sum();
         let moving = || ride.ticks.iter().filter(|tick| tick.speed_mps.abs() > MOVES_MPS);
         let episodes = episodes(&looks);
+        let first_s = looks.first().map_or(0.0, |look| look.at_s);
         let longest_wrong_s = longest(&looks, |look| look.whom == Whom::Wrong);
         Ridden {
             seed: ride.seed,
@@ -152,6 +155,7 @@ impl RideJudge {
             episodes,
             clearance_people_m: least(moving().map(|tick| tick.clearance.people_m)),
             clearance_things_m: least(moving().map(|tick| tick.clearance.things_m)),
+            nearest_s: nearest_s(moving()).map(|at_s| (at_s - first_s).max(0.0)),
             jerk_mps3: jerk(&ride.ticks),
             likeness: self.likeness(ride),
         }
@@ -301,6 +305,16 @@ fn longest(looks: &[JudgedFrame], counts: impl Fn(&JudgedFrame) -> bool) -> f64 
     most
 }
 
+/// Returns the time at which a robot that moved had the least room, s since the start.
+fn nearest_s<'a>(moving: impl Iterator<Item = &'a Tick>) -> Option<f64> {
+    let rooms = moving.map(|tick| {
+        let Clearance { people_m, things_m } = tick.clearance;
+        (people_m.min(things_m), tick.at_s)
+    });
+    let least = rooms.min_by(|a, b| a.0.total_cmp(&b.0));
+    least.filter(|(room_m, _)| room_m.is_finite()).map(|(_, at_s)| at_s)
+}
+
 fn least(values: impl Iterator<Item = f64>) -> Option<f64> {
     values.filter(|value| value.is_finite()).min_by(f64::total_cmp)
 }
@@ -372,8 +386,24 @@ mod tests {
     }
 
     #[test]
+    fn the_nearest_time_is_that_of_the_least_room_to_anything() {
+        let tick = |at_s: f64, people_m, things_m| Tick {
+            at_s,
+            speed_mps: 0.5,
+            turn_rate: 0.0,
+            clearance: Clearance { people_m, things_m },
+            approach: None,
+            reason: None,
+        };
+        let ticks = [tick(0.1, 1.0, 2.0), tick(0.2, f64::INFINITY, 0.4), tick(0.3, 0.5, 2.0)];
+        assert_eq!(nearest_s(ticks.iter()), Some(0.2));
+        let alone = [tick(0.1, f64::INFINITY, f64::INFINITY)];
+        assert_eq!(nearest_s(alone.iter()), None);
+    }
+
+    #[test]
     fn a_steady_speed_has_no_jerk_and_a_sudden_stop_has() {
-        let clearance = tagalong_sim::Clearance { people_m: 1.0, things_m: 1.0 };
+        let clearance = Clearance { people_m: 1.0, things_m: 1.0 };
         let ride = |speed: &dyn Fn(usize) -> f64| -> Vec<Tick> {
             let tick = |i: usize| Tick {
                 at_s: i as f64 * 0.02,

@@ -61,7 +61,8 @@ impl Live {
             notes: Vec::new(),
         };
         let newest = Arc::new(Newest::new(config.clone(), Remedies::new(registry)));
-        let page = Page::new(&heading, name, Arc::clone(&newest)).map_err(io::Error::other)?;
+        let page =
+            Page::new(&heading, name, config, Arc::clone(&newest)).map_err(io::Error::other)?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let serve = move || server.serve(&Arc::new(page), || stopped.load(Ordering::Relaxed));

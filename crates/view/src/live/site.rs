@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use crate::page::data::{PageData, RunData};
 use crate::page::html::{Heading, live_html, scripts, style};
+use crate::page::robot::robot_data;
 use tagalong_serve::{Request, Response, Site};
+use toml::Table;
 
 use crate::live::newest::Newest;
 
@@ -20,8 +22,14 @@ impl Page {
     ///
     /// # Errors
     /// Names that JSON cannot express.
-    pub fn new(heading: &Heading, name: &str, newest: Arc<Newest>) -> Result<Self, String> {
-        let runs = vec![RunData { name: name.to_owned(), ..RunData::default() }];
+    pub fn new(
+        heading: &Heading,
+        name: &str,
+        config: &Table,
+        newest: Arc<Newest>,
+    ) -> Result<Self, String> {
+        let robot = robot_data(config);
+        let runs = vec![RunData { name: name.to_owned(), robot, ..RunData::default() }];
         let data = PageData { runs, live: true, ..PageData::default() };
         let html = live_html(heading, &data).map_err(|error| error.to_string())?;
         Ok(Self { html, style: style(), newest })

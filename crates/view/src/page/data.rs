@@ -53,6 +53,29 @@ pub struct RunData {
     pub tests: BTreeMap<String, TestData>,
     /// Number of the track on each counted person of the truth, frame by frame; none for a miss.
     pub hits: Option<Vec<BTreeMap<i64, Option<i64>>>>,
+    /// The robot and the zones around it, where the run has a controller.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot: Option<RobotData>,
+}
+
+/// Robot with the zones in which it drives slower or stands.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RobotData {
+    /// Corners of its outline, robot frame, m.
+    pub footprint: Vec<[f64; 2]>,
+    /// Corners of the stop polygon, robot frame, m; empty without one.
+    pub stop: Vec<[f64; 2]>,
+    /// Corners of the slowdown polygon, robot frame, m; empty without one.
+    pub slowdown: Vec<[f64; 2]>,
+    /// Distances from the outline at which an approaching person makes the robot stand, and at full
+    /// speed drive slower, m; none where people are judged like things.
+    pub people: Option<[f64; 2]>,
+    /// Distance from the outline at which a thing ahead makes it stand, m.
+    pub things: f64,
+    /// Time from an image to wheels that move accordingly, s.
+    pub reaction: f64,
+    /// Deceleration, m/s².
+    pub decel: f64,
 }
 
 /// Frame of a run.
@@ -93,6 +116,14 @@ pub struct DriveData {
     pub v: f64,
     /// Commanded rate of turn, to the left, rad/s.
     pub w: f64,
+    /// Effect of the reason: `drives`, `slower`, `stands`, or empty where it is not known.
+    pub motion: String,
+    /// Places of things in the odometry frame, cm, x and y in turn.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub things: Vec<i32>,
+    /// Places of people and of things that move, cm, x and y in turn.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub movers: Vec<i32>,
 }
 
 /// Track in one frame.

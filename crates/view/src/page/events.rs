@@ -8,6 +8,9 @@ use crate::page::moment::Moment;
 /// Time without evidence from which on a person counts as lost, s.
 const LOST_AFTER_S: f64 = 0.5;
 
+/// Time after which a cause of a stop or of a lower speed that returns is another event, s.
+const SAME_CAUSE_S: f64 = 2.0;
+
 /// Course of one person so far.
 #[derive(Clone, Copy, Debug)]
 struct Course {
@@ -48,6 +51,10 @@ pub struct Watch {
     courses: BTreeMap<u32, Course>,
     target: Option<u32>,
     lock: Option<String>,
+    /// Times at which each cause of a stop or of a lower speed held last, s.
+    causes: BTreeMap<String, f64>,
+    /// True if the robot stood and did not drive since then.
+    stood: bool,
 }
 
 impl Watch {
@@ -72,6 +79,7 @@ impl Watch {
             self.tell(at, "target", moment.target, text);
         }
         self.compare_lock(at, moment);
+        self.compare_motion(at, t_s, moment);
     }
 
     /// Tells a change of the target lock's state with its cause.
@@ -81,6 +89,25 @@ impl Watch {
         if before.is_some_and(|before| before != drive.lock) {
             let text = format!("{}: {}; {}", drive.lock, drive.lock_about, drive.why);
             self.tell(at, "lock", moment.target, text);
+        }
+    }
+
+    /// Tells why the robot stands or drives slower, and that it drives again after a stop. A cause that
+    /// comes and goes from frame to frame is told once.
+    fn compare_motion(&mut self, at: usize, t_s: f64, moment: &Moment) {
+        let Some(drive) = &moment.notes.drive else { return };
+        let kind = match drive.motion.as_str() {
+            "stands" => "stands",
+            "slower" => "slower",
+            "drives" if std::mem::take(&mut self.stood) => {
+                return self.tell(at, "drives", None, "the robot drives again".to_owned());
+            }
+            _ => return,
+        };
+        let is_new_stop = kind == "stands" && !std::mem::replace(&mut self.stood, true);
+        let before = self.causes.insert(drive.reason.clone(), t_s);
+        if is_new_stop || before.is_none_or(|before_s| t_s - before_s > SAME_CAUSE_S) {
+            self.tell(at, kind, None, drive.reason_about.clone());
         }
     }
 
@@ -186,6 +213,30 @@ mod tests {
         let expected =
             ["person 1 is tracked", "person 1 is followed from now on", "the target is lost"];
         assert_eq!(texts, expected);
+    }
+
+    #[test]
+    fn the_causes_of_stops_and_slow_downs_are_told_once_each() {
+        let of = |motion: &str, reason: &str| {
+            let mut moment = moment(&[]);
+            let drive =
+                DriveNote { motion: motion.into(), reason: reason.into(), ..DriveNote::default() };
+            moment.notes.drive = Some(drive);
+            moment
+        };
+        let moments = [
+            of("drives", "follow"),
+            of("slower", "near"),
+            of("drives", "limited"),
+            of("slower", "near"),
+            of("stands", "blocked"),
+            of("stands", "too-close"),
+            of("drives", "follow"),
+        ];
+        let all: Vec<Option<&Moment>> = moments.iter().map(Some).collect();
+        let told = of_run(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6], &all);
+        let kinds: Vec<_> = told.iter().map(|event| (event.i, event.kind)).collect();
+        assert_eq!(kinds, [(1, "slower"), (4, "stands"), (5, "stands"), (6, "drives")]);
     }
 
     #[test]

@@ -124,6 +124,9 @@ fn drive_data(note: &DriveNote) -> DriveData {
         reason: [note.reason.clone(), note.reason_about.clone()],
         v: note.forward_mps,
         w: note.turn_rps,
+        motion: note.motion.clone(),
+        things: note.things_cm.clone(),
+        movers: note.movers_cm.clone(),
     }
 }
 

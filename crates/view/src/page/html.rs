@@ -140,9 +140,41 @@ fn stage(names: &[&str]) -> Markup {
                         }
                         figure class="above" {
                             svg class="plan" id=(format!("plan-{number}")) role="img" aria-label=(format!("Plan from above of {name}")) {}
+                            figcaption class="legend" id=(format!("zones-{number}")) hidden { (zones()) }
                         }
                     }
                 }
+            }
+        }
+    }
+}
+
+/// Renders the meaning of the marks around a robot that is driven.
+fn zones() -> Markup {
+    let mark = |class: &str, text: &str| {
+        html! { span { span class=(format!("mark {class}")) {} (text) } }
+    };
+    html! {
+        (mark("way", "way until it stands"))
+        (mark("stands", "a person who comes nearer stops it"))
+        (mark("slower", "slows it at full speed"))
+        (mark("things", "obstacle"))
+        (mark("movers", "moves"))
+    }
+}
+
+/// Renders the meaning of the lines above the slider.
+fn strip_legend() -> Markup {
+    let mark = |class: &str, text: &str| {
+        html! { span { span class=(format!("mark {class}")) {} (text) } }
+    };
+    html! {
+        p class="legend" {
+            (mark("life", "person with ID, seen"))
+            (mark("life weak", "not seen"))
+            span id="legend-missed" class="group" { (mark("gap", "missed")) }
+            span id="legend-drive" class="group" {
+                "Robot: " (mark("drives", "drives")) (mark("slower", "slower")) (mark("stands", "stands"))
             }
         }
     }
@@ -158,6 +190,7 @@ fn time_line(runs: usize) -> Markup {
             div class="strips" aria-hidden="true" {
                 @for number in 0..runs { svg class="strip" id=(format!("strip-{number}")) {} }
             }
+            (strip_legend())
             input type="range" id="frame" min="0" max="0" value="0" step="1" aria-label="Frame";
             div class="controls" {
                 (button("before", "|◂", "Previous event"))

@@ -24,14 +24,15 @@
     for (const list of [data.t, data.images, data.scans, run.frames]) list.splice(0, old);
     state.at = Math.max(0, state.at - old);
     for (const event of events) event.i -= old;
-    while (events.length && (events[0].i < 0 || events.length > KEPT_EVENTS)) events.shift();
+    while (events.length > KEPT_EVENTS) events.shift();
   };
 
-  // The position of the newest frame that is not later than a time.
+  // The position of the newest frame that is not later than a time; negative for what was before the
+  // first frame of this page.
   const positionOf = (time) => {
     let at = data.t.length - 1;
-    while (at > 0 && data.t[at] > time) at -= 1;
-    return Math.max(0, at);
+    while (at >= 0 && data.t[at] > time) at -= 1;
+    return at;
   };
 
   const append = (now) => {

@@ -10,3 +10,4 @@ pub mod events;
 pub mod frame;
 pub mod html;
 pub mod moment;
+pub mod robot;

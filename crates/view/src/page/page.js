@@ -34,6 +34,7 @@
     frame.robot = [...turned(frame.robot), frame.robot[2] + turn.angle];
     for (const thing of [...frame.tracks, ...frame.found]) thing.at = turned(thing.at);
     for (const track of frame.tracks) track.v = turned(track.v);
+    if (frame.drive) [frame.drive.things, frame.drive.movers].forEach(turnScan);
   };
   const turnScan = (scan) => {
     if (!turn) startTurn(0);
@@ -228,6 +229,62 @@
     return parts;
   };
 
+  // Zones of the config around the robot, each as the outline with an edge that is as wide as the zone
+  // reaches, and the way on which the robot comes to stand.
+  const zoneMarks = (run, frame) => {
+    const robot = run.robot;
+    if (!robot || !frame.drive) return [];
+    const [x, y, heading] = frame.robot;
+    const [cos, sin] = [Math.cos(heading), Math.sin(heading)];
+    const placed = (corners) => corners.map(([a, b]) => `${x + cos * a - sin * b},${-(y + sin * a + cos * b)}`).join(" ");
+    const around = (kind, reach, hint) => svg("polygon", { class: `zone ${kind}`, points: placed(robot.footprint), "stroke-width": 2 * reach }, svg("title", {}, hint));
+    const polygon = (kind, corners, hint) => (corners.length ? svg("polygon", { class: `zone ${kind}`, points: placed(corners) }, svg("title", {}, hint)) : null);
+    const [stands, slower] = robot.people || [robot.things, 0];
+    return [
+      slower ? around("slower", slower, `a person who comes nearer than ${fixed(slower, 1)} m slows the robot at full speed`) : null,
+      polygon("slower", robot.slowdown, "slowdown polygon"),
+      around("stands", stands, `${slower ? "a person who comes" : "a thing"} nearer than ${fixed(stands, 1)} m stops the robot`),
+      polygon("stands", robot.stop, "stop polygon"),
+      wayAhead(robot, frame),
+      svg("polygon", { class: "footprint", points: placed(robot.footprint) }),
+    ];
+  };
+
+  const WAY_STEPS = 16;
+  const wayAhead = (robot, frame) => {
+    const { v, w } = frame.drive;
+    if (Math.abs(v) < 0.02) return null;
+    const sides = robot.footprint.map((corner) => corner[1]);
+    const length = Math.abs(v) * robot.reaction + (v * v) / (2 * robot.decel) + Math.max(...robot.footprint.map((corner) => corner[0]));
+    let [x, y, heading] = frame.robot;
+    const points = [`${x},${-y}`];
+    const step = (Math.sign(v) * length) / WAY_STEPS;
+    for (let i = 0; i < WAY_STEPS; i += 1) {
+      heading += (w / v) * step;
+      x += step * Math.cos(heading);
+      y += step * Math.sin(heading);
+      points.push(`${x},${-y}`);
+    }
+    return svg("polyline", { class: "way", points: points.join(" "), "stroke-width": Math.max(...sides) - Math.min(...sides) }, svg("title", {}, "way until the robot stands"));
+  };
+
+  // Many points as one line of dots.
+  const dots = (points, kind, k) => {
+    if (!points || !points.length) return null;
+    let d = "";
+    for (let i = 0; i < points.length; i += 2) d += `M${points[i] / 100} ${-points[i + 1] / 100}h0`;
+    return svg("path", { class: `dots ${kind}`, d, "stroke-width": Math.max(0.1, 2.5 * k) });
+  };
+
+  const obstacleMarks = (frame, k) => (frame.drive
+    ? [dots(frame.drive.things, "things", k), dots(frame.drive.movers, "movers", k)] : []);
+
+  const targetLine = (frame, k) => {
+    const track = frame.tracks.find((other) => other.id === frame.target);
+    if (!track) return null;
+    return svg("line", { class: `target ${colour(track.id)}`, x1: frame.robot[0], y1: -frame.robot[1], x2: track.at[0], y2: -track.at[1], "stroke-width": 1.5 * k, "stroke-dasharray": `${4 * k} ${4 * k}` });
+  };
+
   const wayOf = (run, k) => {
     const points = [];
     for (let i = 0; i <= state.at; i += 1) {
@@ -282,9 +339,10 @@
     for (let i = 0; scan && i < scan.length; i += 2) {
       parts.push(svg("circle", { class: "scan", cx: scan[i] / 100, cy: -scan[i + 1] / 100, r: 1.6 * k }));
     }
+    if (frame) parts.push(...zoneMarks(run, frame), ...obstacleMarks(frame, k));
     parts.push(wayOf(run, k));
     if (frame) {
-      parts.push(...robotMark(frame, k));
+      parts.push(targetLine(frame, k), ...robotMark(frame, k));
       if (id("show-truth").checked) parts.push(...truthSpots(run, k));
       if (id("show-dropped").checked) {
         for (const c of frame.found.filter((candidate) => candidate.test)) {
@@ -294,7 +352,7 @@
       }
       parts.push(...[...frame.tracks].reverse().map((track) => personMark(run, track, k)));
     }
-    target.replaceChildren(...parts);
+    target.replaceChildren(...parts.filter(Boolean));
   };
 
   // ---- time line -------------------------------------------------------------------------------
@@ -317,8 +375,9 @@
     });
   };
 
-  const STRIP_WIDTH = 1000;
-  const column = (at) => (last > 0 ? (at / last) * STRIP_WIDTH : 0);
+  // Widths of the strips, px: letters are not stretched.
+  const widths = data.runs.map(() => 1000);
+  const column = (at, number) => (last > 0 ? (at / last) * widths[number] : 0);
 
   const stretches = (points) => {
     const out = [];
@@ -330,27 +389,63 @@
     return out;
   };
 
+  // Times of one reason of the command; a frame that is left out continues the one before.
+  const motionsOf = (run) => {
+    const out = [];
+    run.frames.forEach((frame, at) => {
+      const drive = frame && frame.drive;
+      if (!drive || !drive.motion) return;
+      const open = out[out.length - 1];
+      if (open && open.text === drive.reason[1]) open.to = at + 1;
+      else out.push({ from: at, to: at + 1, motion: drive.motion, text: drive.reason[1] });
+    });
+    return out;
+  };
+
+  // Pixels: the row of one person, and the bar of the command above them.
+  const ROW = 13;
+  const LEAST_ROW = 4;
+  const LETTERS_ROW = 7;
+  const COMMAND = 8;
+
+  const lifeMarks = (life, number, y, row) => {
+    const parts = stretches(life.points).map((part) =>
+      svg("line", { class: `life ${colour(life.track)}${part.seen ? "" : " weak"}`, x1: column(part.from, number), x2: Math.max(column(part.to, number), column(part.from, number) + 1.5), y1: y, y2: y, "stroke-width": row - 3 },
+        svg("title", {}, `person ${life.track}`)));
+    if (row < LETTERS_ROW) return parts;
+    const x = Math.min(column(life.points[0][0], number) + 3, widths[number] - 14);
+    parts.push(svg("text", { class: "strip-id", x, y: y + 0.33 * row, "font-size": Math.max(9, row - 2), "stroke-width": 2.5 }, String(life.track)));
+    return parts;
+  };
+
   const drawStrip = (run, number) => {
+    const target = id(`strip-${number}`);
+    widths[number] = target.getBoundingClientRect().width || widths[number];
     const lives = lanesOf(run);
     const rows = Math.max(1, ...lives.map((life) => life.lane + 1));
-    const height = 10 * rows + 6;
-    const target = id(`strip-${number}`);
-    target.setAttribute("viewBox", `0 0 ${STRIP_WIDTH} ${height}`);
-    target.setAttribute("preserveAspectRatio", "none");
-    const parts = lives.flatMap((life) => stretches(life.points).map((part) =>
-      svg("line", { class: `life ${colour(life.track)}${part.seen ? "" : " weak"}`, x1: column(part.from), x2: Math.max(column(part.to), column(part.from) + 1.5), y1: 10 * life.lane + 5, y2: 10 * life.lane + 5, "stroke-width": 6 },
-        svg("title", {}, `person ${life.track}`))));
+    const motions = motionsOf(run);
+    const top = motions.length ? COMMAND + 2 : 0;
+    const room = (innerHeight < 800 ? 60 : 100) * (data.runs.length > 1 ? 0.75 : 1);
+    const row = Math.max(LEAST_ROW, Math.min(ROW, (room - top) / rows));
+    const height = top + row * rows + 5;
+    target.setAttribute("viewBox", `0 0 ${widths[number]} ${height}`);
+    target.style.height = `${height}px`;
+    const parts = motions.map((part) =>
+      rect([column(part.from, number), 0, Math.max(1, column(part.to, number) - column(part.from, number)), COMMAND], { class: `motion ${part.motion}` }));
+    parts.forEach((part, at) => part.append(svg("title", {}, motions[at].text)));
+    parts.push(...lives.flatMap((life) => lifeMarks(life, number, top + row * (life.lane + 0.5), row)));
     for (const event of run.events) if (event.kind === "missed") {
-      parts.push(svg("line", { class: "gap", x1: column(event.i), x2: column(event.i), y1: height - 6, y2: height, "stroke-width": 2 }));
+      const x = column(event.i, number);
+      parts.push(svg("line", { class: "gap", x1: x, x2: x, y1: height - 5, y2: height, "stroke-width": 2 }));
     }
-    parts.push(svg("line", { class: "head", "stroke-width": 1.5, "vector-effect": "non-scaling-stroke", y1: 0, y2: height }));
+    parts.push(svg("line", { class: "head", "stroke-width": 1.5, y1: 0, y2: height }));
     target.replaceChildren(...parts);
   };
 
   const moveHeads = () => data.runs.forEach((run, number) => {
     const head = id(`strip-${number}`).querySelector(".head");
-    head.setAttribute("x1", column(state.at));
-    head.setAttribute("x2", column(state.at));
+    head.setAttribute("x1", column(state.at, number));
+    head.setAttribute("x2", column(state.at, number));
   });
 
   // ---- tables ----------------------------------------------------------------------------------
@@ -559,9 +654,9 @@
 
   // ---- events ----------------------------------------------------------------------------------
 
-  const events = data.runs.flatMap((run, number) => run.events.map((event) => ({ ...event, run: number })))
+  const events = data.runs.flatMap((run, number) => run.events.map((event) => ({ ...event, t: data.t[event.i], run: number })))
     .sort((a, b) => a.i - b.i || a.run - b.run);
-  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", target: "◎", lock: "◆", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
+  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", target: "◎", lock: "◆", drives: "▶", slower: "▽", stands: "▮", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
   const BAD = ["missed", "switched", "wrong person", "false track"];
   const hiddenKinds = new Set();
   const knownKinds = new Set();
@@ -573,16 +668,19 @@
     if (event.kind === "missed" && person) askPerson(person);
   };
 
+  // Each event with its button; an event of frames that are forgotten cannot be jumped to.
+  let listed = [];
   const fillEvents = () => {
-    const rows = events.filter((event) => !hiddenKinds.has(event.kind)).map((event) => {
+    listed = events.filter((event) => !hiddenKinds.has(event.kind)).map((event) => {
       const text = data.runs.length > 1 ? `${data.runs[event.run].name}: ${event.text}` : event.text;
-      const node = el("button", { type: "button", "data-i": event.i },
-        el("span", { class: "when" }, `${fixed(data.t[event.i], 2)} s`),
+      const node = el("button", { type: "button" },
+        el("span", { class: "when" }, `${fixed(event.t, 2)} s`),
         el("span", { class: BAD.includes(event.kind) ? "kind bad" : "kind" }, `${SIGNS[event.kind] || "·"} ${event.kind}`), el("span", {}, text));
       node.addEventListener("click", () => goToEvent(event));
-      return el("li", {}, node);
+      return { event, node };
     });
-    id("event-list").replaceChildren(...rows);
+    id("event-list").replaceChildren(...listed.map(({ node }) => el("li", {}, node)));
+    markEvents();
   };
 
   const fillKinds = () => {
@@ -601,14 +699,15 @@
   };
 
   const markEvents = () => {
-    for (const node of id("event-list").querySelectorAll("button")) {
-      if (Number(node.dataset.i) === state.at) node.setAttribute("aria-current", "true");
+    for (const { event, node } of listed) {
+      if (event.i === state.at) node.setAttribute("aria-current", "true");
       else node.removeAttribute("aria-current");
+      node.disabled = event.i < 0;
     }
   };
 
   const step = (direction, wanted) => {
-    const kinds = events.filter((event) => (wanted ? event.kind === wanted : !hiddenKinds.has(event.kind)));
+    const kinds = events.filter((event) => event.i >= 0 && (wanted ? event.kind === wanted : !hiddenKinds.has(event.kind))).sort((a, b) => a.i - b.i);
     const ahead = direction > 0 ? kinds.find((event) => event.i > state.at) : kinds.filter((event) => event.i < state.at).pop();
     if (ahead) goToEvent(ahead);
   };
@@ -744,11 +843,28 @@
     fillKinds();
     fillEvents();
     addEventListener("keydown", onKey);
-    addEventListener("resize", draw);
+    addEventListener("resize", () => {
+      strips();
+      draw();
+    });
+    addEventListener("hashchange", () => show(openAt()));
+    id("legend-missed").hidden = !data.truth;
+    id("legend-drive").hidden = id("drive").hidden;
+    data.runs.forEach((run, number) => { id(`zones-${number}`).hidden = !run.robot; });
+  };
+  const strips = () => data.runs.forEach(drawStrip);
+
+  // The time that the address asks for, as #t=12.5, else the first one with the most people.
+  const openAt = () => {
+    const asked = /^#t=(\d+(\.\d+)?)$/.exec(location.hash);
+    if (asked) return Math.max(0, data.t.filter((time) => time <= Number(asked[1]) + 1e-6).length - 1);
+    const seen = (run, at) => (run.frames[at] ? run.frames[at].tracks.filter((track) => track.state === "seen").length : 0);
+    const counts = data.t.map((_, at) => data.runs.reduce((sum, run) => sum + seen(run, at), 0));
+    return Math.max(0, counts.indexOf(Math.max(...counts)));
   };
 
   prepare();
-  if (last >= 0) show(0);
+  if (last >= 0) show(openAt());
 
   // For live.js, which appends frames as they come.
   const resize = (size) => {
@@ -761,7 +877,6 @@
     id("frame").max = last;
     whole = extent();
   };
-  const strips = () => data.runs.forEach(drawStrip);
   const listEvents = () => {
     fillKinds();
     fillEvents();

@@ -1,21 +1,22 @@
-use std::fs;
-use std::io;
 use std::path::Path;
 
 use serde::Serialize;
 use tagalong_app::signals::Signals;
 use tagalong_log::write::WriteError;
 use tagalong_pipeline::FrameReport;
-use tagalong_render::{Overlay, OverlayData, OverlayStyle};
 use tagalong_sim::{Event, Scene, Simulation};
 use tagalong_simulate::Recorder;
-use tagalong_trials::{SimulatedFrame, TrialError, Witness};
+use tagalong_trials::{Ridden, SimulatedFrame, Tick, TrialError, Witness};
 
-/// Writer of a ride's log and pictures, as far as they are requested; it ends early at a stop
+use super::ride_bar::RideBar;
+use super::run_files::RunFiles;
+
+/// Writer of a ride's log and of its folder, as far as they are requested; it ends early at a stop
 /// signal.
 pub struct RideLog {
     recorder: Option<Recorder>,
-    overlay: Option<Overlay>,
+    files: Option<RunFiles>,
+    bar: Option<RideBar>,
     failed: Option<String>,
     signals: Signals,
 }
@@ -44,30 +45,34 @@ impl RideLog {
             Ok(recorder) => (recorder, None),
             Err(error) => (None, Some(error.to_string())),
         };
-        Self { recorder, overlay: None, failed, signals }
+        Self { recorder, files: None, bar: None, failed, signals }
     }
 
-    /// Writes a picture of each frame into a folder, too, in place of those of an earlier ride.
-    ///
-    /// # Errors
-    /// A folder that cannot be made or cleared.
-    pub fn with_overlay(mut self, folder: &Path) -> Result<Self, TrialError> {
-        clear_pictures(folder).map_err(|error| {
-            let shown = folder.display();
-            TrialError::Witness(format!("cannot make the folder {shown} for pictures: {error}"))
-        })?;
-        self.overlay = Some(Overlay::new(folder.to_owned(), OverlayStyle::default()));
-        Ok(self)
+    /// Writes the folder of the ride, too.
+    pub fn with_files(self, files: RunFiles) -> Self {
+        Self { files: Some(files), ..self }
     }
 
-    /// Completes the file.
+    /// Shows the progress of the ride.
+    pub fn with_bar(self, bar: RideBar) -> Self {
+        Self { bar: Some(bar), ..self }
+    }
+
+    /// Completes the log, then the folder with the result of the ride, if it has one.
     ///
     /// # Errors
     /// The first error in writing.
-    pub fn finish(self) -> Result<(), TrialError> {
+    pub fn finish(self, ridden: Option<&Ridden>) -> Result<(), TrialError> {
         let finished = self.recorder.map_or(Ok(()), Recorder::finish);
-        let failed = self.failed.or(finished.err().map(|error| error.to_string()));
-        failed.map_or(Ok(()), |error| Err(TrialError::Witness(error)))
+        if let Some(error) = self.failed.or(finished.err().map(|error| error.to_string())) {
+            return Err(TrialError::Witness(error));
+        }
+        let ended = match self.signals.received() {
+            Some(signal) => format!("stopped by signal {signal}"),
+            None => "complete".into(),
+        };
+        let Some(files) = self.files else { return Ok(()) };
+        files.finish(&ended, ridden).map_err(|failure| TrialError::Witness(failure.message))
     }
 
     fn note(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), WriteError>) {
@@ -75,14 +80,6 @@ impl RideLog {
             return;
         };
         self.failed = write(recorder).err().map(|error| error.to_string());
-    }
-
-    fn draw(&mut self, simulated: &SimulatedFrame, report: &FrameReport) {
-        let Some(overlay) = self.overlay.as_mut().filter(|_| self.failed.is_none()) else {
-            return;
-        };
-        let scene = OverlayData::of(&simulated.frame, simulated.odom_from_robot, report.clone());
-        self.failed = overlay.draw(&scene).err();
     }
 }
 
@@ -94,27 +91,21 @@ impl Witness for RideLog {
     fn frame(&mut self, simulated: &SimulatedFrame, report: &FrameReport) {
         let at_ns = simulated.frame.stamp.nanos();
         self.note(|recorder| recorder.pursuit(at_ns, &frame_json(report)));
-        self.draw(simulated, report);
+        if let Some(files) = self.files.as_mut().filter(|_| self.failed.is_none()) {
+            self.failed = files.take(simulated, report).err();
+        }
+    }
+
+    fn tick(&mut self, tick: &Tick) {
+        if let Some(bar) = &mut self.bar {
+            bar.show(tick.at_s);
+        }
     }
 
     fn goes_on(&self) -> bool {
         // A ride without its log is of no use, so a failed disk ends it.
         self.failed.is_none() && self.signals.received().is_none()
     }
-}
-
-/// Makes the folder, or removes the pictures of an earlier ride from it, which could be longer.
-fn clear_pictures(folder: &Path) -> io::Result<()> {
-    fs::create_dir_all(folder)?;
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let is_numbered = stem.len() >= 6 && stem.bytes().all(|byte| byte.is_ascii_digit());
-        if is_numbered && path.extension().is_some_and(|ending| ending == "png") {
-            fs::remove_file(path)?;
-        }
-    }
-    Ok(())
 }
 
 fn frame_json(report: &FrameReport) -> FrameJson {

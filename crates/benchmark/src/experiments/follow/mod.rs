@@ -3,6 +3,8 @@
 mod approaches;
 mod fit;
 mod log;
+mod ride_bar;
+mod run_files;
 mod story;
 mod table;
 
@@ -11,8 +13,9 @@ use std::path::{Path, PathBuf};
 
 pub use approaches::{ApproachFaults, ApproachLaser};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use log::RideLog;
+use ride_bar::RidesBar;
+use run_files::{RunFiles, folder_name};
 use serde::Serialize;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
@@ -75,14 +78,14 @@ pub struct FollowArgs {
     /// cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub jobs: Option<u8>,
-    /// Write the log of every ride (images, truth, commands, reasons), and the
-    /// tables, to this folder.
+    /// Write the log of every ride (images, truth, commands, reasons), its folder for `view`, and
+    /// the tables, to this folder.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Replace the files of earlier rides in that folder.
     #[arg(long, requires = "output")]
     pub overwrite: bool,
-    /// Write a picture of every frame of every ride beside its log, too: boxes, ids, target, plan.
+    /// Write a picture of every frame into the folder of every ride, too: boxes, ids, target, plan.
     #[arg(long, requires = "output")]
     pub overlay: bool,
     /// Print the settings [target.looks] that fit these rides best, and the calibration of the
@@ -133,6 +136,9 @@ pub struct Followed {
     pub swept: Option<String>,
     /// Name of the pipeline.
     pub pipeline: String,
+    /// Name of the folder of the ride, beside its log.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub folder: Option<String>,
     /// Faults that were injected.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<ScheduledFault>,
@@ -179,11 +185,11 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
         }
         make_folder(folder)?;
     }
-    let bar = bar(jobs.len());
+    let bar = RidesBar::new(jobs.iter().map(|job| job.scene.duration_s));
     let threads = threads(args.jobs);
-    let ride = |job: &Job| ride(job, args, registry, &signals);
-    let results = in_order(&jobs, threads, ride, |_| bar.inc(1)).map_err(failure)?;
-    bar.finish_and_clear();
+    let ride = |job: &Job| ride(job, args, registry, (&signals, &bar));
+    let results = in_order(&jobs, threads, ride, |_| bar.advance()).map_err(failure)?;
+    bar.finish();
     if let Some(signal) = signals.received() {
         say("stopped; the logs that were written are whole, but end early");
         return Ok(Ended::BySignal(signal));
@@ -277,46 +283,48 @@ fn ride(
     job: &Job,
     args: &FollowArgs,
     registry: &Registry,
-    signals: &Signals,
+    (signals, bar): (&Signals, &RidesBar),
 ) -> Result<Followed, TrialError> {
     let Job { suite, swept, scene, contender } = job;
     // A ride that a signal came before leaves no log.
     let folder = args.output.as_deref().filter(|_| signals.received().is_none());
     let file = folder.map(|folder| log_file(folder, job));
-    let mut log = RideLog::new(file.as_deref(), scene, signals.clone());
-    if let Some(file) = file.filter(|_| args.overlay) {
-        log = log.with_overlay(&overlay_folder(&file))?;
+    let mut log = RideLog::new(file.as_deref(), scene, signals.clone())
+        .with_bar(bar.of_ride(scene.duration_s));
+    if let Some(file) = &file {
+        log = log.with_files(run_files(file, contender, registry, scene.seed, args.overlay)?);
     }
     let ride = Ride::new(scene, contender, registry, &mut log)?;
-    log.finish()?;
+    let ridden = RideJudge::default().judge(&ride);
+    log.finish(Some(&ridden))?;
     Ok(Followed {
         suite: suite.clone(),
         swept: swept.clone(),
         pipeline: contender.name.clone(),
-        ridden: RideJudge::default().judge(&ride),
+        folder: file.as_deref().map(folder_name),
+        ridden,
         story: story::story(&ride),
         faults: ride.faults,
         took_ms: ride.took_ms,
     })
 }
 
+/// Opens the folder of the ride with this log.
+fn run_files(
+    log: &Path,
+    contender: &Contender,
+    registry: &Registry,
+    seed: u64,
+    pictures: bool,
+) -> Result<RunFiles, TrialError> {
+    let pipeline = contender.pipeline(registry, seed)?;
+    let files = RunFiles::create(log, &contender.name, pipeline.config(), pictures);
+    files.map_err(|error| TrialError::Witness(error.to_string()))
+}
+
 fn log_file(folder: &Path, job: &Job) -> PathBuf {
     let suite = job.suite.replace(' ', "-");
     folder.join(format!("{suite}-{}-{}.mcap", job.contender.name, job.scene.seed))
-}
-
-/// Returns the folder of a ride's pictures: that of its log, with `-overlay` at its end.
-fn overlay_folder(log: &Path) -> PathBuf {
-    let stem = log.file_stem().unwrap_or_default().to_string_lossy();
-    log.with_file_name(format!("{stem}-overlay"))
-}
-
-fn bar(rides: usize) -> ProgressBar {
-    let bar = ProgressBar::new(rides as u64);
-    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} rides {eta}") {
-        bar.set_style(style);
-    }
-    bar
 }
 
 fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), Failure> {
@@ -341,7 +349,12 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     if let Some(looks) = looks.filter(|_| args.format != TableFormat::Json) {
         print(&fit::toml(&looks, &fit::calibration(results))?)?;
     }
-    let Some(folder) = &args.output else { return Ok(()) };
+    let Some(folder) = &args.output else {
+        if args.format == TableFormat::Text {
+            say("with -o FOLDER the rides are kept, and `tagalong view FOLDER` shows them");
+        }
+        return Ok(());
+    };
     let markdown = joined(Table::markdown);
     let likeness = table::likeness_csv(results);
     for (name, text) in
@@ -349,6 +362,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     {
         write_file(&folder.join(name), text)?;
     }
-    say(&format!("the logs and tables are in {}", folder.display()));
+    let shown = folder.display();
+    say(&format!("the logs and tables are in {shown}; `tagalong view {shown}` shows the rides"));
     Ok(())
 }

@@ -9,6 +9,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, spare, write_file};
@@ -24,7 +25,7 @@ use tagalong_trials::{
 };
 
 use super::log::RideLog;
-use super::{FollowArgs, bar, contenders, failure, overlay_folder, swept, variant};
+use super::{FollowArgs, contenders, failure, run_files, swept, variant};
 
 /// The scene of all approaches unless scenes are named.
 const SCENE: &str = "configs/scenes/approach.toml";
@@ -227,12 +228,13 @@ fn ride(
     signals: &Signals,
 ) -> Result<Option<Outlived>, TrialError> {
     let mut log = RideLog::new(file, scene, signals.clone());
-    if let Some(file) = file.filter(|_| args.overlay) {
-        log = log.with_overlay(&overlay_folder(file))?;
+    if let Some(file) = file {
+        let seed = scene.seed;
+        log = log.with_files(run_files(file, job.contender, registry, seed, args.overlay)?);
     }
     let mut watch = ApproachWatch::new(scene, &mut log);
     let ride = Ride::new(scene, job.contender, registry, &mut watch)?;
-    log.finish()?;
+    log.finish(None)?;
     // A ride that a signal cut short says nothing.
     if signals.received().is_some() {
         return Ok(None);
@@ -245,6 +247,14 @@ fn ride(
         story: story::story(scene, &ride, &judge, &approached),
         approached,
     }))
+}
+
+fn bar(rides: usize) -> ProgressBar {
+    let bar = ProgressBar::new(rides as u64);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} rides {eta}") {
+        bar.set_style(style);
+    }
+    bar
 }
 
 /// Returns the file of an approach's log.

@@ -1,0 +1,273 @@
+//! Folder of rides, as `tagalong follow -o` writes it: a page for each ride, and a list of them with
+//! the worst first.
+
+use std::path::{Path, PathBuf};
+
+use maud::{Markup, PreEscaped, html};
+use serde::Deserialize;
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
+use tagalong_app::progress::Forecast;
+use tagalong_app::remedies::Remedies;
+use tagalong_report::document;
+
+use crate::page::html::style;
+use crate::recording::{RideFacts, read_json};
+use crate::{PAGE, Page, ViewArgs};
+
+/// Results of all rides of a folder.
+const RESULTS: &str = "follow.json";
+/// List of the rides.
+const INDEX: &str = "index.html";
+/// Size of the page of one ride of many, MB.
+const RIDE_MB: u32 = 6;
+
+/// Content of [`RESULTS`], as far as the list shows it.
+#[derive(Debug, Deserialize)]
+struct Results {
+    rides: Vec<Ride>,
+}
+
+/// Ride with its result.
+#[derive(Clone, Debug, Default, Deserialize)]
+struct Ride {
+    /// Name of the scene.
+    suite: String,
+    /// Name of the pipeline.
+    pipeline: String,
+    /// Name of its folder; none in results of earlier versions.
+    #[serde(default)]
+    folder: Option<String>,
+    #[serde(flatten)]
+    facts: RideFacts,
+}
+
+/// Returns true for a folder of rides.
+pub fn is_folder_of_rides(folder: &Path) -> bool {
+    !folder.join("tracks.mcap").exists() && folder.join(RESULTS).is_file()
+}
+
+/// Returns the folder of a ride for its log, and any other path as it is.
+pub fn run_of(path: &Path) -> PathBuf {
+    let beside = path.with_extension("");
+    let is_ride = path.is_file() && beside.join("tracks.mcap").is_file();
+    if is_ride { beside } else { path.to_owned() }
+}
+
+/// Writes the page of each ride of a folder, and the list of all.
+///
+/// # Errors
+/// Results that cannot be read, rides without a folder, pages that exist.
+pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
+    let folder = &args.run;
+    let index = args.output.clone().unwrap_or_else(|| folder.join(INDEX));
+    if args.other.is_some() || args.log.is_some() || args.truth.is_some() {
+        let shown = folder.display();
+        return Err(Failure::usage(format!(
+            "{shown} is a folder of rides, each with its log and its truth; name one of its folders \
+             to use a second run, --log or --truth"
+        )));
+    }
+    let Results { mut rides } = read_json(&folder.join(RESULTS))?;
+    rides.sort_by(|a, b| worse_first(&a.facts, &b.facts));
+    spare(&index, args.overwrite)?;
+    for ride in &rides {
+        spare(&folder.join(ride.folder(folder)?).join(PAGE), args.overwrite)?;
+    }
+    let forecast = Forecast::new(rides.len(), "rides");
+    for ride in &rides {
+        let run = folder.join(ride.folder(folder)?);
+        let args = ViewArgs {
+            run: run.clone(),
+            max_mb: Some(args.max_mb.unwrap_or(RIDE_MB)),
+            ..args.clone()
+        };
+        let page = Page::of(&args.recordings()?, &args, remedies)?;
+        write_file(&run.join(PAGE), &page.text)?;
+        forecast.advance();
+    }
+    // Links are relative, so that the folder can be moved; a list elsewhere names the whole path.
+    let from = if args.output.is_some() { Some(folder.as_path()) } else { None };
+    write_file(&index, list(folder, from, &rides))?;
+    print(&format!(
+        "{}: {} rides, the worst first, each with its page\nopen it in a browser; it needs no network\n",
+        index.display(),
+        rides.len()
+    ))?;
+    Ok(Ended::Well)
+}
+
+/// Orders rides: those with a contact first, then by the least room, then by the share of the time
+/// in which the distance was kept.
+fn worse_first(a: &RideFacts, b: &RideFacts) -> std::cmp::Ordering {
+    let room = |ride: &RideFacts| ride.room_m().unwrap_or(f64::INFINITY);
+    let share = |ride: &RideFacts| ride.distance_share().unwrap_or(1.0);
+    b.touches()
+        .cmp(&a.touches())
+        .then(room(a).total_cmp(&room(b)))
+        .then(share(a).total_cmp(&share(b)))
+}
+
+impl Ride {
+    fn folder(&self, parent: &Path) -> Result<&str, Failure> {
+        // A name, and no way out of the folder: the results may come from elsewhere.
+        let name = self
+            .folder
+            .as_deref()
+            .filter(|name| !name.is_empty() && *name != ".." && !name.contains(['/', '\\']));
+        name.ok_or_else(|| {
+            let shown = parent.join(RESULTS).display().to_string();
+            Failure::usage(format!(
+                "{shown} names no folder for the ride of {} with seed {}: an earlier version made it; \
+                 repeat it with `tagalong follow ... -o FOLDER --overwrite`",
+                self.suite, self.facts.seed
+            ))
+        })
+    }
+
+    /// Returns the address of its page.
+    fn link(&self, from: Option<&Path>) -> String {
+        let name = self.folder.as_deref().unwrap_or_default();
+        let at = self.facts.nearest_s.map_or(String::new(), |at_s| format!("#t={at_s:.1}"));
+        let path = from.map_or(PathBuf::from(name), |folder| folder.join(name)).join(PAGE);
+        let encoded: String = path.to_string_lossy().chars().map(encoded).collect();
+        format!("{encoded}{at}")
+    }
+}
+
+/// Returns a character of a path as an address has it.
+fn encoded(letter: char) -> String {
+    match letter {
+        ' ' => "%20".into(),
+        '%' => "%25".into(),
+        '#' => "%23".into(),
+        '?' => "%3F".into(),
+        letter => letter.to_string(),
+    }
+}
+
+fn list(folder: &Path, from: Option<&Path>, rides: &[Ride]) -> String {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let contacts = rides.iter().filter(|ride| ride.facts.touches()).count();
+    let kept = rides.iter().filter(|ride| ride.facts.kept).count();
+    let head = html! { style { (PreEscaped(style())) } };
+    let body = html! {
+        header class="top" {
+            h1 { "Rides in " (name) }
+            ul class="facts" {
+                li { (rides.len()) " rides" }
+                li { (kept) " kept the person" }
+                li { (contacts) " with a contact" }
+            }
+        }
+        main id="main" tabindex="-1" {
+            p {
+                "The worst ride is first: contacts, then the least room to a person or a thing while the "
+                "robot moved, then the share of the time in which it kept its distance. A link opens the "
+                "ride where it came nearest."
+            }
+            (table(rides, from))
+        }
+        footer { p { "Made by Tagalong " (env!("CARGO_PKG_VERSION")) "." } }
+    };
+    document(&format!("Rides in {name} - Tagalong"), &head, "Skip to the rides", &body)
+        .into_string()
+}
+
+/// Names of the columns after the first, which a phone shows beside each value.
+const COLUMNS: [&str; 7] = [
+    "Contact",
+    "Room to people",
+    "Room to things",
+    "Distance kept",
+    "Person kept",
+    "Wrong person",
+    "In view",
+];
+
+fn table(rides: &[Ride], from: Option<&Path>) -> Markup {
+    html! {
+        div class="scroll" role="region" aria-label="Rides, the worst first" tabindex="0" {
+            table class="cards" role="table" {
+                thead role="rowgroup" {
+                    tr role="row" {
+                        th scope="col" role="columnheader" { "Ride" }
+                        @for name in COLUMNS { th scope="col" role="columnheader" { (name) } }
+                    }
+                }
+                tbody role="rowgroup" {
+                    @for ride in rides {
+                        tr role="row" {
+                            th scope="row" role="rowheader" {
+                                a href=(ride.link(from)) { (ride.suite) ", " (ride.pipeline) ", seed " (ride.facts.seed) }
+                            }
+                            @for (name, (text, is_bad)) in COLUMNS.iter().zip(cells(&ride.facts)) {
+                                td role="cell" data-name=(name) class=[is_bad.then_some("bad")] { (text) }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Returns the text of each column, and whether it is bad.
+fn cells(ride: &RideFacts) -> [(String, bool); 7] {
+    let metres = |room: Option<f64>| {
+        let text = room.map_or("-".into(), |room| format!("{room:.2} m"));
+        (text, room.is_some_and(|room| room < 0.0))
+    };
+    let share = ride.distance_share();
+    let in_view = if ride.time_s > 0.0 { ride.in_view_s / ride.time_s } else { 0.0 };
+    [
+        (if ride.touches() { "yes" } else { "no" }.into(), ride.touches()),
+        metres(ride.clearance_people_m),
+        metres(ride.clearance_things_m),
+        (share.map_or("-".into(), |share| format!("{:.0} %", 100.0 * share)), false),
+        (if ride.kept { "yes" } else { "no" }.into(), !ride.kept),
+        (format!("{:.1} s", ride.wrong_s), false),
+        (format!("{:.0} %", 100.0 * in_view), false),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ride(name: &str, people_m: f64, share: f64) -> Ride {
+        let facts = RideFacts {
+            clearance_people_m: Some(people_m),
+            slow_s: 10.0,
+            distance_kept_s: 10.0 * share,
+            nearest_s: Some(2.5),
+            ..RideFacts::default()
+        };
+        Ride { suite: name.into(), folder: Some(name.into()), facts, ..Ride::default() }
+    }
+
+    #[test]
+    fn the_worst_ride_is_first() {
+        let mut rides = [
+            ride("far", 0.9, 0.1),
+            ride("touch", -0.1, 1.0),
+            ride("a", 0.4, 0.9),
+            ride("b", 0.4, 0.2),
+        ];
+        rides.sort_by(|a, b| worse_first(&a.facts, &b.facts));
+        let names: Vec<&str> = rides.iter().map(|ride| ride.suite.as_str()).collect();
+        assert_eq!(names, ["touch", "b", "a", "far"]);
+    }
+
+    #[test]
+    fn names_stay_text_and_links_stay_in_the_folder() {
+        let mut hostile = ride("<img src=x>", 0.5, 0.5);
+        hostile.folder = Some("a b#c".into());
+        let page = list(Path::new("rides"), None, &[hostile.clone()]);
+        assert!(!page.contains("<img"), "a name became an element");
+        assert!(page.contains("href=\"a%20b%23c/view.html#t=2.5\""), "{page}");
+        for name in ["..", "a/b", ""] {
+            hostile.folder = Some(name.into());
+            assert!(hostile.folder(Path::new("rides")).is_err(), "{name}");
+        }
+    }
+}
