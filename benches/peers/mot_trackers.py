@@ -1,6 +1,6 @@
 """Scores trackers that get the very same boxes: five of `trackers`, and Tagalong.
 
-Usage: python benches/peers/mot_trackers.py ../shared/data/mot [--ours FOLDER]... [--set MOT17]
+Usage: python benches/peers/mot_trackers.py ../shared/data/mot [--ours FOLDER]... [--set NAME]
 
 Needs `pip install trackers trackeval`. SORT, ByteTrack, OC-SORT, BoT-SORT and C-BIoU of
 roboflow's `trackers` run with their default settings. TrackEval scores all of them by the rules
@@ -9,6 +9,8 @@ of the set, IoU 0.5 for MOTA and IDF1. Means are over sequences; "all" counts al
   MOT15  eleven sequences with the detections that SORT was published with.
   MOT17  four sequences with the boxes of a tracker's output, its numbers removed; they have no
          scores, so that a second stage for doubtful boxes has nothing to do.
+  NAME   any other folder of sequences in the first argument, each with seqinfo.ini, gt/gt.txt and
+         det/det.txt, as `mot_variants.py` writes them; scored by the rules of MOT15.
 
 `--ours FOLDER` is what `tagalong boxes -o FOLDER` wrote: a folder for each config, with
 SEQUENCE.txt for each sequence.
@@ -43,11 +45,25 @@ PEERS = {
 }
 
 
+def truth_of(mot, benchmark):
+    """Returns the folder with the truth of a set."""
+    if benchmark in ("MOT15", "MOT17"):
+        return mot / "gt" / f"{benchmark}-train"
+    return mot / benchmark
+
+
+def rules_of(benchmark):
+    """Returns the benchmark by whose rules a set is scored."""
+    return "MOT17" if benchmark == "MOT17" else "MOT15"
+
+
 def boxes_of(mot, benchmark, sequence):
     """Returns the file with the boxes of a sequence."""
     if benchmark == "MOT15":
         return mot / "sort-detections" / sequence / "det.txt"
-    return mot / "tracker-output" / "MOT17-train" / f"{sequence}.txt"
+    if benchmark == "MOT17":
+        return mot / "tracker-output" / "MOT17-train" / f"{sequence}.txt"
+    return mot / benchmark / sequence / "det" / "det.txt"
 
 
 def read_boxes(path):
@@ -90,7 +106,7 @@ def write_peers(mot, benchmark, names, folder):
         frames = seconds = 0
         (folder / name / "data").mkdir(parents=True)
         for sequence in names:
-            length = length_of(mot / "gt" / f"{benchmark}-train" / sequence)
+            length = length_of(truth_of(mot, benchmark) / sequence)
             boxes = read_boxes(boxes_of(mot, benchmark, sequence))
             lines, spent = track(peer, boxes, length)
             (folder / name / "data" / f"{sequence}.txt").write_text("\n".join(lines) + "\n")
@@ -114,11 +130,12 @@ def score(mot, benchmark, names, folder):
     """Returns TrackEval's results by tracker and sequence."""
     truth = folder / "gt"
     (truth / "seqmaps").mkdir(parents=True)
-    (truth / f"{benchmark}-train").symlink_to((mot / "gt" / f"{benchmark}-train").resolve())
-    (truth / "seqmaps" / f"{benchmark}-train.txt").write_text("name\n" + "\n".join(names) + "\n")
+    rules = rules_of(benchmark)
+    (truth / f"{rules}-train").symlink_to(truth_of(mot, benchmark).resolve())
+    (truth / "seqmaps" / f"{rules}-train.txt").write_text("name\n" + "\n".join(names) + "\n")
     dataset = trackeval.datasets.MotChallenge2DBox({
         **trackeval.datasets.MotChallenge2DBox.get_default_dataset_config(),
-        "BENCHMARK": benchmark, "PRINT_CONFIG": False,
+        "BENCHMARK": rules, "PRINT_CONFIG": False,
         "GT_FOLDER": str(truth), "TRACKERS_FOLDER": str(folder / "trackers"),
     })
     evaluator = trackeval.Evaluator({
@@ -167,11 +184,11 @@ def main():
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("mot", type=Path)
     parser.add_argument("--ours", action="append", default=[])
-    parser.add_argument("--set", choices=["MOT15", "MOT17"], default="MOT15")
+    parser.add_argument("--set", default="MOT15")
     args = parser.parse_args()
-    names = sorted(os.listdir(args.mot / "gt" / f"{args.set}-train"))
+    names = sorted(os.listdir(truth_of(args.mot, args.set)))
     with tempfile.TemporaryDirectory() as root:
-        trackers_folder = Path(root) / "trackers" / f"{args.set}-train"
+        trackers_folder = Path(root) / "trackers" / f"{rules_of(args.set)}-train"
         rates = write_peers(args.mot, args.set, names, trackers_folder)
         link_ours(args.ours, names, trackers_folder)
         table(args.set, names, score(args.mot, args.set, names, Path(root)), rates)

@@ -41,7 +41,7 @@ pub use source::{BuildError, ConfigSource};
 pub use suits::Suits;
 pub use tune::{Tunable, with_values};
 
-const OWN: [&str; 13] = [
+const OWN: [&str; 14] = [
     "seed",
     "without",
     "robot",
@@ -50,6 +50,7 @@ const OWN: [&str; 13] = [
     "clock",
     "merge",
     "occlusion",
+    "births",
     "appearance",
     "reidentification",
     "target",

@@ -74,6 +74,7 @@
 //! | `gate`, `not the best sighting` | a detection found near a track |
 //! | `same person` | the weaker of two detections of one person |
 //! | `association not possible`, `associator` | an impossible pair; a detection already used up |
+//! | `rather a new person` | a pair with a track that was lost; the detection may start a track |
 //! | `tracked already` | a detection at the place of a track that is seen there |
 //! | `score`, `verifier` | a candidate that its detector or the verifiers call no person |
 //! | `doubt`, `clutter`, `no track fits` | a candidate that the track manager refuses |
@@ -118,7 +119,7 @@ pub use tagalong_following::{
 pub use tagalong_stereo::StereoSettings;
 pub use tagalong_tracking::StepError;
 pub use tagalong_tracking::{
-    Candidate, ClockSettings, DetectorSettings, Fate, MergeSettings, OcclusionSettings, Outcome,
-    Role, Weighing,
+    BirthSettings, Candidate, ClockSettings, DetectorSettings, Fate, MergeSettings,
+    OcclusionSettings, Outcome, Role, Weighing,
 };
 pub use tagalong_vision::odometry::{MotionSource, OdometrySettings};

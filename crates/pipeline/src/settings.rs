@@ -10,7 +10,8 @@ use tagalong_vision::odometry::OdometrySettings;
 use crate::AppearanceSettings;
 
 use tagalong_tracking::{
-    ClockSettings, MergeSettings, OcclusionSettings, ReidentificationSettings, TrackerSettings,
+    BirthSettings, ClockSettings, MergeSettings, OcclusionSettings, ReidentificationSettings,
+    TrackerSettings,
 };
 
 /// Keys of the pipeline itself. Beside them a config has the plugin sections `[[detectors]]`,
@@ -40,6 +41,8 @@ pub struct PipelineSettings {
     pub merge: MergeSettings,
     /// Test for people hidden behind others.
     pub occlusion: OcclusionSettings,
+    /// New people near a track that was lost.
+    pub births: BirthSettings,
     /// Network that describes people by their appearance.
     pub appearance: AppearanceSettings,
     /// Recognition of people by their appearance.
@@ -61,8 +64,8 @@ impl PipelineSettings {
 
     /// Returns the settings of the tracker.
     pub(crate) fn tracker(&self) -> TrackerSettings {
-        let Self { clock, merge, occlusion, reidentification, .. } = self.clone();
-        TrackerSettings { clock, merge, occlusion, reidentification }
+        let Self { clock, merge, occlusion, births, reidentification, .. } = self.clone();
+        TrackerSettings { clock, merge, occlusion, births, reidentification }
     }
 }
 

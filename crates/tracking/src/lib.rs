@@ -11,6 +11,7 @@
 //! | tracks searched for, image searched for new people | `search` | detectors, verifiers |
 //! | detections of one person merged | `detections` | [`MergeSettings`] |
 //! | detections associated with tracks | | the associator |
+//! | detections of new people taken from lost tracks | `births` | [`BirthSettings`] |
 //! | detections of half-hidden people made less certain | `occlusion` | [`OcclusionSettings`] |
 //! | filter updated | | the filter |
 //! | tracks started, confirmed, ended | `table` | the track manager |
@@ -98,6 +99,7 @@
 //!   miss of a detector look the same to the filter, namely as no evidence.
 //! * Timings influence nothing.
 
+mod births;
 mod clock;
 mod detections;
 mod duplicates;
@@ -123,7 +125,8 @@ pub use reidentification::{AppearanceEvidence, ReidentificationSettings};
 pub use report::{Candidate, Fate, Outcome, TrackingReport};
 pub use search::DetectorSlot;
 pub use settings::{
-    ClockSettings, DetectorSettings, MergeSettings, OcclusionSettings, Role, TrackerSettings,
+    BirthSettings, ClockSettings, DetectorSettings, MergeSettings, OcclusionSettings, Role,
+    TrackerSettings,
 };
 pub use tracker::{Parts, STAGES, Tracked, Tracker};
 pub use weighing::Weighing;

@@ -71,6 +71,8 @@ pub struct TrackerSettings {
     pub merge: MergeSettings,
     /// Occlusion of tracks by nearer ones.
     pub occlusion: OcclusionSettings,
+    /// New people near a track that was lost.
+    pub births: BirthSettings,
     /// Recognition of people by their appearance.
     pub reidentification: ReidentificationSettings,
 }
@@ -99,6 +101,41 @@ pub struct OcclusionSettings {
 impl Default for OcclusionSettings {
     fn default() -> Self {
         Self { min_visible: 0.4, min_gap_m: 0.3, min_gap_sigmas: 3.0, body_width_m: 0.0 }
+    }
+}
+
+/// People who come: a detection whose track was lost starts a new track where a new person is the
+/// likelier explanation of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct BirthSettings {
+    /// Density of new people in a frame, per m² of the floor. A track keeps a detection only if its
+    /// own density at that place, which falls as the track becomes uncertain, is higher. 0: each
+    /// track keeps what the associator gives it.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub inside_per_m2: f64,
+    /// The same at the left, right and lower border of the image.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub border_per_m2: f64,
+    /// Largest distance of a box at the border from it, in widths of the box.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub border_widths: f64,
+    /// Part of the appearance: a factor of its log-likelihood ratio as the associator has it
+    /// (`[reidentification] association_weight`).
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub appearance: f64,
+}
+
+impl BirthSettings {
+    /// Returns true if all tracks keep what the associator gives them.
+    pub(crate) fn are_off(&self) -> bool {
+        self.inside_per_m2 == 0.0 && self.border_per_m2 == 0.0
+    }
+}
+
+impl Default for BirthSettings {
+    fn default() -> Self {
+        Self { inside_per_m2: 0.0, border_per_m2: 0.0, border_widths: 0.1, appearance: 0.6 }
     }
 }
 

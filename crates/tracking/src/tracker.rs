@@ -9,6 +9,7 @@ use tagalong_core::{
 };
 use tagalong_vision::Describer;
 
+use crate::births::remove_births;
 use crate::clock::{Clock, Tick};
 use crate::detections::{DetectionSet, PendingDetection};
 use crate::duplicates::DuplicateFinder;
@@ -352,7 +353,8 @@ impl Tracker {
         detections.merge(&self.settings.merge);
         let open = detections.undecided();
         let found = detections.undecided_detections();
-        let appearance = self.reidentifier.compare(frame, predicted, &found);
+        let births = &self.settings.births;
+        let appearance = self.reidentifier.compare(frame, predicted, &found, !births.are_off());
         let appearance =
             appearance.map_err(|error| StepError::of_stage("[appearance]", frame, error))?;
         let gate = &Gate { appearance: &appearance, ..*gate };
@@ -362,6 +364,9 @@ impl Tracker {
         // The associator is a plugin; pairs outside of the gate must not reach the filter.
         let impossible = remove_impossible(&mut answer, predicted, &found, gate);
         log.funnel.drop_many("association not possible", impossible);
+        let camera = &frame.camera;
+        let removed = remove_births(&mut answer, predicted, &found, &appearance, camera, births);
+        log.funnel.drop_many("rather a new person", removed);
         detections.take_over(&answer, predicted, &open);
         Ok(())
     }

@@ -93,7 +93,8 @@ impl Reidentifier {
     }
 
     /// Returns the log-likelihood ratios of the appearances of tracks and detections, for the
-    /// associator; none if positions alone decide.
+    /// associator; none if positions alone decide. Between one track and one detection there is a
+    /// choice only `with_births`: the detection may be of a new person.
     ///
     /// # Errors
     /// The network that describes people fails.
@@ -102,14 +103,12 @@ impl Reidentifier {
         frame: &Frame,
         tracks: &[Track],
         detections: &[Detection],
+        with_births: bool,
     ) -> Result<Vec<Vec<f64>>> {
         let weight = self.settings.association_weight;
         let evidence = self.settings.association_evidence;
-        // Between one track and one detection there is nothing to choose.
-        if weight == 0.0
-            || self.settings.remember_s == 0.0
-            || tracks.len().max(detections.len()) < 2
-        {
+        let is_choice = with_births || tracks.len().max(detections.len()) > 1;
+        if weight == 0.0 || self.settings.remember_s == 0.0 || !is_choice {
             return Ok(Vec::new());
         }
         let seen = detections.iter().map(|detection| self.describe(frame, detection));
@@ -146,6 +145,7 @@ impl Reidentifier {
     fn predict(&mut self, motion: &EgoMotion) {
         for identity in self.tracks.values_mut() {
             identity.person.predict(motion);
+            identity.start = motion.apply_to_point(identity.start);
             identity.age_s += motion.dt;
         }
         self.absent.iter_mut().for_each(|person| person.predict(motion));
@@ -209,7 +209,7 @@ impl Reidentifier {
             let covered = tracks.iter().any(|other| other.seen && covers(other, track));
             let Some(identity) = self.tracks.get_mut(&track.id) else { continue };
             // The position counts also where the appearance does not: it bounds how far a person can walk.
-            identity.person.see(place(track));
+            identity.person.see(place(track), track.velocity);
             if covered || tracks.iter().any(is_near) {
                 continue;
             }
@@ -302,14 +302,14 @@ impl Reidentifier {
             }
             let reported = identity.reported;
             let too_late = identity.age_s > self.settings.decide_s;
-            let returned = self.returned(identity, track);
+            let returned = self.returned(identity);
             let returned = returned.map(|index| self.absent.remove(index));
             let Some(identity) = self.tracks.get_mut(&track.id) else { continue };
             match returned {
                 Some(person) => {
                     given_up.extend(reported.then_some(identity.person.number));
                     identity.person = person;
-                    identity.person.see(place(track));
+                    identity.person.see(place(track), track.velocity);
                     identity.settle();
                 }
                 None if too_late => identity.settle(),
@@ -320,11 +320,12 @@ impl Reidentifier {
     }
 
     /// Returns the index of the absent person whose track this is.
-    fn returned(&self, identity: &Identity, track: &Track) -> Option<usize> {
+    fn returned(&self, identity: &Identity) -> Option<usize> {
         let ReidentificationSettings { max_difference, margin, .. } = self.settings;
         let seen = &identity.unsure;
         let differences = self.absent.iter().enumerate().filter(|(_, person)| {
-            person.fits_height(seen, &self.settings) && person.reaches(place(track), &self.settings)
+            person.fits_height(seen, &self.settings)
+                && person.reaches(identity.start, identity.age_s, &self.settings)
         });
         let differences = differences.filter_map(|(i, p)| Some((i, p.difference(seen)?)));
         let (best, difference) = differences.min_by(|a, b| a.1.total_cmp(&b.1))?;

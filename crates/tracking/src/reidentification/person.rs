@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use tagalong_core::{EgoMotion, TrackId};
 use tagalong_vision::{Appearance, Gallery};
 
@@ -23,6 +23,8 @@ pub(crate) struct Person {
     heights: (f64, f64),
     /// Where the person was seen last, robot frame, m; `None` after a jump of the clock.
     place: Option<Point2<f64>>,
+    /// Velocity at that time, m/s.
+    velocity: Vector2<f64>,
     /// Time since then, s.
     ago_s: f64,
 }
@@ -31,12 +33,14 @@ impl Person {
     pub(crate) fn new(number: TrackId, place: Point2<f64>) -> Self {
         let gallery = Gallery::default();
         let heights = (0.0, 0.0);
-        Self { number, gallery, heights, place: Some(place), ago_s: 0.0 }
+        let velocity = Vector2::zeros();
+        Self { number, gallery, heights, place: Some(place), velocity, ago_s: 0.0 }
     }
 
     /// Moves the memory into the robot's new frame.
     pub(crate) fn predict(&mut self, motion: &EgoMotion) {
         self.place = self.place.map(|place| motion.apply_to_point(place));
+        self.velocity = motion.apply_to_velocity(self.velocity);
         self.ago_s += motion.dt;
     }
 
@@ -46,9 +50,11 @@ impl Person {
         self.ago_s += pause_s;
     }
 
-    /// Records that the person was seen at a place.
-    pub(crate) fn see(&mut self, place: Point2<f64>) {
-        (self.place, self.ago_s) = (Some(place), 0.0);
+    /// Records that the person was seen at a place, with a velocity.
+    pub(crate) fn see(&mut self, place: Point2<f64>, velocity: Vector2<f64>) {
+        self.place = Some(place);
+        self.velocity = velocity;
+        self.ago_s = 0.0;
     }
 
     pub(crate) fn learn(&mut self, appearance: Appearance) {
@@ -85,10 +91,20 @@ impl Person {
         (height_m - self.heights.0 / self.heights.1).abs() <= settings.max_height_m
     }
 
-    /// Returns true if the person can have got to a place.
-    pub(crate) fn reaches(&self, place: Point2<f64>, settings: &ReidentificationSettings) -> bool {
-        let reach_m = REACH_M + settings.max_speed_mps * self.ago_s;
-        self.place.is_none_or(|last| (place - last).norm() <= reach_m)
+    /// Returns true if the person can have been at a place this long ago: not farther away than at
+    /// the largest speed, and without turning faster than people do.
+    pub(crate) fn reaches(
+        &self,
+        place: Point2<f64>,
+        since_s: f64,
+        settings: &ReidentificationSettings,
+    ) -> bool {
+        let Some(last) = self.place else { return true };
+        let time_s = (self.ago_s - since_s).max(0.0);
+        let coasted = last + self.velocity * time_s;
+        let turn_m = 0.5 * settings.max_acceleration_mps2 * time_s * time_s;
+        (place - last).norm() <= REACH_M + settings.max_speed_mps * time_s
+            && (place - coasted).norm() <= REACH_M + turn_m
     }
 }
 
@@ -99,6 +115,8 @@ pub(crate) struct Identity {
     /// Latest appearances that are not yet certain to be of this person: of a new track, and after
     /// other tracks were near.
     pub(crate) unsure: Vec<Appearance>,
+    /// Where the track started, robot frame, m.
+    pub(crate) start: Point2<f64>,
     /// Time since the track started, s.
     pub(crate) age_s: f64,
     /// True until a new track is known to be a new person, or one who came back.
@@ -114,6 +132,7 @@ impl Identity {
         Self {
             person: Person::new(track, place),
             unsure: Vec::new(),
+            start: place,
             age_s: 0.0,
             is_new: true,
             reported: false,

@@ -36,6 +36,11 @@ pub struct ReidentificationSettings {
     /// Speed beyond which a person cannot have got to where a track starts, m/s.
     #[schemars(range(min = 0.0))]
     pub max_speed_mps: f64,
+    /// Acceleration beyond which a person cannot have turned to where a track starts, m/s²: one who
+    /// walked out of the image is not at the other end of the room soon after. As large as 1,000 it
+    /// excludes nothing.
+    #[schemars(range(min = 0.0))]
+    pub max_acceleration_mps2: f64,
     /// A track may take over a number for this time after its start, s.
     #[schemars(range(min = 0.0))]
     pub decide_s: f64,
@@ -82,6 +87,7 @@ impl Default for ReidentificationSettings {
             margin: 0.06,
             max_height_m: 0.15,
             max_speed_mps: 3.0,
+            max_acceleration_mps2: 1e3,
             decide_s: 2.0,
             alone_m: 0.6,
             association_weight: 0.0,

@@ -172,8 +172,9 @@ fn a_detection_that_looks_like_the_person_of_a_track_speaks_for_it() {
     let tracks = [track(1, 0.8, 1.7), track(2, -0.8, 1.7)];
     scene.show(3, &frame(RED, BLUE), &tracks);
     let detections = [detection(0.8), detection(-0.8)];
-    let compare =
-        |scene: &Scene, image: &Frame| scene.stage.compare(image, &tracks, &detections).unwrap();
+    let compare = |scene: &Scene, image: &Frame| {
+        scene.stage.compare(image, &tracks, &detections, false).unwrap()
+    };
     assert!(compare(&scene, &frame(RED, BLUE)).is_empty(), "positions alone decide by default");
     scene.stage.settings.association_weight = 5.0;
     let [same, changed] = [frame(RED, BLUE), frame(BLUE, RED)].map(|image| compare(&scene, &image));
@@ -184,10 +185,10 @@ fn a_detection_that_looks_like_the_person_of_a_track_speaks_for_it() {
         assert_eq!(changed[row][column], same[row][1 - column], "the colours changed places");
     }
     let stranger =
-        scene.stage.compare(&frame(RED, BLUE), &[track(9, 0.8, 1.7)], &detections).unwrap();
+        scene.stage.compare(&frame(RED, BLUE), &[track(9, 0.8, 1.7)], &detections, false).unwrap();
     assert_eq!(stranger, [[0.0, 0.0]], "nothing is known of a new track");
     let whole = Detection { image: None, ..detection(0.8) };
-    let unseen = scene.stage.compare(&frame(RED, BLUE), &tracks, &[whole]).unwrap();
+    let unseen = scene.stage.compare(&frame(RED, BLUE), &tracks, &[whole], false).unwrap();
     assert_eq!(unseen, [[0.0], [0.0]], "without an image box there is no appearance");
 }
 
@@ -213,7 +214,7 @@ fn the_evidence_of_the_appearance_is_that_of_the_settings() {
     let detections = [detection(0.8), detection(-0.8)];
     scene.stage.settings.association_weight = 1.0;
     scene.stage.settings.association_evidence = AppearanceEvidence::HalfDistance;
-    let same = scene.stage.compare(&frame(RED, BLUE), &tracks, &detections).unwrap();
+    let same = scene.stage.compare(&frame(RED, BLUE), &tracks, &detections, false).unwrap();
     assert!(same[0][0] > 4.0 && same[1][1] > 4.0, "{same:?}");
     assert_eq!([same[0][1], same[1][0]], [0.0; 2], "other clothes say nothing");
 }
@@ -228,4 +229,40 @@ fn the_nearer_person_covers_the_farther_one() {
     assert!(!covers(&near, &same), "nobody covers themselves");
     far.estimate.region.x += 2.0 * far.estimate.region.width;
     assert!(!covers(&near, &far), "beside each other in the image");
+}
+
+/// The person walks to the left at 2 m/s, and so is 2 m further on a second later.
+#[test]
+fn a_person_who_walked_away_is_not_back_at_once() {
+    let walker = Track {
+        estimate: Estimate {
+            person: Person { velocity: Vector2::new(0.0, 2.0), ..*track(1, 0.8, 1.6) },
+            ..track(1, 0.8, 1.6).estimate
+        },
+        ..track(1, 0.8, 1.6)
+    };
+    let number_of_next = |max_acceleration_mps2: f64, pause: usize| {
+        let mut scene = Scene::new();
+        scene.stage.settings.max_acceleration_mps2 = max_acceleration_mps2;
+        let image = frame(RED, BLUE);
+        scene.show(30, &image, std::slice::from_ref(&walker));
+        scene.show(pause, &image, &[]);
+        scene.show(15, &image, &[track(2, 0.8, 1.6)])[0]
+    };
+    assert_eq!(number_of_next(1000.0, 10), 1);
+    assert_eq!(number_of_next(1.5, 10), 2, "it would have to turn within a second");
+    assert_eq!(number_of_next(1.5, 40), 1, "it has had the time");
+}
+
+#[test]
+fn a_single_track_and_detection_are_compared_where_new_people_count() {
+    let mut scene = Scene::new();
+    scene.show(30, &frame(RED, BLUE), &[track(1, 0.8, 1.7)]);
+    scene.stage.settings.association_weight = 1.0;
+    let ratios = |with_births: bool| {
+        let image = frame(RED, BLUE);
+        scene.stage.compare(&image, &[track(1, 0.8, 1.7)], &[detection(0.8)], with_births).unwrap()
+    };
+    assert!(ratios(false).is_empty());
+    assert!(ratios(true)[0][0] > 0.5);
 }

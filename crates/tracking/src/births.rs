@@ -1,0 +1,157 @@
+//! New people near a track that was lost: a pair is kept only if the detection is rather of the
+//! track's person than of one who has just come.
+//!
+//! The uncertainty of a track that is not seen grows until its gate takes in half a room, and the
+//! next person to enter would inherit its number. People who come are rare in the middle of the
+//! image, and less so at its borders.
+
+use std::f64::consts::TAU;
+
+use tagalong_core::{Associations, Detection, Track};
+use tagalong_geometry::Camera;
+
+use crate::BirthSettings;
+
+/// Removes the pairs that are less likely than a new person, and returns their number. `appearance`
+/// has the log-likelihood ratios of the appearances by track and detection, or is empty.
+pub(crate) fn remove_births(
+    answer: &mut Associations,
+    tracks: &[Track],
+    detections: &[Detection],
+    appearance: &[Vec<f64>],
+    camera: &Camera,
+    settings: &BirthSettings,
+) -> u64 {
+    if settings.are_off() {
+        return 0;
+    }
+    let before = answer.pairs.len();
+    answer.pairs.retain(|pair| {
+        let Some(track) = tracks.get(pair.track) else { return true };
+        let Some(detection) = detections.get(pair.detection) else { return true };
+        let row = appearance.get(pair.track);
+        let log_ratio = row.and_then(|row| row.get(pair.detection)).copied().unwrap_or(0.0);
+        let births = births_per_m2(detection, camera, settings);
+        log_density(track, detection) + settings.appearance * log_ratio >= births.ln()
+    });
+    (before - answer.pairs.len()) as u64
+}
+
+/// Returns the logarithm of the density of a track's person at the place of a detection on the
+/// floor, per m²; infinite where the covariance has no inverse.
+fn log_density(track: &Track, detection: &Detection) -> f64 {
+    let innovation = (detection.position - track.estimate.person.position).xy();
+    let prior = track.estimate.covariance.fixed_view::<2, 2>(0, 0);
+    let spread = prior + detection.covariance.fixed_view::<2, 2>(0, 0);
+    let Some(root) = spread.cholesky() else { return f64::INFINITY };
+    let squared_distance = innovation.dot(&root.solve(&innovation));
+    -0.5 * (squared_distance + root.determinant().ln()) - TAU.ln()
+}
+
+/// Returns the density of people who come at the place of a detection. The upper border does not
+/// count, because nobody enters there.
+fn births_per_m2(detection: &Detection, camera: &Camera, settings: &BirthSettings) -> f64 {
+    if camera.is_blind() {
+        return settings.inside_per_m2;
+    }
+    let rect = detection.rect_in(camera);
+    let margin = settings.border_widths * rect.width;
+    let is_at_border = rect.x < margin
+        || rect.right() > camera.width as f64 - margin
+        || rect.bottom() > camera.height as f64 - margin;
+    if is_at_border { settings.border_per_m2 } else { settings.inside_per_m2 }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point3, SMatrix, Vector2, Vector3};
+    use tagalong_core::{Estimate, Person, TrackId};
+    use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
+
+    use super::*;
+
+    const SETTINGS: BirthSettings = BirthSettings {
+        inside_per_m2: 0.05,
+        border_per_m2: 0.2,
+        border_widths: 0.1,
+        appearance: 0.5,
+    };
+
+    fn camera() -> Camera {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+    }
+
+    /// Detection 3 m ahead, with a box at this place in the image.
+    fn detection(x: f64, y: f64) -> Detection {
+        Detection {
+            image: Some(ImageBox::upper_body(Rect::new(x, y, 100.0, 100.0))),
+            position: Point3::new(3.0, 0.0, 1.6),
+            covariance: Matrix3::zeros(),
+            score: 1.0,
+            source: "test",
+        }
+    }
+
+    /// Track so far beside the detection, m, with this variance, m².
+    fn track(off_m: f64, variance_m2: f64) -> Track {
+        let position = Point3::new(3.0, 0.0, 1.6) + Vector3::y() * off_m;
+        let person = Person { position, velocity: Vector2::zeros() };
+        let covariance = SMatrix::identity() * variance_m2;
+        Track {
+            id: TrackId(1),
+            estimate: Estimate { person, covariance, region: Rect::default() },
+            seen: false,
+            occluded: false,
+            confirmed: true,
+            age: 9,
+            unseen_s: 1.0,
+            score: 5.0,
+        }
+    }
+
+    fn is_kept(x: f64, track: Track, log_ratio: f64, settings: &BirthSettings) -> bool {
+        let mut answer = Associations::one_to_one([Some(0)]);
+        let appearance = [vec![log_ratio]];
+        let found = [detection(x, 100.0)];
+        let removed =
+            remove_births(&mut answer, &[track], &found, &appearance, &camera(), settings);
+        assert_eq!(removed as usize + answer.pairs.len(), 1);
+        removed == 0
+    }
+
+    /// The density of a normal distribution with 1 m² is 0.159 per m² in the middle, and 0.0965 at
+    /// one standard deviation.
+    #[test]
+    fn a_vague_track_does_not_take_who_comes_in_at_the_border() {
+        assert!(is_kept(270.0, track(0.0, 1.0), 0.0, &SETTINGS), "in the middle of the image");
+        assert!(!is_kept(5.0, track(0.0, 1.0), 0.0, &SETTINGS), "left border");
+        assert!(!is_kept(535.0, track(0.0, 1.0), 0.0, &SETTINGS), "right border");
+        assert!(is_kept(5.0, track(0.0, 0.1), 0.0, &SETTINGS), "a track that was seen just now");
+    }
+
+    #[test]
+    fn place_and_appearance_count_together() {
+        assert!(is_kept(270.0, track(1.0, 1.0), 0.0, &SETTINGS), "0.0965 per m²");
+        assert!(!is_kept(270.0, track(1.6, 1.0), 0.0, &SETTINGS), "0.044 per m²");
+        assert!(is_kept(270.0, track(1.6, 1.0), 1.0, &SETTINGS), "it looks like the person");
+        assert!(!is_kept(270.0, track(0.0, 1.0), -3.0, &SETTINGS), "it looks different");
+    }
+
+    #[test]
+    fn without_densities_all_pairs_are_kept() {
+        assert!(is_kept(5.0, track(9.0, 1.0), -9.0, &BirthSettings::default()));
+    }
+
+    #[test]
+    fn people_enter_at_the_lower_border_and_not_at_the_upper_one() {
+        let of = |y: f64| births_per_m2(&detection(270.0, y), &camera(), &SETTINGS);
+        assert_eq!([of(0.0), of(100.0), of(375.0)], [0.05, 0.05, 0.2]);
+    }
+
+    #[test]
+    fn a_track_without_uncertainty_keeps_its_detection() {
+        assert_eq!(log_density(&track(0.0, 0.0), &detection(270.0, 100.0)), f64::INFINITY);
+    }
+}
