@@ -44,6 +44,7 @@ mod approach;
 mod behaviour;
 mod body;
 mod camera_settings;
+mod crowd;
 mod daylight;
 mod faults;
 mod figures;
@@ -82,6 +83,7 @@ mod world;
 
 pub use approach::{ApproachBy, ApproachInView, ApproachSettings, ApproachState};
 pub use camera_settings::{CameraKind, CameraSettings};
+pub use crowd::{Block, CrowdSettings, Walk};
 pub use daylight::Daylight;
 pub use faults::{FaultKind, InjectedFault, ScheduledFault};
 pub use figures::FIGURES_VERSION;
