@@ -13,6 +13,7 @@ use crate::approach::{ApproachBy, ApproachSettings};
 use crate::crowd::{Block, CrowdSettings, Walk};
 use crate::daylight::Daylight;
 use crate::faults::InjectedFault;
+use crate::follow_bench::FollowBench;
 use crate::footprint;
 use crate::furniture::Furniture;
 use crate::laser::LaserSettings;
@@ -73,6 +74,9 @@ pub struct Scene {
     pub reacting: CrowdSettings,
     /// A person or a trolley that comes at the robot; none if left out.
     pub approach: Option<ApproachSettings>,
+    /// Room, blocks and people by the rules of the benchmark Follow-Bench.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub follow_bench: Option<FollowBench>,
     /// Variation of the path of the first person by the seed; without it the path is the same for all.
     #[serde(skip_serializing_if = "PathVariation::is_off")]
     pub variation: PathVariation,
@@ -100,6 +104,7 @@ impl Default for Scene {
             people: Vec::new(),
             reacting: CrowdSettings::default(),
             approach: None,
+            follow_bench: None,
             variation: PathVariation::default(),
         }
     }
@@ -138,7 +143,7 @@ impl Scene {
             Ok(Self { seed, ..scene })
         })?;
         scene.check()?;
-        Ok(scene.with_varied_paths())
+        Ok(scene.with_follow_bench().with_varied_paths())
     }
 
     /// Returns the number of people, companions and crowd included.
@@ -264,6 +269,9 @@ impl Scene {
         let has_sides = self.light.day.is_some() || !self.webcams.is_empty();
         let variation = self.variation.rules(has_sides);
         let parts = webcams.chain(laser).chain(ramp).chain(day).chain(approach).chain(outline);
+        let is_empty = self.number_of_people() == 0 && self.blocks.is_empty();
+        let bench = self.follow_bench.iter().flat_map(|bench| bench.rules(is_empty));
+        let parts = parts.chain(bench);
         let blocks = self.blocks.iter().flat_map(Block::rules);
         let parts = parts.chain(variation).chain(self.reacting.rules()).chain(blocks);
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);
