@@ -10,6 +10,8 @@ use crate::person::Person;
 use crate::posture::Posture;
 use crate::scene::{AtEnd, PersonSettings, Trick};
 
+mod react;
+
 /// Largest change of a walker's velocity, m/s².
 const MAX_ACCELERATION: f64 = 1.2;
 /// Largest turn rate of a body, rad/s.
@@ -75,6 +77,8 @@ pub struct Walker {
     tricked: bool,
     /// Time for which an object has blocked the walker, s.
     held_up_s: f64,
+    /// Points on the way round blocks to the point ahead, which is the last of them.
+    turns: Vec<Point2<f64>>,
 }
 
 impl Walker {
@@ -103,6 +107,7 @@ impl Walker {
             waits_until_s,
             tricked: false,
             held_up_s: 0.0,
+            turns: Vec::new(),
         }
     }
 
@@ -146,7 +151,8 @@ impl Walker {
         keep_off: &[Point2<f64>],
         obstacles: &[Obstacle],
     ) {
-        self.look_ahead(now_s);
+        let near_m = if self.held_up_s > HELD_UP_S { NEAR_ENOUGH_M } else { REACHED_M };
+        self.look_ahead(now_s, near_m);
         let wanted = match lead {
             Some(lead) => self.follow(lead),
             None if now_s < self.waits_until_s => Vector2::zeros(),
@@ -170,6 +176,11 @@ impl Walker {
         if wanted != Vector2::zeros() || self.stance.speed_mps > STANDS_MPS {
             self.stay_outside(obstacles);
         }
+        self.finish_step(now_s, dt, lead);
+    }
+
+    /// Moves the body of a walker that has taken a step.
+    fn finish_step(&mut self, now_s: f64, dt: f64, lead: Option<&Lead>) {
         self.get_up(now_s);
         self.turn(dt, lead);
         self.stride(dt);
@@ -252,10 +263,9 @@ impl Walker {
         self.stance.bend_rad += (goal - self.stance.bend_rad) * (dt / BEND_TAKES_S).min(1.0);
     }
 
-    /// Goes on to the next point of the path where one is reached.
-    fn look_ahead(&mut self, now_s: f64) {
+    /// Goes on to the next point of the path where one is within this distance, m.
+    fn look_ahead(&mut self, now_s: f64, near_m: f64) {
         let path = &self.settings.path;
-        let near_m = if self.held_up_s > HELD_UP_S { NEAR_ENOUGH_M } else { REACHED_M };
         let reached = |point: &[f64; 2]| (self.stance.place - Point2::from(*point)).norm() < near_m;
         if path.len() < 2 || !path.get(self.ahead).is_some_and(reached) {
             return;

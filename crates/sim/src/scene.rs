@@ -10,8 +10,10 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use crate::approach::{ApproachBy, ApproachSettings};
+use crate::crowd::{Block, CrowdSettings, Walk};
 use crate::daylight::Daylight;
 use crate::faults::InjectedFault;
+use crate::follow_bench::FollowBench;
 use crate::footprint;
 use crate::furniture::Furniture;
 use crate::laser::LaserSettings;
@@ -62,10 +64,19 @@ pub struct Scene {
     pub webcams: Vec<WebcamSettings>,
     /// Furniture.
     pub furniture: Vec<Furniture>,
+    /// Blocks of wall, which people with a walk other than `plain` find ways around.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub blocks: Vec<Block>,
     /// People.
     pub people: Vec<PersonSettings>,
+    /// Settings of people with a walk other than `plain`.
+    #[serde(skip_serializing_if = "CrowdSettings::is_default")]
+    pub reacting: CrowdSettings,
     /// A person or a trolley that comes at the robot; none if left out.
     pub approach: Option<ApproachSettings>,
+    /// Room, blocks and people by the rules of the benchmark Follow-Bench.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub follow_bench: Option<FollowBench>,
     /// Variation of the path of the first person by the seed; without it the path is the same for all.
     #[serde(skip_serializing_if = "PathVariation::is_off")]
     pub variation: PathVariation,
@@ -89,8 +100,11 @@ impl Default for Scene {
             bumpers: Vec::new(),
             webcams: Vec::new(),
             furniture: Vec::new(),
+            blocks: Vec::new(),
             people: Vec::new(),
+            reacting: CrowdSettings::default(),
             approach: None,
+            follow_bench: None,
             variation: PathVariation::default(),
         }
     }
@@ -129,7 +143,7 @@ impl Scene {
             Ok(Self { seed, ..scene })
         })?;
         scene.check()?;
-        Ok(scene.with_varied_paths())
+        Ok(scene.with_follow_bench().with_varied_paths())
     }
 
     /// Returns the number of people, companions and crowd included.
@@ -218,6 +232,7 @@ impl Scene {
             ((0.0..=20.0).contains(&self.robot.behind_m), "robot.behind_m must be in 0 to 20"),
             (self.robot.ticks_per_turn > 0, "robot.ticks_per_turn must be at least 1"),
             (self.people.iter().all(|p| p.companions <= 3), "companions must be at most 3"),
+            (self.blocks.len() <= 500, "there must be at most 500 blocks"),
             (self.number_of_people() <= 200, "there must be at most 200 people"),
             (
                 self.people.iter().all(|p| !p.path.is_empty() || p.wander > 0),
@@ -254,7 +269,11 @@ impl Scene {
         let has_sides = self.light.day.is_some() || !self.webcams.is_empty();
         let variation = self.variation.rules(has_sides);
         let parts = webcams.chain(laser).chain(ramp).chain(day).chain(approach).chain(outline);
-        let parts = parts.chain(variation);
+        let is_empty = self.number_of_people() == 0 && self.blocks.is_empty();
+        let bench = self.follow_bench.iter().flat_map(|bench| bench.rules(is_empty));
+        let parts = parts.chain(bench);
+        let blocks = self.blocks.iter().flat_map(Block::rules);
+        let parts = parts.chain(variation).chain(self.reacting.rules()).chain(blocks);
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
@@ -412,6 +431,9 @@ pub struct PersonSettings {
     /// Number of points that follow the path, which the seed chooses: anywhere in the
     /// room, off furniture and the robot's start.
     pub wander: usize,
+    /// Way of walking.
+    #[serde(skip_serializing_if = "Walk::is_plain")]
+    pub walk: Walk,
     /// Preferred speed, m/s.
     pub speed_mps: f64,
     /// Stands until then, s.
@@ -456,6 +478,7 @@ impl Default for PersonSettings {
         Self {
             path: Vec::new(),
             wander: 0,
+            walk: Walk::Plain,
             speed_mps: 1.1,
             start_s: 0.0,
             rest_s: Vec::new(),

@@ -10,9 +10,10 @@ use tagalong_core::{Image, Images, RgbImage, RightImage, WheelSpeeds};
 use tagalong_geometry::{Camera, Distortion, Panorama, Pinhole, Rect};
 
 use crate::approach::Approacher;
-use crate::behaviour::{Walker, hidden_by, lead_of, others, play_tricks};
+use crate::behaviour::Walker;
 use crate::body::Skeleton;
 use crate::camera_settings::CameraKind;
+use crate::crowd::Blocks;
 use crate::faults::ScheduledFault;
 use crate::furniture::{Furniture, FurnitureKind};
 use crate::laser::LaserSettings;
@@ -30,6 +31,7 @@ use crate::shape::Shape;
 use crate::webcam::Webcam;
 use crate::world::{Hit, Object, Stage, World};
 
+mod crowd;
 mod injector;
 mod joints;
 mod nearness;
@@ -200,6 +202,7 @@ pub struct Simulation {
     stage: Arc<Stage>,
     pieces: Vec<Furniture>,
     obstacles: Vec<Obstacle>,
+    blocks: Blocks,
     walkers: Vec<Walker>,
     /// The last of the walkers, or a trolley.
     approacher: Option<Approacher>,
@@ -233,6 +236,7 @@ impl Simulation {
             let floor_m = scene.room.floor_m(&piece.at.into());
             room::furniture(piece, ceiling_m - floor_m, &mut chance).raised(floor_m)
         }));
+        fixed.extend(scene.blocks.iter().map(|block| block.solid(ceiling_m)));
         let mirror = (scene.camera.kind == CameraKind::Panorama)
             .then(|| MirrorCamera::new(&scene.camera, &mut stream(6)));
         let camera = mirror
@@ -254,6 +258,7 @@ impl Simulation {
             approacher: scene.approach.as_ref().map(Approacher::new),
             pieces,
             obstacles,
+            blocks: crowd::blocks(scene),
             robot: Robot::new(&scene.robot, stream(4)),
             exposures: [Exposure::new(threads); 2],
             chance: stream(5),
@@ -346,25 +351,6 @@ impl Simulation {
         self.robot.step(now_s, dt);
         self.walk(now_s, dt);
         self.now_ns += STEP_NS;
-    }
-
-    fn walk(&mut self, now_s: f64, dt: f64) {
-        let robot = Point2::from(self.robot.pose.translation.vector);
-        // Tricks depend on the places of all people before any of them moves.
-        let hidden = hidden_by(&self.walkers, &robot);
-        play_tricks(&mut self.walkers, &hidden, now_s);
-        let ways: Vec<_> = (0..self.walkers.len())
-            .map(|i| (lead_of(&self.walkers, i), others(&self.walkers, i, now_s)))
-            .collect();
-        let ahead = self.robot.pose.rotation * Vector2::new(GOES_M, 0.0);
-        // The robot is an obstacle of this step only, because it moves.
-        self.obstacles.push(Obstacle { at: robot, radius_m: ROBOT_M, ahead });
-        let steps = self.walkers.len() - usize::from(self.person_approaches());
-        for (walker, (lead, others)) in self.walkers.iter_mut().zip(&ways).take(steps) {
-            walker.step(now_s, dt, lead.as_ref(), others, &self.obstacles);
-        }
-        self.obstacles.pop();
-        self.approach_robot(dt);
     }
 
     fn record(&mut self, at_ns: u64, event: Event) {

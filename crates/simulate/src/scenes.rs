@@ -3,7 +3,12 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 56] = [
+const BUILT_IN: [(&str, &str); 61] = [
+    ("among-circular", include_str!("../configs/scenes/among-circular.toml")),
+    ("among-clutter", include_str!("../configs/scenes/among-clutter.toml")),
+    ("among-corridor", include_str!("../configs/scenes/among-corridor.toml")),
+    ("among-crossing", include_str!("../configs/scenes/among-crossing.toml")),
+    ("among-doorway", include_str!("../configs/scenes/among-doorway.toml")),
     ("approach", include_str!("../configs/scenes/approach.toml")),
     ("behind-glass", include_str!("../configs/scenes/behind-glass.toml")),
     ("behind-glass-sonar", include_str!("../configs/scenes/behind-glass-sonar.toml")),

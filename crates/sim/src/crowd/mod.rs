@@ -1,0 +1,169 @@
+//! People who react: to each other, to the robot, to blocks and to furniture, by a published model
+//! of crowds instead of the ordinary walk.
+
+mod block;
+mod orca;
+mod route;
+mod social_force;
+
+use nalgebra::{Point2, Vector2};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use block::Block;
+pub(crate) use route::Blocks;
+
+use crate::obstacle::Obstacle;
+
+/// Way of walking of a person.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Walk {
+    /// Along the path, pushed aside by people and furniture that are near.
+    #[default]
+    Plain,
+    /// By the social force model: M. Moussaïd, D. Helbing et al., Experimental study of the
+    /// behavioural mechanisms underlying self-organization in human crowds, Proc. R. Soc. B 276
+    /// (2009).
+    SocialForce,
+    /// By optimal reciprocal collision avoidance: J. van den Berg et al., Reciprocal n-body
+    /// collision avoidance, ISRR 2009.
+    Orca,
+}
+
+impl Walk {
+    /// Returns true for the ordinary walk.
+    pub(crate) fn is_plain(&self) -> bool {
+        *self == Self::Plain
+    }
+}
+
+/// Settings of all people with the walks `social-force` and `orca`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CrowdSettings {
+    /// Radius of a body, m.
+    pub radius_m: f64,
+    /// Distance that the middle of a person keeps from the body of another, m; used by `orca`.
+    pub safe_distance_m: f64,
+    /// Largest change of velocity, m/s².
+    pub acceleration_mps2: f64,
+    /// Time for which velocities are free of collisions with others, s; used by `orca`.
+    pub horizon_s: f64,
+    /// A point of the path counts as reached within this distance, m.
+    pub reached_m: f64,
+}
+
+impl Default for CrowdSettings {
+    fn default() -> Self {
+        Self {
+            radius_m: 0.3,
+            safe_distance_m: 0.5,
+            acceleration_mps2: 1.0,
+            horizon_s: 2.0,
+            reached_m: 0.5,
+        }
+    }
+}
+
+impl CrowdSettings {
+    /// Returns true if nothing is set.
+    pub(crate) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Returns the conditions on the settings, each with the message for a violation.
+    pub(crate) fn rules(&self) -> [(bool, &'static str); 5] {
+        [
+            ((0.1..=0.6).contains(&self.radius_m), "reacting.radius_m must be in 0.1 to 0.6"),
+            (
+                (self.radius_m..=2.0).contains(&self.safe_distance_m),
+                "reacting.safe_distance_m must be in reacting.radius_m to 2",
+            ),
+            (
+                (0.1..=20.0).contains(&self.acceleration_mps2),
+                "reacting.acceleration_mps2 must be in 0.1 to 20",
+            ),
+            ((0.2..=20.0).contains(&self.horizon_s), "reacting.horizon_s must be in 0.2 to 20"),
+            ((0.1..=5.0).contains(&self.reached_m), "reacting.reached_m must be in 0.1 to 5"),
+        ]
+    }
+}
+
+/// A body that moves on the floor, as others perceive it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Agent {
+    /// Where it is, m.
+    pub place: Point2<f64>,
+    /// Its velocity, m/s.
+    pub velocity: Vector2<f64>,
+    /// Its radius, m.
+    pub radius_m: f64,
+}
+
+/// Everything that a person reacts to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Around<'a> {
+    /// The others, and the robot.
+    pub others: &'a [Agent],
+    /// Furniture.
+    pub obstacles: &'a [Obstacle],
+    /// Blocks, and the walls of the room.
+    pub blocks: &'a Blocks,
+    /// Settings of the walk.
+    pub settings: &'a CrowdSettings,
+}
+
+impl Around<'_> {
+    /// Returns the nearest point of each thing that stands, for a body at a place: those of blocks
+    /// and walls, and those of furniture.
+    fn surfaces(&self, place: &Point2<f64>) -> Vec<Point2<f64>> {
+        let round = self.obstacles.iter().filter_map(|thing| {
+            let way = place - thing.at;
+            Some(thing.at + way.try_normalize(1e-9)? * thing.radius_m)
+        });
+        self.blocks.nearest(place).chain(round).collect()
+    }
+
+    /// Returns the velocity that a person chooses who would like to have the velocity `wanted` and
+    /// is never faster than `max_mps`.
+    pub fn velocity(
+        &self,
+        walk: Walk,
+        me: &Agent,
+        wanted: Vector2<f64>,
+        max_mps: f64,
+    ) -> Vector2<f64> {
+        match walk {
+            Walk::Plain => wanted,
+            Walk::SocialForce => social_force::velocity(me, wanted, self).cap_magnitude(max_mps),
+            Walk::Orca => orca::velocity(me, wanted, max_mps, self),
+        }
+    }
+}
+
+/// Moves bodies apart that overlap, because bodies are solid: each gives way for its part, and those
+/// with the part 0 stay where they are.
+pub(crate) fn part_bodies(bodies: &mut [(Point2<f64>, f64)], radius_m: f64) {
+    const ROUNDS: usize = 10;
+    for _ in 0..ROUNDS {
+        for second in 1..bodies.len() {
+            for first in 0..second {
+                let way = bodies[second].0 - bodies[first].0;
+                let overlap_m = 2.0 * radius_m - way.norm();
+                let parts = bodies[first].1 + bodies[second].1;
+                if overlap_m <= 0.0 || parts == 0.0 {
+                    continue;
+                }
+                let aside = way.try_normalize(1e-9).unwrap_or_else(Vector2::x) * overlap_m / parts;
+                let part = bodies[first].1;
+                bodies[first].0 -= aside * part;
+                let part = bodies[second].1;
+                bodies[second].0 += aside * part;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
