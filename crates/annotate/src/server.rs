@@ -204,6 +204,20 @@ mod tests {
     const HEAD: &str = r#"{"op":"head","frame":3,"id":null,"at":[160,90]}"#;
 
     #[test]
+    fn no_two_buttons_have_one_name_and_finish_is_in_the_header() {
+        let ends = PAGE.split("</button>");
+        let all =
+            ends.filter(|part| part.contains("<button")).filter_map(|part| part.rsplit('>').next());
+        let mut names: Vec<&str> = all.collect();
+        let count = names.len();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!((names.len(), count > 10), (count, true), "{names:?}");
+        let header = PAGE.split("</header>").next().unwrap();
+        assert!(header.contains("id=\"finish\""), "{header}");
+    }
+
+    #[test]
     fn the_page_its_parts_and_the_images_are_served() {
         let running = Running::new();
         for (path, part) in [
