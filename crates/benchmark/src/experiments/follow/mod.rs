@@ -1,6 +1,7 @@
 //! `tagalong follow`: a pipeline steers the simulated robot through scenes.
 
 mod approaches;
+mod crowd_table;
 mod fit;
 mod log;
 mod story;
@@ -85,6 +86,11 @@ pub struct FollowArgs {
     /// Write a picture of every frame of every ride beside its log, too: boxes, ids, target, plan.
     #[arg(long, requires = "output")]
     pub overlay: bool,
+    /// Ride each scene once more with each pipeline told where people are: instead of its detectors, the
+    /// positions of all people within reach of the laser scanner and in free sight (within 5 m without
+    /// a scanner), and which of them is the target. The difference is the price of perception.
+    #[arg(long, conflicts_with_all = ["approaches", "replay", "fit"])]
+    pub told: bool,
     /// Print the settings [target.looks] that fit these rides best, and the calibration of the
     /// probabilities; use the split `train`.
     #[arg(long)]
@@ -121,6 +127,7 @@ struct Job {
     swept: Option<String>,
     scene: Scene,
     contender: Contender,
+    is_told: bool,
 }
 
 /// Result of a job.
@@ -202,14 +209,19 @@ fn failure(error: TrialError) -> Failure {
 /// Returns every pipeline on every seed of every scene.
 fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>, Failure> {
     let mut jobs = Vec::new();
-    let contenders = contenders(args, registry)?;
+    let mut contenders = Vec::new();
+    for contender in self::contenders(args, registry)? {
+        let told = if args.told { Some(contender.told().map_err(failure)?) } else { None };
+        contenders.push((contender, false));
+        contenders.extend(told.map(|told| (told, true)));
+    }
     for path in scenes(args)? {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for value in swept(args) {
             let swept = value.as_ref().map(|(_, value)| value.clone());
             let suite = std::iter::once(&name).chain(&swept);
             let suite = suite.map(String::as_str).collect::<Vec<_>>().join(" ");
-            for contender in &contenders {
+            for (contender, is_told) in &contenders {
                 for seed in seeds.numbers() {
                     let mut variant = variant(args, seed);
                     variant.set.extend(value.clone());
@@ -218,7 +230,8 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
                     scene.check_faults().map_err(Failure::usage)?;
                     let suite = suite.clone();
                     let swept = swept.clone();
-                    jobs.push(Job { suite, swept, scene, contender: contender.clone() });
+                    let contender = contender.clone();
+                    jobs.push(Job { suite, swept, scene, contender, is_told: *is_told });
                 }
             }
         }
@@ -279,7 +292,7 @@ fn ride(
     registry: &Registry,
     signals: &Signals,
 ) -> Result<Followed, TrialError> {
-    let Job { suite, swept, scene, contender } = job;
+    let Job { suite, swept, scene, contender, is_told } = job;
     // A ride that a signal came before leaves no log.
     let folder = args.output.as_deref().filter(|_| signals.received().is_none());
     let file = folder.map(|folder| log_file(folder, job));
@@ -287,7 +300,11 @@ fn ride(
     if let Some(file) = file.filter(|_| args.overlay) {
         log = log.with_overlay(&overlay_folder(&file))?;
     }
-    let ride = Ride::new(scene, contender, registry, &mut log)?;
+    let ride = if *is_told {
+        Ride::told(scene, contender, registry, &mut log)?
+    } else {
+        Ride::new(scene, contender, registry, &mut log)?
+    };
     log.finish()?;
     Ok(Followed {
         suite: suite.clone(),
@@ -352,3 +369,6 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     say(&format!("the logs and tables are in {}", folder.display()));
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;
