@@ -20,6 +20,8 @@ pub enum Kind {
     Cvat,
     /// An annotated bag of leg_tracker_benchmarks: truth for the bag instead of a log.
     LegTracker,
+    /// A YAML file of the benchmark Follow-Bench: a scene to simulate instead of a log.
+    FollowBench,
 }
 
 /// Arguments of `tagalong import`.
@@ -31,7 +33,8 @@ pub struct ImportArgs {
     /// File or folder to import.
     pub path: PathBuf,
     /// The log to write [default: runs/NAME.mcap]; of cvat and leg-tracker the truth
-    /// [default: NAME.people.csv, NAME.people-floor.csv].
+    /// [default: NAME.people.csv, NAME.people-floor.csv]; of follow-bench the scene
+    /// [default: NAME.toml].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
     /// Replace the log if it exists.

@@ -6,6 +6,7 @@
 mod args;
 mod cvat;
 mod folders;
+mod follow_bench;
 mod kitti;
 mod leg_bags;
 mod recorded;
@@ -25,6 +26,7 @@ use tagalong_config::PathText;
 
 pub use self::args::{ImportArgs, Kind};
 pub use self::cvat::people_of_cvat;
+pub use self::follow_bench::scene_of_follow_bench;
 use self::sequence::Sequence;
 
 /// Imports a data set.
@@ -40,6 +42,7 @@ pub fn import(args: &ImportArgs) -> Outcome {
     match args.kind {
         Kind::Cvat => return cvat::import(args),
         Kind::LegTracker => return leg_bags::import(args),
+        Kind::FollowBench => return follow_bench::import(args),
         _ => {}
     }
     let log = args.output.clone().unwrap_or_else(|| default_log(args));
@@ -78,7 +81,9 @@ fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
         Kind::Kitti => kitti::read(args)?,
         Kind::Mot => folders::mot(args)?,
         Kind::Images => folders::images(args)?,
-        Kind::Cvat | Kind::LegTracker => return Err(Failure::usage("annotations are no log")),
+        Kind::Cvat | Kind::LegTracker | Kind::FollowBench => {
+            return Err(Failure::usage("annotations are no log"));
+        }
     };
     if sequence.moments.is_empty() {
         return Err(Failure::failed(format!("{} has no images", args.path.display())));

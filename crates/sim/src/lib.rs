@@ -104,7 +104,7 @@ pub use robot::Encoder;
 pub use room_settings::{Floor, RoomSettings};
 pub use scene::{AtEnd, FaultSettings, LightSettings, PersonSettings, RobotSettings, Scene, Trick};
 pub use simulation::{
-    Clearance, Event, Joint, OdometryReading, Shot, Simulation, Truth, WebcamShot,
+    Clearance, CrowdView, Event, Joint, OdometryReading, Shot, Simulation, Truth, WebcamShot,
 };
 pub use split::{Seeds, Split};
 pub use variation::Variant;

@@ -32,12 +32,14 @@ use crate::webcam::Webcam;
 use crate::world::{Hit, Object, Stage, World};
 
 mod crowd;
+mod in_sight;
 mod injector;
 mod joints;
 mod nearness;
 mod sensing;
 mod walkers;
 
+pub use in_sight::CrowdView;
 use injector::Injector;
 pub use joints::Joint;
 use joints::{Spot, joints};

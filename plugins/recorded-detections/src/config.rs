@@ -35,6 +35,9 @@ pub struct Config {
     /// Standard deviation of a recorded position in space, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_position_m: f64,
+    /// Keep recorded places that are outside of the image, without a box: those of a detector that
+    /// sees more than the camera.
+    pub outside_image: bool,
 }
 
 impl Default for Config {
@@ -46,6 +49,7 @@ impl Default for Config {
             score: ScoreScale::Probability,
             boxes: BoxSettings::default(),
             sigma_position_m: 0.15,
+            outside_image: false,
         }
     }
 }

@@ -57,7 +57,11 @@ impl RecordedDetections {
             score,
             source: NAME,
         };
-        is_shown(&frame.camera, &detection).then_some(detection)
+        if is_shown(&frame.camera, &detection) {
+            return Some(detection);
+        }
+        let seen_elsewhere = Detection { image: None, ..detection };
+        (self.config.outside_image && seen_elsewhere.is_sane()).then_some(seen_elsewhere)
     }
 }
 

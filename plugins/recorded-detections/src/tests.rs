@@ -161,6 +161,20 @@ fn recorded_positions_of_the_log_are_taken_as_they_are() {
 }
 
 #[test]
+fn a_position_outside_of_the_image_is_kept_without_a_box_if_the_settings_say_so() {
+    let behind = Point3::new(-2.5, 0.3, 1.6);
+    let recorded = ExternalDetection { region: None, head: Some(behind), score: 0.9 };
+    let frame = frame(1, None).with_recorded(Some(vec![recorded]));
+    let of = |outside_image| {
+        let config = Config { outside_image, ..Config::default() };
+        detect(&mut RecordedDetections::new(config, &context(".".as_ref())).unwrap(), &frame)
+    };
+    assert!(of(false).is_empty());
+    let found = of(true);
+    assert_eq!((found[0].position, found[0].image), (behind, None));
+}
+
+#[test]
 fn a_log_that_is_not_read_for_boxes_is_told_in_the_funnel() {
     let mut detector = RecordedDetections::new(Config::default(), &context(".".as_ref())).unwrap();
     let mut funnel = Funnel::default();

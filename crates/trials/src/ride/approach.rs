@@ -333,6 +333,7 @@ mod tests {
             speed_mps,
             turn_rate,
             clearance: Clearance { people_m: gap_m, things_m: 4.0 },
+            crowd: None,
             approach: Some(ApproachState { gap_m, bearing_rad: -1.6, speed_mps: 1.0 }),
             reason: Some(Reason::Follow),
         });

@@ -4,7 +4,7 @@ use tagalong_core::Track;
 use tagalong_pipeline::{FrameReport, Likeness};
 use tagalong_sim::{Clearance, Truth};
 
-use super::{Ride, Tick};
+use super::{CrowdMeasures, Ride, Tick};
 use crate::Moment;
 
 /// Number of the person to follow: the first of the scene.
@@ -95,6 +95,9 @@ pub struct Ridden {
     pub nearest_s: Option<f64>,
     /// Root of the mean square of the forward jerk, m/s³.
     pub jerk_mps3: f64,
+    /// Measures of Follow-Bench, in a scene whose people react.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub crowd: Option<CrowdMeasures>,
     /// Score of the lock for each detection, and whether it was the person.
     #[serde(skip)]
     pub likeness: Vec<(Likeness, bool)>,
@@ -157,6 +160,7 @@ impl RideJudge {
             clearance_things_m: least(moving().map(|tick| tick.clearance.things_m)),
             nearest_s: nearest_s(moving()).map(|at_s| (at_s - first_s).max(0.0)),
             jerk_mps3: jerk(&ride.ticks),
+            crowd: CrowdMeasures::of(&ride.ticks),
             likeness: self.likeness(ride),
         }
     }
@@ -410,6 +414,7 @@ mod tests {
                 speed_mps: speed(i),
                 turn_rate: 0.0,
                 clearance,
+                crowd: None,
                 approach: None,
                 reason: None,
             };

@@ -1,22 +1,25 @@
 //! Closed loops: the contender's controller drives the robot through the scene.
 
 mod approach;
+mod crowd;
 mod enable;
 mod judge;
+mod told;
 
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
 
 pub use approach::{ApproachJudge, ApproachWatch, Approached, Contact, Side, Touched};
+pub use crowd::CrowdMeasures;
 use enable::StuckEnable;
 pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_config::Registry;
 use tagalong_core::{Command, Frame, Reason, Stamp, WheelSpeeds};
 use tagalong_pipeline::{FrameReport, Pipeline, Sources};
 use tagalong_sim::{
-    ApproachInView, ApproachState, Clearance, Event, ROBOT_RADIUS_M, Scene, ScheduledFault,
-    Simulation,
+    ApproachInView, ApproachState, Clearance, CrowdView, Event, ROBOT_RADIUS_M, Scene,
+    ScheduledFault, Simulation,
 };
 
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
@@ -55,6 +58,8 @@ pub struct Tick {
     pub turn_rate: f64,
     /// Free distance around it: around its footprint, or a disc if the scene has none.
     pub clearance: Clearance,
+    /// The robot among people; `None` in a scene whose people do not react.
+    pub crowd: Option<CrowdView>,
     /// State of the approacher of the scene, once it is there.
     pub approach: Option<ApproachState>,
     /// Reason of the command in force; `None` while the enable lets nothing move.
@@ -105,6 +110,31 @@ impl Ride {
         registry: &Registry,
         witness: &mut dyn Witness,
     ) -> Result<Self, TrialError> {
+        Self::ride(scene, contender, registry, witness, false)
+    }
+
+    /// Simulates a ride as [`Ride::new`] of a pipeline that is told where people are, see
+    /// [`Contender::told`]: each frame has as its recorded detections the positions of all people within
+    /// reach of the laser scanner and in free sight, and the track of the first of them is enrolled.
+    ///
+    /// # Errors
+    /// As [`Ride::new`].
+    pub fn told(
+        scene: &Scene,
+        contender: &Contender,
+        registry: &Registry,
+        witness: &mut dyn Witness,
+    ) -> Result<Self, TrialError> {
+        Self::ride(scene, contender, registry, witness, true)
+    }
+
+    fn ride(
+        scene: &Scene,
+        contender: &Contender,
+        registry: &Registry,
+        witness: &mut dyn Witness,
+        is_told: bool,
+    ) -> Result<Self, TrialError> {
         let mut pipeline = contender.pipeline(registry, scene.seed)?;
         if !pipeline.has_controller() {
             let message = format!("{} has no [controller]: nothing can follow", contender.name);
@@ -131,6 +161,8 @@ impl Ride {
         while let Some(simulated) =
             ride.next_frame(&mut draw, &pipeline, framed, (&mut enable, witness))
         {
+            let simulated =
+                if is_told { told::tell(draw.simulation(), simulated) } else { simulated };
             let may_move = ride.may_move(&mut enable);
             pipeline.set_driving(may_move);
             if ride.reports.is_empty() {
@@ -145,6 +177,9 @@ impl Ride {
             if let Some(command) = report.command {
                 framed = ride.now();
                 draw.steer(if may_move { command.wheels } else { WheelSpeeds::STOP });
+            }
+            if is_told {
+                told::tell_target(&mut pipeline, &simulated, &report);
             }
             witness.frame(&simulated, &report);
             ride.moments.push(Moment::of(simulated));
@@ -216,6 +251,7 @@ fn tick(simulation: &Simulation, at_ns: u64, reason: Option<Reason>) -> Tick {
         speed_mps: simulation.speed_mps(),
         turn_rate: simulation.turn_rate(),
         clearance: simulation.clearance(ROBOT_RADIUS_M),
+        crowd: simulation.crowd_view(),
         approach: simulation.approach(ROBOT_RADIUS_M),
         reason,
     }

@@ -46,7 +46,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "learn",
         ],
     ),
-    ("import", &["app", "log", "eval"]),
+    ("import", &["app", "log", "eval", "sim"]),
     (
         "cli",
         &[

@@ -1,6 +1,7 @@
 //! `tagalong follow`: a pipeline steers the simulated robot through scenes.
 
 mod approaches;
+mod crowd_table;
 mod fit;
 mod log;
 mod ride_bar;
@@ -88,6 +89,11 @@ pub struct FollowArgs {
     /// Write a picture of every frame into the folder of every ride, too: boxes, ids, target, plan.
     #[arg(long, requires = "output")]
     pub overlay: bool,
+    /// Ride each scene once more with each pipeline told where people are: instead of its detectors, the
+    /// positions of all people within reach of the laser scanner and in free sight (within 5 m without
+    /// a scanner), and which of them is the target. The difference is the price of perception.
+    #[arg(long, conflicts_with_all = ["approaches", "replay", "fit"])]
+    pub told: bool,
     /// Print the settings [target.looks] that fit these rides best, and the calibration of the
     /// probabilities; use the split `train`.
     #[arg(long)]
@@ -124,6 +130,7 @@ struct Job {
     swept: Option<String>,
     scene: Scene,
     contender: Contender,
+    is_told: bool,
 }
 
 /// Result of a job.
@@ -208,14 +215,19 @@ fn failure(error: TrialError) -> Failure {
 /// Returns every pipeline on every seed of every scene.
 fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>, Failure> {
     let mut jobs = Vec::new();
-    let contenders = contenders(args, registry)?;
+    let mut contenders = Vec::new();
+    for contender in self::contenders(args, registry)? {
+        let told = if args.told { Some(contender.told().map_err(failure)?) } else { None };
+        contenders.push((contender, false));
+        contenders.extend(told.map(|told| (told, true)));
+    }
     for path in scenes(args)? {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for value in swept(args) {
             let swept = value.as_ref().map(|(_, value)| value.clone());
             let suite = std::iter::once(&name).chain(&swept);
             let suite = suite.map(String::as_str).collect::<Vec<_>>().join(" ");
-            for contender in &contenders {
+            for (contender, is_told) in &contenders {
                 for seed in seeds.numbers() {
                     let mut variant = variant(args, seed);
                     variant.set.extend(value.clone());
@@ -224,7 +236,8 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
                     scene.check_faults().map_err(Failure::usage)?;
                     let suite = suite.clone();
                     let swept = swept.clone();
-                    jobs.push(Job { suite, swept, scene, contender: contender.clone() });
+                    let contender = contender.clone();
+                    jobs.push(Job { suite, swept, scene, contender, is_told: *is_told });
                 }
             }
         }
@@ -285,7 +298,7 @@ fn ride(
     registry: &Registry,
     (signals, bar): (&Signals, &RidesBar),
 ) -> Result<Followed, TrialError> {
-    let Job { suite, swept, scene, contender } = job;
+    let Job { suite, swept, scene, contender, is_told } = job;
     // A ride that a signal came before leaves no log.
     let folder = args.output.as_deref().filter(|_| signals.received().is_none());
     let file = folder.map(|folder| log_file(folder, job));
@@ -294,7 +307,11 @@ fn ride(
     if let Some(file) = &file {
         log = log.with_files(run_files(file, contender, registry, scene.seed, args.overlay)?);
     }
-    let ride = Ride::new(scene, contender, registry, &mut log)?;
+    let ride = if *is_told {
+        Ride::told(scene, contender, registry, &mut log)?
+    } else {
+        Ride::new(scene, contender, registry, &mut log)?
+    };
     let ridden = RideJudge::default().judge(&ride);
     log.finish(Some(&ridden))?;
     Ok(Followed {
@@ -366,3 +383,6 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     say(&format!("the logs and tables are in {shown}; `tagalong view {shown}` shows the rides"));
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

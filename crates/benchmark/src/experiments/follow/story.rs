@@ -69,6 +69,7 @@ mod tests {
                 speed_mps: 0.0,
                 turn_rate: 0.0,
                 clearance,
+                crowd: None,
                 approach: None,
                 reason: None,
             }],

@@ -4,7 +4,7 @@ use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Seeds;
 use tagalong_trials::{Ridden, RideJudge};
 
-use super::Followed;
+use super::{Followed, crowd_table};
 
 /// Steps of the reliability curve.
 const BINS: usize = 10;
@@ -31,11 +31,14 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
     ];
     let pipelines = unique(results.iter().map(|result| result.pipeline.as_str()));
     let mut rows: Vec<Row> = Vec::new();
+    let mut crowd_rows: Vec<Row> = Vec::new();
     for (name, group) in groups(results) {
         for pipeline in &pipelines {
             let chosen: Vec<&Followed> =
                 group.iter().copied().filter(|result| result.pipeline == *pipeline).collect();
-            rows.push(Row::ours(format!("{name}: {pipeline}"), cells(&chosen, &judge)));
+            let label = format!("{name}: {pipeline}");
+            crowd_rows.extend(crowd_table::row(&label, &chosen));
+            rows.push(Row::ours(label, cells(&chosen, &judge)));
         }
     }
     let following = Table {
@@ -45,6 +48,7 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
         notes: notes(&judge, seeds),
     };
     std::iter::once(following)
+        .chain(crowd_table::table(crowd_rows, seeds))
         .chain(pipelines.iter().flat_map(|pipeline| reliabilities(results, pipeline, seeds)))
         .collect()
 }

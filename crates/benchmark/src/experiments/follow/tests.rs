@@ -1,0 +1,61 @@
+use clap::Parser;
+
+use super::*;
+
+#[derive(Parser)]
+struct Cli {
+    #[command(flatten)]
+    follow: FollowArgs,
+}
+
+/// A person stands where the camera does not look, behind the robot or, with `block`, behind a wall.
+fn scene(block: &str) -> Scene {
+    let text = format!(
+        "duration_s = 6.0\n{block}\n[camera]\nwidth = 80\nheight = 60\nrate_hz = 10.0\n\
+         [room]\nsize_m = [12.0, 8.0]\n[robot]\nstart = [7.0, 4.0]\n\
+         [[people]]\nwalk = 'orca'\npath = [[3.0, 4.0], [2.9, 4.0]]\n"
+    );
+    Scene::parse(&text).unwrap()
+}
+
+fn ridden(block: &str, is_told: bool) -> Ridden {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let config = "[[detectors]]\nplugin = \"depth-template\"\nroles = [\"track\", \"discover\"]\n\
+        [filter]\nplugin = \"ekf\"\n[controller]\nplugin = \"clear-follow\"\n";
+    let seeing = Contender::new("follow", config);
+    let ride = if is_told {
+        Ride::told(&scene(block), &seeing.told().unwrap(), &registry, &mut ())
+    } else {
+        Ride::new(&scene(block), &seeing, &registry, &mut ())
+    };
+    RideJudge::default().judge(&ride.unwrap())
+}
+
+#[test]
+fn a_pipeline_that_is_told_follows_a_person_behind_the_robot_but_not_behind_a_wall() {
+    let told = ridden("", true);
+    assert!(told.right_s > 4.0 && told.wrong_s == 0.0, "{told:?}");
+    let seeing = ridden("", false);
+    assert_eq!(seeing.right_s, 0.0, "{seeing:?}");
+    let hidden = ridden("blocks = [{ at = [5.0, 4.0], size_m = [0.2, 6.0] }]", true);
+    assert_eq!(hidden.right_s, 0.0, "{hidden:?}");
+}
+
+#[test]
+fn each_pipeline_is_told_beside_seeing() {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/follow-depth.toml");
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let jobs_of = |more: &[&str]| {
+        let line = ["follow", config.to_str().unwrap(), "among-circular", "--seeds", "2"];
+        let args = Cli::parse_from(line.iter().chain(more)).follow;
+        let seeds = args.split.seeds(0, args.seeds).unwrap();
+        let jobs = jobs(&args, seeds, &registry).unwrap();
+        jobs.into_iter().map(|job| (job.contender.name, job.is_told)).collect::<Vec<_>>()
+    };
+    let seeing = ("follow-depth".to_owned(), false);
+    let told = ("follow-depth-told".to_owned(), true);
+    assert_eq!(jobs_of(&[]), [seeing.clone(), seeing.clone()]);
+    assert_eq!(jobs_of(&["--told"]), [seeing.clone(), seeing, told.clone(), told]);
+}

@@ -1,0 +1,91 @@
+//! Rides that are told where people are, to measure the price of perception.
+
+use nalgebra::Point2;
+use tagalong_core::{ExternalDetection, TrackId};
+use tagalong_pipeline::{Choice, Enrollment, FrameReport, Pipeline};
+use tagalong_sim::Simulation;
+use toml::Table;
+
+use crate::{Contender, SimulatedFrame, TrialError};
+
+/// Log-odds of a position that is told.
+const SURE: f64 = 6.0;
+/// A track within this distance of the target's head is on the target, m.
+const SAME_M: f64 = 0.4;
+/// Detectors of a pipeline that is told the truth.
+const DETECTORS: &str = r#"
+[[detectors]]
+plugin = "recorded-detections"
+roles = ["discover"]
+config = { score = "log-odds", min_score = 0.0, sigma_position_m = 0.05, outside_image = true }
+"#;
+
+impl Contender {
+    /// Returns the same pipeline with one detector, that of the positions that it is told; see
+    /// [`crate::Ride::told`].
+    ///
+    /// # Errors
+    /// [`TrialError::Config`] for a config that is no TOML.
+    pub fn told(&self) -> Result<Self, TrialError> {
+        let wrong = |error: toml::de::Error| TrialError::Config(format!("{}: {error}", self.name));
+        let mut config: Table = self.config.parse().map_err(wrong)?;
+        let detectors: Table = DETECTORS.parse().map_err(wrong)?;
+        config.extend(detectors);
+        // Cameras that a detector suits are no matter of the positions that are told.
+        config.remove("suits");
+        let config = config.to_string();
+        Ok(Self { name: format!("{}-told", self.name), config, ..self.clone() })
+    }
+}
+
+/// Returns a frame with the positions of all people that are within reach of the laser and in free
+/// sight.
+pub(super) fn tell(simulation: &Simulation, simulated: SimulatedFrame) -> SimulatedFrame {
+    let world_from_robot = simulated.world_from_robot;
+    let places: Vec<Point2<f64>> = simulated
+        .truth
+        .iter()
+        .map(|person| world_from_robot * person.torso_in_robot.xy())
+        .collect();
+    let robot = Point2::from(world_from_robot.translation.vector);
+    let in_sight = simulation.in_sight(&robot, &places);
+    let seen = simulated.truth.iter().zip(in_sight).filter(|(_, is_seen)| *is_seen);
+    let told = seen.map(|(person, _)| ExternalDetection {
+        region: None,
+        head: Some(person.head_in_robot),
+        score: SURE,
+    });
+    let told = told.collect();
+    SimulatedFrame { frame: simulated.frame.with_recorded(Some(told)), ..simulated }
+}
+
+/// Tells the pipeline which of its tracks is the target, as a program does that knows it: a target
+/// that was told in the frame and is on a track that is not followed is enrolled.
+pub(super) fn tell_target(
+    pipeline: &mut Pipeline,
+    simulated: &SimulatedFrame,
+    report: &FrameReport,
+) {
+    let Some(track) = track_of_target(simulated, report) else { return };
+    if report.target == Some(track) {
+        return;
+    }
+    let person = Choice::Track(track);
+    let enrollment = Enrollment { person, lose_after_s: None, search: None, give_up_s: None };
+    // A track that is not confirmed yet is refused, and enrolled with a later frame.
+    let _ = pipeline.enroll(&enrollment);
+}
+
+/// Returns the track that is observed at the target's place.
+fn track_of_target(simulated: &SimulatedFrame, report: &FrameReport) -> Option<TrackId> {
+    let target = simulated.truth.iter().find(|person| person.id == 1)?.head_in_robot;
+    let told = simulated.frame.recorded()?;
+    if !told.iter().any(|one| one.head == Some(target)) {
+        return None;
+    }
+    let off_m =
+        |track: &tagalong_core::Track| (track.estimate.person.position.xy() - target.xy()).norm();
+    let seen = report.tracks.iter().filter(|track| track.seen);
+    let nearest = seen.min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
+    (off_m(nearest) < SAME_M).then_some(nearest.id)
+}
