@@ -110,7 +110,7 @@ impl Ride {
         registry: &Registry,
         witness: &mut dyn Witness,
     ) -> Result<Self, TrialError> {
-        Self::ride(scene, contender, registry, witness, false)
+        Self::simulate(scene, contender, registry, witness, false)
     }
 
     /// Simulates a ride as [`Ride::new`] of a pipeline that is told where people are, see
@@ -125,10 +125,10 @@ impl Ride {
         registry: &Registry,
         witness: &mut dyn Witness,
     ) -> Result<Self, TrialError> {
-        Self::ride(scene, contender, registry, witness, true)
+        Self::simulate(scene, contender, registry, witness, true)
     }
 
-    fn ride(
+    fn simulate(
         scene: &Scene,
         contender: &Contender,
         registry: &Registry,
