@@ -398,6 +398,7 @@ mod tests {
             clearance: Clearance { people_m, things_m },
             approach: None,
             reason: None,
+            crowd: None,
         };
         let ticks = [tick(0.1, 1.0, 2.0), tick(0.2, f64::INFINITY, 0.4), tick(0.3, 0.5, 2.0)];
         assert_eq!(nearest_s(ticks.iter()), Some(0.2));
