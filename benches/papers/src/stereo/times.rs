@@ -92,9 +92,8 @@ pub fn boundary_points(lab: &Lab) -> Result<Findings, ReproduceError> {
     let forms = [("with three boundary points", printed), ("compared everywhere", everywhere)];
     let contenders: Vec<Contender> = forms.iter().map(|(_, form)| form.clone()).collect();
     let frames = frames(lab, &contenders)?;
-    let discovery = |at: usize| -> Vec<f64> {
-        frames[at].iter().map(|groups| groups[DETECTION]).collect()
-    };
+    let discovery =
+        |at: usize| -> Vec<f64> { frames[at].iter().map(|groups| groups[DETECTION]).collect() };
     let row = |at: usize| {
         let times = discovery(at);
         let time = |part| Cell::number(percentile(&times, part).unwrap_or(f64::NAN), 1);

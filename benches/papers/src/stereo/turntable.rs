@@ -77,9 +77,7 @@ pub fn background(lab: &Lab) -> Result<Findings, ReproduceError> {
         .map(|percentile| with(&printed, &[(PERCENTILE, *percentile)]))
         .collect::<Result<_, _>>()?;
     let turns = turns(lab, &ONE_STEREO_TURN, &percentiles)?;
-    let row = |which: usize| {
-        Row::ours(format!("K = {}", PERCENTILES[which]), found(&turns, which))
-    };
+    let row = |which: usize| Row::ours(format!("K = {}", PERCENTILES[which]), found(&turns, which));
     Ok(Table {
         title: "Directions of a turning body in which the printed comparison finds it, %, by the \
                 percentile K of the background (P4, section II-A)"
