@@ -161,7 +161,7 @@ Examples:
   tagalong blur robot.mcap
   tagalong blur robot.mcap -o shared/robot.mcap
   tagalong run depth-verified robot.mcap -o runs/robot && tagalong blur robot.mcap --run runs/robot
-  tagalong run robot-blurred.mcap --overlay      # pictures in which nobody is recognised";
+  tagalong run robot-blurred.mcap --overlay      # pictures in which no person is recognised";
 
 const MODEL_HELP: &str = "\
 Prints inputs and outputs of the file, the family of detectors that its outputs have the shapes of,

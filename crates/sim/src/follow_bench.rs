@@ -67,7 +67,7 @@ pub struct FollowBench {
     pub width_m: Option<f64>,
     /// Number of obstacles of the clutter.
     pub obstacles: usize,
-    /// Way of walking of everybody.
+    /// Way of walking of all people.
     pub walk: Walk,
 }
 
@@ -169,7 +169,7 @@ impl Maker {
         self.point_that(area, |_, _| true)
     }
 
-    /// Returns a random point of an area that is off blocks, and away from everybody's start.
+    /// Returns a random point of an area that is off blocks, and away from the start of all others.
     fn start_point(&mut self, area: &Area) -> [f64; 2] {
         self.point_that(area, |scene, point| {
             let starts = scene.people.iter().map(|person| person.path[0]);

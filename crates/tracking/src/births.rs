@@ -1,8 +1,8 @@
 //! New people near a track that was lost: a pair is kept only if the detection is rather of the
-//! track's person than of one who has just come.
+//! track's person than of a newcomer.
 //!
 //! The uncertainty of a track that is not seen grows until its gate takes in half a room, and the
-//! next person to enter would inherit its number. People who come are rare in the middle of the
+//! next person to enter would inherit its number. New people are rare in the middle of the
 //! image, and less so at its borders.
 
 use std::f64::consts::TAU;
@@ -48,8 +48,8 @@ fn log_density(track: &Track, detection: &Detection) -> f64 {
     -0.5 * (squared_distance + root.determinant().ln()) - TAU.ln()
 }
 
-/// Returns the density of people who come at the place of a detection. The upper border does not
-/// count, because nobody enters there.
+/// Returns the density of new people at the place of a detection. The upper border does not
+/// count, because people do not enter there.
 fn births_per_m2(detection: &Detection, camera: &Camera, settings: &BirthSettings) -> f64 {
     if camera.is_blind() {
         return settings.inside_per_m2;

@@ -104,7 +104,7 @@ impl Default for OcclusionSettings {
     }
 }
 
-/// People who come: a detection whose track was lost starts a new track where a new person is the
+/// New people: a detection whose track was lost starts a new track where a new person is the
 /// likelier explanation of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]

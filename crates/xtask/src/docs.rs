@@ -287,7 +287,15 @@ fn printed(workspace: &Workspace, programs: &mut Programs, command: &str) -> Res
             source.split_once(' ').context("accuracy names a page and pipelines")?;
         let text = workspace.read(page)?;
         let first = names.split_whitespace().next().unwrap_or_default();
-        let means = titled(&text, page, LEFT_OUT_TABLE)?;
+        // Pipelines may stand in several such tables, by the number of settings that were tried.
+        let mut means = titled(&text, page, LEFT_OUT_TABLE)?;
+        for later in text.split(&format!("**{LEFT_OUT_TABLE}**")).skip(2) {
+            means += &later
+                .lines()
+                .take_while(|line| !ends_excerpt(line))
+                .collect::<Vec<_>>()
+                .join("\n");
+        }
         let rows = accuracy::markdown(&means, names).with_context(|| format!("in {page}"))?;
         let sentence = accuracy::sentence(first, &means, &titled(&text, page, first)?)
             .with_context(|| format!("in {page}"))?;

@@ -37,12 +37,12 @@ impl Name {
         }
     }
 
-    /// Returns the arguments of cargo that build it as the tests do, which have built it already: the
-    /// trainers are a feature that is on where the whole workspace is built.
-    fn cargo_args(self) -> &'static [&'static str] {
+    /// Returns a test that runs it: cargo builds the program for it, with the features that all tests
+    /// together ask for, so that after them nothing is left to build.
+    fn test(self) -> &'static str {
         match self {
-            Self::Tagalong => &["--package", "tagalong-cli", "--features", "train"],
-            Self::Papers => &["--package", "tagalong-papers"],
+            Self::Tagalong => "command",
+            Self::Papers => "triangulate",
         }
     }
 }
@@ -53,28 +53,41 @@ pub struct Program(PathBuf);
 /// Message of cargo about an artifact that it built.
 #[derive(Deserialize)]
 struct Built {
+    target: Target,
     executable: Option<PathBuf>,
+}
+
+#[derive(Deserialize)]
+struct Target {
+    name: String,
+    kind: Vec<String>,
 }
 
 impl Program {
     /// Builds it as the tests do.
     pub fn built(workspace: &Workspace, name: Name) -> Result<Self> {
-        Self::with_arguments(workspace, name, &[])
+        Self::with_arguments(
+            workspace,
+            name,
+            &["test", "--no-run", "--workspace", "--test", name.test()],
+        )
     }
 
     /// Builds it with optimisation.
     pub fn optimised(workspace: &Workspace, name: Name) -> Result<Self> {
-        Self::with_arguments(workspace, name, &["--release"])
+        let package = name.package();
+        Self::with_arguments(workspace, name, &["build", "--release", "--package", package])
     }
 
     fn with_arguments(workspace: &Workspace, name: Name, arguments: &[&str]) -> Result<Self> {
         let mut cargo = Command::new("cargo");
-        cargo.args(["build", "--quiet", "--bin", name.as_str()]).args(name.cargo_args());
-        cargo.args(arguments);
-        cargo.args(["--message-format", "json"]);
+        cargo.args(arguments).args(["--quiet", "--message-format", "json"]);
         let said = output(cargo.current_dir(workspace.root()))?;
         let built = said.lines().filter_map(|line| serde_json::from_str::<Built>(line).ok());
-        let program = built.filter_map(|built| built.executable).next_back();
+        let mut programs = built.filter(|built| {
+            built.target.name == name.as_str() && built.target.kind.iter().any(|kind| kind == "bin")
+        });
+        let program = programs.find_map(|built| built.executable);
         Ok(Self(program.context("cargo does not say where the program is")?))
     }
 

@@ -1,4 +1,4 @@
-//! Steps of people who react to others by a model of crowds.
+//! Steps of people that react to others by a model of crowds.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 
@@ -6,11 +6,11 @@ use super::{Lead, Walker};
 use crate::crowd::{Agent, Around, Blocks};
 use crate::scene::AtEnd;
 
-/// Largest angle, rad, by which a person misses the direction of the goal: without it people who meet
+/// Largest angle, rad, by which a person misses the direction of the goal: without it people that meet
 /// in perfect symmetry would wait for each other for ever.
 const MISSES_RAD: f64 = 0.03;
-/// A person who makes so little headway, as a part of the wanted speed, for so long, s, steps back to
-/// the right, rad, for some time, s: otherwise a crowd is jammed in an arch for ever in which nobody
+/// A person with so little headway, as a part of the wanted speed, for so long, s, steps back to
+/// the right, rad, for some time, s: otherwise a crowd is jammed in an arch for ever in which no person
 /// can go on. People are patient for different times, of which this is the longest difference, s.
 const JAMMED: f64 = 0.3;
 const JAMMED_S: f64 = 1.5;
@@ -74,7 +74,7 @@ impl Walker {
         self.finish_step(now_s, dt, lead);
     }
 
-    /// Returns the angle by which a person turns to the right who has made no headway for long, rad.
+    /// Returns the angle by which a person without headway for long turns to the right, rad.
     /// The time for which an object has blocked the walker is negative while they step back.
     fn jam_rad(&mut self, wanted: &Vector2<f64>, number: usize, dt: f64) -> f64 {
         if self.held_up_s < 0.0 {

@@ -1,4 +1,4 @@
-//! People who react: to each other, to the robot, to blocks and to furniture, by a published model
+//! Reacting people: to each other, to the robot, to blocks and to furniture, by a published model
 //! of crowds instead of the ordinary walk.
 
 mod block;
@@ -125,7 +125,7 @@ impl Around<'_> {
         self.blocks.nearest(place).chain(round).collect()
     }
 
-    /// Returns the velocity that a person chooses who would like to have the velocity `wanted` and
+    /// Returns the velocity that a person chooses with the wish for the velocity `wanted` and
     /// is never faster than `max_mps`.
     pub fn velocity(
         &self,

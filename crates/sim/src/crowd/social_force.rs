@@ -18,7 +18,7 @@ const TURN_FACTOR: f64 = 2.0;
 const BRAKE_FACTOR: f64 = 3.0;
 /// Weight of the relative velocity against the direction to the other.
 const VELOCITY_WEIGHT: f64 = 2.0;
-/// Bias of the angle to the other, by which people who meet head-on pass on the same side, as the
+/// Bias of the angle to the other, by which people that meet head-on pass on the same side, as the
 /// paper observed.
 const SIDE_BIAS: f64 = 0.005;
 /// Strength, m/s², and reach, m, of the force from a wall.

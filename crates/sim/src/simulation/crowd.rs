@@ -65,7 +65,7 @@ impl Simulation {
         self.approach_robot(dt);
     }
 
-    /// Returns the bodies of all people, `None` for those who are not in the room, and the robot.
+    /// Returns the bodies of all people, `None` for those that are not in the room, and the robot.
     fn agents(&self, now_s: f64) -> Vec<Option<Agent>> {
         if !self.walkers.iter().any(Walker::reacts) {
             return Vec::new();

@@ -10,7 +10,7 @@ const REACH_M: f64 = 5.0;
 /// Parts of the radius to either side of the middle of a body at which it may be seen.
 const ASIDE: [f64; 3] = [0.0, 0.8, -0.8];
 
-/// The robot among people who react to it.
+/// The robot among people that react to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrowdView {
     /// The robot in the world, m and rad.

@@ -21,7 +21,7 @@ const COLUMNS: [&str; 12] = [
     "time s",
 ];
 
-/// Returns the row of some rides; `None` if none of them was among people who react.
+/// Returns the row of some rides; `None` if none of them was among reacting people.
 pub fn row(label: &str, rides: &[&Followed]) -> Option<Row> {
     let all: Vec<CrowdMeasures> = rides.iter().filter_map(|ride| ride.ridden.crowd).collect();
     if all.is_empty() {

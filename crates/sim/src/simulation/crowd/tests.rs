@@ -38,7 +38,7 @@ fn all_arrive(simulation: &Simulation) -> bool {
     simulation.walkers.iter().all(Walker::has_arrived)
 }
 
-/// People on a circle who all walk to the opposite point.
+/// People on a circle, all of whom walk to the opposite point.
 fn circle(people: usize) -> Vec<[[f64; 2]; 2]> {
     let at = |angle: f64| [10.0 + 5.0 * angle.cos(), 10.0 + 5.0 * angle.sin()];
     let way = |i: usize| {
