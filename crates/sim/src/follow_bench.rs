@@ -6,10 +6,9 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::Point2;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tagalong_math::fingerprint;
 
+use crate::bench_setting::{BenchSetting, FollowBench};
 use crate::crowd::{Block, CrowdSettings, Walk};
 use crate::random::Random;
 use crate::scene::{AtEnd, PersonSettings, Scene};
@@ -36,72 +35,6 @@ const TRIES: usize = 1000;
 const FOOTPRINT_M: [[f64; 2]; 4] = [[0.35, 0.275], [-0.35, 0.275], [-0.35, -0.275], [0.35, -0.275]];
 /// Distance of the robot behind the target at the start, m.
 const BEHIND_M: f64 = 1.3;
-
-/// Layout of a scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum BenchSetting {
-    /// A crowd on a circle, each on the way to the opposite point and back.
-    #[default]
-    Circular,
-    /// People on their way to and fro in a corridor.
-    Corridor,
-    /// People on their way through a crossing of two corridors.
-    Crossing,
-    /// People on their way through a wide doorway, in the direction of the target.
-    Doorway,
-    /// Obstacles in a room, and people on their way between random points.
-    Clutter,
-}
-
-/// Scene by the rules of Follow-Bench: it sets the room, the blocks, the people, and the start and the
-/// footprint of the robot. The first person is the target.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FollowBench {
-    /// Layout.
-    pub setting: BenchSetting,
-    /// Number of people besides the target.
-    pub people: usize,
-    /// Width of the corridor, the crossing or the doorway, m; that of the benchmark if left out.
-    pub width_m: Option<f64>,
-    /// Number of obstacles of the clutter.
-    pub obstacles: usize,
-    /// Way of walking of all people.
-    pub walk: Walk,
-}
-
-impl Default for FollowBench {
-    fn default() -> Self {
-        Self {
-            setting: BenchSetting::Circular,
-            people: 10,
-            width_m: None,
-            obstacles: 20,
-            walk: Walk::Orca,
-        }
-    }
-}
-
-impl FollowBench {
-    /// Returns the conditions on the settings, each with the message for a violation; a scene is
-    /// empty if it has neither people nor blocks of its own.
-    pub(crate) fn rules(&self, is_empty: bool) -> [(bool, &'static str); 4] {
-        [
-            (self.people <= 40, "follow_bench.people must be at most 40"),
-            (self.obstacles <= 40, "follow_bench.obstacles must be at most 40"),
-            (
-                self.width_m.is_none_or(|width_m| (2.0..=10.0).contains(&width_m)),
-                "follow_bench.width_m must be in 2 to 10",
-            ),
-            (
-                is_empty,
-                "follow_bench makes the people and the blocks: leave out [[people]], \
-                [[blocks]], crowd and approach",
-            ),
-        ]
-    }
-}
 
 impl Scene {
     /// Returns the scene with the layout and the people of its table `follow_bench`, and without that

@@ -42,6 +42,7 @@
 
 mod approach;
 mod behaviour;
+mod bench_setting;
 mod body;
 mod camera_settings;
 mod crowd;
@@ -83,12 +84,12 @@ mod webcam;
 mod world;
 
 pub use approach::{ApproachBy, ApproachInView, ApproachSettings, ApproachState};
+pub use bench_setting::{BenchSetting, FollowBench};
 pub use camera_settings::{CameraKind, CameraSettings};
 pub use crowd::{Block, CrowdSettings, Walk};
 pub use daylight::Daylight;
 pub use faults::{FaultKind, InjectedFault, ScheduledFault};
 pub use figures::FIGURES_VERSION;
-pub use follow_bench::{BenchSetting, FollowBench};
 pub use footprint::ROBOT_RADIUS_M;
 pub use furniture::{Furniture, FurnitureKind};
 pub use laser::LaserSettings;

@@ -1,5 +1,6 @@
 //! Scenes as TOML: everything that a simulated log depends on, the seed included.
 
+use crate::bench_setting::FollowBench;
 use crate::camera_settings::{CameraKind, CameraSettings};
 use crate::posture::Posture;
 use crate::room_settings::RoomSettings;
@@ -13,7 +14,6 @@ use crate::approach::{ApproachBy, ApproachSettings};
 use crate::crowd::{Block, CrowdSettings, Walk};
 use crate::daylight::Daylight;
 use crate::faults::InjectedFault;
-use crate::follow_bench::FollowBench;
 use crate::footprint;
 use crate::furniture::Furniture;
 use crate::laser::LaserSettings;

@@ -11,6 +11,7 @@ const MAY_NAME: &[(&str, &str)] = &[
     ("crates/pipeline/src/config.rs", "associate-hungarian"), // the default associator
     ("crates/pipeline/src/config.rs", "manage-m-of-n"),       // the default track manager
     ("crates/trials/src/given.rs", "recorded-detections"),    // replaces the detectors of a config
+    ("crates/trials/src/ride/told.rs", "recorded-detections"), // likewise
     ("crates/doctor/src/preparations.rs", "onnx"),            // tries preparations of its images
     ("crates/app/src/installed.rs", "onnx"),                  // the ending of its files
     // Names of configs.
