@@ -30,6 +30,7 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("every-third", "needs a network that a script of Python makes"),
     ("upper-bodies", "needs a network that a script of Python makes"),
     ("turning", "needs a log that a script of Python makes"),
+    ("boxes variants", "needs sequences that a script of Python makes"),
     ("../shared", "needs the annotated logs"),
     ("benches/rooms.toml", "needs the annotated logs"),
     ("LOG.people.csv", "needs an annotated log"),
