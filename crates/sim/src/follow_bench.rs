@@ -9,7 +9,7 @@ use nalgebra::Point2;
 use tagalong_math::fingerprint;
 
 use crate::bench_setting::{BenchSetting, FollowBench};
-use crate::crowd::{Block, CrowdSettings, Walk};
+use crate::crowd::{Block, CrowdSettings};
 use crate::random::Random;
 use crate::scene::{AtEnd, PersonSettings, Scene};
 
