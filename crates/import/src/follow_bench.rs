@@ -90,7 +90,7 @@ fn set_robot(scene: &mut Scene, robot: &Yaml, offset_m: [f64; 2]) -> Result<(), 
     scene.robot.footprint = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]
         .map(|[ahead, left]| [half_m[0] * ahead, half_m[1] * left])
         .to_vec();
-    if let Ok([speed_mps, _]) = numbers(&robot["vel_max"]).ok_or(()) {
+    if let Some([speed_mps, _]) = numbers(&robot["vel_max"]) {
         scene.robot.speed_mps = speed_mps;
     }
     let sensors = listed(&robot["sensors"], "robot.sensors")?;

@@ -149,11 +149,13 @@ fn stage(names: &[&str]) -> Markup {
     }
 }
 
+/// Renders a mark of a legend with its meaning.
+fn mark(class: &str, text: &str) -> Markup {
+    html! { span { span class=(format!("mark {class}")) {} (text) } }
+}
+
 /// Renders the meaning of the marks around a robot that is driven.
 fn zones() -> Markup {
-    let mark = |class: &str, text: &str| {
-        html! { span { span class=(format!("mark {class}")) {} (text) } }
-    };
     html! {
         (mark("way", "way until it stands"))
         (mark("stands", "a person who comes nearer stops it"))
@@ -165,9 +167,6 @@ fn zones() -> Markup {
 
 /// Renders the meaning of the lines above the slider.
 fn strip_legend() -> Markup {
-    let mark = |class: &str, text: &str| {
-        html! { span { span class=(format!("mark {class}")) {} (text) } }
-    };
     html! {
         p class="legend" {
             (mark("life", "person with ID, seen"))
