@@ -96,6 +96,7 @@ fn interruptible(py: Python<'_>, args: RunArgs) -> PyResult<Outcome> {
 
 /// Compares tracks with truth; returns the figures of `tagalong eval` as JSON.
 #[pyfunction]
+#[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python function")]
 #[pyo3(signature = (truth, tracks, *, similarity, log, rate, upper_body, repairs))]
 pub fn scores(
     py: Python<'_>,
