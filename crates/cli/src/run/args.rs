@@ -8,7 +8,7 @@ use tagalong_log::write::BoxedPart;
 use tagalong_render::OverlayStyle;
 
 /// Arguments of `tagalong run`.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct RunArgs {
     /// The pipeline, a TOML file or the name of a built-in one: depth-verified, depth-ekf,
     /// depth-net-ekf, stereo-verified, stereo-street, omni-rich, mono, laser-legs,
@@ -17,7 +17,7 @@ pub struct RunArgs {
     /// The log: .mcap, .db3, .bag, or the folder of a recording [default: a short simulated one, written to
     /// runs/sample.mcap].
     pub log: Option<PathBuf>,
-    /// Output folder [default: runs/LOG-CONFIG].
+    /// Output folder [default: runs/LOG-CONFIG, or runs/LOG-CONFIG-CAMERA with --camera].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Render a picture of every frame: people with ids, distances and trails, and a view from above;
@@ -65,6 +65,10 @@ pub struct RunArgs {
     /// Output format of the results.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
+    /// Run once for each camera of the log, each time into a folder of the camera's name; a person
+    /// has an ID of their own in each.
+    #[arg(long, conflicts_with_all = ["camera", "serve"])]
+    pub each_camera: bool,
     /// Way in which the log is read.
     #[command(flatten)]
     pub input: InputArgs,
@@ -110,6 +114,7 @@ impl RunArgs {
             serve: None,
             realtime: false,
             format: Format::default(),
+            each_camera: false,
             input: InputArgs::default(),
             quiet: true,
         }

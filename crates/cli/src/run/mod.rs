@@ -2,6 +2,7 @@
 
 mod args;
 mod choice;
+mod each_camera;
 mod frames;
 mod images;
 mod pace;
@@ -46,6 +47,9 @@ use tagalong_view::Live;
 /// A config, log or output directory that cannot be used; a plugin that fails on a frame; a disk
 /// that fails.
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
+    if args.each_camera {
+        return each_camera::run(args, registry);
+    }
     run_until(args, registry, Signals::listen)
 }
 
@@ -160,10 +164,14 @@ fn without_odometry(config: &ConfigFile) -> String {
     )
 }
 
-/// Returns `runs/LOG-CONFIG`.
+/// Returns `runs/LOG-CONFIG`, or `runs/LOG-CONFIG-CAMERA` for a camera that is asked for.
 fn default_folder(args: &RunArgs, config: &ConfigFile) -> PathBuf {
     let log = args.log().file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Path::new("runs").join(format!("{log}-{}", config.stem()))
+    let mut name = format!("{log}-{}", config.stem());
+    if let Some(camera) = &args.input.camera {
+        name = format!("{name}-{}", each_camera::folder_name(camera));
+    }
+    Path::new("runs").join(name)
 }
 
 fn log_name(args: &RunArgs) -> String {

@@ -101,6 +101,12 @@ fn all_images_are_of_one_camera() {
     all_say(&log, &["it is of another camera; `camera = \"/back_camera\"` under [input]"]);
     let other = run("", &log, &["--camera", "/back_camera"]);
     assert!(other.used("depth").starts_with("/back_camera/"), "{}", other.said);
+    let both = run("", &log, &["--each-camera"]);
+    for camera in ["front_camera", "back_camera"] {
+        let report = both.folder.path().join("out").join(camera).join("report.json");
+        let report: Value = serde_json::from_slice(&fs::read(report).unwrap()).unwrap();
+        assert!(report["inputs"].to_string().contains(&format!("/{camera}/")), "{}", both.said);
+    }
 }
 
 #[test]

@@ -3,9 +3,13 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tagalong_log::write::MessageLog;
+use tagalong_log::{Channel, Limits, LogWalker, Message};
 
 use crate::common::broken::{self, Changes};
-use crate::common::{code, tagalong, text};
+use crate::common::{Drawn, code, tagalong, text};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -170,4 +174,52 @@ fn a_config_that_asks_for_odometry_says_where_there_is_none() {
     assert!(said.contains("the log has no odometry"), "{said}");
     let (_, said) = ran(&["run", "laser-follow", "-o", "other"]);
     assert!(!said.contains("is for a robot with odometry"), "{said}");
+}
+
+/// Writes a log with a second camera, /rear, that sees the same as the first, and with a third one
+/// whose images cannot be read.
+fn write_cameras(path: &Path) {
+    let drawn = path.with_extension("one.mcap");
+    Drawn::of(8).write(&drawn);
+    let mut log = MessageLog::create(path).unwrap();
+    let mut walker = LogWalker::open(&drawn, &Limits::default()).unwrap();
+    while let Some(message) = walker.next() {
+        log.copy(&message).unwrap();
+        let topic = &message.channel.topic;
+        let Some(rest) = topic.strip_prefix("/camera/") else { continue };
+        let rear = Channel { topic: format!("/rear/{rest}"), ..(**message.channel).clone() };
+        log.copy(&Message { channel: &Arc::new(rear), ..message }).unwrap();
+        if rest == "color/image_raw" {
+            let side = Channel { topic: "/side/image_raw".into(), ..(**message.channel).clone() };
+            let data = &message.data[..60];
+            log.copy(&Message { channel: &Arc::new(side), data, ..message }).unwrap();
+        }
+    }
+    log.finish().unwrap();
+}
+
+#[test]
+fn each_camera_has_a_run_of_its_own() {
+    let home = tempfile::tempdir().unwrap();
+    write_cameras(&home.path().join("two.mcap"));
+    let ran = |args: &[&str]| {
+        let output = tagalong().args(args).current_dir(&home).output().unwrap();
+        (code(&output), text(&output.stderr) + &text(&output.stdout))
+    };
+    let (code, said) = ran(&["run", "two.mcap", "--each-camera", "-o", "out"]);
+    assert_eq!(code, 3, "the third camera is reported, and part of it is lost: {said}");
+    let tracks = |camera: &str| {
+        let folder = home.path().join("out").join(camera);
+        fs::read_to_string(folder.join("tracks.csv")).unwrap_or_else(|_| panic!("{camera}: {said}"))
+    };
+    assert_eq!(tracks("camera"), tracks("rear"));
+    assert!(said.contains("camera /side"), "{said}");
+    // Without -o the folders have the names of log, config and camera.
+    let (_, said) = ran(&["run", "depth-ekf", "two.mcap", "--each-camera"]);
+    for camera in ["camera", "rear"] {
+        let folder = home.path().join(format!("runs/two-depth-ekf-{camera}"));
+        assert!(folder.join("report.json").exists(), "{said}");
+    }
+    let (code, said) = ran(&["run", "two.mcap", "--each-camera", "--camera", "/rear"]);
+    assert!(code == 2 && said.contains("cannot be used with"), "{said}");
 }
