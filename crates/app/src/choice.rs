@@ -27,7 +27,7 @@ pub struct Choice {
 
 /// The pipelines; the first that fits a log is taken. Where several fit, the order is that of
 /// `tagalong bench --leave-one-room-out` in docs/benchmarks.md.
-pub const CHOICES: [Choice; 10] = [
+pub const CHOICES: [Choice; 11] = [
     Choice { config: "depth-verified", reason: "it has the best HOTA in leave-one-room-out tests" },
     Choice {
         config: "depth-alone",
@@ -48,6 +48,11 @@ pub const CHOICES: [Choice; 10] = [
         reason: "it is the one for several people before a conical mirror",
     },
     Choice { config: NETWORK, reason: "you installed this network; places in metres are rough" },
+    Choice {
+        config: "lidar",
+        reason: "it sees people all around by the points of the lidar; it was tried on simulated \
+                 ones alone",
+    },
     Choice {
         config: WITHOUT_NETWORK,
         reason: "nothing else works without depth; places in metres are rough",

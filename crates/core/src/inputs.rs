@@ -34,6 +34,8 @@ impl Input {
         [Self::Colour, Self::Depth, Self::Right, Self::Laser, Self::Detections];
     /// Readings of the further sources of the collision monitor, [`crate::ObstacleReadings`].
     pub const OBSTACLES: Self = Self::Named("obstacle-sources");
+    /// The points of a 3-D lidar, [`crate::PointCloud`].
+    pub const POINTS: Self = Self::Named("points");
 
     /// Returns the name in configs and in JSON.
     pub fn name(self) -> &'static str {
@@ -134,6 +136,12 @@ impl Inputs {
             Usage::Unused => self.with(input, Usage::Optional),
             Usage::Optional | Usage::Required => self,
         }
+    }
+
+    /// Returns true for a pipeline that sees by the points of a 3-D lidar alone.
+    pub fn are_of_points(&self) -> bool {
+        let images = [Input::Colour, Input::Depth, Input::Right];
+        self.requires(Input::POINTS) && !images.into_iter().any(|image| self.uses(image))
     }
 
     /// Returns these inputs with `input` optional, if it is used at all.

@@ -42,6 +42,7 @@ mod motion;
 mod obstacles;
 mod person;
 mod person_filter;
+mod points;
 mod scan;
 mod sensors;
 mod time;
@@ -69,6 +70,7 @@ pub use motion::{
 pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReading};
 pub use person::{Estimate, Person};
 pub use person_filter::{PerPerson, PersonFilter};
+pub use points::PointCloud;
 pub use scan::{FurtherScans, LaserScan, RayReading, UnreadRay};
 pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};
 pub use time::Stamp;

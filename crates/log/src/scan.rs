@@ -10,7 +10,7 @@ use tagalong_core::Stamp;
 
 use crate::images::{
     CloudAxes, CloudCamera, Codec, Content, camera_of_cloud, content_of_encoding,
-    content_of_format, may_be_disparity, size_of_compressed,
+    content_of_format, may_be_disparity, points_of_cloud, size_of_compressed,
 };
 use crate::log_files::LogFiles;
 use crate::msgs::{
@@ -89,6 +89,8 @@ pub(crate) struct Topic {
     /// Camera of a point cloud in rows and columns, and the reason for which there is none.
     pub(crate) cloud: Option<CloudCamera>,
     pub(crate) cloud_fault: Option<String>,
+    /// True for points that can be read and are not those of a camera.
+    pub(crate) is_lidar: bool,
     pub(crate) frame_id: Option<String>,
     pub(crate) stamps: Vec<Stamp>,
     /// Times at which the messages with these stamps were recorded.
@@ -342,6 +344,7 @@ impl Gathering {
             size: None,
             cloud: None,
             cloud_fault: None,
+            is_lidar: false,
             frame_id: None,
             stamps: Vec::new(),
             recorded: Vec::new(),
@@ -406,7 +409,10 @@ impl Gathering {
                         self.infos.insert(calibration_by_points(name), info);
                     }
                 }
-                Err(error) => topic.cloud_fault = Some(error.to_string()),
+                Err(error) => {
+                    topic.cloud_fault = Some(error.to_string());
+                    topic.is_lidar |= points_of_cloud(&cloud, &Limits::default()).is_ok();
+                }
             }
         }
         self.topic(name, "", "").take_header(cloud.header);

@@ -1,6 +1,8 @@
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tagalong_core::{Command, Frame, Inputs, Reason, Stamp};
+use nalgebra::Isometry3;
+use tagalong_core::{Command, Frame, Inputs, PointCloud, Reason, Stamp};
 use tagalong_tracking::StepError;
 use tagalong_tracking::{Identities, Outcome, Tracked, Tracker};
 
@@ -53,7 +55,13 @@ impl Pipeline {
         if frame.odometry_jumped {
             self.disarm("odometry jumped");
         }
-        let restricted = frame.restricted_to(&self.inputs);
+        let mut restricted = frame.restricted_to(&self.inputs);
+        if let (true, Ok(cloud)) = (self.inputs.are_of_points(), frame.sensor::<PointCloud>()) {
+            // Nobody leaves the view at the edge of an image that is not used.
+            let at = Isometry3::from(cloud.scanner.coords);
+            let used = restricted.as_ref().unwrap_or(frame);
+            restricted = Some(used.with_camera(Arc::new(Camera::blind(at))));
+        }
         let report = self
             .process(restricted.as_ref().unwrap_or(frame))
             .map_err(|error| error.blame_declaration(frame));

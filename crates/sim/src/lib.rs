@@ -55,6 +55,7 @@ mod furniture;
 mod gait;
 mod lanes;
 mod laser;
+mod lidar;
 mod material;
 mod mirror;
 mod obstacle;
@@ -93,6 +94,7 @@ pub use figures::FIGURES_VERSION;
 pub use footprint::ROBOT_RADIUS_M;
 pub use furniture::{Furniture, FurnitureKind};
 pub use laser::LaserSettings;
+pub use lidar::{BeamPattern, LidarSettings};
 pub use mirror::MirrorSettings;
 pub use obstacle_sensors::{
     BumperSettings, RangeKind, RangeSettings, ScannerSettings, SensorData, SensorReading,

@@ -17,6 +17,7 @@ use crate::faults::InjectedFault;
 use crate::footprint;
 use crate::furniture::Furniture;
 use crate::laser::LaserSettings;
+use crate::lidar::LidarSettings;
 use crate::obstacle_sensors::{self, BumperSettings, RangeSettings, ScannerSettings};
 use crate::path_variation::PathVariation;
 use crate::person::Extra;
@@ -51,6 +52,9 @@ pub struct Scene {
     pub faults: FaultSettings,
     /// A laser scanner on the robot, if it has one; `laser = {}` is an ordinary one.
     pub laser: Option<LaserSettings>,
+    /// A 3-D lidar on the robot, if it has one; `lidar = {}` is a spinning one of 16 rings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lidar: Option<LidarSettings>,
     /// Further laser scanners, as sources of obstacles.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lasers: Vec<ScannerSettings>,
@@ -95,6 +99,7 @@ impl Default for Scene {
             robot: RobotSettings::default(),
             faults: FaultSettings::default(),
             laser: None,
+            lidar: None,
             lasers: Vec::new(),
             ranges: Vec::new(),
             bumpers: Vec::new(),
@@ -262,6 +267,7 @@ impl Scene {
         ];
         let webcams = self.webcams.iter().flat_map(WebcamSettings::rules);
         let laser = self.laser.iter().flat_map(LaserSettings::rules);
+        let lidar = self.lidar.iter().flat_map(LidarSettings::rules);
         let ramp = self.room.ramp.iter().flat_map(Ramp::rules);
         let day = self.light.day.iter().flat_map(|day| day.rules(&self.room));
         let approach = self.approach.iter().flat_map(ApproachSettings::rules);
@@ -271,7 +277,7 @@ impl Scene {
         let parts = webcams.chain(laser).chain(ramp).chain(day).chain(approach).chain(outline);
         let is_empty = self.number_of_people() == 0 && self.blocks.is_empty();
         let bench = self.follow_bench.iter().flat_map(|bench| bench.rules(is_empty));
-        let parts = parts.chain(bench);
+        let parts = parts.chain(bench).chain(lidar);
         let blocks = self.blocks.iter().flat_map(Block::rules);
         let parts = parts.chain(variation).chain(self.reacting.rules()).chain(blocks);
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);

@@ -17,6 +17,7 @@ use crate::crowd::Blocks;
 use crate::faults::ScheduledFault;
 use crate::furniture::{Furniture, FurnitureKind};
 use crate::laser::LaserSettings;
+use crate::lidar::LidarSettings;
 use crate::mirror::MirrorCamera;
 use crate::obstacle::Obstacle;
 use crate::obstacle_sensors::SensorReading;
@@ -148,6 +149,8 @@ pub struct Shot {
     /// Ranges of the rays of a laser scanner, m, in the order of [`LaserSettings::directions`];
     /// `None` without one.
     pub laser: Option<Vec<f32>>,
+    /// Points of a 3-D lidar in its own frame, x ahead and z up, m; `None` without one.
+    pub lidar: Option<Vec<[f32; 3]>>,
     /// Everybody.
     pub truth: Vec<Truth>,
     /// The robot in the world, m and rad.
@@ -283,6 +286,11 @@ impl Simulation {
     /// image in which the truth gives regions.
     pub fn panorama(&self) -> Option<&Panorama> {
         self.mirror.as_ref().map(|mirror| &mirror.panorama)
+    }
+
+    /// The 3-D lidar, if the robot has one.
+    pub fn lidar(&self) -> Option<&LidarSettings> {
+        self.scene.lidar.as_ref()
     }
 
     /// The laser scanner, if the robot has one.
@@ -422,6 +430,9 @@ impl Simulation {
         };
         let laser =
             self.laser().map(|laser| laser.measure(&world, &pose, self.moment(0, 1.0).seed));
+        let lidar = self
+            .lidar()
+            .map(|lidar| lidar.measure(&world, &pose, self.shots, self.moment(0, 1.0).seed));
         let (captured_ns, world_from_robot) = (self.now_ns, self.robot.pose);
         Shot {
             captured_ns,
@@ -432,6 +443,7 @@ impl Simulation {
             camera: self.injector.described(&self.camera, captured_ns),
             images,
             laser,
+            lidar,
             truth,
             world_from_robot,
         }

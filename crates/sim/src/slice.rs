@@ -39,6 +39,11 @@ impl<'a> Slice<'a> {
         Self { eye, solids: cut }
     }
 
+    /// Keeps all solids, for rays from an eye in any direction.
+    pub fn around(solids: impl Iterator<Item = &'a Shape>, eye: Point3<f64>) -> Self {
+        Self { eye, solids: solids.map(|solid| (solid, solid.seen_from(&eye))).collect() }
+    }
+
     /// Returns the first solid that a ray in the plane meets, and its distance in lengths of the ray.
     pub fn first(&self, ray: &Vector3<f64>) -> Option<(f64, &'a Shape)> {
         let per_length = 1.0 / ray.norm_squared();

@@ -129,6 +129,11 @@ impl World {
         Slice::new(self.opaque().map(|(_, solid)| solid), eye, normal)
     }
 
+    /// Returns the solids that may reflect the beam of a laser in any direction from an eye.
+    pub(crate) fn around(&self, eye: Point3<f64>) -> Slice<'_> {
+        Slice::around(self.opaque().map(|(_, solid)| solid), eye)
+    }
+
     /// Returns the range of a laser in a direction of length one in the plane of a slice, m; infinite
     /// where it meets nothing. Mirrors send it on.
     pub(crate) fn distance(&self, slice: &Slice<'_>, ray: &Vector3<f64>) -> f64 {

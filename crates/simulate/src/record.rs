@@ -11,7 +11,7 @@ use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
 use tagalong_log::camera_info::{CONICAL_MIRROR, mirror_coefficients};
 use tagalong_log::msgs::{
     BoolMsg, CameraInfo, CompressedImage, Header, Image, JointState, LaserScan, Odometry,
-    PoseStamped, Range, StringMsg, TFMessage, TransformStamped, TwistStamped,
+    PointCloud2, PoseStamped, Range, StringMsg, TFMessage, TransformStamped, TwistStamped,
 };
 use tagalong_log::write::{MessageLog, WriteError};
 use tagalong_log::{TruthFrame, TruthJoint, TruthPerson};
@@ -23,6 +23,7 @@ use tagalong_sim::{
 /// Start time of every simulated log.
 const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
 const LASER_FRAME: &str = "laser";
+const LIDAR_FRAME: &str = "lidar";
 /// Frame of the camera.
 pub const CAMERA_FRAME: &str = "camera_color_optical_frame";
 /// Joints of the wheel encoders, left and right.
@@ -70,6 +71,10 @@ impl Recorder {
         if let Some(laser) = simulation.laser() {
             let above = Isometry3::translation(0.0, 0.0, laser.height_m);
             log.send("/tf_static", EPOCH, &mount("base_link", [(LASER_FRAME.into(), above)]))?;
+        }
+        if let Some(lidar) = &scene.lidar {
+            let above = Isometry3::translation(0.0, 0.0, lidar.height_m);
+            log.send("/tf_static", EPOCH, &mount("base_link", [(LIDAR_FRAME.into(), above)]))?;
         }
         let scanners = scene.lasers.iter().map(|s| (s.name.clone(), s.robot_from_scanner()));
         let ranges = scene.ranges.iter().map(|s| (s.name.clone(), s.robot_from_sensor()));
@@ -138,6 +143,10 @@ impl Recorder {
         if let Some((laser, ranges)) = self.laser.as_ref().zip(shot.laser.as_ref()) {
             let header = Header::new(captured, LASER_FRAME);
             self.log.send("/scan", recorded, &scan(header, laser, ranges))?;
+        }
+        if let Some(points) = &shot.lidar {
+            let cloud = PointCloud2::of_points(Header::new(captured, LIDAR_FRAME), points);
+            self.log.send("/points", recorded, &cloud)?;
         }
         if let Some(colour) = &images.colour {
             self.info("color", recorded, &header, 0.0)?;

@@ -212,6 +212,9 @@ impl Draw {
         if let Some(readings) = readings {
             frame = frame.with_sensor(readings);
         }
+        if let Some((lidar, points)) = self.simulation.lidar().zip(shot.lidar.as_deref()) {
+            frame = frame.with_sensor(lidar.cloud(points));
+        }
         SimulatedFrame {
             frame,
             truth: shot.truth,

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// Model file, relative to the config; empty: the built-in model.
     pub model: String,
+    /// Sensor whose readings make the map.
+    pub source: Source,
     /// Log-odds from which a peak of the map is a person. At the default the scores on rooms left
     /// out are those of the model's card.
     pub discover_score: f64,
@@ -40,10 +42,22 @@ pub struct Config {
     pub training: Training,
 }
 
+/// Sensor whose readings make the map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// A depth camera.
+    Depth,
+    /// A 3-D lidar: four maps, of what is ahead, at the left, behind and at the right. Heads are not
+    /// measured on their surface, and have no box in an image.
+    Points,
+}
+
 impl Default for Config {
     fn default() -> Self {
         Self {
             model: String::new(),
+            source: Source::Depth,
             discover_score: 1.0,
             track_score: -1.5,
             track_radius_m: 0.6,

@@ -1,12 +1,13 @@
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use tagalong_config::{Context, check_settings};
 use tagalong_core::{
     Capabilities, Detection, Detector, Frame, Funnel, Input, Inputs, Query, Result, Track,
 };
 use tagalong_geometry::{Camera, ImageBox};
 
+use crate::peaks::peaks_of;
 use crate::surface::Surface;
-use crate::{BUILT_IN, Config, Model, NAME, Peak, peaks};
+use crate::{BUILT_IN, Beams, Config, Model, NAME, Peak, Source};
 
 /// Detector of people in a plan view of depth.
 pub struct DepthNet {
@@ -27,33 +28,29 @@ impl DepthNet {
     }
 
     /// Makes a detection of a peak, with its head measured on the surface if that is given.
-    fn detection(
-        &self,
-        camera: &Camera,
-        surface: Option<&Surface<'_>>,
-        peak: &Peak,
-    ) -> Option<Detection> {
+    fn detection(&self, eyes: &Eyes<'_>, peak: &Peak) -> Option<Detection> {
         let config = &self.config;
-        let measured = surface.and_then(|surface| surface.head(&peak.head));
+        let measured = eyes.measured(&peak.head);
         let sigma_height_m = if measured.is_some() {
             config.sigma_measured_height_m
-        } else if is_in_image(camera, peak) {
+        } else if eyes.have_in_view(&peak.head) {
             config.sigma_height_m
         } else {
             config.sigma_unseen_height_m
         };
         let sigmas = Vector3::new(config.sigma_m, config.sigma_m, sigma_height_m);
         let head = measured.unwrap_or(peak.head);
-        let region = camera.upper_body(&head);
+        let image = eyes.image_box(&head);
+        let has_place = image.is_none_or(|image| image.rect.width > 0.0);
         let detection = Detection {
-            image: Some(ImageBox::upper_body(region)),
+            image,
             position: head,
             covariance: Matrix3::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
             score: self.model.log_odds(peak.logit).min(config.max_score),
             source: NAME,
         };
         // A head behind the camera has no region.
-        (detection.is_sane() && region.width > 0.0).then_some(detection)
+        (detection.is_sane() && has_place).then_some(detection)
     }
 
     /// Returns the nearest peak within reach of a track.
@@ -65,17 +62,50 @@ impl DepthNet {
     }
 }
 
-fn is_in_image(camera: &Camera, peak: &Peak) -> bool {
-    let pixel = camera.project(&peak.head);
-    pixel.is_some_and(|at| {
-        (0.0..camera.width as f64).contains(&at.x) && (0.0..camera.height as f64).contains(&at.y)
-    })
+/// The sensor by which a frame shows heads.
+enum Eyes<'a> {
+    /// A depth camera, with the surface that it shows if heads are measured on it.
+    Camera(&'a Camera, Option<Surface<'a>>),
+    /// A lidar.
+    Lidar(&'a Beams),
+}
+
+impl Eyes<'_> {
+    /// Returns the head near a place, measured on its surface.
+    fn measured(&self, head: &Point3<f64>) -> Option<Point3<f64>> {
+        match self {
+            Self::Camera(_, surface) => surface.as_ref()?.head(head),
+            Self::Lidar(_) => None,
+        }
+    }
+
+    /// Returns true if a head at this place is in view.
+    fn have_in_view(&self, head: &Point3<f64>) -> bool {
+        match self {
+            Self::Camera(camera, _) => camera.project(head).is_some_and(|at| {
+                (0.0..camera.width as f64).contains(&at.x)
+                    && (0.0..camera.height as f64).contains(&at.y)
+            }),
+            Self::Lidar(beams) => beams.range_m(head).is_some(),
+        }
+    }
+
+    /// Returns the box of a person in the image, where there is one.
+    fn image_box(&self, head: &Point3<f64>) -> Option<ImageBox> {
+        match self {
+            Self::Camera(camera, _) => Some(ImageBox::upper_body(camera.upper_body(head))),
+            Self::Lidar(_) => None,
+        }
+    }
 }
 
 impl Detector for DepthNet {
     fn capabilities(&self) -> Capabilities {
         Capabilities {
-            inputs: Inputs::NONE.require(Input::Depth),
+            inputs: Inputs::NONE.require(match self.config.source {
+                Source::Depth => Input::Depth,
+                Source::Points => Input::POINTS,
+            }),
             discovers: true,
             tracks: true,
             weighs: false,
@@ -88,7 +118,7 @@ impl Detector for DepthNet {
         search: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
-        let (map, pass) = self.model.look(frame)?;
+        let (views, passes) = self.model.look(frame, self.config.source)?;
         let Config { discover_score, track_score, separation_m, .. } = self.config;
         // A track lowers the threshold only once it is believed: a peak must not feed itself.
         let least = match search {
@@ -96,24 +126,29 @@ impl Detector for DepthNet {
             _ => discover_score,
         };
         // Peaks below the threshold are counted, so that the funnel tells how near they came.
-        let all = peaks(&map, &pass, self.model.logit(least.min(track_score)), separation_m);
+        let lowest = self.model.logit(least.min(track_score));
+        let all = peaks_of(&views, &passes, lowest, separation_m);
         let (found, low): (Vec<Peak>, Vec<Peak>) =
             all.into_iter().partition(|peak| self.model.log_odds(peak.logit) >= least);
         funnel.drop_many("peak: score", low.len() as u64);
-        let camera = &*frame.camera;
-        let surface = if self.config.measure_heads { Some(Surface::new(frame)?) } else { None };
-        let surface = surface.as_ref();
+        let eyes = match &views.beams {
+            Some(beams) => Eyes::Lidar(beams),
+            None if self.config.measure_heads => {
+                Eyes::Camera(&frame.camera, Some(Surface::new(frame)?))
+            }
+            None => Eyes::Camera(&frame.camera, None),
+        };
         Ok(match search {
             Query::Track(track) => self
                 .near(track, &found)
-                .and_then(|peak| self.detection(camera, surface, peak))
+                .and_then(|peak| self.detection(&eyes, peak))
                 .into_iter()
                 .collect(),
             Query::Discover { .. } => {
                 // People who are tracked already would be discovered twice.
                 let free =
                     found.iter().filter(|peak| !search.is_occupied(&peak.head, separation_m));
-                free.filter_map(|peak| self.detection(camera, surface, peak)).collect()
+                free.filter_map(|peak| self.detection(&eyes, peak)).collect()
             }
         })
     }

@@ -7,6 +7,8 @@
 //! A fully convolutional network ([`Net`]) turns the map into log-odds, the place and the height
 //! of a head for each cell; [`Peak`]s of the log-odds are people.
 //!
+//! The points of a 3-D lidar make the same map, in each quarter around the robot.
+//!
 //! The detector `depth-net` discovers people and finds tracked ones again. The verifier
 //! `depth-net-verifier` returns the log-odds of the same map at a candidate's place.
 //!
@@ -14,6 +16,7 @@
 //!
 //! With the feature `train` the plugin also offers a trainer ([`train`]).
 
+mod beams;
 mod config;
 mod detect;
 mod export;
@@ -28,7 +31,8 @@ mod tests;
 pub mod train;
 mod verify;
 
-pub use config::{Config, Training, VerifierConfig};
+pub use beams::{Beams, Quarter};
+pub use config::{Config, Source, Training, VerifierConfig};
 pub use detect::DepthNet;
 pub use map::{FloorMap, reduced};
 pub use model::Model;

@@ -3,6 +3,8 @@ use tagalong_core::{DepthImage, Derived, Frame, Result};
 use tagalong_geometry::{Camera, Lens};
 use tagalong_learn::conv::Map;
 
+use crate::{Beams, Quarter};
+
 /// Columns of a depth image beyond which it is thinned out.
 const COLUMNS: usize = 320;
 /// Nearest edge of the map in front of the robot, m ...
@@ -14,6 +16,8 @@ const FINE_M: f64 = 0.05;
 /// Height of the lowest slab, m, and height of each, m.
 const FLOOR_M: f64 = 0.1;
 const SLAB_M: f64 = 0.2;
+/// Surfaces that are as large as the front of a cell, per m².
+const PER_CELL: f64 = 1.0 / (FINE_M * SLAB_M);
 /// Points above this height are ceilings and lamps, m.
 const CEILING_M: f64 = 2.3;
 /// Nearest depth that counts, m.
@@ -56,15 +60,44 @@ impl FloorMap {
 
     /// Computes the map of a depth image.
     pub fn new(camera: &Camera, depth: &DepthImage) -> Self {
-        let mut map = Self {
+        let mut map = Self::empty();
+        for_each_point(camera, depth, |point, area_m2| map.add_point(&point, area_m2));
+        map.flatten_surface();
+        map.add_voxels(|voxel| {
+            let pixel = camera.project(voxel)?;
+            let seen_m = depth.get(pixel.x.round() as i64, pixel.y.round() as i64)?;
+            Some([seen_m.into(), camera.depth_of(voxel)])
+        });
+        map.in_view = widened(&map.in_view);
+        map
+    }
+
+    /// Computes the map of what a lidar sees in a quarter of the directions around the robot; `None`
+    /// if nothing of it is in the map.
+    pub fn of_beams(beams: &Beams, quarter: Quarter) -> Option<Self> {
+        let mut map = Self::empty();
+        for (point, area_m2) in &beams.points {
+            map.add_point(&quarter.view_of(*point), *area_m2);
+        }
+        if map.fine.values.iter().all(|value| *value == 0.0) {
+            return None;
+        }
+        map.flatten_surface();
+        map.add_voxels(|voxel| {
+            let voxel = quarter.robot_of(*voxel);
+            let seen_m = beams.range_m(&voxel)?;
+            Some([seen_m.into(), (voxel - beams.scanner()).norm()])
+        });
+        map.in_view = widened(&map.in_view);
+        Some(map)
+    }
+
+    fn empty() -> Self {
+        Self {
             fine: Map::new(2 * Self::CELLS, 2 * Self::CELLS),
             coarse: Map::new(Self::CELLS, Self::CELLS),
             in_view: vec![false; Self::CELLS * Self::CELLS],
-        };
-        map.add_points(camera, depth);
-        map.add_voxels(camera, depth);
-        map.in_view = widened(&map.in_view);
-        map
+        }
     }
 
     /// Returns the centre of a coarse cell on the floor, m.
@@ -87,44 +120,46 @@ impl FloorMap {
         self
     }
 
-    fn add_points(&mut self, camera: &Camera, depth: &DepthImage) {
-        let scale = 1.0 / (FINE_M * SLAB_M);
-        for_each_point(camera, depth, |point, area_m2| {
-            let row = ((point.x - FIRST_X_M) / FINE_M).floor();
-            let column = ((point.y - FIRST_Y_M) / FINE_M).floor();
-            let cells = 0.0..2.0 * Self::CELLS as f64;
-            if !cells.contains(&row) || !cells.contains(&column) || point.z >= CEILING_M {
-                return;
-            }
-            let cell = self.fine.at_mut(row as usize, column as usize);
-            cell[Self::SLABS] = cell[Self::SLABS].max(0.5 * point.z as f32);
-            let slab = ((point.z - FLOOR_M) / SLAB_M).floor();
-            if (0.0..Self::SLABS as f64).contains(&slab) {
-                cell[slab as usize] += (area_m2 * scale) as f32;
-            }
-        });
+    /// Adds a point with the area that it stands for, m².
+    fn add_point(&mut self, point: &Point3<f64>, area_m2: f64) {
+        let row = ((point.x - FIRST_X_M) / FINE_M).floor();
+        let column = ((point.y - FIRST_Y_M) / FINE_M).floor();
+        let cells = 0.0..2.0 * Self::CELLS as f64;
+        if !cells.contains(&row) || !cells.contains(&column) || point.z >= CEILING_M {
+            return;
+        }
+        let cell = self.fine.at_mut(row as usize, column as usize);
+        cell[Self::SLABS] = cell[Self::SLABS].max(0.5 * point.z as f32);
+        let slab = ((point.z - FLOOR_M) / SLAB_M).floor();
+        if (0.0..Self::SLABS as f64).contains(&slab) {
+            cell[slab as usize] += (area_m2 * PER_CELL) as f32;
+        }
+    }
+
+    /// Takes the root of the surfaces, which are still sums of areas.
+    fn flatten_surface(&mut self) {
         for cell in self.fine.values.as_chunks_mut::<{ Self::FINE }>().0 {
             cell[..Self::SLABS].iter_mut().for_each(|surface| *surface = surface.sqrt().min(1.0));
         }
     }
 
-    fn add_voxels(&mut self, camera: &Camera, depth: &DepthImage) {
+    /// Compares voxels with the surfaces in their directions. `look` returns how far away the
+    /// surface is, NaN without a reading, and how far the voxel, m; `None` outside of the view.
+    fn add_voxels(&mut self, look: impl Fn(&Point3<f64>) -> Option<[f64; 2]>) {
         for cell in 0..Self::CELLS * Self::CELLS {
             let row = cell / Self::CELLS;
             let column = cell % Self::CELLS;
             let floor = Self::centre(row, column);
             for (k, height_m) in HEIGHTS_M.into_iter().enumerate() {
-                let voxel = Point3::new(floor.x, floor.y, height_m);
-                let Some(pixel) = camera.project(&voxel) else { continue };
-                let Some(seen_m) = depth.get(pixel.x.round() as i64, pixel.y.round() as i64) else {
+                let Some([seen_m, voxel_m]) = look(&Point3::new(floor.x, floor.y, height_m)) else {
                     continue;
                 };
                 self.in_view[cell] = true;
-                let behind_m = f64::from(seen_m) - camera.depth_of(&voxel);
+                let behind_m = seen_m - voxel_m;
                 let voxel = self.coarse.at_mut(row, column);
                 // Neither comparison holds for a pixel without a reading.
                 voxel[2 * k] = f32::from(behind_m > MARGIN_M);
-                voxel[2 * k + 1] = f32::from(behind_m < -MARGIN_M && seen_m > NEAREST_M);
+                voxel[2 * k + 1] = f32::from(behind_m < -MARGIN_M && seen_m > f64::from(NEAREST_M));
             }
         }
     }

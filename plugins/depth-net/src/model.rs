@@ -1,9 +1,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
-use tagalong_core::{Derived, Frame, Result};
+use tagalong_core::{Derived, Frame, PointCloud, Result};
 use tagalong_learn::{Line, NetworkFile, fingerprint};
 
-use crate::{FloorMap, Net, Pass};
+use crate::{Beams, FloorMap, Net, Pass, Quarter, Source};
 
 /// A network, and the straight line that calibrates its log-odds.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,9 +20,40 @@ pub struct Model {
 
 const FILE: NetworkFile<'static> = NetworkFile { format: "depth-net 1", parts: &Net::PARTS };
 
-/// Answers of networks to a frame, by the fingerprint of the model: several plugins and several
-/// queries ask for the same one.
-struct Answers(Mutex<Vec<(u64, Arc<Pass>)>>);
+/// Maps of a frame: one of a depth image, or those of a lidar.
+pub(crate) struct Views {
+    pub(crate) maps: Vec<(Quarter, Arc<FloorMap>)>,
+    /// Beams of the lidar.
+    pub(crate) beams: Option<Beams>,
+}
+
+impl Derived for Views {
+    fn derive(frame: &Frame) -> Result<Self> {
+        let map = frame.derived::<FloorMap>()?;
+        Ok(Self { maps: vec![(Quarter::AHEAD, map)], beams: None })
+    }
+}
+
+/// Maps of the points of a lidar.
+struct ViewsOfPoints(Arc<Views>);
+
+impl Derived for ViewsOfPoints {
+    fn derive(frame: &Frame) -> Result<Self> {
+        let beams = Beams::new(frame.sensor::<PointCloud>()?);
+        let maps = Quarter::ALL
+            .into_iter()
+            .filter_map(|quarter| Some((quarter, Arc::new(FloorMap::of_beams(&beams, quarter)?))));
+        let maps = maps.collect();
+        Ok(Self(Arc::new(Views { maps, beams: Some(beams) })))
+    }
+}
+
+/// Answers of a network to the views of a frame.
+type Passes = Arc<Vec<Pass>>;
+
+/// Answers of networks to a frame, by the fingerprint of the model and the sensor: several plugins
+/// and several queries ask for the same one.
+struct Answers(Mutex<Vec<(u64, Source, Passes)>>);
 
 impl Derived for Answers {
     fn derive(_: &Frame) -> Result<Self> {
@@ -38,22 +69,29 @@ impl Model {
         Self { net, slope, offset, mark }
     }
 
-    /// Returns the map of a frame and the network's answer to it.
+    /// Returns the maps of what a sensor sees in a frame, and the network's answers to them.
     ///
     /// # Errors
-    /// [`tagalong_core::Error::MissingImage`] for a frame without depth.
-    pub fn look(&self, frame: &Frame) -> Result<(Arc<FloorMap>, Arc<Pass>)> {
-        let map = frame.derived::<FloorMap>()?;
+    /// [`tagalong_core::Error::MissingImage`] for a frame without readings of the sensor.
+    pub(crate) fn look(&self, frame: &Frame, source: Source) -> Result<(Arc<Views>, Passes)> {
+        let views = match source {
+            Source::Depth => frame.derived::<Views>()?,
+            Source::Points => Arc::clone(&frame.derived::<ViewsOfPoints>()?.0),
+        };
         let answers = frame.derived::<Answers>()?;
         let mut known = answers.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, pass)) = known.iter().find(|(mark, _)| *mark == self.mark) {
-            return Ok((map, Arc::clone(pass)));
+        let is_known = |mark: u64, of: Source| mark == self.mark && of == source;
+        if let Some((.., passes)) = known.iter().find(|(mark, of, _)| is_known(*mark, *of)) {
+            return Ok((views, Arc::clone(passes)));
         }
-        let mut pass = Pass::default();
-        self.net.look(&map, &mut pass);
-        let pass = Arc::new(pass);
-        known.push((self.mark, Arc::clone(&pass)));
-        Ok((map, pass))
+        let passes = views.maps.iter().map(|(_, map)| {
+            let mut pass = Pass::default();
+            self.net.look(map, &mut pass);
+            pass
+        });
+        let passes = Arc::new(passes.collect());
+        known.push((self.mark, source, Arc::clone(&passes)));
+        Ok((views, passes))
     }
 
     /// Calibrates an answer of the network: log-odds of a person.

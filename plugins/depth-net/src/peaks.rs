@@ -1,5 +1,6 @@
 use nalgebra::{Point2, Point3};
 
+use crate::model::Views;
 use crate::{FloorMap, Pass};
 
 /// A cell whose neighbours up to this many cells away are not more likely is a peak.
@@ -25,7 +26,7 @@ impl Peak {
 /// `separation_m` to a likelier one are left out.
 pub fn peaks(map: &FloorMap, pass: &Pass, least: f64, separation_m: f64) -> Vec<Peak> {
     let side = FloorMap::CELLS;
-    let mut found: Vec<Peak> = (0..side * side)
+    let found: Vec<Peak> = (0..side * side)
         .filter(|cell| map.in_view[*cell])
         .map(|cell| (cell / side, cell % side))
         .filter(|(row, column)| {
@@ -34,6 +35,11 @@ pub fn peaks(map: &FloorMap, pass: &Pass, least: f64, separation_m: f64) -> Vec<
         })
         .map(|(row, column)| peak(pass, row, column))
         .collect();
+    apart(found, separation_m)
+}
+
+/// Returns the peaks without those nearer than `separation_m` to a likelier one, the likeliest first.
+fn apart(mut found: Vec<Peak>, separation_m: f64) -> Vec<Peak> {
     found.sort_by(|a, b| b.logit.total_cmp(&a.logit));
     let mut kept: Vec<Peak> = Vec::new();
     for peak in found {
@@ -42,6 +48,23 @@ pub fn peaks(map: &FloorMap, pass: &Pass, least: f64, separation_m: f64) -> Vec<
         }
     }
     kept
+}
+
+/// Directions beside the middle of a view that are its own, rad: a little more than an eighth of a
+/// turn, because a person at its edge is a bit aside in the view beside it.
+const OWN_RAD: f64 = 0.9;
+
+/// Returns the peaks of all views of a frame, as [`peaks`].
+pub(crate) fn peaks_of(views: &Views, passes: &[Pass], least: f64, separation_m: f64) -> Vec<Peak> {
+    let mut all = Vec::new();
+    for ((quarter, map), pass) in views.maps.iter().zip(passes) {
+        let found = peaks(map, pass, least, separation_m);
+        let is_own =
+            |peak: &Peak| views.beams.is_none() || peak.head.y.atan2(peak.head.x).abs() <= OWN_RAD;
+        let own = found.into_iter().filter(is_own);
+        all.extend(own.map(|peak| Peak { head: quarter.robot_of(peak.head), ..peak }));
+    }
+    apart(all, separation_m)
 }
 
 fn is_highest(map: &FloorMap, pass: &Pass, [row, column]: [usize; 2]) -> bool {

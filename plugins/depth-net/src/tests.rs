@@ -1,15 +1,17 @@
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector2};
+use nalgebra::{Isometry3, Point3, Vector2};
 use tagalong_config::{NamedTensor, Registry};
 use tagalong_conformance::{Suite, context, target};
 use tagalong_core::{
-    Detection, Detector, EgoMotion, Error, Frame, Funnel, Images, Query, Stamp, Track, Verifier,
+    Detection, Detector, EgoMotion, Error, Frame, Funnel, Images, Input, Inputs, Query, Sensors,
+    Stamp, Track, Verifier,
 };
+use tagalong_geometry::Camera;
 use tagalong_network::{Limits, Network, RtenNetwork, Tensor};
 use tagalong_sim::{Event, Scene, Simulation, Truth};
 
-use crate::{Config, DepthNet, DepthNetVerifier, NAME, VerifierConfig};
+use crate::{Config, DepthNet, DepthNetVerifier, NAME, Source, VerifierConfig};
 
 /// A room with furniture, seen from a height; two people, if they are there.
 fn room(height_m: f64, people: &str) -> (Frame, Vec<Truth>) {
@@ -90,6 +92,74 @@ fn people_are_found_from_every_height_and_the_near_one_without_a_head() {
     let sigmas: Vec<f64> = found(&frame).iter().map(|d| d.covariance[(2, 2)].sqrt()).collect();
     let unseen = Config::default().sigma_unseen_height_m;
     assert!(sigmas.iter().any(|sigma| (sigma - unseen).abs() < 1e-9), "{sigmas:?}");
+}
+
+/// What a lidar in the middle of a room sees of this pattern, with people on three sides.
+fn around(lidar: &str) -> (Frame, Vec<Truth>) {
+    let text = format!(
+        "seed = 5
+        duration_s = 0.3
+        camera = {{ colour = false, width = 32, height = 24 }}
+        faults = {{ dropped = 0.0, late = 0.0 }}
+        lidar = {{ {lidar} }}
+        room = {{ size_m = [9.0, 8.0] }}
+        [robot]
+        start = [4.5, 4.0]
+        [[furniture]]
+        kind = \"coat-stand\"
+        at = [6.5, 5.5]
+        [[people]]
+        path = [[6.9, 3.8]]
+        [[people]]
+        path = [[1.9, 3.4]]
+        heading_deg = 90.0
+        [[people]]
+        path = [[4.8, 1.7]]"
+    );
+    let mut simulation = Simulation::new(&Scene::parse(&text).unwrap(), 1);
+    loop {
+        if let Some(Event::Shot(shot)) = simulation.next_event() {
+            let cloud = simulation.lidar().unwrap().cloud(&shot.lidar.unwrap());
+            let blind = Camera::blind(Isometry3::from(cloud.scanner.coords));
+            let sensors = Sensors::default().with(cloud);
+            let motion = EgoMotion::at_rest(0.1);
+            let frame = Frame::of_sensors(1, Stamp::default(), blind.into(), motion, sensors);
+            return (frame, shot.truth);
+        }
+    }
+}
+
+#[test]
+fn people_are_found_by_the_points_of_both_kinds_of_lidars_on_all_sides_that_they_see() {
+    let rings = "beams = 28800, rings = 32, lowest_deg = -30.0";
+    let petals = "pattern = \"rosette\", beams = 10000, field_of_view_deg = 70.0, \
+                  lowest_deg = -35.0, highest_deg = 35.0";
+    for (pattern, seen) in [(rings, 3), (petals, 1)] {
+        let (frame, mut truth) = around(pattern);
+        // The first of them is ahead.
+        truth.truncate(seen);
+        let config = Config { source: Source::Points, ..Config::default() };
+        assert!(
+            DepthNet::new(config.clone(), &context()).unwrap().capabilities().inputs
+                == Inputs::NONE.require(Input::POINTS)
+        );
+        let query = Query::Discover { occupied: &[] };
+        let found = detector(config.clone()).detect(&frame, &query, &mut Funnel::default());
+        let found = found.unwrap();
+        let heads: Vec<_> = truth.iter().map(|person| person.head_in_robot).collect();
+        let places: Vec<_> = found.iter().map(|found| found.position).collect();
+        assert_eq!(found.len(), truth.len(), "{pattern}: {places:?} for {heads:?}");
+        for person in &truth {
+            let off = |d: &Detection| (d.position - person.head_in_robot).norm();
+            let nearest = found.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+            assert!(off(nearest) < 0.25, "{pattern}: {} m", off(nearest));
+            assert!(nearest.image.is_none(), "there is no image");
+        }
+        // A frame without points is an error that names the input.
+        let (depth, _) = room(1.2, "");
+        let none = detector(config).detect(&depth, &query, &mut Funnel::default());
+        assert!(none.is_err(), "{none:?}");
+    }
 }
 
 #[test]
@@ -197,8 +267,8 @@ mod training {
         assert!(progress.is_sorted() && progress.last() == Some(&1.0), "{progress:?}");
         let model = Model::from_text(&fitted.model).unwrap();
         let (frame, truth) = room(1.2, NEAR_AND_FAR);
-        let (map, pass) = model.look(&frame).unwrap();
-        let best = crate::peaks(&map, &pass, -9.0, 0.4)[0];
+        let (views, passes) = model.look(&frame, Source::Depth).unwrap();
+        let best = crate::peaks(&views.maps[0].1, &passes[0], -9.0, 0.4)[0];
         let off = truth.iter().map(|person| best.distance_m(&person.head_in_robot.xy()));
         assert!(off.fold(9.0, f64::min) < 0.3, "{best:?}");
         let left_out = fitted.figures["another: left out"].as_table().unwrap();
@@ -282,7 +352,7 @@ fn the_exported_network_has_the_same_answers() {
     assert_eq!(names, ["fine", "coarse", "in_view"]);
     let (frame, _) = room(1.0, NEAR_AND_FAR);
     let model = crate::Model::from_text(crate::BUILT_IN).unwrap();
-    let map = model.look(&frame).unwrap().0;
+    let map = Arc::clone(&model.look(&frame, Source::Depth).unwrap().0.maps[0].1);
     for sample in [network.sample, crate::export::named(&model, &map)] {
         let (inputs, outputs): (Vec<_>, Vec<_>) =
             sample.into_iter().partition(|tensor| tensor.is_input);

@@ -2,7 +2,7 @@ use tagalong_config::{Context, check_settings};
 use tagalong_core::{Detection, Frame, Input, Inputs, Result, Verifier};
 use tagalong_learn::ScoreCalibration;
 
-use crate::{BUILT_IN, FloorMap, Model, VerifierConfig};
+use crate::{BUILT_IN, FloorMap, Model, Source, VerifierConfig};
 
 /// Verifier that returns the log-odds of the map at a candidate's place.
 pub struct DepthNetVerifier {
@@ -33,7 +33,10 @@ impl Verifier for DepthNetVerifier {
         if frame.depth().is_err() {
             return Ok(0.0);
         }
-        let (map, pass) = self.model.look(frame)?;
+        let (views, passes) = self.model.look(frame, Source::Depth)?;
+        let (Some((_, map)), Some(pass)) = (views.maps.first(), passes.first()) else {
+            return Ok(0.0);
+        };
         let side = FloorMap::CELLS;
         let near = (0..side * side).filter(|cell| map.in_view[*cell]).filter_map(|cell| {
             let row = cell / side;

@@ -11,8 +11,8 @@ use tagalong_render::OverlayStyle;
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
     /// The pipeline, a TOML file or the name of a built-in one: depth-verified, depth-ekf,
-    /// depth-net-ekf, stereo-verified, stereo-street, omni-rich, mono, laser-legs,
-    /// laser-follow [default: the one for what the log has].
+    /// depth-net-ekf, stereo-verified, stereo-street, omni-rich, lidar, mono,
+    /// laser-legs, laser-follow [default: the one for what the log has].
     pub config: Option<PathBuf>,
     /// The log: .mcap, .db3, .bag, or the folder of a recording [default: a short simulated one, written to
     /// runs/sample.mcap].

@@ -1,6 +1,7 @@
-//! Depth from `sensor_msgs/PointCloud2`: a depth camera that publishes a point for each pixel, in
-//! rows and columns.
+//! `sensor_msgs/PointCloud2`: depth of a camera that publishes a point for each pixel, in rows and
+//! columns, and the points of a lidar.
 
+use nalgebra::Point3;
 use tagalong_core::DepthImage;
 use tagalong_geometry::{Distortion, Pinhole};
 
@@ -111,10 +112,30 @@ pub fn camera_of_cloud(
         }
     }
     Err(ImageError::Cloud(
-        "its rows and columns are not those of a camera, as of a lidar, which is not read: record \
-         the depth images"
-            .into(),
+        "its points are not those of the pixels of a camera, as those of a lidar".into(),
     ))
+}
+
+/// Returns the points of a lidar, m, in its own frame. Beams without a reflection, which drivers write
+/// as not finite or as the place of the lidar itself, are left out.
+///
+/// # Errors
+/// [`ImageError`]: a size beyond the limits, fields or data that contradict the size.
+pub fn points_of_cloud(
+    cloud: &PointCloud2<'_>,
+    limits: &Limits,
+) -> Result<Vec<Point3<f64>>, ImageError> {
+    let points = Points::unordered(cloud, limits)?;
+    let mut found = Vec::new();
+    for row in 0..points.height {
+        for column in 0..points.width {
+            let point = points.at(column, row);
+            if point.iter().all(|value| value.is_finite()) && point != [0.0; 3] {
+                found.push(Point3::from(point.map(f64::from)));
+            }
+        }
+    }
+    Ok(found)
 }
 
 /// Pixel and point.
@@ -197,6 +218,15 @@ impl<'a> Points<'a> {
             ));
         }
         check_size(cloud.width.into(), cloud.height.into(), cloud.point_step.into(), limits)?;
+        Self::unordered(cloud, limits)
+    }
+
+    /// Checks the layout of points in any order.
+    fn unordered(cloud: &'a PointCloud2<'_>, limits: &Limits) -> Result<Self, ImageError> {
+        if cloud.data.len() as u64 > limits.image_bytes || cloud.point_step == 0 {
+            let width = cloud.width.into();
+            return Err(ImageError::TooLarge { width, height: cloud.height.into() });
+        }
         let point_step = cloud.point_step as usize;
         let row_step = cloud.row_step as usize;
         let width = cloud.width as usize;
@@ -373,6 +403,7 @@ mod tests {
             let limits = Limits::default();
             let _ = camera_of_cloud(&cloud, &limits);
             let _ = decode_cloud(&cloud, CloudAxes::Body, &limits);
+            let _ = points_of_cloud(&cloud, &limits);
             // And with a layout that fits the data.
             [cloud.width, cloud.height] = [size[0] % 30, size[1] % 30];
             cloud.point_step = 12;

@@ -14,7 +14,9 @@ mod rvl;
 mod video;
 mod yuv;
 
-pub use cloud::{CloudAxes, CloudCamera, camera_of_cloud, decode_cloud, size_of_cloud};
+pub use cloud::{
+    CloudAxes, CloudCamera, camera_of_cloud, decode_cloud, points_of_cloud, size_of_cloud,
+};
 pub(crate) use compressed::Codec;
 pub use compressed::{decode_compressed, encode_rvl, size_of_compressed};
 pub(crate) use disparity::may_be_disparity;

@@ -205,6 +205,32 @@ pub struct PointCloud2<'a> {
 
 message!(PointCloud2<'_>, "sensor_msgs/msg/PointCloud2", "PointCloud2.msg");
 
+impl PointCloud2<'_> {
+    /// Returns a message with these points, m, in one row.
+    pub fn of_points(header: Header, points: &[[f32; 3]]) -> PointCloud2<'static> {
+        let field = |(name, offset): (&str, u32)| PointField {
+            name: name.to_owned(),
+            offset,
+            datatype: PointField::FLOAT32,
+            count: 1,
+        };
+        let width = points.len() as u32;
+        let point_step = 12;
+        let data: Vec<u8> = points.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+        PointCloud2 {
+            header,
+            height: 1,
+            width,
+            fields: [("x", 0), ("y", 4), ("z", 8)].map(field).to_vec(),
+            is_bigendian: false,
+            point_step,
+            row_step: point_step * width,
+            data: data.into(),
+            is_dense: true,
+        }
+    }
+}
+
 /// `sensor_msgs/PointField`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointField {

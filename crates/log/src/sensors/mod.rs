@@ -8,12 +8,14 @@
 //! 2. `crates/log/src/sensors/NAME.rs`: the message (a struct with the fields of the ROS message in
 //!    their order), a [`SensorReader`] that makes the data of it, and the entry for [`SENSORS`].
 //!
-//! `laser.rs` keeps the message nearest in time, `detections.rs` pairs one message with each frame.
+//! `laser.rs` and `points.rs` keep the message nearest in time, `detections.rs` pairs one message with
+//! each frame.
 //! A topic is found by type, or named as `topics.NAME` under `[input]`. Images are no entries: they
 //! make the frames, and their calibrations the cameras.
 
 mod detections;
 pub(crate) mod laser;
+pub(crate) mod points;
 
 use std::sync::Arc;
 
@@ -29,7 +31,7 @@ use crate::walk::Message;
 use crate::{InputSettings, LogError};
 
 /// The table of all sensors beside the images.
-pub(crate) const SENSORS: &[SensorType] = &[laser::ENTRY, detections::ENTRY];
+pub(crate) const SENSORS: &[SensorType] = &[laser::ENTRY, detections::ENTRY, points::ENTRY];
 
 /// Entry of the table: the message types of a sensor, and how they are read.
 #[derive(Clone, Copy)]

@@ -28,6 +28,7 @@ use crate::register::Registration;
 use crate::scan::Type;
 use crate::sensors::Moment;
 use crate::sensors::laser::{lose_scan, scan_fault, seen_from};
+use crate::sensors::points::cloud_in_robot;
 use crate::tally::Tally;
 
 /// State that is carried from frame to frame.
@@ -73,6 +74,9 @@ impl Assembler {
         let tolerance_s = plan.input.pair_tolerance_s;
         intake.pair_sensors(image.stamp, next, tolerance_s);
         watch_frame(plan, Some(plan.primary()), image, image.stamp, intake, tally);
+        if plan.is_of_points() {
+            return self.assemble_points(plan, image, intake, tally);
+        }
         if plan.is_of_scans() {
             return self.assemble_scan(plan, image, intake, tally);
         }
@@ -136,14 +140,38 @@ impl Assembler {
             tally.count("laser_scans_without_pose");
             return None;
         };
-        let camera = Camera::blind(pose);
-        if self.camera.as_deref() != Some(&camera) {
-            self.camera = Some(Arc::new(camera));
-        }
-        let camera = Arc::clone(self.camera.as_ref()?);
         let seen = seen_from(&sweep, &pose, &Isometry2::identity());
         let sensors = Sensors::default().with(seen);
+        let camera = self.blind_camera(pose);
         Some(self.finish(plan, scan.stamp, camera, sensors, intake, tally))
+    }
+
+    /// Makes a frame of the points of a lidar alone; `None` if they are damaged or their pose is
+    /// unknown, which is counted.
+    fn assemble_points(
+        &mut self,
+        plan: &Plan,
+        cloud: &Payload,
+        intake: &mut Intake,
+        tally: &mut Tally,
+    ) -> Option<LogFrame> {
+        let Some(pose) = plan.mount.at(&intake.tf, cloud.stamp) else {
+            tally.count("clouds_without_pose");
+            return None;
+        };
+        let seen = cloud_in_robot(cloud, plan.primary(), &pose, &Isometry2::identity(), tally)?;
+        let sensors = Sensors::default().with(seen);
+        let camera = self.blind_camera(pose);
+        Some(self.finish(plan, cloud.stamp, camera, sensors, intake, tally))
+    }
+
+    /// Returns the camera of a frame without images, the same one while the sensor stays where it is.
+    fn blind_camera(&mut self, pose: Isometry3<f64>) -> Arc<Camera> {
+        let camera = Camera::blind(pose);
+        match &self.camera {
+            Some(known) if **known == camera => Arc::clone(known),
+            _ => Arc::clone(self.camera.insert(Arc::new(camera))),
+        }
     }
 
     /// Decodes the image that makes the frame, as far as it is used; returns it with the size of

@@ -101,13 +101,20 @@ impl Plan {
         match (&self.chosen.colour, &self.chosen.depth) {
             (Some(_), _) => Input::Colour,
             (None, Some(_)) => Input::Depth,
-            (None, None) => Input::Laser,
+            (None, None) if self.chosen.sensor(Input::Laser).is_some() => Input::Laser,
+            (None, None) => Input::POINTS,
         }
     }
 
-    /// Returns true if laser scans make the frames, because the log has no images.
+    /// Returns true if laser scans or the points of a lidar make the frames, because the log has no
+    /// images.
     pub(super) fn is_of_scans(&self) -> bool {
-        self.primary_input() == Input::Laser
+        [Input::Laser, Input::POINTS].contains(&self.primary_input())
+    }
+
+    /// Returns true if the points of a lidar make the frames.
+    pub(super) fn is_of_points(&self) -> bool {
+        self.primary_input() == Input::POINTS
     }
 
     /// Returns the mirror if its images are still circular.
@@ -444,6 +451,11 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     let mirror = plan.lens.is_some_and(|lens| lens.mirror.is_some());
     if let Some(mount) = Mount::find(&plan.scan, camera, &plan.input, mirror) {
         return Ok(mount);
+    }
+    if plan.is_of_points() {
+        let wanted = "pose of the lidar: tf does not connect it with the robot".to_owned();
+        let hint = "; record /tf_static, or give height and tilt in [input.camera]".to_owned();
+        return Err(missing(&plan.scan, wanted, hint));
     }
     if plan.is_of_scans() {
         return Ok(Mount::scanner_at_origin());

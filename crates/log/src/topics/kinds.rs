@@ -11,7 +11,8 @@ pub(super) fn is_picture(topic: &Topic) -> bool {
 
 /// Returns true for images, those of disparity and the points of depth cameras included.
 pub(super) fn is_image(topic: &Topic) -> bool {
-    is_picture(topic) || matches!(topic.kind, Type::DisparityImage | Type::PointCloud)
+    let is_cloud = topic.kind == Type::PointCloud && !topic.is_lidar;
+    is_picture(topic) || topic.kind == Type::DisparityImage || is_cloud
 }
 
 /// Returns true for pictures that can be read, as far as that is known before the first one.
@@ -97,9 +98,11 @@ pub(super) fn is_odometry(topic: &Topic) -> bool {
     topic.kind == Type::Odometry
 }
 
-/// Returns true for a topic with messages of this sensor, in an encoding that can be read.
+/// Returns true for a topic with messages of this sensor, in an encoding that can be read. Points are
+/// those of a lidar only where they are not those of a camera.
 pub(super) fn is_of(sensor: &SensorType, topic: &Topic) -> bool {
-    topic.kind == Type::Sensor && sensor.reads(&topic.schema)
+    let is_sensor = topic.kind == Type::Sensor || topic.kind == Type::PointCloud && topic.is_lidar;
+    is_sensor && sensor.reads(&topic.schema)
 }
 
 pub(super) fn has(name: &str, words: &[&str]) -> bool {

@@ -74,7 +74,8 @@ impl Chosen {
     /// Returns the topic whose messages make the frames; empty without any.
     pub(crate) fn primary(&self) -> &str {
         let images = self.colour.as_ref().or(self.depth.as_ref());
-        images.map(String::as_str).or(self.sensor(Input::Laser)).unwrap_or_default()
+        let scans = self.sensor(Input::Laser).or(self.sensor(Input::POINTS));
+        images.map(String::as_str).or(scans).unwrap_or_default()
     }
 
     /// Returns the topic of a sensor beside the images.
@@ -99,7 +100,7 @@ pub(crate) struct Decision {
 /// Chooses topics as named in the settings, else by device, type, encoding and name. A topic of an
 /// unused input is not chosen, as if the log did not have it, with one exception: frames are numbered
 /// and timed by the images of the colour topic, and without it by those of the depth topic. In a log
-/// without images they are laser scans.
+/// without images they are laser scans, and without these the points of a lidar.
 ///
 /// # Errors
 /// [`LogError::Missing`] for a named topic or camera that is not there, and for required inputs that
@@ -130,7 +131,12 @@ pub(crate) fn choose(
     input: &InputSettings,
     inputs: Inputs,
 ) -> Result<Chosen, LogError> {
-    let images = choose_images(scan, input, inputs)?;
+    // Images that come more often than points would show each of them several times.
+    let images = if inputs.are_of_points() {
+        Default::default()
+    } else {
+        choose_images(scan, input, inputs)?
+    };
     let (Pick { colour, depth, right, depth_problem }, camera) = images;
     let mut sensors = BTreeMap::new();
     for sensor in SENSORS.iter().filter(|sensor| inputs.uses(sensor.input)) {
@@ -350,7 +356,7 @@ fn check(
         fits: Box::new(|topic| is_of(sensor, topic)),
         taken: None,
     });
-    let has_no_clock = is_blind && chosen.sensor(Input::Laser).is_none();
+    let has_no_clock = is_blind && chosen.primary().is_empty();
     let any = image(has_no_clock, "images at all", "colour_topic", COLOUR);
     match images.into_iter().chain(sensors).chain([any]).find(|required| required.lacks) {
         None => Ok(()),

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use tagalong_core::Stamp;
 use tagalong_geometry::HALF_HEAD_M;
 
-use crate::msgs::{Header, PointCloud2, PointField};
+use crate::msgs::{Header, PointCloud2};
 
 /// Radii of trunk and head, m.
 const TRUNK_M: f64 = 0.22;
@@ -71,26 +71,9 @@ fn points(head_m: f64) -> Vec<Vector3<f64>> {
 }
 
 fn cloud(points: &[Vector3<f64>], at: Stamp, frame: &str) -> PointCloud2<'static> {
-    let field = |(name, offset): (&str, u32)| PointField {
-        name: name.to_owned(),
-        offset,
-        datatype: PointField::FLOAT32,
-        count: 1,
-    };
-    let width = points.len() as u32;
-    let step = 12;
-    let data = points.iter().flat_map(|p| [p.x, p.y, p.z]);
-    PointCloud2 {
-        header: Header::new(at, frame),
-        height: 1,
-        width,
-        fields: [("x", 0), ("y", 4), ("z", 8)].map(field).to_vec(),
-        is_bigendian: false,
-        point_step: step,
-        row_step: step * width,
-        data: data.flat_map(|value| (value as f32).to_le_bytes()).collect::<Vec<u8>>().into(),
-        is_dense: true,
-    }
+    let points: Vec<[f32; 3]> =
+        points.iter().map(|point| [point.x as f32, point.y as f32, point.z as f32]).collect();
+    PointCloud2::of_points(Header::new(at, frame), &points)
 }
 
 #[cfg(test)]

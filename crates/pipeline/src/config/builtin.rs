@@ -37,6 +37,7 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "joint-particle-table"
     "laser-follow"
     "laser-legs"
+    "lidar"
     "mono"
     "naive"
     "omni-appearance"

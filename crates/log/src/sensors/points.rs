@@ -1,0 +1,107 @@
+//! Points of 3-D lidars: the nearest cloud to an image in time, or frames of their own.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Isometry2, Isometry3, Point3};
+use tagalong_core::{Input, PointCloud as Cloud, Sensors, Stamp};
+
+use super::laser::on_floor;
+use super::{Moment, SensorReader, SensorType};
+use crate::Limits;
+use crate::images::points_of_cloud;
+use crate::msgs::{CdrError, PointCloud2, decode};
+use crate::pairing::Payload;
+use crate::tally::Tally;
+use crate::walk::Message;
+
+/// Entry of lidars. Their topics are those of which [`crate::scan`] has found that the points are not
+/// those of a camera.
+pub(super) const ENTRY: SensorType = SensorType {
+    input: Input::POINTS,
+    messages: &["sensor_msgs/PointCloud2"],
+    wanted: "points of a lidar",
+    rank: Some(rank),
+    header: |data| decode::<PointCloud2<'_>>(data).map(|cloud| Some(cloud.header)),
+    fault: |_| None,
+    reader: |_, _| Box::<Clouds>::default(),
+};
+
+/// Points as the lidar delivers them before filtered ones: those have lost surfaces that hide others.
+fn rank(topic: &str) -> i32 {
+    let is_part = ["filtered", "ground", "obstacle", "cluster", "map"];
+    -i32::from(is_part.iter().any(|word| topic.contains(word)))
+}
+
+/// Maximum time between a cloud and an image, s.
+const NEAR_S: f64 = 0.25;
+/// Maximum number of clouds kept: those of the frames that wait for their turn.
+const KEPT: usize = 16;
+
+/// Clouds of the last seconds, in the order of arrival, not yet decoded.
+#[derive(Default)]
+struct Clouds(VecDeque<Payload>);
+
+impl SensorReader for Clouds {
+    fn take(&mut self, message: &Message<'_>, _: &mut Tally) -> Result<(), CdrError> {
+        self.0.push_back(Payload::of_headed(message)?);
+        if self.0.len() > KEPT {
+            self.0.pop_front();
+        }
+        Ok(())
+    }
+
+    fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
+        let Some(cloud) = self.near(moment.stamp) else {
+            tally.count("frames_without_points");
+            return sensors;
+        };
+        let then = cloud.stamp;
+        let Some(mount) = moment.tf.lookup(moment.robot_frame, &cloud.frame_id, then) else {
+            tally.count("clouds_without_pose");
+            let topic = moment.topic;
+            tally.note(format!(
+                "tf does not connect the lidar of {topic} with the robot: it is not used"
+            ));
+            return sensors;
+        };
+        match cloud_in_robot(cloud, moment.topic, &mount, &moment.robot_from(then), tally) {
+            Some(cloud) => sensors.with(cloud),
+            None => sensors,
+        }
+    }
+}
+
+impl Clouds {
+    /// Returns the cloud nearest to an image in time, if it is near enough.
+    fn near(&self, image: Stamp) -> Option<&Payload> {
+        let off_s = |cloud: &&Payload| cloud.stamp.seconds_since(image).abs();
+        let nearest = self.0.iter().min_by(|a, b| off_s(a).total_cmp(&off_s(b)));
+        nearest.filter(|cloud| off_s(cloud) <= NEAR_S)
+    }
+}
+
+/// Returns a cloud in the frame of a robot that has moved by `robot_from_then` since; `None`, counted,
+/// for one that cannot be read.
+pub(crate) fn cloud_in_robot(
+    cloud: &Payload,
+    topic: &str,
+    robot_from_lidar: &Isometry3<f64>,
+    robot_from_then: &Isometry2<f64>,
+    tally: &mut Tally,
+) -> Option<Cloud> {
+    let robot_from_lidar = on_floor(robot_from_then) * robot_from_lidar;
+    let decoded = decode::<PointCloud2<'_>>(&cloud.data).map_err(|error| error.to_string());
+    let points = decoded.and_then(|cloud| {
+        points_of_cloud(&cloud, &Limits::default()).map_err(|error| error.to_string())
+    });
+    match points {
+        Ok(points) => Some(Cloud {
+            scanner: robot_from_lidar * Point3::origin(),
+            points: points.iter().map(|point| robot_from_lidar * point).collect(),
+        }),
+        Err(why) => {
+            tally.lose("clouds_invalid", || format!("{topic}: points cannot be used: {why}"));
+            None
+        }
+    }
+}
