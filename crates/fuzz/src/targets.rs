@@ -10,6 +10,8 @@ use tagalong_log::{FrameSource, InputSettings, Inputs, Limits, LogWalker};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::Scene;
 
+use crate::live;
+
 /// A parser.
 pub struct Target {
     /// Its name on the command line.
@@ -114,6 +116,18 @@ pub fn targets() -> Vec<Target> {
         },
         Target { name: "cdr", about: "ROS messages", seeds: payloads(), parse: messages },
         Target { name: "images", about: "image messages", seeds: pictures(), parse: images },
+        Target {
+            name: "points",
+            about: "clouds of points",
+            seeds: live::clouds(),
+            parse: live::points,
+        },
+        Target {
+            name: "detections",
+            about: "messages of other detectors, to frames",
+            seeds: live::detections(),
+            parse: live::frame_of_detections,
+        },
         Target {
             name: "config",
             about: "the TOML of a pipeline",

@@ -223,7 +223,7 @@ impl<'a> Points<'a> {
 
     /// Checks the layout of points in any order.
     fn unordered(cloud: &'a PointCloud2<'_>, limits: &Limits) -> Result<Self, ImageError> {
-        if cloud.data.len() as u64 > limits.image_bytes || cloud.point_step == 0 {
+        if cloud.data.len() as u64 > limits.image_bytes {
             let width = cloud.width.into();
             return Err(ImageError::TooLarge { width, height: cloud.height.into() });
         }

@@ -1,0 +1,106 @@
+//! Messages as they arrive on a robot, up to the frames that are made of them.
+
+use std::path::Path;
+
+use tagalong_core::Stamp;
+use tagalong_log::images::{CloudAxes, camera_of_cloud, decode_cloud, points_of_cloud};
+use tagalong_log::msgs::{
+    self, BoundingBox2D, Detection2D, Detection2DArray, Header, ObjectHypothesis,
+    ObjectHypothesisWithPose, Point2D, PointCloud2, Pose2D, decode, encode,
+};
+use tagalong_log::{Input, InputSettings, Inputs, Limits, Listening, LogFrame};
+
+const IMAGES: &str = "/image";
+const DETECTIONS: &str = "/detections";
+/// Types of messages with detections whose layout is known without a definition.
+const DETECTION_TYPES: [&str; 2] =
+    ["vision_msgs/msg/Detection2DArray", "vision_msgs/msg/Detection3DArray"];
+
+fn header() -> Header {
+    Header::new(Stamp::from_nanos(1_000_000_000), "camera")
+}
+
+/// Returns messages of two detections.
+pub(crate) fn detections() -> Vec<Vec<u8>> {
+    let detection = |class: &str| Detection2D {
+        header: header(),
+        results: vec![ObjectHypothesisWithPose {
+            hypothesis: ObjectHypothesis { class_id: class.to_owned(), score: 0.9 },
+            pose: msgs::PoseWithCovariance::default(),
+        }],
+        bbox: BoundingBox2D {
+            center: Pose2D { position: Point2D { x: 8.0, y: 6.0 }, theta: 0.0 },
+            size_x: 4.0,
+            size_y: 6.0,
+        },
+        id: String::new(),
+    };
+    let flat = Detection2DArray {
+        header: header(),
+        detections: ["person", "chair"].map(detection).to_vec(),
+    };
+    vec![encode(&flat), encode(&msgs::Detection3DArray::default())]
+}
+
+/// Makes frames of an image with the detections in some bytes, of each type.
+pub(crate) fn frame_of_detections(bytes: &[u8], _: &Path) {
+    for kind in DETECTION_TYPES {
+        drop(frame(bytes, kind));
+    }
+}
+
+fn frame(detections: &[u8], kind: &str) -> Option<LogFrame> {
+    let settings =
+        InputSettings { detections_topic: Some(DETECTIONS.into()), ..InputSettings::default() };
+    let inputs = Inputs::NONE.require(Input::Detections);
+    let mut listening = Listening::new("fuzz", &settings, &Limits::default(), inputs).ok()?;
+    let image = encode(&msgs::Image {
+        header: header(),
+        height: 2,
+        width: 2,
+        encoding: "mono8".into(),
+        is_bigendian: 0,
+        step: 2,
+        data: &[0; 4],
+    });
+    listening.announce(IMAGES, "sensor_msgs/msg/Image");
+    listening.announce(DETECTIONS, kind);
+    listening.take(IMAGES, &image);
+    listening.take(DETECTIONS, detections);
+    let mut source = listening.start().ok()?;
+    source.take(IMAGES, &image);
+    source.take(DETECTIONS, detections);
+    source.newest_frame()
+}
+
+/// Returns messages of points in one row, and in rows and columns.
+pub(crate) fn clouds() -> Vec<Vec<u8>> {
+    let points: Vec<[f32; 3]> =
+        (0..120_u8).map(|k| [2.0, 0.1 * f32::from(k % 12), 0.1 * f32::from(k / 12)]).collect();
+    let row = PointCloud2::of_points(header(), &points);
+    let ordered = PointCloud2 { height: 10, width: 12, row_step: 12 * 12, ..row.clone() };
+    vec![encode(&row), encode(&ordered)]
+}
+
+/// Reads points as those of a camera and as those of a lidar.
+pub(crate) fn points(bytes: &[u8], _: &Path) {
+    let Ok(cloud) = decode::<PointCloud2<'_>>(bytes) else { return };
+    let limits = Limits { image_bytes: 1 << 20, ..Limits::default() };
+    drop(camera_of_cloud(&cloud, &limits));
+    drop(decode_cloud(&cloud, CloudAxes::Optical, &limits));
+    drop(points_of_cloud(&cloud, &limits));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_seeds_are_read_to_the_end() {
+        let seeds = clouds();
+        let cloud: PointCloud2<'_> = decode(&seeds[0]).unwrap();
+        assert_eq!(points_of_cloud(&cloud, &Limits::default()).unwrap().len(), 120);
+        let made = frame(&detections()[0], DETECTION_TYPES[0]).unwrap();
+        assert_eq!(made.frame.recorded().unwrap().len(), 1, "the chair is nobody");
+    }
+}
