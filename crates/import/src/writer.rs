@@ -144,9 +144,7 @@ fn depth(
     let millimetres = |value: &u16| (f64::from(*value) * unit_m * 1e3).round().min(65535.0) as u16;
     let data: Vec<u8> = image.as_raw().iter().flat_map(|v| millimetres(v).to_le_bytes()).collect();
     let (width, height) = image.dimensions();
-    let encoding = "16UC1".to_owned();
-    let message =
-        Image { header, height, width, encoding, is_bigendian: 0, step: 2 * width, data: &data };
+    let message = Image::packed(header, "16UC1", width, height, &data);
     log.send("/camera/aligned_depth_to_color/image_raw", moment.stamp, &message)
         .map_err(Failure::failed)
 }

@@ -45,15 +45,8 @@ impl Stream<'_> {
                 _ => vec![index as u8; bytes],
             });
             let data: Vec<u8> = values.collect();
-            let image = Image {
-                header: Header::new(stamp_of(index), self.frame),
-                height: self.size.1,
-                width: self.size.0,
-                encoding: self.encoding.into(),
-                is_bigendian: 0,
-                step: self.size.0 * bytes as u32,
-                data: &data,
-            };
+            let header = Header::new(stamp_of(index), self.frame);
+            let image = Image::packed(header, self.encoding, self.size.0, self.size.1, &data);
             log.bytes::<Image<'_>>(self.topic, recorded(index), &encode(&image));
         }
     }
@@ -82,8 +75,7 @@ fn open_with(
     inputs: Inputs,
 ) -> Result<(FrameSource, SavedLog), LogError> {
     let saved = log.save();
-    let source = FrameSource::open(&saved.path, input, &Limits::default(), inputs)?;
-    Ok((source, saved))
+    Ok((saved.open(input, inputs)?, saved))
 }
 
 fn open(log: LogWriter, inputs: Inputs) -> (FrameSource, SavedLog) {

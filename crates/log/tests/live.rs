@@ -5,23 +5,15 @@ mod common;
 
 use std::io::Cursor;
 
-use common::{LogWriter, SavedLog, at, camera, level_pose};
+use common::{LogWriter, SavedLog, at, started};
 use tagalong_core::{ObstacleData, ObstacleReadings};
 use tagalong_log::msgs::{BoolMsg, BumperEvent, Header, Range, encode};
 use tagalong_log::{
-    FrameSource, Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogError, LogFrame,
+    Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogError, LogFrame,
 };
 use tagalong_log::{LogWalker, ObstacleKind, ObstacleTopic};
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
-
-/// Starts a log with a calibration and a fixed camera.
-fn started() -> LogWriter {
-    let mut log = LogWriter::plain();
-    log.info("/camera/color/camera_info", "colour", &camera(16, 12, 14.0));
-    log.fixed("base_link", "colour", &level_pose());
-    log
-}
 
 /// Writes colour and depth ten times a second, odometry five times as often.
 fn drive(log: &mut LogWriter, frames: i32) {
@@ -73,9 +65,7 @@ fn whoever_keeps_up_gets_the_frames_of_the_log() {
     drive(&mut log, 12);
     let log = log.finish();
     let saved = SavedLog::new(&log);
-    let input = InputSettings::default();
-    let limits = Limits::default();
-    let mut source = FrameSource::open(&saved.path, &input, &limits, DEPTH).unwrap();
+    let mut source = saved.open(&InputSettings::default(), DEPTH).unwrap();
     let (found, live) = live(&log, DEPTH);
     assert_eq!(found.len(), 12);
     for frame in &found {

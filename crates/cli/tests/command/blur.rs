@@ -24,15 +24,7 @@ fn home() -> tempfile::TempDir {
         log.copy(&message).unwrap();
     }
     let at = Stamp::from_nanos(1_700_000_000_000_000_000);
-    let rear = Image {
-        header: Header::new(at, "rear"),
-        height: 1,
-        width: 1,
-        encoding: "rgb8".into(),
-        is_bigendian: 0,
-        step: 3,
-        data: &[1, 2, 3],
-    };
+    let rear = Image::packed(Header::new(at, "rear"), "rgb8", 1, 1, &[1, 2, 3]);
     log.send("/rear/image_raw", at, &rear).unwrap();
     log.finish().unwrap();
     crate::common::config(folder.path(), "[input]\ncolour_topic = '/camera/color/image_raw'\n");

@@ -24,6 +24,15 @@ pub struct Image<'a> {
     pub data: &'a [u8],
 }
 
+impl<'a> Image<'a> {
+    /// Returns an image of `width` columns and `height` rows, which lie one behind the other without
+    /// bytes between them; values of more than one byte have the low byte first.
+    pub fn packed(header: Header, encoding: &str, width: u32, height: u32, data: &'a [u8]) -> Self {
+        let step = (data.len() as u32).checked_div(height).unwrap_or(0);
+        Self { header, height, width, encoding: encoding.to_owned(), is_bigendian: 0, step, data }
+    }
+}
+
 message!(Image<'_>, "sensor_msgs/msg/Image", "Image.msg");
 
 /// `sensor_msgs/CompressedImage`.
@@ -221,4 +230,9 @@ pub struct PointField {
 impl PointField {
     /// Type of single-precision floats.
     pub const FLOAT32: u8 = 7;
+
+    /// Returns a field of one single-precision float.
+    pub fn float32(name: &str, offset: u32) -> Self {
+        Self { name: name.to_owned(), offset, datatype: Self::FLOAT32, count: 1 }
+    }
 }

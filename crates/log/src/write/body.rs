@@ -71,12 +71,7 @@ fn points(head_m: f64) -> Vec<Vector3<f64>> {
 }
 
 fn cloud(points: &[Vector3<f64>], at: Stamp, frame: &str) -> PointCloud2<'static> {
-    let field = |(name, offset): (&str, u32)| PointField {
-        name: name.to_owned(),
-        offset,
-        datatype: PointField::FLOAT32,
-        count: 1,
-    };
+    let fields = [("x", 0), ("y", 4), ("z", 8)];
     let width = points.len() as u32;
     let step = 12;
     let data = points.iter().flat_map(|p| [p.x, p.y, p.z]);
@@ -84,7 +79,7 @@ fn cloud(points: &[Vector3<f64>], at: Stamp, frame: &str) -> PointCloud2<'static
         header: Header::new(at, frame),
         height: 1,
         width,
-        fields: [("x", 0), ("y", 4), ("z", 8)].map(field).to_vec(),
+        fields: fields.map(|(name, offset)| PointField::float32(name, offset)).to_vec(),
         is_bigendian: false,
         point_step: step,
         row_step: step * width,

@@ -22,9 +22,7 @@ fn input_with(sources: &[ObstacleTopic]) -> InputSettings {
 /// Opens a log with these sources.
 fn open_with(log: LogWriter, sources: &[ObstacleTopic]) -> (FrameSource, SavedLog) {
     let saved = log.save();
-    let input = input_with(sources);
-    let opened = FrameSource::open(&saved.path, &input, &Limits::default(), Inputs::ANY);
-    (opened.unwrap(), saved)
+    (saved.open(&input_with(sources), Inputs::ANY).unwrap(), saved)
 }
 
 /// Returns the readings of each frame.
@@ -215,15 +213,7 @@ fn a_second_scanner_is_read_beside_the_first() {
 /// Writes a depth image of a camera at the back.
 fn rear_depth(log: &mut LogWriter, t: f64, metres: f32) {
     let data: Vec<u8> = [metres; 8 * 6].iter().flat_map(|v| v.to_le_bytes()).collect();
-    let message = Image {
-        header: Header::new(at(t), "rear"),
-        height: 6,
-        width: 8,
-        encoding: "32FC1".into(),
-        is_bigendian: 0,
-        step: 32,
-        data: &data,
-    };
+    let message = Image::packed(Header::new(at(t), "rear"), "32FC1", 8, 6, &data);
     log.message("/rear/depth/aligned", at(t), &message);
 }
 
@@ -374,15 +364,14 @@ fn a_source_of_another_type_is_refused_by_name() {
     log.message("/sonar", at(0.1), &StringMsg { data: "near".into() });
     let input = input_with(&[source("sonar", ObstacleKind::Range, "/sonar")]);
     let saved = log.save();
-    let open = |inputs| FrameSource::open(&saved.path, &input, &Limits::default(), inputs);
-    let told = open(Inputs::ANY).err().unwrap().to_string();
+    let told = saved.open(&input, Inputs::ANY).err().unwrap().to_string();
     assert!(
         told.contains("source `sonar` of [[collision_monitor.sources]] names /sonar"),
         "{told}"
     );
     assert!(told.contains("std_msgs/msg/String; it has to be one of: sensor_msgs/Range"), "{told}");
     // A pipeline without a controller does not read them.
-    let mut source = open(Inputs::NONE.require(Input::Colour)).unwrap();
+    let mut source = saved.open(&input, Inputs::NONE.require(Input::Colour)).unwrap();
     assert!(source.next_frame().unwrap().frame.sensor::<ObstacleReadings>().is_err());
 }
 

@@ -16,26 +16,9 @@ fn stereo_log<T: Message + serde::Serialize>(topic: &str, disparities: &T) -> Lo
     log
 }
 
-fn depths_with(log: LogWriter, input: &InputSettings) -> Result<(FrameSource, LogFrame), String> {
-    let saved = log.save();
-    let inputs = Inputs::ANY.require(Input::Depth);
-    let source = FrameSource::open(&saved.path, input, &Limits::default(), inputs);
-    let mut source = source.map_err(|error| error.to_string())?;
-    let frame = source.next_frame().ok_or_else(|| format!("{:?}", source.notes()))?;
-    Ok((source, frame))
-}
-
 /// Returns an image of 16 columns and 12 rows whose first pixel has no disparity.
 fn disparities<'a>(encoding: &str, data: &'a [u8]) -> Image<'a> {
-    Image {
-        header: Header::new(at(0.1), "colour"),
-        height: 12,
-        width: 16,
-        encoding: encoding.into(),
-        is_bigendian: 0,
-        step: data.len() as u32 / 12,
-        data,
-    }
+    Image::packed(Header::new(at(0.1), "colour"), encoding, 16, 12, data)
 }
 
 #[test]
@@ -51,7 +34,7 @@ fn a_disparity_image_is_depth_with_its_own_geometry() {
         ..DisparityImage::default()
     };
     let log = stereo_log("/stereo/disparity", &message);
-    let (source, found) = depths_with(log, &InputSettings::default()).unwrap();
+    let (source, found) = first_depth(log, &InputSettings::default()).unwrap();
     let depth = found.frame.depth().unwrap();
     let [first, second, third] = [0, 1, 4].map(|x| depth.get(x, 0).unwrap());
     assert!(first.is_nan() && second.is_nan() && (third - 1.4 / 4.0).abs() < 1e-6, "{third}");
@@ -70,7 +53,7 @@ fn plain_disparities_take_their_geometry_from_the_calibrations_or_the_settings()
     let disparity = Some(DisparitySettings::default());
     let input = InputSettings { disparity, ..InputSettings::default() };
     let read = |input: &InputSettings| {
-        let found = depths_with(log(), input)?.1;
+        let found = first_depth(log(), input)?.1;
         Ok::<_, String>(found.frame.depth().unwrap().get(7, 0).unwrap())
     };
     // The settings find the topic by its name, which is otherwise one of grey images.
@@ -84,7 +67,7 @@ fn plain_disparities_take_their_geometry_from_the_calibrations_or_the_settings()
     let mut alone = LogWriter::plain();
     alone.info("/stereo/camera_info", "colour", &camera(16, 12, 14.0));
     alone.message("/stereo/disparity", at(0.1), &disparities("mono8", &data));
-    let error = depths_with(alone, &input).err().unwrap();
+    let error = first_depth(alone, &input).err().unwrap();
     assert!(error.contains("disparity.baseline_m"), "{error}");
 }
 
@@ -93,14 +76,12 @@ fn log_with(topic: &str, encoding: &str) -> LogWriter {
     let mut log = started();
     log.depth(at(0.1), "colour", 2.0);
     let data = [0; 16 * 12 * 6];
-    let image = Image { encoding: encoding.into(), step: 96, ..disparities("", &data) };
-    log.message(topic, at(0.1), &image);
+    log.message(topic, at(0.1), &disparities(encoding, &data));
     log
 }
 
 fn refusal(log: LogWriter, input: &InputSettings, inputs: Inputs) -> LogError {
-    let saved = log.save();
-    FrameSource::open(&saved.path, input, &Limits::default(), inputs).err().unwrap()
+    log.save().open(input, inputs).err().unwrap()
 }
 
 #[test]

@@ -109,7 +109,7 @@ impl Drawn {
         let info = CameraInfo::of_lens(&header, &LENS, (WIDTH, HEIGHT), 0.0);
         log.send("/camera/color/camera_info", stamp, &info);
         let colour = colour(index);
-        log.send("/camera/color/image_raw", stamp, &image(&header, "rgb8", 3, &colour));
+        log.send("/camera/color/image_raw", stamp, &image(&header, "rgb8", &colour));
         if self.in_space {
             log.send("/detections", stamp, &space(&header, index));
         }
@@ -119,7 +119,7 @@ impl Drawn {
         if self.depth {
             log.send("/camera/depth/camera_info", stamp, &info);
             let depth = depth(index);
-            log.send("/camera/depth/image_raw", stamp, &image(&header, "16UC1", 2, &depth));
+            log.send("/camera/depth/image_raw", stamp, &image(&header, "16UC1", &depth));
         }
     }
 }
@@ -177,16 +177,8 @@ fn depth(index: u64) -> Vec<u8> {
         .collect()
 }
 
-fn image<'a>(header: &Header, encoding: &'a str, bytes: u32, data: &'a [u8]) -> Image<'a> {
-    Image {
-        header: header.clone(),
-        height: HEIGHT as u32,
-        width: WIDTH as u32,
-        encoding: encoding.into(),
-        is_bigendian: 0,
-        step: bytes * WIDTH as u32,
-        data,
-    }
+fn image<'a>(header: &Header, encoding: &str, data: &'a [u8]) -> Image<'a> {
+    Image::packed(header.clone(), encoding, WIDTH as u32, HEIGHT as u32, data)
 }
 
 fn mount() -> TFMessage {
