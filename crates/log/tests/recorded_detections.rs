@@ -174,19 +174,17 @@ const YOLO: &str = "std_msgs/Header header\nyolo_msgs/Detection[] detections\n==
 
 /// Returns a message as ROS 1 Noetic writes it, with a number as the class.
 fn noetic(class: i64) -> Vec<u8> {
-    let header = |out: &mut Vec<u8>| {
-        let time = stamp(0);
-        let seconds = (time.nanos() / 1_000_000_000) as u32;
-        let nanos = (time.nanos() % 1_000_000_000) as u32;
-        for word in [7_u32, seconds, nanos, 6] {
-            out.extend(word.to_le_bytes());
-        }
-        out.extend(b"colour");
-    };
-    let mut out = Vec::new();
-    header(&mut out);
+    let mut header = Vec::new();
+    let time = stamp(0);
+    let seconds = (time.nanos() / 1_000_000_000) as u32;
+    let nanos = (time.nanos() % 1_000_000_000) as u32;
+    for word in [7_u32, seconds, nanos, 6] {
+        header.extend(word.to_le_bytes());
+    }
+    header.extend(b"colour");
+    let mut out = header.clone();
     out.extend(1_u32.to_le_bytes());
-    header(&mut out);
+    out.extend(&header);
     out.extend(1_u32.to_le_bytes());
     out.extend(class.to_le_bytes());
     out.extend(0.9_f64.to_le_bytes());
@@ -194,7 +192,7 @@ fn noetic(class: i64) -> Vec<u8> {
     for value in [8.0_f64, 6.0, 0.0, 4.0, 6.0] {
         out.extend(value.to_le_bytes());
     }
-    header(&mut out);
+    out.extend(&header);
     // Height, width, no encoding, byte, step, no data.
     out.extend([0_u8; 4 + 4 + 4 + 1 + 4 + 4]);
     out

@@ -104,8 +104,8 @@ fn run_of(stamps: &[f64]) -> (FrameSource, SavedLog) {
 }
 
 fn stamps(frames: &[LogFrame]) -> Vec<f64> {
-    let seconds = |found: &LogFrame| found.frame.stamp.seconds_since(at(0.0));
-    frames.iter().map(|found| (seconds(found) * 1000.0).round() / 1000.0).collect()
+    let seconds = frames.iter().map(|found| found.frame.stamp.seconds_since(at(0.0)));
+    seconds.map(|seconds| (seconds * 1000.0).round() / 1000.0).collect()
 }
 
 #[test]
@@ -240,13 +240,13 @@ fn a_laser_without_a_place_or_silent_for_long_is_told() {
 #[test]
 fn gaps_and_jumps_of_odometry_are_told() {
     let mut log = started();
-    let seconds = |i: i32| f64::from(i) * 0.1;
     for i in 0..60 {
+        let seconds = f64::from(i) * 0.1;
         if !(10..30).contains(&i) {
             // The odometry jumps by 5 m at 4.5 s.
-            log.odometry(at(seconds(i)), if i < 45 { 0.0 } else { 5.0 }, 0.0);
+            log.odometry(at(seconds), if i < 45 { 0.0 } else { 5.0 }, 0.0);
         }
-        log.colour(at(seconds(i) + 0.01));
+        log.colour(at(seconds + 0.01));
     }
     let (mut source, _saved) = open(log, Inputs::ANY);
     let found = frames(&mut source);
@@ -349,13 +349,16 @@ fn a_bad_calibration_names_topic_and_field() {
 #[test]
 fn c1_a_calibration_that_changes_on_the_way_marks_the_frames_after_it() {
     let mut log = started();
-    let lens = |focal| info_of("colour", &camera(16, 12, focal));
     for i in 0..10 {
         let stamp = at(f64::from(i) * 0.1);
         // The same numbers again are no change.
         let focal = if i < 6 { 14.0 } else { 20.0 };
         let header = Header::new(stamp, "colour");
-        log.message(INFO, stamp, &CameraInfo { header, ..lens(focal) });
+        log.message(
+            INFO,
+            stamp,
+            &CameraInfo { header, ..info_of("colour", &camera(16, 12, focal)) },
+        );
         log.colour(stamp);
     }
     let (mut source, _saved) = open(log, Inputs::ANY);

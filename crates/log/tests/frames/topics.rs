@@ -49,20 +49,18 @@ fn a_disparity_image_is_depth_with_its_own_geometry() {
 #[test]
 fn plain_disparities_take_their_geometry_from_the_calibrations_or_the_settings() {
     let data: Vec<u8> = (0..192).collect();
-    let log = || stereo_log("/stereo/disparity", &disparities("mono8", &data));
     let disparity = Some(DisparitySettings::default());
     let input = InputSettings { disparity, ..InputSettings::default() };
-    let read = |input: &InputSettings| {
-        let found = first_depth(log(), input)?.1;
-        Ok::<_, String>(found.frame.depth().unwrap().get(7, 0).unwrap())
-    };
-    // The settings find the topic by its name, which is otherwise one of grey images.
-    assert!((read(&input).unwrap() - 1.4 / 7.0).abs() < 1e-6);
     let halves = DisparitySettings { unit_px: Some(0.5), baseline_m: Some(0.2) };
     let told = InputSettings { disparity: Some(halves), ..input.clone() };
-    assert!((read(&told).unwrap() - 2.8 / 3.5).abs() < 1e-6);
     let named = InputSettings { depth_topic: Some("/stereo/disparity".into()), ..input.clone() };
-    assert!((read(&named).unwrap() - 1.4 / 7.0).abs() < 1e-6);
+    // The settings find the topic by its name, which is otherwise one of grey images.
+    for (input, expected) in [(&input, 1.4 / 7.0), (&told, 2.8 / 3.5), (&named, 1.4 / 7.0)] {
+        let log = stereo_log("/stereo/disparity", &disparities("mono8", &data));
+        let (_, found) = first_depth(log, input).unwrap();
+        let depth = found.frame.depth().unwrap().get(7, 0).unwrap();
+        assert!((depth - expected).abs() < 1e-6, "{depth} m");
+    }
     // Without a right camera nothing tells the baseline.
     let mut alone = LogWriter::plain();
     alone.info("/stereo/camera_info", "colour", &camera(16, 12, 14.0));
@@ -128,16 +126,13 @@ fn images_in_an_encoding_that_is_not_read_are_named_with_the_remedy() {
 
 #[test]
 fn a_named_topic_of_a_wrong_kind_is_an_error_of_the_settings() {
-    let named = |depth: &str| InputSettings {
-        depth_topic: Some(depth.to_owned()),
-        ..InputSettings::default()
-    };
+    let named = InputSettings { depth_topic: Some("/cam".into()), ..InputSettings::default() };
     for (encoding, remedy) in [
         ("rgb8", "/camera/depth/image_raw (sensor_msgs/msg/Image, 32FC1) would fit"),
         ("mono8", "add [input.disparity]"),
         ("rgb16", "let the driver publish 8 bits"),
     ] {
-        let error = refusal(log_with("/cam", encoding), &named("/cam"), DEPTH);
+        let error = refusal(log_with("/cam", encoding), &named, DEPTH);
         assert!(matches!(&error, LogError::WrongTopic { key, .. } if key == "depth_topic"));
         let told = error.to_string();
         let kind = format!("names /cam, which is sensor_msgs/msg/Image, {encoding}; ");
@@ -156,17 +151,23 @@ fn a_named_topic_of_a_wrong_kind_is_an_error_of_the_settings() {
     assert!(told.contains("`laser_topic`") && told.contains("leave the key out"), "{told}");
 }
 
+fn ros1_text(text: &str) -> Vec<u8> {
+    [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
+}
+
+fn ros1_words(words: &[u32]) -> Vec<u8> {
+    words.iter().flat_map(|word| word.to_le_bytes()).collect()
+}
+
 #[test]
 fn messages_of_ros_1_in_an_mcap_file_are_read() {
-    let text = |text: &str| [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
-    let words = |words: &[u32]| words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>();
     let image = [
-        words(&[7, 1_700_000_000, 100_000_000]),
-        text("colour"),
-        words(&[2, 3]),
-        text("mono8"),
+        ros1_words(&[7, 1_700_000_000, 100_000_000]),
+        ros1_text("colour"),
+        ros1_words(&[2, 3]),
+        ros1_text("mono8"),
         vec![0],
-        words(&[3, 6]),
+        ros1_words(&[3, 6]),
         vec![1, 2, 3, 4, 5, 6],
     ]
     .concat();
