@@ -68,6 +68,14 @@ fn info(log: &mut LogWriter, topic: &str, frame: &str, size: (u32, u32)) {
     log.info(topic, frame, &camera);
 }
 
+/// Starts a log with a fixed camera and its calibration.
+fn log_of_camera(info_topic: &str, size: (u32, u32)) -> LogWriter {
+    let mut log = LogWriter::plain();
+    log.fixed("base_link", "optical", &level_pose());
+    info(&mut log, info_topic, "optical", size);
+    log
+}
+
 fn open_with(
     log: LogWriter,
     input: &InputSettings,
@@ -238,9 +246,7 @@ fn calibrations_of_other_sizes_are_scaled_or_told() {
     for (calibrated, is_scaled) in
         [((16, 12), true), ((32, 24), true), ((64, 48), true), ((8, 6), true), ((20, 15), false)]
     {
-        let mut log = LogWriter::plain();
-        log.fixed("base_link", "optical", &level_pose());
-        info(&mut log, "/cam/camera_info", "optical", calibrated);
+        let mut log = log_of_camera("/cam/camera_info", calibrated);
         colour("/cam/image_raw", "optical").write(&mut log, recorded);
         let found = open_with(log, &InputSettings::default(), Inputs::ANY);
         assert_eq!(found.is_ok(), is_scaled, "{calibrated:?}");
@@ -293,9 +299,7 @@ fn depth_at_other_times_is_told_with_the_offset() {
         (-1.6e9, "`--stamps recording`"),
         (40.0, "`--stamps recording`"),
     ] {
-        let mut log = LogWriter::plain();
-        log.fixed("base_link", "optical", &level_pose());
-        info(&mut log, "/cam/camera_info", "optical", (16, 12));
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
         Stream { count: 1, ..colour("/cam/color", "optical") }.write(&mut log, recorded);
         Stream { count: 1, ..depth("/cam/depth", "optical") }
             .write(&mut log, |index| recorded(index).plus_seconds(offset_s));
@@ -313,9 +317,7 @@ fn depth_at_other_times_is_told_with_the_offset() {
 fn stamps_that_are_never_set_are_replaced_by_the_times_of_recording() {
     for stamp in [0.0, 1.0, 1e-9, 1.7e9, 2e9] {
         let stamp = Stamp::default().plus_seconds(stamp);
-        let mut log = LogWriter::plain();
-        log.fixed("base_link", "optical", &level_pose());
-        info(&mut log, "/cam/camera_info", "optical", (16, 12));
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
         // Depth first, because an image does not wait for it until the end of the log.
         depth("/cam/depth", "optical").write(&mut log, |_| stamp);
         colour("/cam/color", "optical").write(&mut log, |_| stamp);
@@ -335,9 +337,7 @@ fn stamps_that_are_never_set_are_replaced_by_the_times_of_recording() {
 #[test]
 fn odometry_of_another_clock_gives_no_places() {
     for offset_s in [-1.7e9, 3600.0, -30.0, 5.0, 1e5] {
-        let mut log = LogWriter::plain();
-        log.fixed("base_link", "optical", &level_pose());
-        info(&mut log, "/cam/camera_info", "optical", (16, 12));
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
         colour("/cam/color", "optical").write(&mut log, recorded);
         for index in 0..4 {
             let pose = Pose::from(&Isometry3::translation(f64::from(index), 0.0, 0.0));
@@ -359,9 +359,7 @@ fn odometry_of_another_clock_gives_no_places() {
 
 /// Writes a log with colour, and compressed images on another topic.
 fn log_with_compressed(topic: &str, format: &str, data: &[u8]) -> LogWriter {
-    let mut log = LogWriter::plain();
-    log.fixed("base_link", "optical", &level_pose());
-    info(&mut log, "/cam/color/camera_info", "optical", (16, 12));
+    let mut log = log_of_camera("/cam/color/camera_info", (16, 12));
     colour("/cam/color/image_raw", "optical").write(&mut log, recorded);
     for index in 0..4 {
         let header = Header::new(recorded(index), "optical");
@@ -444,9 +442,7 @@ fn grey_images_of_16_bits_are_depth_by_their_name() {
         ("/cam/depth/ir/image", false),
         ("/cam/infra1/image", false),
     ] {
-        let mut log = LogWriter::plain();
-        log.fixed("base_link", "optical", &level_pose());
-        info(&mut log, "/cam/color/camera_info", "optical", (16, 12));
+        let mut log = log_of_camera("/cam/color/camera_info", (16, 12));
         colour("/cam/color/image_raw", "optical").write(&mut log, recorded);
         Stream { encoding: "mono16", ..depth(topic, "optical") }.write(&mut log, recorded);
         let (source, _saved) = open(log, Inputs::ANY);

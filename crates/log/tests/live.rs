@@ -5,7 +5,7 @@ mod common;
 
 use std::io::Cursor;
 
-use common::{LogWriter, SavedLog, at, started};
+use common::{SavedLog, at, started};
 use tagalong_core::{ObstacleData, ObstacleReadings, Stamp};
 use tagalong_log::msgs::{BoolMsg, BumperEvent, Header, Range, encode};
 use tagalong_log::{
@@ -15,8 +15,9 @@ use tagalong_log::{LogWalker, ObstacleKind, ObstacleTopic};
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
 
-/// Writes colour and depth ten times a second, odometry five times as often.
-fn drive(log: &mut LogWriter, frames: i32) {
+/// Returns a log with colour and depth ten times a second, and odometry five times as often.
+fn driven(frames: i32) -> Vec<u8> {
+    let mut log = started();
     for i in 0..5 * frames {
         let t = f64::from(i) * 0.02;
         log.odometry(at(t), 0.4 * t, 0.2 * t);
@@ -25,6 +26,7 @@ fn drive(log: &mut LogWriter, frames: i32) {
             log.depth(at(t - 0.005), "colour", 2.0 + i as f32);
         }
     }
+    log.finish()
 }
 
 /// Calls `hear` with topic, type and bytes of all messages of a log.
@@ -61,9 +63,7 @@ fn count(source: &LiveSource, name: &str) -> u64 {
 
 #[test]
 fn whoever_keeps_up_gets_the_frames_of_the_log() {
-    let mut log = started();
-    drive(&mut log, 12);
-    let log = log.finish();
+    let log = driven(12);
     let saved = SavedLog::new(&log);
     let mut source = saved.open(&InputSettings::default(), DEPTH).unwrap();
     let (found, live) = live(&log, DEPTH);
@@ -85,9 +85,7 @@ fn whoever_keeps_up_gets_the_frames_of_the_log() {
 
 #[test]
 fn whoever_is_slow_gets_the_newest_frame() {
-    let mut log = started();
-    drive(&mut log, 12);
-    let log = log.finish();
+    let log = driven(12);
     let mut source = listen(&log, &InputSettings::default(), DEPTH).start().unwrap();
     replay(&log, |topic, _, data| source.take(topic, data));
     let newest = source.newest_frame().unwrap();
@@ -134,9 +132,7 @@ fn missing(listening: &Listening) -> String {
 
 #[test]
 fn what_is_missing_is_named_until_it_comes() {
-    let mut log = started();
-    drive(&mut log, 3);
-    let log = log.finish();
+    let log = driven(3);
     let input = InputSettings::default();
     let mut listening = Listening::new("the robot", &input, &Limits::default(), DEPTH).unwrap();
     let text = missing(&listening);
@@ -174,9 +170,7 @@ fn frame_at(source: &mut LiveSource, stamp: Stamp, arrival_ns: u64) -> LogFrame 
 
 #[test]
 fn sources_of_obstacles_are_waited_for_and_read() {
-    let mut log = started();
-    drive(&mut log, 6);
-    let log = log.finish();
+    let log = driven(6);
     let sonar = ObstacleTopic {
         mount: Some([0.2, 0.0, 0.1, 0.0, 0.0, 0.0]),
         ..ObstacleTopic::new("sonar", ObstacleKind::Range, "/sonar")
@@ -232,9 +226,7 @@ fn sources_of_obstacles_are_waited_for_and_read() {
 #[test]
 fn an_input_that_no_topic_can_carry_is_refused_before_the_first_frame() {
     const RADAR: Input = Input::Named("radar");
-    let mut log = started();
-    drive(&mut log, 3);
-    let log = log.finish();
+    let log = driven(3);
     let input = InputSettings::default();
     let refusal = missing(&listen(&log, &input, DEPTH.require(RADAR)));
     assert!(refusal.contains("has no input `radar`, because no topic is read for it"), "{refusal}");
