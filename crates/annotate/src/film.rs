@@ -225,12 +225,13 @@ fn rounded(point: &Point3<f64>) -> [f64; 3] {
 
 /// Compresses depth in whole millimetres; 0 is no reading.
 fn packed(depth: &DepthImage) -> io::Result<Vec<u8>> {
-    let unit = |metres: &f32| {
+    let mut bytes = Vec::with_capacity(2 * depth.pixels().len());
+    for metres in depth.pixels() {
         let units = (metres / DEPTH_UNIT_M).round();
         // NaN fails the comparison, too; depth beyond 65 m is as good as none.
-        if (1.0..=f32::from(u16::MAX)).contains(&units) { units as u16 } else { 0 }
-    };
-    let bytes: Vec<u8> = depth.pixels().iter().flat_map(|m| unit(m).to_le_bytes()).collect();
+        let is_known = (1.0..=f32::from(u16::MAX)).contains(&units);
+        bytes.extend(if is_known { units as u16 } else { 0 }.to_le_bytes());
+    }
     zstd::stream::encode_all(&bytes[..], 1)
 }
 

@@ -111,8 +111,7 @@ pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
         server.address(),
         output.display()
     ))?;
-    let is_finished = || app.finished.load(Ordering::Relaxed);
-    server.serve(&app, || signals.received().is_some() || is_finished());
+    server.serve(&app, || signals.received().is_some() || app.finished.load(Ordering::Relaxed));
     if !app.finished.load(Ordering::Relaxed) {
         if !output.exists() {
             say(&format!(
@@ -304,13 +303,13 @@ mod tests {
     #[test]
     fn proposals_bridge_short_pauses_and_not_long_ones() {
         let film = film::tests::film(40);
-        let square = |x: u32| Region { x: f64::from(x), y: 9.0, width: 50.0, height: 50.0 };
-        let boxes = |frames: &[u32]| frames.iter().map(|f| (*f, square(*f))).collect::<Vec<_>>();
-        let tracks = Boxes::from([
-            (7, boxes(&[3, 4, 5, 10, 30, 31])),
-            (9, boxes(&[1, 2, 3, 4])),
-            (12, boxes(&[8, 9])),
-        ]);
+        let mut tracks = Boxes::new();
+        for (id, frames) in [(7, &[3, 4, 5, 10, 30, 31][..]), (9, &[1, 2, 3, 4]), (12, &[8, 9])] {
+            for frame in frames {
+                let region = Region { x: f64::from(*frame), y: 9.0, width: 50.0, height: 50.0 };
+                tracks.entry(id).or_default().push((*frame, region));
+            }
+        }
         let people = proposals(&film, tracks);
         assert_eq!(people.keys().copied().collect::<Vec<_>>(), [1, 2], "too short is left out");
         assert_eq!(people[&1].frames().collect::<Vec<_>>(), [1, 2, 3, 4]);

@@ -71,8 +71,10 @@ impl Person {
     /// Returns the person with these keys, who is in no frame between two keys that `shown` lacks.
     pub fn of(keys: BTreeMap<u32, Key>, shown: &BTreeSet<u32>) -> Self {
         let mut person = Self { keys, holes: BTreeSet::new() };
-        let is_gone = |frame: &u32| !shown.contains(frame) && !person.keys.contains_key(frame);
-        person.holes = person.span().filter(is_gone).collect();
+        let span = person.span();
+        person.holes = span
+            .filter(|frame| !shown.contains(frame) && !person.keys.contains_key(frame))
+            .collect();
         person
     }
 
@@ -359,11 +361,10 @@ mod tests {
 
     #[test]
     fn few_keys_bring_all_boxes_back() {
-        let straight = |frame: u32| square(f64::from(frame));
-        let bent = |frame: u32| square(f64::from(frame.abs_diff(30)) * 5.0);
-        let boxes: Vec<_> = (1..60).map(|frame| (frame, straight(frame))).collect();
+        let boxes: Vec<_> = (1..60).map(|frame| (frame, square(f64::from(frame)))).collect();
         assert_eq!(sparse(&boxes).into_keys().collect::<Vec<_>>(), [1, 59]);
-        let boxes: Vec<_> = (1..60).map(|frame| (frame, bent(frame))).collect();
+        let bent = (1_u32..60).map(|frame| (frame, square(f64::from(frame.abs_diff(30)) * 5.0)));
+        let boxes: Vec<_> = bent.collect();
         let keys = sparse(&boxes);
         assert_eq!(keys.keys().copied().collect::<Vec<_>>(), [1, 30, 59]);
         let person = Person::of(keys, &(1..60).collect());

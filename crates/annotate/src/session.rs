@@ -153,15 +153,16 @@ impl Session {
             | Change::Fill { frame, .. }
             | Change::Note { frame, .. } => *frame,
         };
-        let none = || format!("the log has no frame {frame}");
-        self.film.shot(frame).ok_or_else(none)?;
+        if self.film.shot(frame).is_none() {
+            return Err(format!("the log has no frame {frame}"));
+        }
         let Change::Head { id, at: [x, y], .. } = change else { return Ok(change.clone()) };
         if !(x.is_finite() && y.is_finite()) {
             return Err("a head is at a pixel of the image".into());
         }
         let like = id.and_then(|id| self.latest(id, frame));
         let region = self.film.upper_body(frame, Point2::new(*x, *y), like.as_ref());
-        let region = region.ok_or_else(none)?;
+        let region = region.ok_or_else(|| format!("the log has no frame {frame}"))?;
         let region = [region.x, region.y, region.width, region.height];
         Ok(Change::Box { frame, id: *id, region })
     }
@@ -254,12 +255,14 @@ impl Session {
     /// Fills in the places of a person that depth does not show, hidden behind another one say: the
     /// depth changes evenly between the places that were measured, and as the size of the box does.
     fn fill_places(&self, person: &Person, rows: &mut [Row]) {
-        let size = |row: &Row| person.at(row.frame).map_or(0.0, |key| key.region.width);
         let known: Vec<(u32, f64)> = rows
             .iter()
             // Places that were filled in before are none to begin with.
             .filter(|row| row.interpolated != 1 || !row.key)
-            .filter_map(|row| Some((row.frame, row.head_in_camera_m?[2] * size(row))))
+            .filter_map(|row| {
+                let size = person.at(row.frame).map_or(0.0, |key| key.region.width);
+                Some((row.frame, row.head_in_camera_m?[2] * size))
+            })
             .collect();
         for row in rows.iter_mut().filter(|row| row.head_in_camera_m.is_none()) {
             let (Some(key), Some(product)) = (person.at(row.frame), at_frame(&known, row.frame))
@@ -375,10 +378,11 @@ pub fn read_people(path: &Path, film: &Film) -> Result<BTreeMap<i64, Person>, St
 
 /// Returns the key of a row; none for a place behind the camera.
 fn key_of(row: Row, film: &Film) -> Option<Key> {
-    let of_place = || film.region_of(row.frame, row.head_in_camera_m?);
     let camera = &film.shot(row.frame)?.camera;
-    let whole = |region: &Region| squared(region, camera.width as f64, camera.height as f64);
-    let region = row.upper_body.as_ref().map(whole).or_else(of_place)?;
+    let region = match &row.upper_body {
+        Some(region) => squared(region, camera.width as f64, camera.height as f64),
+        None => film.region_of(row.frame, row.head_in_camera_m?)?,
+    };
     Some(Key {
         region,
         visible: row.visible,

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 use tagalong_app::outcome::Failure;
 use tagalong_app::scoring::read_text;
 use tagalong_config::nearest;
 use tagalong_eval::Scores;
-use tagalong_report::{Benchmark, Outcome, TaskResult};
+use tagalong_report::{Benchmark, Outcome, TaskResult, figures};
 
 use super::args::GateArgs;
 
@@ -58,11 +58,11 @@ impl Rule {
 
     /// Returns the deterioration of a task, if there is one.
     fn judge(&self, old: &TaskResult, new: &TaskResult) -> Option<String> {
-        let value = |task: &TaskResult| {
+        let [old, new] = [old, new].map(|task| {
             let scores = if self.on_floor { task.metres } else { task.image };
             figures(&scores?).get(&self.figure).and_then(Value::as_f64)
-        };
-        match (value(old), value(new)) {
+        });
+        match (old, new) {
             (None, _) => None,
             // A figure that disappeared is a deterioration; one that never was cannot be judged.
             (Some(old), None) => Some(format!("{}: was {old:.4}, is not there", self.text)),
@@ -72,13 +72,6 @@ impl Rule {
                 worse.then(|| format!("{}: {old:.4} -> {new:.4} ({change:+.4})", self.text))
             }
         }
-    }
-}
-
-fn figures(scores: &Scores) -> Map<String, Value> {
-    match serde_json::to_value(scores) {
-        Ok(Value::Object(map)) => map,
-        _ => Map::new(),
     }
 }
 
@@ -177,10 +170,14 @@ mod tests {
 
     #[test]
     fn wrong_rules_are_told_what_is_right() {
-        let message = |rule: &str| Rule::parse(rule).err().unwrap().message;
-        assert!(message("HOTTA<0").contains("did you mean `HOTA`?"));
-        assert!(message("HOTA=0").contains("FIGURE<CHANGE"));
-        assert!(message("HOTA<little").contains("`little` is no number"));
+        for (rule, expected) in [
+            ("HOTTA<0", "did you mean `HOTA`?"),
+            ("HOTA=0", "FIGURE<CHANGE"),
+            ("HOTA<little", "`little` is no number"),
+        ] {
+            let message = Rule::parse(rule).err().unwrap().message;
+            assert!(message.contains(expected), "{message}");
+        }
         assert!(Rule::parse("metres.MOTA<-0.1").is_ok_and(|rule| rule.on_floor));
     }
 }

@@ -25,7 +25,6 @@ pub use args::BenchArgs;
 use args::{PlanArgs, Step};
 use folder::FolderArgs;
 use gate::Gate;
-use plan::Task;
 use store::Store;
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
@@ -88,8 +87,8 @@ fn everything(args: &BenchArgs, registry: &Registry) -> Outcome {
 /// Writes the plan, and returns it as text.
 fn make_plan(args: &PlanArgs, folder: &FolderArgs, registry: &Registry) -> Result<String, Failure> {
     let tasks = plan::plan(args, registry)?;
-    let line = |task: &Task| to_json_line("a task of the plan", task);
-    let text: String = tasks.iter().map(line).collect::<Result<_, _>>()?;
+    let lines = tasks.iter().map(|task| to_json_line("a task of the plan", task));
+    let text: String = lines.collect::<Result<_, _>>()?;
     store(folder).put("plan.jsonl", text.as_bytes())?;
     Ok(text)
 }

@@ -83,9 +83,12 @@ pub fn missed(
             .iter()
             .map(|m| prepared.truth_ids[compared.truths[m.row as usize] as usize])
             .collect();
-        let counts = |id: &i64| frame.truths.iter().any(|t| t.id == *id && t.role == Role::Counts);
-        let people = compared.truths.iter().map(|truth| prepared.truth_ids[*truth as usize]);
-        for person in people.filter(|id| !found.contains(id)).filter(counts) {
+        for truth in &compared.truths {
+            let person = prepared.truth_ids[*truth as usize];
+            let counts = frame.truths.iter().any(|t| t.id == person && t.role == Role::Counts);
+            if found.contains(&person) || !counts {
+                continue;
+            }
             let truth = frame.truths.iter().find(|truth| truth.id == person);
             let place = truth.and_then(|t| t.region).and_then(|at| places.at(number, &at));
             all.push(MissedPerson {
@@ -151,10 +154,12 @@ mod tests {
 
     #[test]
     fn the_longest_misses_get_images() {
-        let miss = |person, frame| MissedPerson { frame, person, ..MissedPerson::default() };
-        let runs = [(1, 5..8), (1, 20..21), (2, 30..40), (2, 50..52), (3, 7..9)];
-        let missed: Vec<_> =
-            runs.into_iter().flat_map(|(id, frames)| frames.map(move |f| miss(id, f))).collect();
+        let mut missed = Vec::new();
+        for (person, frames) in [(1, 5..8), (1, 20..21), (2, 30..40), (2, 50..52), (3, 7..9)] {
+            for frame in frames {
+                missed.push(MissedPerson { frame, person, ..MissedPerson::default() });
+            }
+        }
         assert_eq!(moments(&missed).into_iter().collect::<Vec<_>>(), [6, 8, 35]);
         assert!(moments(&[]).is_empty());
     }

@@ -39,11 +39,11 @@ pub fn gather(stored: &[Stored]) -> Vec<Moment> {
 /// Returns the moments of a log, the worst first.
 fn of_log(witnesses: &[Witness<'_>]) -> Vec<Moment> {
     let frames: BTreeSet<u64> = witnesses.iter().flat_map(|w| w.images.keys().copied()).collect();
-    let misses = |frame: u64| {
-        witnesses.iter().filter(|w| w.result.missed.iter().any(|m| m.frame == frame)).count()
-    };
     let mut ranked: Vec<u64> = frames.into_iter().collect();
-    ranked.sort_by_key(|frame| (std::cmp::Reverse(misses(*frame)), *frame));
+    ranked.sort_by_cached_key(|frame| {
+        let misses = witnesses.iter().filter(|w| w.result.missed.iter().any(|m| m.frame == *frame));
+        (std::cmp::Reverse(misses.count()), *frame)
+    });
     let mut kept: Vec<u64> = Vec::new();
     for frame in ranked {
         if kept.iter().all(|other| other.abs_diff(frame) > SAME_FRAMES) {
@@ -94,20 +94,23 @@ mod tests {
 
     fn stored(pipeline: &str, log: &str, missed: &[u64], images: &[u64]) -> Stored {
         let region = Some(Region { x: 1.0, y: 2.0, width: 30.0, height: 30.0 });
-        let frame = |number: u64| Frame {
-            stamp_ns: number as i64 * 100_000_000,
+        let frames = (1..=40).map(|number| Frame {
+            stamp_ns: number * 100_000_000,
             truths: vec![Truth { id: 1, region, ..Truth::default() }],
             reports: vec![Report { id: 7, region, ..Report::default() }],
             ..Frame::default()
-        };
-        let frames = (1..=40).map(frame).collect();
-        let miss =
-            |frame: &u64| MissedPerson { frame: *frame, person: 1, ..MissedPerson::default() };
+        });
+        let frames = frames.collect();
+        let missed = missed.iter().map(|frame| MissedPerson {
+            frame: *frame,
+            person: 1,
+            ..MissedPerson::default()
+        });
         Stored {
             result: TaskResult {
                 pipeline: pipeline.into(),
                 log: log.into(),
-                missed: missed.iter().map(miss).collect(),
+                missed: missed.collect(),
                 ..TaskResult::default()
             },
             recording: Some(Recording {

@@ -1,6 +1,7 @@
 //! Small pictures of tracking errors.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -98,6 +99,13 @@ fn part(event: &EventRow, frame: &Frame) -> Option<Rect> {
     Some(Rect::new(region.x, region.y, region.width, region.height).inflated(1.0))
 }
 
+/// Returns the pixels of one of `count` cells between `from` and `from + length`, one at least.
+fn cell(index: usize, from: f64, length: f64, count: usize) -> Range<usize> {
+    let [start, end] =
+        [index, index + 1].map(|edge| (from + length * edge as f64 / count as f64) as usize);
+    start..end.max(start + 1)
+}
+
 /// Returns a part of the colour (or grey) image as PNG in base64.
 fn picture(images: &Images, part: &Rect) -> Option<String> {
     let (width, height) = match (&images.colour, &images.grey) {
@@ -116,10 +124,6 @@ fn picture(images: &Images, part: &Rect) -> Option<String> {
     let mut pixels = Vec::with_capacity(columns * rows * 3);
     for row in 0..rows {
         for column in 0..columns {
-            let cell = |index: usize, from: f64, length: f64, count: usize| {
-                let edge = |index: usize| (from + length * index as f64 / count as f64) as usize;
-                edge(index)..edge(index + 1).max(edge(index) + 1)
-            };
             let xs = cell(column, part.x, part.width, columns);
             let ys = cell(row, part.y, part.height, rows);
             pixels.extend(mean(images, xs, ys));
@@ -129,7 +133,7 @@ fn picture(images: &Images, part: &Rect) -> Option<String> {
 }
 
 /// Returns the mean colour of a block of pixels.
-fn mean(images: &Images, xs: std::ops::Range<usize>, ys: std::ops::Range<usize>) -> [u8; 3] {
+fn mean(images: &Images, xs: Range<usize>, ys: Range<usize>) -> [u8; 3] {
     let mut sum = [0u32; 3];
     let mut count = 0u32;
     for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {

@@ -78,11 +78,8 @@ pub fn write(store: &Store, benchmark: &Benchmark) -> Result<String, Failure> {
 
 /// Returns the main figures, for a terminal.
 pub fn text(store: &Store, benchmark: &Benchmark) -> String {
-    let name_width = |name: fn(&TaskResult) -> &str| {
-        benchmark.tasks.iter().map(|task| name(task).len()).max().unwrap_or(0).max(8)
-    };
-    let first = name_width(|t| &t.pipeline);
-    let second = name_width(|t| &t.log);
+    let first = benchmark.tasks.iter().map(|task| task.pipeline.len()).fold(8, usize::max);
+    let second = benchmark.tasks.iter().map(|task| task.log.len()).fold(8, usize::max);
     let mut out = format!(
         "{:<first$}  {:<second$}  {:>6}  {:>6}  {:>6}  {:>6}  {:>5}  {:>10}\n",
         "pipeline", "log", "seed", "HOTA", "MOTA", "IDF1", "IDSW", "error m"

@@ -85,12 +85,12 @@ impl Store {
         let text = read_text(&path, FileLimit::Table).map_err(|error| {
             Failure::usage(format!("cannot read {shown}: {error}; `tagalong bench plan` writes it"))
         })?;
-        let line = |(index, line): (usize, &str)| {
+        let tasks = text.lines().enumerate().map(|(index, line)| {
             serde_json::from_str(line).map_err(|error| {
                 Failure::failed(format!("{shown}, line {}: {error}; plan again", index + 1))
             })
-        };
-        text.lines().enumerate().map(line).collect()
+        });
+        tasks.collect()
     }
 
     /// Returns the result of a task, if it exists, is whole, and says itself that it is of this task:
@@ -146,9 +146,9 @@ fn timing_name(hash: &str) -> String {
 /// # Errors
 /// A disk that fails.
 pub fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let failed = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(format!("{name}.{}.partial", std::process::id()));
     write_file(&partial, bytes)?;
-    fs::rename(&partial, path).map_err(failed)
+    fs::rename(&partial, path)
+        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
 }

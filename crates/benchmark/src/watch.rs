@@ -8,8 +8,8 @@ use tagalong_app::scoring::{
 use tagalong_app::timings::{StageTimes, Timings, WHOLE_FRAME};
 use tagalong_core::{Funnel, Track};
 use tagalong_eval::{
-    Clear, Consistency, Event, Prepared, Repaired, Role, Scores, Sequence, SetDistance, Similarity,
-    Tally, events, repairs,
+    Clear, Consistency, Event, Prepared, Repaired, Role, Sequence, SetDistance, Similarity, Tally,
+    events, repairs,
 };
 use tagalong_log::LogFrame;
 use tagalong_pipeline::FrameReport;
@@ -144,21 +144,19 @@ fn score(
     let mut measured = |similarity: Similarity| -> Result<Option<(Tally, Vec<Event>)>, String> {
         let Some(sequence) = comparable(sequence, similarity) else { return Ok(None) };
         let comparison = comparison(truth, similarity);
-        let in_words = |error: tagalong_eval::EvalError| error.to_string();
-        let prepared = Prepared::new(&sequence, &comparison).map_err(in_words)?;
+        let prepared = Prepared::new(&sequence, &comparison).map_err(|error| error.to_string())?;
         let (_, matches) = Clear::measure(&prepared);
         if similarity == Similarity::Iou {
             missed_people = missed(&sequence, &prepared, &matches, dropped);
         }
         let tally = Tally::measure(&sequence, &comparison, &SetDistance::default());
-        Ok(Some((tally.map_err(in_words)?, events(&prepared, &matches))))
+        let tally = tally.map_err(|error| error.to_string())?;
+        Ok(Some((tally, events(&prepared, &matches))))
     };
     let image = measured(Similarity::Iou)?;
     let metres = measured(Similarity::Metres)?;
-    let scores = |side: &Option<(Tally, Vec<Event>)>| -> Option<Scores> {
-        side.as_ref().map(|(tally, _)| tally.scores())
-    };
-    (result.image, result.metres) = (scores(&image), scores(&metres));
+    result.image = image.as_ref().map(|(tally, _)| tally.scores());
+    result.metres = metres.as_ref().map(|(tally, _)| tally.scores());
     if let Some((tally, _)) = &image {
         result.lamr_curve = tally.detections.curve();
     }
@@ -194,11 +192,11 @@ fn consistency(nis: &[(f64, u32)]) -> Option<Consistency> {
 }
 
 fn paths(paths: BTreeMap<i64, Vec<(u32, [f64; 2])>>, shots: &Shots) -> Vec<Trajectory> {
-    let point = |(number, at): &(u32, [f64; 2])| point(*number, *at, shots);
-    paths
-        .into_iter()
-        .map(|(id, places)| Trajectory { id, points: places.iter().map(point).collect() })
-        .collect()
+    let trajectories = paths.into_iter().map(|(id, places)| {
+        let points = places.iter().map(|(number, at)| point(*number, *at, shots));
+        Trajectory { id, points: points.collect() }
+    });
+    trajectories.collect()
 }
 
 /// Returns the trajectories of the people that count, in the odometry frame.

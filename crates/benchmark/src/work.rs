@@ -1,6 +1,7 @@
 //! Runs tasks. Those that see the same frames share one pass over their log.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
@@ -179,29 +180,43 @@ struct Desk<'a> {
 }
 
 fn run_all(groups: VecDeque<Group>, jobs: usize, desk: &Desk<'_>) -> Result<(), Failure> {
-    let queue = Mutex::new(groups);
     let trouble = Mutex::new(None);
-    let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
-    let work = || {
-        while let Some(group) = next() {
-            if desk.signals.received().is_some() {
-                return;
-            }
-            if let Err(failure) = desk.run(group) {
-                // The disk fails for every job: let the others end, too.
-                queue.lock().unwrap_or_else(PoisonError::into_inner).clear();
-                *trouble.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
-            }
+    work_through(groups, jobs, |group| {
+        if desk.signals.received().is_some() {
+            return ControlFlow::Break(());
+        }
+        let Err(failure) = desk.run(group) else { return ControlFlow::Continue(()) };
+        // The disk fails for every job: let the others end, too.
+        *trouble.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
+        ControlFlow::Break(())
+    });
+    trouble.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+}
+
+/// Takes one item after the other out of a queue, with so many threads, until it is empty or one of
+/// them breaks off.
+pub fn work_through<T: Send>(
+    queue: VecDeque<T>,
+    jobs: usize,
+    step: impl Fn(T) -> ControlFlow<()> + Sync,
+) {
+    let queue = Mutex::new(queue);
+    let work = || loop {
+        let Some(item) = queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front() else {
+            return;
+        };
+        if step(item).is_break() {
+            queue.lock().unwrap_or_else(PoisonError::into_inner).clear();
         }
     };
     std::thread::scope(|scope| {
+        // One job fewer: the calling thread works, too.
         for _ in 1..jobs {
             // Without another thread, those that run do its work.
             let _ = std::thread::Builder::new().spawn_scoped(scope, work);
         }
         work();
     });
-    trouble.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }
 
 impl Desk<'_> {
@@ -238,10 +253,13 @@ impl Desk<'_> {
         let truth = TruthFile::read(&first.truth, options).map_err(|failure| failure.message)?;
         truth.notes.iter().for_each(|note| say(&format!("note: {note}")));
         let mut source = open(&group[0], group[0].config.inputs)?;
-        let build = |ready: &Ready| {
-            ready.config.file.pipeline(self.registry, Some(ready.task.seed)).map(|built| built.0)
-        };
-        let mut lanes: Vec<Lane> = group.iter().map(|ready| Lane::new(|| build(ready))).collect();
+        let lanes = group.iter().map(|ready| {
+            Lane::new(|| {
+                let built = ready.config.file.pipeline(self.registry, Some(ready.task.seed))?;
+                Ok(built.0)
+            })
+        });
+        let mut lanes: Vec<Lane> = lanes.collect();
         let mut shots = Shots::default();
         while let Some(item) = source.next_frame() {
             if self.signals.received().is_some() {

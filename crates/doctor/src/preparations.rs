@@ -45,13 +45,13 @@ pub fn tried(visit: &Visit, when: Trying, scope: Scope, registry: &Registry) -> 
         return Vec::new();
     }
     let frames = sample(visit, scope);
-    let bench = |config: &Table| {
+    let tried = configs.into_iter().filter_map(|config| {
         let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
         let context = Context { seed: 0, base_dir: visit.config.folder().to_owned(), wheels };
         let bench = Bench { registry, context, config: config.clone(), frames: &frames };
         bench.preparations(when == Trying::Always)
-    };
-    configs.into_iter().filter_map(bench).collect()
+    });
+    tried.collect()
 }
 
 /// Returns the settings of a section with a network.
@@ -132,8 +132,8 @@ impl Bench<'_> {
         let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
         let built = self.registry.build_detector(PLUGIN, Some(value), &self.context);
         let mut detector = built.ok()?;
-        let likeliest = |frame| likeliest(&mut *detector, frame);
-        let found: Vec<f64> = self.frames.iter().map(likeliest).collect::<Option<_>>()?;
+        let found = self.frames.iter().map(|frame| likeliest(&mut *detector, frame));
+        let found: Vec<f64> = found.collect::<Option<_>>()?;
         Some(Prepared {
             change: line(settings),
             found: found.iter().filter(|probability| **probability > 0.0).count(),
@@ -155,7 +155,6 @@ fn likeliest(detector: &mut dyn Detector, frame: &Frame) -> Option<f64> {
 
 /// Returns all combinations of colour order, scale and place.
 fn combinations() -> Vec<Settings> {
-    let list = |numbers: [f64; 3]| Value::Array(numbers.into_iter().map(Value::Float).collect());
     let mut all = Vec::new();
     for fit in ["centre", "top-left", "stretch"] {
         for colours in ["rgb", "bgr"] {
@@ -171,8 +170,8 @@ fn combinations() -> Vec<Settings> {
                 all.push(vec![
                     ("fit", Value::from(fit)),
                     ("colours", Value::from(colours)),
-                    ("mean", list(mean)),
-                    ("deviation", list(deviation)),
+                    ("mean", Value::from(mean.to_vec())),
+                    ("deviation", Value::from(deviation.to_vec())),
                 ]);
             }
         }

@@ -70,8 +70,8 @@ fn digits(literal: &str) -> i32 {
 
 /// Compares numbers to the printed digits, other values as they are.
 fn is_equal(value: &Value, now: &Value, digits: i32) -> bool {
-    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|v| v as f64));
-    match (number(value), number(now)) {
+    let [a, b] = [value, now].map(|it| it.as_float().or_else(|| it.as_integer().map(|v| v as f64)));
+    match (a, b) {
         (Some(a), Some(b)) => (a - b).abs() <= 0.5 * 10f64.powi(-digits) * (1.0 - 1e-6),
         _ => value == now,
     }

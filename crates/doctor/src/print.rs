@@ -71,9 +71,9 @@ const MIN_GAIN: f64 = 0.03;
 
 /// Writes which pipeline does better on this log than the one that is taken.
 fn better(out: &mut String, taken: &Row, rows: &[Row]) {
-    let worth = |row: &Row| row.coverage.worth();
-    let best = rows.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)));
-    if let Some(best) = best.filter(|best| worth(best) > worth(taken) + MIN_GAIN) {
+    let best = rows.iter().max_by(|a, b| a.coverage.worth().total_cmp(&b.coverage.worth()));
+    let needed = taken.coverage.worth() + MIN_GAIN;
+    if let Some(best) = best.filter(|best| best.coverage.worth() > needed) {
         let name = best.config;
         let _ = writeln!(out, "by this table {name} does better here: `tagalong run {name} LOG`");
     }
@@ -151,9 +151,8 @@ fn drop(out: &mut String, drop: &Drop) {
 }
 
 fn summary(out: &mut String, findings: &[Finding]) {
-    let count = |severity| findings.iter().filter(|f| f.severity == severity).count();
-    let bad = count(Severity::Bad);
-    let warn = count(Severity::Warn);
+    let [bad, warn] = [Severity::Bad, Severity::Warn]
+        .map(|severity| findings.iter().filter(|finding| finding.severity == severity).count());
     let _ = match (bad, warn) {
         (0, 0) => writeln!(out, "\nnothing to complain about"),
         _ => writeln!(out, "\n{bad} bad, {warn} to look at; begin with the first"),

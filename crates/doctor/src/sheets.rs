@@ -68,8 +68,10 @@ mod tests {
 
     #[test]
     fn pictures_stand_in_rows() {
-        let example = |frame| Example { frame, picture: RgbImage::filled(60, 60, [200, 0, 0]) };
-        let sheet = sheet("a test", &(1..6).map(example).collect::<Vec<_>>()).into_image();
+        let picture = RgbImage::filled(60, 60, [200, 0, 0]);
+        let examples: Vec<Example> =
+            (1..6).map(|frame| Example { frame, picture: picture.clone() }).collect();
+        let sheet = sheet("a test", &examples).into_image();
         assert_eq!((sheet.width(), sheet.height()), (4 * 64 + 4, 2 * 64 + 22 + 4));
         let red = sheet.pixels().iter().filter(|pixel| **pixel == [200, 0, 0]).count();
         // The number of the frame covers a strip of each.

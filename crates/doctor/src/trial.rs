@@ -65,11 +65,10 @@ impl Trial {
         }
         let frame = &item.frame;
         for (test, place) in dropped(&report) {
-            let picture = || picture(frame, &place);
             self.examples
                 .entry(test)
                 .or_default()
-                .offer(|| Some(Example { frame: frame.index, picture: picture()? }));
+                .offer(|| Some(Example { frame: frame.index, picture: picture(frame, &place)? }));
         }
         self.reports.push(report);
     }

@@ -71,8 +71,9 @@ pub fn events(prepared: &Prepared, matches: &[Vec<Match>]) -> Vec<Event> {
         let mut happened = Vec::new();
         watch.people(frame, matches, &mut happened);
         watch.tracks(frame, matches, &mut happened);
-        let at = |kind| Event { frame: index + 1, stamp_ns: frame.stamp_ns, kind };
-        all.extend(happened.into_iter().map(at));
+        for kind in happened {
+            all.push(Event { frame: index + 1, stamp_ns: frame.stamp_ns, kind });
+        }
     }
     all
 }

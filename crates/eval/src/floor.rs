@@ -95,12 +95,12 @@ impl FloorTally {
             clear.people.entry(person.id).or_default()[1] += 1;
         }
         // An estimate near an ignored person is neither right nor wrong.
-        let is_free = |index: usize| pairs.iter().all(|(_, estimate)| *estimate != index);
-        let is_false = |(index, estimate): &(usize, &FloorPoint)| {
-            is_free(*index)
-                && !scan.ignored.iter().any(|point| apart(point, estimate) <= self.cut_m)
-        };
-        let false_positives = scan.estimates.iter().enumerate().filter(is_false).count() as u64;
+        let mut false_positives = 0;
+        for (index, estimate) in scan.estimates.iter().enumerate() {
+            let is_free = pairs.iter().all(|(_, other)| *other != index);
+            let is_ignored = scan.ignored.iter().any(|it| apart(it, estimate) <= self.cut_m);
+            false_positives += u64::from(is_free && !is_ignored);
+        }
         let objects = scan.people.len() as u64;
         clear.scans += 1;
         clear.objects += objects;
@@ -118,26 +118,24 @@ impl FloorTally {
 
     /// Returns the pairs of earlier scans that are still near each other.
     fn kept(&self, scan: &FloorScan) -> Vec<(usize, usize)> {
-        let pair = |(index, person): (usize, &FloorPoint)| {
+        let people = scan.people.iter().enumerate();
+        let kept = people.filter_map(|(index, person)| {
             let last = self.estimate_of.get(&person.id)?;
             let estimate = scan.estimates.iter().position(|e| e.id == *last)?;
             // A pair that one side has left since would undo a later match.
             let is_mutual = self.person_of.get(last) == Some(&person.id);
             let is_near = apart(person, &scan.estimates[estimate]) <= self.cut_m;
             (is_mutual && is_near).then_some((index, estimate))
-        };
-        scan.people.iter().enumerate().filter_map(pair).collect()
+        });
+        kept.collect()
     }
 
     /// Assigns the rest by the least sum of distances, and drops what is too far apart.
     fn assigned(&mut self, scan: &FloorScan, kept: &[(usize, usize)]) -> Vec<(usize, usize)> {
-        let is_open = |person: usize, estimate: usize| {
-            kept.iter().all(|pair| pair.0 != person && pair.1 != estimate)
-        };
         let mut edges = Vec::new();
         for (row, person) in scan.people.iter().enumerate() {
             for (col, estimate) in scan.estimates.iter().enumerate() {
-                if is_open(row, col) {
+                if kept.iter().all(|pair| pair.0 != row && pair.1 != col) {
                     // The matcher maximises, and distances are to be small.
                     let weight = FAR_M - apart(person, estimate);
                     edges.push(Edge { row: row as u32, col: col as u32, weight });
@@ -146,9 +144,9 @@ impl FloorTally {
         }
         let mut chosen = Vec::new();
         self.matcher.best(scan.people.len(), scan.estimates.len(), &edges, &mut chosen);
-        let near = |edge: &Edge| FAR_M - edge.weight <= self.cut_m;
-        let chosen = chosen.iter().map(|index| edges[*index as usize]).filter(near);
-        chosen.map(|edge| (edge.row as usize, edge.col as usize)).collect()
+        let chosen = chosen.iter().map(|index| edges[*index as usize]);
+        let near = chosen.filter(|edge| FAR_M - edge.weight <= self.cut_m);
+        near.map(|edge| (edge.row as usize, edge.col as usize)).collect()
     }
 
     /// Counts a match, and remembers the pair.

@@ -154,12 +154,13 @@ fn alignment(prepared: &Prepared, table: &PairTable) -> Vec<f64> {
             }
         }
     }
-    let jaccard = |(&(truth, track), both): (&(u32, u32), f64)| {
+    let pairs = table.pairs.iter().zip(together);
+    let jaccard = pairs.map(|(&(truth, track), both)| {
         // Jaccard: both over either, each frame weighted by its share.
         let either = prepared.truth_frames[truth as usize] + prepared.track_frames[track as usize];
         both / (f64::from(either) - both)
-    };
-    table.pairs.iter().zip(together).map(jaccard).collect()
+    });
+    jaccard.collect()
 }
 
 /// Sums of the similarities in each row and column.

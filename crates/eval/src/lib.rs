@@ -66,7 +66,7 @@ pub use events::{Event, EventKind, events};
 pub use floor::{FloorClear, FloorPoint, FloorScan, FloorTally};
 pub use hota::{Hota, HotaLevel, LEVELS, alpha};
 pub use identity::Identity;
-pub use missrate::{CurvePoint, DetectionTally, PrecisionRecall, REFERENCE_FPPI, Verdict};
+pub use missrate::{CurvePoint, DetectionTally, REFERENCE_FPPI, Verdict};
 pub use pairs::PairTable;
 pub use position::{PositionError, position_errors_m};
 pub use prepare::{Comparison, Prepared, PreparedFrame};

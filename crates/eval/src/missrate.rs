@@ -121,13 +121,14 @@ impl DetectionTally {
             return None;
         }
         let curve = self.curve();
-        let read = |fppi: f64| {
+        let mut sum = 0.0;
+        for fppi in REFERENCE_FPPI {
             // Left of the curve all people are missed, as in the Caltech benchmark.
             let within = curve.partition_point(|point| point.fppi <= fppi);
-            within.checked_sub(1).map_or(1.0, |last| curve[last].miss_rate)
-        };
-        // The logarithm of a miss rate of 0 is infinite.
-        let sum: f64 = REFERENCE_FPPI.iter().map(|&fppi| read(fppi).max(FLOOR).ln()).sum();
+            let rate = within.checked_sub(1).map_or(1.0, |last| curve[last].miss_rate);
+            // The logarithm of a miss rate of 0 is infinite.
+            sum += rate.max(FLOOR).ln();
+        }
         Some((sum / REFERENCE_FPPI.len() as f64).exp())
     }
 
@@ -138,14 +139,6 @@ impl DetectionTally {
         scores.sort_by(f64::total_cmp);
         scores.dedup();
         scores.len()
-    }
-
-    /// Precision and recall of all detections with at least this score.
-    pub fn precision_recall(&self, least_score: f64) -> PrecisionRecall {
-        let accepted = || self.verdicts.iter().filter(|v| v.score >= least_score);
-        let tp = accepted().filter(|v| v.right).count() as u64;
-        let fp = accepted().count() as u64 - tp;
-        PrecisionRecall { tp, fp, fn_: self.truths - tp }
     }
 
     /// Area under the precision-recall curve, precision made monotone from the
@@ -165,35 +158,6 @@ impl DetectionTally {
             recall_after = Some(recall);
         }
         Some(area + best * recall_after.unwrap_or(0.0))
-    }
-}
-
-/// Quality of a detector at one threshold.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
-pub struct PrecisionRecall {
-    /// Right detections.
-    pub tp: u64,
-    /// Wrong detections.
-    pub fp: u64,
-    /// Missed truths.
-    #[serde(rename = "fn")]
-    pub fn_: u64,
-}
-
-impl PrecisionRecall {
-    /// Fraction of the detections that is right; 0 without any.
-    pub fn precision(&self) -> f64 {
-        ratio(self.tp as f64, (self.tp + self.fp) as f64)
-    }
-
-    /// Fraction of the truths that is found; 0 without any.
-    pub fn recall(&self) -> f64 {
-        ratio(self.tp as f64, (self.tp + self.fn_) as f64)
-    }
-
-    /// Harmonic mean of the two.
-    pub fn f1(&self) -> f64 {
-        ratio(self.tp as f64, self.tp as f64 + 0.5 * (self.fp + self.fn_) as f64)
     }
 }
 

@@ -30,8 +30,8 @@ impl PairTable {
         unique.sort_unstable();
         unique.dedup();
         let pair_of = keys.iter().map(|&key| unique.partition_point(|&k| k < key) as u32).collect();
-        let split = |key: u64| ((key / tracks) as u32, (key % tracks) as u32);
-        Self { pairs: unique.into_iter().map(split).collect(), pair_of }
+        let pairs = unique.into_iter().map(|key| ((key / tracks) as u32, (key % tracks) as u32));
+        Self { pairs: pairs.collect(), pair_of }
     }
 
     /// In how many frames each pair passes the test.
@@ -46,8 +46,7 @@ impl PairTable {
 
     /// One edge for each pair, weighted by its index.
     pub(crate) fn edges(&self, weight: impl Fn(usize) -> f64) -> Vec<Edge> {
-        let edge =
-            |(index, &(row, col)): (usize, &(u32, u32))| Edge { row, col, weight: weight(index) };
-        self.pairs.iter().enumerate().map(edge).collect()
+        let pairs = self.pairs.iter().enumerate();
+        pairs.map(|(index, &(row, col))| Edge { row, col, weight: weight(index) }).collect()
     }
 }

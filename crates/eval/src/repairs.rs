@@ -192,8 +192,8 @@ impl Pairing {
         for place in &self.frames[number].misses {
             let truth = frame.truths[*place];
             let near = self.track_near(truth.id, number);
-            let is_free = |id: &i64| frame.reports.iter().all(|report| report.id != *id);
-            let id = near.filter(is_free).unwrap_or(self.own_ids[&truth.id]);
+            let free = near.filter(|id| frame.reports.iter().all(|report| report.id != *id));
+            let id = free.unwrap_or(self.own_ids[&truth.id]);
             let Truth { region, floor_m, .. } = truth;
             frame.reports.push(Report { id, region, floor_m, ..Report::default() });
         }
@@ -226,8 +226,8 @@ fn own_ids(sequence: &Sequence) -> BTreeMap<i64, i64> {
 
 impl FramePairing {
     fn new(prepared: &PreparedFrame, matcher: &mut Matcher) -> Self {
-        let is_near = |pair: &&Edge| pair.weight >= PAIRED_SIMILARITY;
-        let near: Vec<Edge> = prepared.pairs.iter().filter(is_near).copied().collect();
+        let mut near = prepared.pairs.clone();
+        near.retain(|pair| pair.weight >= PAIRED_SIMILARITY);
         let mut matched = Vec::new();
         matcher.best(prepared.truths.len(), prepared.tracks.len(), &near, &mut matched);
         let mut paired = Self::default();

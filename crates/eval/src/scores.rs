@@ -78,7 +78,6 @@ impl Tally {
     /// The tally of several sequences together, as TrackEval combines them.
     pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         let all: Vec<&Self> = all.into_iter().collect();
-        let sum = |count: fn(&Self) -> u64| all.iter().map(|t| count(t)).sum();
         Self {
             clear: Clear::combine(all.iter().map(|t| &t.clear)),
             identity: Identity::combine(all.iter().map(|t| &t.identity)),
@@ -88,10 +87,10 @@ impl Tally {
             position_errors_m: all.iter().flat_map(|t| &t.position_errors_m).copied().collect(),
             times: Times::combine(all.iter().map(|t| &t.times)),
             visibility: VisibilityTally::combine(all.iter().map(|t| &t.visibility)),
-            truths: sum(|t| t.truths),
-            reports: sum(|t| t.reports),
-            truth_ids: sum(|t| t.truth_ids),
-            track_ids: sum(|t| t.track_ids),
+            truths: all.iter().map(|t| t.truths).sum(),
+            reports: all.iter().map(|t| t.reports).sum(),
+            truth_ids: all.iter().map(|t| t.truth_ids).sum(),
+            track_ids: all.iter().map(|t| t.track_ids).sum(),
         }
     }
 

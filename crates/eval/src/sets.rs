@@ -35,8 +35,10 @@ impl SetDistance {
     pub fn between(&self, truths: usize, reports: usize, near: &[Edge]) -> FrameDistance {
         let pay = self.cutoff.powf(self.order);
         // The solver maximises; a pair gains whatever it saves against two unmatched ones.
-        let gain = |edge: &Edge| Edge { weight: pay - edge.weight.powf(self.order), ..*edge };
-        let gains: Vec<Edge> = near.iter().map(gain).collect();
+        let mut gains = near.to_vec();
+        for edge in &mut gains {
+            edge.weight = pay - edge.weight.powf(self.order);
+        }
         let mut matched = Vec::new();
         Matcher::new().best(truths, reports, &gains, &mut matched);
         let location: f64 = matched.iter().map(|&e| pay - gains[e as usize].weight).sum();
@@ -48,11 +50,12 @@ impl SetDistance {
             missed: 0.5 * pay * (truths - pairs) as f64,
             false_: 0.5 * pay * (reports - pairs) as f64,
         };
-        // Rounding may bring the sum a little below 0.
-        let root = |value: f64| value.max(0.0).powf(self.order.recip());
         // OSPA divides by the larger set; empty sets are at distance 0.
         let mean = (location + pay * (most - pairs) as f64) / most.max(1) as f64;
-        FrameDistance { ospa: root(mean), gospa: root(parts.total()), parts }
+        // Rounding may bring the sum a little below 0.
+        let [ospa, gospa] =
+            [mean, parts.total()].map(|value| value.max(0.0).powf(self.order.recip()));
+        FrameDistance { ospa, gospa, parts }
     }
 }
 

@@ -22,6 +22,14 @@ fn why<T: std::fmt::Debug>(result: Result<T, FormatError>) -> String {
     result.unwrap_err().to_string()
 }
 
+fn measured(sequence: &Sequence, comparison: &Comparison) -> Tally {
+    Tally::measure(sequence, comparison, &SetDistance::default()).unwrap()
+}
+
+fn parse_people(text: &str) -> Result<Vec<people::Row>, FormatError> {
+    people::parse(text, "p.csv")
+}
+
 #[test]
 fn mot_lines_with_commas_or_blanks_long_or_short() {
     let rows = mot::parse("1,-1,2.5,3,4,5,0.9,-1,-1,-1\r\n\n2.0 7 1 2 3 4\n", "det.txt").unwrap();
@@ -33,15 +41,19 @@ fn mot_lines_with_commas_or_blanks_long_or_short() {
 
 #[test]
 fn a_bad_line_is_named_with_what_was_expected() {
-    let parse = |text| why(mot::parse(text, "gt.txt"));
-    assert_eq!(
-        parse("1,1,1,1,1,1,1\n1,1,1\n"),
-        "gt.txt, line 2: has 3 fields, but `y` should be field 4; is the file cut off?"
-    );
-    assert_eq!(parse("1,1,1,x,1,1"), "gt.txt, line 1: `y` is `x`, expected a finite number");
-    assert!(parse("1,1,1,inf,1,1").contains("finite"));
-    assert!(parse("0,1,1,1,1,1").contains("numbered from 1"));
-    assert!(parse("1,1.5,1,1,1,1").contains("`id` is `1.5`, expected a whole number"));
+    for (text, expected) in [
+        (
+            "1,1,1,1,1,1,1\n1,1,1\n",
+            "gt.txt, line 2: has 3 fields, but `y` should be field 4; is the file cut off?",
+        ),
+        ("1,1,1,x,1,1", "gt.txt, line 1: `y` is `x`, expected a finite number"),
+        ("1,1,1,inf,1,1", "finite"),
+        ("0,1,1,1,1,1", "numbered from 1"),
+        ("1,1.5,1,1,1,1", "`id` is `1.5`, expected a whole number"),
+    ] {
+        let error = why(mot::parse(text, "gt.txt"));
+        assert!(error.contains(expected), "{error}");
+    }
 }
 
 /// Returns the answers of all readers to a row of this frame, or scan.
@@ -109,13 +121,16 @@ fn a_truth_without_its_class_is_refused_and_changes_no_rules() {
 
 #[test]
 fn truth_says_whose_rules_it_follows() {
-    let rules = |text: &str| mot::Rules::of_truth(text, "gt.txt").unwrap();
-    assert_eq!(rules(&classed(",13,1")), mot::Rules::Mot17);
-    assert_eq!(rules("1,1,0,0,9,9,1,-1,-1,-1\n2,1,0,0,9,9,0,-1,-1,-1\n"), mot::Rules::Mot15);
-    assert_eq!(rules("1,1,0,0,9,9\n"), mot::Rules::Mot15);
-    assert_eq!(rules(""), mot::Rules::Mot15);
-    // Places in metres, one of which looks like a class.
-    assert_eq!(rules("1,1,0,0,9,9,1,4.25,5.5,0\n2,1,0,0,9,9,1,4,5.5,0\n"), mot::Rules::Mot15);
+    for (text, rules) in [
+        (&classed(",13,1")[..], mot::Rules::Mot17),
+        ("1,1,0,0,9,9,1,-1,-1,-1\n2,1,0,0,9,9,0,-1,-1,-1\n", mot::Rules::Mot15),
+        ("1,1,0,0,9,9\n", mot::Rules::Mot15),
+        ("", mot::Rules::Mot15),
+        // Places in metres, one of which looks like a class.
+        ("1,1,0,0,9,9,1,4.25,5.5,0\n2,1,0,0,9,9,1,4,5.5,0\n", mot::Rules::Mot15),
+    ] {
+        assert_eq!(mot::Rules::of_truth(text, "gt.txt").unwrap(), rules, "{text}");
+    }
     let mixed = why(mot::Rules::of_truth("1,1,0,0,9,9,1,1,1\n2,1,0,0,9,9,1,2.5,1\n", "gt.txt"));
     assert!(mixed.starts_with("gt.txt, line 2: class 2.5;"), "{mixed}");
     assert_eq!(mot::Rules::Mot20.name(), "MOT20");
@@ -168,28 +183,30 @@ fn boxes_without_an_area_match_nobody() {
     timeline.add_truths([rows[0].truth(mot::Rules::Mot15)]);
     timeline.add_reports(rows.iter().map(mot::Row::report));
     let (sequence, _) = timeline.into_sequence("flat", 1, 1, 1.0);
-    let tally =
-        |comparison| Tally::measure(&sequence, &comparison, &SetDistance::default()).unwrap().clear;
-    let clear = tally(Comparison::default());
-    assert_eq!((clear.tp, clear.fp, clear.fn_), (1, 3, 0));
     // KITTI's rules leave out whatever is unmatched and not high.
-    let clear = tally(kitti::comparison(Similarity::Iou));
-    assert_eq!((clear.tp, clear.fp, clear.fn_), (1, 0, 0));
+    for (comparison, fp) in [(Comparison::default(), 3), (kitti::comparison(Similarity::Iou), 0)] {
+        let clear = measured(&sequence, &comparison).clear;
+        assert_eq!((clear.tp, clear.fp, clear.fn_), (1, fp, 0));
+    }
 }
 
 #[test]
 fn classes_and_flags_mean_what_each_benchmark_says() {
-    let role = |class: i64, flag: i64, rules| {
-        let line = format!("1,1,0,0,9,9,{flag},{class},1");
-        mot::parse_truth(&line, "gt.txt", rules).unwrap()[0].role(rules)
-    };
     use mot::Rules::{Mot15, Mot17, Mot20};
-    assert_eq!(role(1, 1, Mot17), Role::Counts);
-    assert_eq!(role(1, 0, Mot17), Role::Bystander);
-    assert_eq!(role(7, 0, Mot17), Role::Ignored);
-    assert_eq!(role(3, 0, Mot17), Role::Bystander);
-    assert_eq!((role(6, 0, Mot17), role(6, 0, Mot20)), (Role::Bystander, Role::Ignored));
-    assert_eq!((role(-1, 1, Mot15), role(-1, 0, Mot15)), (Role::Counts, Role::Bystander));
+    for (class, flag, rules, role) in [
+        (1, 1, Mot17, Role::Counts),
+        (1, 0, Mot17, Role::Bystander),
+        (7, 0, Mot17, Role::Ignored),
+        (3, 0, Mot17, Role::Bystander),
+        (6, 0, Mot17, Role::Bystander),
+        (6, 0, Mot20, Role::Ignored),
+        (-1, 1, Mot15, Role::Counts),
+        (-1, 0, Mot15, Role::Bystander),
+    ] {
+        let line = format!("1,1,0,0,9,9,{flag},{class},1");
+        let rows = mot::parse_truth(&line, "gt.txt", rules).unwrap();
+        assert_eq!(rows[0].role(rules), role, "{line}");
+    }
 }
 
 #[test]
@@ -234,12 +251,9 @@ fn kitti_labels_survive_a_round_trip_and_mean_what_they_say() {
     assert_eq!(sequence.frames[1].ignore_regions, [Region::new(200.0, 100.0, 60.0, 80.0)]);
     assert_eq!(sequence.frames[1].stamp_ns, 100_000_000);
     // Only the walker counts; the person that is cut off is excused with their report.
-    let tally = |similarity| {
-        Tally::measure(&sequence, &kitti::comparison(similarity), &SetDistance::default()).unwrap()
-    };
-    let clear = tally(Similarity::Iou).clear;
+    let clear = measured(&sequence, &kitti::comparison(Similarity::Iou)).clear;
     assert_eq!((clear.tp, clear.fp, clear.fn_), (1, 0, 0));
-    assert_eq!(tally(Similarity::Metres).clear.tp, 1);
+    assert_eq!(measured(&sequence, &kitti::comparison(Similarity::Metres)).clear.tp, 1);
     // A box that ends before it begins is read, and a miss.
     let inside_out = kitti::parse(&source.replace("10 20 30 80", "30 20 10 80"), "0000.txt");
     assert!(!inside_out.unwrap()[0].region.has_area());
@@ -247,22 +261,21 @@ fn kitti_labels_survive_a_round_trip_and_mean_what_they_say() {
 
 #[test]
 fn kitti_pedestrians_count_as_far_as_they_are_seen() {
-    let role = |class: &str, truncated: &str, occluded: &str| {
-        let line = format!("0 1 {class} {truncated} {occluded} 0 1 1 9 9 1 1 1 1 1 1 0\n");
-        kitti::parse(&line, "0000.txt").unwrap()[0].pedestrian_role()
-    };
-    assert_eq!(role("pedestrian", "0", "2"), Some(Role::Counts));
-    assert_eq!(role("Pedestrian", "-1", "-1"), Some(Role::Counts));
-    assert_eq!(role("Pedestrian", "0", "3"), Some(Role::Ignored));
-    assert_eq!(role("Pedestrian", "0.5", "0"), Some(Role::Ignored));
-    assert_eq!(role("Person", "0", "0"), Some(Role::Ignored));
-    assert_eq!(role("Cyclist", "0", "0"), None);
-    let place = |x: &str, z: &str| {
+    for (class, role) in [
+        ("pedestrian 0 2", Some(Role::Counts)),
+        ("Pedestrian -1 -1", Some(Role::Counts)),
+        ("Pedestrian 0 3", Some(Role::Ignored)),
+        ("Pedestrian 0.5 0", Some(Role::Ignored)),
+        ("Person 0 0", Some(Role::Ignored)),
+        ("Cyclist 0 0", None),
+    ] {
+        let line = format!("0 1 {class} 0 1 1 9 9 1 1 1 1 1 1 0\n");
+        assert_eq!(kitti::parse(&line, "0000.txt").unwrap()[0].pedestrian_role(), role, "{class}");
+    }
+    for (x, z, floor_m) in [(-3, 7, Some([-3.0, 7.0])), (-1000, 7, None), (-3, -1000, None)] {
         let line = format!("0 1 Pedestrian 0 0 0 1 1 9 9 1 1 1 {x} 1 {z} 0\n");
-        kitti::parse(&line, "0000.txt").unwrap()[0].floor_m()
-    };
-    assert_eq!(place("-3", "7"), Some([-3.0, 7.0]));
-    assert_eq!((place("-1000", "7"), place("-3", "-1000")), (None, None));
+        assert_eq!(kitti::parse(&line, "0000.txt").unwrap()[0].floor_m(), floor_m);
+    }
     let metres = kitti::comparison(Similarity::Metres);
     assert_eq!(
         (metres.similarity, metres.ignore_unmatched_below_px),
@@ -283,14 +296,15 @@ fn numbers_of_a_line_are_whole_where_they_have_to_be() {
     assert!(frame("0").is_err() && frame("-1").is_err() && frame("4294967296").is_err());
     let whole_file = FormatError { file: "a".into(), line: 0, why: "is empty".into() };
     assert_eq!(whole_file.to_string(), "a: is empty");
-    let short = |text: &str| {
+    for (text, expected) in [
+        ("1,1,0,0,9,9", (1.0, None, None)),
+        ("1,1,0,0,9,9,0.5", (0.5, None, None)),
+        ("1,1,0,0,9,9,0.5,7", (0.5, Some(7.0), None)),
+        ("1,1,0,0,9,9,0.5,7,0.25", (0.5, Some(7.0), Some(0.25))),
+    ] {
         let row = mot::parse(text, "t").unwrap()[0];
-        (row.confidence, row.class, row.visibility)
-    };
-    assert_eq!(short("1,1,0,0,9,9"), (1.0, None, None));
-    assert_eq!(short("1,1,0,0,9,9,0.5"), (0.5, None, None));
-    assert_eq!(short("1,1,0,0,9,9,0.5,7"), (0.5, Some(7.0), None));
-    assert_eq!(short("1,1,0,0,9,9,0.5,7,0.25"), (0.5, Some(7.0), Some(0.25)));
+        assert_eq!((row.confidence, row.class, row.visibility), expected);
+    }
 }
 
 #[test]
@@ -307,35 +321,37 @@ fn places_that_are_broken_are_named_by_line_and_column() {
     assert!(broken.starts_with("t.csv, line 2: `z` is `high`"), "{broken}");
     let header = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,head_x,head_y,head_z,visible,\
                   occluder,ignore,interpolated\n";
-    let row = |text: &str| people::parse(&format!("{header}{text}"), "p.csv");
-    let read = row("1,4,1,2,3,4,5,6,7,8,0.5,-0.3,2.5,0.75,0,0,300").unwrap()[0].clone();
+    let read = "1,4,1,2,3,4,5,6,7,8,0.5,-0.3,2.5,0.75,0,0,300";
+    let read = parse_people(&format!("{header}{read}")).unwrap()[0].clone();
     assert_eq!((read.ignore, read.interpolated, read.occluder.as_str()), (false, 255, "0"));
     assert_eq!(read.visible_body, Some(Region::new(5.0, 6.0, 7.0, 8.0)));
     assert!(read.key, "by default");
     for negative in ["1,4,1,2,-3,4,5,6,7,8,0,0,1,1,0,0,0", "1,4,1,2,3,4,5,6,7,-8,0,0,1,1,0,0,0"] {
-        assert!(why(row(negative)).contains("p.csv, line 2: a box has a negative size"));
+        let error = why(parse_people(&format!("{header}{negative}")));
+        assert!(error.contains("p.csv, line 2: a box has a negative size"));
     }
-    assert!(row("1,4,1,2,0,0,5,6,0,0,0,0,1,1,0,0,0").is_ok(), "who is out of the image has no box");
+    let outside = "1,4,1,2,0,0,5,6,0,0,0,0,1,1,0,0,0";
+    let outside = parse_people(&format!("{header}{outside}"));
+    assert!(outside.is_ok(), "who is out of the image has no box");
 }
 
 #[test]
 fn only_a_box_or_a_place_is_required_of_a_person() {
-    let parse = |text: &str| people::parse(text, "p.csv");
-    let boxes = parse("id,frame,ub_x,ub_y,ub_w,ub_h\n4,2,10,20,30,30\n").unwrap();
+    let boxes = parse_people("id,frame,ub_x,ub_y,ub_w,ub_h\n4,2,10,20,30,30\n").unwrap();
     assert_eq!((boxes[0].frame, boxes[0].id, boxes[0].visible), (2, 4, 1.0));
     let (_, truth) = boxes[0].truth(|_| panic!("it has no place"));
     assert_eq!((truth.region, truth.floor_m), (Some(Region::new(10.0, 20.0, 30.0, 30.0)), None));
     assert_eq!((truth.role, truth.view), (Role::Counts, None));
-    let places = parse("frame,id,head_x,head_y,head_z,ignore\n2,4,0,0,2.5,1\n").unwrap();
+    let places = parse_people("frame,id,head_x,head_y,head_z,ignore\n2,4,0,0,2.5,1\n").unwrap();
     let (_, truth) = places[0].truth(|[_, _, z]| Some([z, 0.0]));
     assert_eq!((truth.region, truth.floor_m, truth.role), (None, Some([2.5, 0.0]), Role::Ignored));
     // Empty cells are those of missing columns.
     let mixed =
         "frame,id,ub_x,ub_y,ub_w,ub_h,head_x,head_y,head_z,key\n1,1,5,5,9,9,,,,0\n1,2,,,,,0,0,3,\n";
-    let mixed = parse(mixed).unwrap();
+    let mixed = parse_people(mixed).unwrap();
     assert_eq!((mixed[0].head_in_camera_m, mixed[0].key), (None, false));
     assert_eq!((mixed[1].upper_body, mixed[1].key), (None, true));
-    assert_eq!(parse(&text(|out| people::write(out, &mixed))).unwrap(), mixed);
+    assert_eq!(parse_people(&text(|out| people::write(out, &mixed))).unwrap(), mixed);
     for (wrong, cause) in [
         ("frame,id\n1,1\n", "line 1: has neither a box nor a place: add ub_x"),
         ("frame,ub_x,ub_y,ub_w,ub_h\n", "no column `id`"),
@@ -343,7 +359,7 @@ fn only_a_box_or_a_place_is_required_of_a_person() {
         ("frame,id,head_x,head_y,head_z\n1,1,,,\n", "line 2: has neither a box (ub_*) nor"),
         ("frame,id,head_x,head_y,head_z\n1,1,2,,3\n", "line 2: fill all of head_x, head_y, head_z"),
     ] {
-        let error = why(parse(wrong));
+        let error = why(parse_people(wrong));
         assert!(error.contains(cause), "{error}");
     }
 }
@@ -471,10 +487,8 @@ proptest! {
         let files = exported(&sequence);
         let read = trackeval::read(&files, "Tagalong", "ours", mot::Rules::Mot17).unwrap();
         prop_assert_eq!(&read[0].1, &sequence);
-        let tally = |s: &Sequence| {
-            Tally::measure(s, &Comparison::from(Similarity::Iou), &SetDistance::default()).unwrap()
-        };
-        prop_assert_eq!(tally(&read[0].1), tally(&sequence));
+        let comparison = Comparison::from(Similarity::Iou);
+        prop_assert_eq!(measured(&read[0].1, &comparison), measured(&sequence, &comparison));
     }
 
     #[test]

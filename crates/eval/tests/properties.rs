@@ -34,11 +34,13 @@ fn some_edges() -> impl Strategy<Value = (u32, u32, Vec<Edge>)> {
             (rows * cols) as usize,
         );
         weights.prop_map(move |weights| {
-            let edge = |(i, weight): (usize, f64)| {
-                let i = i as u32;
-                (weight > 0.0).then_some(Edge { row: i / cols, col: i % cols, weight })
-            };
-            (rows, cols, weights.into_iter().enumerate().filter_map(edge).collect())
+            let mut edges = Vec::new();
+            for (i, weight) in (0..).zip(weights) {
+                if weight > 0.0 {
+                    edges.push(Edge { row: i / cols, col: i % cols, weight });
+                }
+            }
+            (rows, cols, edges)
         })
     })
 }
@@ -74,12 +76,12 @@ fn a_report() -> impl Strategy<Value = Report> {
 }
 
 fn a_frame() -> impl Strategy<Value = Frame> {
-    let ids = || prop::sample::subsequence(vec![1_i64, 2, 3, 4, 5, 6], 0..=6).prop_shuffle();
-    let truths = ids().prop_flat_map(|ids| {
+    let ids = prop::sample::subsequence(vec![1_i64, 2, 3, 4, 5, 6], 0..=6).prop_shuffle();
+    let truths = ids.clone().prop_flat_map(|ids| {
         let count = ids.len();
         (Just(ids), prop::collection::vec(a_truth(), count))
     });
-    let reports = ids().prop_flat_map(|ids| {
+    let reports = ids.prop_flat_map(|ids| {
         let count = ids.len();
         (Just(ids), prop::collection::vec(a_report(), count))
     });
@@ -141,20 +143,21 @@ fn slow_hota(prepared: &Prepared, level: usize) -> HotaLevel {
     let mut counts = vec![vec![0.0; tracks]; truths];
     let mut result = HotaLevel::default();
     for frame in &prepared.frames {
-        let score = |pair: &Edge| {
-            let i = frame.truths[pair.row as usize];
-            let j = frame.tracks[pair.col as usize];
-            let both = soft[i as usize][j as usize];
-            let frames = prepared.truth_frames[i as usize] + prepared.track_frames[j as usize];
-            both / (f64::from(frames) - both) * pair.weight
-        };
-        let scored: Vec<Edge> =
-            frame.pairs.iter().map(|pair| Edge { weight: score(pair), ..*pair }).collect();
+        let mut scored = frame.pairs.clone();
+        for pair in &mut scored {
+            let i = frame.truths[pair.row as usize] as usize;
+            let j = frame.tracks[pair.col as usize] as usize;
+            let both = soft[i][j];
+            let frames = prepared.truth_frames[i] + prepared.track_frames[j];
+            pair.weight *= both / (f64::from(frames) - both);
+        }
         let mut matched = Vec::new();
         Matcher::new().best(frame.truths.len(), frame.tracks.len(), &scored, &mut matched);
-        let enough = |e: &&u32| frame.pairs[**e as usize].weight >= alpha(level) - f64::EPSILON;
-        for &e in matched.iter().filter(enough) {
+        for e in matched {
             let pair = frame.pairs[e as usize];
+            if pair.weight < alpha(level) - f64::EPSILON {
+                continue;
+            }
             result.tp += 1;
             result.similarity_sum += pair.weight;
             counts[frame.truths[pair.row as usize] as usize]

@@ -54,15 +54,7 @@ fn frame(detections: &[u8], kind: &str) -> Option<LogFrame> {
         InputSettings { detections_topic: Some(DETECTIONS.into()), ..InputSettings::default() };
     let inputs = Inputs::NONE.require(Input::Detections);
     let mut listening = Listening::new("fuzz", &settings, &Limits::default(), inputs).ok()?;
-    let image = encode(&msgs::Image {
-        header: header(),
-        height: 2,
-        width: 2,
-        encoding: "mono8".into(),
-        is_bigendian: 0,
-        step: 2,
-        data: &[0; 4],
-    });
+    let image = encode(&msgs::Image::packed(header(), "mono8", 2, 2, &[0; 4]));
     listening.announce(IMAGES, "sensor_msgs/msg/Image");
     listening.announce(DETECTIONS, kind);
     listening.take(IMAGES, &image);

@@ -67,9 +67,9 @@ struct Read {
 /// Reads the boxes, by frame and number.
 fn read(path: &Path) -> Result<Read, Failure> {
     let name = path.display().to_string();
-    let cannot = |why: String| Failure::failed(format!("cannot read {name}: {why}"));
-    let text = read_text(path, FileLimit::Bytes(MOST_BYTES))
-        .map_err(|error| cannot(format!("{error}; give the XML file that CVAT exports")))?;
+    let text = read_text(path, FileLimit::Bytes(MOST_BYTES)).map_err(|error| {
+        Failure::failed(format!("cannot read {name}: {error}; give the XML file that CVAT exports"))
+    })?;
     parse(&text).map_err(|why| Failure::failed(format!("{name}{why}")))
 }
 
@@ -194,8 +194,7 @@ fn row(
     let [x, y] = [number(shape, "xtl")?, number(shape, "ytl")?];
     let [width, height] = [number(shape, "xbr")? - x, number(shape, "ybr")? - y];
     // Corners far apart have no finite distance.
-    let is_size = |size: f64| size > 0.0 && size.is_finite();
-    if !is_size(width) || !is_size(height) {
+    if ![width, height].iter().all(|size| *size > 0.0 && size.is_finite()) {
         return Err(at(shape, "a box without an area"));
     }
     let ignored = attribute(shape, "ignore").is_some_and(|text| text.trim() == "true");
@@ -241,14 +240,17 @@ fn at(node: &Node<'_, '_>, why: &str) -> String {
 
 /// Returns MOTChallenge text of whole bodies, of which `eval` compares the upper bodies.
 fn mot(rows: &[Row]) -> String {
-    let body = |row: &Row| {
-        let frame = row.frame;
-        let id = row.id;
-        let visible = row.visible;
-        let counts = !row.ignore;
-        Some(WholeBody { frame, id, region: row.upper_body?, visible, counts })
-    };
-    boxes_csv(&rows.iter().filter_map(body).collect::<Vec<_>>())
+    let mut bodies = Vec::new();
+    for row in rows {
+        bodies.extend(row.upper_body.map(|region| WholeBody {
+            frame: row.frame,
+            id: row.id,
+            region,
+            visible: row.visible,
+            counts: !row.ignore,
+        }));
+    }
+    boxes_csv(&bodies)
 }
 
 #[cfg(test)]

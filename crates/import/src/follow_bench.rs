@@ -264,9 +264,6 @@ human:
 
     #[test]
     fn files_with_something_else_are_refused_with_the_cause() {
-        let refused = |from: &str, to: &str| {
-            scene_of_follow_bench(&SCENE.replace(from, to), "x").unwrap_err()
-        };
         for (from, to, cause) in [
             ("width: 40", "depth: 40", "world.width"),
             ("name: sfm", "name: rvo", "`rvo`"),
@@ -277,7 +274,7 @@ human:
             ("world:", "world: &a", "anchors"),
             ("world:", "world: [", "at "),
         ] {
-            let why = refused(from, to);
+            let why = scene_of_follow_bench(&SCENE.replace(from, to), "x").unwrap_err();
             assert!(why.contains(cause), "{to}: {why}");
         }
         assert!(scene_of_follow_bench("", "x").is_err());

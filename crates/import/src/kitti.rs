@@ -30,11 +30,12 @@ pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
     let [left, right] = projections(&folder.join("calib").join(format!("{name}.txt")))?;
     // The fourth column of a projection is minus the focal length times the camera's offset.
     let baseline_m = (left[3] - right[3]) / left[0];
-    let files = |camera: &str| pictures(&folder.join(camera).join(name));
-    let mut moments: Vec<_> = steady(files("image_02")?, Eye::Left, HZ).collect();
-    let is_pair = folder.join("image_03").join(name).exists();
+    let left_files = pictures(&folder.join("image_02").join(name))?;
+    let mut moments: Vec<_> = steady(left_files, Eye::Left, HZ).collect();
+    let right_folder = folder.join("image_03").join(name);
+    let is_pair = right_folder.exists();
     if is_pair {
-        moments.extend(steady(files("image_03")?, Eye::Right, HZ));
+        moments.extend(steady(pictures(&right_folder)?, Eye::Right, HZ));
         moments.sort_by_key(|moment| (moment.stamp, moment.eye));
     }
     let labels = folder.join("label_02").join(format!("{name}.txt"));
@@ -59,17 +60,20 @@ pub fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
 /// Returns P2 and P3, row by row.
 fn projections(path: &Path) -> Result<[[f64; 12]; 2], Failure> {
     let text = text(path, LAYOUT)?;
-    let read = |name: &str| {
-        let lines = (1..).zip(text.lines());
-        let mut found = lines.filter_map(|(number, line)| Some((number, line.strip_prefix(name)?)));
-        let wrong =
-            || Failure::failed(format!("{}: no twelve numbers after {name}", path.display()));
-        let (number, line) = found.next().ok_or_else(wrong)?;
-        let values = numbers(line.split_whitespace(), path, number)?;
-        let values: [f64; 12] = values.try_into().map_err(|_| wrong())?;
-        if values[0] > 0.0 { Ok(values) } else { Err(wrong()) }
-    };
-    Ok([read("P2:")?, read("P3:")?])
+    Ok([projection(&text, path, "P2:")?, projection(&text, path, "P3:")?])
+}
+
+fn projection(text: &str, path: &Path, name: &str) -> Result<[f64; 12], Failure> {
+    let lines = (1..).zip(text.lines());
+    let mut found = lines.filter_map(|(number, line)| Some((number, line.strip_prefix(name)?)));
+    if let Some((number, line)) = found.next() {
+        let values: Result<[f64; 12], _> =
+            numbers(line.split_whitespace(), path, number)?.try_into();
+        if let Some(values) = values.ok().filter(|values| values[0] > 0.0) {
+            return Ok(values);
+        }
+    }
+    Err(Failure::failed(format!("{}: no twelve numbers after {name}", path.display())))
 }
 
 /// Columns of a label: frame, id, type, truncated, occluded, alpha, and the box.

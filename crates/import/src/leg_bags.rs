@@ -131,18 +131,19 @@ impl Bag {
 
     /// Returns the scans of the topic that is told, or of the only one.
     fn annotated_scans(&self, args: &ImportArgs) -> Result<&[Scan], Failure> {
-        let topics = || self.scans.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        let topics = self.scans.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
         let shown = args.path.display();
         let found = match &args.scan {
             Some(topic) => self.scans.get(topic),
             None if self.scans.len() > 1 => {
-                let why = format!("{shown}: scans on {}; name one with --scan TOPIC", topics());
+                let why = format!("{shown}: scans on {topics}; name one with --scan TOPIC");
                 return Err(Failure::failed(why));
             }
             None => self.scans.values().next(),
         };
-        let none = || Failure::failed(format!("{shown}: no such scans; there are: {}", topics()));
-        found.map(Vec::as_slice).ok_or_else(none)
+        found
+            .map(Vec::as_slice)
+            .ok_or_else(|| Failure::failed(format!("{shown}: no such scans; there are: {topics}")))
     }
 }
 
@@ -152,13 +153,13 @@ impl Scan {
         let range = f64::from(scan.range_min)..=f64::from(scan.range_max);
         let beams = scan.ranges.iter().enumerate();
         let seen = beams.filter(|(_, range_m)| range.contains(&f64::from(**range_m)));
-        let point = |(beam, range_m): (usize, &f32)| {
+        let points_m = seen.map(|(beam, range_m)| {
             let angle = first + step * beam as f64;
             let range_m = f64::from(*range_m);
             [range_m * angle.cos(), range_m * angle.sin()]
-        };
+        });
         let stamp_ns = Stamp::from(scan.header.stamp).nanos();
-        Self { log_time, stamp_ns, points_m: seen.map(point).collect() }
+        Self { log_time, stamp_ns, points_m: points_m.collect() }
     }
 
     fn points_near(&self, [x, y]: [f64; 2]) -> usize {

@@ -94,16 +94,14 @@ fn read(args: &ImportArgs) -> Result<Sequence, Failure> {
 /// Writes the truth beside the log, where `eval` and `bench` look for it, and the config that tracks
 /// recorded detections.
 fn beside(sequence: &Sequence, log: &Path) -> Result<(), Failure> {
-    let write = |ending: &str, text: &str| {
+    for (ending, text) in &sequence.beside {
         let path = log.with_extension(ending);
         write_file(&path, text)?;
-        Ok::<_, Failure>(path)
-    };
-    for (ending, text) in &sequence.beside {
-        say(&format!("truth is in {}", write(ending, text)?.display()));
+        say(&format!("truth is in {}", path.display()));
     }
     if let Some(text) = &sequence.recorded {
-        let config = write("recorded.toml", text)?;
+        let config = log.with_extension("recorded.toml");
+        write_file(&config, text)?;
         let config = config.display();
         let log = log.display();
         say(&format!("its detections can be tracked: tagalong run {config} {log}"));

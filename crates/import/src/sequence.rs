@@ -142,11 +142,11 @@ pub fn pictures(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 pub fn files(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>, Failure> {
     let entries = fs::read_dir(folder)
         .map_err(|error| Failure::failed(format!("cannot read {}: {error}", folder.display())))?;
-    let is_wanted = |path: &PathBuf| {
+    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|path| {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         endings.contains(&extension.to_lowercase().as_str())
-    };
-    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).filter(is_wanted).collect();
+    });
     // The order of a directory depends on the file system.
     files.sort_by_cached_key(|path| (counted(path), path.clone()));
     Ok(files)
@@ -170,8 +170,11 @@ fn counted(path: &Path) -> Vec<(String, u64)> {
 
 /// Returns files at a steady rate.
 pub fn steady(files: Vec<PathBuf>, eye: Eye, hz: f64) -> impl Iterator<Item = Moment> {
-    let at = move |index: usize| EPOCH.plus_seconds(index as f64 / hz);
-    files.into_iter().enumerate().map(move |(i, file)| Moment { stamp: at(i), eye, file })
+    files.into_iter().enumerate().map(move |(index, file)| Moment {
+        stamp: EPOCH.plus_seconds(index as f64 / hz),
+        eye,
+        file,
+    })
 }
 
 impl ImportArgs {
@@ -199,10 +202,15 @@ mod tests {
 
     #[test]
     fn times_keep_every_digit() {
-        let at = |word| stamp(word).map(Stamp::nanos);
-        assert_eq!(at("1305031102.175304"), Some(1_305_031_102_175_304_000));
-        assert_eq!(at("1339064317.986969085"), Some(1_339_064_317_986_969_085));
-        assert_eq!(at("7"), Some(7_000_000_000));
-        assert!(at("x.5").is_none() && at("1.x").is_none() && at("").is_none());
+        for (word, nanos) in [
+            ("1305031102.175304", Some(1_305_031_102_175_304_000)),
+            ("1339064317.986969085", Some(1_339_064_317_986_969_085)),
+            ("7", Some(7_000_000_000)),
+            ("x.5", None),
+            ("1.x", None),
+            ("", None),
+        ] {
+            assert_eq!(stamp(word).map(Stamp::nanos), nanos, "{word}");
+        }
     }
 }

@@ -64,26 +64,24 @@ fn is_bonn(folder: &Path) -> bool {
 /// Returns the colour camera as the benchmark publishes it, by the name of the folder.
 fn calibration(folder: &Path, notes: &mut Vec<String>) -> Calibration {
     let name = folder.to_string_lossy();
-    let of = |focal, centre, distortion| Calibration { focal, centre: Some(centre), distortion };
-    if name.contains("freiburg1") {
+    let (focal, centre, distortion) = if name.contains("freiburg1") {
         let distortion = [0.2624, -0.9531, -0.0054, 0.0026, 1.1633];
-        return of([517.3, 516.5], [318.6, 255.3], distortion);
-    }
-    if name.contains("freiburg2") {
+        ([517.3, 516.5], [318.6, 255.3], distortion)
+    } else if name.contains("freiburg2") {
         let distortion = [0.2312, -0.7849, -0.0033, -0.0001, 0.9172];
-        return of([520.9, 521.0], [325.1, 249.7], distortion);
-    }
-    if is_bonn(folder) {
+        ([520.9, 521.0], [325.1, 249.7], distortion)
+    } else if is_bonn(folder) {
         let distortion = [0.039903, -0.099343, -0.000730, -0.000144, 0.0];
-        return of([542.822841, 542.576870], [315.593520, 237.756098], distortion);
-    }
-    if name.contains("freiburg3") {
-        return of([535.4, 539.2], [320.1, 247.6], [0.0; 5]);
-    }
-    notes.push(
-        "not freiburg1 to 3 nor rgbd_bonn by its name: the usual 525 pixels of focal length are taken".into(),
-    );
-    of([525.0, 525.0], [319.5, 239.5], [0.0; 5])
+        ([542.822841, 542.576870], [315.593520, 237.756098], distortion)
+    } else if name.contains("freiburg3") {
+        ([535.4, 539.2], [320.1, 247.6], [0.0; 5])
+    } else {
+        notes.push(
+            "not freiburg1 to 3 nor rgbd_bonn by its name: the usual 525 pixels of focal length are taken".into(),
+        );
+        ([525.0, 525.0], [319.5, 239.5], [0.0; 5])
+    };
+    Calibration { focal, centre: Some(centre), distortion }
 }
 
 /// Reads a list of images. Images that are not there, as in parts of a sequence, are left out.

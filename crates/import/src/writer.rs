@@ -64,12 +64,12 @@ fn transforms<'a>(
     at: Stamp,
     links: impl IntoIterator<Item = (&'a str, &'a str, &'a Isometry3<f64>)>,
 ) -> TFMessage {
-    let stamped = |(parent, child, pose): (&str, &str, &Isometry3<f64>)| TransformStamped {
+    let transforms = links.into_iter().map(|(parent, child, pose)| TransformStamped {
         header: Header::new(at, parent),
         child_frame_id: child.to_owned(),
         transform: pose.into(),
-    };
-    TFMessage { transforms: links.into_iter().map(stamped).collect() }
+    });
+    TFMessage { transforms: transforms.collect() }
 }
 
 /// Writes one image with its calibration.
@@ -141,12 +141,11 @@ fn depth(
         }
     };
     // Saturates at 65.535 m, the largest value of 16 bits in millimetres.
-    let millimetres = |value: &u16| (f64::from(*value) * unit_m * 1e3).round().min(65535.0) as u16;
-    let data: Vec<u8> = image.as_raw().iter().flat_map(|v| millimetres(v).to_le_bytes()).collect();
+    let millimetres =
+        image.as_raw().iter().map(|value| (f64::from(*value) * unit_m * 1e3).round().min(65535.0));
+    let data: Vec<u8> = millimetres.flat_map(|value| (value as u16).to_le_bytes()).collect();
     let (width, height) = image.dimensions();
-    let encoding = "16UC1".to_owned();
-    let message =
-        Image { header, height, width, encoding, is_bigendian: 0, step: 2 * width, data: &data };
+    let message = Image::packed(header, "16UC1", width, height, &data);
     log.send("/camera/aligned_depth_to_color/image_raw", moment.stamp, &message)
         .map_err(Failure::failed)
 }

@@ -27,21 +27,16 @@ impl Intrinsics {
         if !is_known || self.mirror.is_some() || (width, height) == (self.width, self.height) {
             return None;
         }
-        let is_multiple = |large: (usize, usize), small: (usize, usize)| {
-            let times = large.0 / small.0;
-            times > 1 && (times * small.0, times * small.1) == large
-        };
         let ours = (self.width, self.height);
         let theirs = (width, height);
         if !is_multiple(ours, theirs) && !is_multiple(theirs, ours) {
             return None;
         }
         let scale = width as f64 / self.width as f64;
-        // Pixel centres have whole coordinates, hence the half pixels.
-        let centre = |c: f64| (c + 0.5) * scale - 0.5;
         let Pinhole { fx, fy, cx, cy, distortion } = self.lens;
-        let lens =
-            Pinhole { fx: fx * scale, fy: fy * scale, cx: centre(cx), cy: centre(cy), distortion };
+        // Pixel centres have whole coordinates, hence the half pixels.
+        let [cx, cy] = [cx, cy].map(|c| (c + 0.5) * scale - 0.5);
+        let lens = Pinhole { fx: fx * scale, fy: fy * scale, cx, cy, distortion };
         Some(Self { lens, width, height, ..*self })
     }
 }
@@ -305,6 +300,12 @@ fn baseline(p: &[f64; 12]) -> Option<f64> {
     (p[0] > 0.0 && p[3] != 0.0).then(|| -p[3] / p[0])
 }
 
+/// Returns true if a size is a whole number of times another, and larger, in both directions.
+fn is_multiple(large: (usize, usize), small: (usize, usize)) -> bool {
+    let times = large.0 / small.0;
+    times > 1 && (times * small.0, times * small.1) == large
+}
+
 fn delivered(info: &CameraInfo, full: [f64; 4], distortion: Distortion) -> Intrinsics {
     let [fx, fy, cx, cy] = full;
     let bx = info.binning_x.max(1);
@@ -314,16 +315,10 @@ fn delivered(info: &CameraInfo, full: [f64; 4], distortion: Distortion) -> Intri
     let whole = roi.width == 0 || roi.height == 0;
     let (width, height) = if whole { (info.width, info.height) } else { (roi.width, roi.height) };
     let (x0, y0) = if whole { (0, 0) } else { (roi.x_offset, roi.y_offset) };
-    let centre = |c: f64, offset: u32, binning: u32| {
-        (c - f64::from(offset) + 0.5) / f64::from(binning) - 0.5
-    };
-    let lens = Pinhole {
-        fx: fx / f64::from(bx),
-        fy: fy / f64::from(by),
-        cx: centre(cx, x0, bx),
-        cy: centre(cy, y0, by),
-        distortion,
-    };
+    let [cx, cy] = [(cx, x0, bx), (cy, y0, by)].map(|(centre, offset, binning)| {
+        (centre - f64::from(offset) + 0.5) / f64::from(binning) - 0.5
+    });
+    let lens = Pinhole { fx: fx / f64::from(bx), fy: fy / f64::from(by), cx, cy, distortion };
     Intrinsics {
         lens,
         width: (width / bx) as usize,
@@ -402,19 +397,20 @@ mod tests {
         assert_eq!((seen.width, seen.height), (200, 50));
         // The centre of the first delivered pixel is the middle of the two full pixels 100 and 101,
         // that is 100.5.
-        let column = |full: f64| (full - 320.0) / 500.0 * seen.lens.fx + seen.lens.cx;
-        assert!((column(100.5) - 0.0).abs() < 1e-12);
-        assert!((column(498.5) - 199.0).abs() < 1e-12);
+        for (full, column) in [(100.5, 0.0), (498.5, 199.0)] {
+            let found = (full - 320.0) / 500.0 * seen.lens.fx + seen.lens.cx;
+            assert!((found - column).abs() < 1e-12);
+        }
         assert_eq!(seen.lens.fy, 127.5);
     }
 
     #[test]
     fn what_cannot_be_is_refused_by_name() {
-        let blank = |i: &mut CameraInfo| {
+        let blank = broken(|i| {
             i.k = [0.0; 9];
             i.p = [0.0; 12];
-        };
-        assert!(broken(blank).contains("uncalibrated"));
+        });
+        assert!(blank.contains("uncalibrated"));
         assert!(broken(|i| i.k[0] = f64::NAN).starts_with("K = NaN"));
         assert!(broken(|i| i.k[4] = -1.0).starts_with("K[4] = -1"));
         assert!(broken(|i| i.k[2] = 900.0).starts_with("K[2] = 900"));

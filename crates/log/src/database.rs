@@ -58,11 +58,11 @@ impl Database {
     /// # Errors
     /// A file that is no database of messages.
     pub(crate) fn open(path: &Path, limits: &Limits) -> Result<Self, NotMcap> {
-        let failed = |why: rusqlite::Error| NotMcap(format!("not a rosbag2 database: {why}"));
         let opened = unfinished::open(path, limits)?;
         let connection = &opened.connection;
-        connection.pragma_update(None, "trusted_schema", false).map_err(failed)?;
-        let tables: i64 = connection.query_row(TABLES, [], |row| row.get(0)).map_err(failed)?;
+        connection.pragma_update(None, "trusted_schema", false).map_err(no_database)?;
+        let tables: i64 =
+            connection.query_row(TABLES, [], |row| row.get(0)).map_err(no_database)?;
         if tables != 2 {
             let why = "not a rosbag2 database: a database without the tables `topics` and `messages` of rosbag2";
             return Err(NotMcap(why.to_owned()));
@@ -145,8 +145,9 @@ impl Database {
     fn next(&self, longest: u64) -> rusqlite::Result<Option<(i64, Option<Stored>)>> {
         let mut statement = self.opened.connection.prepare_cached(NEXT)?;
         let longest = i64::try_from(longest).unwrap_or(i64::MAX);
-        let row = |row: &Row<'_>| Ok((row.get(0)?, stored(row).ok()));
-        statement.query_row((self.last, longest), row).optional()
+        let found =
+            statement.query_row((self.last, longest), |row| Ok((row.get(0)?, stored(row).ok())));
+        found.optional()
     }
 
     /// Returns about how many bytes of the file have been read.
@@ -183,18 +184,23 @@ fn stored(row: &Row<'_>) -> rusqlite::Result<Stored> {
     })
 }
 
+fn no_database(why: rusqlite::Error) -> NotMcap {
+    NotMcap(format!("not a rosbag2 database: {why}"))
+}
+
+fn bounded_text(row: &Row<'_>, at: usize, longest: u64) -> rusqlite::Result<String> {
+    let text: String = row.get(at)?;
+    if text.len() as u64 <= longest { Ok(text) } else { Err(rusqlite::Error::InvalidQuery) }
+}
+
 /// Reads a row of the table of topics. Names are bounded, because all of them are kept.
 fn channel(row: &Row<'_>, longest: u64) -> rusqlite::Result<Channel> {
-    let text = |at: usize| -> rusqlite::Result<String> {
-        let text: String = row.get(at)?;
-        if text.len() as u64 <= longest { Ok(text) } else { Err(rusqlite::Error::InvalidQuery) }
-    };
     Ok(Channel {
         id: row.get(0)?,
-        topic: text(1)?,
-        schema_name: text(2)?,
+        topic: bounded_text(row, 1, longest)?,
+        schema_name: bounded_text(row, 2, longest)?,
         schema_encoding: "ros2msg".into(),
-        encoding: text(3)?,
+        encoding: bounded_text(row, 3, longest)?,
         definition: Arc::default(),
     })
 }

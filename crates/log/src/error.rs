@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::camera_info::CalibrationError;
 
@@ -127,4 +127,11 @@ pub enum LogError {
     /// The settings of `[input]` are invalid.
     #[error("[input] {0}")]
     Settings(String),
+}
+
+impl LogError {
+    /// Returns the error of a path that cannot be opened or read, from its cause.
+    pub(crate) fn opening(path: &Path) -> impl Fn(std::io::Error) -> Self {
+        move |source| Self::Open { path: path.to_owned(), source }
+    }
 }

@@ -111,9 +111,8 @@ pub fn examine(
 ) -> Result<Examination, LogError> {
     input.check()?;
     let scan = Arc::new(Scan::read(path, input.depth_unit_m, limits)?);
-    let open = |inputs| FrameSource::of_scan(Arc::clone(&scan), input, limits, inputs);
     // Described with all inputs, even if the pipeline uses only some of them.
-    let everything = open(Inputs::ANY);
+    let everything = FrameSource::of_scan(Arc::clone(&scan), input, limits, Inputs::ANY);
     let mut inspection = Inspection::of_scan(&scan);
     match &everything {
         Ok(frames) => inspection.describe(&scan, frames, input.pair_tolerance_s),
@@ -122,7 +121,7 @@ pub fn examine(
             inspection.inputs = account_of(&scan, input);
         }
     }
-    let (frames, refusal) = match open(inputs) {
+    let (frames, refusal) = match FrameSource::of_scan(scan, input, limits, inputs) {
         Ok(frames) => (Some(frames), None),
         Err(refusal) => (everything.ok(), Some(refusal)),
     };
@@ -158,21 +157,24 @@ impl Inspection {
         self.facts = source.facts().clone();
         self.notes = source.notes().to_vec();
         let facts = &self.facts;
-        let usable = [
+        self.inputs = source.account().clone();
+        self.usable.clear();
+        for (name, topic) in [
             ("colour", &facts.colour_topic),
             ("depth", &facts.depth_topic),
             ("right", &facts.right_topic),
             ("odometry", &facts.odometry_topic),
             ("laser", &facts.laser_topic),
-        ];
-        self.inputs = source.account().clone();
-        let fails = |name: &str| self.inputs.used_as(name).is_some_and(|it| it.problem.is_some());
-        let found = usable.iter().filter(|(name, t)| t.is_some() && !fails(name)).map(|(n, _)| *n);
-        self.usable = found.chain(facts.sensor_topics.keys().copied()).collect();
-        let stamps = |topic: &Option<String>| {
-            topic.as_ref().and_then(|topic| scan.topics.get(topic)).map(|topic| &topic.stamps[..])
-        };
-        let both = stamps(&facts.colour_topic).zip(stamps(&facts.depth_topic));
+        ] {
+            let fails = self.inputs.used_as(name).is_some_and(|it| it.problem.is_some());
+            if topic.is_some() && !fails {
+                self.usable.push(name);
+            }
+        }
+        self.usable.extend(facts.sensor_topics.keys());
+        let [colour, depth] = [&facts.colour_topic, &facts.depth_topic]
+            .map(|topic| scan.topics.get(topic.as_ref()?).map(|topic| &topic.stamps[..]));
+        let both = colour.zip(depth);
         self.skew = both.and_then(|(colour, depth)| Skew::between(colour, depth, tolerance_s));
     }
 

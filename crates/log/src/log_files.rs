@@ -35,11 +35,10 @@ impl LogFiles {
     /// [`LogError::Open`] for a path that cannot be read; [`LogError::NotAFile`] for a pipe, a
     /// device, or a folder that is not one log.
     pub fn of(path: &Path) -> Result<Self, LogError> {
-        let failed = |source| LogError::Open { path: path.to_owned(), source };
-        if !std::fs::metadata(path).map_err(failed)?.is_dir() {
+        if !std::fs::metadata(path).map_err(LogError::opening(path))?.is_dir() {
             return Ok(Self { parts: vec![path.to_owned()], missing: Vec::new() });
         }
-        let mut parts = parts_in(path).map_err(failed)?;
+        let mut parts = parts_in(path).map_err(LogError::opening(path))?;
         // The order of a directory depends on the file system.
         parts.sort_by_key(|part| part_number(part));
         let listed = listed_parts(&path.join(METADATA));
@@ -58,10 +57,9 @@ impl LogFiles {
             });
         }
         // Only names count: metadata may come from another machine.
-        let present =
-            |name: &String| parts.iter().any(|part| unpacked_name(part) == stripped(name));
-        let missing = listed.unwrap_or_default().into_iter().filter(|name| !present(name));
-        Ok(Self { missing: missing.collect(), parts })
+        let mut missing = listed.unwrap_or_default();
+        missing.retain(|name| !parts.iter().any(|part| unpacked_name(part) == stripped(name)));
+        Ok(Self { missing, parts })
     }
 
     /// Returns the files.
@@ -80,16 +78,16 @@ impl LogFiles {
 /// # Errors
 /// [`LogError::Open`], [`LogError::NotAFile`].
 pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
-    let failed = |source| LogError::Open { path: path.to_owned(), source };
-    let kind = std::fs::metadata(path).map_err(failed)?;
-    let refused = |kind, remedy| LogError::NotAFile { path: path.to_owned(), kind, remedy };
-    if kind.is_dir() {
-        return Err(refused("a directory", " (the .mcap or .db3 in it)"));
+    let about = std::fs::metadata(path).map_err(LogError::opening(path))?;
+    if about.is_file() {
+        return File::open(path).map_err(LogError::opening(path));
     }
-    if !kind.is_file() {
-        return Err(refused("a pipe or a device", "; a pipe can be written to a file first"));
-    }
-    File::open(path).map_err(failed)
+    let (kind, remedy) = if about.is_dir() {
+        ("a directory", " (the .mcap or .db3 in it)")
+    } else {
+        ("a pipe or a device", "; a pipe can be written to a file first")
+    };
+    Err(LogError::NotAFile { path: path.to_owned(), kind, remedy })
 }
 
 /// Returns the name of a file without the ending of a compressed one.
@@ -106,17 +104,20 @@ fn stripped(name: &str) -> &str {
 fn parts_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let files = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path());
     let files: Vec<PathBuf> = files.collect();
-    let of = |kind: &&str| -> Vec<PathBuf> {
-        let has_kind = |path: &&PathBuf| {
-            Path::new(unpacked_name(path)).extension().is_some_and(|it| it == *kind)
-        };
-        let is_plain = |path: &Path| path.extension().is_some_and(|it| it == *kind);
-        let is_twice = |path: &PathBuf| {
-            !is_plain(path) && files.contains(&path.with_file_name(unpacked_name(path)))
-        };
-        files.iter().filter(has_kind).filter(|path| !is_twice(path)).cloned().collect()
-    };
-    Ok(KINDS.iter().map(of).find(|parts| !parts.is_empty()).unwrap_or_default())
+    for kind in KINDS {
+        let mut parts = Vec::new();
+        for path in &files {
+            let unpacked = path.with_file_name(unpacked_name(path));
+            let is_twice = unpacked != *path && files.contains(&unpacked);
+            if unpacked.extension().is_some_and(|it| it == kind) && !is_twice {
+                parts.push(path.clone());
+            }
+        }
+        if !parts.is_empty() {
+            return Ok(parts);
+        }
+    }
+    Ok(Vec::new())
 }
 
 /// Splits `NAME_12.mcap` into its name and its number; a name without a number is number 0.

@@ -28,6 +28,11 @@ pub(crate) fn is_packed(data: &[u8]) -> bool {
     data.starts_with(&MAGIC)
 }
 
+fn too_long(length: u64, limit: u64) -> (&'static str, String) {
+    let why = format!("a compressed message of {length} bytes or more; the limit is {limit}");
+    ("oversized_records", why)
+}
+
 /// Unpacks a message.
 ///
 /// # Errors
@@ -41,12 +46,8 @@ pub(crate) fn unpack_message(
     let longest = limits.record_bytes;
     // Stated by most writers; a wrong one is noticed when the message is unpacked.
     let claimed = get_frame_content_size(data).ok().flatten().unwrap_or(0);
-    let too_long = |length: u64| {
-        let why = format!("a compressed message of {length} bytes or more; the limit is {longest}");
-        Err(("oversized_records", why))
-    };
     if claimed > longest {
-        return too_long(claimed);
+        return Err(too_long(claimed, longest));
     }
     let unpacked = Decoder::with_buffer(data).and_then(|mut decoder| {
         decoder.window_log_max(MAX_WINDOW_LOG)?;
@@ -54,7 +55,7 @@ pub(crate) fn unpack_message(
         decoder.take(longest + 1).read_to_end(out)
     });
     match unpacked {
-        Ok(length) if length as u64 > longest => too_long(longest + 1),
+        Ok(length) if length as u64 > longest => Err(too_long(longest + 1, longest)),
         Ok(_) => Ok(()),
         Err(error) => {
             let why = format!("a compressed message does not unpack: {error}");
@@ -80,11 +81,10 @@ impl LogFile {
     /// [`LogError::Open`], [`LogError::NotAFile`]; [`LogError::Packed`] for a compressed file that
     /// is beyond the limit or cannot be unpacked to a temporary one.
     pub(crate) fn open(path: &Path, limits: &Limits) -> Result<Self, LogError> {
-        let failed = |source| LogError::Open { path: path.to_owned(), source };
         let mut file = open_file(path)?;
         let mut head = Vec::with_capacity(MAX_FRAME_HEADER);
-        (&mut file).take(MAX_FRAME_HEADER as u64).read_to_end(&mut head).map_err(failed)?;
-        file.rewind().map_err(failed)?;
+        let read = (&mut file).take(MAX_FRAME_HEADER as u64).read_to_end(&mut head);
+        read.and_then(|_| file.rewind()).map_err(LogError::opening(path))?;
         if !is_packed(&head) {
             return Ok(Self { file, path: path.to_owned(), _unpacked: None, fault: None });
         }
@@ -122,12 +122,13 @@ fn too_large(bytes: u64, limits: &Limits) -> String {
     )
 }
 
+fn no_room(error: std::io::Error) -> String {
+    let folder = std::env::temp_dir();
+    format!("it cannot be unpacked in {}: {error}; TMPDIR names another", folder.display())
+}
+
 /// Unpacks a file to a temporary one, as far as it is whole.
 fn unpack_file(packed: File, limits: &Limits) -> Result<LogFile, String> {
-    let no_room = |error: std::io::Error| {
-        let folder = std::env::temp_dir();
-        format!("it cannot be unpacked in {}: {error}; TMPDIR names another", folder.display())
-    };
     let mut out = NamedTempFile::new().map_err(no_room)?;
     let mut decoder = Decoder::new(packed).map_err(|error| error.to_string())?;
     decoder.window_log_max(MAX_WINDOW_LOG).map_err(|error| error.to_string())?;

@@ -62,6 +62,11 @@ impl Waiting {
         count > MAX_WAITING || count > MIN_WAITING && bytes > MAX_WAITING_BYTES
     }
 
+    /// Returns the time between a waiting image and a stamp, s.
+    fn off_s(&self, image: usize, stamp: Stamp) -> f64 {
+        self.images[image].stamp.seconds_since(stamp).abs()
+    }
+
     /// Takes the image nearest to `stamp` if it is within the tolerance and not nearer to the next
     /// image of the other stream. Images older than the tolerance are dropped.
     pub(crate) fn take(
@@ -70,12 +75,11 @@ impl Waiting {
         next: Option<Stamp>,
         tolerance_s: f64,
     ) -> Option<Payload> {
-        let off = |image: &Payload, to: Stamp| image.stamp.seconds_since(to).abs();
         let nearest = (0..self.images.len())
-            .min_by(|a, b| off(&self.images[*a], stamp).total_cmp(&off(&self.images[*b], stamp)));
+            .min_by(|a, b| self.off_s(*a, stamp).total_cmp(&self.off_s(*b, stamp)));
         let found = nearest.filter(|i| {
-            let here = off(&self.images[*i], stamp);
-            let there = next.map_or(f64::INFINITY, |next| off(&self.images[*i], next));
+            let here = self.off_s(*i, stamp);
+            let there = next.map_or(f64::INFINITY, |next| self.off_s(*i, next));
             here <= tolerance_s && here <= there
         });
         let taken = found.and_then(|i| self.images.remove(i));

@@ -24,11 +24,9 @@ impl Registration {
     /// Prepares the registration from the lenses and sizes of both cameras (their poses on the
     /// robot are not used) and the pose of the depth camera in the colour camera.
     pub fn new(depth: &Camera, colour: &Camera, colour_from_depth: Isometry3<f64>) -> Self {
-        let ray = |x: usize, y: usize| depth.ray(Point2::new(x as f64, y as f64));
-        let rays =
-            (0..depth.height).flat_map(|y| (0..depth.width).map(move |x| ray(x, y))).collect();
+        let pixels = (0..depth.height).flat_map(|y| (0..depth.width).map(move |x| (x, y)));
         Self {
-            rays,
+            rays: pixels.map(|(x, y)| depth.ray(Point2::new(x as f64, y as f64))).collect(),
             depth_size: (depth.width, depth.height),
             colour: colour.clone(),
             colour_from_depth,

@@ -219,8 +219,9 @@ impl Scan {
             *self.counters.entry(name).or_default() += count;
         }
         let file = part.path.file_name().unwrap_or_default().display();
-        let said = |note: &String| if is_split { format!("{file}: {note}") } else { note.clone() };
-        self.notes.extend(walker.notes().iter().map(said));
+        for note in walker.notes() {
+            self.notes.push(if is_split { format!("{file}: {note}") } else { note.clone() });
+        }
         self.data_lost |= walker.data_lost();
     }
 
@@ -270,12 +271,12 @@ impl Scan {
 
     /// Returns the topics as lines of text.
     pub(crate) fn listing(&self) -> String {
-        let line = |(name, topic): (&String, &Topic)| {
+        let mut lines = Vec::new();
+        for (name, topic) in &self.topics {
             let pixels =
                 topic.pixels.as_ref().map(|pixels| format!(", {pixels}")).unwrap_or_default();
-            format!("  {name} ({}{pixels}; {} messages)", topic.schema, topic.count)
-        };
-        let lines: Vec<_> = self.topics.iter().map(line).collect();
+            lines.push(format!("  {name} ({}{pixels}; {} messages)", topic.schema, topic.count));
+        }
         if lines.is_empty() { "  nothing".into() } else { lines.join("\n") }
     }
 }
@@ -481,8 +482,9 @@ pub(crate) fn is_static(tf_topic: &str) -> bool {
 impl Topic {
     /// Returns true if all messages have one stamp and were recorded at different times.
     pub(crate) fn has_constant_stamps(&self) -> bool {
-        let is_one = |stamps: &[Stamp]| stamps.windows(2).all(|pair| pair[0] == pair[1]);
-        self.stamps.len() > 1 && is_one(&self.stamps) && !is_one(&self.recorded)
+        let [stamps_same, recorded_same] = [&self.stamps, &self.recorded]
+            .map(|stamps| stamps.windows(2).all(|pair| pair[0] == pair[1]));
+        self.stamps.len() > 1 && stamps_same && !recorded_same
     }
 
     /// Returns the reason for which no message can be used, although all can be decoded.

@@ -155,12 +155,12 @@ impl TfBuffer {
         let up_t = self.ancestors(plain(target));
         let up_s = self.ancestors(plain(source));
         let common = up_s.iter().find(|frame| up_t.contains(frame)).copied();
-        let below = |up: Vec<&'a str>| {
-            let frames = up.into_iter().take_while(move |frame| Some(*frame) != common);
-            frames.filter_map(|frame| self.links.get(frame)).collect::<Vec<_>>()
-        };
-        let links = common.map(|_| [below(up_t), below(up_s)].concat());
-        links.into_iter().flatten()
+        let ways = common.map(|common| [(up_t, common), (up_s, common)]);
+        let frames = ways
+            .into_iter()
+            .flatten()
+            .flat_map(|(up, common)| up.into_iter().take_while(move |frame| *frame != common));
+        frames.filter_map(|frame| self.links.get(frame))
     }
 
     /// Returns the pose of frame `source` in frame `target` by the static transforms between them
@@ -169,12 +169,12 @@ impl TfBuffer {
         let up_t = self.ancestors(plain(target));
         let up_s = self.ancestors(plain(source));
         let common = up_s.iter().find(|frame| up_t.contains(frame))?;
-        let climbed = |up: &[&str]| {
+        let [target, source] = [&up_t, &up_s].map(|up| {
             let below = up.iter().take_while(|frame| *frame != common);
             let fixed = below.filter_map(|frame| self.links.get(*frame)?.fixed);
             fixed.fold(Isometry3::identity(), |pose, link| link * pose)
-        };
-        Some(climbed(&up_t).inverse() * climbed(&up_s))
+        });
+        Some(target.inverse() * source)
     }
 
     /// Returns the frame, its parent, and so on; ends at a loop.
@@ -237,11 +237,11 @@ impl Link {
     }
 
     fn at(&self, at: Stamp) -> Option<Isometry3<f64>> {
-        let near =
-            |sample: &Sample| (sample.0.seconds_since(at).abs() <= REACH_S).then_some(sample.1);
         let moving = match self.around(at) {
             (Some(a), Some(b)) => Some(interpolate(a, b, at)),
-            (Some(one), None) | (None, Some(one)) => near(one),
+            (Some(one), None) | (None, Some(one)) => {
+                (one.0.seconds_since(at).abs() <= REACH_S).then_some(one.1)
+            }
             (None, None) => None,
         };
         // A link may be on both topics; the static one serves without a sample.

@@ -150,13 +150,14 @@ mod tests {
     fn truth_is_read_from_lines_and_a_wrong_one_is_named() {
         let path =
             std::env::temp_dir().join(format!("tagalong-lines-{}.jsonl", std::process::id()));
-        let line =
-            |stamp_ns| serde_json::to_string(&TruthFrame { stamp_ns, people: Vec::new() }).unwrap();
-        std::fs::write(&path, format!("{}\n\n{}\n", line(7), line(5))).unwrap();
+        let [five, seven] = [5, 7].map(|stamp_ns| {
+            serde_json::to_string(&TruthFrame { stamp_ns, people: Vec::new() }).unwrap()
+        });
+        std::fs::write(&path, format!("{seven}\n\n{five}\n")).unwrap();
         let stamps: Vec<u64> =
             read_truth_lines(&path).unwrap().iter().map(|frame| frame.stamp_ns).collect();
         assert_eq!(stamps, [5, 7]);
-        std::fs::write(&path, format!("{}\nnonsense\n", line(7))).unwrap();
+        std::fs::write(&path, format!("{seven}\nnonsense\n")).unwrap();
         let error = read_truth_lines(&path).unwrap_err();
         assert!(matches!(error, LogError::Truth { number: 2, .. }), "{error}");
         std::fs::remove_file(&path).unwrap();

@@ -31,6 +31,15 @@ enum Container {
     Database(Box<Database>),
 }
 
+/// Returns true if the file begins with a long magic, whose first bytes have been read.
+fn begins<R: Read>(source: &mut Source<R>, first: &[u8], magic: &[u8]) -> bool {
+    let mut rest = vec![0; magic.len() - 8];
+    first == &magic[..8] && {
+        source.fill(&mut rest);
+        rest == magic[8..]
+    }
+}
+
 impl LogWalker<LogFile> {
     /// Opens a file of a log, compressed or not.
     ///
@@ -67,21 +76,14 @@ impl<R: Read> LogWalker<R> {
         let mut source = Source::new(reader);
         let mut magic = [0; 8];
         let got = source.fill(&mut magic);
-        // Other magics are longer than that of MCAP, and no more may be read of the latter.
-        let mut is = |whole: &[u8]| {
-            let mut rest = vec![0; whole.len() - 8];
-            magic[..got] == whole[..8] && {
-                source.fill(&mut rest);
-                rest == whole[8..]
-            }
-        };
-        let container = if is(bag::MAGIC) {
+        let magic = &magic[..got];
+        let container = if begins(&mut source, magic, bag::MAGIC) {
             Container::Bag(Bag::default())
-        } else if is(database::MAGIC) {
+        } else if begins(&mut source, magic, database::MAGIC) {
             let path = path.ok_or_else(|| NotMcap("a database is read by its path".into()))?;
             Container::Database(Box::new(Database::open(path, limits)?))
         } else {
-            Container::Mcap(Mcap::behind(&magic[..got])?)
+            Container::Mcap(Mcap::behind(magic)?)
         };
         let mut walk = Walk::new(source, limits);
         if let Container::Database(database) = &container {

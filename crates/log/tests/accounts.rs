@@ -9,8 +9,7 @@ use nalgebra::{Isometry3, Vector3};
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{CompressedImage, Header, Image, LaserScan, Pose, encode};
 use tagalong_log::{
-    CameraSettings, FrameSource, Input, InputSettings, Inputs, Limits, LogError, StampSource,
-    TopicUse,
+    CameraSettings, FrameSource, Input, InputSettings, Inputs, LogError, StampSource, TopicUse,
 };
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
@@ -45,15 +44,8 @@ impl Stream<'_> {
                 _ => vec![index as u8; bytes],
             });
             let data: Vec<u8> = values.collect();
-            let image = Image {
-                header: Header::new(stamp_of(index), self.frame),
-                height: self.size.1,
-                width: self.size.0,
-                encoding: self.encoding.into(),
-                is_bigendian: 0,
-                step: self.size.0 * bytes as u32,
-                data: &data,
-            };
+            let header = Header::new(stamp_of(index), self.frame);
+            let image = Image::packed(header, self.encoding, self.size.0, self.size.1, &data);
             log.bytes::<Image<'_>>(self.topic, recorded(index), &encode(&image));
         }
     }
@@ -76,14 +68,21 @@ fn info(log: &mut LogWriter, topic: &str, frame: &str, size: (u32, u32)) {
     log.info(topic, frame, &camera);
 }
 
+/// Starts a log with a fixed camera and its calibration.
+fn log_of_camera(info_topic: &str, size: (u32, u32)) -> LogWriter {
+    let mut log = LogWriter::plain();
+    log.fixed("base_link", "optical", &level_pose());
+    info(&mut log, info_topic, "optical", size);
+    log
+}
+
 fn open_with(
     log: LogWriter,
     input: &InputSettings,
     inputs: Inputs,
 ) -> Result<(FrameSource, SavedLog), LogError> {
     let saved = log.save();
-    let source = FrameSource::open(&saved.path, input, &Limits::default(), inputs)?;
-    Ok((source, saved))
+    Ok((saved.open(input, inputs)?, saved))
 }
 
 fn open(log: LogWriter, inputs: Inputs) -> (FrameSource, SavedLog) {
@@ -190,7 +189,7 @@ fn a_camera_that_is_not_there_is_refused_with_those_that_are() {
 
 #[test]
 fn streams_whose_names_have_nothing_in_common_are_one_device_unless_they_look_apart() {
-    let log = |yaw_rad: f64| {
+    let [near, apart] = [0.1, 3.0].map(|yaw_rad| {
         let mut log = LogWriter::plain();
         log.fixed("base_link", "a", &level_pose());
         let turned = Isometry3::new(Vector3::zeros(), Vector3::new(0.0, 0.0, yaw_rad));
@@ -200,10 +199,11 @@ fn streams_whose_names_have_nothing_in_common_are_one_device_unless_they_look_ap
         }
         colour("/usb_cam/image_raw", "a").write(&mut log, recorded);
         depth("/kinect/image", "b").write(&mut log, recorded);
-        log
-    };
-    assert_eq!(used(&open(log(0.1), Inputs::ANY).0, "depth"), "/kinect/image");
-    let (source, _saved) = open(log(3.0), Inputs::ANY);
+        log.save()
+    });
+    let source = near.open(&InputSettings::default(), Inputs::ANY).unwrap();
+    assert_eq!(used(&source, "depth"), "/kinect/image");
+    let source = apart.open(&InputSettings::default(), Inputs::ANY).unwrap();
     assert!(used(&source, "colour").is_empty() || used(&source, "depth").is_empty());
     // Both are used if the settings name both.
     let input = InputSettings {
@@ -211,7 +211,7 @@ fn streams_whose_names_have_nothing_in_common_are_one_device_unless_they_look_ap
         depth_topic: Some("/kinect/image".into()),
         ..InputSettings::default()
     };
-    let (source, _saved) = open_with(log(3.0), &input, DEPTH).unwrap();
+    let source = apart.open(&input, DEPTH).unwrap();
     assert_eq!(used(&source, "depth"), "/kinect/image");
 }
 
@@ -246,9 +246,7 @@ fn calibrations_of_other_sizes_are_scaled_or_told() {
     for (calibrated, is_scaled) in
         [((16, 12), true), ((32, 24), true), ((64, 48), true), ((8, 6), true), ((20, 15), false)]
     {
-        let mut log = LogWriter::plain();
-        log.fixed("base_link", "optical", &level_pose());
-        info(&mut log, "/cam/camera_info", "optical", calibrated);
+        let mut log = log_of_camera("/cam/camera_info", calibrated);
         colour("/cam/image_raw", "optical").write(&mut log, recorded);
         let found = open_with(log, &InputSettings::default(), Inputs::ANY);
         assert_eq!(found.is_ok(), is_scaled, "{calibrated:?}");
@@ -301,22 +299,17 @@ fn depth_at_other_times_is_told_with_the_offset() {
         (-1.6e9, "`--stamps recording`"),
         (40.0, "`--stamps recording`"),
     ] {
-        let mut log = LogWriter::plain();
-        log.fixed("base_link", "optical", &level_pose());
-        info(&mut log, "/cam/camera_info", "optical", (16, 12));
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
         Stream { count: 1, ..colour("/cam/color", "optical") }.write(&mut log, recorded);
         Stream { count: 1, ..depth("/cam/depth", "optical") }
             .write(&mut log, |index| recorded(index).plus_seconds(offset_s));
-        let bytes = log.finish();
-        let saved = SavedLog::new(&bytes);
-        let open = |stamps| {
-            let input = InputSettings { stamps, ..InputSettings::default() };
-            FrameSource::open(&saved.path, &input, &Limits::default(), Inputs::ANY).unwrap()
-        };
-        let source = open(StampSource::Auto);
+        let saved = log.save();
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
         let told = entry(&source, "/cam/depth");
         assert!(told.remedy.as_ref().unwrap().contains(remedy), "{offset_s}: {told}");
-        assert!(open(StampSource::Recording).account().usable().contains(&"depth"), "{offset_s}");
+        let input = InputSettings { stamps: StampSource::Recording, ..InputSettings::default() };
+        let source = saved.open(&input, Inputs::ANY).unwrap();
+        assert!(source.account().usable().contains(&"depth"), "{offset_s}");
     }
 }
 
@@ -324,22 +317,18 @@ fn depth_at_other_times_is_told_with_the_offset() {
 fn stamps_that_are_never_set_are_replaced_by_the_times_of_recording() {
     for stamp in [0.0, 1.0, 1e-9, 1.7e9, 2e9] {
         let stamp = Stamp::default().plus_seconds(stamp);
-        let log = || {
-            let mut log = LogWriter::plain();
-            log.fixed("base_link", "optical", &level_pose());
-            info(&mut log, "/cam/camera_info", "optical", (16, 12));
-            // Depth first, because an image does not wait for it until the end of the log.
-            depth("/cam/depth", "optical").write(&mut log, |_| stamp);
-            colour("/cam/color", "optical").write(&mut log, |_| stamp);
-            log
-        };
-        let (mut source, _saved) = open(log(), DEPTH);
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
+        // Depth first, because an image does not wait for it until the end of the log.
+        depth("/cam/depth", "optical").write(&mut log, |_| stamp);
+        colour("/cam/color", "optical").write(&mut log, |_| stamp);
+        let saved = log.save();
+        let mut source = saved.open(&InputSettings::default(), DEPTH).unwrap();
         assert!(source.notes().iter().any(|note| note.contains("are not set: all are")));
         assert_eq!(count_frames(&mut source), 4);
         assert!(!source.data_lost(), "{:?}", source.notes());
         // If the settings insist on the stamps, images are lost, and reported as lost.
         let input = InputSettings { stamps: StampSource::Header, ..InputSettings::default() };
-        let (mut source, _saved) = open_with(log(), &input, DEPTH).unwrap();
+        let mut source = saved.open(&input, DEPTH).unwrap();
         assert_eq!(count_frames(&mut source), 1);
         assert!(source.data_lost() && source.counters()["frames_of_same_stamp"] == 3);
     }
@@ -348,25 +337,21 @@ fn stamps_that_are_never_set_are_replaced_by_the_times_of_recording() {
 #[test]
 fn odometry_of_another_clock_gives_no_places() {
     for offset_s in [-1.7e9, 3600.0, -30.0, 5.0, 1e5] {
-        let log = || {
-            let mut log = LogWriter::plain();
-            log.fixed("base_link", "optical", &level_pose());
-            info(&mut log, "/cam/camera_info", "optical", (16, 12));
-            colour("/cam/color", "optical").write(&mut log, recorded);
-            for index in 0..4 {
-                let pose = Pose::from(&Isometry3::translation(f64::from(index), 0.0, 0.0));
-                let stamp = recorded(index).plus_seconds(offset_s);
-                log.odometry_of(recorded(index), stamp, pose);
-            }
-            log
-        };
-        let (source, _saved) = open(log(), Inputs::ANY);
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
+        colour("/cam/color", "optical").write(&mut log, recorded);
+        for index in 0..4 {
+            let pose = Pose::from(&Isometry3::translation(f64::from(index), 0.0, 0.0));
+            let stamp = recorded(index).plus_seconds(offset_s);
+            log.odometry_of(recorded(index), stamp, pose);
+        }
+        let saved = log.save();
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
         assert!(source.lacks_usable_odometry() && !source.has_odometry(), "{offset_s}");
         let told = entry(&source, "/odom");
         let offset = format!("begins {:.1} s", offset_s.abs());
         assert!(told.problem.as_ref().unwrap().contains(&offset), "{told}");
         let input = InputSettings { stamps: StampSource::Recording, ..InputSettings::default() };
-        let (mut source, _saved) = open_with(log(), &input, Inputs::ANY).unwrap();
+        let mut source = saved.open(&input, Inputs::ANY).unwrap();
         let last = std::iter::from_fn(|| source.next_frame()).last().unwrap();
         assert!((last.odom_from_robot.translation.x - 3.0).abs() < 1e-6, "{offset_s}");
     }
@@ -374,9 +359,7 @@ fn odometry_of_another_clock_gives_no_places() {
 
 /// Writes a log with colour, and compressed images on another topic.
 fn log_with_compressed(topic: &str, format: &str, data: &[u8]) -> LogWriter {
-    let mut log = LogWriter::plain();
-    log.fixed("base_link", "optical", &level_pose());
-    info(&mut log, "/cam/color/camera_info", "optical", (16, 12));
+    let mut log = log_of_camera("/cam/color/camera_info", (16, 12));
     colour("/cam/color/image_raw", "optical").write(&mut log, recorded);
     for index in 0..4 {
         let header = Header::new(recorded(index), "optical");
@@ -428,20 +411,22 @@ fn sixteen_bits_of_grey_are_depth_by_content_if_their_name_says_so_or_the_user()
         ("/cam/image/compressed", "png", false),
         ("/cam/deep", "", false),
     ] {
-        let depth_of = |input: &InputSettings| {
-            let log = log_with_compressed(topic, format, &png);
-            let (mut source, _saved) = open_with(log, input, DEPTH).unwrap();
-            source.next_frame().unwrap().frame.depth().unwrap().get(3, 3).unwrap()
-        };
+        let saved = log_with_compressed(topic, format, &png).save();
         let named = InputSettings { depth_topic: Some(topic.into()), ..InputSettings::default() };
-        assert!((depth_of(&named) - 2.5).abs() < 1e-6, "{topic}");
-        let unit = InputSettings { depth_unit_m: Some(0.01), ..named };
-        assert!((depth_of(&unit) - 25.0).abs() < 1e-4, "{topic}");
+        let unit = InputSettings { depth_unit_m: Some(0.01), ..named.clone() };
+        let mut expected = vec![(named, 2.5), (unit, 25.0)];
         if is_named {
-            assert!((depth_of(&InputSettings::default()) - 2.5).abs() < 1e-6, "{topic}");
+            expected.push((InputSettings::default(), 2.5));
+        }
+        for (input, metres) in expected {
+            let found = saved.open(&input, DEPTH).unwrap().next_frame().unwrap();
+            let depth = found.frame.depth().unwrap().get(3, 3).unwrap();
+            assert!((depth - metres).abs() < 1e-4, "{topic}: {depth} m");
+        }
+        if is_named {
             continue;
         }
-        let (source, _saved) = open(log_with_compressed(topic, format, &png), Inputs::ANY);
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
         let told = entry(&source, topic);
         assert!(told.to_string().contains("could be depth"), "{told}");
         assert!(told.remedy.as_ref().unwrap().contains("`depth_topic`"), "{told}");
@@ -457,9 +442,7 @@ fn grey_images_of_16_bits_are_depth_by_their_name() {
         ("/cam/depth/ir/image", false),
         ("/cam/infra1/image", false),
     ] {
-        let mut log = LogWriter::plain();
-        log.fixed("base_link", "optical", &level_pose());
-        info(&mut log, "/cam/color/camera_info", "optical", (16, 12));
+        let mut log = log_of_camera("/cam/color/camera_info", (16, 12));
         colour("/cam/color/image_raw", "optical").write(&mut log, recorded);
         Stream { encoding: "mono16", ..depth(topic, "optical") }.write(&mut log, recorded);
         let (source, _saved) = open(log, Inputs::ANY);

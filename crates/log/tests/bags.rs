@@ -265,12 +265,12 @@ fn annotated_legs_belong_to_the_scans_in_their_order() {
     assert_eq!(scans.len(), 83);
     assert!(scans.iter().all(|scan| scan.scan.points.len() > 300 && !scan.legs.is_empty()));
     // Most legs are where the scanner met something.
-    let near = |scan: &tagalong_log::LegScan| {
+    let near = scans.iter().filter(|scan| {
         scan.legs
             .iter()
             .all(|leg| scan.scan.points.iter().any(|point| (point.xy() - leg).norm() < 0.15))
-    };
-    assert!(scans.iter().filter(|scan| near(scan)).count() > 75);
+    });
+    assert!(near.count() > 75);
 }
 
 #[test]

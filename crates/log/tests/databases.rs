@@ -117,20 +117,17 @@ fn a_database_makes_the_frames_of_the_mcap_file() {
     let stored = Stored::new("");
     let mcap = stored.path.with_extension("mcap");
     std::fs::write(&mcap, log()).unwrap();
-    let input = InputSettings { base_frame: "colour".into(), ..InputSettings::default() };
-    let inputs = Inputs::NONE.require(Input::Colour);
-    let frames = |path: &Path| {
-        let mut source = FrameSource::open(path, &input, &Limits::default(), inputs).unwrap();
+    let [of_database, of_mcap] = [&stored.path, &mcap].map(|path| {
+        let mut source = source(path, &Limits::default()).unwrap();
         let mut all = Vec::new();
         while let Some(item) = source.next_frame() {
             let frame = item.frame;
             all.push((frame.stamp, frame.colour().unwrap().clone(), frame.camera.clone()));
         }
         all
-    };
-    let of_database = frames(&stored.path);
+    });
     assert_eq!(of_database.len(), 9);
-    assert_eq!(of_database, frames(&mcap));
+    assert_eq!(of_database, of_mcap);
 }
 
 #[test]
@@ -140,16 +137,13 @@ fn a_real_database_tells_what_its_mcap_file_tells() {
         return;
     };
     let walker = LogWalker::at(&path, File::open(&path).unwrap(), &Limits::default()).unwrap();
-    let (messages, counters, lost) = told(walker);
-    assert!(!lost && messages.len() == 5, "{} {counters:?}", messages.len());
+    let (mut found, counters, lost) = told(walker);
+    assert!(!lost && found.len() == 5, "{} {counters:?}", found.len());
     let mcap = std::fs::read(path.with_file_name("sample-none.mcap")).unwrap();
     // Old recorders leave out `msg`. The MCAP file is in the order of recording times, which the database does not keep.
-    let sorted = |mut all: Vec<Told>| {
-        all.sort();
-        all
-    };
-    let found = sorted(messages);
-    let expected = sorted(in_mcap(&mcap));
+    found.sort();
+    let mut expected = in_mcap(&mcap);
+    expected.sort();
     for ((topic, kind, time, data), expected) in found.iter().zip(&expected) {
         let kind = kind.replace('/', "/msg/");
         assert_eq!((topic, &kind, *time), (&expected.0, &expected.1, expected.2));
@@ -182,9 +176,10 @@ fn frames_of(path: &Path) -> (Vec<(Stamp, RgbImage)>, Vec<String>, bool) {
 
 /// Compresses each message, as `compression_mode: MESSAGE` does.
 fn packed_messages(messages: &[Told]) -> Vec<Told> {
-    let pack =
-        |(topic, kind, time, data): &Told| (topic.clone(), kind.clone(), *time, packed(data));
-    messages.iter().map(pack).collect()
+    let packed = messages
+        .iter()
+        .map(|(topic, kind, time, data)| (topic.clone(), kind.clone(), *time, packed(data)));
+    packed.collect()
 }
 
 #[test]

@@ -46,8 +46,6 @@ fn messages_and_images_are_those_that_were_written() {
                 sha256(message.data),
             ));
         }
-        let number = |value: &serde_json::Value| value.as_u64().unwrap();
-        let string = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
         let mut wanted: Vec<_> = listed
             .iter()
             .map(|m| {
@@ -66,6 +64,14 @@ fn messages_and_images_are_those_that_were_written() {
     }
 }
 
+fn number(value: &serde_json::Value) -> u64 {
+    value.as_u64().unwrap()
+}
+
+fn string(value: &serde_json::Value) -> String {
+    value.as_str().unwrap().to_owned()
+}
+
 fn check_image(listed: &[serde_json::Value], topic: &str, data: &[u8]) {
     let Some(wanted) =
         listed.iter().find(|m| m["topic"] == topic && m.get("data_sha256").is_some())
@@ -80,8 +86,8 @@ fn check_image(listed: &[serde_json::Value], topic: &str, data: &[u8]) {
     } else {
         let image: Image<'_> = decode(data).unwrap();
         let size = (u64::from(image.width), u64::from(image.height), u64::from(image.step));
-        let number = |key: &str| wanted[key].as_u64().unwrap();
-        assert_eq!(size, (number("width"), number("height"), number("step")));
+        let expected = ["width", "height", "step"].map(|key| number(&wanted[key]));
+        assert_eq!(size, expected.into());
         assert_eq!(image.encoding, wanted["encoding"].as_str().unwrap());
         assert_eq!(sha256(image.data), wanted["data_sha256"].as_str().unwrap());
         assert_eq!(decode_raw(&image, None, &Limits::default()).unwrap().size(), (640, 480));

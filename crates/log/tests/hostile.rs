@@ -5,12 +5,13 @@
 mod common;
 
 use std::io::{Read, Write};
+use std::path::Path;
 
 use common::{LogWriter, SavedLog, at, compressions};
 use mcap::{Compression, WriteOptions};
 use tagalong_log::LogWalker;
 use tagalong_log::msgs::StringMsg;
-use tagalong_log::{FrameSource, InputSettings, Inputs, Limits};
+use tagalong_log::{InputSettings, Inputs, Limits};
 use tagalong_math::{RandomSource, XorShift64};
 
 const MESSAGES: usize = 120;
@@ -212,10 +213,7 @@ fn a_file_without_checksums_says_so() {
     let options = WriteOptions::new().compression(None).calculate_chunk_crcs(false);
     let mut log = LogWriter::new(options);
     log.colour(at(0.0));
-    let saved = log.save();
-    let source =
-        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), Inputs::ANY)
-            .unwrap();
+    let source = log.save().open(&InputSettings::default(), Inputs::ANY).unwrap();
     assert!(source.notes().iter().any(|note| note.starts_with("crc: absent")));
     assert!(!source.counters().contains_key("chunks_verified"));
 }
@@ -341,41 +339,35 @@ fn a_pipe_in_small_pieces_gives_the_same() {
 
 #[test]
 fn what_is_no_log_is_refused_in_one_line() {
-    let open = |bytes: &[u8]| {
-        let saved = SavedLog::new(bytes);
-        let input = InputSettings::default();
-        let limits = Limits::default();
-        let error = FrameSource::open(&saved.path, &input, &limits, Inputs::ANY).err().unwrap();
-        let error = error.to_string();
-        assert!(error.contains("test.mcap"), "{error}");
-        error
-    };
-    assert!(open(b"").contains("it is empty"));
-    assert!(open(b"#ROSBAG V1.2\n").contains("ROS 1 bag"));
-    assert!(open(b"#ROSBAG V2.0\n").contains("no images"));
-    assert!(open(b"SQLite format 3\0").contains("rosbag2 database"));
-    assert!(open(b"hello, this is text").contains("starts with"));
-    assert!(open(&MAGIC).contains("no images"));
-    assert!(open(&[MAGIC, MAGIC].concat()).contains("no images"));
     let noise: Vec<u8> =
         (0..5000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
-    assert!(open(&noise).contains("not an MCAP file"));
-    assert!(open(&[&MAGIC[..], &noise].concat()).contains("no images"));
+    for (bytes, reason) in [
+        (&b""[..], "it is empty"),
+        (b"#ROSBAG V1.2\n", "ROS 1 bag"),
+        (b"#ROSBAG V2.0\n", "no images"),
+        (b"SQLite format 3\0", "rosbag2 database"),
+        (b"hello, this is text", "starts with"),
+        (&MAGIC, "no images"),
+        (&[MAGIC, MAGIC].concat(), "no images"),
+        (&noise, "not an MCAP file"),
+        (&[&MAGIC[..], &noise].concat(), "no images"),
+    ] {
+        let error = refusal(&SavedLog::new(bytes).path);
+        assert!(error.contains("test.mcap") && error.contains(reason), "{error}");
+    }
+}
+
+fn refusal(path: &Path) -> String {
+    common::open(path, &InputSettings::default(), Inputs::ANY).err().unwrap().to_string()
 }
 
 #[test]
 fn what_is_no_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let open = |path: &std::path::Path| {
-        FrameSource::open(path, &InputSettings::default(), &Limits::default(), Inputs::ANY)
-            .err()
-            .unwrap()
-            .to_string()
-    };
-    assert!(open(folder.path()).contains("holds no .mcap"));
-    assert!(open(&folder.path().join("absent.mcap")).contains("absent.mcap"));
+    assert!(refusal(folder.path()).contains("holds no .mcap"));
+    assert!(refusal(&folder.path().join("absent.mcap")).contains("absent.mcap"));
     if cfg!(unix) {
-        assert!(open(std::path::Path::new("/dev/zero")).contains("a pipe or a device"));
+        assert!(refusal(Path::new("/dev/zero")).contains("a pipe or a device"));
     }
 }
 

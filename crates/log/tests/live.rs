@@ -5,26 +5,19 @@ mod common;
 
 use std::io::Cursor;
 
-use common::{LogWriter, SavedLog, at, camera, level_pose};
-use tagalong_core::{ObstacleData, ObstacleReadings};
+use common::{SavedLog, at, started};
+use tagalong_core::{ObstacleData, ObstacleReadings, Stamp};
 use tagalong_log::msgs::{BoolMsg, BumperEvent, Header, Range, encode};
 use tagalong_log::{
-    FrameSource, Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogError, LogFrame,
+    Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogError, LogFrame,
 };
 use tagalong_log::{LogWalker, ObstacleKind, ObstacleTopic};
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
 
-/// Starts a log with a calibration and a fixed camera.
-fn started() -> LogWriter {
-    let mut log = LogWriter::plain();
-    log.info("/camera/color/camera_info", "colour", &camera(16, 12, 14.0));
-    log.fixed("base_link", "colour", &level_pose());
-    log
-}
-
-/// Writes colour and depth ten times a second, odometry five times as often.
-fn drive(log: &mut LogWriter, frames: i32) {
+/// Returns a log with colour and depth ten times a second, and odometry five times as often.
+fn driven(frames: i32) -> Vec<u8> {
+    let mut log = started();
     for i in 0..5 * frames {
         let t = f64::from(i) * 0.02;
         log.odometry(at(t), 0.4 * t, 0.2 * t);
@@ -33,6 +26,7 @@ fn drive(log: &mut LogWriter, frames: i32) {
             log.depth(at(t - 0.005), "colour", 2.0 + i as f32);
         }
     }
+    log.finish()
 }
 
 /// Calls `hear` with topic, type and bytes of all messages of a log.
@@ -69,13 +63,9 @@ fn count(source: &LiveSource, name: &str) -> u64 {
 
 #[test]
 fn whoever_keeps_up_gets_the_frames_of_the_log() {
-    let mut log = started();
-    drive(&mut log, 12);
-    let log = log.finish();
+    let log = driven(12);
     let saved = SavedLog::new(&log);
-    let input = InputSettings::default();
-    let limits = Limits::default();
-    let mut source = FrameSource::open(&saved.path, &input, &limits, DEPTH).unwrap();
+    let mut source = saved.open(&InputSettings::default(), DEPTH).unwrap();
     let (found, live) = live(&log, DEPTH);
     assert_eq!(found.len(), 12);
     for frame in &found {
@@ -95,9 +85,7 @@ fn whoever_keeps_up_gets_the_frames_of_the_log() {
 
 #[test]
 fn whoever_is_slow_gets_the_newest_frame() {
-    let mut log = started();
-    drive(&mut log, 12);
-    let log = log.finish();
+    let log = driven(12);
     let mut source = listen(&log, &InputSettings::default(), DEPTH).start().unwrap();
     replay(&log, |topic, _, data| source.take(topic, data));
     let newest = source.newest_frame().unwrap();
@@ -134,17 +122,19 @@ fn a_jump_of_odometry_is_told_with_its_frame() {
     assert_eq!((found.len(), jumped), (20, vec![11]));
 }
 
-#[test]
-fn what_is_missing_is_named_until_it_comes() {
-    let mut log = started();
-    drive(&mut log, 3);
-    let log = log.finish();
-    let input = InputSettings::default();
-    let mut listening = Listening::new("the robot", &input, &Limits::default(), DEPTH).unwrap();
-    let missing = |listening: &Listening| match listening.start().err() {
+/// Returns the error of a start without an input.
+fn missing(listening: &Listening) -> String {
+    match listening.start().err() {
         Some(error @ LogError::Missing { .. }) => error.to_string(),
         other => panic!("{other:?}"),
-    };
+    }
+}
+
+#[test]
+fn what_is_missing_is_named_until_it_comes() {
+    let log = driven(3);
+    let input = InputSettings::default();
+    let mut listening = Listening::new("the robot", &input, &Limits::default(), DEPTH).unwrap();
     let text = missing(&listening);
     assert!(text.starts_with("`the robot` has no colour images"), "{text}");
     let depth = "/camera/depth/image_raw";
@@ -165,11 +155,22 @@ fn what_is_missing_is_named_until_it_comes() {
     assert!(error.to_string().contains("did you mean `/odom`?"), "{error}");
 }
 
+/// Returns the frame of a colour and a depth image that arrive at this time.
+fn frame_at(source: &mut LiveSource, stamp: Stamp, arrival_ns: u64) -> LogFrame {
+    let mut next = started();
+    next.colour(stamp);
+    next.depth(stamp, "colour", 2.0);
+    replay(&next.finish(), |topic, _, data| {
+        if matches!(topic, "/camera/color/image_raw" | "/camera/depth/image_raw") {
+            source.take_at(topic, data, arrival_ns);
+        }
+    });
+    source.newest_frame().unwrap()
+}
+
 #[test]
 fn sources_of_obstacles_are_waited_for_and_read() {
-    let mut log = started();
-    drive(&mut log, 6);
-    let log = log.finish();
+    let log = driven(6);
     let sonar = ObstacleTopic {
         mount: Some([0.2, 0.0, 0.1, 0.0, 0.0, 0.0]),
         ..ObstacleTopic::new("sonar", ObstacleKind::Range, "/sonar")
@@ -179,19 +180,15 @@ fn sources_of_obstacles_are_waited_for_and_read() {
     let sources = vec![sonar, bumper, button];
     let input = InputSettings { sources, ..InputSettings::default() };
     let mut listening = listen(&log, &input, DEPTH);
-    let lacks = |listening: &Listening| {
-        let missing = listening.start().err().map(|error| error.to_string());
-        missing.unwrap_or_default()
-    };
-    assert!(lacks(&listening).contains("no message of source `sonar` on /sonar"));
+    assert!(missing(&listening).contains("no message of source `sonar` on /sonar"));
     let range = Range { field_of_view: 0.5, max_range: 4.0, range: 1.5, ..Range::default() };
     listening.announce("/sonar", "sensor_msgs/msg/Range");
     assert!(listening.wants("/sonar"));
     listening.take("/sonar", &encode(&range));
     // Events need not have come: a bumper that is not pressed is silent.
-    assert!(lacks(&listening).contains("source `bumper`"));
+    assert!(missing(&listening).contains("source `bumper`"));
     listening.announce("/bumper", "kobuki_ros_interfaces/msg/BumperEvent");
-    assert!(lacks(&listening).contains("source `button`"));
+    assert!(missing(&listening).contains("source `button`"));
     listening.announce("/button", "std_msgs/msg/Bool");
     listening.take("/button", &encode(&BoolMsg { data: false }));
     let mut source = listening.start().unwrap();
@@ -209,19 +206,6 @@ fn sources_of_obstacles_are_waited_for_and_read() {
     let stamp = last.unwrap().frame.stamp.plus_seconds(0.1);
     let header = Header::new(stamp.plus_seconds(-0.05), "sonar");
     source.take("/sonar", &encode(&Range { header, ..range }));
-    let colour = "/camera/color/image_raw";
-    let depth = "/camera/depth/image_raw";
-    let frame_at = |source: &mut LiveSource, stamp, arrival_ns| {
-        let mut next = started();
-        next.colour(stamp);
-        next.depth(stamp, "colour", 2.0);
-        replay(&next.finish(), |topic, _, data| {
-            if topic == colour || topic == depth {
-                source.take_at(topic, data, arrival_ns);
-            }
-        });
-        source.newest_frame().unwrap()
-    };
     let found = frame_at(&mut source, stamp, 5_000_000_000);
     let readings = &found.frame.sensor::<ObstacleReadings>().unwrap().0;
     let names: Vec<&str> = readings.iter().map(|reading| &*reading.source).collect();
@@ -242,15 +226,12 @@ fn sources_of_obstacles_are_waited_for_and_read() {
 #[test]
 fn an_input_that_no_topic_can_carry_is_refused_before_the_first_frame() {
     const RADAR: Input = Input::Named("radar");
-    let mut log = started();
-    drive(&mut log, 3);
-    let log = log.finish();
-    let listening = |inputs| listen(&log, &InputSettings::default(), inputs);
-    let refusal = listening(DEPTH.require(RADAR)).start().err().map(|error| error.to_string());
-    let refusal = refusal.unwrap_or_default();
+    let log = driven(3);
+    let input = InputSettings::default();
+    let refusal = missing(&listen(&log, &input, DEPTH.require(RADAR)));
     assert!(refusal.contains("has no input `radar`, because no topic is read for it"), "{refusal}");
     assert!(refusal.contains("`inputs.relax(..)`"), "{refusal}");
-    assert!(listening(DEPTH.require(RADAR).relax(RADAR)).start().is_ok());
+    assert!(listen(&log, &input, DEPTH.require(RADAR).relax(RADAR)).start().is_ok());
 }
 
 #[test]

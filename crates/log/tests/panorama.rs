@@ -5,15 +5,14 @@ mod common;
 
 use std::f64::consts::TAU;
 
-use common::{LogWriter, at, camera, info_of};
+use common::{INFO, LogWriter, at, camera, info_of};
 use nalgebra::Point3;
 use tagalong_geometry::{ConicalMirror, Panorama};
 use tagalong_log::camera_info::{CONICAL_MIRROR, UNWRAPPED, mirror_coefficients};
 use tagalong_log::msgs::{CameraInfo, Header, Image};
-use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits, LogFrame};
+use tagalong_log::{Input, InputSettings, Inputs, LogFrame};
 
 const INPUTS: Inputs = Inputs::ANY.require(Input::Colour);
-const INFO: &str = "/camera/color/camera_info";
 const SIDE: u32 = 120;
 
 fn mirror() -> ConicalMirror {
@@ -60,20 +59,9 @@ fn first(
     let data: Vec<u8> =
         places.flat_map(|(x, y)| if bright(x, y) { [250; 3] } else { [10; 3] }).collect();
     let header = Header::new(at(0.0), "colour");
-    let image = Image {
-        header,
-        height,
-        width,
-        encoding: "rgb8".into(),
-        is_bigendian: 0,
-        step: 3 * width,
-        data: &data,
-    };
+    let image = Image::packed(header, "rgb8", width, height, &data);
     log.message("/camera/color/image_raw", at(0.0), &image);
-    let saved = log.save();
-    let input = InputSettings::default();
-    let limits = Limits::default();
-    FrameSource::open(&saved.path, &input, &limits, INPUTS).unwrap().next_frame().unwrap()
+    log.save().open(&InputSettings::default(), INPUTS).unwrap().next_frame().unwrap()
 }
 
 fn panorama(found: &LogFrame) -> Panorama {
@@ -120,10 +108,7 @@ fn numbers_of_no_mirror_are_refused() {
         log.message(INFO, at(0.0), &CameraInfo { d, ..raw_info() });
         log.fixed("base_link", "colour", &ConicalMirror::upright(1.5));
         log.colour_of(at(0.0), SIDE, SIDE);
-        let saved = log.save();
-        let input = InputSettings::default();
-        let limits = Limits::default();
-        let error = FrameSource::open(&saved.path, &input, &limits, INPUTS).err().unwrap();
+        let error = log.save().open(&InputSettings::default(), INPUTS).err().unwrap();
         assert!(error.to_string().contains("conical_mirror"), "{error}");
     }
 }

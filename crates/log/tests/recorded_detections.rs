@@ -4,24 +4,16 @@
 #[path = "common/mod.rs"]
 mod common;
 
-use common::{LogWriter, at, camera, level_pose};
+use common::{LogWriter, at, started};
 use serde::Serialize;
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{
     BoundingBox2D, Detection2D, Detection2DArray, Header, ObjectHypothesis,
     ObjectHypothesisWithPose, Point2D, Pose2D, PoseWithCovariance, encode,
 };
-use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs};
 
 const TOPIC: &str = "/detections";
-
-/// Starts a log whose images follow with [`read`].
-fn started() -> LogWriter {
-    let mut log = LogWriter::plain();
-    log.info("/camera/color/camera_info", "colour", &camera(16, 12, 14.0));
-    log.fixed("base_link", "colour", &level_pose());
-    log
-}
 
 fn stamp(index: u32) -> Stamp {
     at(0.1 * f64::from(index))
@@ -31,14 +23,13 @@ fn stamp(index: u32) -> Stamp {
 fn read(mut log: LogWriter, frames: u32, classes: &[&str]) -> (Vec<Option<usize>>, FrameSource) {
     // Behind the detections, because an image does not wait for them until the end of the log.
     (0..frames).for_each(|index| log.colour(stamp(index)));
-    let saved = log.save();
     let input = InputSettings {
         detections_topic: Some(TOPIC.into()),
         detection_classes: classes.iter().map(|class| (*class).to_owned()).collect(),
         ..InputSettings::default()
     };
     let inputs = Inputs::NONE.require(Input::Colour).require(Input::Detections);
-    let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), inputs).unwrap();
+    let mut source = log.save().open(&input, inputs).unwrap();
     let frames = std::iter::from_fn(|| source.next_frame());
     let counts = frames.map(|found| found.frame.recorded().map(<[_]>::len)).collect();
     (counts, source)
@@ -183,19 +174,17 @@ const YOLO: &str = "std_msgs/Header header\nyolo_msgs/Detection[] detections\n==
 
 /// Returns a message as ROS 1 Noetic writes it, with a number as the class.
 fn noetic(class: i64) -> Vec<u8> {
-    let header = |out: &mut Vec<u8>| {
-        let time = stamp(0);
-        let seconds = (time.nanos() / 1_000_000_000) as u32;
-        let nanos = (time.nanos() % 1_000_000_000) as u32;
-        for word in [7_u32, seconds, nanos, 6] {
-            out.extend(word.to_le_bytes());
-        }
-        out.extend(b"colour");
-    };
-    let mut out = Vec::new();
-    header(&mut out);
+    let mut header = Vec::new();
+    let time = stamp(0);
+    let seconds = (time.nanos() / 1_000_000_000) as u32;
+    let nanos = (time.nanos() % 1_000_000_000) as u32;
+    for word in [7_u32, seconds, nanos, 6] {
+        header.extend(word.to_le_bytes());
+    }
+    header.extend(b"colour");
+    let mut out = header.clone();
     out.extend(1_u32.to_le_bytes());
-    header(&mut out);
+    out.extend(&header);
     out.extend(1_u32.to_le_bytes());
     out.extend(class.to_le_bytes());
     out.extend(0.9_f64.to_le_bytes());
@@ -203,7 +192,7 @@ fn noetic(class: i64) -> Vec<u8> {
     for value in [8.0_f64, 6.0, 0.0, 4.0, 6.0] {
         out.extend(value.to_le_bytes());
     }
-    header(&mut out);
+    out.extend(&header);
     // Height, width, no encoding, byte, step, no data.
     out.extend([0_u8; 4 + 4 + 4 + 1 + 4 + 4]);
     out

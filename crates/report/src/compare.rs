@@ -33,8 +33,8 @@ pub fn compare<'a>(benchmark: &'a Benchmark, a: &str, b: &str) -> Vec<Difference
 pub fn compare_in<'a>(view: &OrderedBenchmark<'a>, a: &str, b: &str) -> Vec<Difference<'a>> {
     let mut all = Vec::new();
     for of_a in view.done(a) {
-        let same = |t: &&TaskResult| t.log == of_a.log && t.seed == of_a.seed;
-        let Some(of_b) = view.done(b).find(same) else { continue };
+        let of_b = view.done(b).find(|task| task.log == of_a.log && task.seed == of_a.seed);
+        let Some(of_b) = of_b else { continue };
         let mut here = only_one(of_a, of_b);
         here.sort_by(|x, y| {
             // Of equal times by pipeline, so that the order is always the same.
@@ -56,17 +56,16 @@ fn only_one<'a>(a: &'a TaskResult, b: &'a TaskResult) -> Vec<Difference<'a>> {
         in_a.keys().chain(in_b.keys()).copied().collect();
     let mut out = Vec::new();
     for key in keys {
-        let of =
-            |map: &BTreeMap<Key<'a>, Vec<&'a EventRow>>| map.get(&key).cloned().unwrap_or_default();
-        let (only_a, only_b) = unmatched(&of(&in_a), &of(&in_b));
-        let told = |task: &'a TaskResult, event| Difference {
-            log: &task.log,
-            seed: task.seed,
-            pipeline: &task.pipeline,
-            event,
-        };
-        out.extend(only_a.into_iter().map(|e| told(a, e)));
-        out.extend(only_b.into_iter().map(|e| told(b, e)));
+        let [of_a, of_b] = [&in_a, &in_b].map(|map| map.get(&key).cloned().unwrap_or_default());
+        let (only_a, only_b) = unmatched(&of_a, &of_b);
+        for (task, events) in [(a, only_a), (b, only_b)] {
+            out.extend(events.into_iter().map(|event| Difference {
+                log: &task.log,
+                seed: task.seed,
+                pipeline: &task.pipeline,
+                event,
+            }));
+        }
     }
     out
 }
@@ -136,12 +135,10 @@ mod tests {
         ) {
             a.sort_unstable();
             b.sort_unstable();
-            let seconds = |v: &[u8]| v.iter().map(|&x| f64::from(x) * 0.2).collect::<Vec<_>>();
-            let a = seconds(&a);
-            let b = seconds(&b);
-            let rows = |v: &[f64]| v.iter().map(|&t| at(t)).collect::<Vec<_>>();
-            let in_a = rows(&a);
-            let in_b = rows(&b);
+            let [a, b] =
+                [a, b].map(|times| times.iter().map(|&t| f64::from(t) * 0.2).collect::<Vec<_>>());
+            let [in_a, in_b] =
+                [&a, &b].map(|times| times.iter().map(|&t| at(t)).collect::<Vec<_>>());
             let (only_a, only_b) =
                 unmatched(&in_a.iter().collect::<Vec<_>>(), &in_b.iter().collect::<Vec<_>>());
             let pairs = most_pairs(&a, &b);

@@ -45,10 +45,11 @@ pub fn csv(benchmark: &Benchmark) -> String {
 
 fn figure_names() -> BTreeSet<String> {
     // From the default, so that all names are there even if no task has the figure.
-    flat(&Scores::default()).keys().cloned().collect()
+    figures(&Scores::default()).keys().cloned().collect()
 }
 
-fn flat(scores: &Scores) -> Map<String, Value> {
+/// Returns the figures by their names.
+pub fn figures(scores: &Scores) -> Map<String, Value> {
     match serde_json::to_value(scores) {
         Ok(Value::Object(map)) => map,
         _ => Map::new(),
@@ -106,7 +107,7 @@ fn row(task: &TaskResult, names: &BTreeSet<String>) -> Vec<String> {
         task.events.len().to_string(),
     ];
     for place in ComparisonSpace::ALL {
-        let scores = place.scores(task).map(flat).unwrap_or_default();
+        let scores = place.scores(task).map(figures).unwrap_or_default();
         cells.extend(names.iter().map(|name| number(scores.get(name))));
     }
     cells

@@ -31,7 +31,7 @@ mod table;
 mod view;
 
 pub use compare::{Difference, SAME_EVENT_S, compare};
-pub use files::{csv, json};
+pub use files::{csv, figures, json};
 pub use model::{
     Benchmark, Dropped, EventRow, MissedPerson, Moment, Outcome, StageTiming, TaskResult,
     TaskTiming, Timings, Trajectory,

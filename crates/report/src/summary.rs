@@ -8,7 +8,7 @@ use tagalong_eval::{
 };
 
 use crate::figures::{ComparisonSpace, Figure};
-use crate::model::{Benchmark, Outcome, TaskResult};
+use crate::model::{Benchmark, Outcome};
 use crate::view::OrderedBenchmark;
 
 /// Summary of a benchmark.
@@ -172,13 +172,13 @@ fn estimate(values: &[f64], figure: &Figure) -> Option<Estimate> {
 
 /// Returns the numbers of people found and of people present, for each log.
 fn people(view: &OrderedBenchmark<'_>, pipeline: &str) -> Vec<[u64; 2]> {
-    let counts = |task: &TaskResult| {
-        let scores = task.image.as_ref().or(task.metres.as_ref())?;
-        Some([scores.truth_ids.saturating_sub(scores.never_confirmed), scores.truth_ids])
-    };
     // One seed per log: the same people again would make the interval too narrow.
     let tasks = view.logs.iter().filter_map(|log| view.drawn(pipeline, log));
-    tasks.filter_map(counts).collect()
+    let counts = tasks.filter_map(|task| {
+        let scores = task.image.as_ref().or(task.metres.as_ref())?;
+        Some([scores.truth_ids.saturating_sub(scores.never_confirmed), scores.truth_ids])
+    });
+    counts.collect()
 }
 
 fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: ComparisonSpace) {

@@ -81,11 +81,10 @@ impl Cell {
     /// Converts a fraction to per cent.
     #[must_use]
     pub fn percent(self) -> Self {
-        let times = |value: f64| 100.0 * value;
         Self {
-            value: self.value.map(times),
-            deviation: self.deviation.map(times),
-            interval: self.interval.map(|ends| ends.map(times)),
+            value: self.value.map(|value| 100.0 * value),
+            deviation: self.deviation.map(|value| 100.0 * value),
+            interval: self.interval.map(|ends| ends.map(|value| 100.0 * value)),
             digits: self.digits.saturating_sub(2),
         }
     }
@@ -126,10 +125,12 @@ impl Table {
         let lines = self.lines();
         let columns = lines.iter().map(Vec::len).max().unwrap_or(0);
         // Characters, not bytes: the sign of a deviation has two bytes.
-        let widest = |at: usize| {
-            lines.iter().filter_map(|line| line.get(at)).map(|cell| cell.chars().count()).max()
-        };
-        let widths: Vec<usize> = (0..columns).map(|at| widest(at).unwrap_or(0)).collect();
+        let mut widths = vec![0; columns];
+        for line in &lines {
+            for (width, cell) in widths.iter_mut().zip(line) {
+                *width = cell.chars().count().max(*width);
+            }
+        }
         let mut out = format!("{}\n", self.title);
         for line in &lines {
             let cells = line.iter().zip(&widths).enumerate().map(|(at, (cell, width))| match at {
@@ -160,10 +161,10 @@ impl Table {
     /// Returns header and rows, as texts.
     fn lines(&self) -> Vec<Vec<String>> {
         let header = std::iter::once(String::new()).chain(self.columns.iter().cloned());
-        let line = |row: &Row| {
+        let rows = self.rows.iter().map(|row| {
             std::iter::once(row.title()).chain(row.cells.iter().map(Cell::text)).collect()
-        };
-        std::iter::once(header.collect()).chain(self.rows.iter().map(line)).collect()
+        });
+        std::iter::once(header.collect()).chain(rows).collect()
     }
 }
 

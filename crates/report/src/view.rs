@@ -19,12 +19,14 @@ impl<'a> OrderedBenchmark<'a> {
         let mut tasks: Vec<&TaskResult> = benchmark.tasks.iter().collect();
         // With the hash last, the order never depends on that of the input.
         tasks.sort_by_key(|t| (&t.pipeline, &t.log, t.seed, &t.hash));
-        let names = |of: fn(&TaskResult) -> &str| {
-            tasks.iter().map(|&t| of(t)).collect::<BTreeSet<_>>().into_iter().collect()
-        };
-        let pipelines = names(|t| &t.pipeline);
-        let logs = names(|t| &t.log);
-        Self { version: &benchmark.version, tasks, pipelines, logs }
+        let pipelines: BTreeSet<&str> = tasks.iter().map(|task| task.pipeline.as_str()).collect();
+        let logs: BTreeSet<&str> = tasks.iter().map(|task| task.log.as_str()).collect();
+        Self {
+            version: &benchmark.version,
+            tasks,
+            pipelines: pipelines.into_iter().collect(),
+            logs: logs.into_iter().collect(),
+        }
     }
 
     /// Puts the pipelines in the order of their main figure, best first; those with fewer logs after
@@ -35,15 +37,13 @@ impl<'a> OrderedBenchmark<'a> {
         });
         let Some(place) = place else { return self };
         let key = MAIN.key(place);
-        let estimate = |name: &str| summary.pipeline(name)?.figures.get(&key).copied();
-        let rank = |name: &str| {
-            let estimate = estimate(name).filter(|estimate| estimate.mean.is_finite());
-            estimate.map_or((0, f64::NEG_INFINITY), |estimate| (estimate.logs, estimate.mean))
-        };
         // The sort is stable, so that equal ones stay in the order of their names.
         self.pipelines.sort_by(|a, b| {
-            let a = rank(a);
-            let b = rank(b);
+            let [a, b] = [a, b].map(|name| {
+                let estimate = summary.pipeline(name).and_then(|it| it.figures.get(&key));
+                let estimate = estimate.filter(|estimate| estimate.mean.is_finite());
+                estimate.map_or((0, f64::NEG_INFINITY), |estimate| (estimate.logs, estimate.mean))
+            });
             b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
         });
         self

@@ -216,13 +216,13 @@ fn csv_has_one_row_per_task_and_quotes_what_needs_it() {
 }
 
 fn with_hota(values: &[(&str, &str, f64)]) -> Benchmark {
-    let task = |&(pipeline, log, hota): &(&str, &str, f64)| TaskResult {
+    let tasks = values.iter().map(|&(pipeline, log, hota)| TaskResult {
         pipeline: pipeline.into(),
         log: log.into(),
         image: Some(Scores { hota: Some(hota), ..Scores::default() }),
         ..TaskResult::default()
-    };
-    Benchmark { tasks: values.iter().map(task).collect(), ..Benchmark::default() }
+    });
+    Benchmark { tasks: tasks.collect(), ..Benchmark::default() }
 }
 
 #[test]
@@ -253,12 +253,13 @@ fn pair_of<'a>(summary: &'a Summary, a: &str, b: &str) -> &'a PairSummary {
 /// each.
 fn on_logs(count: usize, pipelines: &[(&str, f64)]) -> Benchmark {
     let names: Vec<String> = (0..count).map(|log| format!("log {log}")).collect();
-    let of_log = |(at, log)| {
-        let hota = move |level: f64| level + 0.01 * level * (at as f64 + 1.0);
-        pipelines.iter().map(move |(name, level)| (*name, log, hota(*level)))
-    };
-    let logs = names.iter().map(String::as_str).enumerate();
-    with_hota(&logs.flat_map(of_log).collect::<Vec<_>>())
+    let mut values = Vec::new();
+    for (at, log) in names.iter().enumerate() {
+        for (name, level) in pipelines {
+            values.push((*name, log.as_str(), level + 0.01 * level * (at as f64 + 1.0)));
+        }
+    }
+    with_hota(&values)
 }
 
 #[test]
@@ -293,8 +294,10 @@ fn the_verdict_of_a_pair_allows_for_the_other_pairs() {
 
 /// Returns where each text begins in the page.
 fn places<'a>(page: &str, texts: impl IntoIterator<Item = &'a str>) -> Vec<usize> {
-    let place = |text: &str| page.find(text).unwrap_or_else(|| panic!("{text} is missing"));
-    texts.into_iter().map(place).collect()
+    let places = texts
+        .into_iter()
+        .map(|text| page.find(text).unwrap_or_else(|| panic!("{text} is missing")));
+    places.collect()
 }
 
 #[test]
@@ -359,12 +362,12 @@ fn thirty_pipelines_make_a_page_below_five_megabytes() {
     }
     let moment = benchmark.moments[0].clone();
     let image_jpeg_base64 = "QUJD".repeat(12_000);
-    let large = |frame| tagalong_report::Moment {
+    let moments = (1..200).map(|frame| tagalong_report::Moment {
         frame,
         image_jpeg_base64: image_jpeg_base64.clone(),
         ..moment.clone()
-    };
-    benchmark.moments = (1..200).map(large).collect();
+    });
+    benchmark.moments = moments.collect();
     let page = html(&benchmark, Some(&common::timings(&benchmark)));
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     assert!(page.len() > 3_000_000, "{} bytes: the bounds are not reached", page.len());

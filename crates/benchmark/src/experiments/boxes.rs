@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::tuning::{Choice, Figures, Objective, candidates, leave_one_out, mean};
+use crate::tuning::{Choice, Figures, Objective, candidates, leave_one_out, mean, shown_value};
 use clap::{Args, ValueEnum};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
@@ -224,11 +224,11 @@ impl Bench<'_> {
         for (sequence, place) in self.sequences.iter().zip(&self.places) {
             without.entry(choice.without[*place]).or_default().push(&sequence.info.name);
         }
-        let all = format!("With all: {}.", contestant.words(choice.with_all));
-        let one = |(setting, names): (&usize, &Vec<&str>)| {
-            format!("Without {}: {}.", names.join(", "), contestant.words(*setting))
-        };
-        std::iter::once(all).chain(without.iter().map(one)).collect()
+        let mut words = vec![format!("With all: {}.", contestant.words(choice.with_all))];
+        for (setting, names) in without {
+            words.push(format!("Without {}: {}.", names.join(", "), contestant.words(setting)));
+        }
+        words
     }
 
     fn write(&self, name: &str, tracked: &[Tracked]) -> Result<(), Failure> {
@@ -247,17 +247,17 @@ impl Bench<'_> {
         let columns = all
             .iter()
             .flat_map(|(name, _)| ["HOTA", "IDF1"].map(|figure| format!("{figure}, {name}")));
-        let row = |(at, sequence): (usize, &GivenSequence)| {
+        let rows = self.sequences.iter().enumerate().map(|(at, sequence)| {
             let cells = all.iter().flat_map(|(_, tracked)| {
                 let scores = tracked[at].tally.scores();
                 [percent(scores.hota), percent(scores.idf1)]
             });
             Row::ours(&sequence.info.name, cells.collect())
-        };
+        });
         Table {
             title: "By sequence, %".into(),
             columns: columns.collect(),
-            rows: self.sequences.iter().enumerate().map(row).collect(),
+            rows: rows.collect(),
             notes: Vec::new(),
         }
     }
@@ -269,14 +269,14 @@ impl Contestant {
         let resolved = for_given_boxes(&pipeline.resolved()).map_err(Failure::usage)?;
         let tunables = if args.leave_one_out { settings.tune } else { Vec::new() };
         let tried = candidates(&tunables, args.budget.into(), args.seed);
-        let contender = |values: Vec<toml::Value>| -> Result<_, Failure> {
+        let mut settings = Vec::new();
+        for values in tried {
             let keys = tunables.iter().map(|tunable| tunable.key.as_str());
             let named: Vec<(&str, &toml::Value)> = keys.zip(&values).collect();
             let text = with_values(&resolved, &named).map_err(|e| Failure::usage(e.message))?;
             let folder = file.folder().to_owned();
-            Ok((values, Contender { folder, ..Contender::new(file.stem(), text) }))
-        };
-        let mut settings = tried.into_iter().map(contender).collect::<Result<Vec<_>, _>>()?;
+            settings.push((values, Contender { folder, ..Contender::new(file.stem(), text) }));
+        }
         if args.leave_one_out {
             file.check_tuning(registry)?;
         }
@@ -290,17 +290,9 @@ impl Contestant {
             .tunables
             .iter()
             .zip(&self.settings[setting].0)
-            .map(|(tunable, value)| format!("`{}` = {}", tunable.key, shown(value)))
+            .map(|(tunable, value)| format!("`{}` = {}", tunable.key, shown_value(value)))
             .collect();
         if setting == 0 { "as shipped".to_owned() } else { words.join(", ") }
-    }
-}
-
-/// Formats a value without the digits that come from dividing a range.
-fn shown(value: &toml::Value) -> String {
-    match value {
-        toml::Value::Float(number) => format!("{:?}", (number * 1e9).round() / 1e9),
-        other => other.to_string(),
     }
 }
 
@@ -318,16 +310,17 @@ fn places(sequences: &[GivenSequence]) -> Vec<usize> {
 }
 
 fn numbered(names: &[&str]) -> Vec<usize> {
-    let place = |name: &str| name.split('-').next().unwrap_or_default().to_owned();
-    let mut numbers: BTreeMap<String, usize> = BTreeMap::new();
+    let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut places = Vec::new();
     for name in names {
         let next = numbers.len();
-        numbers.entry(place(name)).or_insert(next);
+        let place = name.split('-').next().unwrap_or_default();
+        places.push(*numbers.entry(place).or_insert(next));
     }
     if numbers.len() < 2 {
         return (0..names.len()).collect();
     }
-    names.iter().map(|name| numbers[&place(name)]).collect()
+    places
 }
 
 fn cells(tracked: &[Tracked]) -> Vec<Cell> {

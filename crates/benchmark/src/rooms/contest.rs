@@ -1,11 +1,11 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::tuning::candidates;
+use crate::tuning::{candidates, shown_value};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::outcome::Failure;
 use tagalong_config::Registry;
-use tagalong_pipeline::{ResolvedConfig, Tunable};
+use tagalong_pipeline::ResolvedConfig;
 
 use super::RoomsArgs;
 use crate::plan::{self, Annotated, PlannedConfig, sha256};
@@ -78,20 +78,11 @@ impl Contestant {
 
     /// Returns the settings as text: `manager.config.confirm_hits = 2, ...`.
     pub fn words(&self, setting: usize) -> String {
-        let word = |(tunable, value): (&Tunable, &toml::Value)| {
-            format!("{} = {}", tunable.key, shown(value))
-        };
-        let words: Vec<String> =
-            self.config.tune.iter().zip(&self.settings[setting].values).map(word).collect();
+        let values = self.config.tune.iter().zip(&self.settings[setting].values);
+        let words: Vec<String> = values
+            .map(|(tunable, value)| format!("{} = {}", tunable.key, shown_value(value)))
+            .collect();
         if words.is_empty() { "nothing to tune".to_owned() } else { words.join(", ") }
-    }
-}
-
-/// Formats a value without the digits that come from dividing a range.
-pub fn shown(value: &toml::Value) -> String {
-    match value {
-        toml::Value::Float(number) => format!("{:?}", (number * 1e9).round() / 1e9),
-        other => other.to_string(),
     }
 }
 

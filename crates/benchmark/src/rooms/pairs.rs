@@ -37,22 +37,21 @@ pub fn pairs(pipelines: &[Fitted]) -> Vec<Pair> {
 
 impl Pair {
     fn new(pipeline: &Fitted, baseline: &Fitted) -> Self {
-        let same = |name: &str| baseline.rooms.iter().find(|room| room.room == name);
-        let both: Vec<[Figures; 2]> = pipeline
-            .rooms
-            .iter()
-            .filter_map(|room| same(&room.room).map(|other| [other.without, room.without]))
-            .collect();
-        let gain = |figure: Read| {
+        let mut both: Vec<[Figures; 2]> = Vec::new();
+        for room in &pipeline.rooms {
+            let other = baseline.rooms.iter().find(|other| other.room == room.room);
+            both.extend(other.map(|other| [other.without, room.without]));
+        }
+        let gains = COMPARED.iter().map(|(_, figure)| {
             let [a, b] = [0, 1].map(|at| both.iter().map(|pair| figure(&pair[at])).collect());
             let [a, b]: [Vec<f64>; 2] = [a, b];
             paired_gain(&a, &b)
-        };
+        });
         Self {
             pipeline: pipeline.name.clone(),
             baseline: baseline.name.clone(),
             rooms: both.len(),
-            gains: COMPARED.iter().map(|(_, figure)| gain(*figure)).collect(),
+            gains: gains.collect(),
         }
     }
 }
@@ -60,16 +59,16 @@ impl Pair {
 /// Returns the table of the differences, if there are any.
 pub fn differences(pairs: &[Pair]) -> Option<Table> {
     let baseline = &pairs.first()?.baseline;
-    let row = |pair: &Pair| {
+    let rows = pairs.iter().map(|pair| {
         let rooms = Cell::number(pair.rooms as f64, 0);
         let gains = pair.gains.iter().map(|gain| Cell::estimate(gain.map(|of| of.difference), 3));
         Row::ours(&pair.pipeline, std::iter::once(rooms).chain(gains).collect())
-    };
+    });
     let titles = COMPARED.iter().map(|(title, _)| *title);
     Some(Table {
         title: format!("Difference to {baseline}, each without the room that is scored"),
         columns: std::iter::once("rooms").chain(titles).map(String::from).collect(),
-        rows: pairs.iter().map(row).collect(),
+        rows: rows.collect(),
         notes: vec![
             "Means of the differences w/o, paired by room, with Student's intervals of 95 % over \
              rooms; fewer than six rooms are never called clear."

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::tuning::{Choice, Figures, Objective, leave_one_out, mean};
+use crate::tuning::{Choice, Figures, Objective, leave_one_out, mean, shown_value};
 use serde::Serialize;
 use tagalong_app::outcome::Failure;
 use tagalong_app::serialize::to_json;
@@ -99,11 +99,11 @@ impl Report {
         desk: &Desk<'_>,
     ) -> Result<Self, Failure> {
         let objective = args.objective.into();
-        let about = |location: &Location| About {
+        let rooms = locations.iter().map(|location| About {
             name: location.name.clone(),
             about: location.about.clone(),
             logs: location.logs.iter().map(described).collect(),
-        };
+        });
         let fitted = contestants
             .iter()
             .enumerate()
@@ -113,7 +113,7 @@ impl Report {
             objective,
             budget: args.budget,
             seed: args.seed,
-            rooms: locations.iter().map(about).collect(),
+            rooms: rooms.collect(),
             // Only the user knows which of them is the baseline.
             pairs: if args.configs.is_empty() { Vec::new() } else { pairs(&pipelines) },
             pipelines,
@@ -149,11 +149,11 @@ impl Report {
 
     /// Returns the means over the rooms.
     fn summary(&self) -> Table {
-        let row = |fitted: &Fitted| {
+        let rows = self.pipelines.iter().map(|fitted| {
             let rooms = Cell::number(fitted.rooms.len() as f64, 0);
             let cells = if fitted.rooms.is_empty() { Vec::new() } else { cells(&fitted.mean()) };
             Row::ours(&fitted.name, [vec![rooms], cells].concat())
-        };
+        });
         let objective = match self.objective {
             Objective::Hota => "HOTA",
             Objective::HotaAndIdf1 => "HOTA and IDF1",
@@ -183,12 +183,7 @@ impl Report {
         notes.extend(too_few);
         let columns = ["rooms"].into_iter().map(String::from).chain(columns()).collect();
         let title = "Chosen without the room that is scored, and with all: means over the rooms";
-        Table {
-            title: title.into(),
-            columns,
-            rows: self.pipelines.iter().map(row).collect(),
-            notes,
-        }
+        Table { title: title.into(), columns, rows: rows.collect(), notes }
     }
 }
 
@@ -242,36 +237,42 @@ impl Scorer<'_> {
         if too_few.is_some() {
             rooms.clear();
         }
-        let settings = self.contestant.settings.len();
-        let table = |unseen: bool| {
-            (0..settings)
-                .map(|at| rooms.iter().map(|(_, logs)| self.room(at, unseen, logs)).collect())
-                .collect::<Result<Vec<Vec<Figures>>, Failure>>()
-        };
-        let unseen = table(true)?;
-        let seen = table(false)?;
+        let unseen = self.table(true, &rooms)?;
+        let seen = self.table(false, &rooms)?;
         // A model that has seen a room would make any setting look good there.
         let Choice { without, with_all } = leave_one_out(&unseen, objective);
-        let in_room = |(at, (location, logs)): (usize, &(&Location, Vec<usize>))| {
-            Ok::<_, Failure>(InRoom {
+        let mut in_rooms = Vec::new();
+        for (at, (location, logs)) in rooms.iter().enumerate() {
+            in_rooms.push(InRoom {
                 room: location.name.clone(),
                 chosen_without: self.values(without[at]),
                 without: unseen[without[at]][at],
                 with_all: seen[with_all][at],
                 shipped: seen[0][at],
                 logs: self.by_log(without[at], logs)?,
-            })
-        };
+            });
+        }
         Ok(Fitted {
             name: self.contestant.name(),
-            settings,
+            settings: self.contestant.settings.len(),
             refused: self.contestant.refused,
             skipped,
             shipped: self.values(0),
             chosen_with_all: self.values(with_all),
-            rooms: rooms.iter().enumerate().map(in_room).collect::<Result<_, _>>()?,
+            rooms: in_rooms,
             too_few,
         })
+    }
+
+    /// Returns the figures with each setting in each room.
+    fn table(
+        &self,
+        unseen: bool,
+        rooms: &[(&Location, Vec<usize>)],
+    ) -> Result<Vec<Vec<Figures>>, Failure> {
+        (0..self.contestant.settings.len())
+            .map(|at| rooms.iter().map(|(_, logs)| self.room(at, unseen, logs)).collect())
+            .collect()
     }
 
     fn room(&self, setting: usize, unseen: bool, logs: &[usize]) -> Result<Figures, Failure> {
@@ -286,18 +287,20 @@ impl Scorer<'_> {
             .iter()
             .flat_map(|location| location.logs.iter().map(|log| log.name.as_str()))
             .collect();
-        let of = |log: &usize| {
+        let logs = logs.iter().map(|log| {
             let without = self.log(chosen, true, *log)?;
             let shipped = self.log(0, false, *log)?;
             Ok(InLog { log: names[*log].to_owned(), without, shipped })
-        };
-        logs.iter().map(of).collect()
+        });
+        logs.collect()
     }
 
     fn log(&self, setting: usize, unseen: bool, log: usize) -> Result<Figures, Failure> {
         let run = Run { contestant: self.at, setting, log, unseen };
-        let missing = || Failure::failed("a result went missing; run the command again");
-        self.desk.result(run).map(|result| result.figures).ok_or_else(missing)
+        let result = self.desk.result(run);
+        let result = result
+            .ok_or_else(|| Failure::failed("a result went missing; run the command again"))?;
+        Ok(result.figures)
     }
 
     fn values(&self, setting: usize) -> Values {
@@ -309,13 +312,12 @@ impl Scorer<'_> {
 impl Fitted {
     /// Returns the means over the rooms.
     fn mean(&self) -> InRoom {
-        let of = |figures: fn(&InRoom) -> &Figures| mean(self.rooms.iter().map(figures));
         InRoom {
             room: "mean".to_owned(),
             chosen_without: Values::new(),
-            without: of(|room| &room.without),
-            with_all: of(|room| &room.with_all),
-            shipped: of(|room| &room.shipped),
+            without: mean(self.rooms.iter().map(|room| &room.without)),
+            with_all: mean(self.rooms.iter().map(|room| &room.with_all)),
+            shipped: mean(self.rooms.iter().map(|room| &room.shipped)),
             logs: Vec::new(),
         }
     }
@@ -358,9 +360,8 @@ impl Fitted {
     /// Formats the values that differ from those of the config.
     fn changes(&self, values: &Values) -> String {
         let changed = values.iter().filter(|(key, value)| self.shipped.get(*key) != Some(*value));
-        let words: Vec<String> = changed
-            .map(|(key, value)| format!("`{key}` = {}", super::contest::shown(value)))
-            .collect();
+        let words: Vec<String> =
+            changed.map(|(key, value)| format!("`{key}` = {}", shown_value(value))).collect();
         if words.is_empty() { "as shipped".to_owned() } else { words.join(", ") }
     }
 }

@@ -2,6 +2,7 @@
 //! side by side and share their findings.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -17,7 +18,7 @@ use tagalong_report::TaskResult;
 use super::contest::{Contestant, Location, Variant};
 use crate::plan::{self, Annotated, version};
 use crate::store::Store;
-use crate::work::{Lane, bar, spread};
+use crate::work::{Lane, bar, spread, work_through};
 
 /// Most pipelines side by side; a signal loses at most one pass of these per job.
 const LANES: usize = 48;
@@ -82,8 +83,10 @@ impl<'a> Desk<'a> {
         contestants: &'a [Contestant],
         locations: &'a [Location],
     ) -> Result<Self, Failure> {
-        let of_room = |room: &'a Location| room.logs.iter().map(|log| (room.name.as_str(), log));
-        let logs: Vec<(&str, &Annotated)> = locations.iter().flat_map(of_room).collect();
+        let logs: Vec<(&str, &Annotated)> = locations
+            .iter()
+            .flat_map(|room| room.logs.iter().map(|log| (room.name.as_str(), log)))
+            .collect();
         let mut skips = BTreeMap::new();
         let mut tried = BTreeMap::new();
         for (contestant, about) in contestants.iter().enumerate() {
@@ -143,8 +146,8 @@ impl<'a> Desk<'a> {
         shift.run_all(self.passes(due, jobs), jobs);
         bar.finish_and_clear();
         shift.verdict()?;
-        let lost = |run: &Run| self.result(*run).is_some_and(|result| result.data_lost);
-        let lost = asked.iter().any(lost);
+        let mut results = asked.iter().filter_map(|run| self.result(*run));
+        let lost = results.any(|result| result.data_lost);
         Ok(RunSummary { asked: asked.len(), ran, lost, signal: signals.received() })
     }
 
@@ -156,9 +159,10 @@ impl<'a> Desk<'a> {
                     continue;
                 }
                 for (setting, values) in about.settings.iter().enumerate() {
-                    let run = |unseen| Run { contestant, setting, log, unseen };
-                    runs.push(run(false));
-                    runs.extend(values.has_seen(room).then(|| run(true)));
+                    runs.push(Run { contestant, setting, log, unseen: false });
+                    if values.has_seen(room) {
+                        runs.push(Run { contestant, setting, log, unseen: true });
+                    }
                 }
             }
         }
@@ -190,25 +194,14 @@ struct Shift<'a> {
 
 impl Shift<'_> {
     fn run_all(&self, passes: VecDeque<Vec<Run>>, jobs: usize) {
-        let queue = Mutex::new(passes);
-        let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
-        let work = || {
-            while let Some(pass) = next() {
-                if self.has_to_stop() {
-                    return;
-                }
-                if let Err(failure) = self.pass(&pass) {
-                    pass.iter().for_each(|run| self.fail(*run, failure.message.clone()));
-                }
+        work_through(passes, jobs, |pass| {
+            if self.has_to_stop() {
+                return ControlFlow::Break(());
             }
-        };
-        std::thread::scope(|scope| {
-            // One job fewer: the calling thread works, too.
-            for _ in 1..jobs {
-                // Without another thread, those that run do its work.
-                let _ = std::thread::Builder::new().spawn_scoped(scope, work);
+            if let Err(failure) = self.pass(&pass) {
+                pass.iter().for_each(|run| self.fail(*run, failure.message.clone()));
             }
-            work();
+            ControlFlow::Continue(())
         });
     }
 

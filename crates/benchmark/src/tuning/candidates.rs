@@ -31,11 +31,13 @@ fn grid(tunables: &[Tunable], shipped: &Candidate, most: usize) -> Option<Vec<Ca
         if all.len() * values.len() > most + 1 {
             return None;
         }
-        let with = |begun: &Candidate| {
-            let begun = begun.clone();
-            values.iter().map(move |value| [begun.as_slice(), std::slice::from_ref(value)].concat())
-        };
-        all = all.iter().flat_map(with).collect();
+        let mut longer = Vec::new();
+        for begun in &all {
+            for value in values {
+                longer.push([begun.as_slice(), std::slice::from_ref(value)].concat());
+            }
+        }
+        all = longer;
     }
     all.retain(|candidate| candidate != shipped);
     (all.len() <= most).then_some(all)
@@ -74,6 +76,14 @@ fn shuffled(mut values: Candidate, random: &mut ChaCha) -> Candidate {
 
 fn shown(candidate: &Candidate) -> String {
     format!("{candidate:?}")
+}
+
+/// Formats a value without the digits that come from dividing a range.
+pub fn shown_value(value: &toml::Value) -> String {
+    match value {
+        toml::Value::Float(number) => format!("{:?}", (number * 1e9).round() / 1e9),
+        other => other.to_string(),
+    }
 }
 
 #[cfg(test)]

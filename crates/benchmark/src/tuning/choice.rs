@@ -112,13 +112,10 @@ pub fn leave_one_out(figures: &[Vec<Figures>], objective: Objective) -> Choice {
 }
 
 fn best(figures: &[Vec<Figures>], objective: Objective, counts: impl Fn(usize) -> bool) -> usize {
-    let worth = |rooms: &Vec<Figures>| {
-        let counting = rooms.iter().enumerate().filter(|(room, _)| counts(*room));
-        objective.of(&mean(counting.map(|(_, figures)| figures)))
-    };
     let mut best = (0, f64::NEG_INFINITY);
     for (at, rooms) in figures.iter().enumerate() {
-        let worth = worth(rooms);
+        let counting = rooms.iter().enumerate().filter(|(room, _)| counts(*room));
+        let worth = objective.of(&mean(counting.map(|(_, figures)| figures)));
         if worth > best.1 {
             best = (at, worth);
         }

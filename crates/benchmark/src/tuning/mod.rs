@@ -8,6 +8,6 @@ mod candidates;
 mod choice;
 mod rooms;
 
-pub use candidates::candidates;
+pub use candidates::{candidates, shown_value};
 pub use choice::{Choice, Figures, Objective, leave_one_out, mean};
 pub use rooms::Rooms;

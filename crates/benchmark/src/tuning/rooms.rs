@@ -82,9 +82,11 @@ impl Rooms {
         let File { folder, rooms } = toml::from_str(text)?;
         let folder = logs_dir.map_or_else(|| base_dir.join(folder), Path::to_owned);
         let whole = rooms.span();
-        let room = |(name, entry): (String, Entry)| Room::read(name, entry, &folder, base_dir);
-        let rooms: Vec<Room> =
-            rooms.into_inner().into_iter().map(room).collect::<Result<_, _>>()?;
+        let rooms: Vec<Room> = rooms
+            .into_inner()
+            .into_iter()
+            .map(|(name, entry)| Room::read(name, entry, &folder, base_dir))
+            .collect::<Result<_, _>>()?;
         if rooms.len() < FEWEST {
             let message = format!("{} room: one is left out, so two are needed", rooms.len());
             return Err(ConfigError { message, span: Some(whole) });
@@ -102,10 +104,10 @@ impl Room {
         base_dir: &Path,
     ) -> Result<Self, ConfigError> {
         let place = entry.logs.span();
-        let log = |log| RoomFile::new(log, folder);
-        let logs: Vec<RoomFile> = entry.logs.into_inner().into_iter().map(log).collect();
-        let model = |(plugin, path)| (plugin, RoomFile::new(path, base_dir));
-        let models = entry.models.into_iter().map(model).collect();
+        let logs = entry.logs.into_inner().into_iter();
+        let logs: Vec<RoomFile> = logs.map(|log| RoomFile::new(log, folder)).collect();
+        let models = entry.models.into_iter();
+        let models = models.map(|(plugin, path)| (plugin, RoomFile::new(path, base_dir))).collect();
         if logs.is_empty() {
             let message = format!("room `{name}` has no log");
             return Err(ConfigError { message, span: Some(place) });

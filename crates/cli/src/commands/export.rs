@@ -61,13 +61,12 @@ fn card_of(file: &Path) -> PathBuf {
 }
 
 fn as_json(sample: &[NamedTensor]) -> Value {
-    let part = |is_input: bool| -> Map<String, Value> {
-        let tensors = sample.iter().filter(|tensor| tensor.is_input == is_input);
-        tensors
-            .map(|tensor| {
-                (tensor.name.to_owned(), json!({ "shape": tensor.shape, "values": tensor.values }))
-            })
-            .collect()
-    };
-    json!({ "inputs": part(true), "outputs": part(false) })
+    let mut inputs = Map::new();
+    let mut outputs = Map::new();
+    for tensor in sample {
+        let part = if tensor.is_input { &mut inputs } else { &mut outputs };
+        let value = json!({ "shape": tensor.shape, "values": tensor.values });
+        part.insert(tensor.name.to_owned(), value);
+    }
+    json!({ "inputs": inputs, "outputs": outputs })
 }

@@ -73,8 +73,9 @@ impl Install<'_> {
             (None, Some(network)) => network.name.clone(),
             (None, None) => name_of(self.file),
         };
-        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-        if name.is_empty() || !name.chars().all(is_plain) {
+        let is_plain =
+            name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
+        if name.is_empty() || !is_plain {
             return Err(Failure::usage(format!(
                 "a network is called by lower-case letters, digits and `-`, not `{name}`: give \
                  another --name"

@@ -262,8 +262,8 @@ impl KnownDetector<'_> {
         // A string of JSON is one of TOML.
         let mut lines = format!("model = {}\n", json!(file.to_string_lossy()));
         let _ = writeln!(lines, "family = \"{}\"", self.family);
-        let is_open = |port: &Port| port.shape.len() == 4 && port.shape[1..].contains(&None);
-        if self.about.inputs.iter().any(is_open) {
+        let mut shapes = self.about.inputs.iter().map(|port| &port.shape);
+        if shapes.any(|shape| shape.len() == 4 && shape[1..].contains(&None)) {
             let _ = writeln!(lines, "size = [{}, {}]", self.input.width, self.input.height);
         }
         if let Some(network) = self.published {
@@ -281,9 +281,12 @@ impl KnownDetector<'_> {
 }
 
 fn as_json(about: &About, known: Option<&Known<'_>>) -> Value {
-    let ports = |ports: &[Port]| -> Vec<Value> {
-        ports.iter().map(|port| json!({ "name": port.name, "shape": port.shape })).collect()
-    };
+    let [inputs, outputs] = [&about.inputs, &about.outputs].map(|ports| {
+        ports
+            .iter()
+            .map(|port| json!({ "name": port.name, "shape": port.shape }))
+            .collect::<Vec<_>>()
+    });
     let detector = match known {
         Some(Known::Detector(known)) => Some(known),
         _ => None,
@@ -295,8 +298,8 @@ fn as_json(about: &About, known: Option<&Known<'_>>) -> Value {
     let input = detector.map(|known| known.input).or(embedding.map(|known| known.network.input()));
     let call_ms = detector.map(|known| known.call_ms).or(embedding.map(|known| known.call_ms));
     json!({
-        "inputs": ports(&about.inputs),
-        "outputs": ports(&about.outputs),
+        "inputs": inputs,
+        "outputs": outputs,
         "family": detector.map(|known| known.family.name()),
         "vector": embedding.map(|known| known.numbers),
         "size": input.map(|input| [input.width, input.height]),

@@ -38,10 +38,10 @@ impl Frames {
         let (sender, receiver) = sync_channel(AHEAD);
         // The source stays here until the thread runs: one that cannot start would drop it.
         let (hand_over, sources) = channel();
-        let read = move || sources.recv().ok().map(|source| read_all(source, &sender));
-        let Ok(reader) = thread::Builder::new().name("reader".into()).spawn(read) else {
-            return Self::Here(Box::new(source));
-        };
+        let reader = thread::Builder::new()
+            .name("reader".into())
+            .spawn(move || sources.recv().ok().map(|source| read_all(source, &sender)));
+        let Ok(reader) = reader else { return Self::Here(Box::new(source)) };
         match hand_over.send(source) {
             Ok(()) => Self::Ahead(receiver, reader),
             Err(unsent) => Self::Here(Box::new(unsent.0)),

@@ -28,13 +28,11 @@ impl Pictures {
         let (sender, scenes) = sync_channel::<OverlayData>(WAITING);
         // The renderer stays here until the thread runs: one that cannot start would drop it.
         let (hand_over, overlays) = channel::<Overlay>();
-        let draw_all = move || {
+        let drawer = thread::Builder::new().name("pictures".into()).spawn(move || {
             let Ok(mut overlay) = overlays.recv() else { return Ok(()) };
             scenes.iter().try_for_each(|scene| overlay.draw(&scene))
-        };
-        let Ok(drawer) = thread::Builder::new().name("pictures".into()).spawn(draw_all) else {
-            return Self::Here(overlay);
-        };
+        });
+        let Ok(drawer) = drawer else { return Self::Here(overlay) };
         match hand_over.send(overlay) {
             Ok(()) => Self::Aside(sender, drawer),
             Err(unsent) => Self::Here(unsent.0),
@@ -64,7 +62,9 @@ impl Pictures {
     pub fn finish(self) -> Result<(), Failure> {
         let Self::Aside(sender, drawer) = self else { return Ok(()) };
         drop(sender);
-        let gone = || "drawing failed; please report this, and run without --overlay".to_owned();
-        drawer.join().unwrap_or_else(|_| Err(gone())).map_err(Failure::failed)
+        let drawn = drawer.join().unwrap_or_else(|_| {
+            Err("drawing failed; please report this, and run without --overlay".to_owned())
+        });
+        drawn.map_err(Failure::failed)
     }
 }

@@ -62,8 +62,8 @@ fn persons(out: &mut String, report: &RunReport) {
 
 /// Returns a path as one word of a POSIX shell.
 fn quoted(path: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:@%,".contains(c);
-    if !path.is_empty() && path.chars().all(is_plain) {
+    let is_plain = path.chars().all(|c| c.is_ascii_alphanumeric() || "/._-+=:@%,".contains(c));
+    if is_plain && !path.is_empty() {
         return path.to_owned();
     }
     // A quote ends the quoted word, stands escaped, and begins the next.

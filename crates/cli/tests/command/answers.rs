@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{Drawn, code, config, own_plugin, tagalong, text};
+use crate::common::{Drawn, assert_same, code, config, own_plugin, tagalong, text};
 
 fn answer(args: &[&str], folder: &Path) -> String {
     let output = own_plugin().args(args).current_dir(folder).output().unwrap();
@@ -102,8 +102,7 @@ fn the_shipped_config_runs_on_every_real_log_with_depth_and_repeats_to_the_byte(
         run_real(&log, &a, "1");
         run_real(&log, &b, "3");
         for file in ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json"] {
-            let read = |folder: &Path| fs::read(folder.join(file)).unwrap();
-            assert_eq!(read(&a), read(&b), "{name}: {file}");
+            assert_same(&a.join(file), &b.join(file));
         }
     }
 }

@@ -1,22 +1,17 @@
-//! Every command with every kind of bad input: one clear message that names the file, and the right
-//! exit code: 1 for data that cannot be used, 2 for settings and outputs that cannot.
+//! Every command with every kind of bad input, and users' mistakes: one clear message with the problem
+//! and the remedy, and the right exit code: 1 for data that cannot be used, 2 for settings and outputs
+//! that cannot.
 
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use crate::common::{Drawn, code, config, own_plugin, people, text, unread};
+use crate::common::{Drawn, code, config, own_plugin, people, tagalong, text, unread, write};
 
-/// Content in place of a valid file.
-const BAD_FILES: [(&str, &str); 6] = [
-    ("a missing file", "missing.EXT"),
-    ("a file of words", "words.EXT"),
-    ("an empty file", "empty.EXT"),
-    ("a folder", "folder.EXT"),
-    // Without a writer: opening it would wait for ever.
-    ("a pipe", "pipe.EXT"),
-    ("gigabytes of nothing", "sparse.EXT"),
-];
+/// Content in place of a valid file. Opening a pipe without a writer would wait for ever; the sparse
+/// file has gigabytes.
+const BAD_FILES: [&str; 6] =
+    ["missing.EXT", "words.EXT", "empty.EXT", "folder.EXT", "pipe.EXT", "sparse.EXT"];
 
 /// Commands with a place for a file, its extension, and the exit code where the file is bad.
 const FILES: [(&str, &str, i32); 15] = [
@@ -47,65 +42,81 @@ const FINE: [&str; 6] = [
     "trials empty.toml --seeds 1 --configs nearest.toml",
 ];
 
-/// Other mistakes: description, command, exit code, and part of the message.
-const OTHERS: [(&str, &str, i32, &str); 30] = [
-    ("no depth", "run nearest.toml no-depth.mcap -o out", 1, "depth"),
-    ("no depth", "check nearest.toml no-depth.mcap", 1, "depth"),
-    ("an unknown key", "run typo.toml good.mcap -o out", 2, "typo.toml:4"),
-    ("an unknown key", "check typo.toml", 2, "typo.toml:4"),
-    ("an unknown key", "doctor typo.toml good.mcap", 2, "typo.toml:4"),
-    ("an unknown key", "bench --configs typo.toml --logs good.mcap -o out", 2, "typo.toml:4"),
-    ("an unknown key", "simulate scene-typo.toml -o out.mcap", 2, "scene-typo.toml:"),
+/// Other mistakes: command, exit code, and parts of the message.
+const OTHERS: [(&str, i32, &[&str]); 50] = [
+    ("run nearest.toml no-depth.mcap -o out", 1, &["depth"]),
+    ("check nearest.toml no-depth.mcap", 1, &["depth"]),
+    ("run typo.toml good.mcap -o out", 2, &["typo.toml:4", "did you mean `roles`"]),
+    ("check typo.toml", 2, &["typo.toml:4"]),
+    ("doctor typo.toml good.mcap", 2, &["typo.toml:4"]),
+    ("bench --configs typo.toml --logs good.mcap -o out", 2, &["typo.toml:4"]),
+    ("simulate scene-typo.toml -o out.mcap", 2, &["scene-typo.toml:"]),
+    ("trials scene-typo.toml --seeds 1 --configs nearest.toml", 2, &["scene-typo.toml:"]),
+    ("run nearest.toml good.mcap -o old.bag/x", 2, &["old.bag"]),
+    ("doctor nearest.toml good.mcap -o old.bag/x", 2, &["old.bag"]),
+    ("demo -o old.bag/x", 2, &["old.bag"]),
+    ("simulate scene.toml -o old.bag/x.mcap", 2, &["old.bag"]),
+    ("import images photos -o old.bag/x.mcap", 2, &["old.bag"]),
+    ("bench --configs nearest.toml --logs good.mcap -o old.bag/x", 2, &["old.bag"]),
+    ("run nearest.toml good.mcap -o full", 2, &["--overwrite"]),
+    ("doctor nearest.toml good.mcap -o full", 2, &["--overwrite"]),
+    ("demo -o full", 2, &["--overwrite"]),
+    ("simulate scene.toml -o good.mcap", 2, &["--overwrite"]),
+    ("import images photos -o good.mcap", 2, &["--overwrite"]),
+    ("config nearest-thin", 2, &["nearest-thing", "pipeline"]),
+    ("train svm-pitch", 2, &["svm-patch"]),
+    ("import tmu folder.csv", 2, &["tum"]),
+    ("run steered.toml good.mcap", 1, &["odometry = \"none\"` in [robot]"]),
+    ("check steered.toml good.mcap", 1, &["odometry = \"none\"` in [robot]"]),
+    ("check sparse-model.toml", 2, &["at most 67108864 are read"]),
+    ("check pipe-model.toml", 2, &["is a pipe or a device"]),
+    ("import images cut -o out.mcap", 1, &["cut/1.png"]),
+    ("import images photos --fps 1e300", 2, &["at most 10000"]),
+    ("import images photos --focal 1e30", 2, &["at most 1000000"]),
+    ("check fast.toml", 2, &["must lie between 0.05 and 0.9, not 50"]),
+    ("rum a b", 2, &["rum", "run"]),
+    ("run a b --overly", 2, &["--overlay"]),
+    ("run a b --threads 0", 2, &["--threads"]),
+    ("run neerest.toml good.mcap", 2, &["did you mean", "nearest.toml"]),
+    ("run full good.mcap", 2, &["full is a directory"]),
+    ("run empty.toml good.mcap", 2, &["empty.toml", "filter"]),
+    ("run words.toml good.mcap", 2, &["words.toml:1:"]),
+    ("run extends.toml good.mcap", 2, &["extends.toml:1:11", "secret.env", "ends in .toml"]),
     (
-        "an unknown key",
-        "trials scene-typo.toml --seeds 1 --configs nearest.toml",
-        2,
-        "scene-typo.toml:",
-    ),
-    ("an output below a file", "run nearest.toml good.mcap -o old.bag/x", 2, "old.bag"),
-    ("an output below a file", "doctor nearest.toml good.mcap -o old.bag/x", 2, "old.bag"),
-    ("an output below a file", "demo -o old.bag/x", 2, "old.bag"),
-    ("an output below a file", "simulate scene.toml -o old.bag/x.mcap", 2, "old.bag"),
-    ("an output below a file", "import images photos -o old.bag/x.mcap", 2, "old.bag"),
-    (
-        "an output below a file",
-        "bench --configs nearest.toml --logs good.mcap -o old.bag/x",
-        2,
-        "old.bag",
-    ),
-    ("an existing output", "run nearest.toml good.mcap -o full", 2, "--overwrite"),
-    ("an existing output", "doctor nearest.toml good.mcap -o full", 2, "--overwrite"),
-    ("an existing output", "demo -o full", 2, "--overwrite"),
-    ("an existing output", "simulate scene.toml -o good.mcap", 2, "--overwrite"),
-    ("an existing output", "import images photos -o good.mcap", 2, "--overwrite"),
-    ("an unknown plugin", "config nearest-thin", 2, "nearest-thing"),
-    ("an unknown plugin", "train svm-pitch", 2, "svm-patch"),
-    ("an unknown layout", "import tmu folder.csv", 2, "tum"),
-    (
-        "no odometry for a controller",
-        "run steered.toml good.mcap",
+        "eval --truth stamps.txt --tracks stamps.txt",
         1,
-        "odometry = \"none\"` in [robot]",
+        &["stamps.txt, line 2: frame 1700000000", "up to 1000000"],
     ),
-    ("the same in a check", "check steered.toml good.mcap", 1, "odometry = \"none\"` in [robot]"),
-    ("a model of gigabytes", "check sparse-model.toml", 2, "at most 67108864 are read"),
-    ("a pipe as a model", "check pipe-model.toml", 2, "is a pipe or a device"),
-    ("a cut image", "import images cut -o out.mcap", 1, "cut/1.png"),
-    ("a rate beyond sense", "import images photos --fps 1e300", 2, "at most 10000"),
-    ("a lens beyond sense", "import images photos --focal 1e30", 2, "at most 1000000"),
-    ("a limit beyond its ceiling", "check fast.toml", 2, "must lie between 0.05 and 0.9, not 50"),
+    ("run plugin.toml good.mcap", 2, &["plugin.toml:3", "nearest-thing"]),
+    ("check deep.toml", 2, &["deep.toml:"]),
+    ("run input.toml good.mcap", 2, &["depth_tropic", "depth_topic"]),
+    ("run output.toml good.mcap", 2, &["report_unseen_s"]),
+    ("run nearest.toml goood.mcap", 1, &["no such file", "did you mean `good.mcap`"]),
+    ("run nearest.toml logs", 1, &["directory", "inside.mcap"]),
+    ("run nearest.toml old.bag", 1, &["rosbag fix"]),
+    ("inspect bag.db3", 1, &["bag.db3", "rosbag2 database"]),
+    ("run nearest.toml good.mcap -o old.bag", 2, &["not a directory"]),
+    ("run nearest.toml good.mcap -o good.mcap --overwrite", 2, &["good.mcap"]),
+    (
+        "run nearest.toml logs/inside.mcap -o logs --overwrite",
+        2,
+        &["logs/inside.mcap", "another directory"],
+    ),
 ];
 
 fn lay_out(home: &Path) {
-    let write = |name: &str, text: &str| fs::write(home.join(name), text).unwrap();
     Drawn::of(3).write(&home.join("good.mcap"));
     Drawn { depth: false, ..Drawn::of(3) }.write(&home.join("no-depth.mcap"));
     config(home, "");
-    write("good.people.csv", &people(3));
-    write("good.boxes.csv", "1,1,10,10,20,40,1,1,1\n2,1,11,10,20,40,1,1,1\n");
+    write(home, "good.people.csv", &people(3));
+    write(home, "good.boxes.csv", "1,1,10,10,20,40,1,1,1\n2,1,11,10,20,40,1,1,1\n");
     for extension in ["mcap", "toml", "csv"] {
-        write(&format!("words.{extension}"), "these are only words, and a good lot of them\n");
-        write(&format!("empty.{extension}"), "");
+        write(
+            home,
+            &format!("words.{extension}"),
+            "these are only words, and a good lot of them\n",
+        );
+        write(home, &format!("empty.{extension}"), "");
         fs::create_dir_all(home.join(format!("folder.{extension}"))).unwrap();
         let pipe = Command::new("mkfifo").arg(home.join(format!("pipe.{extension}"))).status();
         assert!(pipe.unwrap().success());
@@ -116,19 +127,31 @@ fn lay_out(home: &Path) {
     for kind in ["sparse", "pipe"] {
         let verifier = "[[verifiers]]\nplugin = \"body-net\"\n";
         let model = format!("{verifier}config = {{ model = \"{kind}.toml\" }}\n");
-        write(&format!("{kind}-model.toml"), &(fine.clone() + "\n" + &model));
+        write(home, &format!("{kind}-model.toml"), &(fine.clone() + "\n" + &model));
     }
     let steered = format!("{fine}\n[controller]\nplugin = \"arc-follow\"\n");
-    write("steered.toml", &steered);
-    write("fast.toml", &format!("robot.max_speed_mps = 50.0\n{steered}"));
-    write("typo.toml", &fine.replace("roles = ", "rolls = "));
+    write(home, "steered.toml", &steered);
+    write(home, "fast.toml", &format!("robot.max_speed_mps = 50.0\n{steered}"));
+    write(home, "typo.toml", &fine.replace("roles = ", "rolls = "));
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
     let scene = fs::read_to_string(scenes.join("sample.toml")).unwrap();
-    write("scene.toml", &scene);
-    write("scene-typo.toml", &scene.replace("duration_s", "durations"));
-    write("old.bag", "#ROSBAG V2.0\n");
+    write(home, "scene.toml", &scene);
+    write(home, "scene-typo.toml", &scene.replace("duration_s", "durations"));
+    write(home, "plugin.toml", &fine.replace("nearest-thing", "nearest-think"));
+    write(home, "input.toml", &format!("{fine}\n[input]\ndepth_tropic = \"/d\"\n"));
+    write(home, "output.toml", &format!("{fine}\n[output]\nreport_unseen_s = -1.0\n"));
+    write(home, "deep.toml", &format!("{fine}config = {{ max_depth_m = \"far\" }}\n"));
+    write(home, "extends.toml", "extends = 'secret.env'\n");
+    write(home, "secret.env", "SEED = 'abc'\n");
+    write(home, "stamps.txt", "1,1,0,0,9,9,1,1,1\n1700000000,1,0,0,9,9,1,1,1\n");
+    write(home, "old.bag", "#ROSBAG V1.2\n");
+    write(home, "bag.db3", "SQLite format 3\0");
+    fs::create_dir_all(home.join("logs")).unwrap();
+    Drawn::of(2).write(&home.join("logs/inside.mcap"));
+    // Two different logs in a folder are not the parts of one.
+    write(home, "logs/other.mcap", "x");
     fs::create_dir_all(home.join("full")).unwrap();
-    write("full/precious.txt", "keep me");
+    write(home, "full/precious.txt", "keep me");
     fs::create_dir_all(home.join("photos")).unwrap();
     image::RgbImage::new(8, 8).save(home.join("photos/1.png")).unwrap();
     let whole = fs::read(home.join("photos/1.png")).unwrap();
@@ -137,15 +160,15 @@ fn lay_out(home: &Path) {
 }
 
 /// Runs a command; returns a description of its wrong answer, if it is wrong.
-fn complaint(home: &Path, line: &str, expected: i32, says: &str) -> Option<String> {
+fn complaint(home: &Path, line: &str, expected: i32, says: &[&str]) -> Option<String> {
     let output = own_plugin().args(line.split(' ')).current_dir(home).output().unwrap();
     let told = text(&output.stderr);
     let ended = output.status.code();
     let wrong = if ended != Some(expected) {
         format!("exit code {ended:?} instead of {expected}")
-    } else if !told.contains(says) {
-        format!("no `{says}`")
-    } else if told.contains("panicked") || told.contains("internal error") {
+    } else if let Some(part) = says.iter().find(|part| !told.contains(**part)) {
+        format!("no `{part}`")
+    } else if ["panicked", "internal error", "backtrace"].iter().any(|word| told.contains(word)) {
         "a stack trace".into()
     } else if told.lines().count() > 40 || !told.contains("error: ") {
         "not one clear message".into()
@@ -161,20 +184,21 @@ fn every_command_answers_bad_input_with_a_clear_message() {
     lay_out(home.path());
     let mut complaints = Vec::new();
     for (template, extension, expected) in FILES {
-        for (_, file) in BAD_FILES {
+        for file in BAD_FILES {
             let file = file.replace("EXT", extension);
             let line = template.replace("FILE", &file);
             if FINE.contains(&line.as_str()) {
                 continue;
             }
-            complaints.extend(complaint(home.path(), &line, expected, &file));
+            complaints.extend(complaint(home.path(), &line, expected, &[&file]));
         }
     }
-    for (_, line, expected, says) in OTHERS {
+    for (line, expected, says) in OTHERS {
         complaints.extend(complaint(home.path(), line, expected, says));
     }
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
     assert_eq!(fs::read(home.path().join("full/precious.txt")).unwrap(), b"keep me");
+    assert!(fs::metadata(home.path().join("good.mcap")).unwrap().len() > 1000);
     let left: Vec<_> =
         ["out", "out.mcap", "runs"].iter().filter(|n| home.path().join(n).exists()).collect();
     assert!(left.is_empty(), "refused commands left {left:?}");
@@ -222,6 +246,7 @@ fn a_closed_pipe_is_a_quiet_end_for_every_command_that_prints() {
         let output = unread(own_plugin().args(line.split(' ')).current_dir(home.path()));
         let told = text(&output.stderr);
         assert!(!told.contains("roken pipe") && !told.contains("panic"), "{line}: {told}");
+        assert!(told.is_empty() || line != "config pipeline", "{told}");
         assert!([0, 3].contains(&code(&output)) || line.starts_with("eval"), "{line}: {told}");
     }
 }
@@ -264,5 +289,50 @@ fn lost_data_is_an_exit_code_of_every_command_that_reads_a_log() {
                 own_plugin().args(line.split(' ')).current_dir(home.path()).output().unwrap();
             assert_eq!(code(&output), expected, "{line}: {}", text(&output.stderr));
         }
+    }
+}
+
+#[test]
+fn without_a_command_the_usage_is_told() {
+    let output = tagalong().output().unwrap();
+    assert_eq!(code(&output), 2);
+    assert!(text(&output.stderr).contains("Usage"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn help_is_there_for_every_command() {
+    for command in ["run", "list", "config", "check", "inspect"] {
+        let output = tagalong().args([command, "--help"]).output().unwrap();
+        assert_eq!(code(&output), 0);
+        assert!(text(&output.stdout).contains("Example"), "{command}");
+    }
+}
+
+#[test]
+fn a_detector_without_a_model_is_a_failure_with_the_key_to_set() {
+    let home = tempfile::tempdir().unwrap();
+    Drawn::of(3).write(&home.path().join("walk.mcap"));
+    fs::write(home.path().join("onnx.toml"), include_str!("../../../../configs/onnx.toml"))
+        .unwrap();
+    let arguments = ["run", "onnx.toml", "walk.mcap", "-o", "out"];
+    let output = tagalong().args(arguments).current_dir(home.path()).output().unwrap();
+    let told = text(&output.stderr);
+    assert_eq!(code(&output), 1, "{told}");
+    assert!(told.contains("has no model (`model`)") && told.contains("tagalong model"), "{told}");
+}
+
+#[test]
+fn a_name_that_is_no_config_costs_no_simulation() {
+    let home = tempfile::tempdir().unwrap();
+    fs::write(home.path().join("walk.people.csv"), "frame,id\n").unwrap();
+    for name in ["walk.people.csv", "none.toml"] {
+        let output = tagalong().args(["run", name]).current_dir(home.path()).output().unwrap();
+        let told = text(&output.stderr);
+        assert_eq!(code(&output), 2, "{told}");
+        assert!(
+            !told.contains("two drawn people") && !told.contains("two simulated people"),
+            "{told}"
+        );
+        assert!(!home.path().join("runs").exists(), "{name}: a log was simulated");
     }
 }

@@ -101,10 +101,11 @@ fn results_and_times_of_another_task_are_not_taken() {
     ok(home.bench(&arguments));
     let before = files(&home.path("out"));
     let hashes = home.plan("out");
-    let hash = |at: usize| hashes[at]["hash"].as_str().unwrap();
+    let [first, second] = [0, 1].map(|at: usize| hashes[at]["hash"].as_str().unwrap());
     for folder in ["results", "timings"] {
-        let file = |at| home.path("out").join(folder).join(format!("{}.json", hash(at)));
-        fs::copy(file(0), file(1)).unwrap();
+        let folder = home.path("out").join(folder);
+        let copied = folder.join(format!("{second}.json"));
+        fs::copy(folder.join(format!("{first}.json")), copied).unwrap();
     }
     let refused = home.bench(&["report", "-o", "out"]);
     assert_eq!(code(&refused), 1, "{}", text(&refused.stdout));
@@ -113,7 +114,7 @@ fn results_and_times_of_another_task_are_not_taken() {
     assert!(told.contains("1 tasks run, 1 had their results"), "{told}");
     assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
     // A damaged result is computed again, too.
-    fs::write(home.path("out/results").join(format!("{}.json", hash(0))), "{").unwrap();
+    fs::write(home.path("out/results").join(format!("{first}.json")), "{").unwrap();
     let told = ok(home.bench(&arguments[..4]));
     assert!(told.contains("1 tasks run, 1 had their results"), "{told}");
     assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");

@@ -47,7 +47,7 @@ fn end(arguments: &[&str], file: &Path) -> i32 {
 
 /// Returns copies of a file: cut, with bytes that changed, and with lengths that lie.
 fn damaged(bytes: &[u8], count: usize) -> Vec<Vec<u8>> {
-    let copy = |k: usize| {
+    let copies = (0..count).map(|k| {
         let at = (k + 1) * bytes.len() / (count + 1);
         let mut copy = bytes.to_vec();
         match k % 3 {
@@ -56,8 +56,8 @@ fn damaged(bytes: &[u8], count: usize) -> Vec<Vec<u8>> {
             _ => (at..bytes.len().min(at + 8)).for_each(|i| copy[i] = 0xff),
         }
         copy
-    };
-    (0..count).map(copy).collect()
+    });
+    copies.collect()
 }
 
 /// Returns all logs below a folder, in order.

@@ -24,16 +24,15 @@ fn trials_print_the_same_table_on_any_number_of_jobs() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("s.toml"), SCENE).unwrap();
     let config = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/naive.toml");
-    let trials = |jobs: &str| {
+    let [table, other] = ["1", "3"].map(|jobs| {
         let mut command = tagalong();
         command.current_dir(folder.path()).args(["trials", "s.toml", "--seeds", "3"]);
         command.args(["--format", "json", "--jobs", jobs, "--configs", config, config]);
         let output = command.output().unwrap();
         assert_eq!(code(&output), 0, "{}", text(&output.stderr));
         text(&output.stdout)
-    };
-    let table = trials("1");
-    assert_eq!(table, trials("3"));
+    });
+    assert_eq!(table, other);
     let table: serde_json::Value = serde_json::from_str(&table).unwrap();
     assert_eq!(
         (table["rows"].as_array().unwrap().len(), &table["rows"][0]["draws"]),

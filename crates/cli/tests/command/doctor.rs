@@ -64,15 +64,19 @@ struct Case {
 }
 
 fn shifted(dx: i64, dy: i64) -> Changes {
-    let depth = move |all: &[u16], width: usize, x, y| reading(all, width, x - dx, y - dy);
-    Changes { depth: Some(Box::new(depth)), ..Changes::default() }
+    Changes {
+        depth: Some(Box::new(move |all, width, x, y| reading(all, width, x - dx, y - dy))),
+        ..Changes::default()
+    }
 }
 
 fn scaled(factor: f64) -> Changes {
-    let depth = move |all: &[u16], width: usize, x, y| {
-        (f64::from(reading(all, width, x, y)) * factor).round() as u16
-    };
-    Changes { depth: Some(Box::new(depth)), ..Changes::default() }
+    Changes {
+        depth: Some(Box::new(move |all, width, x, y| {
+            (f64::from(reading(all, width, x, y)) * factor).round() as u16
+        })),
+        ..Changes::default()
+    }
 }
 
 fn with_info(info: fn(&mut CameraInfo)) -> Changes {
@@ -100,8 +104,17 @@ fn uncalibrated(info: &mut CameraInfo) {
     info.p = [0.0; 12];
 }
 
+fn case(
+    name: &'static str,
+    changes: Changes,
+    id: &'static str,
+    severity: &'static str,
+    remedy: &'static str,
+) -> Case {
+    Case { name, changes, id, severity, remedy }
+}
+
 fn cases() -> Vec<Case> {
-    let case = |name, changes, id, severity, remedy| Case { name, changes, id, severity, remedy };
     vec![
         case("depth beside colour", shifted(-7, 2), "registration", "bad", "depth_offset_px = ["),
         case("tenths of millimetres", scaled(10.0), "depth", "bad", "depth_unit_m = 0.0001"),
@@ -279,9 +292,9 @@ fn the_remedy_for_shifted_depth_cures_it() {
     broken::write(good(), &log, &shifted(6, -5));
     let (_, said) = doctor(&config(), &log, &[]);
     let figures = &finding(&said, "registration")["figures"];
-    let off = |name: &str| figures[name].as_f64().unwrap();
-    assert!((off("offset_x_px") + 6.0).abs() <= 1.0, "{figures}");
-    assert!((off("offset_y_px") - 5.0).abs() <= 1.0, "{figures}");
+    for (name, offset_px) in [("offset_x_px", -6.0), ("offset_y_px", 5.0)] {
+        assert!((figures[name].as_f64().unwrap() - offset_px).abs() <= 1.0, "{figures}");
+    }
     let remedy = finding(&said, "registration")["remedy"].as_str().unwrap();
     let line = remedy.lines().last().unwrap().replace("[input] ", "[input]\n");
     let text = std::fs::read_to_string(config()).unwrap();

@@ -6,15 +6,10 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::common::{Drawn, code, own_plugin, tagalong, text};
+use crate::common::{Drawn, code, json, own_plugin, tagalong, text, write};
 
 fn eval(arguments: &[&str]) -> Output {
     tagalong().arg("eval").args(arguments).output().unwrap()
-}
-
-fn json(output: &Output) -> Value {
-    assert_eq!(code(output), 0, "{}", text(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 fn shown(path: &Path) -> &str {
@@ -89,9 +84,8 @@ fn repairs_show_what_each_kind_of_error_costs() {
 #[test]
 fn truth_that_is_named_after_another_log_is_noted() {
     let folder = home();
-    let path = |name: &str| folder.path().join(name);
     for name in ["other.people.csv", "truth.csv"] {
-        fs::copy(path("walk.people.csv"), path(name)).unwrap();
+        fs::copy(folder.path().join("walk.people.csv"), folder.path().join(name)).unwrap();
     }
     for (truth, is_noted) in
         [("walk.people.csv", false), ("other.people.csv", true), ("truth.csv", false)]
@@ -189,35 +183,26 @@ fn truth_is_read_from_the_log_itself() {
 #[test]
 fn whole_bodies_can_be_compared_by_their_upper_bodies() {
     let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name);
     // 1.7 m over 170 pixels: the square has 57 of them, and 2.5 of air.
-    fs::write(path("whole.txt"), "1,1,100,50,60,170,1,1,1\n").unwrap();
-    fs::write(path("upper.txt"), "1,1,101.5,47.5,57,57,1,-1,-1,-1\n").unwrap();
-    let truth = path("whole.txt");
-    let tracks = path("upper.txt");
-    let files = ["--truth", shown(&truth), "--tracks", shown(&tracks), "--format", "json"];
-    let nothing = json(&eval(&files));
+    write(folder.path(), "whole.txt", "1,1,100,50,60,170,1,1,1\n");
+    write(folder.path(), "upper.txt", "1,1,101.5,47.5,57,57,1,-1,-1,-1\n");
+    let files = ["--truth", "whole.txt", "--tracks", "upper.txt", "--format", "json"];
+    let nothing = json(&in_home(folder.path(), &files));
     assert_eq!(nothing["TP"].as_u64(), Some(0));
     assert!(nothing["notes"].to_string().contains("whole bodies? --upper-body"), "{nothing}");
-    let upper = json(&eval(&[&files[..], &["--upper-body"]].concat()));
+    let upper = json(&in_home(folder.path(), &[&files[..], &["--upper-body"]].concat()));
     assert!((upper["MOTP"].as_f64().unwrap() - 1.0).abs() < 1e-9, "{upper}");
 }
 
 #[test]
 fn kitti_labels_count_frames_from_zero() {
     let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name);
-    let line = |frame: u32, class: &str| {
-        format!("{frame} 4 {class} 0 0 0 100 100 150 220 1.7 0.5 0.5 1 1.6 8 0")
-    };
-    fs::write(path("truth.txt"), [line(0, "Pedestrian"), line(1, "Pedestrian")].join("\n"))
-        .unwrap();
-    fs::write(path("tracks.txt"), "1,9,100,100,50,120,1,-1,-1,-1\n2,9,100,100,50,120,1,-1,-1,-1\n")
-        .unwrap();
-    let truth = path("truth.txt");
-    let tracks = path("tracks.txt");
-    let scores =
-        json(&eval(&["--truth", shown(&truth), "--tracks", shown(&tracks), "--format", "json"]));
+    let label = "4 Pedestrian 0 0 0 100 100 150 220 1.7 0.5 0.5 1 1.6 8 0";
+    let rows = "1,9,100,100,50,120,1,-1,-1,-1\n2,9,100,100,50,120,1,-1,-1,-1\n";
+    write(folder.path(), "truth.txt", &format!("0 {label}\n1 {label}"));
+    write(folder.path(), "tracks.txt", rows);
+    let files = ["--truth", "truth.txt", "--tracks", "tracks.txt", "--format", "json"];
+    let scores = json(&in_home(folder.path(), &files));
     assert_eq!(scores["HOTA"].as_f64(), Some(1.0), "{scores}");
 }
 
@@ -229,10 +214,9 @@ fn truth_with(class: &str) -> String {
 /// Scores two texts, as files of a sequence of two frames.
 fn scored(truth: &str, tracks: &str, more: &[&str]) -> Output {
     let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
-    write("gt.txt", truth);
-    write("tracks.txt", tracks);
-    write("seqinfo.ini", "name=two\nframeRate=10\nseqLength=2\n");
+    write(folder.path(), "gt.txt", truth);
+    write(folder.path(), "tracks.txt", tracks);
+    write(folder.path(), "seqinfo.ini", "name=two\nframeRate=10\nseqLength=2\n");
     let files = ["--truth", "gt.txt", "--tracks", "tracks.txt"];
     in_home(folder.path(), &[&files[..], more].concat())
 }
@@ -241,18 +225,18 @@ const TRACKS: &str = "1,1,0,0,40,90,1,-1,-1,-1\n2,1,0,0,40,90,1,-1,-1,-1\n";
 
 #[test]
 fn what_trackeval_refuses_is_refused_with_its_line() {
-    let second = |line: &str| format!("1,1,0,0,40,90,1,-1,-1,-1\n{line}\n");
+    let right = "2,1,0,0,40,90,1,-1,-1,-1";
     let cases = [
-        (truth_with("0"), TRACKS.to_owned(), "gt.txt, line 2: class 0"),
-        (truth_with("-1"), TRACKS.to_owned(), "gt.txt, line 2: class -1"),
-        (truth_with("14"), TRACKS.to_owned(), "gt.txt, line 2: class 14"),
-        (truth_with("1").replace("2,1", "3,1"), TRACKS.to_owned(), "gt.txt, line 2: frame 3"),
-        (truth_with("1"), second("2,1,0,0,40,90,1,3,-1,-1"), "tracks.txt, line 2: class 3"),
-        (truth_with("1"), second("2,-1,0,0,40,90,1,-1,-1,-1"), "tracks.txt, line 2: id -1"),
-        (truth_with("1"), second("3,1,0,0,40,90,1,-1,-1,-1"), "tracks.txt, line 2: frame 3"),
+        (truth_with("0"), right, "gt.txt, line 2: class 0"),
+        (truth_with("-1"), right, "gt.txt, line 2: class -1"),
+        (truth_with("14"), right, "gt.txt, line 2: class 14"),
+        (truth_with("1").replace("2,1", "3,1"), right, "gt.txt, line 2: frame 3"),
+        (truth_with("1"), "2,1,0,0,40,90,1,3,-1,-1", "tracks.txt, line 2: class 3"),
+        (truth_with("1"), "2,-1,0,0,40,90,1,-1,-1,-1", "tracks.txt, line 2: id -1"),
+        (truth_with("1"), "3,1,0,0,40,90,1,-1,-1,-1", "tracks.txt, line 2: frame 3"),
     ];
-    for (truth, tracks, expected) in cases {
-        let output = scored(&truth, &tracks, &[]);
+    for (truth, second, expected) in cases {
+        let output = scored(&truth, &format!("1,1,0,0,40,90,1,-1,-1,-1\n{second}\n"), &[]);
         let said = text(&output.stderr);
         assert!(code(&output) == 1 && said.contains(expected), "{expected}: {said}");
     }
@@ -284,15 +268,13 @@ fn rules_odd_boxes_and_constant_scores_are_said() {
 #[test]
 fn a_car_of_a_kitti_tracker_that_ends_before_it_begins_refuses_no_file() {
     let folder = tempfile::tempdir().unwrap();
-    let line = |id: i64, class: &str, right: u32| {
-        format!("0 {id} {class} 0 0 0 100 100 {right} 220 1.7 0.5 0.5 1 1.6 8 0 0.9\n")
-    };
-    let write = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
-    write("gt.txt", line(1, "Pedestrian", 150));
-    write(
-        "tracks.txt",
-        line(7, "Pedestrian", 150) + &line(8, "Car", 90) + &line(-1, "Pedestrian", 150),
-    );
+    let [truth, person, car, nobody] =
+        [(1, "Pedestrian", 150), (7, "Pedestrian", 150), (8, "Car", 90), (-1, "Pedestrian", 150)]
+            .map(|(id, class, right)| {
+                format!("0 {id} {class} 0 0 0 100 100 {right} 220 1.7 0.5 0.5 1 1.6 8 0 0.9\n")
+            });
+    write(folder.path(), "gt.txt", &truth);
+    write(folder.path(), "tracks.txt", &(person + &car + &nobody));
     let files = ["--truth", "gt.txt", "--tracks", "tracks.txt", "--format", "json"];
     let said = json(&in_home(folder.path(), &files));
     assert_eq!((said["TP"].as_u64(), said["FP"].as_u64()), (Some(1), Some(0)), "{said}");

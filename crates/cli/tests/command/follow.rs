@@ -6,7 +6,7 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::common::{code, tagalong, text};
+use crate::common::{code, json, tagalong, text};
 
 const SCENE: &str = "duration_s = 5.0\n[camera]\nwidth = 120\nheight = 90\ncolour = false\n\
     [robot]\nstart = [1.0, 3.0]\n[[people]]\npath = [[3.2, 3.0], [8.0, 3.0]]\nspeed_mps = 0.6\n";
@@ -22,20 +22,14 @@ fn follow(folder: &Path, config: &str, more: &[&str]) -> Output {
     command.arg("walk.toml").args(more).output().unwrap()
 }
 
-fn json(output: &Output) -> Value {
-    assert_eq!(code(output), 0, "{}", text(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
 #[test]
 fn a_person_who_walks_is_followed_the_same_way_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let rides = |jobs| {
+    let [first, second] = ["1", "2"].map(|jobs| {
         let more = ["--seeds", "2", "--jobs", jobs, "--format", "json"];
         json(&follow(folder.path(), "follow-depth.toml", &more))["rides"].clone()
-    };
-    let first = rides("1");
-    assert_eq!(first, rides("2"));
+    });
+    assert_eq!(first, second);
     assert_eq!(first.as_array().unwrap().len(), 2);
     for ride in first.as_array().unwrap() {
         assert_eq!(ride["kept"], true, "{ride}");
@@ -47,12 +41,10 @@ fn a_person_who_walks_is_followed_the_same_way_on_any_number_of_threads() {
 #[test]
 fn another_first_seed_rides_elsewhere_and_the_tables_name_it() {
     let folder = tempfile::tempdir().unwrap();
-    let ride = |first| {
+    let [near, far] = ["3", "4"].map(|first| {
         let more = ["--seeds", "1", "--first-seed", first, "--format", "json"];
         json(&follow(folder.path(), "follow-depth.toml", &more))
-    };
-    let near = ride("3");
-    let far = ride("4");
+    });
     assert_eq!(near["seeds"], serde_json::json!({ "split": "test", "first": 3, "count": 1 }));
     assert_eq!(
         (&near["rides"][0]["seed"], &far["rides"][0]["seed"]),
@@ -76,13 +68,12 @@ fn a_sweep_rides_each_scene_with_each_value_as_a_row_of_its_own() {
     let suites = found["rides"].as_array().unwrap().iter().map(|ride| ride["suite"].clone());
     assert_eq!(suites.collect::<Vec<_>>(), ["walk 0.9", "walk 1.2"]);
     assert_ne!(found["rides"][0]["distance_kept_s"], Value::Null);
-    let log = |height: &str| format!("rides/walk-{height}-follow-depth-2000000000.mcap");
-    let inspected = |height: &str| {
-        let output = tagalong().arg("inspect").arg(folder.path().join(log(height))).output();
-        text(&output.unwrap().stdout)
-    };
-    assert!(inspected("0.9").contains("0.90 m above the floor"), "{}", inspected("0.9"));
-    assert!(inspected("1.2").contains("1.20 m above the floor"));
+    for height in ["0.9", "1.2"] {
+        let log = format!("rides/walk-{height}-follow-depth-2000000000.mcap");
+        let output = tagalong().arg("inspect").arg(folder.path().join(log)).output();
+        let told = text(&output.unwrap().stdout);
+        assert!(told.contains(&format!("{height}0 m above the floor")), "{told}");
+    }
     let wrong = follow(folder.path(), "follow-depth.toml", &["--sweep", "camera.height=1.0"]);
     assert_eq!(code(&wrong), 2, "{}", text(&wrong.stderr));
 }

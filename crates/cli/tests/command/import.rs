@@ -43,17 +43,16 @@ fn a_tum_folder_has_depth_and_a_camera_that_moves() {
         colour(&folder.join(format!("rgb/{i}.png")), (640, 480), 10 * i);
         depth(&folder.join(format!("depth/{i}.png")), (640, 480), 10_000);
     }
-    let list = |name: &str, offset: u32| {
-        let line = |i: u32| format!("100.{:06} {name}/{i}.png\n", 100_000 * i + offset);
-        "# a comment\n".to_owned() + &(0..3).map(line).collect::<String>()
-    };
-    fs::write(folder.join("rgb.txt"), list("rgb", 0)).unwrap();
-    fs::write(folder.join("depth.txt"), list("depth", 8000)).unwrap();
+    for (name, offset) in [("rgb", 0), ("depth", 8000)] {
+        let lines = (0..3).map(|i| format!("100.{:06} {name}/{i}.png\n", 100_000 * i + offset));
+        let list = "# a comment\n".to_owned() + &lines.collect::<String>();
+        fs::write(folder.join(format!("{name}.txt")), list).unwrap();
+    }
     // Upright, looking along Y, 1.4 m high, going ahead by 0.1 m an image.
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    let pose =
-        |i: u32| format!("100.{i} 1.0 {:.1} 1.4 {} 0 0 {half}\n", 2.0 + 0.1 * f64::from(i), -half);
-    fs::write(folder.join("groundtruth.txt"), (0..4).map(pose).collect::<String>()).unwrap();
+    let poses = (0..4)
+        .map(|i| format!("100.{i} 1.0 {:.1} 1.4 {} 0 0 {half}\n", 2.0 + 0.1 * f64::from(i), -half));
+    fs::write(folder.join("groundtruth.txt"), poses.collect::<String>()).unwrap();
     let (code, said) = import(home.path(), &["tum", "rgbd_dataset_freiburg3_tiny"]);
     assert_eq!(code, 0, "{said}");
     let found = frames(&home.path().join("runs/rgbd_dataset_freiburg3_tiny.mcap"), DEPTH);
@@ -77,9 +76,10 @@ fn a_part_of_a_tum_folder_is_what_is_there_of_it() {
         colour(&folder.join(format!("rgb/{i}.png")), (640, 480), 10 * i);
         depth(&folder.join(format!("depth/{i}.png")), (640, 480), 10_000);
     }
-    let list = |name: &str| (0..3).map(|i| format!("100.{i} {name}/{i}.png\n")).collect::<String>();
-    fs::write(folder.join("rgb.txt"), list("rgb")).unwrap();
-    fs::write(folder.join("depth.txt"), list("depth")).unwrap();
+    for name in ["rgb", "depth"] {
+        let list: String = (0..3).map(|i| format!("100.{i} {name}/{i}.png\n")).collect();
+        fs::write(folder.join(format!("{name}.txt")), list).unwrap();
+    }
     let (code, said) = import(home.path(), &["tum", "part", "--height", "1.2"]);
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("1 of 3 images of rgb.txt are not there"), "{said}");
@@ -133,8 +133,8 @@ fn a_kitti_sequence_is_a_pair_with_boxes_and_a_drive() {
     fs::write(folder.join("label_02/0007.txt"), labels).unwrap();
     // An image later 10 m north, at the same heading (north).
     let north = 49.0 + (10.0 / 6_378_137.0_f64).to_degrees();
-    let oxts = |lat: f64| format!("{lat:.12} 8.4 100 0 0 1.5707963267948966 0 0\n");
-    fs::write(folder.join("oxts/0007.txt"), oxts(49.0) + &oxts(north)).unwrap();
+    let oxts = [49.0, north].map(|lat| format!("{lat:.12} 8.4 100 0 0 1.5707963267948966 0 0\n"));
+    fs::write(folder.join("oxts/0007.txt"), oxts.concat()).unwrap();
     let args = ["kitti", "training", "--sequence", "0007", "-o", "k.mcap"];
     let (code, said) = import(home.path(), &args);
     assert_eq!(code, 0, "{said}");
@@ -244,13 +244,13 @@ fn what_is_not_of_the_layout_is_told() {
 #[test]
 fn annotations_of_cvat_become_truth_that_eval_reads() {
     let home = tempfile::tempdir().unwrap();
-    let shape = |frame: u32| {
+    let shapes = (0..4).map(|frame| {
         format!(
             "<box frame=\"{frame}\" keyframe=\"1\" outside=\"0\" occluded=\"0\" \
              xtl=\"10\" ytl=\"10\" xbr=\"40\" ybr=\"40\"/>"
         )
-    };
-    let shapes: String = (0..4).map(shape).collect();
+    });
+    let shapes: String = shapes.collect();
     let text =
         format!("<annotations><track id=\"2\" label=\"person\">{shapes}</track></annotations>");
     fs::write(home.path().join("walk.xml"), text).unwrap();
@@ -298,61 +298,74 @@ fn numbered_images_are_in_the_order_of_their_numbers() {
 
 /// A ROS 1 bag, record by record: two scans 0.1 s apart, and people half way after each.
 fn leg_bag(topics: &[&str]) -> Vec<u8> {
-    let field = |name: &str, value: &[u8]| {
-        let body = [name.as_bytes(), b"=", value].concat();
-        [&(body.len() as u32).to_le_bytes()[..], &body].concat()
-    };
-    let record = |header: &[Vec<u8>], data: &[u8]| {
-        let header = header.concat();
-        let lengths = [header.len(), data.len()].map(|length| (length as u32).to_le_bytes());
-        [&lengths[0][..], &header, &lengths[1], data].concat()
-    };
-    let connection = |id: u32, topic: &str, kind: &str| {
-        let head =
-            [field("op", &[7]), field("conn", &id.to_le_bytes()), field("topic", topic.as_bytes())];
-        let data = [field("topic", topic.as_bytes()), field("type", kind.as_bytes())].concat();
-        record(&head, &data)
-    };
-    let message = |id: u32, tenths: u32, data: &[u8]| {
-        let time = [9_u32.to_le_bytes(), (tenths * 50_000_000).to_le_bytes()].concat();
-        record(&[field("op", &[2]), field("conn", &id.to_le_bytes()), field("time", &time)], data)
-    };
-    // The clock of the scanner is another one than that of the recorder.
-    let scan = |sec: u32| {
-        let mut out = [sec, 1400 + sec, 500].map(u32::to_le_bytes).concat();
-        out.extend([&5_u32.to_le_bytes()[..], b"laser"].concat());
-        let fixed = [-0.1_f32, 0.1, 0.1, 0.0, 0.1, 0.05, 9.0];
-        out.extend(fixed.iter().flat_map(|value| value.to_le_bytes()));
-        out.extend(3_u32.to_le_bytes());
-        out.extend([2.0_f32, 2.0, f32::INFINITY].iter().flat_map(|v| v.to_le_bytes()));
-        out.extend(0_u32.to_le_bytes());
-        out
-    };
-    let person = |id: u32, x: f64, y: f64| {
-        let pose = [x, y, 0.0, 0.0, 0.0, 0.0, 1.0].map(f64::to_le_bytes).concat();
-        [&pose[..], &id.to_le_bytes()].concat()
-    };
-    let mut records = connection(0, "/ground_truth_people_tracks", "leg_tracker/Person");
+    let mut records = bag_connection(0, "/ground_truth_people_tracks", "leg_tracker/Person");
     for (id, topic) in (1..).zip(topics) {
-        records.extend(connection(id, topic, "sensor_msgs/LaserScan"));
+        records.extend(bag_connection(id, topic, "sensor_msgs/LaserScan"));
     }
     for (at, step) in [(0, 0), (2, 1)] {
         for id in 1..=topics.len() as u32 {
-            records.extend(message(id, at, &scan(step)));
+            records.extend(bag_message(id, at, &bag_scan(step)));
         }
-        records.extend(message(0, at + 1, &person(4, 2.0, -0.1)));
+        records.extend(bag_message(0, at + 1, &bag_person(4, 2.0, -0.1)));
         if step == 1 {
-            records.extend(message(0, at + 1, &person(1000, 5.0, 1.25)));
+            records.extend(bag_message(0, at + 1, &bag_person(1000, 5.0, 1.25)));
         }
     }
     let head = [
-        field("op", &[5]),
-        field("compression", b"none"),
-        field("size", &(records.len() as u32).to_le_bytes()),
+        bag_field("op", &[5]),
+        bag_field("compression", b"none"),
+        bag_field("size", &(records.len() as u32).to_le_bytes()),
     ];
     let magic: &[u8] = b"#ROSBAG V2.0\n";
-    let end = record(&[field("op", &[6])], &[0; 8]);
-    [magic, &record(&[field("op", &[3])], &[b' '; 40]), &record(&head, &records), &end].concat()
+    let end = bag_record(&[bag_field("op", &[6])], &[0; 8]);
+    [magic, &bag_record(&[bag_field("op", &[3])], &[b' '; 40]), &bag_record(&head, &records), &end]
+        .concat()
+}
+
+fn bag_field(name: &str, value: &[u8]) -> Vec<u8> {
+    let body = [name.as_bytes(), b"=", value].concat();
+    [&(body.len() as u32).to_le_bytes()[..], &body].concat()
+}
+
+fn bag_record(header: &[Vec<u8>], data: &[u8]) -> Vec<u8> {
+    let header = header.concat();
+    let lengths = [header.len(), data.len()].map(|length| (length as u32).to_le_bytes());
+    [&lengths[0][..], &header, &lengths[1], data].concat()
+}
+
+fn bag_connection(id: u32, topic: &str, kind: &str) -> Vec<u8> {
+    let head = [
+        bag_field("op", &[7]),
+        bag_field("conn", &id.to_le_bytes()),
+        bag_field("topic", topic.as_bytes()),
+    ];
+    let data = [bag_field("topic", topic.as_bytes()), bag_field("type", kind.as_bytes())].concat();
+    bag_record(&head, &data)
+}
+
+fn bag_message(id: u32, tenths: u32, data: &[u8]) -> Vec<u8> {
+    let time = [9_u32.to_le_bytes(), (tenths * 50_000_000).to_le_bytes()].concat();
+    bag_record(
+        &[bag_field("op", &[2]), bag_field("conn", &id.to_le_bytes()), bag_field("time", &time)],
+        data,
+    )
+}
+
+/// Returns a scan by the clock of the scanner, which is another one than that of the recorder.
+fn bag_scan(sec: u32) -> Vec<u8> {
+    let mut out = [sec, 1400 + sec, 500].map(u32::to_le_bytes).concat();
+    out.extend([&5_u32.to_le_bytes()[..], b"laser"].concat());
+    let fixed = [-0.1_f32, 0.1, 0.1, 0.0, 0.1, 0.05, 9.0];
+    out.extend(fixed.iter().flat_map(|value| value.to_le_bytes()));
+    out.extend(3_u32.to_le_bytes());
+    out.extend([2.0_f32, 2.0, f32::INFINITY].iter().flat_map(|v| v.to_le_bytes()));
+    out.extend(0_u32.to_le_bytes());
+    out
+}
+
+fn bag_person(id: u32, x: f64, y: f64) -> Vec<u8> {
+    let pose = [x, y, 0.0, 0.0, 0.0, 0.0, 1.0].map(f64::to_le_bytes).concat();
+    [&pose[..], &id.to_le_bytes()].concat()
 }
 
 #[test]

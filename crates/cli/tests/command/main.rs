@@ -21,7 +21,6 @@ mod import;
 mod inputs;
 mod live;
 mod missing_topics;
-mod mistakes;
 mod model;
 mod recorded;
 mod rooms;

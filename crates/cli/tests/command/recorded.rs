@@ -44,10 +44,10 @@ fn without_depth_the_size_of_the_box_tells_the_distance() {
 
 #[test]
 fn detections_in_space_are_brought_into_the_robot_frame() {
-    let log = || Drawn { in_space: true, depth: false, ..Drawn::of(20) };
-    let floor = scores(&log(), "metres");
+    let log = Drawn { in_space: true, depth: false, ..Drawn::of(20) };
+    let floor = scores(&log, "metres");
     assert!(floor["position_error_mean_m"].as_f64().unwrap() < 0.1, "{floor}");
-    let image = scores(&log(), "iou");
+    let image = scores(&log, "iou");
     assert!(image["MOTP"].as_f64().unwrap() > 0.8, "{image}");
 }
 

@@ -8,7 +8,7 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::common::{Drawn, code, own_plugin, people, text};
+use crate::common::{Drawn, assert_same, code, own_plugin, people, text};
 
 /// The detector of the config misses the walker; one value of two lets it detect them.
 const TUNE: &str = "config = { max_depth_m = 2.0 }";
@@ -72,15 +72,17 @@ impl Home {
 
     fn results(&self, out: &str) -> BTreeMap<String, Vec<u8>> {
         let entries = fs::read_dir(self.path(out).join("rooms")).unwrap().map(Result::unwrap);
-        let name = |entry: &fs::DirEntry| entry.file_name().into_string().unwrap();
-        entries.map(|entry| (name(&entry), fs::read(entry.path()).unwrap())).collect()
+        let files = entries.map(|entry| {
+            (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap())
+        });
+        files.collect()
     }
 }
 
 fn chosen(fitted: &Value) -> [f64; 3] {
-    let of = |values: &Value| values[KEY].as_f64().unwrap();
-    let without = |room: usize| of(&fitted["rooms"][room]["chosen_without"]);
-    [without(0), without(1), of(&fitted["chosen_with_all"])]
+    let rooms = &fitted["rooms"];
+    [&rooms[0]["chosen_without"], &rooms[1]["chosen_without"], &fitted["chosen_with_all"]]
+        .map(|values| values[KEY].as_f64().unwrap())
 }
 
 fn mota(fitted: &Value, room: usize, which: &str) -> f64 {
@@ -117,8 +119,7 @@ fn a_second_time_computes_nothing_and_jobs_change_no_byte() {
     assert!(first.stdout == second.stdout && first.stdout == third.stdout);
     assert_eq!(home.results("one").len(), 4);
     assert!(home.results("one") == home.results("two"));
-    let json = |out: &str| fs::read(home.path(out).join("rooms.json")).unwrap();
-    assert!(json("one") == json("two"));
+    assert_same(&home.path("one/rooms.json"), &home.path("two/rooms.json"));
     let lost = home.results("two").into_keys().next().unwrap();
     fs::write(home.path("two").join("rooms").join(lost), "{\"figures\":").unwrap();
     let repaired = home.rooms(&["-o", "two"]);

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use crate::common::{Drawn, code, config, own_plugin, text};
+use crate::common::{Drawn, assert_same, code, config, own_plugin, text};
 
 const FILES: [&str; 4] = ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json"];
 
@@ -78,13 +78,13 @@ fn boxes_follow_the_walker_in_ten_columns() {
     assert!(rows.len() >= 15, "{} rows", rows.len());
     assert!(rows.iter().all(|row| row.len() == 10 && row[7..] == ["-1", "-1", "-1"]));
     for row in &rows {
-        let value = |i: usize| row[i].parse::<f64>().unwrap();
-        let frame = value(0);
-        let centre = value(2) + 0.5 * value(4);
+        let values: Vec<f64> = row.iter().map(|cell| cell.parse().unwrap()).collect();
+        let frame = values[0];
+        let centre = values[2] + 0.5 * values[4];
         assert!((1.0..=20.0).contains(&frame));
         let walker = 90.0 - (frame - 1.0) + 13.0;
         assert!((centre - walker).abs() < 4.0, "frame {frame}: {centre}, drawn at {walker}");
-        assert!((0.0..=1.0).contains(&value(6)));
+        assert!((0.0..=1.0).contains(&values[6]));
     }
 }
 
@@ -96,10 +96,10 @@ fn metres_have_a_header_and_the_place_of_the_walker() {
     assert_eq!(rows[0][..3], ["stamp_ns", "frame", "id"]);
     assert!(rows.iter().all(|row| row.len() == rows[0].len()));
     let last = rows.last().unwrap();
-    let value = |i: usize| last[i].parse::<f64>().unwrap();
+    let [in_robot, in_odom] = [3, 6].map(|column: usize| last[column].parse::<f64>().unwrap());
     assert_eq!(last[0], (crate::common::FIRST_NS + 19 * 100_000_000).to_string());
-    assert!((value(3) - 2.88).abs() < 0.15, "the head is 2.88 m ahead: {}", value(3));
-    assert_eq!(value(3), value(6), "no odometry: both frames agree");
+    assert!((in_robot - 2.88).abs() < 0.15, "the head is 2.88 m ahead: {in_robot}");
+    assert_eq!(in_robot, in_odom, "no odometry: both frames agree");
 }
 
 #[test]
@@ -131,12 +131,10 @@ fn every_run_gives_the_same_bytes() {
         command.env("TZ", "Asia/Tokyo").env("LC_ALL", "de_DE.UTF-8").env_remove("HOME");
         assert!(command.output().unwrap().status.success());
         for name in FILES {
-            let read = |out: &str| fs::read(home.path(out).join(name)).unwrap();
-            assert_eq!(read("a"), read(out), "{name} with {threads} threads");
+            assert_same(&home.path("a").join(name), &home.path(out).join(name));
         }
     }
-    let picture = |out: &str| fs::read(home.path(out).join("overlay/000017.png")).unwrap();
-    assert_eq!(picture("b"), picture("e"));
+    assert_same(&home.path("b/overlay/000017.png"), &home.path("e/overlay/000017.png"));
 }
 
 /// The surroundings of a process have no part in its results; without a terminal are all tests.
@@ -159,8 +157,7 @@ fn p10_surroundings_change_no_byte() {
         let done = command.output().unwrap();
         assert!(done.status.success(), "{}", text(&done.stderr));
         for file in FILES {
-            let read = |out: &str| fs::read(home.path(out).join(file)).unwrap();
-            assert_eq!(read("plain"), read(&out), "{file} with {name}={value}");
+            assert_same(&home.path("plain").join(file), &home.path(&out).join(file));
         }
     }
 }
@@ -174,8 +171,7 @@ fn p10_the_wall_clock_is_not_in_the_results() {
     std::thread::sleep(std::time::Duration::from_millis(1100));
     assert_eq!(code(&home.run("late", &[])), 0);
     for file in FILES {
-        let read = |out: &str| fs::read(home.path(out).join(file)).unwrap();
-        assert_eq!(read("early"), read("late"), "{file}");
+        assert_same(&home.path("early").join(file), &home.path("late").join(file));
     }
 }
 
@@ -299,6 +295,6 @@ fn the_config_travels_with_the_tracks() {
     command.current_dir(home.folder.path()).args(["run", "again.toml", "walk.mcap", "-o", "again"]);
     let output = command.output().unwrap();
     assert_eq!(code(&output), 0, "{config}\n{}", text(&output.stderr));
-    let read = |out: &str| fs::read(home.path(out).join("tracks.csv")).unwrap();
-    assert_eq!(read("out"), read("again"), "the resolved config does the same");
+    // The resolved config does the same.
+    assert_same(&home.path("out/tracks.csv"), &home.path("again/tracks.csv"));
 }

@@ -32,17 +32,12 @@ fn printed(output: &Output) -> String {
 
 #[test]
 fn another_first_seed_draws_other_scenes_and_the_same_one_the_same() {
-    let json = |first: &str, jobs: &str| {
+    let [here, again, there] = [("5", "1"), ("5", "2"), ("6", "2")].map(|(first, jobs)| {
         let more = ["--seeds", "2", "--format", "json", "--jobs", jobs, "--first-seed", first];
         printed(&trials(&more))
-    };
-    let here = json("5", "1");
-    let again = json("5", "2");
-    let there = json("6", "2");
+    });
     assert_eq!(here, again);
-    let read = |text: &str| serde_json::from_str::<Value>(text).unwrap();
-    let here = read(&here);
-    let there = read(&there);
+    let [here, there] = [here, there].map(|text| serde_json::from_str::<Value>(&text).unwrap());
     assert_ne!(here["rows"], there["rows"]);
     let seeds = serde_json::json!({ "split": "test", "first": 5, "count": 2 });
     assert_eq!(here["seeds"], seeds);

@@ -19,18 +19,20 @@ fn simulate(folder: &Path, arguments: &[&str]) -> std::process::Output {
     command.current_dir(folder).arg("simulate").args(arguments).output().unwrap()
 }
 
+/// Renders the scene `s.toml`, and returns the bytes of the log.
+fn log_of(folder: &Path, name: &str, more: &[&str]) -> Vec<u8> {
+    let output = simulate(folder, &[&["s.toml", "-o", name], more].concat());
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    fs::read(folder.join(name)).unwrap()
+}
+
 #[test]
 fn the_same_scene_and_seed_are_the_same_bytes_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("s.toml"), SMALL).unwrap();
-    let log = |name: &str, more: &[&str]| {
-        let output = simulate(folder.path(), &[&["s.toml", "-o", name], more].concat());
-        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-        fs::read(folder.path().join(name)).unwrap()
-    };
-    let first = log("a.mcap", &["--threads", "1"]);
-    assert_eq!(first, log("b.mcap", &["--threads", "3"]));
-    assert_ne!(first, log("c.mcap", &["--seed", "9"]));
+    let first = log_of(folder.path(), "a.mcap", &["--threads", "1"]);
+    assert_eq!(first, log_of(folder.path(), "b.mcap", &["--threads", "3"]));
+    assert_ne!(first, log_of(folder.path(), "c.mcap", &["--seed", "9"]));
     let truth = read_truth(&folder.path().join("a.mcap"), &Limits::default()).unwrap().unwrap();
     let person = &truth[0].people[0];
     assert_eq!((truth.len(), truth[0].people.len(), person.id), (6, 1, 1));
@@ -71,15 +73,14 @@ fn a_split_and_settings_choose_the_scene() {
     let folder = tempfile::tempdir().unwrap();
     let varied = format!("{SMALL}[vary]\nlight.lux = {{ between = [50.0, 900.0] }}\n");
     fs::write(folder.path().join("s.toml"), varied).unwrap();
-    let log = |name: &str, more: &[&str]| {
-        let output = simulate(folder.path(), &[&["s.toml", "-o", name], more].concat());
-        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-        fs::read(folder.path().join(name)).unwrap()
-    };
-    let test = log("a.mcap", &["--split", "test", "--seed", "1"]);
-    assert_eq!(test, log("b.mcap", &["--seed", "2000000001"]));
-    assert_ne!(test, log("c.mcap", &["--split", "train", "--seed", "1"]));
-    log("d.mcap", &["--set", "camera.kind=stereo", "--set", "people.0.speed_mps=0.5"]);
+    let test = log_of(folder.path(), "a.mcap", &["--split", "test", "--seed", "1"]);
+    assert_eq!(test, log_of(folder.path(), "b.mcap", &["--seed", "2000000001"]));
+    assert_ne!(test, log_of(folder.path(), "c.mcap", &["--split", "train", "--seed", "1"]));
+    log_of(
+        folder.path(),
+        "d.mcap",
+        &["--set", "camera.kind=stereo", "--set", "people.0.speed_mps=0.5"],
+    );
     let inspected = tagalong().arg("inspect").arg(folder.path().join("d.mcap")).output().unwrap();
     assert!(text(&inspected.stdout).contains("/camera/right/image_rect"));
     for (wrong, told) in [
@@ -160,15 +161,13 @@ fn pictures_of_a_mirror_show_the_panorama_and_the_webcams() {
     fs::write(folder.path().join("s.toml"), OMNI).unwrap();
     let output = simulate(folder.path(), &["s.toml", "--gallery", "pictures"]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    let size = |path: &Path| {
+    let sizes = fs::read_dir(folder.path().join("pictures")).unwrap().map(|entry| {
+        let path = entry.unwrap().path();
         let reader = png::Decoder::new(std::io::BufReader::new(fs::File::open(path).unwrap()));
         let info = reader.read_info().unwrap();
         (info.info().width, info.info().height)
-    };
-    let mut sizes: Vec<_> = fs::read_dir(folder.path().join("pictures"))
-        .unwrap()
-        .map(|entry| size(&entry.unwrap().path()))
-        .collect();
+    });
+    let mut sizes: Vec<_> = sizes.collect();
     sizes.sort_unstable();
     sizes.dedup();
     assert_eq!(sizes, [(64, 24), (480 + 96, 120)]);

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::{code, tagalong, text};
+use crate::common::{assert_same, code, tagalong, text};
 
 fn train(folder: &Path, arguments: &[&str]) -> std::process::Output {
     tagalong().current_dir(folder).arg("train").args(arguments).output().unwrap()
@@ -14,17 +14,16 @@ fn train(folder: &Path, arguments: &[&str]) -> std::process::Output {
 #[cfg(feature = "train")]
 fn the_same_seed_makes_the_same_model_and_card_and_the_model_works() {
     let folder = tempfile::tempdir().unwrap();
-    let make = |name: &str| {
+    for name in ["a.toml", "b.toml"] {
         let output = train(folder.path(), &["svm-patch", "--quick", "--scenes", "4", "-o", name]);
         assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-        let read = |extension: &str| {
-            fs::read_to_string(folder.path().join(name).with_extension(extension)).unwrap()
-        };
-        (read("toml"), read("card.toml"))
-    };
-    let first = make("a.toml");
-    assert_eq!(first, make("b.toml"));
-    let card: toml::Table = first.1.parse().unwrap();
+    }
+    for ending in ["toml", "card.toml"] {
+        let [first, second] = ["a", "b"].map(|name| folder.path().join(format!("{name}.{ending}")));
+        assert_same(&first, &second);
+    }
+    let card = fs::read_to_string(folder.path().join("a.card.toml")).unwrap();
+    let card: toml::Table = card.parse().unwrap();
     assert_eq!(card["scenes"].as_integer(), Some(4));
     assert!(card["fit"]["people"].as_integer().unwrap() > 0, "{card}");
     assert!(card["fit"]["others"].as_integer().unwrap() > 0, "{card}");

@@ -1,5 +1,3 @@
-use tagalong_vision::quality::Exposure;
-
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
@@ -13,10 +11,9 @@ pub fn exposure(evidence: &Evidence) -> Option<Finding> {
         return None;
     }
     let count = all.len() as f64;
-    let mean = |value: fn(&Exposure) -> f64| all.iter().map(value).sum::<f64>() / count;
     let blind = all.iter().filter(|e| e.black.max(e.white) > BLIND || e.contrast < 3.0).count();
-    let black = mean(|e| e.black);
-    let white = mean(|e| e.white);
+    let black = all.iter().map(|e| e.black).sum::<f64>() / count;
+    let white = all.iter().map(|e| e.white).sum::<f64>() / count;
     let severity = Severity::beyond(blind as f64 / count, 0.05, 0.5)
         .max(Severity::beyond(black, 0.5, 0.8))
         .max(Severity::beyond(white, 0.25, 0.6));

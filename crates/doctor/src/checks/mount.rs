@@ -1,4 +1,4 @@
-use tagalong_geometry::Camera;
+use tagalong_math::median;
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
@@ -13,16 +13,14 @@ pub fn mount(evidence: &Evidence) -> Option<Finding> {
     {
         return None;
     }
-    let median = |value: &dyn Fn(&Camera, usize) -> f64| {
-        let mut values: Vec<f64> =
-            floors.iter().enumerate().map(|(i, (_, c))| value(c, i)).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied()
-    };
-    let height = median(&|camera, i| floors[i].0.height_m - camera.height_m())?;
+    let height = median(floors.iter().map(|(ground, camera)| ground.height_m - camera.height_m()))?;
     let pitch =
-        median(&|camera, i| (floors[i].0.pitch_down_rad() - camera.pitch_down_rad()).to_degrees())?;
-    let roll = median(&|camera, i| (floors[i].0.roll_rad() - camera.roll_rad()).to_degrees())?;
+        median(floors.iter().map(|(ground, camera)| {
+            (ground.pitch_down_rad() - camera.pitch_down_rad()).to_degrees()
+        }))?;
+    let roll = median(
+        floors.iter().map(|(ground, camera)| (ground.roll_rad() - camera.roll_rad()).to_degrees()),
+    )?;
     let [seen, ..] = by_floor(evidence)?;
     let told = seen - height;
     let severity = Severity::beyond(height.abs(), 0.12, 0.3)

@@ -10,9 +10,8 @@ const ALL_MOVES: f64 = 0.5;
 /// Checks that the robot's motion is known.
 pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     let counters = &evidence.inspection.counters;
-    let count = |name| counters.get(name).copied().unwrap_or(0);
-    let gaps = count("odometry_gap_frames");
-    let jumps = count("odometry_jump_frames");
+    let [gaps, jumps] = ["odometry_gap_frames", "odometry_jump_frames"]
+        .map(|name| counters.get(name).copied().unwrap_or(0));
     let metres = evidence.driven.metres;
     let stands = metres < STANDS_M;
     let all_moves = stands && evidence.changed.is_some_and(|share| share > ALL_MOVES);

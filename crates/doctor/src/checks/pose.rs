@@ -1,19 +1,16 @@
 //! Pose of the camera by the visible floor, for several checks.
 
+use tagalong_math::median;
+
 use super::super::evidence::Evidence;
 
 /// Returns height, pitch and roll by the floor, each the median over the frames.
 pub fn by_floor(evidence: &Evidence) -> Option<[f64; 3]> {
     let floors = &evidence.samples.floors;
-    let median = |value: &dyn Fn(usize) -> f64| {
-        let mut values: Vec<f64> = (0..floors.len()).map(value).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied()
-    };
     Some([
-        median(&|i| floors[i].0.height_m)?,
-        median(&|i| floors[i].0.pitch_down_rad().to_degrees())?,
-        median(&|i| floors[i].0.roll_rad().to_degrees())?,
+        median(floors.iter().map(|(ground, _)| ground.height_m))?,
+        median(floors.iter().map(|(ground, _)| ground.pitch_down_rad().to_degrees()))?,
+        median(floors.iter().map(|(ground, _)| ground.roll_rad().to_degrees()))?,
     ])
 }
 

@@ -48,8 +48,11 @@ mod tests {
     use super::*;
 
     fn finding(now: (usize, f64), best: Option<(usize, f64)>) -> Finding {
-        let prepared = |(found, score)| Prepared { change: "a line".into(), found, score };
         judge(&Preparations { frames: 8, now: prepared(now), best: best.map(prepared) })
+    }
+
+    fn prepared((found, score): (usize, f64)) -> Prepared {
+        Prepared { change: "a line".into(), found, score }
     }
 
     #[test]

@@ -1,3 +1,5 @@
+use tagalong_vision::registration::Offset;
+
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
@@ -14,20 +16,12 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
     if facts.depth_topic.is_none() || facts.colour_topic.is_none() || camera.panorama().is_some() {
         return None;
     }
-    let unknown = |why: &str| Some(Finding::new("registration", Severity::Unknown, why));
     let Some(offset) = evidence.samples.overlap.offset() else {
-        return unknown("no outlines in depth to compare with colour");
+        let why = "no outlines in depth to compare with colour";
+        return Some(Finding::new("registration", Severity::Unknown, why));
     };
     let [dx, dy] = offset.px;
     let error = offset.error_px[0].hypot(offset.error_px[1]);
-    let figures = |finding: Finding| {
-        finding
-            .figure("offset_x_px", f64::from(dx))
-            .figure("offset_y_px", f64::from(dy))
-            .figure("error_px", error)
-            .figure("gain", offset.gain)
-            .figure("contrast", offset.contrast)
-    };
     let off = f64::from(dx).hypot(f64::from(dy));
     let scale = (camera.width as f64 / USUAL_COLUMNS).clamp(0.5, 2.0);
     // An offset near its own error is no evidence of a misregistration: outlines of the floor may
@@ -36,7 +30,8 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
         let measured = format!(
             "outlines in depth and colour do not tell ({dx:+}, {dy:+} px, give or take {error:.1})"
         );
-        return unknown(&measured).map(figures);
+        let finding = Finding::new("registration", Severity::Unknown, measured);
+        return Some(with_figures(finding, &offset));
     }
     let limits = [3.0, 5.0].map(|px| px * scale);
     // An offset without a gain in overlap is ignored.
@@ -46,7 +41,8 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
         100.0 * offset.gain
     );
     let severity = Severity::beyond(deviation, limits[0], limits[1]);
-    let finding = figures(Finding::new("registration", severity, measured)).why(
+    let finding = Finding::new("registration", severity, measured);
+    let finding = with_figures(finding, &offset).why(
         "people have the depth of what is beside them: their boxes slip, and narrow things vanish",
     );
     let [x, y] = evidence.input.depth_offset_px;
@@ -55,4 +51,14 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
         x + dx,
         y + dy
     )))
+}
+
+fn with_figures(finding: Finding, offset: &Offset) -> Finding {
+    let [dx, dy] = offset.px;
+    finding
+        .figure("offset_x_px", f64::from(dx))
+        .figure("offset_y_px", f64::from(dy))
+        .figure("error_px", offset.error_px[0].hypot(offset.error_px[1]))
+        .figure("gain", offset.gain)
+        .figure("contrast", offset.contrast)
 }

@@ -5,12 +5,11 @@ use super::super::finding::{Finding, Severity};
 pub fn skew(evidence: &Evidence) -> Option<Finding> {
     let skew = evidence.inspection.skew?;
     let facts = &evidence.inspection.facts;
-    let count = |topic: &Option<String>| {
+    let [colour, depth] = [&facts.colour_topic, &facts.depth_topic].map(|topic| {
         topic.as_ref().and_then(|t| evidence.inspection.topic(t)).map_or(0, |t| t.count)
-    };
+    });
     // A slower depth camera cannot pair with every colour image, which is no fault of the stamps.
-    let possible =
-        (count(&facts.depth_topic) as f64 / count(&facts.colour_topic).max(1) as f64).min(1.0);
+    let possible = (depth as f64 / colour.max(1) as f64).min(1.0);
     let share = skew.paired / possible.max(1e-9);
     let late = skew.median_s.abs();
     let severity = Severity::beyond(1.0 - share, 0.1, 0.5).max(Severity::beyond(late, 0.025, 0.2));

@@ -62,8 +62,9 @@ fn remedy(evidence: &Evidence) -> String {
 
 /// Returns advice on another config, unless it is taken already or cannot be taken.
 fn other_config(evidence: &Evidence) -> String {
-    let usable = |wanted| evidence.inspection.usable.contains(&wanted);
-    let fits = usable("colour") && usable("depth") && evidence.config != VERIFIED;
+    let usable = &evidence.inspection.usable;
+    let fits =
+        usable.contains(&"colour") && usable.contains(&"depth") && evidence.config != VERIFIED;
     if fits { format!("take {VERIFIED}, or") } else { "believe tracks by evidence:".to_owned() }
 }
 

@@ -33,9 +33,10 @@ fn camera(evidence: &Evidence) -> Option<Finding> {
     if camera.is_blind() || evidence.is_pose_assumed() || !is_stated {
         return None;
     }
-    let by = |value: Option<(f64, [f64; 2])>| value.map_or(0.0, |(now, range)| beyond(now, range));
-    let severity = Severity::beyond(by(height), HEIGHT_M.0, HEIGHT_M.1).max(Severity::beyond(
-        by(pitch),
+    let [height_off, pitch_off] =
+        [height, pitch].map(|value| value.map_or(0.0, |(now, range)| beyond(now, range)));
+    let severity = Severity::beyond(height_off, HEIGHT_M.0, HEIGHT_M.1).max(Severity::beyond(
+        pitch_off,
         PITCH_DEG.0,
         PITCH_DEG.1,
     ));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry2, Point2};
 use tagalong_core::Stamp;
+use tagalong_math::median;
 use tagalong_pipeline::FrameReport;
 
 /// Confirmed track in one frame.
@@ -104,23 +105,25 @@ impl Course {
     }
 }
 
+/// Returns the median of a value; 0 without any.
+fn middle(part: &[(Stamp, Placed)], value: impl Fn(&Placed) -> f64) -> f64 {
+    median(part.iter().map(|(_, placed)| value(placed))).unwrap_or(0.0)
+}
+
+fn middle_place(part: &[(Stamp, Placed)]) -> Point2<f64> {
+    Point2::new(middle(part, |placed| placed.place.x), middle(part, |placed| placed.place.y))
+}
+
 /// Judges the motion of a track by the frames in which it was seen.
 fn life(seen: &[(Stamp, Placed)]) -> Life {
-    let middle = |value: &dyn Fn(&Placed) -> f64, part: &[(Stamp, Placed)]| {
-        let mut values: Vec<f64> = part.iter().map(|(_, placed)| value(placed)).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied().unwrap_or(0.0)
-    };
-    let place = |part: &[(Stamp, Placed)]| {
-        Point2::new(middle(&|p| p.place.x, part), middle(&|p| p.place.y, part))
-    };
-    let noise_m = MOVED_M + MOVED_GROWTH * middle(&|p| p.range_m, seen);
-    let home = place(seen);
+    let noise_m = MOVED_M + MOVED_GROWTH * middle(seen, |placed| placed.range_m);
+    let home = middle_place(seen);
     // The median of three frames in a row: a single wild detection is no motion. Short tracks of
     // slow cameras have no frames to spare.
     let length = if seen.len() < SHORT { 1 } else { 3 };
-    let farthest = seen.windows(length).map(|part| (place(part) - home).norm()).fold(0.0, f64::max);
-    let is_rough = middle(&|p| p.sigma_m, seen) > MAX_SIGMA_M;
+    let farthest =
+        seen.windows(length).map(|part| (middle_place(part) - home).norm()).fold(0.0, f64::max);
+    let is_rough = middle(seen, |placed| placed.sigma_m) > MAX_SIGMA_M;
     let ends = seen.first().zip(seen.last());
     let lasted_s = ends.map_or(0.0, |((first, _), (last, _))| last.seconds_since(*first));
     match () {
@@ -137,12 +140,13 @@ mod tests {
 
     /// A track seen ten times a second at these places along the x axis, m.
     fn walk(places: &[f64]) -> Life {
-        let placed = |(i, x): (usize, &f64)| {
+        let mut seen = Vec::new();
+        for (i, x) in places.iter().enumerate() {
             let stamp = Stamp::default().plus_seconds(0.1 * i as f64);
             let place = Point2::new(*x, 1.0);
-            (stamp, Placed { id: 1, place, range_m: 3.0, sigma_m: 0.05, seen: true })
-        };
-        life(&places.iter().enumerate().map(placed).collect::<Vec<_>>())
+            seen.push((stamp, Placed { id: 1, place, range_m: 3.0, sigma_m: 0.05, seen: true }));
+        }
+        life(&seen)
     }
 
     #[test]
@@ -166,8 +170,8 @@ mod tests {
     fn rough_places_tell_nothing() {
         let rough =
             Placed { id: 1, place: Point2::new(3.0, 0.0), range_m: 3.0, sigma_m: 2.0, seen: true };
-        let at = |i| Stamp::default().plus_seconds(f64::from(i));
-        let seen: Vec<_> = (0..20).map(|i| (at(i), rough)).collect();
+        let seen: Vec<_> =
+            (0..20).map(|i| (Stamp::default().plus_seconds(f64::from(i)), rough)).collect();
         assert_eq!(life(&seen), Life::Unclear);
     }
 }

@@ -93,10 +93,13 @@ impl Coverage {
 
     /// Counts the tracks by their motion.
     fn add_tracks(&mut self, lives: &Lives) {
-        let count = |life: Life| lives.values().filter(|other| **other == life).count();
-        self.moving = count(Life::Moved);
-        self.still = count(Life::Still);
-        self.unclear = count(Life::Unclear);
+        for life in lives.values() {
+            match life {
+                Life::Moved => self.moving += 1,
+                Life::Still => self.still += 1,
+                Life::Unclear => self.unclear += 1,
+            }
+        }
     }
 
     /// Counts the boxes of a frame: of tracks that never moved, and at idle places.
@@ -179,17 +182,16 @@ mod tests {
 
     /// Tracks at places by the time, in all frames.
     fn course(tracks: &[&dyn Fn(f64) -> Point2<f64>]) -> Course {
-        let moment = |number: u64| {
+        let moments = (0..FRAMES).map(|number| {
             let seconds = 0.1 * number as f64;
-            let placed = |(id, place): (u32, &&dyn Fn(f64) -> Point2<f64>)| {
+            let tracks = (1..).zip(tracks).map(|(id, place)| {
                 let place = place(seconds);
                 Placed { id, place, range_m: place.coords.norm(), sigma_m: 0.05, seen: true }
-            };
+            });
             let stamp = Stamp::default().plus_seconds(seconds);
-            let tracks = (1..).zip(tracks).map(placed).collect();
-            Moment { index: number + 1, stamp, tracks }
-        };
-        Course { moments: (0..FRAMES).map(moment).collect(), spent_ms: 80.0 }
+            Moment { index: number + 1, stamp, tracks: tracks.collect() }
+        });
+        Course { moments: moments.collect(), spent_ms: 80.0 }
     }
 
     fn scenery() -> Scenery {

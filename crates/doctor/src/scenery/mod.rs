@@ -101,8 +101,9 @@ impl Views {
     /// Returns some views near one in time, spread evenly.
     fn others(&self, at: usize) -> Vec<&View> {
         let now = self.views[at].stamp;
-        let near = |view: &&View| view.stamp.seconds_since(now).abs() <= COMPARED_S;
-        let near: Vec<&View> = self.views.iter().filter(near).collect();
+        let near = self.views.iter();
+        let near: Vec<&View> =
+            near.filter(|view| view.stamp.seconds_since(now).abs() <= COMPARED_S).collect();
         let every = near.len() as f64 / COMPARED as f64;
         if every <= 1.0 {
             return near;

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 use tagalong_core::{DepthImage, Stamp};
 use tagalong_geometry::{Camera, Lens};
@@ -100,8 +102,9 @@ impl View {
     /// Returns the smallest reading around a pixel of the full image, m.
     fn reading(&self, pixel: Point2<f64>) -> Option<f64> {
         let cell = pixel.map(|v| (v / self.step as f64).floor());
-        let is_inside = |v: f64, count: usize| v >= 0.0 && v < count as f64;
-        if !is_inside(cell.x, self.columns) || !is_inside(cell.y, self.rows) {
+        if !(0.0..self.columns as f64).contains(&cell.x)
+            || !(0.0..self.rows as f64).contains(&cell.y)
+        {
             return None;
         }
         let reading = self.nearest[cell.y as usize * self.columns + cell.x as usize];
@@ -133,23 +136,26 @@ const MARGIN_M: f64 = 0.2;
 const MARGIN_GROWTH: f64 = 0.015;
 
 fn reduced(depth: &DepthImage, step: usize, columns: usize, rows: usize) -> Vec<f32> {
-    let at = |i: usize| {
+    let readings = (0..columns * rows).map(|i| {
         let x = i % columns * step + step / 2;
         let y = i / columns * step + step / 2;
         depth.row(y)[x]
-    };
-    (0..columns * rows).map(at).collect()
+    });
+    readings.collect()
 }
 
 /// Returns the smallest reading within one pixel of each.
 fn nearest(depth: &[f32], columns: usize, rows: usize) -> Vec<f32> {
-    let around = |v: usize, count: usize| v.saturating_sub(1)..(v + 2).min(count);
-    let smallest = |at: usize| {
-        let x = at % columns;
-        let y = at / columns;
-        let cells = around(y, rows).flat_map(|y| around(x, columns).map(move |x| (x, y)));
+    let smallest = (0..depth.len()).map(|at| {
+        let xs = around(at % columns, columns);
+        let cells = around(at / columns, rows).flat_map(|y| xs.clone().map(move |x| (x, y)));
         // `min` passes over NaN, which is no reading.
         cells.map(|(x, y)| depth[y * columns + x]).fold(f32::INFINITY, f32::min)
-    };
-    (0..depth.len()).map(smallest).collect()
+    });
+    smallest.collect()
+}
+
+/// Returns a column or a row and those beside it.
+fn around(at: usize, count: usize) -> Range<usize> {
+    at.saturating_sub(1)..(at + 2).min(count)
 }

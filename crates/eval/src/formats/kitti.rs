@@ -87,25 +87,24 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Label>, FormatError> {
 }
 
 fn label(line: &Line<'_>) -> Result<Label, FormatError> {
-    let number = |index, name| line.number(index, name);
-    let left = number(6, "left")?;
-    let top = number(7, "top")?;
-    let right = number(8, "right")?;
-    let bottom = number(9, "bottom")?;
+    let left = line.number(6, "left")?;
+    let top = line.number(7, "top")?;
+    let right = line.number(8, "right")?;
+    let bottom = line.number(9, "bottom")?;
     let region = Region::new(left, top, right - left, bottom - top);
     Ok(Label {
         line: line.number,
         frame: line.frame(0, 0)?,
         id: line.whole(1, "id")?,
         class: line.text(2, "type")?.to_owned(),
-        truncated: number(3, "truncated")?,
-        occluded: number(4, "occluded")?,
-        alpha: number(5, "alpha")?,
+        truncated: line.number(3, "truncated")?,
+        occluded: line.number(4, "occluded")?,
+        alpha: line.number(5, "alpha")?,
         region,
-        size_m: [number(10, "height")?, number(11, "width")?, number(12, "length")?],
-        position_in_camera_m: [number(13, "x")?, number(14, "y")?, number(15, "z")?],
-        rotation_y: number(16, "rotation_y")?,
-        score: if line.fields.len() > 17 { Some(number(17, "score")?) } else { None },
+        size_m: [line.number(10, "height")?, line.number(11, "width")?, line.number(12, "length")?],
+        position_in_camera_m: [line.number(13, "x")?, line.number(14, "y")?, line.number(15, "z")?],
+        rotation_y: line.number(16, "rotation_y")?,
+        score: if line.fields.len() > 17 { Some(line.number(17, "score")?) } else { None },
     })
 }
 
@@ -126,8 +125,10 @@ pub fn add_truths(timeline: &mut Timeline, labels: &[Label]) {
 
 /// Adds the pedestrians among labels to a timeline as reports, without the anonymous.
 pub fn add_reports(timeline: &mut Timeline, labels: &[Label]) {
-    let is_pedestrian = |label: &&Label| label.class.eq_ignore_ascii_case("pedestrian");
-    for label in labels.iter().filter(is_pedestrian).filter(|label| !label.is_anonymous()) {
+    for label in labels {
+        if !label.class.eq_ignore_ascii_case("pedestrian") || label.is_anonymous() {
+            continue;
+        }
         timeline.frame(label.frame).reports.push(Report {
             id: label.id,
             region: Some(label.region),

@@ -182,9 +182,10 @@ impl<'a> Line<'a> {
     /// A whole number; some programs write it as `12.0`.
     fn whole(&self, index: usize, name: &str) -> Result<i64, FormatError> {
         let value = self.number(index, name)?;
-        let whole = value.fract() == 0.0 && value.abs() <= MOST_ID as f64;
-        let wrong = || self.error(format!("`{name}` is `{value}`, expected a whole number"));
-        if whole { Ok(value as i64) } else { Err(wrong()) }
+        if value.fract() == 0.0 && value.abs() <= MOST_ID as f64 {
+            return Ok(value as i64);
+        }
+        Err(self.error(format!("`{name}` is `{value}`, expected a whole number")))
     }
 
     fn frame(&self, index: usize, first: u32) -> Result<u32, FormatError> {

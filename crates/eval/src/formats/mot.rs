@@ -189,28 +189,30 @@ pub fn check_length(rows: &[Row], file: &str, length: u32) -> Result<(), FormatE
 impl Row {
     /// Refuses rows without an id: one id for all of them would be one person in many places.
     fn check_id(&self, file: &str) -> Result<(), FormatError> {
-        let why = || format!("id {}; rows with an identity have an id from 0 on", self.id);
-        if self.id >= 0 { Ok(()) } else { Err(self.error(file, why())) }
+        if self.id >= 0 {
+            return Ok(());
+        }
+        let why = format!("id {}; rows with an identity have an id from 0 on", self.id);
+        Err(self.error(file, why))
     }
 }
 
 fn row(line: &Line<'_>) -> Result<Row, FormatError> {
-    let number = |index, name| line.number(index, name);
     let region = Region {
-        x: number(2, "x")?,
-        y: number(3, "y")?,
-        width: number(4, "width")?,
-        height: number(5, "height")?,
+        x: line.number(2, "x")?,
+        y: line.number(3, "y")?,
+        width: line.number(4, "width")?,
+        height: line.number(5, "height")?,
     };
-    let more = |index| line.fields.len() > index;
+    let fields = line.fields.len();
     Ok(Row {
         line: line.number,
         frame: line.frame(0, 1)?,
         id: line.whole(1, "id")?,
         region,
-        confidence: if more(6) { number(6, "confidence")? } else { 1.0 },
-        class: if more(7) { Some(number(7, "class")?) } else { None },
-        visibility: if more(8) { Some(number(8, "visibility")?) } else { None },
+        confidence: if fields > 6 { line.number(6, "confidence")? } else { 1.0 },
+        class: if fields > 7 { Some(line.number(7, "class")?) } else { None },
+        visibility: if fields > 8 { Some(line.number(8, "visibility")?) } else { None },
     })
 }
 
@@ -268,35 +270,41 @@ pub struct SequenceInfo {
 /// A name, rate or length that is missing or no number, or a length beyond a
 /// million frames.
 pub fn parse_info(text: &str, file: &str) -> Result<SequenceInfo, FormatError> {
-    let value = |key: &str| {
-        text.lines()
-            .filter_map(|line| line.split_once('='))
-            .find(|(name, _)| name.trim().eq_ignore_ascii_case(key))
-            .map(|(_, value)| value.trim())
-    };
-    let error = |why: String| FormatError { file: file.to_owned(), line: 0, why };
-    let number = |key: &str| match value(key) {
-        None => Err(error(format!("has no `{key}=`"))),
-        Some(text) => match text.parse::<f64>() {
-            Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
-            _ => Err(error(format!("`{key}` is `{text}`, expected a number"))),
-        },
-    };
-    let rate_hz = number("frameRate")?;
+    info_of(text).map_err(|why| FormatError { file: file.to_owned(), line: 0, why })
+}
+
+fn info_of(text: &str) -> Result<SequenceInfo, String> {
+    let rate_hz = info_number(text, "frameRate")?;
     if rate_hz == 0.0 {
-        return Err(error("`frameRate` is 0, expected frames per second".to_owned()));
+        return Err("`frameRate` is 0, expected frames per second".to_owned());
     }
-    let length = number("seqLength")?;
+    let length = info_number(text, "seqLength")?;
     if length > f64::from(MOST_FRAMES) {
-        return Err(error(format!("`seqLength` is {length}, more than {MOST_FRAMES} frames")));
+        return Err(format!("`seqLength` is {length}, more than {MOST_FRAMES} frames"));
     }
     Ok(SequenceInfo {
-        name: value("name").ok_or_else(|| error("has no `name=`".to_owned()))?.to_owned(),
+        name: info_value(text, "name")?.to_owned(),
         rate_hz,
         length: length as u32,
-        width: number("imWidth").unwrap_or(0.0) as u32,
-        height: number("imHeight").unwrap_or(0.0) as u32,
+        width: info_number(text, "imWidth").unwrap_or(0.0) as u32,
+        height: info_number(text, "imHeight").unwrap_or(0.0) as u32,
     })
+}
+
+fn info_value<'a>(text: &'a str, key: &str) -> Result<&'a str, String> {
+    text.lines()
+        .filter_map(|line| line.split_once('='))
+        .find(|(name, _)| name.trim().eq_ignore_ascii_case(key))
+        .map(|(_, value)| value.trim())
+        .ok_or_else(|| format!("has no `{key}=`"))
+}
+
+fn info_number(text: &str, key: &str) -> Result<f64, String> {
+    let value = info_value(text, key)?;
+    match value.parse::<f64>() {
+        Ok(number) if number.is_finite() && number >= 0.0 => Ok(number),
+        _ => Err(format!("`{key}` is `{value}`, expected a number")),
+    }
 }
 
 /// Writes `seqinfo.ini`.

@@ -107,8 +107,9 @@ impl Bag {
             }
             Ok(()) => walk.fault("damaged_chunks", || "a chunk has not the size it claims".into()),
             Err(Unpack::Unknown) => {
-                let why = || format!("compression `{compression}`; known: none, bz2, lz4");
-                walk.fault("unknown_compression_chunks", why);
+                walk.fault("unknown_compression_chunks", || {
+                    format!("compression `{compression}`; known: none, bz2, lz4")
+                });
             }
             Err(Unpack::Damaged(why)) => {
                 walk.fault("damaged_chunks", || format!("a chunk does not unpack: {why}"));
@@ -153,15 +154,16 @@ pub(crate) fn step_in_buffer<R: Read>(walk: &mut Walk<R>) {
 
 /// Returns the parts of the record at the start of the rest; `None` if it is longer than that.
 fn parts<R>(walk: &Walk<R>) -> Option<Parts> {
-    let length = |at: usize| {
-        let bytes = walk.buffer.get(at..at.checked_add(4)?)?;
-        Some(u32_at(bytes, 0) as usize)
-    };
-    let start = walk.rest.start + 4;
-    let header = start..start.checked_add(length(walk.rest.start)?)?;
-    let start = header.end.checked_add(4)?;
-    let data = start..start.checked_add(length(header.end)?)?;
+    let header = counted(&walk.buffer, walk.rest.start)?;
+    let data = counted(&walk.buffer, header.end)?;
     (data.end <= walk.rest.end).then_some(Parts { header, data })
+}
+
+/// Returns the range of the bytes behind the length at `at`, which says how many they are.
+fn counted(buffer: &[u8], at: usize) -> Option<Range<usize>> {
+    let start = at.checked_add(4)?;
+    let length = u32_at(buffer.get(at..start)?, 0) as usize;
+    Some(start..start.checked_add(length)?)
 }
 
 fn learn<R: Read>(walk: &mut Walk<R>, parts: &Parts) -> Option<()> {

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use rusqlite::{Connection, OpenFlags};
 use tempfile::TempDir;
 
+use super::no_database;
 use crate::Limits;
 use crate::error::NotMcap;
 
@@ -60,17 +61,16 @@ enum State {
 pub(super) fn open(path: &Path, limits: &Limits) -> Result<Opened, NotMcap> {
     // SQLite looks for the other files beside the file that a link names.
     let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let failed = |why: rusqlite::Error| NotMcap(format!("not a rosbag2 database: {why}"));
     let read_only = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     match state_of(&path) {
         State::Closed => {
-            let connection = Connection::open_with_flags(&path, read_only).map_err(failed)?;
+            let connection = Connection::open_with_flags(&path, read_only).map_err(no_database)?;
             Ok(Opened { connection, path, left_out: None, tells_size: true, _copy: None })
         }
         State::ClosedWal => {
             let flags = read_only | OpenFlags::SQLITE_OPEN_URI;
             let connection =
-                Connection::open_with_flags(unchanging(&path), flags).map_err(failed)?;
+                Connection::open_with_flags(unchanging(&path), flags).map_err(no_database)?;
             Ok(Opened { connection, path, left_out: None, tells_size: true, _copy: None })
         }
         State::Journal => {
@@ -152,8 +152,7 @@ fn open_copy(
     left_out: Option<String>,
     limits: &Limits,
 ) -> Result<Opened, NotMcap> {
-    let size = |file: &Path| std::fs::metadata(file).map_or(0, |about| about.len());
-    let bytes = size(path).saturating_add(size(&beside(path, ending)));
+    let bytes = file_size(path).saturating_add(file_size(&beside(path, ending)));
     let limit = limits.file_bytes;
     if bytes > limit {
         return Err(NotMcap(format!(
@@ -196,24 +195,32 @@ fn copy_file(from: &Path, to: &Path) -> io::Result<()> {
 /// # Errors
 /// A journal of a transaction over several databases. It names a file that SQLite would delete.
 fn pages_of_journal(journal: &Path) -> Result<u64, String> {
-    let failed = |error: io::Error| error.to_string();
-    let mut file = File::open(journal).map_err(failed)?;
-    let mut header = [0; 28];
-    file.read_exact(&mut header).map_err(failed)?;
-    let length = file.seek(SeekFrom::End(0)).map_err(failed)?;
-    file.seek(SeekFrom::End(-8)).map_err(failed)?;
-    let mut end = [0; 8];
-    file.read_exact(&mut end).map_err(failed)?;
+    let (header, length, end) = ends_of_journal(journal).map_err(|error| error.to_string())?;
     if end == JOURNAL_MAGIC {
         return Err("it belongs to a transaction over several databases; open it with `sqlite3`, \
                     which finishes it"
             .into());
     }
-    let number = |at: usize| u64::from(u32_at(&header, at));
-    let sector = number(20);
-    let page = number(24);
+    let sector = u64::from(u32_at(&header, 20));
+    let page = u64::from(u32_at(&header, 24));
     // A number of each page, and a checksum.
     Ok(length.saturating_sub(sector) / (page + 8))
+}
+
+/// Returns the header of a journal, its length, and its last bytes.
+fn ends_of_journal(journal: &Path) -> io::Result<([u8; 28], u64, [u8; 8])> {
+    let mut file = File::open(journal)?;
+    let mut header = [0; 28];
+    file.read_exact(&mut header)?;
+    let length = file.seek(SeekFrom::End(0))?;
+    file.seek(SeekFrom::End(-8))?;
+    let mut end = [0; 8];
+    file.read_exact(&mut end)?;
+    Ok((header, length, end))
+}
+
+fn file_size(file: &Path) -> u64 {
+    std::fs::metadata(file).map_or(0, |about| about.len())
 }
 
 /// Returns the number of pages behind the last commit of a write-ahead log.

@@ -35,14 +35,13 @@ impl Pattern {
 pub(super) fn interpolate(rows: &Rows<'_>, pattern: Pattern) -> RgbImage {
     let width = rows.width;
     let height = rows.height;
-    let inner = |at: usize, size: usize| at.clamp(1, size.max(3) - 2);
     let mut pixels = Vec::with_capacity(width * height);
     for y in 0..height {
-        let y = inner(y, height);
+        let y = y.clamp(1, height.max(3) - 2);
         // An image of one or two rows has no neighbours on one side.
         let lines = [y - 1, y, y + 1].map(|y| rows.row(y.min(height - 1)));
         let colours = pattern.rows(y);
-        pixels.extend((0..width).map(|x| colours_at(lines, colours, inner(x, width))));
+        pixels.extend((0..width).map(|x| colours_at(lines, colours, x.clamp(1, width.max(3) - 2))));
     }
     exact(width, height, pixels)
 }
@@ -54,7 +53,6 @@ fn colours_at([upper, middle, lower]: [&[u8]; 3], pattern: [[usize; 2]; 2], x: u
     let right = (x + 1).min(middle.len() - 1);
     let columns = [x - 1, x.min(right), right];
     let [above, own, below] = [upper, middle, lower].map(|row| columns.map(|x| u16::from(row[x])));
-    let fourth = |values: [u16; 4]| ((values.iter().sum::<u16>() + 2) / 4) as u8;
     let [colour, beside] = [pattern[0][x % 2], pattern[0][(x + 1) % 2]];
     let mut out = [0; 3];
     out[colour] = own[1] as u8;
@@ -62,8 +60,12 @@ fn colours_at([upper, middle, lower]: [&[u8]; 3], pattern: [[usize; 2]; 2], x: u
         out[beside] = (own[0] + own[2]).div_ceil(2) as u8;
         out[pattern[1][x % 2]] = (above[1] + below[1]).div_ceil(2) as u8;
     } else {
-        out[GREEN] = fourth([own[0], own[2], above[1], below[1]]);
-        out[pattern[1][(x + 1) % 2]] = fourth([above[0], above[2], below[0], below[2]]);
+        out[GREEN] = mean_of([own[0], own[2], above[1], below[1]]);
+        out[pattern[1][(x + 1) % 2]] = mean_of([above[0], above[2], below[0], below[2]]);
     }
     out
+}
+
+fn mean_of(values: [u16; 4]) -> u8 {
+    ((values.iter().sum::<u16>() + 2) / 4) as u8
 }

@@ -311,16 +311,11 @@ mod tests {
             // Rows may be padded.
             data.extend([0; 5]);
         }
-        let field = |(name, offset): (&str, u32)| PointField {
-            name: name.into(),
-            offset,
-            datatype: PointField::FLOAT32,
-            count: 1,
-        };
+        let fields = [("x", 0), ("y", 4), ("z", 8), ("rgb", 12)];
         PointCloud2 {
             height: 30,
             width: 40,
-            fields: [("x", 0), ("y", 4), ("z", 8), ("rgb", 12)].map(field).to_vec(),
+            fields: fields.map(|(name, offset)| PointField::float32(name, offset)).to_vec(),
             is_bigendian,
             point_step: 16,
             row_step: 16 * 40 + 5,

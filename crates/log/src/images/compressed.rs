@@ -11,6 +11,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 use super::raw::exact;
 use super::{ImageError, Pixels, check_size, deep_png, metres, metres_of_float, rvl, video_codec};
 use crate::Limits;
+use crate::mcap::record::u32_at;
 use crate::msgs::CompressedImage;
 
 /// Maximum number of scans of a progressive JPEG; a regular one has about ten.
@@ -62,11 +63,10 @@ impl Codec {
     /// Returns the codec of an image, also behind the header of `compressedDepth`.
     pub(crate) fn of(image: &CompressedImage<'_>) -> Self {
         let data = image.data;
-        let starts = |data: &[u8]| {
-            data.starts_with(&[0xff, 0xd8]) || data.starts_with(&[0x89, b'P', b'N', b'G'])
-        };
+        let has_no_header =
+            data.starts_with(&[0xff, 0xd8]) || data.starts_with(&[0x89, b'P', b'N', b'G']);
         let body = match data.get(DEPTH_HEADER..) {
-            Some(body) if !starts(data) && is_compressed_depth(image) => body,
+            Some(body) if !has_no_header && is_compressed_depth(image) => body,
             _ => data,
         };
         match body {
@@ -256,15 +256,14 @@ fn compressed_depth(
         return Err(ImageError::Codec("shorter than its 12-byte header".into()));
     };
     let is_rvl = image.format.to_ascii_lowercase().contains("rvl");
-    let float = |at: usize| {
-        f32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
-    };
     if image.format.starts_with("32FC1") {
-        let a = float(4);
-        let b = float(8);
+        let a = f32::from_bits(u32_at(header, 4));
+        let b = f32::from_bits(u32_at(header, 8));
         let unit = depth_unit_m.unwrap_or(1.0) as f32;
-        let inverse = |v: u16| if v == 0 { f32::NAN } else { a / (f32::from(v) - b) };
-        depth_of(body, is_rvl, limits, |v| metres_of_float(inverse(v), unit))
+        depth_of(body, is_rvl, limits, |v| {
+            let depth = if v == 0 { f32::NAN } else { a / (f32::from(v) - b) };
+            metres_of_float(depth, unit)
+        })
     } else {
         let unit = depth_unit_m.unwrap_or(0.001) as f32;
         depth_of(body, is_rvl, limits, |v| metres(v, unit))
@@ -291,10 +290,8 @@ fn depth_of(
     }
     // Columns and rows as 32-bit numbers, then the stream.
     let (size, stream) = body.split_first_chunk::<8>().ok_or_else(|| lost("RVL without a size"))?;
-    let number =
-        |at: usize| u32::from_le_bytes([size[at], size[at + 1], size[at + 2], size[at + 3]]);
-    let width = number(0);
-    let height = number(4);
+    let width = u32_at(size, 0);
+    let height = u32_at(size, 4);
     check_size(width.into(), height.into(), 4, limits)?;
     let width = width as usize;
     let height = height as usize;

@@ -172,7 +172,6 @@ impl Above {
 
 /// Undoes a filter up to [`LAST_SIMPLE`], in place of the row above.
 fn undo_simple(filter: u8, filtered: &[[u8; 2]], row: &mut [[u8; 2]]) {
-    let sum = |a: [u8; 2], b: [u8; 2]| [a[0].wrapping_add(b[0]), a[1].wrapping_add(b[1])];
     let both = row.iter_mut().zip(filtered);
     match filter {
         0 => both.for_each(|(value, filtered)| *value = *filtered),
@@ -185,7 +184,10 @@ fn undo_simple(filter: u8, filtered: &[[u8; 2]], row: &mut [[u8; 2]]) {
                 (value[0], value[1]) = (high, low);
             });
         }
-        _ => both.for_each(|(value, filtered)| *value = sum(*value, *filtered)),
+        _ => both.for_each(|([high, low], filtered)| {
+            *high = high.wrapping_add(filtered[0]);
+            *low = low.wrapping_add(filtered[1]);
+        }),
     }
 }
 

@@ -126,12 +126,14 @@ impl StereoGeometry {
 
 /// Returns true for pixels inside of a window; one without an area is none.
 fn holds(window: &RegionOfInterest, x: usize, y: usize) -> bool {
-    let inside = |at: usize, from: u32, size: u32| {
-        (u64::from(from)..u64::from(from) + u64::from(size)).contains(&(at as u64))
-    };
     window.width == 0
         || window.height == 0
-        || inside(x, window.x_offset, window.width) && inside(y, window.y_offset, window.height)
+        || is_within(x, window.x_offset, window.width)
+            && is_within(y, window.y_offset, window.height)
+}
+
+fn is_within(at: usize, from: u32, size: u32) -> bool {
+    (u64::from(from)..u64::from(from) + u64::from(size)).contains(&(at as u64))
 }
 
 /// Returns the disparities of an uncompressed image, pixels.
@@ -163,10 +165,9 @@ fn signed(image: &Image<'_>, unit_px: f64, limits: &Limits) -> Result<Plane<f32>
 
 /// Scales values to pixels.
 fn in_pixels(values: &Pixels, unit_px: f64, encoding: &str) -> Result<Plane<f32>, ImageError> {
-    let scaled = |value: f32| (f64::from(value) * unit_px) as f32;
     match values {
-        Pixels::Grey(grey) => Ok(grey.map(|value| scaled(f32::from(value)))),
-        Pixels::Depth(values) => Ok(values.map(scaled)),
+        Pixels::Grey(grey) => Ok(grey.map(|value| (f64::from(value) * unit_px) as f32)),
+        Pixels::Depth(values) => Ok(values.map(|value| (f64::from(value) * unit_px) as f32)),
         Pixels::Colour(_) => Err(ImageError::NoDisparity(encoding.to_owned())),
     }
 }

@@ -18,6 +18,11 @@ fn decoded(image: &Image<'_>) -> Result<Pixels, ImageError> {
     decode_raw(image, None, &Limits::default())
 }
 
+/// Returns the counter of an image that does not decode.
+fn fault(image: Image<'_>) -> &'static str {
+    decoded(&image).unwrap_err().counter()
+}
+
 fn compressed(format: &str, data: &[u8]) -> Result<Pixels, ImageError> {
     let image = CompressedImage { header: Header::default(), format: format.into(), data };
     decode_compressed(&image, None, &Limits::default())
@@ -269,14 +274,12 @@ fn other_names_of_the_same_order_give_the_same_image() {
 #[test]
 fn the_step_of_planes_of_one_resolution_may_be_that_of_any_plane() {
     let bytes = noise(24);
-    let image = |step| decoded(&raw("nv24", 4, 2, step, &bytes)).unwrap();
-    assert!(image(4) == image(8) && image(4) == image(12));
+    let [four, eight, twelve] =
+        [4, 8, 12].map(|step| decoded(&raw("nv24", 4, 2, step, &bytes)).unwrap());
+    assert!(four == eight && four == twelve);
     let odd = noise(27);
     assert!(decoded(&raw("nv24", 3, 3, 3, &odd)).is_ok());
-    assert_eq!(
-        decoded(&raw("nv24", 4, 2, 8, &bytes[1..])).unwrap_err().counter(),
-        "images_of_wrong_layout"
-    );
+    assert_eq!(fault(raw("nv24", 4, 2, 8, &bytes[1..])), "images_of_wrong_layout");
 }
 
 #[test]
@@ -285,26 +288,24 @@ fn small_and_odd_mosaics_do_no_harm() {
         let bytes = noise((width * height) as usize);
         assert!(decoded(&raw("bayer_rggb8", width, height, width, &bytes)).is_ok());
     }
-    let layout = |image| decoded(&image).unwrap_err().counter();
-    assert_eq!(layout(raw("yuyv", 3, 2, 6, &[0; 12])), "images_of_wrong_layout");
-    assert_eq!(layout(raw("nv12", 2, 3, 2, &[0; 9])), "images_of_wrong_layout");
-    assert_eq!(layout(raw("nv12", 2, 2, 2, &[0; 4])), "images_of_wrong_layout");
-    assert_eq!(layout(raw("bayer_grbg8", 4, 2, 3, &[0; 6])), "images_of_wrong_layout");
+    assert_eq!(fault(raw("yuyv", 3, 2, 6, &[0; 12])), "images_of_wrong_layout");
+    assert_eq!(fault(raw("nv12", 2, 3, 2, &[0; 9])), "images_of_wrong_layout");
+    assert_eq!(fault(raw("nv12", 2, 2, 2, &[0; 4])), "images_of_wrong_layout");
+    assert_eq!(fault(raw("bayer_grbg8", 4, 2, 3, &[0; 6])), "images_of_wrong_layout");
 }
 
 #[test]
 fn lies_about_the_layout_are_refused() {
     let data = [0; 12];
-    let counter = |image: Image<'_>| decoded(&image).unwrap_err().counter();
-    assert_eq!(counter(raw("rgb8", 2, 2, 5, &data)), "images_of_wrong_layout");
-    assert_eq!(counter(raw("rgb8", 2, 2, 7, &data)), "images_of_wrong_layout");
-    assert_eq!(counter(raw("rgb8", 2, 3, 6, &data)), "images_of_wrong_layout");
-    assert_eq!(counter(raw("rgb8", 0, 0, 0, &[])), "images_of_wrong_layout");
+    assert_eq!(fault(raw("rgb8", 2, 2, 5, &data)), "images_of_wrong_layout");
+    assert_eq!(fault(raw("rgb8", 2, 2, 7, &data)), "images_of_wrong_layout");
+    assert_eq!(fault(raw("rgb8", 2, 3, 6, &data)), "images_of_wrong_layout");
+    assert_eq!(fault(raw("rgb8", 0, 0, 0, &[])), "images_of_wrong_layout");
     let huge = i32::MAX as u32;
-    assert_eq!(counter(raw("rgb8", huge, huge, huge, &data)), "images_too_large");
-    assert_eq!(counter(raw("mono8", 16_000, 16_000, 16_000, &data)), "images_too_large");
-    assert_eq!(counter(raw("nonsense99", 2, 2, 6, &data)), "images_of_unknown_encoding");
-    assert_eq!(counter(raw("", 2, 2, 6, &data)), "images_of_unknown_encoding");
+    assert_eq!(fault(raw("rgb8", huge, huge, huge, &data)), "images_too_large");
+    assert_eq!(fault(raw("mono8", 16_000, 16_000, 16_000, &data)), "images_too_large");
+    assert_eq!(fault(raw("nonsense99", 2, 2, 6, &data)), "images_of_unknown_encoding");
+    assert_eq!(fault(raw("", 2, 2, 6, &data)), "images_of_unknown_encoding");
 }
 
 #[test]
@@ -314,8 +315,9 @@ fn jpegs_are_read_whatever_the_format_says() {
         assert_eq!((image.width(), image.height()), (48, 32));
         for (x, y) in [(0, 0), (40, 3), (20, 30)] {
             let [r, g, b] = image.get(x, y).unwrap();
-            let off = |got: u8, want: i64| (i64::from(got) - want).abs();
-            assert!(off(r, x * 5) < 9 && off(g, y * 8) < 9 && off(b, 128) < 9, "{r} {g} {b}");
+            for (got, want) in [(r, x * 5), (g, y * 8), (b, 128)] {
+                assert!((i64::from(got) - want).abs() < 9, "{r} {g} {b}");
+            }
         }
     }
     let Pixels::Grey(grey) = compressed("mono8; jpeg", GREY_JPEG).unwrap() else { panic!("grey") };
@@ -462,6 +464,11 @@ fn plain_disparity(
 }
 
 /// The values are those of `tests/clients/disparity_opencv.py`.
+fn is_same(read: &[f32], expected: &[f32; 6]) -> bool {
+    let mut pairs = read.iter().zip(expected);
+    pairs.all(|(a, b)| a.is_nan() && b.is_nan() || (a - b).abs() <= 1e-6 * b.abs())
+}
+
 #[test]
 fn disparities_are_the_depth_that_opencv_computes() {
     let tables: [(&str, &[u8], [f32; 6]); 3] = [
@@ -477,10 +484,6 @@ fn disparities_are_the_depth_that_opencv_computes() {
             [f32::NAN, 100.8, 6.951_724, 1.2, 0.793_700_8, 0.1008],
         ),
     ];
-    let is_same = |read: &[f32], expected: &[f32; 6]| {
-        let mut pairs = read.iter().zip(expected);
-        pairs.all(|(a, b)| a.is_nan() && b.is_nan() || (a - b).abs() <= 1e-6 * b.abs())
-    };
     for (encoding, data, expected) in &tables {
         let read = plain_disparity(encoding, None, data).unwrap();
         assert!(is_same(&read, expected), "{encoding}: {read:?}");

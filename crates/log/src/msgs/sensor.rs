@@ -24,6 +24,15 @@ pub struct Image<'a> {
     pub data: &'a [u8],
 }
 
+impl<'a> Image<'a> {
+    /// Returns an image of `width` columns and `height` rows, which lie one behind the other without
+    /// bytes between them; values of more than one byte have the low byte first.
+    pub fn packed(header: Header, encoding: &str, width: u32, height: u32, data: &'a [u8]) -> Self {
+        let step = (data.len() as u32).checked_div(height).unwrap_or(0);
+        Self { header, height, width, encoding: encoding.to_owned(), is_bigendian: 0, step, data }
+    }
+}
+
 message!(Image<'_>, "sensor_msgs/msg/Image", "Image.msg");
 
 /// `sensor_msgs/CompressedImage`.
@@ -208,12 +217,7 @@ message!(PointCloud2<'_>, "sensor_msgs/msg/PointCloud2", "PointCloud2.msg");
 impl PointCloud2<'_> {
     /// Returns a message with these points, m, in one row.
     pub fn of_points(header: Header, points: &[[f32; 3]]) -> PointCloud2<'static> {
-        let field = |(name, offset): (&str, u32)| PointField {
-            name: name.to_owned(),
-            offset,
-            datatype: PointField::FLOAT32,
-            count: 1,
-        };
+        let fields = [("x", 0), ("y", 4), ("z", 8)];
         let width = points.len() as u32;
         let point_step = 12;
         let data: Vec<u8> = points.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
@@ -221,7 +225,7 @@ impl PointCloud2<'_> {
             header,
             height: 1,
             width,
-            fields: [("x", 0), ("y", 4), ("z", 8)].map(field).to_vec(),
+            fields: fields.map(|(name, offset)| PointField::float32(name, offset)).to_vec(),
             is_bigendian: false,
             point_step,
             row_step: point_step * width,
@@ -247,4 +251,9 @@ pub struct PointField {
 impl PointField {
     /// Type of single-precision floats.
     pub const FLOAT32: u8 = 7;
+
+    /// Returns a field of one single-precision float.
+    pub fn float32(name: &str, offset: u32) -> Self {
+        Self { name: name.to_owned(), offset, datatype: Self::FLOAT32, count: 1 }
+    }
 }

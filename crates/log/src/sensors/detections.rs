@@ -237,11 +237,10 @@ fn best_hypothesis(detection: &Value) -> (String, f64) {
 }
 
 fn in_image(detection: &Value, score: f64) -> Option<ExternalDetection> {
-    let number = |paths: &[&str]| detection.number(paths);
-    let width = number(&["bbox.size_x", "bbox.size.x"])?;
-    let height = number(&["bbox.size_y", "bbox.size.y"])?;
-    let x = number(&["bbox.center.position.x", "bbox.center.x"])? - 0.5 * width;
-    let y = number(&["bbox.center.position.y", "bbox.center.y"])? - 0.5 * height;
+    let width = detection.number(&["bbox.size_x", "bbox.size.x"])?;
+    let height = detection.number(&["bbox.size_y", "bbox.size.y"])?;
+    let x = detection.number(&["bbox.center.position.x", "bbox.center.x"])? - 0.5 * width;
+    let y = detection.number(&["bbox.center.position.y", "bbox.center.y"])? - 0.5 * height;
     let region = Rect { x, y, width, height };
     region.is_sane().then_some(ExternalDetection { region: Some(region), head: None, score })
 }
@@ -271,15 +270,10 @@ fn in_space(
 
 /// Returns the centre of the head of a person in a box: below the upper end of the box.
 fn head_of(detection: &Value, robot_from_message: &Isometry3<f64>) -> Option<Point3<f64>> {
-    let vector = |path: &str, names: [&str; 3]| -> Option<Vector3<f64>> {
-        let value = detection.get(path)?;
-        let [x, y, z] = names.map(|name| value.number(&[name]));
-        Some(Vector3::new(x?, y?, z?))
-    };
-    let position = vector("bbox.center.position", ["x", "y", "z"])?;
-    let turn = vector("bbox.center.orientation", ["x", "y", "z"])?;
+    let position = vector_of(detection.get("bbox.center.position")?)?;
+    let turn = vector_of(detection.get("bbox.center.orientation")?)?;
     let w = detection.number(&["bbox.center.orientation.w"])?;
-    let size = vector("bbox.size", ["x", "y", "z"])?;
+    let size = vector_of(detection.get("bbox.size")?)?;
     let turn = UnitQuaternion::try_new(Quaternion::new(w, turn.x, turn.y, turn.z), 1e-9)?;
     let pose = robot_from_message * Isometry3::from_parts(position.into(), turn);
     // Vertical extent of the rotated box.
@@ -288,6 +282,10 @@ fn head_of(detection: &Value, robot_from_message: &Isometry3<f64>) -> Option<Poi
     let at = pose.translation.vector;
     let head = Point3::new(at.x, at.y, at.z + 0.5 * height - HALF_HEAD_M);
     head.iter().all(|v| v.is_finite()).then_some(head)
+}
+
+fn vector_of(value: &Value) -> Option<Vector3<f64>> {
+    Some(Vector3::new(value.number(&["x"])?, value.number(&["y"])?, value.number(&["z"])?))
 }
 
 /// Definition of boxes in ROS 2 Foxy and Galactic.

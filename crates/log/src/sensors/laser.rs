@@ -108,9 +108,10 @@ impl Scans {
 
     /// Returns the scan nearest to an image in time, if it is near enough.
     fn near(&self, image: Stamp) -> Option<&LaserScan> {
-        let off_s = |scan: &&LaserScan| scan.header.stamp().seconds_since(image).abs();
-        let nearest = self.scans.iter().min_by(|a, b| off_s(a).total_cmp(&off_s(b)));
-        nearest.filter(|scan| off_s(scan) <= NEAR_S)
+        let aged =
+            self.scans.iter().map(|scan| (scan.header.stamp().seconds_since(image).abs(), scan));
+        let (off_s, nearest) = aged.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        (off_s <= NEAR_S).then_some(nearest)
     }
 }
 
@@ -120,14 +121,14 @@ pub(crate) fn seen_from(
     robot_from_laser: &Isometry3<f64>,
     robot_from_then: &Isometry2<f64>,
 ) -> Scan {
-    let moved_point = |point: Point3<f64>| {
-        let then = robot_from_laser * point;
-        // The robot moves on a floor: heights stay.
-        let now = robot_from_then * then.xy();
-        Point3::new(now.x, now.y, then.z)
-    };
-    let (rays, points): (Vec<u32>, Vec<Point3<f64>>) =
-        points(scan).map(|(ray, point)| (ray, moved_point(point))).unzip();
+    let (rays, points): (Vec<u32>, Vec<Point3<f64>>) = points(scan)
+        .map(|(ray, point)| {
+            let then = robot_from_laser * point;
+            // The robot moves on a floor: heights stay.
+            let now = robot_from_then * then.xy();
+            (ray, Point3::new(now.x, now.y, then.z))
+        })
+        .unzip();
     Scan {
         stamp: Some(scan.header.stamp()),
         robot_from_scanner: on_floor(robot_from_then) * robot_from_laser,
@@ -229,12 +230,12 @@ fn points(scan: &LaserScan) -> impl Iterator<Item = (u32, Point3<f64>)> {
     let limits = limits(scan);
     let rays = scan.ranges.iter().enumerate();
     let met = rays.filter(move |(_, range)| limits.contains(*range));
-    let point = move |(ray, range): (usize, &f32)| {
+    let points = met.map(move |(ray, range)| {
         let angle = first + ray as f64 * step;
         let range = f64::from(*range);
         (ray as u32, Point3::new(range * angle.cos(), range * angle.sin(), 0.0))
-    };
-    met.map(point).filter(|(_, point)| point.coords.norm().is_finite())
+    });
+    points.filter(|(_, point)| point.coords.norm().is_finite())
 }
 
 /// Yields the rays without a reflection, with what the scanner said instead.
@@ -282,14 +283,17 @@ mod tests {
         assert_eq!(points(&scan(1.0, &[0.05, f32::NAN, 11.0])).count(), 0);
     }
 
-    #[test]
-    fn a_header_that_cannot_be_is_refused_with_its_field() {
-        let base = || LaserScan {
+    fn base() -> LaserScan {
+        LaserScan {
             angle_increment: 0.01,
             angle_min: -0.5,
             angle_max: 0.5,
             ..scan(1.0, &[1.0; 101])
-        };
+        }
+    }
+
+    #[test]
+    fn a_header_that_cannot_be_is_refused_with_its_field() {
         assert_eq!(scan_fault(&base()), None);
         let nan = f32::NAN;
         for (field, broken) in [
@@ -311,12 +315,6 @@ mod tests {
 
     #[test]
     fn headers_of_real_drivers_are_taken() {
-        let base = || LaserScan {
-            angle_increment: 0.01,
-            angle_min: -0.5,
-            angle_max: 0.5,
-            ..scan(1.0, &[1.0; 101])
-        };
         for fine in [
             // One ray more or less than the angles say, both ends of a turn, a turn the other way,
             // no last angle, no largest range.
@@ -335,14 +333,13 @@ mod tests {
     fn the_nearest_scan_counts_and_one_of_long_ago_does_not() {
         let mut scans = Scans::default();
         (0..100).for_each(|i| scans.push(scan(0.1 * f64::from(i), &[1.0])));
-        let near = |seconds| {
+        // The scans of long ago are dropped, and later on it is silent.
+        for (seconds, expected) in [(7.03, Some(7.0)), (9.99, Some(9.9)), (1.0, None), (12.0, None)]
+        {
             let found = scans.near(Stamp::default().plus_seconds(seconds));
-            found.map(|scan| {
-                (scan.header.stamp().seconds_since(Stamp::default()) * 10.0).round() as i64
-            })
-        };
-        assert_eq!((near(7.03), near(9.99)), (Some(70), Some(99)));
-        assert_eq!((near(1.0), near(12.0)), (None, None), "dropped, and silent");
+            let stamp = expected.map(|seconds| Stamp::default().plus_seconds(seconds));
+            assert_eq!(found.map(|scan| scan.header.stamp()), stamp, "{seconds} s");
+        }
     }
 
     #[test]

@@ -133,11 +133,11 @@ impl SensorType {
 /// Compares a message type of a log (`sensor_msgs/msg/LaserScan`, in ROS 1 without the middle
 /// part) with a package and a name.
 pub(crate) fn is_type(schema: &str, wanted: &str) -> bool {
-    let ends = |name: &str| {
+    let [schema, wanted] = [schema, wanted].map(|name| {
         let (package, rest) = name.split_once('/')?;
-        Some((package.to_owned(), rest.rsplit('/').next()?.to_owned()))
-    };
-    ends(schema).is_some() && ends(schema) == ends(wanted)
+        Some((package, rest.rsplit('/').next()?))
+    });
+    schema.is_some() && schema == wanted
 }
 
 impl InputSettings {

@@ -93,10 +93,11 @@ impl Assembler {
                 watch_frame(plan, topic.as_deref(), partner, image.stamp, intake, tally);
             }
         }
-        let requires = |input| plan.inputs.requires(input);
+        let requires_depth = plan.inputs.requires(Input::Depth);
+        let requires_right = plan.inputs.requires(Input::Right);
         // Tested before decoding, which is the costly part.
-        let lacks_depth = requires(Input::Depth) && plan.has_second_depth() && depth.is_none();
-        if lacks_depth || requires(Input::Right) && right.is_none() {
+        let lacks_depth = requires_depth && plan.has_second_depth() && depth.is_none();
+        if lacks_depth || requires_right && right.is_none() {
             return None;
         }
         let (mut images, size) = self.primary(plan, image, tally)?;
@@ -107,8 +108,8 @@ impl Assembler {
         if let Some(right) = right {
             images.right = right_image(plan, &right, size, tally).map(Arc::new);
         }
-        let lacks = requires(Input::Depth) && images.depth.is_none()
-            || requires(Input::Right) && images.right.is_none();
+        let lacks =
+            requires_depth && images.depth.is_none() || requires_right && images.right.is_none();
         if lacks {
             return None;
         }
@@ -350,16 +351,13 @@ impl Assembler {
         tally: &mut Tally,
     ) -> Sensors {
         let odom_from_robot = |stamp| self.pose_at(plan, stamp, intake).pose;
-        let moment = |topic| Moment {
-            topic,
-            stamp,
-            camera,
-            robot_frame: robot_frame(&plan.scan, &plan.input),
-            tf: &intake.tf,
-            odom_from_robot: &odom_from_robot,
-        };
-        let each = intake.sensors.iter();
-        each.fold(sensors, |all, (topic, sensor)| sensor.add_to(all, &moment(topic), tally))
+        let robot_frame = robot_frame(&plan.scan, &plan.input);
+        let tf = &intake.tf;
+        let odom_from_robot = &odom_from_robot;
+        intake.sensors.iter().fold(sensors, |all, (topic, sensor)| {
+            let moment = Moment { topic, stamp, camera, robot_frame, tf, odom_from_robot };
+            sensor.add_to(all, &moment, tally)
+        })
     }
 
     /// Returns the sensors of a frame with the readings of the further sources of obstacles, if there
@@ -561,12 +559,12 @@ fn right_image(
 
 /// Returns the lens of the frames after unwrapping.
 fn lens_of(known: &Intrinsics, width: usize, height: usize) -> Lens {
-    let sized = |mirror| Panorama { mirror, columns: width, rows: height };
-    match known.mirror {
-        None => Lens::Pinhole(known.lens),
-        Some(Mirrored::Raw(mirror)) => Lens::Panorama(sized(mirror)),
-        Some(Mirrored::Unwrapped(panorama)) => Lens::Panorama(sized(panorama.mirror)),
-    }
+    let mirror = match known.mirror {
+        None => return Lens::Pinhole(known.lens),
+        Some(Mirrored::Raw(mirror)) => mirror,
+        Some(Mirrored::Unwrapped(panorama)) => panorama.mirror,
+    };
+    Lens::Panorama(Panorama { mirror, columns: width, rows: height })
 }
 
 /// Decodes an image message; a failure is counted as lost.
@@ -605,15 +603,15 @@ fn depth_of_disparity(
     let unit_m = plan.input.depth_unit_m;
     let limits = &plan.limits;
     let stereo = plan.disparity.ok_or_else(|| ImageError::NoDisparity("an image".into()));
-    let of = |image: AnyImage<'_>| match image {
+    let read = read(plan, topic, image, tally, |image| match image {
         AnyImage::Disparity(image) => decode_disparity(&image, unit_px, unit_m, limits),
         AnyImage::Raw(image) => decode_plain_disparity(&image, stereo.clone()?, unit_px, limits),
         AnyImage::Compressed(image) => {
             decode_compressed_disparity(&image, stereo.clone()?, unit_px, limits)
         }
         AnyImage::Cloud(_) => Err(ImageError::NoDisparity("points".into())),
-    };
-    let DepthFromDisparity { depth, invalid } = read(plan, topic, image, tally, of)?;
+    });
+    let DepthFromDisparity { depth, invalid } = read?;
     tally.add("disparity_pixels", depth.pixels().len() as u64);
     tally.add("disparity_pixels_invalid", invalid as u64);
     Some(depth)

@@ -1,5 +1,7 @@
 //! Frames from messages of any source.
 
+use std::sync::Arc;
+
 use tagalong_core::Input;
 use tagalong_geometry::Camera;
 
@@ -112,8 +114,7 @@ impl Assembly {
     pub(super) fn facts(&self) -> LogFacts {
         let scan = &self.plan.scan;
         let chosen = &self.plan.chosen;
-        let camera = self.assembler.camera();
-        let of_camera = |value: fn(&Camera) -> f64| camera.map_or(0.0, |camera| value(camera));
+        let camera = self.assembler.camera().map(Arc::as_ref);
         LogFacts {
             path: scan.path.clone(),
             bytes: scan.bytes,
@@ -130,11 +131,11 @@ impl Assembly {
             robot_frame: robot_frame(scan, &self.plan.input).to_owned(),
             width: camera.map_or(0, |camera| camera.width),
             height: camera.map_or(0, |camera| camera.height),
-            focal_px: of_camera(Camera::focal_px),
+            focal_px: camera.map_or(0.0, Camera::focal_px),
             baseline_m: self.plan.baseline_m,
-            camera_height_m: of_camera(Camera::height_m),
-            camera_pitch_down_deg: of_camera(Camera::pitch_down_rad).to_degrees(),
-            camera_roll_deg: of_camera(Camera::roll_rad).to_degrees(),
+            camera_height_m: camera.map_or(0.0, Camera::height_m),
+            camera_pitch_down_deg: camera.map_or(0.0, Camera::pitch_down_rad).to_degrees(),
+            camera_roll_deg: camera.map_or(0.0, Camera::roll_rad).to_degrees(),
             camera_source: self.plan.mount.source(),
         }
     }

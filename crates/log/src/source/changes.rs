@@ -40,8 +40,11 @@ impl CameraWatch {
     pub(super) fn new(plan: &Plan) -> Self {
         let chosen = &plan.chosen;
         let topics = [&chosen.colour_info, &chosen.depth_info, &chosen.right_info];
-        let info = |topic: &String| Some((topic.clone(), plan.scan.infos.get(topic)?.clone()));
-        let infos = topics.into_iter().flatten().filter_map(info).collect();
+        let infos = topics
+            .into_iter()
+            .flatten()
+            .filter_map(|topic| Some((topic.clone(), plan.scan.infos.get(topic)?.clone())))
+            .collect();
         Self { infos, mounts: watched_mounts(plan), changed_at: None }
     }
 
@@ -156,11 +159,13 @@ fn watched_mounts(plan: &Plan) -> Vec<WatchedMount> {
         primary.zip(depth),
         laser.map(|laser| (robot_frame(&plan.scan, &plan.input), laser)),
     ];
-    let watched = |(target, source): (&str, &str)| WatchedMount {
-        target: target.to_owned(),
-        source: source.to_owned(),
-    };
-    pairs.into_iter().flatten().filter(|(target, source)| target != source).map(watched).collect()
+    let pairs = pairs.into_iter().flatten().filter(|(target, source)| target != source);
+    pairs
+        .map(|(target, source)| WatchedMount {
+            target: target.to_owned(),
+            source: source.to_owned(),
+        })
+        .collect()
 }
 
 /// Returns true if a pose has moved or turned by more than a republished one differs, or is gone.

@@ -250,9 +250,11 @@ fn readers(plan: &Plan, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
     let Plan { scan, chosen, input, .. } = plan;
     let topics = SENSORS.iter().filter_map(|sensor| Some((sensor, chosen.sensor(sensor.input)?)));
     let others = topics.filter(|(_, topic)| *topic != primary);
-    let schema = |topic: &str| scan.topics.get(topic).map_or("", |topic| &topic.schema);
     let mut readers: Vec<(String, Box<dyn SensorReader>)> = others
-        .map(|(sensor, topic)| (topic.to_owned(), (sensor.reader)(schema(topic), input)))
+        .map(|(sensor, name)| {
+            let schema = scan.topics.get(name).map_or("", |topic| &topic.schema);
+            (name.to_owned(), (sensor.reader)(schema, input))
+        })
         .collect();
     for topic in &chosen.further_scans {
         readers.push((topic.clone(), Box::new(Scans::further())));

@@ -14,6 +14,7 @@ use super::mount::{Mount, robot_frame};
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::images::StereoGeometry;
 use crate::input::StampSource;
+use crate::msgs::CameraInfo;
 use crate::obstacles::{PlannedSource, planned_sources};
 use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
@@ -130,13 +131,12 @@ impl Plan {
         let (Some(colour), Some(depth)) = (self.lens, self.depth_lens) else { return true };
         let a = colour.lens;
         let b = depth.lens;
-        let close = |a: f64, b: f64, off: f64| (a - b).abs() <= off;
         // Calibrations of one camera may differ slightly: by 1 % in focal length, 2 px in the
         // centre.
-        close(a.fx, b.fx, 0.01 * a.fx)
-            && close(a.fy, b.fy, 0.01 * a.fy)
-            && close(a.cx, b.cx, 2.0)
-            && close(a.cy, b.cy, 2.0)
+        (a.fx - b.fx).abs() <= 0.01 * a.fx
+            && (a.fy - b.fy).abs() <= 0.01 * a.fy
+            && (a.cx - b.cx).abs() <= 2.0
+            && (a.cy - b.cy).abs() <= 2.0
     }
 
     /// Returns the camera that took a depth image, without its pose; `None` without a calibration
@@ -348,8 +348,9 @@ fn note_unread_images(plan: &Plan, tally: &mut Tally) {
 }
 
 fn same_frame(scan: &Scan, chosen: &Chosen) -> bool {
-    let frame = |topic: &Option<String>| scan.frame_of(topic.as_deref()?);
-    frame(&chosen.colour).is_some() && frame(&chosen.colour) == frame(&chosen.depth)
+    let [colour, depth] =
+        [&chosen.colour, &chosen.depth].map(|topic| scan.frame_of(topic.as_deref()?));
+    colour.is_some() && colour == depth
 }
 
 /// Returns the calibration of an image topic, if there is one.
@@ -402,12 +403,15 @@ fn stereo_geometry(plan: &Plan) -> Result<Option<StereoGeometry>, LogError> {
 
 /// Returns the baseline of the right camera that the settings name, else of the only one.
 fn right_baseline_m(plan: &Plan) -> Option<f64> {
-    let of = |info| intrinsics(info, true).ok()?.baseline_m.filter(|baseline| *baseline > 0.0);
     if let Some(named) = &plan.chosen.right_info {
-        return of(plan.scan.infos.get(named)?);
+        return positive_baseline_m(plan.scan.infos.get(named)?);
     }
-    let mut all = plan.scan.infos.values().filter_map(of);
+    let mut all = plan.scan.infos.values().filter_map(positive_baseline_m);
     all.next().filter(|_| all.next().is_none())
+}
+
+fn positive_baseline_m(info: &CameraInfo) -> Option<f64> {
+    intrinsics(info, true).ok()?.baseline_m.filter(|baseline_m| *baseline_m > 0.0)
 }
 
 /// Checks that there is a calibration if positions in metres need it; a monocular pipeline works
@@ -484,10 +488,10 @@ const SAME_FACTOR: f64 = 1.1;
 fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogError> {
     let is_set = plan.input.depth_unit_m.is_some() || plan.input.disparity.is_some();
     let topic = plan.chosen.depth.as_ref().and_then(|topic| plan.scan.topics.get(topic));
-    let has_unit = |topic: &&Topic| is_disparity_image(topic) || topic.kind == Type::PointCloud;
-    let Some(topic) = topic.filter(|topic| !is_set && !has_unit(topic)) else {
+    let Some(topic) = topic else { return Ok(None) };
+    if is_set || is_disparity_image(topic) || topic.kind == Type::PointCloud {
         return Ok(None);
-    };
+    }
     // Every other source of the pose is measured by depth, or a guess.
     let is_known = match &plan.mount {
         Mount::Tf { .. } => true,

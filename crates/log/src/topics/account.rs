@@ -67,15 +67,10 @@ impl InputAccount {
     }
 
     pub(super) fn sort(&mut self) {
-        self.topics.sort_by(|a, b| {
-            let place = |topic: &TopicUse| {
-                let used = topic.used_as.as_deref();
-                ORDER.iter().position(|input| used == Some(*input))
-            };
-            let key = |topic: &TopicUse| {
-                (topic.used_as.is_none(), place(topic).unwrap_or(ORDER.len()), topic.topic.clone())
-            };
-            key(a).cmp(&key(b))
+        self.topics.sort_by_cached_key(|topic| {
+            let used = topic.used_as.as_deref();
+            let place = ORDER.iter().position(|input| used == Some(*input));
+            (used.is_none(), place.unwrap_or(ORDER.len()), topic.topic.clone())
         });
     }
 }

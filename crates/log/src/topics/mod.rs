@@ -192,7 +192,6 @@ fn choose_images(
     input: &InputSettings,
     inputs: Inputs,
 ) -> Result<(Pick, Option<String>), LogError> {
-    let is_depth = |topic: &Topic| is_usable_depth(topic, input);
     let is_disparity = input.disparity.is_some();
     // Chosen first, because such images look like those of a grey camera.
     let disparity = match (&input.depth_topic, is_disparity) {
@@ -200,7 +199,9 @@ fn choose_images(
         _ => None,
     };
     let colour_topic = input.colour_topic.as_deref();
-    let depth = named(scan, "depth_topic", input.depth_topic.as_deref(), is_depth);
+    let depth = named(scan, "depth_topic", input.depth_topic.as_deref(), |topic| {
+        is_usable_depth(topic, input)
+    });
     // A mistake in a topic that is not used is none.
     let depth = if inputs.uses(Input::Depth) { depth? } else { depth.unwrap_or(None) };
     let named = Pick {
@@ -261,8 +262,10 @@ fn wanted_rigs<'a>(
     for topic in [&named.colour, &named.right, &named.depth].into_iter().flatten() {
         let Some(own) = all.iter().find(|rig| rig.has(topic)) else { continue };
         // Depth that the settings name may stand apart from the colour of its device.
-        let may_add = |rig: &Rig| named.colour.is_none() && may_be_one(scan, rig, own);
-        return Ok(all.iter().filter(|rig| rig.has(topic) || may_add(rig)).collect());
+        let may_add = named.colour.is_none();
+        let wanted =
+            all.iter().filter(|rig| rig.has(topic) || may_add && may_be_one(scan, rig, own));
+        return Ok(wanted.collect());
     }
     Ok(all.iter().collect())
 }
@@ -285,17 +288,18 @@ fn choose_sensor(
     sensor: &SensorType,
     input: &InputSettings,
 ) -> Result<Option<String>, LogError> {
-    let fits = |topic: &Topic| is_of(sensor, topic);
-    let named = named(scan, &sensor.key(), named_topic(sensor, input), fits)?;
+    let named = named(scan, &sensor.key(), named_topic(sensor, input), |it| is_of(sensor, it))?;
     let robot = robot_frame(scan, input);
-    let rank = |name: &str, topic: &Topic| {
-        let rank = sensor.rank.filter(|_| is_of(sensor, topic))?(&name.to_lowercase());
-        // Any scanner is better than one whose scans cannot be, or whose place is not known.
-        let has_place = topic.frame_id.as_ref().is_none_or(|frame| scan.tf.connects(robot, frame));
-        let is_possible = topic.impossible().is_none();
-        Some(rank - 100 * i32::from(!is_possible) - 50 * i32::from(!has_place))
-    };
-    Ok(named.or_else(|| best_of(scan, &input.sources, scan.names(), rank)))
+    Ok(named.or_else(|| {
+        best_of(scan, &input.sources, scan.names(), |name, topic| {
+            let rank = sensor.rank.filter(|_| is_of(sensor, topic))?(&name.to_lowercase());
+            // Any scanner is better than one whose scans cannot be, or whose place is not known.
+            let frame = topic.frame_id.as_ref();
+            let has_place = frame.is_none_or(|frame| scan.tf.connects(robot, frame));
+            let is_possible = topic.impossible().is_none();
+            Some(rank - 100 * i32::from(!is_possible) - 50 * i32::from(!has_place))
+        })
+    }))
 }
 
 /// Returns the topic that the settings name for a sensor.
@@ -326,11 +330,11 @@ fn check(
     inputs: Inputs,
     account: &InputAccount,
 ) -> Result<(), LogError> {
-    let is_unknown = |input: &Input| !SENSORS.iter().any(|sensor| sensor.input == *input);
-    let mut unknown = inputs.of(Usage::Required).filter(is_named).filter(is_unknown);
-    if let Some(input) = unknown.next() {
-        let name = input.name();
-        return Err(missing(scan, format!("input `{name}`"), UNREADABLE.to_owned()));
+    for input in inputs.of(Usage::Required).filter(is_named) {
+        if !SENSORS.iter().any(|sensor| sensor.input == input) {
+            let name = input.name();
+            return Err(missing(scan, format!("input `{name}`"), UNREADABLE.to_owned()));
+        }
     }
     let is_blind = chosen.colour.is_none() && chosen.depth.is_none();
     let lacks = |input, topic: &Option<String>| inputs.requires(input) && topic.is_none();
@@ -374,8 +378,7 @@ impl Requirement<'_> {
             let why = unreadable(topic).filter(|_| is_image)?;
             Some(format!("; {name} ({}) cannot be read: {why}", kind_of(topic)))
         });
-        let is_free = |name: &str| *taken != Some(name);
-        let mut free = scan.topics.iter().filter(|(name, _)| is_free(name));
+        let mut free = scan.topics.iter().filter(|(name, _)| *taken != Some(name.as_str()));
         let meant = free.find(|(_, topic)| fits(topic)).map(|(name, topic)| {
             let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
             let of_camera = account.topics.iter().find(|entry| {
@@ -464,9 +467,11 @@ pub(super) fn best_of<'a>(
     names: impl Iterator<Item = &'a str>,
     rank: impl Fn(&str, &Topic) -> Option<i32>,
 ) -> Option<String> {
-    let is_source = |name: &str| sources.iter().any(|source| source.topic == name);
     let mut best: Option<(i32, u32, &str)> = None;
-    for name in names.filter(|name| !is_source(name)) {
+    for name in names {
+        if sources.iter().any(|source| source.topic == name) {
+            continue;
+        }
         let Some(topic) = scan.topics.get(name).filter(|topic| topic.count > 0) else { continue };
         let Some(rank) = rank(name, topic) else { continue };
         // By powers of two: a lost message or two is no reason for another choice.

@@ -162,11 +162,12 @@ impl TopicName {
     }
 
     fn places(&self) -> BTreeSet<&str> {
-        let is_place = |word: &str| {
+        let words = self.device.iter().map(String::as_str);
+        let places = words.filter(|word| {
             PLACES.iter().any(|place| word.contains(place))
                 || word.chars().all(|c| c.is_ascii_digit())
-        };
-        self.device.iter().map(String::as_str).filter(|word| is_place(word)).collect()
+        });
+        places.collect()
     }
 }
 
@@ -236,10 +237,13 @@ mod tests {
 
     #[test]
     fn names_of_other_places_and_numbers_contradict() {
-        let contradict = |a: &str, b: &str| TopicName::of(a).contradicts(&TopicName::of(b));
-        assert!(contradict("/front_camera/color/image", "/back_camera/depth/image"));
-        assert!(contradict("/cam0/image_raw", "/cam1/depth"));
-        assert!(!contradict("/usb_cam/image_raw", "/camera/depth/image"));
-        assert!(!contradict("/front/color/image", "/front/depth/image"));
+        for (a, b, contradict) in [
+            ("/front_camera/color/image", "/back_camera/depth/image", true),
+            ("/cam0/image_raw", "/cam1/depth", true),
+            ("/usb_cam/image_raw", "/camera/depth/image", false),
+            ("/front/color/image", "/front/depth/image", false),
+        ] {
+            assert_eq!(TopicName::of(a).contradicts(&TopicName::of(b)), contradict, "{a} {b}");
+        }
     }
 }

@@ -79,8 +79,8 @@ fn registration_problem(
     colour: &str,
     depth: &str,
 ) -> Option<Problem> {
-    let size = |topic: &str| scan.topics.get(topic).and_then(|topic| topic.size);
-    let (Some(of_colour), Some(of_depth)) = (size(colour), size(depth)) else { return None };
+    let of_colour = scan.topics.get(colour)?.size?;
+    let of_depth = scan.topics.get(depth)?.size?;
     // Images of the same size are taken to be registered where nothing says how to do it.
     if of_colour == of_depth {
         return None;

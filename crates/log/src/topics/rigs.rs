@@ -63,20 +63,18 @@ fn words_of(topic: &str) -> Option<String> {
 /// Splits a group at left and right if each side has depth of its own, which are two devices and no
 /// stereo pair.
 fn by_side(scan: &Scan, group: Vec<String>) -> Vec<Rig> {
-    let has_depth = |side| {
-        group.iter().any(|name| {
-            TopicName::of(name).side == side && scan.topics[name].content == Content::Depth
-        })
-    };
-    let rig = |topics| Rig { label: String::new(), topics };
-    if !(has_depth(Side::Left) && has_depth(Side::Right)) {
-        return vec![rig(group)];
-    }
+    let is_depth = |name: &&String| scan.topics[*name].content == Content::Depth;
+    let with_depth: Vec<Side> =
+        group.iter().filter(is_depth).map(|name| TopicName::of(name).side).collect();
     let mut sides: BTreeMap<Side, Vec<String>> = BTreeMap::new();
-    for name in group {
-        sides.entry(TopicName::of(&name).side).or_default().push(name);
+    if with_depth.contains(&Side::Left) && with_depth.contains(&Side::Right) {
+        for name in group {
+            sides.entry(TopicName::of(&name).side).or_default().push(name);
+        }
+    } else {
+        sides.insert(Side::Left, group);
     }
-    sides.into_values().map(rig).collect()
+    sides.into_values().map(|topics| Rig { label: String::new(), topics }).collect()
 }
 
 /// Joins a rig that has depth alone with the only one that has colour alone and may be of the same
@@ -91,11 +89,11 @@ fn join_streams(scan: &Scan, rigs: &mut Vec<Rig>) {
                 }
             }
         }
-        let is_only = |(c, d): &(usize, usize)| {
+        let only = pairs.iter().copied().find(|(c, d)| {
             pairs.iter().filter(|(other, _)| other == c).count() == 1
                 && pairs.iter().filter(|(_, other)| other == d).count() == 1
-        };
-        let Some((colour, depth)) = pairs.iter().copied().find(is_only) else { return };
+        });
+        let Some((colour, depth)) = only else { return };
         let topics = std::mem::take(&mut rigs[depth].topics);
         rigs[colour].topics.extend(topics);
         rigs.remove(depth);
@@ -146,21 +144,15 @@ fn is_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
 
 /// Returns the folder that the topics of a rig share, else the folder of the first one.
 fn label_of(topics: &[String]) -> String {
-    let folders = |topic: &String| -> Vec<String> {
-        let mut parts: Vec<String> = topic.split('/').map(str::to_owned).collect();
-        parts.pop();
-        parts
-    };
-    let mut shared: Option<Vec<String>> = None;
+    let mut shared: Option<Vec<&str>> = None;
     for topic in topics {
-        let own = folders(topic);
-        shared = Some(match shared {
-            None => own,
-            Some(shared) => {
-                let same = shared.iter().zip(&own).take_while(|(a, b)| a == b).count();
-                shared[..same].to_vec()
-            }
-        });
+        let mut own: Vec<&str> = topic.split('/').collect();
+        own.pop();
+        if let Some(shared) = shared {
+            let same = shared.iter().zip(&own).take_while(|(a, b)| a == b).count();
+            own.truncate(same);
+        }
+        shared = Some(own);
     }
     let label = shared.unwrap_or_default().join("/");
     if !label.trim_matches('/').is_empty() {
@@ -180,13 +172,13 @@ impl Rig {
     pub(super) fn is_called(&self, name: &str) -> bool {
         let wanted = name.trim_matches('/');
         let words = TopicName::of(name).device;
-        let is_device = |topic: &String| !words.is_empty() && TopicName::of(topic).device == words;
         self.label.trim_matches('/') == wanted
             || self.topics.iter().any(|topic| {
-                let topic = topic.trim_matches('/');
-                topic == wanted || topic.starts_with(&format!("{wanted}/"))
+                let plain = topic.trim_matches('/');
+                plain == wanted
+                    || plain.starts_with(&format!("{wanted}/"))
+                    || !words.is_empty() && TopicName::of(topic).device == words
             })
-            || self.topics.iter().any(is_device)
     }
 
     /// Chooses the images of the rig. Those that are `taken` already have another use.

@@ -117,8 +117,9 @@ impl TrackLog {
         value: &T,
     ) -> Result<(), WriteError> {
         let path = self.file("tracks.mcap");
-        let in_words = |why| io::Error::other(format!("a message of {topic} as JSON: {why}"));
-        let text = serde_json::to_string(value).map_err(in_words).map_err(WriteError::io(&path))?;
+        let text = serde_json::to_string(value)
+            .map_err(|why| io::Error::other(format!("a message of {topic} as JSON: {why}")))
+            .map_err(WriteError::io(&path))?;
         self.mcap.write_text(topic, at, text).map_err(WriteError::mcap(&path))
     }
 

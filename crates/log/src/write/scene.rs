@@ -58,17 +58,17 @@ impl Figure {
         let at = head.translation.vector;
         // A head far too low must not give a cylinder of negative height.
         let height_m = (at.z + HALF_HEAD_M).max(0.1);
-        let upright = |z: f64| {
+        let [middle, top] = [0.5 * height_m, height_m + TEXT_M].map(|z| {
             Isometry3::from_parts(Vector3::new(at.x, at.y, z).into(), UnitQuaternion::identity())
-        };
+        });
         let speed = track.estimate.person.velocity.norm();
         let walks = speed >= MIN_HEADING_SPEED_MPS;
-        let tail = Isometry3::from_parts(upright(0.5 * height_m).translation, head.rotation);
+        let tail = Isometry3::from_parts(middle.translation, head.rotation);
         Self {
             id: track.id.0,
-            middle: upright(0.5 * height_m),
+            middle,
             height_m,
-            top: upright(height_m + TEXT_M),
+            top,
             arrow: walks.then_some((tail, speed)),
             trail: if track.seen { trail_lines(trails, track) } else { Vec::new() },
             label: label(track),

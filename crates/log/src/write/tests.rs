@@ -166,8 +166,8 @@ fn two_runs_give_the_same_bytes() {
     log(a.path(), 25, true);
     log(b.path(), 25, true);
     for name in ["tracks.mcap", "tracks.csv", "tracks-metres.csv"] {
-        let read = |home: &tempfile::TempDir| std::fs::read(home.path().join(name)).unwrap();
-        assert_eq!(read(&a), read(&b), "{name}");
+        let [a, b] = [&a, &b].map(|home| std::fs::read(home.path().join(name)).unwrap());
+        assert_eq!(a, b, "{name}");
     }
 }
 

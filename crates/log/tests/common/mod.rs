@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
@@ -15,6 +15,17 @@ use tagalong_log::msgs::{
     CameraInfo, Header, Image, Message, Odometry, Pose, TFMessage, Transform, TransformStamped,
     encode,
 };
+use tagalong_log::{FrameSource, InputSettings, Inputs, Limits, LogError};
+
+pub const INFO: &str = "/camera/color/camera_info";
+
+/// Starts a log with a calibration and a fixed camera.
+pub fn started() -> LogWriter {
+    let mut log = LogWriter::plain();
+    log.info(INFO, "colour", &camera(16, 12, 14.0));
+    log.fixed("base_link", "colour", &level_pose());
+    log
+}
 
 pub fn at(seconds: f64) -> Stamp {
     Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(seconds)
@@ -51,6 +62,10 @@ impl LogWriter {
 
     pub fn bytes<T: Message>(&mut self, topic: &str, stamp: Stamp, data: &[u8]) {
         let channel_id = self.channel(topic, T::TYPE, T::DEFINITION);
+        self.write(channel_id, stamp, data);
+    }
+
+    fn write(&mut self, channel_id: u16, stamp: Stamp, data: &[u8]) {
         let time = stamp.nanos();
         let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
         self.writer.write_to_known_channel(&header, data).unwrap();
@@ -61,9 +76,7 @@ impl LogWriter {
         let schema = self.writer.add_schema(name, "", b"").unwrap();
         let channel_id =
             self.writer.add_channel(schema, topic, encoding, &BTreeMap::new()).unwrap();
-        let time = stamp.nanos();
-        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
-        self.writer.write_to_known_channel(&header, data).unwrap();
+        self.write(channel_id, stamp, data);
     }
 
     /// Writes a message of a type whose definition is given.
@@ -79,9 +92,7 @@ impl LogWriter {
         let schema = self.writer.add_schema(name, language, definition.as_bytes()).unwrap();
         let channel_id =
             self.writer.add_channel(schema, topic, encoding, &BTreeMap::new()).unwrap();
-        let time = stamp.nanos();
-        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
-        self.writer.write_to_known_channel(&header, data).unwrap();
+        self.write(channel_id, stamp, data);
     }
 
     pub fn message<T: Message + Serialize>(&mut self, topic: &str, stamp: Stamp, message: &T) {
@@ -97,9 +108,7 @@ impl LogWriter {
         message: &T,
     ) {
         let channel_id = self.channel(topic, name, "");
-        let time = stamp.nanos();
-        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
-        self.writer.write_to_known_channel(&header, &encode(message)).unwrap();
+        self.write(channel_id, stamp, &encode(message));
     }
 
     pub fn colour(&mut self, stamp: Stamp) {
@@ -117,15 +126,7 @@ impl LogWriter {
 
     fn colour_with(&mut self, stamp: Stamp, frame: &str, width: u32, height: u32) {
         let data = vec![(stamp.nanos() / 1_000_000 % 251) as u8; (3 * width * height) as usize];
-        let message = Image {
-            header: Header::new(stamp, frame),
-            height,
-            width,
-            encoding: "rgb8".into(),
-            is_bigendian: 0,
-            step: 3 * width,
-            data: &data,
-        };
+        let message = Image::packed(Header::new(stamp, frame), "rgb8", width, height, &data);
         self.message("/camera/color/image_raw", stamp, &message);
     }
 
@@ -137,15 +138,7 @@ impl LogWriter {
 
     pub fn depth_of(&mut self, stamp: Stamp, frame: &str, width: u32, height: u32, depth: &[f32]) {
         let data: Vec<u8> = depth.iter().flat_map(|v| v.to_le_bytes()).collect();
-        let message = Image {
-            header: Header::new(stamp, frame),
-            height,
-            width,
-            encoding: "32FC1".into(),
-            is_bigendian: 0,
-            step: 4 * width,
-            data: &data,
-        };
+        let message = Image::packed(Header::new(stamp, frame), "32FC1", width, height, &data);
         self.message("/camera/depth/image_raw", stamp, &message);
     }
 
@@ -252,6 +245,15 @@ impl SavedLog {
         std::fs::write(&path, bytes).unwrap();
         Self { _folder: folder, path }
     }
+
+    pub fn open(&self, input: &InputSettings, inputs: Inputs) -> Result<FrameSource, LogError> {
+        open(&self.path, input, inputs)
+    }
+}
+
+/// Opens a log with the usual limits.
+pub fn open(path: &Path, input: &InputSettings, inputs: Inputs) -> Result<FrameSource, LogError> {
+    FrameSource::open(path, input, &Limits::default(), inputs)
 }
 
 /// Returns each kind of compression of the chunks, with its name.

@@ -24,17 +24,12 @@ fn wall(frame: &str, stamp: Stamp, is_body: bool) -> PointCloud2<'static> {
             data.extend(point.iter().flat_map(|value| (*value as f32).to_le_bytes()));
         }
     }
-    let field = |(name, offset): (&str, u32)| PointField {
-        name: name.into(),
-        offset,
-        datatype: PointField::FLOAT32,
-        count: 1,
-    };
+    let fields = [("x", 0), ("y", 4), ("z", 8)];
     PointCloud2 {
         header: Header::new(stamp, frame),
         height: SIZE.1,
         width: SIZE.0,
-        fields: [("x", 0), ("y", 4), ("z", 8)].map(field).to_vec(),
+        fields: fields.map(|(name, offset)| PointField::float32(name, offset)).to_vec(),
         point_step: 12,
         row_step: 12 * SIZE.0,
         data: Cow::Owned(data),
@@ -50,13 +45,7 @@ fn log_with(cloud: &PointCloud2<'_>) -> LogWriter {
 }
 
 fn opened(log: LogWriter) -> Result<(FrameSource, LogFrame), String> {
-    let saved = log.save();
-    let inputs = Inputs::ANY.require(Input::Depth);
-    let source =
-        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), inputs);
-    let mut source = source.map_err(|error| error.to_string())?;
-    let frame = source.next_frame().ok_or_else(|| format!("{:?}", source.notes()))?;
-    Ok((source, frame))
+    first_depth(log, &InputSettings::default())
 }
 
 #[test]

@@ -9,7 +9,7 @@ mod obstacles;
 mod odometry_age;
 mod topics;
 
-use common::{LogWriter, SavedLog, at, camera, info_of, level_pose};
+use common::{INFO, LogWriter, SavedLog, at, camera, info_of, level_pose, started};
 use mcap::WriteOptions;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use tagalong_core::{DepthImage, Stamp};
@@ -24,21 +24,18 @@ use tagalong_log::{
 };
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);
-const INFO: &str = "/camera/color/camera_info";
-
-/// Starts a log with a calibration and a fixed camera.
-fn started() -> LogWriter {
-    let mut log = LogWriter::plain();
-    log.info(INFO, "colour", &camera(16, 12, 14.0));
-    log.fixed("base_link", "colour", &level_pose());
-    log
-}
 
 fn open(log: LogWriter, inputs: Inputs) -> (FrameSource, SavedLog) {
     let saved = log.save();
-    let source =
-        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), inputs);
-    (source.unwrap(), saved)
+    (saved.open(&InputSettings::default(), inputs).unwrap(), saved)
+}
+
+/// Returns the first frame of a log with depth, and the source.
+fn first_depth(log: LogWriter, input: &InputSettings) -> Result<(FrameSource, LogFrame), String> {
+    let source = log.save().open(input, Inputs::ANY.require(Input::Depth));
+    let mut source = source.map_err(|error| error.to_string())?;
+    let frame = source.next_frame().ok_or_else(|| format!("{:?}", source.notes()))?;
+    Ok((source, frame))
 }
 
 fn frames(source: &mut FrameSource) -> Vec<LogFrame> {
@@ -65,11 +62,8 @@ fn colour_without_depth_is_counted_and_keeps_its_index() {
     }
     let bytes = log.finish();
     let saved = SavedLog::new(&bytes);
-    let open = |inputs| {
-        FrameSource::open(&saved.path, &InputSettings::default(), &Limits::default(), inputs)
-            .unwrap()
-    };
-    let mut source = open(DEPTH);
+    let input = InputSettings::default();
+    let mut source = saved.open(&input, DEPTH).unwrap();
     let found = frames(&mut source);
     assert_eq!(indices(&found), [1, 3, 5, 7, 9]);
     assert_eq!(found[2].frame.depth().unwrap().get(3, 3), Some(6.0));
@@ -77,7 +71,7 @@ fn colour_without_depth_is_counted_and_keeps_its_index() {
     assert_eq!(count(&source, "depth_without_colour"), 0);
     assert!((found[1].frame.motion.dt - 0.066).abs() < 1e-9);
     assert!(!source.data_lost());
-    let mut source = open(Inputs::ANY.require(Input::Colour));
+    let mut source = saved.open(&input, Inputs::ANY.require(Input::Colour)).unwrap();
     let found = frames(&mut source);
     assert_eq!(found.len(), 10);
     assert!(found[0].frame.depth().is_ok() && found[1].frame.depth().is_err());
@@ -110,8 +104,8 @@ fn run_of(stamps: &[f64]) -> (FrameSource, SavedLog) {
 }
 
 fn stamps(frames: &[LogFrame]) -> Vec<f64> {
-    let seconds = |found: &LogFrame| found.frame.stamp.seconds_since(at(0.0));
-    frames.iter().map(|found| (seconds(found) * 1000.0).round() / 1000.0).collect()
+    let seconds = frames.iter().map(|found| found.frame.stamp.seconds_since(at(0.0)));
+    seconds.map(|seconds| (seconds * 1000.0).round() / 1000.0).collect()
 }
 
 #[test]
@@ -246,13 +240,13 @@ fn a_laser_without_a_place_or_silent_for_long_is_told() {
 #[test]
 fn gaps_and_jumps_of_odometry_are_told() {
     let mut log = started();
-    let seconds = |i: i32| f64::from(i) * 0.1;
     for i in 0..60 {
+        let seconds = f64::from(i) * 0.1;
         if !(10..30).contains(&i) {
             // The odometry jumps by 5 m at 4.5 s.
-            log.odometry(at(seconds(i)), if i < 45 { 0.0 } else { 5.0 }, 0.0);
+            log.odometry(at(seconds), if i < 45 { 0.0 } else { 5.0 }, 0.0);
         }
-        log.colour(at(seconds(i) + 0.01));
+        log.colour(at(seconds + 0.01));
     }
     let (mut source, _saved) = open(log, Inputs::ANY);
     let found = frames(&mut source);
@@ -299,15 +293,7 @@ fn both_byte_orders_and_every_compression_give_the_same_frames() {
         let info = info_of("colour", &camera(16, 12, 14.0));
         log.bytes::<CameraInfo>(INFO, at(0.0), &encode_big_endian(&info));
         let data: Vec<u8> = (0..16 * 12 * 3).map(|v| v as u8).collect();
-        let mut image = Image {
-            header: Header::new(at(1.0), "colour"),
-            height: 12,
-            width: 16,
-            encoding: "bgr8".into(),
-            is_bigendian: 0,
-            step: 48,
-            data: &data,
-        };
+        let mut image = Image::packed(Header::new(at(1.0), "colour"), "bgr8", 16, 12, &data);
         log.bytes::<Image<'_>>("/camera/color/image_raw", at(1.0), &encode_big_endian(&image));
         image.header = Header::new(at(2.0), "colour");
         log.message("/camera/color/image_raw", at(2.0), &image);
@@ -344,10 +330,7 @@ fn images_of_another_size_are_refused() {
 
     let mut log = started();
     log.colour_of(at(0.2), 20, 12);
-    let saved = log.save();
-    let input = InputSettings::default();
-    let limits = Limits::default();
-    let error = FrameSource::open(&saved.path, &input, &limits, Inputs::ANY).err().unwrap();
+    let error = log.save().open(&InputSettings::default(), Inputs::ANY).err().unwrap();
     assert!(matches!(error, LogError::Calibration { .. }));
     assert!(error.to_string().contains("16x12, but the images are 20x12"), "{error}");
 }
@@ -359,23 +342,23 @@ fn a_bad_calibration_names_topic_and_field() {
     info.k[0] = f64::NAN;
     log.message(INFO, at(0.0), &info);
     log.colour(at(0.1));
-    let saved = log.save();
-    let input = InputSettings::default();
-    let limits = Limits::default();
-    let error = FrameSource::open(&saved.path, &input, &limits, Inputs::ANY).err().unwrap();
+    let error = log.save().open(&InputSettings::default(), Inputs::ANY).err().unwrap();
     assert!(error.to_string().contains("topic /camera/color/camera_info: K = NaN"), "{error}");
 }
 
 #[test]
 fn c1_a_calibration_that_changes_on_the_way_marks_the_frames_after_it() {
     let mut log = started();
-    let lens = |focal| info_of("colour", &camera(16, 12, focal));
     for i in 0..10 {
         let stamp = at(f64::from(i) * 0.1);
         // The same numbers again are no change.
         let focal = if i < 6 { 14.0 } else { 20.0 };
         let header = Header::new(stamp, "colour");
-        log.message(INFO, stamp, &CameraInfo { header, ..lens(focal) });
+        log.message(
+            INFO,
+            stamp,
+            &CameraInfo { header, ..info_of("colour", &camera(16, 12, focal)) },
+        );
         log.colour(stamp);
     }
     let (mut source, _saved) = open(log, Inputs::ANY);
@@ -398,51 +381,39 @@ fn the_pose_of_the_camera_can_be_given() {
     let mount = MountSettings { height_m: 1.5, pitch_down_deg: 10.0, roll_deg: -3.0, name: None };
     let input =
         InputSettings { camera: Some(CameraSettings::Mounted(mount)), ..InputSettings::default() };
-    let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), DEPTH).unwrap();
+    let mut source = saved.open(&input, DEPTH).unwrap();
     let camera = source.next_frame().unwrap().frame.camera.clone();
     assert!((camera.height_m() - 1.5).abs() < 1e-12);
     assert!((camera.pitch_down_rad().to_degrees() - 10.0).abs() < 1e-9);
     assert!((camera.roll_rad().to_degrees() + 3.0).abs() < 1e-9);
     assert!(source.facts().camera_source.contains("[input.camera]"));
     // A wall gives no floor: without another source of the pose, the run cannot start.
-    let input = InputSettings::default();
-    let limits = Limits::default();
-    let error = FrameSource::open(&saved.path, &input, &limits, DEPTH).err().unwrap();
+    let error = saved.open(&InputSettings::default(), DEPTH).err().unwrap();
     assert!(error.to_string().contains("camera pose"), "{error}");
     assert!(error.to_string().contains("[input.camera]"), "{error}");
 }
 
 #[test]
 fn the_given_pose_of_the_camera_goes_before_that_of_tf() {
-    let mut log = LogWriter::plain();
-    log.info(INFO, "colour", &camera(16, 12, 14.0));
-    log.fixed("base_link", "colour", &level_pose());
+    let mut log = started();
     log.colour(at(0.1));
     let saved = log.save();
     let mount = MountSettings { height_m: 0.7, ..MountSettings::default() };
-    let height = |camera| {
+    for (camera, height_m) in [(Some(CameraSettings::Mounted(mount)), 0.7), (None, 1.2)] {
         let input = InputSettings { camera, ..InputSettings::default() };
-        let inputs = Inputs::ANY;
-        let mut source =
-            FrameSource::open(&saved.path, &input, &Limits::default(), inputs).unwrap();
-        source.next_frame().unwrap().frame.camera.height_m()
-    };
-    assert!((height(Some(CameraSettings::Mounted(mount))) - 0.7).abs() < 1e-12);
-    assert!((height(None) - 1.2).abs() < 1e-12);
+        let found = saved.open(&input, Inputs::ANY).unwrap().next_frame().unwrap();
+        assert!((found.frame.camera.height_m() - height_m).abs() < 1e-12);
+    }
 }
 
 #[test]
 fn depth_is_moved_onto_colour_as_the_settings_say() {
-    let mut log = LogWriter::plain();
-    log.info(INFO, "colour", &camera(16, 12, 14.0));
-    log.fixed("base_link", "colour", &level_pose());
+    let mut log = started();
     log.colour(at(0.1));
     let values: Vec<f32> = (0..16 * 12).map(|i| 1.0 + i as f32).collect();
     log.depth_of(at(0.1), "colour", 16, 12, &values);
-    let saved = log.save();
     let input = InputSettings { depth_offset_px: [3, -2], ..InputSettings::default() };
-    let mut source = FrameSource::open(&saved.path, &input, &Limits::default(), DEPTH).unwrap();
-    let frame = source.next_frame().unwrap().frame;
+    let frame = log.save().open(&input, DEPTH).unwrap().next_frame().unwrap().frame;
     let depth = frame.depth().unwrap();
     assert_eq!(depth.get(3, 0), Some(1.0 + 2.0 * 16.0));
     assert_eq!(depth.get(15, 9), Some(1.0 + 11.0 * 16.0 + 12.0));
@@ -522,9 +493,7 @@ fn a_truncated_log_gives_what_is_whole_and_says_so() {
     }
     let bytes = log.finish();
     let saved = SavedLog::new(&bytes[..bytes.len() * 6 / 10]);
-    let input = InputSettings::default();
-    let limits = Limits::default();
-    let mut source = FrameSource::open(&saved.path, &input, &limits, DEPTH).unwrap();
+    let mut source = saved.open(&InputSettings::default(), DEPTH).unwrap();
     let found = frames(&mut source);
     assert!((5..15).contains(&found.len()), "{}", found.len());
     assert!(source.data_lost());
@@ -548,8 +517,7 @@ fn two_readings_are_the_same() {
 fn settings_that_cannot_work_name_their_key() {
     let saved = started().save();
     let input = InputSettings { pair_tolerance_s: f64::NAN, ..InputSettings::default() };
-    let error =
-        FrameSource::open(&saved.path, &input, &Limits::default(), Inputs::ANY).err().unwrap();
+    let error = saved.open(&input, Inputs::ANY).err().unwrap();
     assert!(error.to_string().contains("pair_tolerance_s"), "{error}");
 }
 
@@ -577,15 +545,8 @@ fn with_damage() -> LogWriter {
     for i in 0..3 {
         let stamp = at(f64::from(i) * 0.1);
         if i == 1 {
-            let short = Image {
-                header: Header::new(stamp, "colour"),
-                height: 12,
-                width: 16,
-                encoding: "rgb8".into(),
-                is_bigendian: 0,
-                step: 48,
-                data: &[7; 48],
-            };
+            let header = Header::new(stamp, "colour");
+            let short = Image { step: 48, ..Image::packed(header, "rgb8", 16, 12, &[7; 48]) };
             log.message("/camera/color/image_raw", stamp, &short);
         } else {
             log.colour(stamp);
@@ -640,14 +601,9 @@ fn part(from: u32, to: u32, odometry_first: bool) -> LogWriter {
 #[test]
 fn the_parts_of_a_folder_are_one_log() {
     let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, log: LogWriter| {
-        std::fs::write(folder.path().join(name), log.finish()).unwrap();
-    };
-    write("drive_0.mcap", part(0, 5, false));
-    write("drive_1.mcap", part(5, 9, true));
-    let input = InputSettings::default();
-    let limits = Limits::default();
-    let mut split = FrameSource::open(folder.path(), &input, &limits, DEPTH).unwrap();
+    std::fs::write(folder.path().join("drive_0.mcap"), part(0, 5, false).finish()).unwrap();
+    std::fs::write(folder.path().join("drive_1.mcap"), part(5, 9, true).finish()).unwrap();
+    let mut split = common::open(folder.path(), &InputSettings::default(), DEPTH).unwrap();
     let (mut whole, _saved) = open(part(0, 9, false), DEPTH);
     let expected = frames(&mut whole);
     let found = frames(&mut split);
@@ -671,9 +627,7 @@ fn a_part_that_is_cut_or_missing_costs_its_own_frames() {
     let listed = "  relative_file_paths:\n    - drive_0.mcap\n    - drive_1.mcap\n    - \
                   drive_2.mcap\n";
     std::fs::write(folder.path().join("metadata.yaml"), listed).unwrap();
-    let input = InputSettings::default();
-    let limits = Limits::default();
-    let mut source = FrameSource::open(folder.path(), &input, &limits, DEPTH).unwrap();
+    let mut source = common::open(folder.path(), &InputSettings::default(), DEPTH).unwrap();
     assert_eq!(frames(&mut source).len(), 9);
     assert!(source.data_lost());
     assert_eq!(count(&source, "missing_files"), 1);

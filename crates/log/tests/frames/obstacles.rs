@@ -22,29 +22,27 @@ fn input_with(sources: &[ObstacleTopic]) -> InputSettings {
 /// Opens a log with these sources.
 fn open_with(log: LogWriter, sources: &[ObstacleTopic]) -> (FrameSource, SavedLog) {
     let saved = log.save();
-    let input = input_with(sources);
-    let opened = FrameSource::open(&saved.path, &input, &Limits::default(), Inputs::ANY);
-    (opened.unwrap(), saved)
+    (saved.open(&input_with(sources), Inputs::ANY).unwrap(), saved)
 }
 
 /// Returns the readings of each frame.
 fn readings(frames: &[LogFrame]) -> Vec<Vec<ObstacleReading>> {
-    let of = |found: &LogFrame| found.frame.sensor::<ObstacleReadings>().unwrap().0.to_vec();
-    frames.iter().map(of).collect()
+    let readings = frames.iter().map(|found| found.frame.sensor::<ObstacleReadings>().unwrap());
+    readings.map(|readings| readings.0.to_vec()).collect()
 }
 
 fn ranges(readings: &[Vec<ObstacleReading>]) -> Vec<RangeReading> {
-    let of = |reading: &ObstacleReading| match &reading.data {
+    let ranges = readings.iter().flatten().map(|reading| match &reading.data {
         ObstacleData::Range(range) => *range,
         other => panic!("no range: {other:?}"),
-    };
-    readings.iter().flatten().map(of).collect()
+    });
+    ranges.collect()
 }
 
 /// Returns the state of the bumper in each frame; `None` where it has delivered nothing.
 fn presses(readings: &[Vec<ObstacleReading>]) -> Vec<Option<bool>> {
-    let of = |reading: &ObstacleReading| matches!(reading.data, ObstacleData::Bumper(true));
-    readings.iter().map(|readings| readings.first().map(of)).collect()
+    let first = readings.iter().map(|readings| readings.first());
+    first.map(|it| Some(matches!(it?.data, ObstacleData::Bumper(true)))).collect()
 }
 
 fn range(stamp: f64, metres: f32) -> Range {
@@ -84,10 +82,11 @@ fn a_range_is_where_the_robot_is_at_the_time_of_the_frame() {
         assert_eq!(source.facts().obstacle_topics["sonar"], "/sonar");
         let found = frames(&mut source);
         let all = readings(&found);
-        let is_known = |reading: &ObstacleReading| {
-            &*reading.source == "sonar" && (reading.age_s - 0.06).abs() < 1e-6
-        };
-        assert!(all.iter().all(|readings| readings.len() == 1 && is_known(&readings[0])));
+        for readings in &all {
+            let [reading] = &readings[..] else { panic!("one reading: {readings:?}") };
+            assert_eq!(&*reading.source, "sonar");
+            assert!((reading.age_s - 0.06).abs() < 1e-6, "{} s", reading.age_s);
+        }
         // Before the first frame the place of the robot is not known.
         for reading in ranges(&all[1..]) {
             let place = reading.robot_from_sensor * Point3::new(1.5, 0.0, 0.0);
@@ -163,8 +162,9 @@ fn stamps_an_hour_ahead_or_standing_still_make_no_reading_young() {
         } else {
             assert!(all.iter().all(Vec::is_empty));
             assert_eq!(count(&source, "source_readings_ahead"), 20);
-            let told = |note: &&String| note.contains("source `sonar` is stamped 3600.0 s after");
-            assert_eq!(source.notes().iter().filter(told).count(), 1, "{:?}", source.notes());
+            let ahead = "source `sonar` is stamped 3600.0 s after";
+            let told = source.notes().iter().filter(|note| note.contains(ahead));
+            assert_eq!(told.count(), 1, "{:?}", source.notes());
         }
     }
 }
@@ -215,15 +215,7 @@ fn a_second_scanner_is_read_beside_the_first() {
 /// Writes a depth image of a camera at the back.
 fn rear_depth(log: &mut LogWriter, t: f64, metres: f32) {
     let data: Vec<u8> = [metres; 8 * 6].iter().flat_map(|v| v.to_le_bytes()).collect();
-    let message = Image {
-        header: Header::new(at(t), "rear"),
-        height: 6,
-        width: 8,
-        encoding: "32FC1".into(),
-        is_bigendian: 0,
-        step: 32,
-        data: &data,
-    };
+    let message = Image::packed(Header::new(at(t), "rear"), "32FC1", 8, 6, &data);
     log.message("/rear/depth/aligned", at(t), &message);
 }
 
@@ -288,14 +280,14 @@ fn an_event_of_a_bumper_holds_until_it_is_released() {
         let mut log = started();
         for tick in 0..30 {
             ride(&mut log, tick);
-            let event = |bumper, state| BumperEvent { bumper, state };
             let events = match tick {
-                10 => vec![event(0, BumperEvent::PRESSED), event(1, BumperEvent::PRESSED)],
-                12 => vec![event(0, BumperEvent::RELEASED)],
-                20 => vec![event(1, BumperEvent::RELEASED)],
+                10 => vec![(0, BumperEvent::PRESSED), (1, BumperEvent::PRESSED)],
+                12 => vec![(0, BumperEvent::RELEASED)],
+                20 => vec![(1, BumperEvent::RELEASED)],
                 _ => Vec::new(),
             };
-            for event in events {
+            for (bumper, state) in events {
+                let event = BumperEvent { bumper, state };
                 log.typed("/bumper", kind, at(0.1 * f64::from(tick) + 0.05), &event);
             }
         }
@@ -374,15 +366,14 @@ fn a_source_of_another_type_is_refused_by_name() {
     log.message("/sonar", at(0.1), &StringMsg { data: "near".into() });
     let input = input_with(&[source("sonar", ObstacleKind::Range, "/sonar")]);
     let saved = log.save();
-    let open = |inputs| FrameSource::open(&saved.path, &input, &Limits::default(), inputs);
-    let told = open(Inputs::ANY).err().unwrap().to_string();
+    let told = saved.open(&input, Inputs::ANY).err().unwrap().to_string();
     assert!(
         told.contains("source `sonar` of [[collision_monitor.sources]] names /sonar"),
         "{told}"
     );
     assert!(told.contains("std_msgs/msg/String; it has to be one of: sensor_msgs/Range"), "{told}");
     // A pipeline without a controller does not read them.
-    let mut source = open(Inputs::NONE.require(Input::Colour)).unwrap();
+    let mut source = saved.open(&input, Inputs::NONE.require(Input::Colour)).unwrap();
     assert!(source.next_frame().unwrap().frame.sensor::<ObstacleReadings>().is_err());
 }
 

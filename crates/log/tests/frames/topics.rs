@@ -16,26 +16,9 @@ fn stereo_log<T: Message + serde::Serialize>(topic: &str, disparities: &T) -> Lo
     log
 }
 
-fn depths_with(log: LogWriter, input: &InputSettings) -> Result<(FrameSource, LogFrame), String> {
-    let saved = log.save();
-    let inputs = Inputs::ANY.require(Input::Depth);
-    let source = FrameSource::open(&saved.path, input, &Limits::default(), inputs);
-    let mut source = source.map_err(|error| error.to_string())?;
-    let frame = source.next_frame().ok_or_else(|| format!("{:?}", source.notes()))?;
-    Ok((source, frame))
-}
-
 /// Returns an image of 16 columns and 12 rows whose first pixel has no disparity.
 fn disparities<'a>(encoding: &str, data: &'a [u8]) -> Image<'a> {
-    Image {
-        header: Header::new(at(0.1), "colour"),
-        height: 12,
-        width: 16,
-        encoding: encoding.into(),
-        is_bigendian: 0,
-        step: data.len() as u32 / 12,
-        data,
-    }
+    Image::packed(Header::new(at(0.1), "colour"), encoding, 16, 12, data)
 }
 
 #[test]
@@ -51,7 +34,7 @@ fn a_disparity_image_is_depth_with_its_own_geometry() {
         ..DisparityImage::default()
     };
     let log = stereo_log("/stereo/disparity", &message);
-    let (source, found) = depths_with(log, &InputSettings::default()).unwrap();
+    let (source, found) = first_depth(log, &InputSettings::default()).unwrap();
     let depth = found.frame.depth().unwrap();
     let [first, second, third] = [0, 1, 4].map(|x| depth.get(x, 0).unwrap());
     assert!(first.is_nan() && second.is_nan() && (third - 1.4 / 4.0).abs() < 1e-6, "{third}");
@@ -66,25 +49,23 @@ fn a_disparity_image_is_depth_with_its_own_geometry() {
 #[test]
 fn plain_disparities_take_their_geometry_from_the_calibrations_or_the_settings() {
     let data: Vec<u8> = (0..192).collect();
-    let log = || stereo_log("/stereo/disparity", &disparities("mono8", &data));
     let disparity = Some(DisparitySettings::default());
     let input = InputSettings { disparity, ..InputSettings::default() };
-    let read = |input: &InputSettings| {
-        let found = depths_with(log(), input)?.1;
-        Ok::<_, String>(found.frame.depth().unwrap().get(7, 0).unwrap())
-    };
-    // The settings find the topic by its name, which is otherwise one of grey images.
-    assert!((read(&input).unwrap() - 1.4 / 7.0).abs() < 1e-6);
     let halves = DisparitySettings { unit_px: Some(0.5), baseline_m: Some(0.2) };
     let told = InputSettings { disparity: Some(halves), ..input.clone() };
-    assert!((read(&told).unwrap() - 2.8 / 3.5).abs() < 1e-6);
     let named = InputSettings { depth_topic: Some("/stereo/disparity".into()), ..input.clone() };
-    assert!((read(&named).unwrap() - 1.4 / 7.0).abs() < 1e-6);
+    // The settings find the topic by its name, which is otherwise one of grey images.
+    for (input, expected) in [(&input, 1.4 / 7.0), (&told, 2.8 / 3.5), (&named, 1.4 / 7.0)] {
+        let log = stereo_log("/stereo/disparity", &disparities("mono8", &data));
+        let (_, found) = first_depth(log, input).unwrap();
+        let depth = found.frame.depth().unwrap().get(7, 0).unwrap();
+        assert!((depth - expected).abs() < 1e-6, "{depth} m");
+    }
     // Without a right camera nothing tells the baseline.
     let mut alone = LogWriter::plain();
     alone.info("/stereo/camera_info", "colour", &camera(16, 12, 14.0));
     alone.message("/stereo/disparity", at(0.1), &disparities("mono8", &data));
-    let error = depths_with(alone, &input).err().unwrap();
+    let error = first_depth(alone, &input).err().unwrap();
     assert!(error.contains("disparity.baseline_m"), "{error}");
 }
 
@@ -93,14 +74,12 @@ fn log_with(topic: &str, encoding: &str) -> LogWriter {
     let mut log = started();
     log.depth(at(0.1), "colour", 2.0);
     let data = [0; 16 * 12 * 6];
-    let image = Image { encoding: encoding.into(), step: 96, ..disparities("", &data) };
-    log.message(topic, at(0.1), &image);
+    log.message(topic, at(0.1), &disparities(encoding, &data));
     log
 }
 
 fn refusal(log: LogWriter, input: &InputSettings, inputs: Inputs) -> LogError {
-    let saved = log.save();
-    FrameSource::open(&saved.path, input, &Limits::default(), inputs).err().unwrap()
+    log.save().open(input, inputs).err().unwrap()
 }
 
 #[test]
@@ -147,16 +126,13 @@ fn images_in_an_encoding_that_is_not_read_are_named_with_the_remedy() {
 
 #[test]
 fn a_named_topic_of_a_wrong_kind_is_an_error_of_the_settings() {
-    let named = |depth: &str| InputSettings {
-        depth_topic: Some(depth.to_owned()),
-        ..InputSettings::default()
-    };
+    let named = InputSettings { depth_topic: Some("/cam".into()), ..InputSettings::default() };
     for (encoding, remedy) in [
         ("rgb8", "/camera/depth/image_raw (sensor_msgs/msg/Image, 32FC1) would fit"),
         ("mono8", "add [input.disparity]"),
         ("rgb16", "let the driver publish 8 bits"),
     ] {
-        let error = refusal(log_with("/cam", encoding), &named("/cam"), DEPTH);
+        let error = refusal(log_with("/cam", encoding), &named, DEPTH);
         assert!(matches!(&error, LogError::WrongTopic { key, .. } if key == "depth_topic"));
         let told = error.to_string();
         let kind = format!("names /cam, which is sensor_msgs/msg/Image, {encoding}; ");
@@ -175,17 +151,23 @@ fn a_named_topic_of_a_wrong_kind_is_an_error_of_the_settings() {
     assert!(told.contains("`laser_topic`") && told.contains("leave the key out"), "{told}");
 }
 
+fn ros1_text(text: &str) -> Vec<u8> {
+    [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
+}
+
+fn ros1_words(words: &[u32]) -> Vec<u8> {
+    words.iter().flat_map(|word| word.to_le_bytes()).collect()
+}
+
 #[test]
 fn messages_of_ros_1_in_an_mcap_file_are_read() {
-    let text = |text: &str| [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
-    let words = |words: &[u32]| words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>();
     let image = [
-        words(&[7, 1_700_000_000, 100_000_000]),
-        text("colour"),
-        words(&[2, 3]),
-        text("mono8"),
+        ros1_words(&[7, 1_700_000_000, 100_000_000]),
+        ros1_text("colour"),
+        ros1_words(&[2, 3]),
+        ros1_text("mono8"),
         vec![0],
-        words(&[3, 6]),
+        ros1_words(&[3, 6]),
         vec![1, 2, 3, 4, 5, 6],
     ]
     .concat();

@@ -77,8 +77,8 @@ impl Axis {
         let last = (self.high / step + 1e-9).floor();
         // A bound, so that a step lost to rounding cannot fill the chart with ticks.
         let count = (last - first).clamp(0.0, 20.0) as u32;
-        let value = |i: u32| (first + f64::from(i)) * step;
-        (0..=count).map(|i| (minus(&format!("{:.decimals$}", value(i))), value(i))).collect()
+        let values = (0..=count).map(|i| (first + f64::from(i)) * step);
+        values.map(|value| (minus(&format!("{value:.decimals$}")), value)).collect()
     }
 
     /// Returns the powers of ten; within less than two decades also 2 and 5 times those.
@@ -89,8 +89,8 @@ impl Axis {
         let all = (first..=last.min(first + 20))
             .flat_map(|exponent| times.iter().map(move |t| (exponent, t * 10_f64.powi(exponent))));
         // A margin, so that ticks at the ends are not lost to rounding.
-        let inside = |v: f64| self.low * 0.999 <= v && v <= self.high * 1.001;
-        all.filter(|(_, v)| inside(*v)).map(|(e, v)| (rounded(e, v), v)).collect()
+        let inside = self.low * 0.999..=self.high * 1.001;
+        all.filter(|(_, v)| inside.contains(v)).map(|(e, v)| (rounded(e, v), v)).collect()
     }
 }
 

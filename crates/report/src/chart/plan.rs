@@ -32,11 +32,11 @@ impl Extent {
         }
         // Ten percent of margin; at least a metre, so that a person standing still has a scale.
         let half = 0.55 * (high[0] - low[0]).max(high[1] - low[1]).max(1.0);
-        let around = |i: usize| {
-            let centre = 0.5 * (low[i] + high[i]);
+        let [x_m, y_m] = [0, 1].map(|axis| {
+            let centre = 0.5 * (low[axis] + high[axis]);
             [centre - half, centre + half]
-        };
-        Some(Self { x_m: around(0), y_m: around(1) })
+        });
+        Some(Self { x_m, y_m })
     }
 }
 
@@ -56,17 +56,16 @@ pub fn plan(
 ) -> Markup {
     let ahead = Axis::new(Scale::Linear, extent.x_m, [PLOT.bottom, PLOT.top]);
     let left = Axis::new(Scale::Linear, extent.y_m, [PLOT.right, PLOT.left]);
-    let lines = |t: &Trajectory| lines(t, &left, &ahead);
     let body = html! {
         (axes(PLOT, &left, &ahead, ["y: metres to the left", "x: metres ahead"]))
         @for person in truth {
             g class="truth" {
-                @for line in lines(person) { (truth_line(&line)) }
+                @for line in lines(person, &left, &ahead) { (truth_line(&line)) }
                 (hint(&format!("person {}", person.id)))
             }
         }
         // After the people, so that the thin lines lie on the wide ones.
-        @for (index, track) in tracks.iter().enumerate() { (track_lines(index, track, &lines(track))) }
+        @for (index, track) in tracks.iter().enumerate() { (track_lines(index, track, &lines(track, &left, &ahead))) }
     };
     picture(words, SIZE, &body)
 }

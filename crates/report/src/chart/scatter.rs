@@ -61,12 +61,12 @@ fn labels(marks: &[(&str, (f64, f64))]) -> Vec<(f64, f64, &'static str)> {
             (x + 5.0, y + 21.0, "end"),
         ];
         let right_half = x > 0.5 * (PLOT.left + PLOT.right);
-        let is_free = |side: &&(f64, f64, &str)| {
+        let free = sides.iter().find(|side| {
             let own = label_box(name, **side);
             let inside = own[0] >= PLOT.left && own[2] <= PLOT.right;
             inside && own[3] <= PLOT.bottom && !taken.iter().any(|other| overlap(&own, other))
-        };
-        let side = *sides.iter().find(is_free).unwrap_or(&sides[usize::from(right_half)]);
+        });
+        let side = *free.unwrap_or(&sides[usize::from(right_half)]);
         taken.push(label_box(name, side));
         placed.push(side);
     }

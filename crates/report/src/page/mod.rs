@@ -70,8 +70,7 @@ pub fn document(title: &str, style: &Markup, skip: &str, body: &Markup) -> Marku
 pub fn html(benchmark: &Benchmark, timings: Option<&Timings>) -> String {
     let mut summary = Summary::new(benchmark);
     let view = OrderedBenchmark::new(benchmark).ranked(&summary);
-    let position = |name: &str| view.pipelines.iter().position(|p| *p == name);
-    summary.pipelines.sort_by_key(|p| position(&p.pipeline));
+    summary.pipelines.sort_by_key(|p| view.pipelines.iter().position(|name| *name == p.pipeline));
     let page = Page {
         moments: moments::shown(&benchmark.moments, &view),
         listed: events::Listed::of(&view),

@@ -34,8 +34,7 @@ pub(super) fn shown<'a>(all: &'a [Moment], view: &OrderedBenchmark<'_>) -> Vec<&
         })
         .take(MOST_MOMENTS)
         .collect();
-    let place = |moment: &Moment| view.logs.iter().position(|log| *log == moment.log);
-    kept.sort_by_key(|moment| (place(moment), moment.frame));
+    kept.sort_by_key(|moment| (view.logs.iter().position(|log| *log == moment.log), moment.frame));
     kept
 }
 
@@ -134,8 +133,8 @@ impl Page<'_> {
     /// Returns the missed people of the moment with their tasks, best pipelines first.
     fn missed_at(&self, moment: &Moment) -> Vec<(&TaskResult, &MissedPerson)> {
         let tasks = self.view.pipelines.iter().filter_map(|p| self.view.drawn(p, &moment.log));
-        let here = |missed: &&MissedPerson| missed.frame == moment.frame;
-        tasks.flat_map(|task| task.missed.iter().filter(here).map(move |m| (task, m))).collect()
+        let missed = tasks.flat_map(|task| task.missed.iter().map(move |missed| (task, missed)));
+        missed.filter(|(_, missed)| missed.frame == moment.frame).collect()
     }
 
     fn picture(&self, moment: &Moment, missed: &[(&TaskResult, &MissedPerson)]) -> Markup {
@@ -187,9 +186,8 @@ impl Page<'_> {
                 },
             }
         };
-        let has = |p: &str| self.view.drawn(p, &moment.log).is_some();
         let body = html! {
-            @for p in self.view.pipelines.iter().filter(|p| has(p)) {
+            @for p in self.view.pipelines.iter().filter(|p| self.view.drawn(p, &moment.log).is_some()) {
                 tr {
                     th scope="row" { (key(self.series(p), p)) }
                     @for id in people { td { (fate(p, *id)) } }
@@ -223,11 +221,11 @@ fn track_on(moment: &Moment, pipeline: &str, person: i64) -> Option<i64> {
 
 /// Returns the intersection over union of two boxes.
 fn overlap(a: &Box, b: &Box) -> f64 {
-    let common = |axis: usize| {
+    let [width, height] = [0, 1].map(|axis| {
         let end = (a[axis] + a[axis + 2]).min(b[axis] + b[axis + 2]);
         (end - a[axis].max(b[axis])).max(0.0)
-    };
-    let both = common(0) * common(1);
+    });
+    let both = width * height;
     let union = a[2] * a[3] + b[2] * b[3] - both;
     if union > 0.0 { both / union } else { 0.0 }
 }

@@ -48,9 +48,10 @@ impl Page<'_> {
     /// Says in one line in what a pair differs: people found, and the test that costs the worse one
     /// most.
     pub(super) fn why_of_pair(&self, a: &str, b: &str) -> Option<String> {
-        let found = |name: &str| self.summary.pipeline(name)?.people_found_count();
-        let [mut better, mut worse] =
-            [a, b].map(|name| (self.misses_by_test(name), found(name), name));
+        let [mut better, mut worse] = [a, b].map(|name| {
+            let found = self.summary.pipeline(name).and_then(|it| it.people_found_count());
+            (self.misses_by_test(name), found, name)
+        });
         let worse_by_misses = worse.0.values().sum::<u64>() < better.0.values().sum::<u64>();
         if worse.1 > better.1 || (worse.1 == better.1 && worse_by_misses) {
             std::mem::swap(&mut better, &mut worse);

@@ -11,8 +11,8 @@ const MOST_OPEN: usize = 12;
 impl Page<'_> {
     /// Renders the HOTA of each task, and the gain by repairing one kind of error alone.
     pub(super) fn repairs(&self) -> Option<Markup> {
-        let has_repairs = |task: &&&TaskResult| !task.repairs.is_empty();
-        let tasks: Vec<&TaskResult> = self.view.tasks.iter().filter(has_repairs).copied().collect();
+        let tasks = self.view.tasks.iter().copied();
+        let tasks: Vec<&TaskResult> = tasks.filter(|task| !task.repairs.is_empty()).collect();
         if tasks.is_empty() {
             return None;
         }

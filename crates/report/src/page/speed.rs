@@ -35,12 +35,13 @@ impl Page<'_> {
         let place = ComparisonSpace::ALL.into_iter().find(|p| {
             self.summary.pipelines.iter().any(|s| s.figures.contains_key(&MAIN.key(*p)))
         })?;
-        let of = |(series, name): (usize, &&'_ str)| {
+        let pipelines = self.view.pipelines.iter().enumerate();
+        let known = pipelines.filter_map(|(series, name)| {
             let accuracy = self.summary.pipeline(name)?.figures.get(&MAIN.key(place))?.mean;
             let ms = mean(self.times(timings, name).iter().map(|t| t.frame_ms_p50))?;
             Some((series, (*name).to_owned(), ms, accuracy))
-        };
-        let known: Vec<_> = self.view.pipelines.iter().enumerate().filter_map(of).collect();
+        });
+        let known: Vec<_> = known.collect();
         let marks: Vec<Mark<'_>> = known
             .iter()
             .map(|(series, name, ms, accuracy)| Mark {
@@ -112,11 +113,9 @@ struct StageRow {
 impl StageRow {
     /// Creates a row of the times of one stage in all tasks: p50, p95, p99 and worst, ms.
     fn new(stage: &str, times: &[[f64; 4]], is_total: bool) -> Self {
-        let of = |i: usize| mean(times.iter().map(|t| t[i])).unwrap_or(f64::NAN);
         let max_ms = times.iter().map(|t| t[3]).fold(f64::NAN, f64::max);
-        let p50_ms = of(0);
-        let p95_ms = of(1);
-        let p99_ms = of(2);
+        let [p50_ms, p95_ms, p99_ms] =
+            [0, 1, 2].map(|i| mean(times.iter().map(|t| t[i])).unwrap_or(f64::NAN));
         Self { stage: stage.to_owned(), p50_ms, p95_ms, p99_ms, max_ms, is_total }
     }
 
@@ -131,8 +130,10 @@ fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
     if !times.iter().any(|t| t.frame_ms_p50.is_finite()) {
         return Vec::new();
     }
-    let whole = |t: &&TaskTiming| [t.frame_ms_p50, t.frame_ms_p95, t.frame_ms_p99, t.frame_ms_max];
-    let whole: Vec<_> = times.iter().map(whole).collect();
+    let whole: Vec<[f64; 4]> = times
+        .iter()
+        .map(|t| [t.frame_ms_p50, t.frame_ms_p95, t.frame_ms_p99, t.frame_ms_max])
+        .collect();
     let mut by_stage: BTreeMap<&str, Vec<[f64; 4]>> = BTreeMap::new();
     // The map sorts by name; the rows keep the order of the pipeline.
     let mut order: Vec<&str> = Vec::new();

@@ -95,13 +95,12 @@ fn task(pipeline: &str, log: &str, level: f64, seed: u64, place: u64) -> TaskRes
 
 fn repairs(level: f64) -> Vec<Repaired> {
     let gains = [0.05, 0.0, 0.01, 0.21, 0.11, 0.04, 0.02];
-    let gained = |gain: f64| Some(level + gain);
     let rows = Repair::ALL.into_iter().zip(gains);
     rows.map(|(repair, gain)| Repaired {
         repair,
-        hota: gained(gain),
-        mota: gained(gain - 0.1),
-        idf1: gained(gain),
+        hota: Some(level + gain),
+        mota: Some(level + (gain - 0.1)),
+        idf1: Some(level + gain),
     })
     .collect()
 }
@@ -153,17 +152,15 @@ fn curve(level: f64) -> Vec<CurvePoint> {
 
 fn people(seed: u64) -> Vec<Trajectory> {
     let phase = seed as f64;
-    let walk = |id: i64, from: f64| Trajectory {
-        id,
-        points: (0..270)
-            .map(|i| {
-                let t_s = 0.1 * f64::from(i);
-                let turn = 0.12 * t_s + phase;
-                [t_s, from + 0.12 * t_s + 1.2 * turn.sin(), (from - 3.0) + 1.6 * turn.cos()]
-            })
-            .collect(),
-    };
-    vec![walk(1, 2.0), walk(2, 4.0)]
+    let people = [(1, 2.0), (2, 4.0)].map(|(id, from)| {
+        let points = (0..270).map(|i| {
+            let t_s = 0.1 * f64::from(i);
+            let turn = 0.12 * t_s + phase;
+            [t_s, from + 0.12 * t_s + 1.2 * turn.sin(), (from - 3.0) + 1.6 * turn.cos()]
+        });
+        Trajectory { id, points: points.collect() }
+    });
+    people.to_vec()
 }
 
 fn tracks(truth: &[Trajectory], wobble: &mut Wobble) -> Vec<Trajectory> {
@@ -186,13 +183,13 @@ const MOMENT: u64 = 61;
 /// Returns people missed around the moment, by one test or another.
 fn missed(seed: u64) -> Vec<MissedPerson> {
     let test = ["margin", "size"][seed as usize % 2].to_owned();
-    let miss = |(i, frame)| MissedPerson {
+    let missed = (0..4).zip(MOMENT..).map(|(i, frame)| MissedPerson {
         frame,
         person: 1,
         test: (i != 2).then(|| test.clone()),
         box_px: (i != 2).then_some([200.0, 90.0, 70.0, 70.0]),
-    };
-    (0u64..4).zip(MOMENT..).map(miss).collect()
+    });
+    missed.collect()
 }
 
 /// Returns one moment for each log.

@@ -68,9 +68,9 @@ pub fn calibration(results: &[Followed]) -> Vec<[f64; 2]> {
 
 /// Returns the features of an example; an unknown difference has no weight and no offset.
 fn features(differences: &Differences) -> [f64; FEATURES] {
-    let of = |difference: Option<f64>| difference.map_or([0.0; 2], |d| [-d, 1.0]);
     let Differences { torso, legs, texture, vector, .. } = *differences;
-    let [torso, legs, texture, vector] = [torso, legs, texture, vector].map(of);
+    let [torso, legs, texture, vector] = [torso, legs, texture, vector]
+        .map(|difference| difference.map_or([0.0; 2], |difference| [-difference, 1.0]));
     let height = [-differences.height_m, 1.0];
     let rivals = differences.rivals.unwrap_or(0.0);
     let mut all = [rivals; FEATURES];

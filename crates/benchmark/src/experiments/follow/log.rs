@@ -40,8 +40,8 @@ impl RideLog {
     /// Writes to a file, if there is one.
     pub fn new(file: Option<&Path>, scene: &Scene, signals: Signals) -> Self {
         // This simulation only supplies the cameras' poses; the ride runs its own.
-        let create = |path| Recorder::create(path, scene, &Simulation::new(scene, 1));
-        let (recorder, failed) = match file.map(create).transpose() {
+        let recorder = file.map(|it| Recorder::create(it, scene, &Simulation::new(scene, 1)));
+        let (recorder, failed) = match recorder.transpose() {
             Ok(recorder) => (recorder, None),
             Err(error) => (None, Some(error.to_string())),
         };

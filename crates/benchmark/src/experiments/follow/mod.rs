@@ -194,8 +194,13 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
     }
     let bar = RidesBar::new(jobs.iter().map(|job| job.scene.duration_s));
     let threads = threads(args.jobs);
-    let ride = |job: &Job| ride(job, args, registry, (&signals, &bar));
-    let results = in_order(&jobs, threads, ride, |_| bar.advance()).map_err(failure)?;
+    let results = in_order(
+        &jobs,
+        threads,
+        |job| ride(job, args, registry, (&signals, &bar)),
+        |_| bar.advance(),
+    );
+    let results = results.map_err(failure)?;
     bar.finish();
     if let Some(signal) = signals.received() {
         say("stopped; the logs that were written are whole, but end early");
@@ -252,16 +257,18 @@ fn swept(args: &FollowArgs) -> Vec<Option<(String, String)>> {
 }
 
 fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, Failure> {
-    let read = |path: &PathBuf| {
+    let mut contenders = Vec::new();
+    for path in std::iter::once(&args.config).chain(&args.against) {
         let file = ConfigFile::read(path)?;
         let (pipeline, _) = file.pipeline(registry, None)?;
-        if pipeline.has_controller() {
-            return Ok(contender(&file));
+        if !pipeline.has_controller() {
+            let shown = path.display();
+            let message = format!("{shown} has no [controller]: it steers no robot");
+            return Err(Failure::usage(message));
         }
-        let shown = path.display();
-        Err(Failure::usage(format!("{shown} has no [controller]: it steers no robot")))
-    };
-    std::iter::once(&args.config).chain(&args.against).map(read).collect()
+        contenders.push(contender(&file));
+    }
+    Ok(contenders)
 }
 
 /// Returns the named scenes, or all default ones.

@@ -128,9 +128,9 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
         let least = rides.iter().filter_map(|ride| of(ride)).min_by(f64::total_cmp);
         least.map_or_else(Cell::default, |least| Cell::number(least, 2))
     };
-    let touches = |ride: &&&Ridden| {
+    let touches = rides.iter().filter(|ride| {
         [ride.clearance_people_m, ride.clearance_things_m].into_iter().flatten().any(|m| m < 0.0)
-    };
+    });
     let farther: Vec<f64> = rides.iter().filter_map(|ride| ride.farther_m).collect();
     let jerks: Vec<f64> = rides.iter().map(|ride| ride.jerk_mps3).collect();
     let took: Vec<f64> = results.iter().flat_map(|result| &result.took_ms).copied().collect();
@@ -145,7 +145,7 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
         part(|r| r.in_view_s, |r| r.time_s, 3),
         part(|r| r.distance_kept_s, |r| r.slow_s, 3),
         Cell::mean(&farther, 2),
-        Cell::number(rides.iter().filter(touches).count() as f64, 0),
+        Cell::number(touches.count() as f64, 0),
         least(|ride| ride.clearance_people_m),
         least(|ride| ride.clearance_things_m),
         Cell::mean(&jerks, 1),
@@ -192,31 +192,35 @@ fn reliability(
     probability: fn(&Likeness) -> f64,
     seeds: Seeds,
 ) -> Table {
-    let bin = |p: f64| ((p * BINS as f64) as usize).min(BINS - 1);
-    let within = |ride: &Ridden, at: usize| -> Vec<(f64, bool)> {
-        let all = ride.likeness.iter().map(|(like, same)| (probability(like), *same));
-        all.filter(|(p, _)| bin(*p) == at).collect()
-    };
-    let row = |at: usize| {
-        let rides: Vec<Vec<(f64, bool)>> = of.iter().map(|ride| within(ride, at)).collect();
-        let count = rides.iter().map(Vec::len).sum::<usize>() as f64;
-        let mean = rides.iter().flatten().map(|(p, _)| p).sum::<f64>() / count;
-        let same = |ride: &Vec<(f64, bool)>| {
-            [ride.iter().filter(|(_, same)| *same).count() as u64, ride.len() as u64]
-        };
+    let rows = (0..BINS).map(|at| {
+        let mut probabilities = Vec::new();
+        let mut shares = Vec::new();
+        for ride in of {
+            let mut share = [0; 2];
+            for (like, same) in &ride.likeness {
+                let probability = probability(like);
+                if ((probability * BINS as f64) as usize).min(BINS - 1) == at {
+                    probabilities.push(probability);
+                    share = [share[0] + u64::from(*same), share[1] + 1];
+                }
+            }
+            shares.push(share);
+        }
+        let count = probabilities.len() as f64;
+        let mean = probabilities.iter().sum::<f64>() / count;
         let low = at as f64 / BINS as f64;
         let cells = vec![
             Cell::number(count, 0),
             Cell::number(100.0 * mean, 1),
-            Cell::clustered(&rides.iter().map(same).collect::<Vec<_>>(), 1),
+            Cell::clustered(&shares, 1),
         ];
         Row::ours(format!("{low:.1} to {:.1}", low + 1.0 / BINS as f64), cells)
-    };
+    });
     let columns = ["sightings", "mean probability %", "were the person %"];
     Table {
         title,
         columns: columns.map(str::to_owned).to_vec(),
-        rows: (0..BINS).map(row).collect(),
+        rows: rows.collect(),
         notes: vec![
             format!("each scene with {seeds}"),
             "intervals: 95 %, with the spread between rides: sightings of one ride are not \
@@ -242,12 +246,12 @@ fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 pub fn likeness_csv(results: &[Followed]) -> String {
     let mut out =
         "suite,pipeline,seed,same,probability,torso,legs,texture,height_m,rivals\n".to_owned();
-    let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
     for Followed { suite, pipeline, ridden, .. } in results {
         for (like, same) in &ridden.likeness {
             let d = &like.differences;
-            let numbers =
-                [d.torso, d.legs, d.texture, Some(d.height_m), d.rivals].map(number).join(",");
+            let numbers = [d.torso, d.legs, d.texture, Some(d.height_m), d.rivals]
+                .map(|value| value.map_or(String::new(), |value| format!("{value:.4}")))
+                .join(",");
             let seed = ridden.seed;
             let p = like.probability;
             out += &format!("{suite},{pipeline},{seed},{},{p:.4},{numbers}\n", u8::from(*same));
@@ -267,13 +271,11 @@ mod tests {
 
     #[test]
     fn people_who_come_back_are_found_after_the_mean_time() {
-        let episode = |in_view_s, found_s| Episode { lost_s: 1.0, in_view_s, found_s };
-        let episodes = vec![
-            episode(Some(2.0), Some(3.0)),
-            episode(Some(5.0), Some(7.0)),
-            episode(Some(8.0), None),
-            episode(None, None),
-        ];
+        let episodes =
+            [(Some(2.0), Some(3.0)), (Some(5.0), Some(7.0)), (Some(8.0), None), (None, None)];
+        let episodes = episodes
+            .map(|(in_view_s, found_s)| Episode { lost_s: 1.0, in_view_s, found_s })
+            .to_vec();
         let ridden = Ridden { episodes, ..Ridden::default() };
         let ride = Followed { ridden, ..Followed::default() };
         let table = &tables(&[ride], Split::Test.seeds(0, 1).unwrap())[0];
@@ -309,12 +311,12 @@ mod tests {
     }
 
     fn rides(of: &[(&str, Option<&str>)]) -> Vec<Followed> {
-        let ride = |(suite, swept): &(&str, Option<&str>)| Followed {
+        let rides = of.iter().map(|(suite, swept)| Followed {
             suite: (*suite).into(),
             swept: swept.map(str::to_owned),
             ..Followed::default()
-        };
-        of.iter().map(ride).collect()
+        });
+        rides.collect()
     }
 
     /// Names of the groups, with the number of rides of each.

@@ -31,7 +31,7 @@ pub fn run(
 }
 
 fn results(trial: Trial) -> std::result::Result<Vec<Result>, TrialError> {
-    let result = |run| {
+    let results = trial.runs.iter().map(|run| {
         let judged = Judge::default().judge(&trial, run)?;
         Ok(Result {
             clear: judged.tally.clear,
@@ -39,6 +39,6 @@ fn results(trial: Trial) -> std::result::Result<Vec<Result>, TrialError> {
             errors_m: judged.errors_in_robot_m,
             success: crossing(&trial, run, &Crossing::default()).is_ok(),
         })
-    };
-    trial.runs.iter().map(result).collect()
+    });
+    results.collect()
 }

@@ -76,10 +76,6 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let trials = suites.iter().map(|(_, scenes)| scenes.len()).sum();
     let bar = bar(trials);
     let forecast = Forecast::new(trials, "trials");
-    let advance = || {
-        bar.inc(1);
-        forecast.advance();
-    };
     let names = suites.iter().map(|(name, _)| name);
     let mut table = table::Table::new(seeds, names, contenders.iter().map(|c| &c.name));
     let tell = |text: String| match args.format {
@@ -90,8 +86,11 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     for (name, scenes) in &suites {
         bar.set_message(name.clone());
         let jobs = threads(args.jobs);
-        let results =
-            contest::run(scenes, &contenders, registry, jobs, advance).map_err(Failure::failed)?;
+        let results = contest::run(scenes, &contenders, registry, jobs, || {
+            bar.inc(1);
+            forecast.advance();
+        });
+        let results = results.map_err(Failure::failed)?;
         table.add(name, &contenders, &results);
         tell(table.last_rows())?;
     }
@@ -118,21 +117,24 @@ fn or_default(named: &[PathBuf], folder: &str, names: &[&str]) -> Vec<PathBuf> {
 /// A config that cannot be read or built.
 pub fn contenders(named: &[PathBuf], registry: &Registry) -> Result<Vec<Contender>, Failure> {
     let paths = or_default(named, "configs", &PIPELINES);
-    let read = |path: &PathBuf| {
+    let mut contenders = Vec::new();
+    for path in &paths {
         let file = ConfigFile::read(path)?;
         // Built once now, so that a mistake shows before the first trial.
         file.pipeline(registry, None)?;
-        Ok(contender(&file))
-    };
-    paths.iter().map(read).collect()
+        contenders.push(contender(&file));
+    }
+    Ok(contenders)
 }
 
 /// Returns a scene with each of the seeds.
 fn suite(path: &Path, args: &TrialsArgs, seeds: Seeds) -> Result<(String, Vec<Scene>), Failure> {
-    let variant =
-        |seed| Variant { seed: Some(seed), split: Some(args.split), set: args.set.clone() };
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let scenes = seeds.numbers().map(|seed| tagalong_simulate::read(path, &variant(seed)));
+    let scenes = seeds.numbers().map(|seed| {
+        let set = args.set.clone();
+        let variant = Variant { seed: Some(seed), split: Some(args.split), set };
+        tagalong_simulate::read(path, &variant)
+    });
     Ok((name, scenes.collect::<Result<_, _>>()?))
 }
 

@@ -71,9 +71,10 @@ impl Table {
         contenders: impl Iterator<Item = &'a String>,
     ) -> Self {
         // Eight is the width of the heading `pipeline`.
-        let widest = |lengths: Option<usize>| lengths.unwrap_or(0).max(8);
-        let widths =
-            [widest(suites.map(String::len).max()), widest(contenders.map(String::len).max())];
+        let widths = [
+            suites.map(String::len).fold(8, usize::max),
+            contenders.map(String::len).fold(8, usize::max),
+        ];
         Self { seeds, rows: Vec::new(), gains: Vec::new(), widths }
     }
 
@@ -184,8 +185,11 @@ impl Table {
     }
 
     fn page_row(&self, row: &Row) -> report::Row {
-        let of_row = |gain: &&GainRow| gain.suite == row.suite && gain.pipeline == row.pipeline;
-        let gain = self.gains.iter().find(of_row).map(|gain| gain.idf1.difference);
+        let gain = self
+            .gains
+            .iter()
+            .find(|gain| gain.suite == row.suite && gain.pipeline == row.pipeline)
+            .map(|gain| gain.idf1.difference);
         let cells = vec![
             Cell::estimate(row.mota, 3),
             Cell::estimate(row.idf1, 3),
@@ -213,17 +217,20 @@ impl Table {
 }
 
 fn row(suite: &str, pipeline: &str, results: &[&Result]) -> Row {
-    let mota = |drawn: &[usize]| Clear::combine(drawn.iter().map(|&i| &results[i].clear)).mota();
-    let idf1 =
-        |drawn: &[usize]| Identity::combine(drawn.iter().map(|&i| &results[i].identity)).idf1();
+    let mota = draws_interval(results.len(), |drawn| {
+        Clear::combine(drawn.iter().map(|&i| &results[i].clear)).mota()
+    });
+    let idf1 = draws_interval(results.len(), |drawn| {
+        Identity::combine(drawn.iter().map(|&i| &results[i].identity)).idf1()
+    });
     let errors: Vec<f64> = results.iter().flat_map(|r| &r.errors_m).copied().collect();
     let successes = results.iter().filter(|result| result.success).count() as u64;
     Row {
         suite: suite.to_owned(),
         pipeline: pipeline.to_owned(),
         draws: results.len(),
-        mota: draws_interval(results.len(), mota).map(|of| of.within(f64::NEG_INFINITY, 1.0)),
-        idf1: draws_interval(results.len(), idf1).map(|of| of.within(0.0, 1.0)),
+        mota: mota.map(|of| of.within(f64::NEG_INFINITY, 1.0)),
+        idf1: idf1.map(|of| of.within(0.0, 1.0)),
         error: PositionError::of(&errors),
         success: wilson(successes, results.len() as u64, CONFIDENCE),
         switches: results.iter().map(|result| result.clear.id_switches).sum(),

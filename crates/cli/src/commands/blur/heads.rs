@@ -62,11 +62,9 @@ mod tests {
     use super::*;
 
     fn heads() -> Heads {
-        let region = |x: f64| vec![Region::new(x, 100.0, 100.0, 100.0)];
         let second = 1_000_000_000;
-        Heads {
-            boxes: [(second, region(0.0)), (2 * second, region(50.0)), (9 * second, vec![])].into(),
-        }
+        let [left, right] = [0.0, 50.0].map(|x| vec![Region::new(x, 100.0, 100.0, 100.0)]);
+        Heads { boxes: [(second, left), (2 * second, right), (9 * second, vec![])].into() }
     }
 
     #[test]
@@ -82,10 +80,9 @@ mod tests {
     #[test]
     fn images_near_a_frame_have_its_heads() {
         let heads = heads();
-        let count = |seconds: f64| heads.at((seconds * 1e9) as u64, 0.0).len();
-        assert_eq!(count(1.5), 2);
-        assert_eq!(count(1.0), 2, "the next frame counts, too");
-        assert_eq!(count(0.2), 1);
-        assert_eq!(count(9.5), 0);
+        // At 1 s the next frame counts, too.
+        for (seconds, count) in [(1.5, 2), (1.0, 2), (0.2, 1), (9.5, 0)] {
+            assert_eq!(heads.at((seconds * 1e9) as u64, 0.0).len(), count, "{seconds} s");
+        }
     }
 }

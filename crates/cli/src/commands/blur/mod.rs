@@ -233,12 +233,12 @@ impl Copying<'_> {
         let Some(pixels) = self.blurred(pixels, image.header.stamp().nanos(), aside) else {
             return Ok(false);
         };
-        let (encoding, step, data) = match &pixels {
-            Pixels::Colour(colour) => ("rgb8", 3 * image.width, colour.pixels().as_flattened()),
-            Pixels::Grey(grey) => ("mono8", image.width, grey.pixels()),
+        let (encoding, data) = match &pixels {
+            Pixels::Colour(colour) => ("rgb8", colour.pixels().as_flattened()),
+            Pixels::Grey(grey) => ("mono8", grey.pixels()),
             Pixels::Depth(_) => return Ok(false),
         };
-        let image = Image { encoding: encoding.into(), is_bigendian: 0, step, data, ..image };
+        let image = Image::packed(image.header, encoding, image.width, image.height, data);
         out.send_like(message, &image)?;
         Ok(true)
     }

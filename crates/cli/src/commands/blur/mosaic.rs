@@ -1,5 +1,7 @@
 //! Areas of an image made unrecognisable.
 
+use std::ops::Range;
+
 use tagalong_core::Image;
 use tagalong_eval::Region;
 
@@ -36,16 +38,18 @@ impl Averaged for [u8; 3] {
     }
 }
 
+/// Returns the columns or rows that a range covers, of so many.
+fn covered(from: f64, to: f64, size: usize) -> Range<usize> {
+    let from = from.floor().clamp(0.0, size as f64) as usize;
+    from..(to.ceil().clamp(0.0, size as f64) as usize).max(from)
+}
+
 /// Replaces the pixels of an area by the means of its blocks; what lies outside of the image is left
 /// alone.
 pub(super) fn pixelate<P: Averaged>(image: &mut Image<P>, area: &Region) {
-    let inside = |from: f64, to: f64, size: usize| {
-        let from = from.floor().clamp(0.0, size as f64) as usize;
-        from..(to.ceil().clamp(0.0, size as f64) as usize).max(from)
-    };
     let width = image.width();
-    let columns = inside(area.x, area.x + area.width, width);
-    let rows = inside(area.y, area.y + area.height, image.height());
+    let columns = covered(area.x, area.x + area.width, width);
+    let rows = covered(area.y, area.y + area.height, image.height());
     let side = ((area.width.min(area.height) / BLOCKS) as usize).max(MIN_BLOCK_PX);
     let pixels = image.pixels_mut();
     for top in rows.clone().step_by(side) {
@@ -60,8 +64,8 @@ pub(super) fn pixelate<P: Averaged>(image: &mut Image<P>, area: &Region) {
 }
 
 struct Block {
-    rows: std::ops::Range<usize>,
-    columns: std::ops::Range<usize>,
+    rows: Range<usize>,
+    columns: Range<usize>,
 }
 
 impl Block {

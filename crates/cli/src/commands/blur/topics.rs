@@ -38,7 +38,6 @@ const COLOURED: &str = "their colours may show faces";
 pub(super) fn treatment(facts: &LogFacts, message: &Message<'_>) -> Treatment {
     let channel = message.channel;
     let name = channel.schema_name.rsplit(['/', '.']).next().unwrap_or_default();
-    let is = |topic: &Option<String>| topic.as_deref() == Some(channel.topic.as_str());
     if name == "PointCloud2" {
         return match decode::<PointCloud2<'_>>(message.data) {
             Ok(cloud) if !has_colour(&cloud) => Treatment::Copy,
@@ -48,10 +47,10 @@ pub(super) fn treatment(facts: &LogFacts, message: &Message<'_>) -> Treatment {
     if !PICTURES.contains(&name) || is_depth(name, message.data) {
         return Treatment::Copy;
     }
-    if is(&facts.colour_topic) {
+    if facts.colour_topic.as_ref() == Some(&channel.topic) {
         return Treatment::Blur { aside: 0.0 };
     }
-    match facts.baseline_m.filter(|_| is(&facts.right_topic)) {
+    match facts.baseline_m.filter(|_| facts.right_topic.as_ref() == Some(&channel.topic)) {
         Some(baseline_m) => Treatment::Blur { aside: baseline_m / BOX_WIDTH_M },
         None => Treatment::LeaveOut(NOT_SEARCHED),
     }

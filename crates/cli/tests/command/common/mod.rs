@@ -45,6 +45,23 @@ pub fn own_plugin() -> Command {
     Command::new(program)
 }
 
+/// Checks that two files have the same bytes.
+pub fn assert_same(one: &Path, other: &Path) {
+    let is_same = std::fs::read(one).unwrap() == std::fs::read(other).unwrap();
+    assert!(is_same, "{} and {} differ", one.display(), other.display());
+}
+
+/// Writes a file into a folder.
+pub fn write(folder: &Path, name: &str, text: &str) {
+    std::fs::write(folder.join(name), text).unwrap();
+}
+
+/// Reads what a command printed as JSON.
+pub fn json(output: &Output) -> serde_json::Value {
+    assert_eq!(code(output), 0, "{}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
@@ -109,7 +126,7 @@ impl Drawn {
         let info = CameraInfo::of_lens(&header, &LENS, (WIDTH, HEIGHT), 0.0);
         log.send("/camera/color/camera_info", stamp, &info);
         let colour = colour(index);
-        log.send("/camera/color/image_raw", stamp, &image(&header, "rgb8", 3, &colour));
+        log.send("/camera/color/image_raw", stamp, &image(&header, "rgb8", &colour));
         if self.in_space {
             log.send("/detections", stamp, &space(&header, index));
         }
@@ -119,7 +136,7 @@ impl Drawn {
         if self.depth {
             log.send("/camera/depth/camera_info", stamp, &info);
             let depth = depth(index);
-            log.send("/camera/depth/image_raw", stamp, &image(&header, "16UC1", 2, &depth));
+            log.send("/camera/depth/image_raw", stamp, &image(&header, "16UC1", &depth));
         }
     }
 }
@@ -162,31 +179,22 @@ fn walker(index: u64) -> std::ops::Range<usize> {
 }
 
 fn colour(index: u64) -> Vec<u8> {
-    let pixel = |x: usize, y: usize| {
+    let places = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y)));
+    let pixels = places.flat_map(|(x, y)| {
         if walker(index).contains(&x) && y >= 40 { [200, 120, 40] } else { [x as u8, y as u8, 90] }
-    };
-    (0..HEIGHT).flat_map(|y| (0..WIDTH).flat_map(move |x| pixel(x, y))).collect()
+    });
+    pixels.collect()
 }
 
 fn depth(index: u64) -> Vec<u8> {
-    let millimetres = |x: usize, y: usize| -> u16 {
-        if walker(index).contains(&x) && y >= 40 { 2800 } else { 6000 }
-    };
-    (0..HEIGHT)
-        .flat_map(|y| (0..WIDTH).flat_map(move |x| millimetres(x, y).to_le_bytes()))
-        .collect()
+    let places = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y)));
+    let millimetres =
+        places.map(|(x, y)| if walker(index).contains(&x) && y >= 40 { 2800_u16 } else { 6000 });
+    millimetres.flat_map(u16::to_le_bytes).collect()
 }
 
-fn image<'a>(header: &Header, encoding: &'a str, bytes: u32, data: &'a [u8]) -> Image<'a> {
-    Image {
-        header: header.clone(),
-        height: HEIGHT as u32,
-        width: WIDTH as u32,
-        encoding: encoding.into(),
-        is_bigendian: 0,
-        step: bytes * WIDTH as u32,
-        data,
-    }
+fn image<'a>(header: &Header, encoding: &str, data: &'a [u8]) -> Image<'a> {
+    Image::packed(header.clone(), encoding, WIDTH as u32, HEIGHT as u32, data)
 }
 
 fn mount() -> TFMessage {
@@ -204,7 +212,7 @@ fn mount() -> TFMessage {
 pub fn people(frames: u64) -> String {
     let header = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,head_x,head_y,head_z,\
                   visible,occluder,ignore,interpolated\n";
-    let row = |index: u64| {
+    let rows = (0..frames).map(|index| {
         let depth = 2.8;
         let centre = 90.0 - index as f64 + 13.0;
         let scale = 130.0 / depth;
@@ -217,8 +225,8 @@ pub fn people(frames: u64) -> String {
             "{},1,{left},{top},{side},{side},{left},{top},{side},80,{x},{y},{depth},1,0,0,0\n",
             index + 1
         )
-    };
-    header.to_owned() + &(0..frames).map(row).collect::<String>()
+    });
+    header.to_owned() + &rows.collect::<String>()
 }
 
 struct Log {

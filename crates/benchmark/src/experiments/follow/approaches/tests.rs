@@ -54,8 +54,9 @@ fn ridden(controller: &str, count: u64, line: &str, threads: usize) -> Vec<Appro
     let paths = scenes(&args);
     let jobs = jobs(&args, &contenders, &paths, Split::Test.seeds(0, count).unwrap());
     let registry = registry();
-    let work = |job: &Job<'_>| approach(job, &args, &registry, &Signals::default());
-    let results = in_order(&jobs, threads, work, |_| {}).unwrap();
+    let signals = Signals::default();
+    let results =
+        in_order(&jobs, threads, |job| approach(job, &args, &registry, &signals), |_| {}).unwrap();
     results.into_iter().map(|one| one.unwrap().approached).collect()
 }
 
