@@ -61,7 +61,10 @@ pub const CHOICES: [Choice; 11] = [
         config: "laser-legs",
         reason: "it believes in what moves where nothing was; people who stand may be missed",
     },
-    Choice { config: "laser-follow", reason: "nothing can be concluded from motion over ground" },
+    Choice {
+        config: "laser-follow",
+        reason: "without odometry, motion of the robot and of people cannot be told apart",
+    },
 ];
 
 /// A pipeline that fits a log.

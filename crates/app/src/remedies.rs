@@ -116,10 +116,12 @@ impl Remedies {
         let Some(remedy) = self.of(test) else {
             return format!("the test \"{test}\" dropped the candidate");
         };
-        let lines = remedy.lines(resolved);
-        let settings = match lines.len() {
-            0 => "no setting decides it".to_owned(),
-            count => format!("decided by {}", lines[..count.min(MOST_SETTINGS)].join(" and ")),
+        let mut found = remedy.settings_in(resolved);
+        found.truncate(MOST_SETTINGS);
+        let settings = if found.is_empty() {
+            "no setting decides it".to_owned()
+        } else {
+            format!("decided by {}", Setting::in_words(&found))
         };
         format!("the test \"{test}\" dropped the candidate ({}); {settings}", remedy.look)
     }
@@ -260,35 +262,78 @@ impl Remedy {
 
     /// Returns the settings with their sections in a resolved config, and their values.
     pub fn lines(&self, resolved: &Table) -> Vec<String> {
-        let mut lines = Vec::new();
+        self.settings_in(resolved)
+            .iter()
+            .map(|one| Setting::line(std::slice::from_ref(one)))
+            .collect()
+    }
+
+    /// Returns the settings in the order of the sections.
+    fn settings_in(&self, resolved: &Table) -> Vec<Setting> {
+        let mut found = Vec::new();
         for (section, value) in resolved {
             match value {
                 Value::Array(items) => {
                     let tables = items.iter().filter_map(Value::as_table);
                     tables.for_each(|table| {
-                        self.section(&format!("[[{section}]]"), table, &mut lines)
+                        self.section(&format!("[[{section}]]"), table, &mut found)
                     });
                 }
-                Value::Table(table) => self.section(&format!("[{section}]"), table, &mut lines),
+                Value::Table(table) => self.section(&format!("[{section}]"), table, &mut found),
                 _ => {}
             }
         }
-        lines
+        found
     }
 
     /// Adds the settings in one section: its own keys, or those of its plugin.
-    fn section(&self, name: &str, table: &Table, lines: &mut Vec<String>) {
+    fn section(&self, name: &str, table: &Table, found: &mut Vec<Setting>) {
         let plugin = table.get("plugin").and_then(Value::as_str);
         if plugin.is_some() && self.plugin.is_some() && self.plugin.as_deref() != plugin {
             return;
         }
         let config = table.get("config").and_then(Value::as_table);
         for key in &self.settings {
-            if let Some((plugin, value)) = plugin.zip(config.and_then(|config| config.get(key))) {
-                lines.push(format!("{name} plugin = \"{plugin}\", config = {{ {key} = {value} }}"));
-            } else if let (None, Some(value)) = (plugin, table.get(key)) {
-                lines.push(format!("{name} {key} = {value}"));
+            let value = match plugin {
+                Some(_) => config.and_then(|config| config.get(key)),
+                None => table.get(key),
+            };
+            found.extend(value.map(|value| Setting {
+                section: name.to_owned(),
+                plugin: plugin.map(ToOwned::to_owned),
+                assignment: format!("{key} = {value}"),
+            }));
+        }
+    }
+}
+
+/// Setting with its place in a config.
+struct Setting {
+    /// Header of the section.
+    section: String,
+    /// Plugin that has the setting; none for the pipeline's.
+    plugin: Option<String>,
+    /// Key and value.
+    assignment: String,
+}
+
+impl Setting {
+    /// Returns settings in the syntax of a config; those of one section and plugin are one line.
+    fn in_words(settings: &[Self]) -> String {
+        let lines = settings.chunk_by(|a, b| a.section == b.section && a.plugin == b.plugin);
+        lines.map(Self::line).collect::<Vec<_>>().join(" and ")
+    }
+
+    /// Returns the line of settings of one section and plugin.
+    fn line(settings: &[Self]) -> String {
+        let Some(first) = settings.first() else { return String::new() };
+        let values: Vec<&str> = settings.iter().map(|one| one.assignment.as_str()).collect();
+        let section = &first.section;
+        match &first.plugin {
+            Some(plugin) => {
+                format!("{section} plugin = \"{plugin}\", config = {{ {} }}", values.join(", "))
             }
+            None => format!("{section} {}", values.join(" and ")),
         }
     }
 }
@@ -379,7 +424,7 @@ mod tests {
         assert_eq!(
             remedies.sentence("too blue", &resolved),
             "the test \"too blue\" dropped the candidate (the sky); decided by [[detectors]] plugin = \
-             \"own\", config = { a = 1 } and [[detectors]] plugin = \"own\", config = { b = 2 }"
+             \"own\", config = { a = 1, b = 2 }"
         );
         let without = remedies.sentence("too blue", &Table::new());
         assert!(without.ends_with("; no setting decides it"), "{without}");

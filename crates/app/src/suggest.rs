@@ -10,8 +10,17 @@ use tagalong_log::LogFiles;
 use crate::config_file::ConfigFile;
 use crate::outcome::Failure;
 
-/// Returns "; did you mean `configs/depth-ekf.toml`?", or the names of the configs that there are.
+/// Endings of logs.
+pub const LOG_ENDINGS: [&str; 3] = ["mcap", "db3", "bag"];
+
+/// Returns "; did you mean `configs/depth-ekf.toml`?", or the names of the configs that there are. A
+/// single path that is no config may also be a mistyped log.
 pub fn config_hint(wanted: &Path) -> String {
+    // A config has the ending `toml` or, being built in, none.
+    let is_config = wanted.extension().is_none_or(|ending| ending == "toml");
+    if let Some(log) = nearest_log(wanted).filter(|_| !is_config) {
+        return format!("; did you mean the log `{}`?", log.display());
+    }
     let folders = [wanted.parent().unwrap_or(Path::new("")).to_owned(), PathBuf::from("configs")];
     let files: Vec<PathBuf> = folders.iter().flat_map(|folder| toml_files(folder)).collect();
     let names: Vec<&str> = files.iter().filter_map(|f| f.file_stem()?.to_str()).collect();
@@ -60,11 +69,17 @@ pub fn check_log_path(path: &Path) -> Result<(), Failure> {
     if path.is_dir() {
         // Accepts a folder whose files are the parts of one log.
         let Err(error) = LogFiles::of(path) else { return Ok(()) };
-        let hint = match mcap_files(path).unwrap_or_default().first() {
-            Some(file) => format!("give a file in it, for example {}", file.display()),
-            None => format!("and {error}"),
+        let message = match mcap_files(path).unwrap_or_default().first() {
+            Some(file) => {
+                format!("{shown} is a folder; give a file in it, for example {}", file.display())
+            }
+            None if has_images(path) => format!(
+                "{shown} is a folder of images; `tagalong import images {shown} --fps 15 --view 69` \
+                 makes a log of it (frames per second, and angle of view in degrees)"
+            ),
+            None => error.to_string(),
         };
-        return Err(Failure::failed(format!("{shown} is a directory; {hint}")));
+        return Err(Failure::failed(message));
     }
     Ok(())
 }
@@ -83,14 +98,52 @@ pub fn mcap_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// Returns true for a folder with an image that `tagalong import images` reads.
+fn has_images(folder: &Path) -> bool {
+    let is_image = |ending: &str| ["jpg", "jpeg", "png"].contains(&ending);
+    files_in(folder).iter().any(|file| ending_of(file).is_some_and(|ending| is_image(&ending)))
+}
+
 fn log_hint(wanted: &Path) -> String {
+    nearest_log(wanted)
+        .map_or(String::new(), |best| format!("; did you mean `{}`?", best.display()))
+}
+
+/// Returns the log whose name is nearest to that of a missing file, in the same folder.
+fn nearest_log(wanted: &Path) -> Option<PathBuf> {
+    nearest_file(wanted, |ending| LOG_ENDINGS.contains(&ending))
+}
+
+/// Returns "; did you mean `LOG.people.csv`?" for a missing file, or nothing if no file in its folder
+/// has a similar name.
+pub fn file_hint(wanted: &Path) -> String {
+    nearest_file(wanted, |_| true)
+        .map_or(String::new(), |best| format!("; did you mean `{}`?", best.display()))
+}
+
+/// Returns the file whose name is nearest to that of a missing one, among those in its folder whose
+/// ending is accepted.
+fn nearest_file(wanted: &Path, accepts: impl Fn(&str) -> bool) -> Option<PathBuf> {
     let folder = wanted.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let files = mcap_files(folder).unwrap_or_default();
-    let names: Vec<&str> = files.iter().filter_map(|f| f.file_name()?.to_str()).collect();
-    let name = wanted.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-    nearest(name, names).map_or(String::new(), |best| {
-        format!("; did you mean `{}`?", wanted.with_file_name(best).display())
-    })
+    let files = files_in(folder);
+    let accepted = files.iter().filter(|file| accepts(&ending_of(file).unwrap_or_default()));
+    let names: Vec<&str> = accepted.filter_map(|file| file.file_name()?.to_str()).collect();
+    let best = nearest(wanted.file_name()?.to_str()?, names)?;
+    Some(wanted.with_file_name(best))
+}
+
+/// Returns what is in a folder, by name; nothing for a folder that cannot be read.
+fn files_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    // The order of a directory depends on the file system.
+    files.sort();
+    files
+}
+
+/// Returns the ending of a file in lower case.
+fn ending_of(file: &Path) -> Option<String> {
+    Some(file.extension()?.to_str()?.to_lowercase())
 }
 
 #[cfg(test)]
@@ -108,6 +161,34 @@ mod tests {
         assert!(hint.contains(", depth-ekf, ") && hint.contains(", other, "), "{hint}");
         let hint = config_hint(&home.path().join("follow-lov.toml"));
         assert!(hint.contains("did you mean `follow-low`"), "{hint}");
+    }
+
+    #[test]
+    fn a_mistyped_ending_of_a_log_is_answered_with_the_log() {
+        let home = tempfile::tempdir().unwrap();
+        fs::write(home.path().join("robot.mcap"), "").unwrap();
+        let hint = config_hint(&home.path().join("robot.mpac"));
+        assert!(hint.contains("did you mean the log") && hint.contains("robot.mcap"), "{hint}");
+        let hint = config_hint(&home.path().join("robot"));
+        assert!(!hint.contains("robot.mcap"), "a name without an ending is a config: {hint}");
+    }
+
+    #[test]
+    fn a_mistyped_file_is_answered_with_the_nearest_of_its_folder() {
+        let home = tempfile::tempdir().unwrap();
+        fs::write(home.path().join("robot.people.csv"), "").unwrap();
+        let hint = file_hint(&home.path().join("robot.peopl.csv"));
+        assert!(hint.ends_with("robot.people.csv`?"), "{hint}");
+        assert_eq!(file_hint(&home.path().join("zzz")), "");
+    }
+
+    #[test]
+    fn a_folder_of_images_is_answered_with_the_import() {
+        let home = tempfile::tempdir().unwrap();
+        let refused = || check_log_path(home.path()).unwrap_err().message;
+        assert!(refused().contains("it holds no .mcap and no .db3"), "{}", refused());
+        fs::write(home.path().join("1.JPG"), "").unwrap();
+        assert!(refused().contains("`tagalong import images "), "{}", refused());
     }
 
     #[test]

@@ -94,8 +94,9 @@ fn place_of(value: &Value<'_>, key: &str) -> Option<ops::Range<usize>> {
 
 impl From<toml::de::Error> for ConfigError {
     fn from(error: toml::de::Error) -> Self {
-        let message = error.message().trim_end();
-        Self { message: with_suggestion(message), span: error.span() }
+        // Serde names the types of Rust.
+        let message = error.message().trim_end().replace(", expected f64", ", expected a number");
+        Self { message: with_suggestion(&message), span: error.span() }
     }
 }
 
@@ -537,7 +538,8 @@ mod tests {
         assert!(unknown.contains(&format!("a.toml:1:12: {nearest_first}")), "{unknown}");
         assert!(unknown.ends_with("           ^^^^^^^"), "{unknown}");
         let kind = shown("{ own = 2, height_m = 'tall' }");
-        assert!(kind.contains("a.toml:1:23: invalid type: string \"tall\""), "{kind}");
+        let number = "a.toml:1:23: invalid type: string \"tall\", expected a number\n";
+        assert!(kind.contains(number), "{kind}");
         let range = shown("{ own = 2, height_m = 4.0 }");
         assert!(range.contains("a.toml:1:23: `height_m` must lie between 0 and 3"), "{range}");
         let own = shown("{ own = -2, height_m = 1.0 }");

@@ -55,6 +55,13 @@ pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
         return Err(Failure::failed(message));
     };
     let folder = args.path.join(value("imDir").map_or("img1", |(_, name)| name));
+    if !folder.exists() {
+        return Err(Failure::failed(format!(
+            "{}: no such folder, so there are no images; `tagalong boxes FOLDER_OF_SEQUENCES` tracks \
+             the boxes of det/det.txt without them",
+            folder.display()
+        )));
+    }
     let mut sequence = of_files(args, pictures(&folder)?, fps)?;
     if let Ok(truth) = read_text(&args.path.join("gt/gt.txt"), FileLimit::Table) {
         sequence.beside.push(("boxes.csv", truth));

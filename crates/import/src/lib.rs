@@ -67,7 +67,16 @@ pub fn import(args: &ImportArgs) -> Outcome {
     sequence.notes.iter().for_each(|note| say(&format!("note: {note}")));
     let images = sequence.moments.len();
     print(&match args.format {
-        Format::Text => format!("{images} images are in {}\n", log.display()),
+        Format::Text => {
+            let log = log.display();
+            // Data sets come with truth or boxes, whose next step the notes name.
+            let next = if args.kind == Kind::Images {
+                format!("; next: tagalong run {log} --overlay")
+            } else {
+                String::new()
+            };
+            format!("{images} images are in {log}{next}\n")
+        }
         Format::Json => {
             format!("{:#}\n", serde_json::json!({ "log": PathText(&log), "images": images }))
         }

@@ -71,7 +71,7 @@
 //! | `stereo: ...`, `stereo pixels: ...` | a stereo pair, or pixels of it, without depth |
 //! | `motion not finite` | a frame's odometry; the robot counts as standing |
 //! | `detection not finite`, `verifier not finite` | a candidate with numbers that cannot be |
-//! | `gate`, `not the best sighting` | a detection found near a track |
+//! | `gate`, `not the best detection` | a detection found near a track |
 //! | `same person` | the weaker of two detections of one person |
 //! | `association not possible`, `associator` | an impossible pair; a detection already used up |
 //! | `rather a new person` | a pair with a track that was lost; the detection may start a track |

@@ -74,8 +74,14 @@ fn labels(scene: &OverlayData, by: usize, style: OverlayStyle) -> Labels {
 /// room.
 pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize, style: OverlayStyle) {
     let lettering = Lettering::of_width(by * scene.camera.width);
+    let area = Rect::new(0.0, 0.0, scene.camera.width as f64, scene.camera.height as f64);
     for track in style.tracks(scene) {
-        let region = scaled(&style.region(scene, track), by as f64);
+        let region = style.region(scene, track);
+        // A label at the border for a predicted person outside of the image explains nothing there.
+        if !track.seen && region.intersection(&area).area() <= 0.0 {
+            continue;
+        }
+        let region = scaled(&region, by as f64);
         labels.add(&region, name_of(track), lettering, colour(track));
     }
     for (region, test) in dropped(scene).into_iter().filter(|_| style.is_debug()) {

@@ -137,6 +137,16 @@ fn the_labels_of_two_people_side_by_side_do_not_overlap() {
     }
 }
 
+#[test]
+fn a_predicted_person_outside_of_the_image_has_no_label() {
+    let mut scene = scene(&[1, 2], Vec::new());
+    scene.report.tracks[0].estimate.region.x = -500.0;
+    scene.report.tracks[0].seen = false;
+    let labels = image_view::placed_labels(&scene, DEBUG);
+    let texts: Vec<&str> = labels.bars().into_iter().map(|(_, text)| text).collect();
+    assert_eq!(texts, ["2 3.0 m"]);
+}
+
 fn dropped(test: &'static str) -> Candidate {
     let detection = Detection {
         image: Some(ImageBox::upper_body(Rect::new(20.0, 150.0, 60.0, 60.0))),

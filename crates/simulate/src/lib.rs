@@ -125,7 +125,8 @@ pub fn read(path: &Path, variant: &Variant) -> Result<Scene, Failure> {
             scenes::built_in(path).unwrap_or_default().to_owned()
         }
         Err(error) => {
-            let named = nearest(&path.to_string_lossy(), scenes::names());
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+            let named = nearest(&stem, scenes::names());
             let hint = named.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
             return Err(Failure::usage(format!("cannot read scene {shown}: {error}{hint}")));
         }
@@ -191,6 +192,13 @@ mod tests {
     const SCENE: &str = "seed = 3\nduration_s = 3.0\n[laser]\nrays = 90\n[camera]\nwidth = 64\nheight = 48\n\
         rate_hz = 20.0\ndepth_offset_s = 0.015\nrolling_shutter_s = 0.015\n[robot]\npath = [[6.0, 4.0]]\n[faults]\nlate = 0.4\ndropped = 0.1\n\
         [[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
+
+    #[test]
+    fn a_mistyped_scene_is_answered_with_the_nearest_one() {
+        let path = Path::new("configs/scenes/follow-pasing.toml");
+        let failure = read(path, &Variant::default()).err().unwrap();
+        assert!(failure.message.contains("did you mean `follow-passing`?"), "{}", failure.message);
+    }
 
     #[test]
     fn a_log_has_encoders_commands_and_the_time_of_its_depth() {

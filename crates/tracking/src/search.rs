@@ -155,7 +155,7 @@ impl SearchStage {
 }
 
 /// Name of the test that the weaker of two detections of one track fails.
-const NOT_BEST: &str = "not the best sighting";
+const NOT_BEST: &str = "not the best detection";
 
 #[cfg(test)]
 mod tests {

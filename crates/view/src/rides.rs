@@ -89,9 +89,9 @@ pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
     let from = if args.output.is_some() { Some(folder.as_path()) } else { None };
     write_file(&index, list(folder, from, &rides))?;
     print(&format!(
-        "{}: {} rides, the worst first, each with its page\nopen it in a browser; it needs no network\n",
+        "{}: {}, the worst first, each with its page\nopen it in a browser; it needs no network\n",
         index.display(),
-        rides.len()
+        counted(rides.len())
     ))?;
     Ok(Ended::Well)
 }
@@ -145,6 +145,11 @@ fn encoded(letter: char) -> String {
     }
 }
 
+/// Returns a number of rides in words.
+fn counted(rides: usize) -> String {
+    if rides == 1 { "1 ride".to_owned() } else { format!("{rides} rides") }
+}
+
 fn list(folder: &Path, from: Option<&Path>, rides: &[Ride]) -> String {
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let contacts = rides.iter().filter(|ride| ride.facts.touches()).count();
@@ -154,7 +159,7 @@ fn list(folder: &Path, from: Option<&Path>, rides: &[Ride]) -> String {
         header class="top" {
             h1 { "Rides in " (name) }
             ul class="facts" {
-                li { (rides.len()) " rides" }
+                li { (counted(rides.len())) }
                 li { (kept) " kept the person" }
                 li { (contacts) " with a contact" }
             }
@@ -263,6 +268,7 @@ mod tests {
         let mut hostile = ride("<img src=x>", 0.5, 0.5);
         hostile.folder = Some("a b#c".into());
         let page = list(Path::new("rides"), None, &[hostile.clone()]);
+        assert!(page.contains("<li>1 ride</li>"), "{page}");
         assert!(!page.contains("<img"), "a name became an element");
         assert!(page.contains("href=\"a%20b%23c/view.html#t=2.5\""), "{page}");
         for name in ["..", "a/b", ""] {

@@ -410,6 +410,7 @@ const begin = async () => {
   byId("origin").textContent = `${about.origin}; ${about.depth ? "depth fills in the places" : "no depth, so boxes only"}.`;
   byId("frame").max = about.frames.length - 1;
   byId("stage").style.aspectRatio = `${about.size[0]} / ${about.size[1]}`;
+  byId("stage").style.setProperty("--shape", about.size[0] / about.size[1]);
   const image = Object.assign(document.createElement("img"), { id: "image", alt: "Image of the frame", draggable: false });
   byId("stage").prepend(image);
   byId("boxes").setAttribute("viewBox", `0 0 ${about.size[0]} ${about.size[1]}`);

@@ -10,6 +10,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use crate::outcome::Failure;
+use crate::suggest::file_hint;
 pub use extents::extents_note;
 pub use shots::{Shot, Shots};
 use tagalong_config::{FileLimit, read_text as read_bounded};
@@ -126,6 +127,7 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
                 "{shown} is no text; truth and tracks are MOTChallenge, KITTI or CSV text, a log, or \
                  the folder of a run"
             ),
+            ErrorKind::NotFound => format!("{shown}: no such file{}", file_hint(path)),
             _ => format!("cannot read {shown}: {error}"),
         })
     })

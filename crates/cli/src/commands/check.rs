@@ -24,14 +24,21 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     let outer = file.outer_for(&pipeline)?;
     let inputs = pipeline.inputs();
     let distances = pipeline.safety_distances();
+    let suited_m = pipeline.config().suits.camera_height_m;
     let fit = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
     let blind_zone = fit.as_ref().and_then(|fit| fit.blind_zone);
     let data_lost = fit.as_ref().is_some_and(|fit| fit.data_lost);
+    let seen_m = fit.as_ref().and_then(|fit| fit.camera_height_m);
+    let height_m = seen_m.or_else(|| outer.input.mount().map(|mount| mount.height_m));
+    let unsuited = height_m.zip(suited_m).and_then(|(height_m, range)| unsuited(height_m, range));
     let notes = fit.map(|fit| fit.notes);
     let config = config.display();
     print(&match format {
         Format::Text => {
-            let mut out = format!("{config}: right; {}\n", in_words(inputs));
+            let mut out = format!("{config}: valid; {}\n", in_words(inputs));
+            if let Some(unsuited) = &unsuited {
+                let _ = writeln!(out, "  {unsuited}");
+            }
             if let Some(distances) = &distances {
                 out += &told(distances);
             }
@@ -49,7 +56,8 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
             let uses = names(inputs, Usage::Optional);
             let answer = serde_json::json!({
                 "config": config.to_string(), "needs": needs, "uses": uses, "log": log.map(PathText),
-                "notes": notes, "distances": distances, "blind_zone": blind_zone,
+                "notes": notes, "unsuited": unsuited, "distances": distances,
+                "blind_zone": blind_zone,
             });
             format!("{answer:#}\n")
         }
@@ -63,8 +71,24 @@ struct Fit {
     notes: Vec<String>,
     /// Part of the log was lost.
     data_lost: bool,
+    /// Height of the camera above the floor, m, where its pose is known.
+    camera_height_m: Option<f64>,
     /// Region that the camera of the log does not see, for a config with a controller.
     blind_zone: Option<BlindZone>,
+}
+
+/// Deviation of the camera's height from the stated range that does not matter, m.
+const HEIGHT_TOLERANCE_M: f64 = 0.1;
+
+/// Returns the warning of a camera that is lower or higher than those of `[suits]`.
+fn unsuited(height_m: f64, [low_m, high_m]: [f64; 2]) -> Option<String> {
+    let beyond_m = (low_m - height_m).max(height_m - high_m);
+    (beyond_m > HEIGHT_TOLERANCE_M).then(|| {
+        format!(
+            "warning: the camera is {height_m:.2} m high, and the config is for {low_m} to {high_m} m: \
+             take one for this height, see the first table of configs/README.md"
+        )
+    })
 }
 
 /// Returns the distances of a robot in lines.
@@ -126,10 +150,14 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit
         .map_err(|why| Failure::failed(format!("`{}`: {why}", log.display())))?;
     let mut tried = 0;
     let mut blind_zone = None;
+    let mut camera_height_m = None;
     while tried < FRAMES
         && let Some(item) = source.next_frame()
     {
-        blind_zone = pipeline.blind_zone(&item.frame.camera);
+        let camera = &item.frame.camera;
+        blind_zone = pipeline.blind_zone(camera);
+        let is_known = !camera.is_blind() && !is_pose_assumed(&source);
+        camera_height_m = is_known.then(|| camera.height_m());
         pipeline.step(&item.frame).map_err(Failure::failed)?;
         tried += 1;
     }
@@ -137,7 +165,13 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit
     if tried == 0 {
         return Err(Failure::failed(format!("{}: no frame that can be used", log.display())));
     }
-    Ok(Fit { notes: source.notes().to_vec(), data_lost: source.data_lost(), blind_zone })
+    let notes = source.notes().to_vec();
+    Ok(Fit { notes, data_lost: source.data_lost(), camera_height_m, blind_zone })
+}
+
+/// Returns true if the log tells nothing about the pose of the camera.
+fn is_pose_assumed(source: &FrameSource) -> bool {
+    source.notes().iter().any(|note| note.contains("comes from an assumption"))
 }
 
 fn names(inputs: Inputs, usage: Usage) -> Vec<&'static str> {

@@ -115,9 +115,13 @@ impl Scored {
 fn scored(args: &EvalArgs) -> Result<Scored, Failure> {
     let Judged { sequence, truth, mut notes } = judged(args)?;
     let similarity = args.similarity.into();
+    let reported = reports_of(&sequence);
     let Some(sequence) = comparable(&sequence, similarity) else {
         return Err(no_place(args, &truth));
     };
+    if reported > 0 && reports_of(&sequence) == 0 {
+        return Err(no_place_reported(args));
+    }
     let comparison = comparison(&truth, similarity);
     let scores = Scores::measure(&sequence, comparison).map_err(|error| refused(args, &error))?;
     let repairs = args.repairs.then(|| repairs(&sequence, &comparison));
@@ -129,6 +133,25 @@ fn scored(args: &EvalArgs) -> Result<Scored, Failure> {
         notes.push(format!("{}: {CONSTANT_SCORES}", args.tracks.display()));
     }
     Ok(Scored { rules: rules(&truth), scores, repairs, notes })
+}
+
+fn reports_of(sequence: &Sequence) -> usize {
+    sequence.frames.iter().map(|frame| frame.reports.len()).sum()
+}
+
+/// Returns the failure of tracks of which none has what is compared.
+fn no_place_reported(args: &EvalArgs) -> Failure {
+    let shown = args.tracks.display();
+    Failure::usage(match args.similarity {
+        SimilarityChoice::Iou => format!(
+            "{shown} has positions and no boxes; compare places (--similarity metres), or give the \
+             folder of the run"
+        ),
+        SimilarityChoice::Metres => format!(
+            "{shown} has boxes and no positions; compare boxes (--similarity iou), or give the folder \
+             of the run"
+        ),
+    })
 }
 
 fn refused(args: &EvalArgs, error: &EvalError) -> Failure {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use tagalong_app::format::Format;
 use tagalong_app::input_args::InputArgs;
+use tagalong_app::suggest::LOG_ENDINGS;
 use tagalong_log::write::BoxedPart;
 use tagalong_render::OverlayStyle;
 
@@ -147,9 +148,6 @@ impl RunArgs {
         }
     }
 }
-
-/// Endings of logs.
-const LOG_ENDINGS: [&str; 3] = ["mcap", "db3", "bag"];
 
 /// Returns true for the path of a log, as opposed to that of a config: a file of a recorder, or a
 /// folder with its files.

@@ -43,7 +43,8 @@ fn persons(out: &mut String, report: &RunReport) {
     let _ = match report.persons.len() {
         0 => writeln!(
             out,
-            "nobody was found; --overlay=debug shows the test that dropped each candidate"
+            "no person was found; `tagalong doctor LOG` looks for the cause, and --overlay=debug shows \
+             the test that dropped each candidate"
         ),
         1 => writeln!(out, "1 person:"),
         many => writeln!(out, "{many} persons:"),

@@ -39,7 +39,7 @@ fn printed_defaults_are_accepted_as_they_are() {
     );
     fs::write(home.path().join("all.toml"), around + &plugins).unwrap();
     let told = answer(&["check", "all.toml"], home.path());
-    assert!(told.contains("right; needs depth\n"), "{told}");
+    assert!(told.contains("valid; needs depth\n"), "{told}");
 }
 
 #[test]
@@ -50,6 +50,24 @@ fn a_check_with_a_log_tries_it() {
     let told = answer(&["check", "nearest.toml", "walk.mcap"], home.path());
     assert!(told.contains("walk.mcap: fits"), "{told}");
     assert!(!home.path().join("runs").exists(), "a check writes nothing");
+}
+
+#[test]
+fn a_check_warns_of_a_camera_that_the_config_is_not_for() {
+    let home = tempfile::tempdir().unwrap();
+    Drawn::of(3).write(&home.path().join("walk.mcap"));
+    let with = |height_m: f64| {
+        let camera =
+            format!("extends = 'follow-depth.toml'\n[input.camera]\nheight_m = {height_m}\n");
+        fs::write(home.path().join("mine.toml"), camera).unwrap();
+        answer(&["check", "mine.toml"], home.path())
+    };
+    let warning = "the camera is 0.60 m high, and the config is for 0.9 to 2 m";
+    assert!(with(0.6).contains(warning), "{}", with(0.6));
+    assert!(!with(1.2).contains("the camera is"), "{}", with(1.2));
+    config(home.path(), "[suits]\ncamera_height_m = [2.0, 3.0]\n");
+    let told = answer(&["check", "nearest.toml", "walk.mcap"], home.path());
+    assert!(told.contains("the camera is 1.20 m high"), "{told}");
 }
 
 #[test]

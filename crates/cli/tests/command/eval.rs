@@ -47,6 +47,19 @@ fn a_run_is_scored_in_the_image_and_on_the_floor() {
     assert!(floor.as_object().unwrap().values().all(|value| !value.is_object()), "one flat object");
 }
 
+#[test]
+fn tracks_without_what_is_compared_are_refused_with_the_remedy() {
+    let folder = home();
+    let truth = ["--truth", "walk.people.csv", "--tracks"];
+    let places = in_home(folder.path(), &[&truth[..], &["out/tracks-metres.csv"]].concat());
+    let told = text(&places.stderr);
+    assert!(code(&places) == 2 && told.contains("positions and no boxes"), "{told}");
+    let boxes = ["out/tracks.csv", "--similarity", "metres", "--log", "walk.mcap"];
+    let boxes = in_home(folder.path(), &[&truth[..], &boxes].concat());
+    let told = text(&boxes.stderr);
+    assert!(code(&boxes) == 2 && told.contains("boxes and no positions"), "{told}");
+}
+
 /// In the truth there is a second person, whom the run never reports.
 #[test]
 fn repairs_show_what_each_kind_of_error_costs() {

@@ -225,10 +225,13 @@ fn what_is_not_of_the_layout_is_told() {
     let home = tempfile::tempdir().unwrap();
     fs::create_dir_all(home.path().join("empty")).unwrap();
     fs::write(home.path().join("a.bag"), "#ROSBAG").unwrap();
-    let cases: [(&[&str], i32, &str); 6] = [
+    fs::create_dir_all(home.path().join("bare")).unwrap();
+    fs::write(home.path().join("bare/seqinfo.ini"), "frameRate=30\n").unwrap();
+    let cases: [(&[&str], i32, &str); 7] = [
         (&["tum", "empty"], 1, "TUM RGB-D"),
         (&["kitti", "empty"], 1, "KITTI"),
         (&["mot", "empty"], 1, "MOTChallenge"),
+        (&["mot", "bare"], 1, "`tagalong boxes FOLDER_OF_SEQUENCES`"),
         (&["images", "empty"], 1, "no images"),
         (&["images", "nowhere"], 1, "no such file"),
         (&["images", "a.bag"], 1, "is a file"),
@@ -290,6 +293,7 @@ fn numbered_images_are_in_the_order_of_their_numbers() {
     }
     let (code, said) = import(home.path(), &["images", "photos", "--view", "60"]);
     assert_eq!(code, 0, "{said}");
+    assert!(said.contains("next: tagalong run runs/photos.mcap --overlay"), "{said}");
     let found = frames(&home.path().join("runs/photos.mcap"), Inputs::ANY.require(Input::Colour));
     let levels: Vec<u8> =
         found.iter().map(|item| item.frame.colour().unwrap().pixels()[0][0]).collect();

@@ -132,7 +132,7 @@ fn check_says_what_is_needed_and_what_is_used() {
         text(&output.stdout) + &text(&output.stderr)
     };
     let mono = said(&config("mono"));
-    assert!(mono.contains("right; needs colour\n"), "{mono}");
+    assert!(mono.contains("valid; needs colour\n"), "{mono}");
     let both = said(&config("rgbd-compressive"));
     assert!(both.contains("needs colour; uses depth where the log has it"), "{both}");
     let refused = said(&format!("without = [\"depth\"]\n{}", config("rgbd-ekf")));

@@ -126,7 +126,7 @@ impl Judge<'_> {
     fn failure(&self, name: &str) -> Option<Reason> {
         if let Some(fault) = self.scan.topics.get(name).and_then(Topic::impossible) {
             return Some((
-                format!("its messages cannot be: {fault}"),
+                format!("its messages are invalid: {fault}"),
                 Some(SCANNER_REMEDY.to_owned()),
             ));
         }

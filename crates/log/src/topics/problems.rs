@@ -152,7 +152,7 @@ pub(super) fn scanner_problem(
         return Problem::new(format!("it is the source of obstacles `{}`", source.name), "");
     }
     if let Some(fault) = scan.topics.get(topic).and_then(Topic::impossible) {
-        return Problem::new(format!("its messages cannot be: {fault}"), SCANNER_REMEDY);
+        return Problem::new(format!("its messages are invalid: {fault}"), SCANNER_REMEDY);
     }
     let named =
         format!("`laser_topic = \"{topic}\"` under [input] takes this one in place of {first}");

@@ -178,7 +178,7 @@ impl Page<'_> {
             match miss {
                 Some((task, miss)) => html! {
                     strong class="bad" { "✕ " (miss.test.as_deref().unwrap_or(NO_CANDIDATE)) }
-                    @if let Some(why) = miss.test.as_ref().and_then(|test| task.reasons.get(test)) { span class="why" { (why) } }
+                    @if let Some(why) = miss.test.as_ref().and_then(|test| task.reasons.get(test)) { span class="why line" { (why) } }
                 },
                 None => match track_on(moment, pipeline, id) {
                     Some(track) => html! { "● track " (track) },

@@ -64,7 +64,11 @@ impl Page<'_> {
         let all: u64 = worse.0.values().sum();
         let costly = worse.0.iter().max_by_key(|(test, count)| (**count, std::cmp::Reverse(*test)));
         if let Some((test, count)) = costly {
-            line += &format!("; {count} of the {all} misses of {} by {test}", worse.2);
+            let why = match *test {
+                NO_CANDIDATE => "had no candidate".to_owned(),
+                test => format!("were dropped by the test {test}"),
+            };
+            line += &format!("; {count} of the {all} misses of {} {why}", worse.2);
         }
         Some(line)
     }

@@ -232,7 +232,7 @@ fn answers(names: &[&str]) -> Markup {
                 (columns("people", names))
             }
             section id="funnel" aria-labelledby="h-funnel" {
-                h2 id="h-funnel" { "Funnel of this frame" }
+                h2 id="h-funnel" { "Dropped candidates in this frame (funnel)" }
                 (columns("funnel", names))
             }
             section id="events" aria-labelledby="h-events" {

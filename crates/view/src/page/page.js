@@ -492,6 +492,12 @@
     return node;
   };
 
+  // Turn rates below this are shown as straight, rad/s: they would print as zero.
+  const STRAIGHT = 0.005;
+  const turnOf = (rate) => Math.abs(rate) < STRAIGHT
+    ? "does not turn"
+    : `turns ${rate < 0 ? "right" : "left"} by ${fixed(Math.abs(rate), 2)} rad/s`;
+
   // The state of the target lock and the reason of the command, each with its meaning.
   const drive = (run, place) => {
     const frame = frameOf(run, state.at);
@@ -504,7 +510,7 @@
       row("Target", target, `${now.lock[1]}${sure}`),
       row("Lock", now.lock[0], `for ${fixed(now.since, 1)} s: ${now.why}`),
       row("Command", now.reason[0], now.reason[1]),
-      row("Speed", `${fixed(now.v, 2)} m/s`, `turns ${now.w < 0 ? "right" : "left"} by ${fixed(Math.abs(now.w), 2)} rad/s`),
+      row("Speed", `${fixed(now.v, 2)} m/s`, turnOf(now.w)),
     ]));
   };
 
@@ -584,7 +590,7 @@
     const test = decidingTest(run, frame, question);
     const why = test ? sentence(run, test) : "no detector proposed a candidate near this place";
     const ended = endedNear(run, question);
-    return ended ? `Track ${ended.id} is gone since ${fixed(ended.s, 1)} s, and no new one began: ${why}.` : `No track began here: ${why}.`;
+    return ended ? `Track ${ended.id} ended ${fixed(ended.s, 1)} s before, and no new one began: ${why}.` : `No track began here: ${why}.`;
   };
 
   // Many tests drop thousands of places and record some of them.

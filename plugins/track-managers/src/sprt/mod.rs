@@ -39,7 +39,7 @@ const REMEDIES: &[Remedy] = &[
     Remedy {
         test: "track: evidence",
         settings: &["end_log_odds", "miss_log_odds", "max_look"],
-        look: "misses and doubtful detections wear a track down",
+        look: "misses and doubtful detections lower the score of the track",
     },
 ];
 
