@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use tagalong_eval::{Frame, Region, Role};
+use tagalong_eval::{Region, Role};
 use tagalong_report::{Moment, TaskResult};
 
 use super::store::{Recording, Stored};
@@ -55,14 +55,12 @@ fn of_log(witnesses: &[Witness<'_>]) -> Vec<Moment> {
 
 fn moment(witnesses: &[Witness<'_>], number: u64) -> Option<Moment> {
     let source = witnesses.iter().find(|witness| witness.images.contains_key(&number))?;
-    let at = |recording: &Recording| -> Option<Frame> {
-        recording.sequence.frames.get(usize::try_from(number).ok()?.checked_sub(1)?).cloned()
-    };
-    let frame = at(source.recording)?;
+    let index = usize::try_from(number).ok()?.checked_sub(1)?;
+    let frame = source.recording.sequence.frames.get(index)?;
     let people = frame.truths.iter().filter(|truth| truth.role == Role::Counts);
     let mut tracks = BTreeMap::new();
     for witness in witnesses {
-        let boxes = at(witness.recording).map(|frame| {
+        let boxes = witness.recording.sequence.frames.get(index).map(|frame| {
             let reports = frame.reports.iter();
             reports.filter_map(|r| Some((r.id, corners(&r.region?)))).collect::<Vec<_>>()
         });
@@ -87,7 +85,7 @@ fn corners(region: &Region) -> [f64; 4] {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_eval::{Report, Sequence, Truth};
+    use tagalong_eval::{Frame, Report, Sequence, Truth};
     use tagalong_report::MissedPerson;
 
     use super::*;

@@ -110,14 +110,9 @@ fn first_line(text: &str) -> &str {
 }
 
 fn figures(task: &TaskResult) -> String {
-    let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
     let Some(scores) = task.image.or(task.metres) else { return "nothing to score".into() };
-    format!(
-        "{:>6}  {:>6}  {:>6}  {:>5}  {:>10}",
-        number(scores.hota),
-        number(scores.mota),
-        number(scores.idf1),
-        scores.idsw,
-        number(scores.position_error_mean_m)
-    )
+    let [hota, mota, idf1, error_m] =
+        [scores.hota, scores.mota, scores.idf1, scores.position_error_mean_m]
+            .map(|value| value.map_or("-".to_owned(), |value| format!("{value:.3}")));
+    format!("{hota:>6}  {mota:>6}  {idf1:>6}  {:>5}  {error_m:>10}", scores.idsw)
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::tuning::{Choice, Figures, Objective, candidates, leave_one_out, mean, shown_value};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
@@ -62,8 +62,8 @@ pub struct BoxesArgs {
     #[arg(long)]
     pub leave_one_out: bool,
     /// The objective: the mean of this figure over the places is maximised.
-    #[arg(long, value_enum, default_value_t)]
-    pub objective: BoxesObjective,
+    #[arg(long, value_enum, default_value_t = Objective::HotaAndIdf1)]
+    pub objective: Objective,
     /// Most settings that are tried for a pipeline, its own among them: all combinations where they
     /// are so few, otherwise a sample.
     #[arg(long, value_name = "N", default_value_t = 100,
@@ -82,35 +82,6 @@ pub struct BoxesArgs {
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
-}
-
-/// Figure to maximise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum BoxesObjective {
-    /// The mean of HOTA and IDF1.
-    #[default]
-    #[value(name = "both")]
-    Both,
-    /// Detection and association, with equal weight.
-    #[value(name = "HOTA")]
-    Hota,
-    /// Association.
-    #[value(name = "IDF1")]
-    Idf1,
-    /// Detection, with few false positives.
-    #[value(name = "MOTA")]
-    Mota,
-}
-
-impl From<BoxesObjective> for Objective {
-    fn from(choice: BoxesObjective) -> Self {
-        match choice {
-            BoxesObjective::Both => Self::HotaAndIdf1,
-            BoxesObjective::Hota => Self::Hota,
-            BoxesObjective::Idf1 => Self::Idf1,
-            BoxesObjective::Mota => Self::Mota,
-        }
-    }
 }
 
 /// A config with the settings that are tried.
@@ -215,7 +186,7 @@ impl Bench<'_> {
             |done| say_progress(done, contestant.settings.len()),
         )
         .map_err(Failure::failed)?;
-        Ok((leave_one_out(&figures, self.args.objective.into()), figures.len()))
+        Ok((leave_one_out(&figures, self.args.objective), figures.len()))
     }
 
     /// Returns the chosen settings as text.

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use crate::tuning::Objective;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use tagalong_app::format::TableFormat;
 
 use crate::folder::FolderArgs;
@@ -31,8 +31,8 @@ pub struct RoomsArgs {
     #[arg(long, value_name = "DIR")]
     pub logs_dir: Option<PathBuf>,
     /// The objective: the mean of this figure over the rooms is maximised.
-    #[arg(long, value_enum, default_value_t)]
-    pub objective: ObjectiveChoice,
+    #[arg(long, value_enum, default_value_t = Objective::Hota)]
+    pub objective: Objective,
     /// Most settings that are tried for a pipeline, its own among them: all combinations where they
     /// are so few, otherwise a sample.
     #[arg(long, value_name = "N", default_value_t = 32,
@@ -50,29 +50,4 @@ pub struct RoomsArgs {
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
-}
-
-/// Figure to maximise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum ObjectiveChoice {
-    /// Detection and association, with equal weight.
-    #[default]
-    #[value(name = "HOTA")]
-    Hota,
-    /// Association.
-    #[value(name = "IDF1")]
-    Idf1,
-    /// Detection, with few false positives.
-    #[value(name = "MOTA")]
-    Mota,
-}
-
-impl From<ObjectiveChoice> for Objective {
-    fn from(choice: ObjectiveChoice) -> Self {
-        match choice {
-            ObjectiveChoice::Hota => Self::Hota,
-            ObjectiveChoice::Idf1 => Self::Idf1,
-            ObjectiveChoice::Mota => Self::Mota,
-        }
-    }
 }

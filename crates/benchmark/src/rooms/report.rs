@@ -98,7 +98,7 @@ impl Report {
         contestants: &[Contestant],
         desk: &Desk<'_>,
     ) -> Result<Self, Failure> {
-        let objective = args.objective.into();
+        let objective = args.objective;
         let rooms = locations.iter().map(|location| About {
             name: location.name.clone(),
             about: location.about.clone(),

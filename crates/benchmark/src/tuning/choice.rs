@@ -1,3 +1,4 @@
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use tagalong_eval::Scores;
 
@@ -27,20 +28,23 @@ pub struct Figures {
 }
 
 /// Figure to maximise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 pub enum Objective {
-    /// HOTA.
-    #[default]
+    /// Detection and association, with equal weight.
     #[serde(rename = "HOTA")]
+    #[value(name = "HOTA")]
     Hota,
     /// The mean of HOTA and IDF1.
     #[serde(rename = "HOTA and IDF1")]
+    #[value(name = "both")]
     HotaAndIdf1,
-    /// IDF1.
+    /// Association.
     #[serde(rename = "IDF1")]
+    #[value(name = "IDF1")]
     Idf1,
-    /// MOTA.
+    /// Detection, with few false positives.
     #[serde(rename = "MOTA")]
+    #[value(name = "MOTA")]
     Mota,
 }
 

@@ -1,7 +1,7 @@
 //! `people-floor.csv`: people annotated in laser scans, in the frame of the laser. The first line
 //! names the columns; scans are numbered from 0.
 
-use super::{FormatError, Table};
+use super::{FormatError, Line, Table};
 use crate::FloorPoint;
 
 /// One annotated person in one scan.
@@ -32,29 +32,33 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let [scan, id, ignore, source] =
         [column("scan")?, column("id")?, column("ignore")?, column("source")?];
     let [x, y] = [column("x_laser_m")?, column("y_laser_m")?];
-    let row = |line: &super::Line<'_>| {
-        // An empty field is a place that is not known.
-        let known = |name: &str| {
-            let at = table.find(name);
-            let at = at.filter(|at| line.fields.get(*at).is_some_and(|text| !text.is_empty()));
-            at.map(|at| line.number(at, name)).transpose()
-        };
-        let both = |[x, y]: [&str; 2]| {
-            Ok::<_, FormatError>(known(x)?.zip(known(y)?).map(<[f64; 2]>::from))
-        };
-        let robot_m = both(["x_robot_m", "y_robot_m"])?;
-        let odom_m = both(["x_odom_m", "y_odom_m"])?;
+    let rows = table.rows.iter().map(|line| {
         let at_m = [line.number(x.1, x.0)?, line.number(y.1, y.0)?];
         Ok(Row {
             scan: line.frame(scan.1, 0)?,
             person: FloorPoint { id: line.whole(id.1, id.0)?, at_m },
-            robot_m,
-            odom_m,
+            robot_m: place(&table, line, ["x_robot_m", "y_robot_m"])?,
+            odom_m: place(&table, line, ["x_odom_m", "y_odom_m"])?,
             ignore: line.number(ignore.1, ignore.0)? != 0.0,
             annotated: line.text(source.1, source.0)? == "annotated",
         })
-    };
-    table.rows.iter().map(row).collect()
+    });
+    rows.collect()
+}
+
+/// Returns a place of two columns; `None` if it is not known: a column is not there, or its field is
+/// empty.
+fn place(
+    table: &Table<'_>,
+    line: &Line<'_>,
+    names: [&str; 2],
+) -> Result<Option<[f64; 2]>, FormatError> {
+    let [x, y] = names.map(|name| {
+        let at = table.find(name);
+        let at = at.filter(|at| line.fields.get(*at).is_some_and(|text| !text.is_empty()));
+        at.map(|at| line.number(at, name)).transpose()
+    });
+    Ok(x?.zip(y?).map(<[f64; 2]>::from))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! `tracks-metres.csv`: the places of tracks as a run writes them. The first
 //! line names the columns; frames are numbered from 1.
 
-use super::{FormatError, Table};
+use super::{FormatError, Line, Table};
 use crate::types::Report;
 
 /// One track in one frame.
@@ -52,21 +52,15 @@ impl Row {
 /// A missing column or something that is no number.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let table = Table::new(text, file)?;
-    let place = |frame: &str| -> Result<[usize; 3], FormatError> {
-        let column = |axis: &str| table.column(&format!("{axis}_{frame}_m"));
-        Ok([column("x")?, column("y")?, column("z")?])
-    };
     let stamp = table.column("stamp_ns")?;
     let frame = table.column("frame")?;
     let id = table.column("id")?;
-    let robot = place("robot")?;
-    let odom = place("odom")?;
+    let robot =
+        [table.column("x_robot_m")?, table.column("y_robot_m")?, table.column("z_robot_m")?];
+    let odom = [table.column("x_odom_m")?, table.column("y_odom_m")?, table.column("z_odom_m")?];
     let seen = table.column("seen")?;
     let mut rows = Vec::new();
     for line in &table.rows {
-        let point = |at: [usize; 3]| -> Result<[f64; 3], FormatError> {
-            Ok([line.number(at[0], "x")?, line.number(at[1], "y")?, line.number(at[2], "z")?])
-        };
         let stamp = line.text(stamp, "stamp_ns")?;
         rows.push(Row {
             line: line.number,
@@ -75,15 +69,19 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
             })?,
             frame: line.frame(frame, 1)?,
             id: line.whole(id, "id")?,
-            head_in_robot_m: point(robot)?,
+            head_in_robot_m: point(line, robot)?,
             head_in_odom_m: match line.text(odom[0], "x")? {
                 "NaN" => [f64::NAN; 3],
-                _ => point(odom)?,
+                _ => point(line, odom)?,
             },
             seen: line.number(seen, "seen")? != 0.0,
         });
     }
     Ok(rows)
+}
+
+fn point(line: &Line<'_>, [x, y, z]: [usize; 3]) -> Result<[f64; 3], FormatError> {
+    Ok([line.number(x, "x")?, line.number(y, "y")?, line.number(z, "z")?])
 }
 
 /// Refuses frames beyond the end of a sequence.

@@ -52,14 +52,12 @@ impl Rules {
     /// As [`parse`]; lines with and without a class in one file: the first without.
     pub fn of_truth(text: &str, file: &str) -> Result<Self, FormatError> {
         let rows = parse(text, file)?;
-        let has_class = |row: &Row| row.known_class().is_some();
-        let has_places = || {
-            lines(text, file).all(|line| line.fields.len() >= MOT15_FIELDS)
-                && rows.iter().any(|row| row.class.is_some_and(|class| class.fract() != 0.0))
-        };
-        match rows.iter().find(|row| !has_class(row)) {
+        let has_places = lines(text, file).all(|line| line.fields.len() >= MOT15_FIELDS)
+            && rows.iter().any(|row| row.class.is_some_and(|class| class.fract() != 0.0));
+        let is_mixed = rows.iter().any(|row| row.known_class().is_some()) && !has_places;
+        match rows.iter().find(|row| row.known_class().is_none()) {
             None if !rows.is_empty() => Ok(Self::Mot17),
-            Some(row) if rows.iter().any(has_class) && !has_places() => Err(row.error(
+            Some(row) if is_mixed => Err(row.error(
                 file,
                 format!(
                     "{}, and other lines have one; correct the line, or say whose rules the file \

@@ -108,9 +108,9 @@ impl Page<'_> {
         // At least 1, because no candidate may have been dropped.
         let all = counts.values().sum::<u64>().max(1) as f64;
         let head = html! { (column("Test", None)) (column("Dropped", None)) (column("Share", None)) th scope="col" class="picture" { "Dropped, as a bar" } };
-        let row = |test: &str| {
-            let count = counts[test] as f64;
-            html! {
+        let body = html! {
+            @for test in &order {
+                @let count = counts[test] as f64;
                 tr.(series_class(self.series(pipeline))) {
                     th scope="row" { (test) }
                     (cell(count, &html! { (thousands(counts[test])) }))
@@ -119,7 +119,6 @@ impl Page<'_> {
                 }
             }
         };
-        let body = html! { @for test in &order { (row(test)) } };
         Some(table(
             &format!("Funnel of {pipeline}"),
             &key(self.series(pipeline), pipeline),

@@ -143,20 +143,16 @@ impl Page<'_> {
             (column("Log", None))
             @for (rank, (name, _)) in columns.iter().enumerate() { (self.column_of(rank, name)) }
         };
-        let row = |log: &str| {
-            let best = columns
-                .iter()
-                .filter_map(|(_, v)| v.get(log))
-                .copied()
-                .fold(f64::NEG_INFINITY, f64::max);
-            html! {
+        let body = html! {
+            @for log in logs {
+                @let known = columns.iter().filter_map(|(_, values)| values.get(log).copied());
+                @let best = known.fold(f64::NEG_INFINITY, f64::max);
                 tr {
                     th scope="row" { (log) }
                     @for (_, values) in &columns { (log_cell(values.get(log).copied(), best, columns.len())) }
                 }
             }
         };
-        let body = html! { @for log in logs { (row(log)) } };
         let name = format!("{} of each log {}", MAIN.name, place_where(place));
         html! {
             details class="print" {

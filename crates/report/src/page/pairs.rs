@@ -173,8 +173,8 @@ impl Page<'_> {
             (column("Log", None)) (column("Seed", None)) (column("Time [s]", None)) (column("Frame", None))
             (column("Only with", None)) (column("Kind", None)) (column("What", None))
         };
-        let row = |d: &Difference<'_>| {
-            html! {
+        let body = html! {
+            @for d in all.iter().take(most) {
                 tr data-kind=(d.event.kind) {
                     th scope="row" { (d.log) }
                     (cell(d.seed as f64, &html! { (d.seed) }))
@@ -186,7 +186,6 @@ impl Page<'_> {
                 }
             }
         };
-        let body = html! { @for d in all.iter().take(most) { (row(d)) } };
         let caption = html! {
             "Events that happened to one of them only, in time. Events of one kind and person within "
             (number(SAME_EVENT_S, 1)) " s of each other count as the same."

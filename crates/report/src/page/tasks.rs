@@ -15,18 +15,17 @@ impl Page<'_> {
         let lost: Vec<&TaskResult> =
             self.view.tasks.iter().copied().filter(|t| t.data_lost).collect();
         let head = html! { (column("Pipeline", None)) (column("Log", None)) (column("Seed", None)) (column("Outcome", None)) (column("Why", None)) };
-        let row = |task: &TaskResult, (outcome, why): (&str, &str)| {
-            html! {
+        let body = html! {
+            @for (task, (outcome, why)) in &not_done {
                 tr {
                     th scope="row" { (key(self.series(&task.pipeline), &task.pipeline)) }
                     td class="log" { (task.log) }
                     (cell(task.seed as f64, &html! { (task.seed) }))
-                    td { @if outcome == "failed" { strong class="bad" { "✕ failed" } } @else { (outcome) } }
+                    td { @if *outcome == "failed" { strong class="bad" { "✕ failed" } } @else { (outcome) } }
                     td class="why" { (why) }
                 }
             }
         };
-        let body = html! { @for (task, why) in &not_done { (row(task, *why)) } };
         (!not_done.is_empty() || !lost.is_empty()).then(|| html! {
             p { "None of these enters a mean. A pipeline with fewer logs than another is marked, and is never called the best." }
             @if !not_done.is_empty() {
