@@ -71,7 +71,7 @@ pub fn check_log_path(path: &Path) -> Result<(), Failure> {
         let Err(error) = LogFiles::of(path) else { return Ok(()) };
         let message = match mcap_files(path).unwrap_or_default().first() {
             Some(file) => {
-                format!("{shown} is a folder; give a file in it, for example {}", file.display())
+                format!("{shown} is a directory; give a file in it, for example {}", file.display())
             }
             None if has_images(path) => format!(
                 "{shown} is a folder of images; `tagalong import images {shown} --fps 15 --view 69` \

@@ -43,7 +43,7 @@ const FINE: [&str; 6] = [
 ];
 
 /// Other mistakes: command, exit code, and parts of the message.
-const OTHERS: [(&str, i32, &[&str]); 50] = [
+const OTHERS: [(&str, i32, &[&str]); 51] = [
     ("run nearest.toml no-depth.mcap -o out", 1, &["depth"]),
     ("check nearest.toml no-depth.mcap", 1, &["depth"]),
     ("run typo.toml good.mcap -o out", 2, &["typo.toml:4", "did you mean `roles`"]),
@@ -92,6 +92,7 @@ const OTHERS: [(&str, i32, &[&str]); 50] = [
     ("run input.toml good.mcap", 2, &["depth_tropic", "depth_topic"]),
     ("run output.toml good.mcap", 2, &["report_unseen_s"]),
     ("run nearest.toml goood.mcap", 1, &["no such file", "did you mean `good.mcap`"]),
+    ("run good.mpac", 2, &["did you mean the log", "good.mcap"]),
     ("run nearest.toml logs", 1, &["directory", "inside.mcap"]),
     ("run nearest.toml old.bag", 1, &["rosbag fix"]),
     ("inspect bag.db3", 1, &["bag.db3", "rosbag2 database"]),
