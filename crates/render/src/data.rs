@@ -1,9 +1,13 @@
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point2};
-use tagalong_core::{Frame, Images};
+use tagalong_core::{Frame, Images, PointCloud};
 use tagalong_geometry::Camera;
 use tagalong_pipeline::FrameReport;
+
+/// Heights of the points of a lidar that are shown, m.
+const TRUNKS_M: Range<f64> = 0.9..1.1;
 
 /// Data that a picture of one frame shows.
 pub struct OverlayData {
@@ -11,8 +15,10 @@ pub struct OverlayData {
     pub camera: Arc<Camera>,
     /// Images of the frame; shared, not copied.
     pub images: Images,
-    /// Points of the laser scan in the robot frame, m.
+    /// Points of the laser scan in the robot frame, or of a lidar at the height of trunks, m.
     pub scan: Vec<Point2<f64>>,
+    /// True if a lidar sees people on all sides.
+    pub is_around: bool,
     /// Pose of the robot in the odometry frame.
     pub odom_from_robot: Isometry2<f64>,
     /// Report of the pipeline.
@@ -23,9 +29,14 @@ impl OverlayData {
     /// Returns the data of a frame.
     pub fn of(frame: &Frame, odom_from_robot: Isometry2<f64>, report: FrameReport) -> Self {
         let points = frame.scan().map_or(&[][..], |scan| &scan.points);
-        let scan = points.iter().map(|point| point.xy()).collect();
+        let mut scan: Vec<Point2<f64>> = points.iter().map(|point| point.xy()).collect();
+        let cloud = frame.sensor::<PointCloud>().ok();
+        if let Some(cloud) = cloud {
+            let trunks = cloud.points.iter().filter(|point| TRUNKS_M.contains(&point.z));
+            scan.extend(trunks.map(|point| point.xy()));
+        }
         let camera = frame.camera.clone();
         let images = frame.images();
-        Self { camera, images, scan, odom_from_robot, report }
+        Self { camera, images, scan, is_around: cloud.is_some(), odom_from_robot, report }
     }
 }

@@ -77,8 +77,9 @@ pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize, style: Ov
     let area = Rect::new(0.0, 0.0, scene.camera.width as f64, scene.camera.height as f64);
     for track in style.tracks(scene) {
         let region = style.region(scene, track);
-        // A label at the border for a predicted person outside of the image explains nothing there.
-        if !track.seen && region.intersection(&area).area() <= 0.0 {
+        // A person that another sensor sees has no box. A label at the border for a predicted person
+        // outside of the image explains nothing there.
+        if region.width <= 0.0 || !track.seen && region.intersection(&area).area() <= 0.0 {
             continue;
         }
         let region = scaled(&region, by as f64);

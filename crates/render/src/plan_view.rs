@@ -8,11 +8,11 @@ use super::labels::Labels;
 use super::style::{OverlayStyle, colour, colour_of};
 use super::trails::Trails;
 
-/// Reach of the view ahead of the robot, m.
-const AHEAD_M: f64 = 8.0;
+/// Reach of the view ahead of the robot and behind it, m.
+const REACH_M: [f64; 2] = [8.0, 1.0];
 
-/// Reach of the view behind the robot, m.
-const BEHIND_M: f64 = 1.0;
+/// The same where people are seen on all sides, m.
+const REACH_AROUND_M: [f64; 2] = [5.0, 4.0];
 
 /// Half the side of the square around a person that labels spare, pixels.
 const MARK_PX: f64 = 8.0;
@@ -32,14 +32,18 @@ struct Plan {
     robot: Point2<f64>,
     px_per_m: f64,
     width: f64,
+    /// Reach ahead and behind, m.
+    reach_m: [f64; 2],
 }
 
 impl Plan {
-    fn new(height: usize) -> Self {
-        let px_per_m = height as f64 / (AHEAD_M + BEHIND_M);
+    fn new(height: usize, is_around: bool) -> Self {
+        let reach_m = if is_around { REACH_AROUND_M } else { REACH_M };
+        let [ahead_m, behind_m] = reach_m;
+        let px_per_m = height as f64 / (ahead_m + behind_m);
         let width = width_px(height) as f64;
-        let robot = Point2::new(0.5 * width, AHEAD_M * px_per_m);
-        Self { robot, px_per_m, width }
+        let robot = Point2::new(0.5 * width, ahead_m * px_per_m);
+        Self { robot, px_per_m, width, reach_m }
     }
 
     fn pixel(&self, forward_m: f64, left_m: f64) -> Point2<f64> {
@@ -65,11 +69,11 @@ impl Plan {
 
 /// Renders the people from above, `height` pixels high.
 pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: usize) -> Canvas {
-    let plan = Plan::new(height);
+    let plan = Plan::new(height, scene.is_around);
     let mut canvas = Canvas::new(width_px(height), height, [24, 24, 28]);
     draw_grid(&mut canvas, &plan);
     // A frame without an image has a camera that sees nothing.
-    if !scene.camera.is_blind() {
+    if !scene.camera.is_blind() && !scene.is_around {
         draw_field_of_view(&mut canvas, &plan, scene);
     }
     for point in &scene.scan {
@@ -105,13 +109,14 @@ fn labels(scene: &OverlayData, plan: &Plan, style: OverlayStyle, height: usize) 
 
 /// Renders a line every metre, its number every second one.
 fn draw_grid(canvas: &mut Canvas, plan: &Plan) {
+    let [ahead_m, behind_m] = plan.reach_m;
     let sides = (0.5 * plan.width / plan.px_per_m).ceil();
     for metre in -(sides as i32)..=sides as i32 {
         let column = plan.pixel(0.0, f64::from(metre)).x;
-        let ends = [plan.pixel(AHEAD_M, 0.0).y, plan.pixel(-BEHIND_M, 0.0).y];
+        let ends = [plan.pixel(ahead_m, 0.0).y, plan.pixel(-behind_m, 0.0).y];
         canvas.line(Point2::new(column, ends[0]), Point2::new(column, ends[1]), GRID);
     }
-    for metre in -(BEHIND_M as i32)..=AHEAD_M as i32 {
+    for metre in -(behind_m as i32)..=ahead_m as i32 {
         let row = plan.pixel(f64::from(metre), 0.0).y;
         canvas.line(Point2::new(0.0, row), Point2::new(plan.width, row), GRID);
         if metre > 0 && metre % 2 == 0 {

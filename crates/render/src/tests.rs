@@ -39,6 +39,7 @@ fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> OverlayData {
     report.tracks = tracks.iter().map(|id| track(*id, &camera)).collect();
     OverlayData {
         scan: Vec::new(),
+        is_around: false,
         images: Images { depth, ..Images::default() },
         odom_from_robot: Isometry2::identity(),
         report,
@@ -113,6 +114,24 @@ fn points_of_a_scan_are_in_the_plan() {
     // 3 m ahead and 1 m to the left, by 50 pixels a metre, of a robot at column 180 and row 400.
     let at = |k: &usize| (k % 360).abs_diff(130) <= 1 && (k / 360).abs_diff(250) <= 1;
     assert!(!changed.is_empty() && changed.iter().all(at), "{changed:?}");
+}
+
+#[test]
+fn a_person_behind_the_robot_is_in_the_plan_of_a_lidar_and_has_no_label_in_the_image() {
+    let mut behind = scene(&[1], Vec::new());
+    behind.report.tracks[0].estimate.person.position.x = -3.0;
+    behind.report.tracks[0].estimate.region = Rect::default();
+    assert!(image_view::placed_labels(&behind, OverlayStyle::default()).bars().is_empty());
+    // 3 m behind a robot at row 250, by 50 pixels a metre.
+    for is_around in [true, false] {
+        let empty = OverlayData { is_around, ..scene(&[], Vec::new()) };
+        behind.is_around = is_around;
+        let [with, without] = [&behind, &empty].map(|scene| {
+            plan_view::draw(scene, &Trails::default(), OverlayStyle::default(), 450).into_image()
+        });
+        let pixels = changed(&with, &without, 0..360, 380..420);
+        assert_eq!(pixels > 20, is_around, "{pixels}");
+    }
 }
 
 #[test]

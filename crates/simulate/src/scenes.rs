@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 61] = [
+const BUILT_IN: [(&str, &str); 63] = [
     ("among-circular", include_str!("../configs/scenes/among-circular.toml")),
     ("among-clutter", include_str!("../configs/scenes/among-clutter.toml")),
     ("among-corridor", include_str!("../configs/scenes/among-corridor.toml")),
@@ -52,6 +52,8 @@ const BUILT_IN: [(&str, &str); 61] = [
     ("follow-turns", include_str!("../configs/scenes/follow-turns.toml")),
     ("following", include_str!("../configs/scenes/following.toml")),
     ("full-occlusion", include_str!("../configs/scenes/full-occlusion.toml")),
+    ("lidar-rings", include_str!("../configs/scenes/lidar-rings.toml")),
+    ("lidar-rosette", include_str!("../configs/scenes/lidar-rosette.toml")),
     ("mirrors", include_str!("../configs/scenes/mirrors.toml")),
     ("office", include_str!("../configs/scenes/office.toml")),
     ("office-high", include_str!("../configs/scenes/office-high.toml")),
