@@ -94,7 +94,7 @@ fn people_are_found_from_every_height_and_the_near_one_without_a_head() {
     assert!(sigmas.iter().any(|sigma| (sigma - unseen).abs() < 1e-9), "{sigmas:?}");
 }
 
-/// What a lidar in the middle of a room sees of this pattern, with people on three sides.
+/// A frame of a lidar of this pattern in the middle of a room, with people on three sides.
 fn around(lidar: &str) -> (Frame, Vec<Truth>) {
     let text = format!(
         "seed = 5
