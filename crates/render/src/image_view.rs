@@ -102,6 +102,10 @@ pub fn placed_labels(scene: &OverlayData, style: OverlayStyle) -> Labels {
 /// Renders the box of a track, thick if it is seen and thin if it is only predicted, with a dark
 /// rim that sets it off from bright images.
 pub fn draw_box(canvas: &mut Canvas, region: &Rect, seen: bool, ink: Ink) {
+    // A person that another sensor sees has no box.
+    if region.width <= 0.0 {
+        return;
+    }
     let thick = if seen { 3 } else { 1 };
     let rim = Rect::new(region.x - 1.0, region.y - 1.0, region.width + 2.0, region.height + 2.0);
     canvas.outline(&rim, thick + 2, Ink::solid([0; 3]).faint(0.5));

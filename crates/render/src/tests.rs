@@ -122,6 +122,10 @@ fn a_person_behind_the_robot_is_in_the_plan_of_a_lidar_and_has_no_label_in_the_i
     behind.report.tracks[0].estimate.person.position.x = -3.0;
     behind.report.tracks[0].estimate.region = Rect::default();
     assert!(image_view::placed_labels(&behind, OverlayStyle::default()).bars().is_empty());
+    let [with, without] = [&behind, &scene(&[], Vec::new())].map(|scene| {
+        image_view::draw(scene, &Trails::default(), OverlayStyle::default()).into_image()
+    });
+    assert!(with == without, "there is no box");
     // 3 m behind a robot at row 250, by 50 pixels a metre.
     for is_around in [true, false] {
         let empty = OverlayData { is_around, ..scene(&[], Vec::new()) };
