@@ -89,8 +89,8 @@ pub(crate) struct Topic {
     /// Camera of a point cloud in rows and columns, and the reason for which there is none.
     pub(crate) cloud: Option<CloudCamera>,
     pub(crate) cloud_fault: Option<String>,
-    /// True for points that can be read and are not those of a camera.
-    pub(crate) is_lidar: bool,
+    /// True for points that can be read, also if they are not those of a camera.
+    pub(crate) has_points: bool,
     pub(crate) frame_id: Option<String>,
     pub(crate) stamps: Vec<Stamp>,
     /// Times at which the messages with these stamps were recorded.
@@ -345,7 +345,7 @@ impl Gathering {
             size: None,
             cloud: None,
             cloud_fault: None,
-            is_lidar: false,
+            has_points: false,
             frame_id: None,
             stamps: Vec::new(),
             recorded: Vec::new(),
@@ -412,7 +412,8 @@ impl Gathering {
                 }
                 Err(error) => {
                     topic.cloud_fault = Some(error.to_string());
-                    topic.is_lidar |= points_of_cloud(&cloud, &Limits::default()).is_ok();
+                    topic.has_points =
+                        topic.has_points || points_of_cloud(&cloud, &Limits::default()).is_ok();
                 }
             }
         }
@@ -490,6 +491,11 @@ impl Topic {
     /// Returns the reason for which no message can be used, although all can be decoded.
     pub(crate) fn impossible(&self) -> Option<&str> {
         self.fault.as_deref().filter(|_| self.faulty == self.count)
+    }
+
+    /// Returns true for points that are not those of a camera.
+    pub(crate) fn is_lidar(&self) -> bool {
+        self.has_points && self.cloud.is_none()
     }
 
     /// Returns the first and the last stamp in time.

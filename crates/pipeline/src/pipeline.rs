@@ -57,7 +57,7 @@ impl Pipeline {
         }
         let mut restricted = frame.restricted_to(&self.inputs);
         if let (true, Ok(cloud)) = (self.inputs.are_of_points(), frame.sensor::<PointCloud>()) {
-            // Nobody leaves the view at the edge of an image that is not used.
+            // No person leaves the view at the edge of an image that is not used.
             let at = Isometry3::from(cloud.scanner.coords);
             let used = restricted.as_ref().unwrap_or(frame);
             restricted = Some(used.with_camera(Arc::new(Camera::blind(at))));

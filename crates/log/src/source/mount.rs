@@ -29,16 +29,20 @@ impl Mount {
         input: &InputSettings,
         mirror: bool,
     ) -> Option<Self> {
-        let Some(mount) = input.mount() else {
-            let base = robot_frame(scan, input);
-            let camera = camera.filter(|camera| scan.tf.connects(base, camera))?;
-            return Some(Self::Tf { base: base.to_owned(), camera: camera.to_owned() });
-        };
+        let Some(mount) = input.mount() else { return Self::of_tf(scan, camera, input) };
         let source = "[input.camera] of the config".into();
         if mirror {
             return Some(Self::Fixed { pose: ConicalMirror::upright(mount.height_m), source });
         }
         Some(Self::fixed(mount, source))
+    }
+
+    /// Returns the mount of the sensor with this frame from tf; `None` if tf does not connect it with the
+    /// robot.
+    pub(super) fn of_tf(scan: &Scan, frame: Option<&str>, input: &InputSettings) -> Option<Self> {
+        let base = robot_frame(scan, input);
+        let camera = frame.filter(|frame| scan.tf.connects(base, frame))?;
+        Some(Self::Tf { base: base.to_owned(), camera: camera.to_owned() })
     }
 
     pub(super) fn fixed(mount: &MountSettings, source: String) -> Self {

@@ -452,14 +452,16 @@ fn odom_frames(
 /// Returns the mount from tf, the settings, or the floor in the first depth images.
 fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     let camera = plan.scan.frame_of(plan.primary());
+    if plan.is_of_points() {
+        // The pose of [input.camera] is that of a camera, whose axes are others.
+        return Mount::of_tf(&plan.scan, camera, &plan.input).ok_or_else(|| {
+            let wanted = "pose of the lidar: tf does not connect it with the robot".to_owned();
+            missing(&plan.scan, wanted, "; record /tf_static with its mount".to_owned())
+        });
+    }
     let mirror = plan.lens.is_some_and(|lens| lens.mirror.is_some());
     if let Some(mount) = Mount::find(&plan.scan, camera, &plan.input, mirror) {
         return Ok(mount);
-    }
-    if plan.is_of_points() {
-        let wanted = "pose of the lidar: tf does not connect it with the robot".to_owned();
-        let hint = "; record /tf_static, or give height and tilt in [input.camera]".to_owned();
-        return Err(missing(&plan.scan, wanted, hint));
     }
     if plan.is_of_scans() {
         return Ok(Mount::scanner_at_origin());

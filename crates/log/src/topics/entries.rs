@@ -45,7 +45,7 @@ impl Judge<'_> {
         let sensor = SENSORS.iter().find(|sensor| is_of(sensor, topic));
         // Where depth is wanted and none is there, what matters is why these points are none.
         let lacks_depth = self.inputs.uses(Input::Depth) && self.chosen.depth.is_none();
-        let sensor = sensor.filter(|_| !(topic.is_lidar && lacks_depth));
+        let sensor = sensor.filter(|_| !(topic.is_lidar() && lacks_depth));
         let is_known = is_image(topic) || is_odometry(topic) || sensor.is_some();
         if !is_known && unreadable(topic).is_none() {
             return None;

@@ -11,7 +11,7 @@ pub(super) fn is_picture(topic: &Topic) -> bool {
 
 /// Returns true for images, those of disparity and the points of depth cameras included.
 pub(super) fn is_image(topic: &Topic) -> bool {
-    let is_cloud = topic.kind == Type::PointCloud && !topic.is_lidar;
+    let is_cloud = topic.kind == Type::PointCloud && !topic.is_lidar();
     is_picture(topic) || topic.kind == Type::DisparityImage || is_cloud
 }
 
@@ -101,7 +101,8 @@ pub(super) fn is_odometry(topic: &Topic) -> bool {
 /// Returns true for a topic with messages of this sensor, in an encoding that can be read. Points are
 /// those of a lidar only where they are not those of a camera.
 pub(super) fn is_of(sensor: &SensorType, topic: &Topic) -> bool {
-    let is_sensor = topic.kind == Type::Sensor || topic.kind == Type::PointCloud && topic.is_lidar;
+    let is_sensor =
+        topic.kind == Type::Sensor || topic.kind == Type::PointCloud && topic.is_lidar();
     is_sensor && sensor.reads(&topic.schema)
 }
 

@@ -175,7 +175,7 @@ fn a_lidar_without_a_pose_is_an_error_and_one_that_is_not_used_is_told() {
     let mut log = LogWriter::plain();
     log.message("/points", at(0.1), &lidar(at(0.1)));
     let error = opened_with(log, POINTS).err().unwrap();
-    assert!(error.contains("pose of the lidar") && error.contains("[input.camera]"), "{error}");
+    assert!(error.contains("pose of the lidar") && error.contains("/tf_static"), "{error}");
     let mut log = lidar_log();
     log.info("/camera/color/camera_info", "colour", &camera(16, 12, 14.0));
     log.colour(at(0.1));
