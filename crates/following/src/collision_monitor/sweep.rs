@@ -5,7 +5,8 @@
 //! `L = v t + v²/2a` and the time `T = t + v/a`. An obstacle that stands is cleared if the robot stops
 //! before its footprint, swept along the path, comes nearer than the clearance. A person may come
 //! nearer in that time, and until the wheels stand after it, by `reach(T)`; with speed u at once that
-//! is the distance of ISO 13855, `S = (u + v) t + u v/a + v²/2a + C`, where C is `protective_m`.
+//! is the distance of ISO 13855, `S = (u + v) t + u v/a + v²/2a + C`, where C is `protective_m`. A turn in
+//! place brings the robot nearer to nobody: a person is expected to go on at the speed that they have.
 
 use nalgebra::Point2;
 use tagalong_core::Reason;
@@ -227,7 +228,7 @@ impl<'a> Sweep<'a> {
         let [most, gentle] = delays.map(|delay_s| match hazard.kind {
             HazardKind::Still => self.speed_before(delay_s),
             HazardKind::Moves(closing) => self.speed_beside(delay_s, |time_s| {
-                reach_m(self.settings, closing, time_s) + self.settings.protective_m
+                self.comes_m(closing, time_s) + self.settings.protective_m
             }),
             HazardKind::Followed(closing) => self.speed_beside(delay_s, |time_s| {
                 closing.max(0.0) * time_s + self.settings.followed_stop_m
@@ -237,13 +238,23 @@ impl<'a> Sweep<'a> {
         (gentle < self.speed).then_some(Limit { gentle, most, points: hazard.points, is_person })
     }
 
+    /// Returns the distance, m, by which a person may be nearer after `time_s`.
+    fn comes_m(&self, closing_mps: f64, time_s: f64) -> f64 {
+        match self.path {
+            Path::Arc { .. } => reach_m(self.settings, closing_mps, time_s),
+            // The robot stays where it is: only a person who is on the way already meets it while it
+            // turns. Otherwise nobody could stand beside a robot that looks for the person it lost.
+            Path::Turn { .. } => closing_mps.clamp(0.0, self.settings.people_mps) * time_s,
+        }
+    }
+
     /// Returns the largest distance that may matter between the swept area and the hazard, m.
     fn margin_m(&self, hazard: &Hazard) -> f64 {
         let time_s = self.braking.time_s(self.speed, self.braking.reaction_s + self.braking.rise_s);
         match hazard.kind {
             HazardKind::Still => self.settings.stop_m.max(self.settings.side_m),
             HazardKind::Moves(closing) => {
-                reach_m(self.settings, closing, time_s) + self.settings.protective_m
+                self.comes_m(closing, time_s) + self.settings.protective_m
             }
             HazardKind::Followed(closing) => {
                 closing.max(0.0) * time_s + self.settings.followed_stop_m
@@ -471,6 +482,18 @@ mod tests {
         assert!((reach_m(&settings, 1.6, 0.5) - 0.8).abs() < 1e-12);
         assert!((reach_m(&settings, 9.0, 0.5) - 0.8).abs() < 1e-12);
         assert_eq!(reach_m(&settings, -1.6, 0.5), 0.0);
+    }
+
+    #[test]
+    fn beside_a_person_who_stands_the_robot_turns_and_does_not_drive() {
+        let turn = Path::Turn { left: true };
+        let gap_m = 0.65 - octagon().front_m();
+        assert!(gap_m > CollisionMonitorSettings::default().protective_m);
+        assert_eq!(allowed(moving(0.65, 0.0, 0.0), AHEAD, 0.9).most, 0.0);
+        assert_eq!(allowed(moving(0.65, 0.0, 0.0), turn, 0.5), Allowance::FREE);
+        // One who comes, or is nearer than the protective distance, stops the turn, too.
+        assert_eq!(allowed(moving(0.65, 0.0, 1.2), turn, 0.5).most, 0.0);
+        assert_eq!(allowed(moving(0.4, 0.0, 0.0), turn, 0.5).most, 0.0);
     }
 
     #[test]
