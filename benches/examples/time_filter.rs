@@ -22,13 +22,8 @@ fn main() -> Result<()> {
     let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
     let motion = EgoMotion::at_rest(0.1);
     let frame = Frame::new(1, Stamp::default(), Arc::clone(&camera), motion, Images::default());
-    let seen = Detection {
-        image: None,
-        position: Point3::new(3.0, 0.0, 1.6),
-        covariance: Matrix3::identity() * 0.01,
-        score: 1.0,
-        source: "example",
-    };
+    let seen =
+        Detection::new("example", Point3::new(3.0, 0.0, 1.6), Matrix3::identity() * 0.01, 1.0);
     let mut filter = PerPerson::new(Ekf::new(Config::default())?);
     filter.start(TrackId(1), &seen, &camera);
     let matched = [Matched::certain(TrackId(1), &seen)];

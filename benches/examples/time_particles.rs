@@ -47,13 +47,8 @@ fn step() -> Result<f64> {
     let frame = Frame::new(1, Stamp::default(), Arc::clone(&camera), motion, Images::default());
     let config = Config { particles: 625, ..Config::default() };
     let mut filter = JointParticle::new(config, 1)?;
-    let first = Detection {
-        image: None,
-        position: Point3::new(3.0, 0.0, 1.6),
-        covariance: Matrix3::identity() * 0.01,
-        score: 1.0,
-        source: "example",
-    };
+    let first =
+        Detection::new("example", Point3::new(3.0, 0.0, 1.6), Matrix3::identity() * 0.01, 1.0);
     filter.start(TrackId(1), &first, &camera);
     let likelihood: Option<&dyn Likelihood> = Some(&Wide);
     let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };

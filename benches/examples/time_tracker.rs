@@ -58,13 +58,8 @@ impl Detector for Grid {
             let row = (i / side) as f64;
             let column = (i % side) as f64 - 0.5 * (side - 1) as f64;
             let position = Point3::new(2.0 + 1.1 * row + off(), 1.1 * column + off(), 1.6 + off());
-            Detection {
-                image: Some(ImageBox::upper_body(frame.camera.upper_body(&position))),
-                position,
-                covariance: Matrix3::identity() * 0.0025,
-                score: 4.0,
-                source: "grid",
-            }
+            Detection::new("grid", position, Matrix3::identity() * 0.0025, 4.0)
+                .with_image(ImageBox::upper_body(frame.camera.upper_body(&position)))
         });
         Ok(found.collect())
     }

@@ -1,10 +1,11 @@
 //! Results of a frame.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, ToPyArray as _};
 use pyo3::prelude::*;
-use tagalong::core::{Command, Stamp, Track};
+use tagalong::core::{Command, Joints, Stamp, Track, TrackId};
 use tagalong::geometry::Camera;
 use tagalong::pipeline::{FrameReport, Outcome};
 
@@ -13,13 +14,16 @@ use tagalong::pipeline::{FrameReport, Outcome};
 pub struct PyTrack {
     track: Track,
     image_box: Option<(f64, f64, f64, f64)>,
+    joints: Option<Arc<Joints>>,
 }
 
 impl PyTrack {
-    fn of(track: &Track, camera: &Camera) -> Self {
+    fn of(track: &Track, camera: &Camera, joints: &[(TrackId, Arc<Joints>)]) -> Self {
         let seen = track.estimate.region.clipped(camera.width, camera.height);
         let image_box = (seen.area() > 0.0).then_some((seen.x, seen.y, seen.width, seen.height));
-        Self { track: track.clone(), image_box }
+        let joints = joints.iter().find(|(id, _)| *id == track.id);
+        let joints = joints.map(|(_, joints)| Arc::clone(joints));
+        Self { track: track.clone(), image_box, joints }
     }
 }
 
@@ -56,6 +60,32 @@ impl PyTrack {
     #[getter]
     fn r#box(&self) -> Option<(f64, f64, f64, f64)> {
         self.image_box
+    }
+
+    /// Joints in the image by their names in COCO (`left_wrist`), each (x, y, score), pixels and 0 to 1;
+    /// None unless a detector of this frame found them.
+    #[getter]
+    fn joints(&self) -> Option<BTreeMap<&'static str, (f64, f64, f64)>> {
+        let joints = self.joints.as_ref()?.iter();
+        Some(
+            joints
+                .map(|(name, joint)| (name.name(), (joint.at.x, joint.at.y, joint.score)))
+                .collect(),
+        )
+    }
+
+    /// Direction in which the body is turned, rad from the x axis of the robot's frame to the left; None
+    /// where joints do not show it.
+    #[getter]
+    fn body_direction(&self) -> Option<f64> {
+        let at = self.track.estimate.person.position;
+        self.joints.as_ref()?.body_direction_rad(at.y.atan2(at.x))
+    }
+
+    /// True if a hand is held above the head; None without joints.
+    #[getter]
+    fn raised_hand(&self) -> Option<bool> {
+        Some(self.joints.as_ref()?.has_raised_hand())
     }
 
     /// Probability that this is a person, smoothed over the track.
@@ -168,7 +198,9 @@ impl PyReport {
     /// # Errors
     /// An interpreter without memory.
     pub fn new(py: Python<'_>, report: FrameReport, camera: &Camera) -> PyResult<Self> {
-        let tracks = report.tracks.iter().map(|track| Py::new(py, PyTrack::of(track, camera)));
+        let joints = report.joints();
+        let each = report.tracks.iter();
+        let tracks = each.map(|track| Py::new(py, PyTrack::of(track, camera, &joints)));
         Ok(Self { tracks: tracks.collect::<PyResult<_>>()?, report })
     }
 

@@ -573,6 +573,7 @@ impl Bridge {
             odom_from_robot: &found.odom_from_robot,
             is_odom_known: true,
             tracks: &report.tracks,
+            joints: &report.joints(),
             target: report.target,
             command: report.command.map(|command| command.wheels),
         };

@@ -98,7 +98,7 @@ impl Skill {
         match serde_json::from_slice::<Enrollment>(body) {
             Ok(enrollment) => self.change(Verb::Enroll(enrollment)),
             Err(error) => {
-                let example = r#"send {"person": "nearest"}, "approach", {"track": 3} or {"point": [320, 240]}"#;
+                let example = r#"send {"person": "nearest"}, "approach", "raised-hand", {"track": 3} or {"point": [320, 240]}"#;
                 refused(400, &format!("{error}; {example}"))
             }
         }

@@ -76,6 +76,7 @@ pub(crate) fn offer(
     let verbs = [
         ("people/enroll_nearest", Verb::Enroll(Enrollment::of(Choice::Nearest))),
         ("people/enroll_approach", Verb::Enroll(Enrollment::of(Choice::Approach))),
+        ("people/enroll_raised_hand", Verb::Enroll(Enrollment::of(Choice::RaisedHand))),
         ("people/clear", Verb::Clear),
     ];
     for (name, verb) in verbs {
@@ -138,7 +139,7 @@ fn enroll(desk: &Desk, request: &SetParametersRequest) -> SetParametersResponse 
     SetParametersResponse { results: vec![result; request.parameter.len().max(1)] }
 }
 
-/// Parses `person` ("nearest" or "approach"), `track` or `point`, and the patience.
+/// Parses `person` ("nearest", "approach" or "raised-hand"), `track` or `point`, and the patience.
 fn enrollment(parameters: &[Parameter]) -> Result<Enrollment, String> {
     let mut person = None;
     let mut patience = Enrollment::of(Choice::Nearest);
@@ -182,6 +183,7 @@ fn named(value: &ParameterValue) -> Option<Choice> {
     match (value.ptype, value.string_value.as_str()) {
         (ParameterType::STRING, "nearest") => Some(Choice::Nearest),
         (ParameterType::STRING, "approach") => Some(Choice::Approach),
+        (ParameterType::STRING, "raised-hand") => Some(Choice::RaisedHand),
         _ => None,
     }
 }

@@ -39,6 +39,7 @@ impl fmt::Display for Verb {
                 Choice::Point([x, y]) => write!(f, "enroll the person at ({x}, {y})"),
                 Choice::Nearest => write!(f, "enroll the nearest person in front"),
                 Choice::Approach => write!(f, "enroll the person that walks up"),
+                Choice::RaisedHand => write!(f, "enroll the person that raises a hand"),
             },
         }
     }

@@ -238,10 +238,7 @@ mod tests {
         let position = Point3::new(2.0, 0.0, 1.6);
         let covariance = Matrix3::identity();
         let source = "eyes";
-        Candidate {
-            detection: Detection { image: None, position, covariance, score: 1.23456, source },
-            fate,
-        }
+        Candidate { detection: Detection::new(source, position, covariance, 1.23456), fate }
     }
 
     #[test]

@@ -73,13 +73,10 @@ impl Detector for NearestThing {
         let region = Rect::new(left, bounds.y - 0.025 * scale, side, side);
         let face = FaceDepth { depth_m, sigma_m: 0.05 };
         let PointEstimate { position, covariance } = frame.camera.locate_head(&region, face, 3.0);
-        Ok(vec![Detection {
-            image: Some(ImageBox::upper_body(region)),
-            position,
-            covariance,
-            score: 2.0,
-            source: "nearest-thing",
-        }])
+        Ok(vec![
+            Detection::new("nearest-thing", position, covariance, 2.0)
+                .with_image(ImageBox::upper_body(region)),
+        ])
     }
 }
 

@@ -36,11 +36,6 @@ pub fn frame(grey: GreyImage) -> Frame {
 
 /// Returns the candidate of that picture: 2 m ahead, of score 1.
 pub fn candidate() -> Detection {
-    Detection {
-        image: Some(ImageBox::upper_body(Rect::new(8.0, 8.0, 48.0, 48.0))),
-        position: Point3::new(2.0, 0.0, 1.6),
-        covariance: Matrix3::identity(),
-        score: 1.0,
-        source: "test",
-    }
+    Detection::new("test", Point3::new(2.0, 0.0, 1.6), Matrix3::identity(), 1.0)
+        .with_image(ImageBox::upper_body(Rect::new(8.0, 8.0, 48.0, 48.0)))
 }

@@ -27,13 +27,8 @@ const SIGMA_M: f64 = 0.1;
 /// deviation of 0.1 m.
 pub fn detection_at(x: f64, y: f64) -> Detection {
     let position = Point3::new(x, y, HEAD_M);
-    Detection {
-        image: Some(ImageBox::upper_body(level().upper_body(&position))),
-        position,
-        covariance: Matrix3::identity() * (SIGMA_M * SIGMA_M),
-        score: 2.0,
-        source: "sample",
-    }
+    Detection::new("sample", position, Matrix3::identity() * (SIGMA_M * SIGMA_M), 2.0)
+        .with_image(ImageBox::upper_body(level().upper_body(&position)))
 }
 
 /// Returns a detection 3 m ahead with this box of the whole body, for plugins that compare boxes.

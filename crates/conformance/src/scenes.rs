@@ -145,6 +145,7 @@ pub(crate) fn sighting(
         covariance: nalgebra::Matrix3::identity() * (sigma_m * sigma_m).max(1e-4),
         score: 3.0,
         source: "conformance",
+        joints: None,
     }
 }
 

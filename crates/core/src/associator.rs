@@ -111,7 +111,7 @@ impl Associations {
 /// # let covariance = Matrix3::identity();
 /// let found = [5.0, 2.5].map(|x| {
 ///     let position = [x, 0.0, 1.6].into();
-///     Detection { image: None, position, covariance, score: 1.0, source: "example" }
+///     Detection::new("example", position, covariance, 1.0)
 /// });
 /// let answer = FirstComer.associate(&[track], &found, &Gate::default());
 /// assert_eq!(answer, Associations::one_to_one([Some(1)]));

@@ -1,6 +1,9 @@
-use nalgebra::{Matrix3, Point3};
+use std::sync::Arc;
 
+use nalgebra::{Matrix3, Point3};
 use tagalong_geometry::{Camera, ImageBox, Rect};
+
+use crate::Joints;
 
 /// One detection of a person: a position, and a box in the image if a camera made it.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +19,8 @@ pub struct Detection {
     pub score: f64,
     /// Name of the plugin that made the detection.
     pub source: &'static str,
+    /// Joints in the image, from a detector that finds them.
+    pub joints: Option<Arc<Joints>>,
 }
 
 impl Detection {
@@ -27,12 +32,17 @@ impl Detection {
         covariance: Matrix3<f64>,
         score: f64,
     ) -> Self {
-        Self { image: None, position, covariance, score, source }
+        Self { image: None, position, covariance, score, source, joints: None }
     }
 
     /// Returns the detection with its box in the image.
     pub fn with_image(self, image: ImageBox) -> Self {
         Self { image: Some(image), ..self }
+    }
+
+    /// Returns the detection with these joints, if any.
+    pub fn with_joints(self, joints: Option<Joints>) -> Self {
+        Self { joints: joints.map(Arc::new), ..self }
     }
 
     /// Returns the rectangle of the box in the image, if there is one.
@@ -53,6 +63,7 @@ impl Detection {
             && self.covariance.iter().all(|v| v.is_finite())
             && self.covariance.diagonal().iter().all(|v| *v >= 0.0)
             && self.score.is_finite()
+            && self.joints.as_ref().is_none_or(|joints| joints.is_sane())
     }
 }
 
@@ -78,13 +89,8 @@ mod tests {
 
     #[test]
     fn every_number_of_a_detection_is_looked_at() {
-        let fine = Detection {
-            image: Some(ImageBox::upper_body(Rect::new(1.0, 2.0, 3.0, 3.0))),
-            position: Point3::new(3.0, 0.0, 1.6),
-            covariance: Matrix3::zeros(),
-            score: 0.5,
-            source: "test",
-        };
+        let fine = Detection::new("test", Point3::new(3.0, 0.0, 1.6), Matrix3::zeros(), 0.5)
+            .with_image(ImageBox::upper_body(Rect::new(1.0, 2.0, 3.0, 3.0)));
         assert!(fine.is_sane());
         let odd = f64::NAN;
         let mut negative = Matrix3::identity();

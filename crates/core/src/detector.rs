@@ -46,7 +46,7 @@ pub enum Query<'a> {
 ///         let nearest = points.min_by(|a, b| a.coords.norm().total_cmp(&b.coords.norm()));
 ///         let covariance = nalgebra::Matrix3::identity() * 0.04;
 ///         let (image, score, source) = (None, 1.0, "nearest");
-///         let found = nearest.map(|at| Detection { image, position: *at, covariance, score, source });
+///         let found = nearest.map(|at| Detection { image, ..Detection::new(source, *at, covariance, score) });
 ///         Ok(found.into_iter().collect())
 ///     }
 /// }
@@ -198,7 +198,7 @@ pub trait Likelihood: Send + Sync {
 /// # let (covariance, source) = (Matrix3::identity(), "example");
 /// let head_at = |z| {
 ///     let position = [2.0, 0.0, z].into();
-///     Detection { image: None, position, covariance, score: 1.0, source }
+///     Detection::new(source, position, covariance, 1.0)
 /// };
 /// assert_eq!(Upright.log_odds(&frame, &head_at(1.7))?, 0.5);
 /// assert_eq!(Upright.log_odds(&frame, &head_at(0.4))?, -2.0);
@@ -236,13 +236,7 @@ mod tests {
     use crate::Error;
 
     fn seen(x: f64, y: f64, z: f64) -> Detection {
-        Detection {
-            image: None,
-            position: Point3::new(x, y, z),
-            covariance: nalgebra::Matrix3::identity(),
-            score: 1.0,
-            source: "test",
-        }
+        Detection::new("test", Point3::new(x, y, z), nalgebra::Matrix3::identity(), 1.0)
     }
 
     #[test]

@@ -121,7 +121,7 @@ pub struct FilterRequirements {
 /// }
 ///
 /// # let (position, covariance) = (Point3::new(2.0, 0.0, 1.6), nalgebra::Matrix3::identity());
-/// # let seen = Detection { image: None, position, covariance, score: 1.0, source: "example" };
+/// # let seen = Detection::new("example", position, covariance, 1.0);
 /// let (mut filter, camera) = (LastSeen::default(), Camera::blind(Isometry3::identity()));
 /// filter.start(TrackId(1), &seen, &camera);
 /// filter.predict(&EgoMotion { forward: 0.5, ..EgoMotion::at_rest(0.1) }, &camera);

@@ -36,6 +36,7 @@ mod frame;
 mod funnel;
 mod image;
 mod inputs;
+mod joints;
 mod manager;
 mod mixture;
 mod motion;
@@ -60,6 +61,7 @@ pub use frame::{Derived, Frame, Images};
 pub use funnel::{Dropped, Funnel, MAX_PLACES};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
 pub use inputs::{Capabilities, Input, Inputs, Usage};
+pub use joints::{Joint, JointName, Joints};
 pub use manager::{
     Initiation, Observation, ObservedTrack, TrackChanges, TrackHealth, TrackManager, Unassociated,
 };

@@ -102,7 +102,7 @@ pub struct TrackChanges {
 ///
 /// # use nalgebra::{Matrix3, SMatrix, zero};
 /// # let (position, covariance) = ([2.0, 0.0, 1.6].into(), Matrix3::identity());
-/// # let detection = Detection { image: None, position, covariance, score: 1.0, source: "example" };
+/// # let detection = Detection::new("example", position, covariance, 1.0);
 /// let new = Unassociated { detection: &detection, detector_log_odds: 1.0, discovered: true };
 /// let Initiation::Start(health) = Credulous.initiate(TrackId(1), &new) else { unreachable!() };
 /// assert!(health.confirmed);

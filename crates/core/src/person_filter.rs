@@ -162,7 +162,7 @@ mod tests {
     fn seen(x: f64) -> Detection {
         let position = Point3::new(x, 0.0, 1.6);
         let covariance = Matrix3::identity();
-        Detection { image: None, position, covariance, score: 1.0, source: "test" }
+        Detection::new("test", position, covariance, 1.0)
     }
 
     #[test]

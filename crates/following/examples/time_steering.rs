@@ -117,7 +117,7 @@ fn time_ms(camera: Camera, rays: Option<usize>) -> Result<[f64; 2], Box<dyn Erro
             .with_laser(rays.map(|rays| scan_at(index, x, rays)));
         let track = person();
         let start = ThreadTime::now();
-        steering.steer(&frame, &motion, std::slice::from_ref(&track))?;
+        steering.steer(&frame, &motion, std::slice::from_ref(&track), &[])?;
         times_ms.push(start.elapsed().as_secs_f64() * 1e3);
     }
     times_ms.sort_by(f64::total_cmp);

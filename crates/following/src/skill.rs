@@ -20,6 +20,9 @@ pub enum Choice {
     Nearest,
     /// The next person that walks up to the robot and stands still before it.
     Approach,
+    /// The next person that holds a hand above the head, where a detector finds joints.
+    #[serde(rename = "raised-hand")]
+    RaisedHand,
 }
 
 /// Request to follow a person, with the patience of the pursuit. What is left out is that of the
@@ -189,6 +192,7 @@ impl View {
         settings.track = None;
         match enrollment.person {
             Choice::Approach => settings.choose = ChoiceRule::Approach,
+            Choice::RaisedHand => settings.choose = ChoiceRule::RaisedHand,
             Choice::Track(id) => settings.track = Some(self.numbered(id)?.id.0),
             Choice::Point(at) => settings.track = Some(self.at(at)?.id.0),
             Choice::Nearest => settings.track = Some(self.in_front(&settings)?.id.0),
@@ -397,6 +401,9 @@ mod tests {
         let configured = TargetSettings { track: Some(7), ..TargetSettings::default() };
         let settings = view().settings(&enrollment, &configured).unwrap();
         assert_eq!((settings.choose, settings.track), (ChoiceRule::Approach, None));
+        let enrollment = Enrollment::of(Choice::RaisedHand);
+        let settings = view().settings(&enrollment, &configured).unwrap();
+        assert_eq!((settings.choose, settings.track), (ChoiceRule::RaisedHand, None));
     }
 
     #[test]

@@ -1,6 +1,8 @@
+use std::sync::Arc;
+
 use tagalong_core::{
-    Command, Controller, EgoMotion, Frame, Inputs, Reason, Scene, Stamp, Track, TrackId, Twist,
-    WheelSpeeds,
+    Command, Controller, EgoMotion, Frame, Inputs, Joints, Reason, Scene, Stamp, Track, TrackId,
+    Twist, WheelSpeeds,
 };
 use tagalong_tracking::{Guarded, StepError};
 use tagalong_vision::Describer;
@@ -159,7 +161,7 @@ impl Steering {
     }
 
     /// Returns the command for a frame, and the target; `motion` is the robot's since the last
-    /// frame that was processed.
+    /// frame that was processed, `joints` are those of tracks in this frame.
     ///
     /// # Errors
     /// The controller panicked, or the network that describes people failed.
@@ -168,11 +170,12 @@ impl Steering {
         frame: &Frame,
         motion: &EgoMotion,
         tracks: &[Track],
+        joints: &[(TrackId, Arc<Joints>)],
     ) -> Result<Steered, StepError> {
         // Checked first: a fault is latched before this frame's command is made.
         self.limiter.check_motion(frame);
         let settled = self.is_settled();
-        let lock = self.lock.update(frame, motion, tracks, settled);
+        let lock = self.lock.update(frame, motion, tracks, joints, settled);
         let lock = lock.map_err(|error| StepError::of_stage("[appearance]", frame, error))?;
         let followed = self.lock.followed();
         let target = tracks.iter().find(|track| Some(track.id) == followed);

@@ -1,5 +1,7 @@
 //! From the outputs of a family to boxes in pixels of the network's input.
 
+use nalgebra::Point2;
+use tagalong_core::{Joint, Joints};
 use tagalong_geometry::Rect;
 
 use crate::family::{NANODET_BINS, NANODET_M_BINS, NANODET_STRIDES, STRIDES, count_cells};
@@ -8,20 +10,24 @@ use crate::{Family, InputSize, Tensor};
 
 /// Largest offset from a cell, in cells.
 const MAX_OFFSET: f32 = 16.0;
-/// Joints of a person in MoveNet.
+/// Joints of a person.
 const JOINTS: usize = 17;
+/// Rows of YOLOv8 for people with joints: the box, the score, and column, row and score of each joint.
+const POSE_ROWS: usize = 5 + 3 * JOINTS;
 /// Part of the height between the highest and the lowest joint by which a person is higher than
 /// the eyes, and lower than the ankles.
 const ABOVE_EYES: f64 = 0.08;
 const BELOW_ANKLES: f64 = 0.05;
 
 /// Box with a score.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ScoredBox {
     /// The whole person.
     pub rect: Rect,
     /// Probability of a person, 0 to 1.
     pub score: f32,
+    /// Joints of the person, from a network that finds them.
+    pub joints: Option<Joints>,
 }
 
 /// Boxes that are searched.
@@ -50,7 +56,11 @@ impl Wanted<'_> {
             return None;
         }
         let rect = rect();
-        (rect.is_sane() && rect.area() > 0.0).then_some(ScoredBox { rect, score: score.min(1.0) })
+        (rect.is_sane() && rect.area() > 0.0).then(|| ScoredBox {
+            rect,
+            score: score.min(1.0),
+            joints: None,
+        })
     }
 }
 
@@ -151,12 +161,36 @@ fn yolox(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredBox
 fn yolo_v8(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
     let rows: Vec<&[f32]> = output.rows().collect();
     let boxes = rows.first().map_or(0, |row| row.len());
+    let has_joints = has_pose_rows(&rows);
     let found = (0..boxes).filter_map(|k| {
         let score = wanted.best(|class| rows.get(4 + class).map(|row| row[k]));
         let [x, y, width, height] = [0, 1, 2, 3].map(|part| f64::from(rows[part][k]));
-        wanted.take(score, || around(x, y, width, height))
+        let person = wanted.take(score, || around(x, y, width, height))?;
+        let joints = has_joints.then(|| {
+            joints_of(|joint| {
+                let first = 5 + 3 * joint;
+                [rows[first][k], rows[first + 1][k], rows[first + 2][k]]
+            })
+        });
+        Some(ScoredBox { joints, ..person })
     });
     found.collect()
+}
+
+/// Returns true if the rows after the score are those of joints rather than of classes: their places
+/// are no scores.
+fn has_pose_rows(rows: &[&[f32]]) -> bool {
+    rows.len() == POSE_ROWS && rows[5].iter().any(|value| !is_score(*value))
+}
+
+/// Returns the joints of a person, each made of column and row, pixels of the input, and score.
+fn joints_of(joint: impl Fn(usize) -> [f32; 3]) -> Joints {
+    let mut all = [Joint { at: Point2::origin(), score: 0.0 }; JOINTS];
+    for (index, place) in all.iter_mut().enumerate() {
+        let [x, y, score] = joint(index).map(f64::from);
+        *place = Joint { at: Point2::new(x, y), score: score.clamp(0.0, 1.0) };
+    }
+    Joints::new(all)
 }
 
 fn yolo_v8_rows(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
@@ -337,7 +371,13 @@ fn movenet(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredB
             Some(score) => *score,
             None => joints.chunks_exact(3).map(|joint| joint[2]).sum::<f32>() / JOINTS as f32,
         };
-        wanted.take(score, || box_of_joints(joints, input))
+        let person = wanted.take(score, || box_of_joints(joints, input))?;
+        let size = [input.width as f32, input.height as f32];
+        let joints = joints_of(|index| {
+            let [row, column, score] = [0, 1, 2].map(|part| joints[3 * index + part]);
+            [column * size[0], row * size[1], score]
+        });
+        Some(ScoredBox { joints: Some(joints), ..person })
     });
     found.collect()
 }
@@ -371,6 +411,8 @@ pub(crate) fn suppress(mut boxes: Vec<ScoredBox>, iou: f64) -> Vec<ScoredBox> {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_core::JointName;
+
     use super::*;
 
     const INPUT: InputSize = InputSize { width: 64, height: 64, channels_last: false };
@@ -475,13 +517,40 @@ mod tests {
         let six = [six, vec![0.0; 5 * 56]].concat();
         let found = movenet(&tensor(&[1, 6, 56], &six), INPUT, PEOPLE);
         assert_eq!((found.len(), found[0].score), (1, 0.7));
+        let joints = found[0].joints.as_ref().unwrap();
+        let nose = joints.get(JointName::Nose);
+        assert_eq!((nose.at, nose.score), (Point2::new(24.0, 16.0), f64::from(0.6_f32)));
+        assert_eq!(joints.get(JointName::RightAnkle).at, Point2::new(40.0, 48.0));
+    }
+
+    #[test]
+    fn yolo_v8_for_poses_has_three_rows_for_each_joint() {
+        let mut rows = vec![[10.0, 0.0], [30.0, 0.0], [8.0, 0.0], [16.0, 0.0], [0.9, 0.1]];
+        for joint in 0..JOINTS {
+            rows.extend([[joint as f32 + 5.0, 0.0], [20.0, 0.0], [0.7, 0.0]]);
+        }
+        let values: Vec<f32> = rows.concat();
+        let found = yolo_v8(&tensor(&[1, POSE_ROWS, 2], &values), PEOPLE);
+        assert_eq!(rects(&found), [[6.0, 22.0, 8.0, 16.0]]);
+        let wrist = *found[0].joints.as_ref().unwrap().get(JointName::LeftWrist);
+        assert_eq!((wrist.at, wrist.score), (Point2::new(14.0, 20.0), f64::from(0.7_f32)));
+        // The same shape with scores of 52 classes has none.
+        let mut classes = values;
+        classes[10..].fill(0.2);
+        let found = yolo_v8(&tensor(&[1, POSE_ROWS, 2], &classes), PEOPLE);
+        assert_eq!((found.len(), found[0].joints.is_none()), (1, true));
     }
 
     #[test]
     fn of_two_boxes_that_overlap_the_likelier_stays() {
-        let scored = |x: f64, score: f32| ScoredBox { rect: Rect::new(x, 0.0, 10.0, 10.0), score };
-        let boxes = vec![scored(0.0, 0.6), scored(1.0, 0.9), scored(20.0, 0.7)];
-        assert_eq!(suppress(boxes.clone(), 0.5), [boxes[1], boxes[2]]);
+        let boxes: Vec<ScoredBox> = [(0.0, 0.6), (1.0, 0.9), (20.0, 0.7)]
+            .map(|(x, score)| ScoredBox {
+                rect: Rect::new(x, 0.0, 10.0, 10.0),
+                score,
+                joints: None,
+            })
+            .into();
+        assert_eq!(suppress(boxes.clone(), 0.5), boxes[1..]);
         assert_eq!(suppress(boxes, 0.9).len(), 3);
     }
 }

@@ -287,7 +287,10 @@ impl PersonNetwork {
         // Lists without doubles are sorted all the same.
         let iou = if self.family.needs_suppression(&shapes) { iou } else { 1.0 };
         let mut people = suppress(found, iou);
-        people.iter_mut().for_each(|person| person.rect = place.rect_to_image(&person.rect));
+        for person in &mut people {
+            person.rect = place.rect_to_image(&person.rect);
+            person.joints = person.joints.take().map(|joints| place.joints_to_image(&joints));
+        }
         Ok(Some(people))
     }
 

@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::RgbImage;
+use tagalong_core::{Joints, RgbImage};
 use tagalong_geometry::Rect;
 
 use crate::Tensor;
@@ -106,6 +106,11 @@ impl Placement {
     pub fn rect_to_image(&self, input: &Rect) -> Rect {
         let corner = self.to_image(Point2::new(input.x, input.y));
         Rect::new(corner.x, corner.y, input.width / self.scale[0], input.height / self.scale[1])
+    }
+
+    /// Returns the joints in the image of joints in the input.
+    pub fn joints_to_image(&self, input: &Joints) -> Joints {
+        input.moved(|at| self.to_image(at))
     }
 }
 

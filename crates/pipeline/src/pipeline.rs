@@ -274,7 +274,7 @@ impl Pipeline {
             steering.reset();
         }
         let Steered { command, target, lock, obstacles } =
-            steering.steer(frame, &report.motion, &report.tracks)?;
+            steering.steer(frame, &report.motion, &report.tracks, &report.joints())?;
         let not_finite = u64::from(command.reason == Reason::NotFinite);
         report.funnel.drop_many("command not finite", not_finite);
         report.target = target;

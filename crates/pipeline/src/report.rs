@@ -1,5 +1,7 @@
-use tagalong_core::{Command, EgoMotion, Funnel, Stamp, Track, TrackId, Visualisation};
-use tagalong_tracking::{Candidate, Outcome, TrackingReport, Weighing};
+use std::sync::Arc;
+
+use tagalong_core::{Command, EgoMotion, Funnel, Joints, Stamp, Track, TrackId, Visualisation};
+use tagalong_tracking::{Candidate, Outcome, TrackingReport, Weighing, joints_of};
 
 use crate::{LockReport, ObstaclePoint};
 
@@ -50,6 +52,12 @@ pub struct FrameReport {
 }
 
 impl FrameReport {
+    /// Returns the joints in the image, pixels, of each track for which a detector of this frame found
+    /// them.
+    pub fn joints(&self) -> Vec<(TrackId, Arc<Joints>)> {
+        joints_of(&self.candidates)
+    }
+
     /// Returns an empty report for a frame.
     pub fn new(index: u64, stamp: Stamp) -> Self {
         TrackingReport::new(index, stamp).into()

@@ -52,6 +52,7 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> Canvas
         let region = view.scaled(&style.region(scene, track));
         draw_box(&mut view.canvas, &region, track.seen, colour(track));
     }
+    view.draw_joints(scene, style);
     add_labels(&mut labels, scene, by, style);
     labels.paint(&mut view.canvas);
     view.canvas
@@ -186,6 +187,18 @@ impl ImageView {
         self.canvas.text(Point2::new(left, top), &map.title, TITLE);
         let width = (cell * columns as f64).max(Lettering::Small.size_px(&map.title)[0]);
         Rect::new(left, top, width, height + LINE_PX)
+    }
+
+    /// Renders the lines between the joints of people whose joints a detector found.
+    fn draw_joints(&mut self, scene: &OverlayData, style: OverlayStyle) {
+        let joints = scene.report.joints();
+        for track in style.tracks(scene) {
+            let Some((_, joints)) = joints.iter().find(|(id, _)| *id == track.id) else { continue };
+            for [from, to] in joints.bones() {
+                let ends = [self.pixel(&from), self.pixel(&to)];
+                self.canvas.thick_path(&ends, colour(track));
+            }
+        }
     }
 
     fn draw_dropped(&mut self, scene: &OverlayData) {

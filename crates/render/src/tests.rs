@@ -171,13 +171,9 @@ fn a_predicted_person_outside_of_the_image_has_no_label() {
 }
 
 fn dropped(test: &'static str) -> Candidate {
-    let detection = Detection {
-        image: Some(ImageBox::upper_body(Rect::new(20.0, 150.0, 60.0, 60.0))),
-        position: Point3::new(4.0, 1.0, 1.0),
-        covariance: nalgebra::Matrix3::identity(),
-        score: -1.0,
-        source: "test",
-    };
+    let detection =
+        Detection::new("test", Point3::new(4.0, 1.0, 1.0), nalgebra::Matrix3::identity(), -1.0)
+            .with_image(ImageBox::upper_body(Rect::new(20.0, 150.0, 60.0, 60.0)));
     Candidate { detection, fate: Fate::Dropped(test) }
 }
 

@@ -85,13 +85,8 @@ mod tests {
 
     /// Detection 3 m ahead, with a box at this place in the image.
     fn detection(x: f64, y: f64) -> Detection {
-        Detection {
-            image: Some(ImageBox::upper_body(Rect::new(x, y, 100.0, 100.0))),
-            position: Point3::new(3.0, 0.0, 1.6),
-            covariance: Matrix3::zeros(),
-            score: 1.0,
-            source: "test",
-        }
+        Detection::new("test", Point3::new(3.0, 0.0, 1.6), Matrix3::zeros(), 1.0)
+            .with_image(ImageBox::upper_body(Rect::new(x, y, 100.0, 100.0)))
     }
 
     /// Track so far beside the detection, m, with this variance, m².

@@ -261,15 +261,11 @@ mod tests {
         let lens =
             Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         let position = Point3::new(x, y, 1.6);
-        Detection {
-            image: Some(ImageBox::upper_body(
+        Detection::new("test", position, Matrix3::identity() * 0.01, 1.0).with_image(
+            ImageBox::upper_body(
                 Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
-            )),
-            position,
-            covariance: Matrix3::identity() * 0.01,
-            score: 1.0,
-            source: "test",
-        }
+            ),
+        )
     }
 
     #[test]

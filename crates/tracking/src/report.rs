@@ -1,4 +1,6 @@
-use tagalong_core::{Detection, EgoMotion, Funnel, Stamp, Track, TrackId, Visualisation};
+use std::sync::Arc;
+
+use tagalong_core::{Detection, EgoMotion, Funnel, Joints, Stamp, Track, TrackId, Visualisation};
 
 use crate::Weighing;
 
@@ -20,6 +22,43 @@ pub struct Candidate {
     pub detection: Detection,
     /// Its fate.
     pub fate: Fate,
+}
+
+impl Candidate {
+    /// Returns the track that the detection supports, if any.
+    pub fn track(&self) -> Option<TrackId> {
+        match self.fate {
+            Fate::Matched(track) | Fate::Started(track) => Some(track),
+            Fate::Dropped(_) => None,
+        }
+    }
+}
+
+/// Returns the joints of the tracks in the image, as far as a detector of this frame found them: those
+/// of the detection that supports a track, or of one that another detector made of the same person,
+/// with the head and the shoulders in that detection's box.
+pub fn joints_of(candidates: &[Candidate]) -> Vec<(TrackId, Arc<Joints>)> {
+    let mut found = Vec::new();
+    for candidate in candidates {
+        let Some(track) = candidate.track() else { continue };
+        let own = candidate.detection.joints.as_ref();
+        let joints = own.or_else(|| joints_beside(&candidate.detection, candidates));
+        if let Some(joints) = joints {
+            found.push((track, Arc::clone(joints)));
+        }
+    }
+    found
+}
+
+/// Returns the joints of the dropped candidate that shows the person of a detection.
+fn joints_beside<'a>(
+    detection: &Detection,
+    candidates: &'a [Candidate],
+) -> Option<&'a Arc<Joints>> {
+    let region = detection.rect()?;
+    let dropped = candidates.iter().filter(|candidate| candidate.track().is_none());
+    let mut poses = dropped.filter_map(|candidate| candidate.detection.joints.as_ref());
+    poses.find(|joints| joints.upper_body_middle().is_some_and(|at| region.contains(at)))
 }
 
 /// Outcome of the check of a frame's stamp.
@@ -108,5 +147,53 @@ impl TrackingReport {
             plugin_timings: Vec::new(),
             ended: Vec::new(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Point2, Point3};
+    use tagalong_core::Joint;
+    use tagalong_geometry::{ImageBox, Rect};
+
+    use super::*;
+
+    /// Returns a candidate with a box that begins at a column.
+    fn candidate(column: f64, fate: Fate) -> Candidate {
+        let region = Rect::new(column, 0.0, 40.0, 40.0);
+        let detection =
+            Detection::new("test", Point3::new(3.0, 0.0, 1.6), Matrix3::identity(), 1.0)
+                .with_image(ImageBox::upper_body(region));
+        Candidate { detection, fate }
+    }
+
+    /// Returns the candidate with all joints in one column.
+    fn with_joints(candidate: Candidate, column: f64) -> Candidate {
+        let joints = [Joint { at: Point2::new(column, 20.0), score: 0.9 }; 17];
+        let detection = candidate.detection.with_joints(Some(Joints::new(joints)));
+        Candidate { detection, ..candidate }
+    }
+
+    fn columns(candidates: &[Candidate]) -> Vec<(u32, f64)> {
+        let found = joints_of(candidates);
+        let column = |joints: &Joints| joints.upper_body_middle().map_or(0.0, |at| at.x);
+        found.iter().map(|(track, joints)| (track.0, column(joints))).collect()
+    }
+
+    #[test]
+    fn joints_belong_to_the_track_of_their_detection() {
+        let matched = with_joints(candidate(0.0, Fate::Matched(TrackId(4))), 10.0);
+        let started = with_joints(candidate(100.0, Fate::Started(TrackId(5))), 110.0);
+        let without = candidate(200.0, Fate::Matched(TrackId(6)));
+        assert_eq!(columns(&[matched, started, without]), [(4, 10.0), (5, 110.0)]);
+    }
+
+    #[test]
+    fn joints_of_another_detector_belong_to_the_track_of_the_same_person() {
+        let own = candidate(0.0, Fate::Matched(TrackId(4)));
+        let beside = with_joints(candidate(3.0, Fate::Dropped("double")), 15.0);
+        let elsewhere = with_joints(candidate(100.0, Fate::Dropped("double")), 120.0);
+        assert_eq!(columns(&[own.clone(), elsewhere.clone(), beside]), [(4, 15.0)]);
+        assert_eq!(columns(&[own, elsewhere]), []);
     }
 }

@@ -179,12 +179,13 @@ mod tests {
         }
 
         fn detect(&mut self, _: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
-            let detection = |score: &f64| Detection {
-                image: None,
-                position: Point3::new(3.0, 0.0, 1.6),
-                covariance: Matrix3::identity() * 0.01,
-                score: *score,
-                source: "test",
+            let detection = |score: &f64| {
+                Detection::new(
+                    "test",
+                    Point3::new(3.0, 0.0, 1.6),
+                    Matrix3::identity() * 0.01,
+                    *score,
+                )
             };
             Ok(self.0.iter().map(detection).collect())
         }

@@ -136,13 +136,7 @@ fn add_bag(bag: &Path, quick: bool, trainer: &mut dyn Trainer) -> Result<usize, 
 fn add_scan(scan: &LegScan, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {
     let frame = frame(scan.scan.clone());
     let mut add = |x: f64, y: f64, is_person: bool| {
-        let candidate = Detection {
-            image: None,
-            position: Point3::new(x, y, 0.0),
-            covariance: Matrix3::zeros(),
-            score: 0.0,
-            source: "annotation",
-        };
+        let candidate = Detection::new("annotation", Point3::new(x, y, 0.0), Matrix3::zeros(), 0.0);
         trainer.add(&frame, &candidate, Example { is_person, group }).map_err(Failure::failed)
     };
     scan.legs.iter().try_for_each(|leg| add(leg.x, leg.y, true))?;

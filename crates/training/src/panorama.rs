@@ -112,13 +112,7 @@ fn take(
     trainer: &mut dyn Trainer,
 ) -> Result<(), Failure> {
     let mut add = |at, example| {
-        let candidate = Detection {
-            image: None,
-            position: at,
-            covariance: Matrix3::zeros(),
-            score: 0.0,
-            source: "truth",
-        };
+        let candidate = Detection::new("truth", at, Matrix3::zeros(), 0.0);
         trainer.add(frame, &candidate, example).map_err(Failure::failed)
     };
     // Frames without people are needed, too: the trainer learns the background from them.

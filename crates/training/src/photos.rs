@@ -295,13 +295,7 @@ pub fn frame(grey: GreyImage) -> Frame {
 pub fn candidate(region: Rect) -> Detection {
     let position = Point3::new(2.0, 0.0, 1.6);
     let covariance = Matrix3::identity();
-    Detection {
-        image: Some(ImageBox::upper_body(region)),
-        position,
-        covariance,
-        score: 0.0,
-        source: "photograph",
-    }
+    Detection::new("photograph", position, covariance, 0.0).with_image(ImageBox::upper_body(region))
 }
 
 #[cfg(test)]

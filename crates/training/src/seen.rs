@@ -157,13 +157,8 @@ mod tests {
     }
 
     fn at(x: f64, left: f64) -> Detection {
-        Detection {
-            image: Some(ImageBox::upper_body(Rect::new(left, 50.0, 60.0, 60.0))),
-            position: Point3::new(x, 0.0, 1.6),
-            covariance: Matrix3::identity(),
-            score: 0.0,
-            source: "test",
-        }
+        Detection::new("test", Point3::new(x, 0.0, 1.6), Matrix3::identity(), 0.0)
+            .with_image(ImageBox::upper_body(Rect::new(left, 50.0, 60.0, 60.0)))
     }
 
     #[test]

@@ -94,7 +94,7 @@ impl BoxSettings {
             BoxedBody::FullBox => ImageBox::full_body(*region),
             BoxedBody::Full | BoxedBody::Upper => ImageBox::upper_body(upper_body),
         };
-        let detection = Detection { image: Some(image), position, covariance, score, source };
+        let detection = Detection::new(source, position, covariance, score).with_image(image);
         is_shown(&frame.camera, &detection).then_some(detection)
     }
 
@@ -283,13 +283,8 @@ mod tests {
 
     fn at(x: f64, y: f64, sigma_m: f64) -> Detection {
         let position = Point3::new(x, y, 1.5);
-        Detection {
-            image: Some(ImageBox::upper_body(camera().upper_body(&position))),
-            position,
-            covariance: Matrix3::identity() * sigma_m * sigma_m,
-            score: 1.0,
-            source: "test",
-        }
+        Detection::new("test", position, Matrix3::identity() * sigma_m * sigma_m, 1.0)
+            .with_image(ImageBox::upper_body(camera().upper_body(&position)))
     }
 
     #[test]

@@ -394,13 +394,8 @@ fn sighting(
     // A person behind the camera has no pixel: the answer is as good as none.
     let unknown = PointEstimate { position: expected, covariance: Matrix3::identity() * 100.0 };
     let PointEstimate { position, covariance } = place(head_m).unwrap_or(unknown);
-    Detection {
-        image: Some(ImageBox::upper_body(region)),
-        position,
-        covariance,
-        score: config.score,
-        source: NAME,
-    }
+    Detection::new(NAME, position, covariance, config.score)
+        .with_image(ImageBox::upper_body(region))
 }
 
 impl Detector for Compressive {

@@ -164,13 +164,8 @@ pub(crate) fn sighting(
     // here it is that of the head.
     let pixel = camera.project(&position).unwrap_or(region.centre());
     let covariance = camera.covariance(pixel, head_m, sigma_px, config.sigma_distance_m);
-    Detection {
-        image: Some(ImageBox::upper_body(region)),
-        position,
-        covariance,
-        score: config.score,
-        source: NAME,
-    }
+    Detection::new(NAME, position, covariance, config.score)
+        .with_image(ImageBox::upper_body(region))
 }
 
 impl Detector for Correlation {

@@ -44,10 +44,12 @@ impl DepthNet {
         let has_place = image.is_none_or(|image| image.rect.width > 0.0);
         let detection = Detection {
             image,
-            position: head,
-            covariance: Matrix3::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
-            score: self.model.log_odds(peak.logit).min(config.max_score),
-            source: NAME,
+            ..Detection::new(
+                NAME,
+                head,
+                Matrix3::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
+                self.model.log_odds(peak.logit).min(config.max_score),
+            )
         };
         // A head behind the camera has no region.
         (detection.is_sane() && has_place).then_some(detection)

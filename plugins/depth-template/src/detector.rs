@@ -310,13 +310,13 @@ impl DepthTemplate {
         let position = frame.camera.back_project(pixel, depth_m + c.centre_behind_m);
         let sigma_depth_m = c.sigma_depth_m + c.sigma_depth_per_m2 * depth_m * depth_m;
         let sigma_px = c.sigma_across_m * px_per_m;
-        Ok(Detection {
-            image: Some(ImageBox::upper_body(frame.camera.upper_body(&position))),
+        Ok(Detection::new(
+            NAME,
             position,
-            covariance: frame.camera.covariance(pixel, depth_m, sigma_px, sigma_depth_m),
-            score: c.score_per_cost * (c.even_cost - person.cost),
-            source: NAME,
-        })
+            frame.camera.covariance(pixel, depth_m, sigma_px, sigma_depth_m),
+            c.score_per_cost * (c.even_cost - person.cost),
+        )
+        .with_image(ImageBox::upper_body(frame.camera.upper_body(&position))))
     }
 }
 

@@ -98,6 +98,7 @@ impl FaceRgbd {
             // The logarithm needs a positive strength.
             score: (slope * group.strength.max(1e-3).ln() + offset).min(config.max_score),
             source: NAME,
+            joints: None,
         };
         detection.is_sane().then_some(detection)
     }

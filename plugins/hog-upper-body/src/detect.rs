@@ -59,13 +59,13 @@ impl HogUpperBody {
             .or_measured(window.depth_m, config.sigma_depth_m);
         let PointEstimate { position, covariance } =
             camera.locate_head(&window.region, face, config.sigma_place * width);
-        let detection = Detection {
-            image: Some(ImageBox::upper_body(window.region)),
+        let detection = Detection::new(
+            NAME,
             position,
             covariance,
-            score: self.model.log_odds(window.sum).min(config.max_score),
-            source: NAME,
-        };
+            self.model.log_odds(window.sum).min(config.max_score),
+        )
+        .with_image(ImageBox::upper_body(window.region));
         detection.is_sane().then_some(detection)
     }
 }

@@ -317,13 +317,7 @@ mod tests {
         let position = Point3::new(2.0, 0.0, 1.6);
         let region = Rect::new(40.0, 30.0, 20.0, 20.0);
         let covariance = Matrix3::identity() * 0.01;
-        Detection {
-            image: Some(ImageBox::upper_body(region)),
-            position,
-            covariance,
-            score: 3.0,
-            source: "drawn",
-        }
+        Detection::new("drawn", position, covariance, 3.0).with_image(ImageBox::upper_body(region))
     }
 
     /// Returns for twelve frames without a detection if a person that explains this many nats is

@@ -95,14 +95,13 @@ impl LaserLegs {
         };
         let at = at + scanner;
         let variance = sigma_m * sigma_m;
-        Detection {
-            image: None,
-            position: Point3::new(at.x, at.y, config.head_height_m),
-            covariance: Matrix3::from_diagonal(&Vector3::new(variance, variance, UNKNOWN_HEIGHT)),
-            score: (log_odds + config.free_log_odds * self.past.was_free(&at))
+        Detection::new(
+            NAME,
+            Point3::new(at.x, at.y, config.head_height_m),
+            Matrix3::from_diagonal(&Vector3::new(variance, variance, UNKNOWN_HEIGHT)),
+            (log_odds + config.free_log_odds * self.past.was_free(&at))
                 .clamp(-config.limit, config.limit),
-            source: NAME,
-        }
+        )
     }
 }
 

@@ -394,13 +394,7 @@ mod training {
     use super::*;
 
     fn candidate(at: [f64; 2]) -> Detection {
-        Detection {
-            image: None,
-            position: Point3::new(at[0], at[1], 0.0),
-            covariance: nalgebra::Matrix3::zeros(),
-            score: 0.0,
-            source: "test",
-        }
+        Detection::new("test", Point3::new(at[0], at[1], 0.0), nalgebra::Matrix3::zeros(), 0.0)
     }
 
     fn frame(scan: LaserScan) -> Frame {

@@ -67,13 +67,13 @@ impl OmniAppearance {
         // Outside the accepted heights the exact value does not matter: the detection is
         // dropped.
         position.z = (top - HALF_HEAD_M).clamp(low - 0.5, high + 0.5);
-        Detection {
-            image: Some(ImageBox::upper_body(camera.upper_body(&position))),
+        Detection::new(
+            NAME,
             position,
-            covariance: self.covariance(&position, camera, [distance, sigma], blob.visible),
-            score: self.score(position.z),
-            source: NAME,
-        }
+            self.covariance(&position, camera, [distance, sigma], blob.visible),
+            self.score(position.z),
+        )
+        .with_image(ImageBox::upper_body(camera.upper_body(&position)))
     }
 
     /// Returns the covariance in polar form: that of the distance along the ray; across it the sum
@@ -250,13 +250,8 @@ mod tests {
         let reach = 3.0 * 0.2 + 0.3;
         let near = |way: Vector2<f64>| {
             let position = Point3::new(2.0 + way.x, 1.0 + way.y, 0.2);
-            let person = Detection {
-                image: Some(ImageBox::upper_body(Rect::default())),
-                position,
-                covariance: Matrix3::identity(),
-                score: 0.0,
-                source: "test",
-            };
+            let person = Detection::new("test", position, Matrix3::identity(), 0.0)
+                .with_image(ImageBox::upper_body(Rect::default()));
             fits(&Query::Track(&track), &person)
         };
         for way in [Vector2::new(0.6, 0.8), Vector2::new(-0.6, 0.8)] {

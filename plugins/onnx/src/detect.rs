@@ -151,7 +151,7 @@ impl Detector for Onnx {
             }
             let score = log_odds_of(person.score.into()) - zero;
             match self.config.boxes.detection(frame, &person.rect, score, NAME) {
-                Some(detection) => found.push(detection),
+                Some(detection) => found.push(detection.with_joints(person.joints.clone())),
                 None => funnel.drop_at("outside", person.rect),
             }
         }

@@ -50,13 +50,13 @@ impl RecordedDetections {
             return self.config.boxes.detection(frame, &recorded.region?, score, NAME);
         };
         let region = recorded.region.unwrap_or_else(|| frame.camera.upper_body(&head));
-        let detection = Detection {
-            image: Some(ImageBox::upper_body(region)),
-            position: head,
-            covariance: Matrix3::identity() * self.config.sigma_position_m.powi(2),
+        let detection = Detection::new(
+            NAME,
+            head,
+            Matrix3::identity() * self.config.sigma_position_m.powi(2),
             score,
-            source: NAME,
-        };
+        )
+        .with_image(ImageBox::upper_body(region));
         if is_shown(&frame.camera, &detection) {
             return Some(detection);
         }

@@ -65,13 +65,8 @@ impl Heads {
             _ => {}
         }
         let score = if self.fault == "moody" { self.mood } else { 2.0 };
-        Detection {
-            image: Some(ImageBox::upper_body(region)),
-            position,
-            covariance,
-            score,
-            source: "heads",
-        }
+        Detection::new("heads", position, covariance, score)
+            .with_image(ImageBox::upper_body(region))
     }
 
     fn places(&self, frame: &Frame, search: &Query<'_>) -> Result<Vec<Point3<f64>>> {

@@ -121,13 +121,8 @@ mod tests {
     }
 
     fn person(head: Point3<f64>) -> Detection {
-        Detection {
-            image: Some(ImageBox::upper_body(camera().upper_body(&head))),
-            position: head,
-            covariance: Matrix3::identity() * 1e-4,
-            score: 3.0,
-            source: "test",
-        }
+        Detection::new("test", head, Matrix3::identity() * 1e-4, 3.0)
+            .with_image(ImageBox::upper_body(camera().upper_body(&head)))
     }
 
     /// Returns the estimate after the detections of one person, each after a motion of the robot.

@@ -55,7 +55,7 @@ impl Detector for Legs {
                 // Legs contain no information on a person's height.
                 let covariance = Matrix3::from_diagonal(&[0.01, 0.01, 1e3].into());
                 let position = Point3::new(at.x, at.y, 1.6);
-                Detection { image: None, position, covariance, score: 1.5, source: "legs" }
+                Detection::new("legs", position, covariance, 1.5)
             })
             .collect())
     }

@@ -327,6 +327,7 @@ impl Desk {
             odom_from_robot: &item.frame.odom_from_robot,
             is_odom_known: self.is_odom_known,
             tracks: &report.tracks,
+            joints: &report.joints(),
             target: report.target,
             command: report.command.map(|command| command.wheels),
         };

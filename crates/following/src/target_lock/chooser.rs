@@ -1,8 +1,9 @@
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Track, TrackId};
+use tagalong_core::{Joints, Track, TrackId};
 
 use super::settings::TargetSettings;
 
@@ -13,6 +14,8 @@ const NEARER_M: f64 = 0.3;
 /// Distance beyond which a person's head is in the image of a camera as low as 0.3 m, so that nobody
 /// there was overlooked, m.
 const OVERLOOKED_M: f64 = 3.0;
+/// Time without joints after which a raised hand is forgotten, s.
+const HAND_UNSEEN_S: f64 = 1.0;
 /// Speed across the line of sight from which a person walks past, m/s.
 const CROSSES_MPS: f64 = 0.4;
 
@@ -25,6 +28,9 @@ pub enum ChoiceRule {
     Nearest,
     /// The person that walks up to the robot and stands still before it.
     Approach,
+    /// The nearest person that holds a hand above the head; needs a detector that finds joints.
+    #[serde(rename = "raised-hand")]
+    RaisedHand,
     /// No person: the robot waits for an enrollment.
     None,
 }
@@ -38,6 +44,17 @@ pub(super) struct Chooser {
     chosen_s: f64,
     /// Confirmed tracks that may be walking up to the robot.
     approaches: BTreeMap<TrackId, Approach>,
+    /// Tracks with a raised hand.
+    raised: BTreeMap<TrackId, RaisedHand>,
+}
+
+/// Raised hand of a track.
+#[derive(Clone, Copy, Debug, Default)]
+struct RaisedHand {
+    /// Time since it was first seen, s.
+    held_s: f64,
+    /// Time since joints were last found, s.
+    unseen_s: f64,
 }
 
 /// Way of a track towards the robot.
@@ -83,12 +100,13 @@ fn nearest<'a>(tracks: impl Iterator<Item = &'a Track>) -> Option<&'a Track> {
 }
 
 impl Chooser {
-    /// Returns the track to follow from now on, if there is one; `dt_s` is the time since the last
-    /// call.
+    /// Returns the track to follow from now on, if there is one; `joints` are those of tracks in this
+    /// frame, `dt_s` is the time since the last call.
     pub(super) fn choose<'a>(
         &mut self,
         settings: &TargetSettings,
         tracks: &'a [Track],
+        joints: &[(TrackId, Arc<Joints>)],
         dt_s: f64,
     ) -> Option<&'a Track> {
         if let Some(number) = settings.track {
@@ -97,8 +115,39 @@ impl Chooser {
         match settings.choose {
             ChoiceRule::Nearest => self.wait_for_nearest(settings, tracks, dt_s),
             ChoiceRule::Approach => self.wait_for_approach(settings, tracks, dt_s),
+            ChoiceRule::RaisedHand => self.wait_for_hand(settings, tracks, joints, dt_s),
             ChoiceRule::None => None,
         }
+    }
+
+    /// Returns the nearest track within `choose_within_m` that held a hand above the head for
+    /// `raised_hand_s`. Frames in which a slower network finds no joints neither count nor begin anew.
+    fn wait_for_hand<'a>(
+        &mut self,
+        settings: &TargetSettings,
+        tracks: &'a [Track],
+        joints: &[(TrackId, Arc<Joints>)],
+        dt_s: f64,
+    ) -> Option<&'a Track> {
+        for hand in self.raised.values_mut() {
+            hand.held_s += dt_s;
+            hand.unseen_s += dt_s;
+        }
+        for (track, joints) in joints {
+            if joints.has_raised_hand() {
+                self.raised.entry(*track).or_default().unseen_s = 0.0;
+            } else {
+                self.raised.remove(track);
+            }
+        }
+        self.raised.retain(|_, hand| hand.unseen_s < HAND_UNSEEN_S);
+        let raised = &self.raised;
+        nearest(tracks.iter().filter(|track| {
+            let held = raised
+                .get(&track.id)
+                .is_some_and(|hand| hand.unseen_s == 0.0 && hand.held_s >= settings.raised_hand_s);
+            held && track.confirmed && distance_m(track) <= settings.choose_within_m
+        }))
     }
 
     fn wait_for_nearest<'a>(
@@ -169,8 +218,9 @@ impl Chooser {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector2;
+    use nalgebra::{Point2, Vector2};
     use tagalong_conformance::target;
+    use tagalong_core::{Joint, JointName};
 
     use super::*;
 
@@ -191,7 +241,7 @@ mod tests {
         let settings = approaching();
         let mut chooser = Chooser::default();
         let mut at = frames.into_iter().enumerate().map(|(index, tracks)| {
-            let found = chooser.choose(&settings, &tracks, DT_S);
+            let found = chooser.choose(&settings, &tracks, &[], DT_S);
             found.map(|track| (index, track.id.0))
         });
         at.find_map(|found| found)
@@ -239,6 +289,43 @@ mod tests {
         assert_eq!(chosen(swaying), None);
     }
 
+    /// Returns the joints of a track whose left wrist is above or below the head.
+    fn joints(id: u32, is_raised: bool) -> (TrackId, Arc<Joints>) {
+        let mut all = [Joint { at: Point2::new(50.0, 40.0), score: 0.9 }; 17];
+        all[JointName::LeftWrist as usize].at.y = if is_raised { 20.0 } else { 90.0 };
+        all[JointName::RightWrist as usize].at.y = 90.0;
+        (TrackId(id), Arc::new(Joints::new(all)))
+    }
+
+    /// Returns the frame in which the person of track 2 is chosen, who raises a hand where `raised` says
+    /// so; `None`: no joints are found in that frame.
+    fn chosen_by_hand(raised: &[Option<bool>]) -> Option<usize> {
+        let settings = TargetSettings { choose: ChoiceRule::RaisedHand, ..approaching() };
+        let mut chooser = Chooser::default();
+        let tracks = [track(1, 1.0, 0.0, 0.0), track(2, 2.0, 1.0, 0.0)];
+        let mut frames = raised.iter().map(|raised| {
+            let found: Vec<_> = raised.map(|raised| joints(2, raised)).into_iter().collect();
+            chooser.choose(&settings, &tracks, &found, DT_S).map(|track| track.id.0)
+        });
+        frames.position(|chosen| chosen == Some(2))
+    }
+
+    #[test]
+    fn whoever_holds_a_hand_above_the_head_is_chosen() {
+        let raised = Some(true);
+        assert_eq!(chosen_by_hand(&[raised; 20]), Some(6), "after 0.6 s");
+        assert_eq!(chosen_by_hand(&[Some(false); 20]), None);
+        // A network that runs on every third frame says nothing in between.
+        let slow: Vec<_> = (0..20).map(|frame| raised.filter(|_| frame % 3 == 0)).collect();
+        assert_eq!(chosen_by_hand(&slow), Some(6));
+        let waving: Vec<_> = (0..40).map(|frame| Some(frame % 5 != 0)).collect();
+        assert_eq!(chosen_by_hand(&waving), None, "it was never up for long enough");
+        let mut gone = vec![raised; 3];
+        gone.extend([None; 12]);
+        gone.extend([raised; 5]);
+        assert_eq!(chosen_by_hand(&gone), None, "it begins anew after a second without joints");
+    }
+
     fn bystander() -> Track {
         track(2, 1.2, 0.5, 0.0)
     }
@@ -248,7 +335,7 @@ mod tests {
         let none = TargetSettings { choose: ChoiceRule::None, ..TargetSettings::default() };
         let tracks = [bystander()];
         let chosen = |settings: &TargetSettings| {
-            Chooser::default().choose(settings, &tracks, DT_S).map(|track| track.id.0)
+            Chooser::default().choose(settings, &tracks, &[], DT_S).map(|track| track.id.0)
         };
         assert_eq!(chosen(&none), None);
         let numbered = TargetSettings { track: Some(2), ..none };

@@ -1,7 +1,8 @@
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{EgoMotion, Frame, Person, Result, Track, TrackId};
+use tagalong_core::{EgoMotion, Frame, Joints, Person, Result, Track, TrackId};
 use tagalong_vision::{Appearance, Describer};
 
 use super::chooser::Chooser;
@@ -212,7 +213,8 @@ impl TargetLock {
         self.track.filter(|_| self.state.follows())
     }
 
-    /// Takes in a frame; `tracks` are near to far, `may_choose` allows the choice of a target.
+    /// Takes in a frame; `tracks` are near to far, `joints` those of them in this frame, and `may_choose`
+    /// allows the choice of a target.
     ///
     /// # Errors
     /// The network that describes people fails.
@@ -221,6 +223,7 @@ impl TargetLock {
         frame: &Frame,
         motion: &EgoMotion,
         tracks: &[Track],
+        joints: &[(TrackId, Arc<Joints>)],
         may_choose: bool,
     ) -> Result<LockReport> {
         self.move_along(motion);
@@ -229,7 +232,7 @@ impl TargetLock {
         let log_odds = likeness.iter().map(|like| (like.track, like.log_odds)).collect();
         match self.state {
             LockState::Initial if !may_choose => {}
-            LockState::Initial => self.start(tracks, motion.dt),
+            LockState::Initial => self.start(tracks, joints, motion.dt),
             LockState::Lost => self.look_for(tracks, &log_odds),
             _ => self.hold(tracks, &log_odds, motion.dt),
         }
@@ -279,8 +282,8 @@ impl TargetLock {
     }
 
     /// Follows the track that the chooser picks, if it picks one.
-    fn start(&mut self, tracks: &[Track], dt_s: f64) {
-        if let Some(track) = self.chooser.choose(&self.settings, tracks, dt_s) {
+    fn start(&mut self, tracks: &[Track], joints: &[(TrackId, Arc<Joints>)], dt_s: f64) {
+        if let Some(track) = self.chooser.choose(&self.settings, tracks, joints, dt_s) {
             self.begin(track, "chosen");
         }
     }

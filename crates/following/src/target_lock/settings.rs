@@ -12,7 +12,8 @@ pub struct TargetSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub track: Option<u32>,
     /// Choice of a person while there is none: "nearest" in front; "approach", the one that walks up to
-    /// the robot and stands still before it; or "none", to wait for an enrollment.
+    /// the robot and stands still before it; "raised-hand", the one that holds a hand above the head,
+    /// with a detector that finds joints; or "none", to wait for an enrollment.
     pub choose: ChoiceRule,
     /// Largest bearing to either side of a track that may be chosen, degrees.
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -37,6 +38,9 @@ pub struct TargetSettings {
     /// Time for which that person stands still, s.
     #[schemars(range(min = 0.2, max = 30.0))]
     pub approach_stands_s: f64,
+    /// Time for which a person holds a hand above the head, s.
+    #[schemars(range(min = 0.2, max = 10.0))]
+    pub raised_hand_s: f64,
     /// Remember the person's appearance, doubt a track that looks different, and recognise the
     /// person again. Without it a track is followed while it lives, and no other after that.
     pub remember: bool,
@@ -88,6 +92,7 @@ impl Default for TargetSettings {
             approach_within_m: 2.0,
             approach_by_m: 0.5,
             approach_stands_s: 1.0,
+            raised_hand_s: 0.6,
             remember: true,
             training_sightings: 15,
             belief_weight: 0.25,

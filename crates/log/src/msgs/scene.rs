@@ -283,6 +283,8 @@ pub struct PointsAnnotation {
 impl PointsAnnotation {
     /// Shape of a closed line.
     pub const LINE_LOOP: u8 = 2;
+    /// Shape of lines with two ends each.
+    pub const LINE_LIST: u8 = 4;
 }
 
 /// `foxglove_msgs/TextAnnotation`.

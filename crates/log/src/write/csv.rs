@@ -64,6 +64,31 @@ pub(super) fn metres(out: &mut impl Write, record: &FrameRecord<'_>) -> io::Resu
     Ok(())
 }
 
+/// Header line of `joints.csv`.
+pub(super) const JOINTS_HEADER: &str = "stamp_ns,frame,id,joint,x_px,y_px,score";
+
+/// Writes the lines of `joints.csv` for one frame: each joint of each confirmed track whose joints a
+/// detector found, by its name in COCO.
+pub(super) fn joints(out: &mut impl Write, record: &FrameRecord<'_>) -> io::Result<()> {
+    for track in record.confirmed() {
+        let Some(joints) = record.joints_of(track) else { continue };
+        for (name, joint) in joints.iter() {
+            writeln!(
+                out,
+                "{},{},{},{},{},{},{}",
+                record.stamp.nanos(),
+                record.index,
+                track.id,
+                name.name(),
+                Decimal(joint.at.x, 1),
+                Decimal(joint.at.y, 1),
+                Decimal(joint.score, 3),
+            )?;
+        }
+    }
+    Ok(())
+}
+
 /// Number with fixed decimals that never prints a negative zero.
 struct Decimal(f64, usize);
 
@@ -78,11 +103,40 @@ impl std::fmt::Display for Decimal {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry2, Vector2};
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry2, Point2, Vector2};
+    use tagalong_core::{Joint, JointName, Joints, TrackId};
 
     use super::super::record::BoxedPart;
     use super::super::testing::{camera, track};
     use super::*;
+
+    #[test]
+    fn joints_are_written_by_their_names() {
+        let mut all = [Joint { at: Point2::new(3.04, 5.0), score: 0.25 }; 17];
+        all[JointName::RightAnkle as usize].at = Point2::new(-0.01, 470.0);
+        let joints = [(TrackId(12), Arc::new(Joints::new(all)))];
+        let (known, other) = (track(12), track(13));
+        let tracks = [known, other];
+        let record = FrameRecord {
+            index: 7,
+            stamp: tagalong_core::Stamp::from_nanos(5),
+            camera: &camera(),
+            odom_from_robot: &Isometry2::identity(),
+            is_odom_known: true,
+            tracks: &tracks,
+            joints: &joints,
+            target: None,
+            command: None,
+        };
+        let mut text = Vec::new();
+        super::joints(&mut text, &record).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!((lines.len(), lines[0]), (17, "5,7,12,nose,3.0,5.0,0.250"));
+        assert_eq!(lines[16], "5,7,12,right_ankle,0.0,470.0,0.250");
+    }
 
     fn lines(tracks: &[tagalong_core::Track], unseen_s: f64) -> (String, String) {
         let record = FrameRecord {
@@ -92,6 +146,7 @@ mod tests {
             odom_from_robot: &Isometry2::new(Vector2::new(1.0, 2.0), std::f64::consts::FRAC_PI_2),
             is_odom_known: true,
             tracks,
+            joints: &[],
             target: None,
             command: None,
         };
@@ -122,6 +177,7 @@ mod tests {
             odom_from_robot: &Isometry2::identity(),
             is_odom_known: true,
             tracks: std::slice::from_ref(&one),
+            joints: &[],
             target: None,
             command: None,
         };

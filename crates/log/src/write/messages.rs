@@ -1,8 +1,10 @@
 //! Tracks of one frame as ROS 2 messages.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Point3, SMatrix, UnitQuaternion, Vector3};
 use serde::Serialize;
-use tagalong_core::{Track, WheelSpeeds};
+use tagalong_core::{Joints, Track, WheelSpeeds};
 use tagalong_geometry::HALF_HEAD_M;
 
 use super::mcap_tracks::FrameNames;
@@ -166,6 +168,12 @@ struct TrackJson {
     head_odom_m: [f64; 3],
     velocity_robot_mps: [f64; 2],
     upper_body_px: [f64; 4],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    joints: Option<BTreeMap<&'static str, [f64; 3]>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    body_direction_rad: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    raised_hand: Option<bool>,
 }
 
 /// Returns all tracks of a frame as JSON, tentative ones too, with velocity, age and occlusion.
@@ -186,6 +194,7 @@ pub(super) fn json(record: &FrameRecord<'_>) -> serde_json::Result<String> {
 fn track_json(record: &FrameRecord<'_>, track: &Track) -> TrackJson {
     let person = &track.estimate.person;
     let region = track.estimate.region;
+    let joints = record.joints_of(track);
     TrackJson {
         id: track.id.0,
         confirmed: track.confirmed,
@@ -198,7 +207,19 @@ fn track_json(record: &FrameRecord<'_>, track: &Track) -> TrackJson {
         head_odom_m: record.head_in_odom(track).coords.map(rounded).into(),
         velocity_robot_mps: person.velocity.map(rounded).into(),
         upper_body_px: [region.x, region.y, region.width, region.height].map(rounded),
+        joints: joints.map(joints_json),
+        body_direction_rad: record.body_direction_rad(track).map(rounded),
+        raised_hand: joints.map(Joints::has_raised_hand),
     }
+}
+
+/// Returns column and row, pixels, and score of each joint by its name.
+fn joints_json(joints: &Joints) -> BTreeMap<&'static str, [f64; 3]> {
+    let mut places = BTreeMap::new();
+    for (name, joint) in joints.iter() {
+        places.insert(name.name(), [joint.at.x, joint.at.y, joint.score].map(rounded));
+    }
+    places
 }
 
 /// Rounds to six decimals: a micrometre, and short enough to read.

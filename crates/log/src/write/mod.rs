@@ -1,5 +1,5 @@
 //! Files of a run: `tracks.mcap`, `tracks.csv`, `tracks-metres.csv`, `report.json`,
-//! `timings.json` and `origin.json`.
+//! `timings.json` and `origin.json`, and `joints.csv` where a detector finds joints.
 //!
 //! All are written under partial names and get their final names together at the end of the run, so
 //! that the files of a crash are never mistaken for a result. At least once per second of log time
@@ -62,6 +62,8 @@ pub struct TrackLog {
     mcap: McapTracks<BufWriter<File>>,
     boxes: BufWriter<File>,
     metres: BufWriter<File>,
+    /// Opened by the first joints.
+    joints: Option<BufWriter<File>>,
     flushed: Option<Stamp>,
 }
 
@@ -82,7 +84,7 @@ impl TrackLog {
         let boxes = dir.open("tracks.csv")?;
         let mut metres = dir.open("tracks-metres.csv")?;
         writeln!(metres, "{METRES_HEADER}").map_err(WriteError::io(dir.path()))?;
-        Ok(Self { dir, output, mcap, boxes, metres, flushed: None })
+        Ok(Self { dir, output, mcap, boxes, metres, joints: None, flushed: None })
     }
 
     /// Returns the directory of the run.
@@ -100,10 +102,27 @@ impl TrackLog {
             .map_err(WriteError::io(&self.file("tracks.csv")))?;
         csv::metres(&mut self.metres, record)
             .map_err(WriteError::io(&self.file("tracks-metres.csv")))?;
+        self.write_joints(record)?;
         let due =
             // The absolute value, because the stamps of a log may jump back.
             self.flushed.is_none_or(|last| record.stamp.seconds_since(last).abs() >= FLUSH_EVERY_S);
         if due { self.flush(record.stamp) } else { Ok(()) }
+    }
+
+    fn write_joints(&mut self, record: &FrameRecord<'_>) -> Result<(), WriteError> {
+        if record.joints.is_empty() {
+            return Ok(());
+        }
+        let path = self.file("joints.csv");
+        if self.joints.is_none() {
+            let mut out = self.dir.open("joints.csv")?;
+            writeln!(out, "{}", csv::JOINTS_HEADER).map_err(WriteError::io(&path))?;
+            self.joints = Some(out);
+        }
+        match &mut self.joints {
+            Some(out) => csv::joints(out, record).map_err(WriteError::io(&path)),
+            None => Ok(()),
+        }
     }
 
     /// Writes a value as a JSON text to a topic of `tracks.mcap`; `at` is the stamp of its frame.
@@ -140,7 +159,9 @@ impl TrackLog {
 
     fn flush_text(&mut self) -> Result<(), WriteError> {
         self.boxes.flush().map_err(WriteError::io(&self.file("tracks.csv")))?;
-        self.metres.flush().map_err(WriteError::io(&self.file("tracks-metres.csv")))
+        self.metres.flush().map_err(WriteError::io(&self.file("tracks-metres.csv")))?;
+        let path = self.file("joints.csv");
+        self.joints.iter_mut().try_for_each(|out| out.flush()).map_err(WriteError::io(&path))
     }
 
     /// Ends the files, adds the report, the timings, the origin and `about` (as metadata of the log), and gives

@@ -1,6 +1,8 @@
+use std::sync::Arc;
+
 use nalgebra::{Isometry2, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Stamp, Track, TrackId, WheelSpeeds};
+use tagalong_core::{Joints, Stamp, Track, TrackId, WheelSpeeds};
 use tagalong_geometry::{Camera, Rect};
 
 /// Settings of the output, `[output]` of a config.
@@ -51,6 +53,8 @@ pub struct FrameRecord<'a> {
     pub is_odom_known: bool,
     /// All tracks, confirmed or not.
     pub tracks: &'a [Track],
+    /// Joints of tracks in the image, where a detector found them.
+    pub joints: &'a [(TrackId, Arc<Joints>)],
     /// Track of the person that is followed.
     pub target: Option<TrackId>,
     /// Commanded wheel speeds, if there is a controller.
@@ -58,6 +62,19 @@ pub struct FrameRecord<'a> {
 }
 
 impl FrameRecord<'_> {
+    /// Returns the joints of a track in the image, if a detector found them.
+    pub(super) fn joints_of(&self, track: &Track) -> Option<&Joints> {
+        let found = self.joints.iter().find(|(id, _)| *id == track.id);
+        found.map(|(_, joints)| joints.as_ref())
+    }
+
+    /// Returns the direction in which the body of a track is turned, rad in the robot frame, if its
+    /// joints show it.
+    pub(super) fn body_direction_rad(&self, track: &Track) -> Option<f64> {
+        let at = track.estimate.person.position;
+        self.joints_of(track)?.body_direction_rad(at.y.atan2(at.x))
+    }
+
     /// Returns the confirmed tracks, seen or not.
     pub(super) fn confirmed(&self) -> impl Iterator<Item = &Track> {
         self.tracks.iter().filter(|track| track.confirmed)

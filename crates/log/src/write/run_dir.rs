@@ -18,10 +18,11 @@ pub struct RunDir {
 }
 
 /// Names of the files of a run; only these are ever removed.
-const OWN_FILES: [&str; 6] = [
+const OWN_FILES: [&str; 7] = [
     "tracks.mcap",
     "tracks.csv",
     "tracks-metres.csv",
+    "joints.csv",
     "report.json",
     "timings.json",
     "origin.json",

@@ -257,6 +257,17 @@ pub(super) fn annotations(record: &FrameRecord<'_>, part: BoxedPart) -> ImageAnn
             thickness: if track.seen { 3.0 } else { 1.0 },
             ..PointsAnnotation::default()
         });
+        if let Some(joints) = record.joints_of(track) {
+            let ends = joints.bones().concat();
+            out.points.push(PointsAnnotation {
+                timestamp,
+                shape: PointsAnnotation::LINE_LIST,
+                points: ends.iter().map(|end| Pixel { x: end.x, y: end.y }).collect(),
+                outline_color: colour,
+                thickness: 2.0,
+                ..PointsAnnotation::default()
+            });
+        }
         out.texts.push(TextAnnotation {
             timestamp,
             position: Pixel { x: left, y: top },

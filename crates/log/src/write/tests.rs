@@ -1,8 +1,10 @@
 use std::collections::BTreeMap;
+use std::fs;
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
+use std::sync::Arc;
 
-use nalgebra::{Isometry2, Vector2};
-use tagalong_core::{Stamp, Track, WheelSpeeds};
+use nalgebra::{Isometry2, Point2, Vector2};
+use tagalong_core::{Joint, Joints, Stamp, Track, TrackId, WheelSpeeds};
 
 use super::mcap_tracks::McapTracks;
 use super::testing::{camera, track};
@@ -16,6 +18,12 @@ fn names() -> FrameNames {
     FrameNames { base: "base_link".into(), odom: "odom".into(), camera: "eye".into() }
 }
 
+/// Returns the joints of a track, all in one place.
+fn joints_of(id: u32) -> (TrackId, Arc<Joints>) {
+    let joints = [Joint { at: Point2::new(40.0, 50.0), score: 0.75 }; 17];
+    (TrackId(id), Arc::new(Joints::new(joints)))
+}
+
 /// Passes a record of frame `index` (ten a second) to `use_it`.
 fn with_record<T>(index: u64, tracks: &[Track], use_it: impl FnOnce(&FrameRecord<'_>) -> T) -> T {
     use_it(&FrameRecord {
@@ -25,6 +33,7 @@ fn with_record<T>(index: u64, tracks: &[Track], use_it: impl FnOnce(&FrameRecord
         odom_from_robot: &Isometry2::new(Vector2::new(0.1 * index as f64, 0.0), 0.0),
         is_odom_known: true,
         tracks,
+        joints: &[],
         target: tracks.first().map(|track| track.id),
         command: Some(WheelSpeeds { left: 0.25, right: 0.5 }),
     })
@@ -60,7 +69,7 @@ fn read(bytes: &[u8], topic: &str) -> Vec<Vec<u8>> {
 fn the_log_carries_tracks_poses_transforms_and_the_config() {
     let home = tempfile::tempdir().unwrap();
     log(home.path(), 3, true);
-    let bytes = std::fs::read(home.path().join("tracks.mcap")).unwrap();
+    let bytes = fs::read(home.path().join("tracks.mcap")).unwrap();
     let arrays = read(&bytes, "/people/tracks");
     assert_eq!(arrays.len(), 3);
     let array: Detection3DArray = decode(&arrays[0]).unwrap();
@@ -91,7 +100,7 @@ fn the_log_carries_tracks_poses_transforms_and_the_config() {
 fn the_log_carries_what_viewers_draw() {
     let home = tempfile::tempdir().unwrap();
     log(home.path(), 2, true);
-    let bytes = std::fs::read(home.path().join("tracks.mcap")).unwrap();
+    let bytes = fs::read(home.path().join("tracks.mcap")).unwrap();
     let markers: MarkerArray = decode(&read(&bytes, "/people/markers")[1]).unwrap();
     let shapes: Vec<i32> = markers.markers.iter().map(|marker| marker.shape).collect();
     assert_eq!(markers.markers[0].action, Marker::DELETE_ALL);
@@ -136,6 +145,7 @@ fn people_of_planners_are_on_the_floor_with_their_velocity_over_ground() {
         odom_from_robot: &Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2),
         is_odom_known: true,
         tracks: &[track(12), tentative],
+        joints: &[],
         target: None,
         command: None,
     };
@@ -160,13 +170,45 @@ fn images_are_passed_through_as_they_are() {
 }
 
 #[test]
+fn joints_are_in_the_log_and_in_a_file_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = RunDir::create(dir.path(), true, Path::new("nowhere.mcap")).unwrap();
+    let mut log = TrackLog::create(run, names(), OutputSettings::default(), "seed = 1\n").unwrap();
+    let joints = [joints_of(12)];
+    with_record(1, &[track(12), track(13)], |record| log.write(record)).unwrap();
+    with_record(2, &[track(12), track(13)], |record| {
+        log.write(&FrameRecord { joints: &joints, ..*record })
+    })
+    .unwrap();
+    let texts = RunTexts { report: "{}", timings: "{}", origin: "{}" };
+    log.finish(BTreeMap::new(), &texts).unwrap();
+    let table = fs::read_to_string(dir.path().join("joints.csv")).unwrap();
+    assert_eq!(table.lines().count(), 1 + 17, "a header, and one track of one frame");
+    assert!(table.contains(",2,12,left_wrist,40.0,50.0,0.750\n"), "{table}");
+    let bytes = fs::read(dir.path().join("tracks.mcap")).unwrap();
+    let json = read(&bytes, "/people/tracks_json");
+    let text = String::from_utf8_lossy(&json[1]).into_owned();
+    assert!(text.contains(r#""left_wrist":[40.0,50.0,0.75]"#), "{text}");
+    assert!(text.contains(r#""raised_hand":false"#), "{text}");
+    assert!(!String::from_utf8_lossy(&json[0]).contains("joints"));
+    let drawn = read(&bytes, "/people/annotations");
+    // Twelve lines with two ends of two numbers each.
+    assert!(
+        drawn[1].len() >= drawn[0].len() + 12 * 2 * 16,
+        "{} {}",
+        drawn[1].len(),
+        drawn[0].len()
+    );
+}
+
+#[test]
 fn two_runs_give_the_same_bytes() {
     let a = tempfile::tempdir().unwrap();
     let b = tempfile::tempdir().unwrap();
     log(a.path(), 25, true);
     log(b.path(), 25, true);
     for name in ["tracks.mcap", "tracks.csv", "tracks-metres.csv"] {
-        let [a, b] = [&a, &b].map(|home| std::fs::read(home.path().join(name)).unwrap());
+        let [a, b] = [&a, &b].map(|home| fs::read(home.path().join(name)).unwrap());
         assert_eq!(a, b, "{name}");
     }
 }
@@ -176,10 +218,10 @@ fn a_killed_run_loses_at_most_a_second() {
     let home = tempfile::tempdir().unwrap();
     log(home.path(), 35, false);
     assert!(!home.path().join("tracks.mcap").exists(), "a final name is a whole file");
-    let bytes = std::fs::read(home.path().join("tracks.mcap.partial")).unwrap();
+    let bytes = fs::read(home.path().join("tracks.mcap.partial")).unwrap();
     let kept = read(&bytes, "/people/tracks").len();
     assert!((26..=35).contains(&kept), "kept {kept} of 35");
-    let csv = std::fs::read_to_string(home.path().join("tracks.csv.partial")).unwrap();
+    let csv = fs::read_to_string(home.path().join("tracks.csv.partial")).unwrap();
     assert!(csv.lines().count() >= 26 && csv.ends_with('\n'), "{csv}");
 }
 
@@ -192,7 +234,7 @@ fn a_clock_that_jumps_back_still_flushes() {
         with_record(index, &[track(1)], |r| log.write(r)).unwrap();
     }
     std::mem::forget(log);
-    let csv = std::fs::read_to_string(home.path().join("tracks.csv.partial")).unwrap();
+    let csv = fs::read_to_string(home.path().join("tracks.csv.partial")).unwrap();
     assert_eq!(csv.lines().count(), 2);
 }
 

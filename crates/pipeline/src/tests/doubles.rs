@@ -52,13 +52,8 @@ pub fn with_eyes(frame: Frame) -> Frame {
 /// A person 1.6 m tall (to the head's centre) at a place on the floor.
 pub fn person(x: f64, y: f64) -> Detection {
     let position = Point3::new(x, y, 1.6);
-    Detection {
-        image: Some(ImageBox::upper_body(camera().upper_body(&position))),
-        position,
-        covariance: Matrix3::identity() * 0.01,
-        score: 1.0,
-        source: "script",
-    }
+    Detection::new("script", position, Matrix3::identity() * 0.01, 1.0)
+        .with_image(ImageBox::upper_body(camera().upper_body(&position)))
 }
 
 pub fn scored(score: f64, detection: Detection) -> Detection {

@@ -157,13 +157,8 @@ fn after_a_jump_of_the_clock_the_appearance_is_remembered() {
 /// A detection where a track would be seen.
 fn detection(y_m: f64) -> Detection {
     let Track { estimate, .. } = track(0, y_m, 1.7);
-    Detection {
-        image: Some(ImageBox::upper_body(estimate.region)),
-        position: estimate.person.position,
-        covariance: Matrix3::identity() * 0.01,
-        score: 1.0,
-        source: "test",
-    }
+    Detection::new("test", estimate.person.position, Matrix3::identity() * 0.01, 1.0)
+        .with_image(ImageBox::upper_body(estimate.region))
 }
 
 #[test]

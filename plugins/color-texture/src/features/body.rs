@@ -72,13 +72,9 @@ mod tests {
         let camera = Camera::mounted(lens, 320, 320, 1.2, 0.0, 0.0);
         let metres = |pixel: usize| (160.0 - pixel as f64) / 300.0 * ahead_m;
         let image = GreyImage::from_fn(320, 320, |x, y| paint(metres(x), 1.2 + metres(y)));
-        let candidate = Detection {
-            image: Some(ImageBox::upper_body(Rect::new(140.0, 60.0, 40.0, 40.0))),
-            position: Point3::new(ahead_m, 0.0, 1.6),
-            covariance: Matrix3::identity(),
-            score: 0.0,
-            source: "test",
-        };
+        let candidate =
+            Detection::new("test", Point3::new(ahead_m, 0.0, 1.6), Matrix3::identity(), 0.0)
+                .with_image(ImageBox::upper_body(Rect::new(140.0, 60.0, 40.0, 40.0)));
         let mut out = Vec::new();
         push(&camera, &image, &candidate, &mut out);
         assert_eq!(out.len(), COUNT);

@@ -26,13 +26,9 @@ mod tests {
     fn the_distance_is_from_the_camera_and_the_height_from_the_floor() {
         let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 32.0, cy: 32.0, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 64, 64, 1.2, 0.0, 0.0);
-        let candidate = Detection {
-            image: Some(ImageBox::upper_body(Rect::new(8.0, 8.0, 20.0, 20.0))),
-            position: Point3::new(3.0, 4.0, 1.2),
-            covariance: Matrix3::identity(),
-            score: -1.5,
-            source: "test",
-        };
+        let candidate =
+            Detection::new("test", Point3::new(3.0, 4.0, 1.2), Matrix3::identity(), -1.5)
+                .with_image(ImageBox::upper_body(Rect::new(8.0, 8.0, 20.0, 20.0)));
         let mut out = Vec::new();
         push(&camera, &candidate, &mut out);
         assert_eq!(out, [1.2, 5.0, 20.0, -1.5]);

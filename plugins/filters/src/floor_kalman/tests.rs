@@ -23,13 +23,8 @@ fn frame() -> Frame {
 }
 
 fn sighting(x: f64, y: f64) -> Detection {
-    Detection {
-        image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
-        position: Point3::new(x, y, 1.6),
-        covariance: Matrix3::from_diagonal_element(0.02),
-        score: 1.0,
-        source: "test",
-    }
+    Detection::new("test", Point3::new(x, y, 1.6), Matrix3::from_diagonal_element(0.02), 1.0)
+        .with_image(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0)))
 }
 
 fn see(filter: &mut FloorKalman, detection: &Detection) -> (f64, u32) {

@@ -20,13 +20,8 @@ fn camera() -> Arc<Camera> {
 }
 
 fn person(head: Point3<f64>) -> Detection {
-    Detection {
-        image: Some(ImageBox::upper_body(camera().upper_body(&head))),
-        position: head,
-        covariance: Matrix3::identity() * 1e-4,
-        score: 3.0,
-        source: "test",
-    }
+    Detection::new("test", head, Matrix3::identity() * 1e-4, 3.0)
+        .with_image(ImageBox::upper_body(camera().upper_body(&head)))
 }
 
 /// Filters the detections of one person, each after a motion of the robot.
@@ -255,13 +250,7 @@ fn ahead(range_m: f64) -> (Camera, Detection) {
     let covariance = Matrix3::zeros();
     (
         camera,
-        Detection {
-            image: Some(ImageBox::upper_body(region)),
-            position,
-            covariance,
-            score: 1.0,
-            source: "test",
-        },
+        Detection::new("test", position, covariance, 1.0).with_image(ImageBox::upper_body(region)),
     )
 }
 

@@ -116,13 +116,8 @@ mod tests {
     use super::*;
 
     fn sighting(x: f64, y: f64) -> Detection {
-        Detection {
-            image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
-            position: Point3::new(x, y, 1.6),
-            covariance: Matrix3::identity() * 0.01,
-            score: 1.0,
-            source: "test",
-        }
+        Detection::new("test", Point3::new(x, y, 1.6), Matrix3::identity() * 0.01, 1.0)
+            .with_image(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0)))
     }
 
     fn after_a_turn(ego_motion: bool) -> State {

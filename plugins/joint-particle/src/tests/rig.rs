@@ -53,13 +53,7 @@ pub fn frame(motion: EgoMotion, colour: Option<RgbImage>) -> Frame {
 pub fn sighting(position: Point3<f64>, sigmas: [f64; 3]) -> Detection {
     let covariance = Matrix3::from_diagonal(&Vector3::from(sigmas).map(|s| s * s));
     let region = Rect::new(40.0, 30.0, 20.0, 20.0);
-    Detection {
-        image: Some(ImageBox::upper_body(region)),
-        position,
-        covariance,
-        score: 3.0,
-        source: "drawn",
-    }
+    Detection::new("drawn", position, covariance, 3.0).with_image(ImageBox::upper_body(region))
 }
 
 /// A filter and its frames.

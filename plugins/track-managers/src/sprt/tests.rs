@@ -12,13 +12,8 @@ use crate::sprt::{Config, Sprt};
 const DT_S: f64 = 0.1;
 
 fn detection(x: f64, log_odds: f64) -> Detection {
-    Detection {
-        image: Some(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0))),
-        position: Point3::new(x, 0.0, 1.6),
-        covariance: Matrix3::identity() * 0.01,
-        score: log_odds,
-        source: "test",
-    }
+    Detection::new("test", Point3::new(x, 0.0, 1.6), Matrix3::identity() * 0.01, log_odds)
+        .with_image(ImageBox::upper_body(Rect::new(0.0, 0.0, 9.0, 9.0)))
 }
 
 /// One place, looked at in each frame: starts a track whenever it may.

@@ -127,6 +127,7 @@ impl RunFiles {
             odom_from_robot,
             is_odom_known: true,
             tracks: &report.tracks,
+            joints: &report.joints(),
             target: report.target,
             command: report.command.map(|command| command.wheels),
         })?;

@@ -38,7 +38,7 @@ fn tall(height_m: f64) -> Track {
 
 /// An eighth of a second later.
 fn step(lock: &mut TargetLock, tracks: &[Track]) -> LockReport {
-    lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.125), tracks, true).unwrap()
+    lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.125), tracks, &[], true).unwrap()
 }
 
 fn steps(lock: &mut TargetLock, count: usize, track: &Track) -> Vec<LockState> {
@@ -121,7 +121,8 @@ fn in_front_is_what_the_settings_say() {
     assert!(at(30.0, 4.9) && !at(30.0, 5.1));
     assert!(!chosen(Track { confirmed: false, ..somebody(1, 2.0, 0.0) }));
     let mut lock = new_lock(settings());
-    lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.1), &[somebody(1, 2.0, 0.0)], false).unwrap();
+    lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.1), &[somebody(1, 2.0, 0.0)], &[], false)
+        .unwrap();
     assert_eq!(lock.state(), LockState::Initial, "not yet");
 }
 

@@ -28,13 +28,8 @@ pub fn camera() -> Camera {
 }
 
 pub fn detection(position: Point3<f64>, sigma_m: f64) -> Detection {
-    Detection {
-        image: Some(ImageBox::upper_body(Rect::default())),
-        position,
-        covariance: Matrix3::identity() * (sigma_m * sigma_m),
-        score: 1.0,
-        source: "test",
-    }
+    Detection::new("test", position, Matrix3::identity() * (sigma_m * sigma_m), 1.0)
+        .with_image(ImageBox::upper_body(Rect::default()))
 }
 
 /// A robot at constant speed, and a person that starts at rest.
