@@ -1,5 +1,6 @@
 """Pipelines on arrays and on logs."""
 
+import pathlib
 import threading
 import time
 
@@ -10,6 +11,8 @@ import tagalong
 CAMERA = tagalong.Camera(64, 48, fx=60.0, height_m=1.2)
 DEPTH = np.full((48, 64), 3.0, np.float32)
 COLOUR = np.zeros((48, 64, 3), np.uint8)
+# Hand-weighted networks; each finds an upright bright blob.
+MODELS = pathlib.Path(__file__).parents[3] / "crates/network/tests/models"
 
 
 def lines(report, pose):
@@ -134,6 +137,36 @@ def test_a_camera_projects_along_its_axis():
     assert CAMERA.project([-2.0, 0.0, 1.2]) is None
     same = tagalong.Camera(64, 48, fx=60.0, robot_from_camera=CAMERA.robot_from_camera)
     assert same.project([2.0, 0.3, 1.0]) == pytest.approx(CAMERA.project([2.0, 0.3, 1.0]))
+
+
+def test_tracks_have_the_joints_that_a_pose_network_finds():
+    model = MODELS / "movenet.onnx"
+    pipeline = tagalong.Pipeline.from_toml(
+        f"""
+        [[detectors]]
+        plugin = "onnx"
+        config = {{ model = "{model.as_posix()}" }}
+
+        [filter]
+        plugin = "ekf"
+        """
+    )
+    camera = tagalong.Camera(384, 384, fx=300.0, height_m=1.0)
+    colour = np.full((384, 384, 3), 10, np.uint8)
+    colour[96:288, 192:288] = 240
+    for tenth in range(6):
+        report = pipeline.step(colour, None, camera, None, 1.0 + 0.1 * tenth)
+    (track,) = report.tracks
+    assert len(track.joints) == 17
+    x, y, score = track.joints["left_wrist"]
+    assert 192 <= x <= 288 and 96 <= y <= 288 and 0.0 < score <= 1.0
+    assert track.raised_hand in (True, False)
+
+
+def test_other_detectors_find_no_joints(log):
+    pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+    tracks = [track for frame in pipeline.frames(log) for track in pipeline.step_frame(frame).tracks]
+    assert tracks and all(track.joints is None and track.raised_hand is None for track in tracks)
 
 
 def test_depth_in_millimetres_is_depth_in_metres(log):

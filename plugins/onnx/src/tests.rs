@@ -106,6 +106,11 @@ fn every_family_finds_the_person_and_the_place() {
         let image = found[0].image.unwrap();
         assert_eq!(image.extent, Extent::FullBody);
         assert!(image.rect.iou(&BODY) > 0.97, "{family}: {image:?}");
+        let joints = found[0].joints.as_ref();
+        assert_eq!(joints.is_some(), family == Family::MoveNet, "{family}");
+        for (name, joint) in joints.iter().flat_map(|joints| joints.iter()) {
+            assert!(BODY.contains(joint.at), "{name:?} in pixels of the image: {joint:?}");
+        }
         let upper = detect(&mut detector(config(family)), &frame(1, 240)).remove(0);
         assert!(upper.rect().unwrap().iou(&BODY.upper_body_of_standing(1.7)) > 0.95, "{family}");
         // 1.7 m in 192 pixels of a lens of 300.
