@@ -61,9 +61,20 @@ const BUILT_IN: &[(&str, &str)] = configs! {
     "stereo-verified"
 };
 
+/// Configs of robots, by the names of their files.
+const ROBOTS: &[(&str, &str)] = &[
+    ("turtlebot3", include_str!("../../configs/robots/turtlebot3.toml")),
+    ("turtlebot4", include_str!("../../configs/robots/turtlebot4.toml")),
+];
+
+/// Returns all built-in configs with their names.
+fn all() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
+    BUILT_IN.iter().chain(ROBOTS)
+}
+
 /// Returns the names of the built-in configs.
 pub(super) fn builtin_names() -> impl Iterator<Item = &'static str> {
-    BUILT_IN.iter().map(|(name, _)| *name)
+    all().map(|(name, _)| *name)
 }
 
 /// Returns the text of a built-in config with those that it extends; `None` if there is none of this
@@ -75,7 +86,7 @@ pub(super) fn builtin_text(name: &str) -> Option<String> {
 }
 
 fn text_alone(name: &str) -> Option<&'static str> {
-    BUILT_IN.iter().find(|(builtin, _)| *builtin == name).map(|(_, text)| *text)
+    all().find(|(builtin, _)| *builtin == name).map(|(_, text)| *text)
 }
 
 /// Returns the text of a config that another one extends: it is built in, too.
@@ -95,7 +106,8 @@ mod tests {
     fn all_configs_of_the_folder_are_built_in_but_those_with_a_model_of_their_own() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
         let mut left_out = Vec::new();
-        for entry in fs::read_dir(folder).unwrap() {
+        let robots = fs::read_dir(folder.join("robots")).unwrap();
+        for entry in fs::read_dir(folder).unwrap().chain(robots) {
             let path = entry.unwrap().path();
             let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
             let is_config = path.extension().is_some_and(|extension| extension == "toml");
@@ -105,5 +117,11 @@ mod tests {
         }
         left_out.sort();
         assert_eq!(left_out, ["colour-net", "onnx"]);
+    }
+
+    #[test]
+    fn configs_of_robots_have_what_they_extend() {
+        let text = builtin_text("turtlebot4").unwrap();
+        assert!(text.contains("clear-follow") && text.contains("footprint"), "{text}");
     }
 }
