@@ -9,8 +9,9 @@ use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
 use crate::images::{
-    CloudAxes, CloudCamera, Codec, Content, camera_of_cloud, content_of_encoding,
-    content_of_format, may_be_disparity, points_of_cloud, size_of_compressed,
+    CloudAxes, CloudCamera, Codec, Content, H264, Packet, camera_of_cloud, content_of_encoding,
+    content_of_format, may_be_disparity, points_of_cloud, size_of_compressed, size_of_video,
+    video_codec,
 };
 use crate::log_files::LogFiles;
 use crate::msgs::{
@@ -33,6 +34,8 @@ const MAX_STAMPS: usize = 20_000;
 pub(crate) enum Type {
     Image,
     CompressedImage,
+    /// Packets of video: of messages of their own, or in place of a compressed image.
+    Video,
     DisparityImage,
     PointCloud,
     CameraInfo,
@@ -52,6 +55,8 @@ impl Type {
         match (package, name.rsplit('/').next().unwrap_or(name)) {
             ("sensor_msgs", "Image") => Self::Image,
             ("sensor_msgs", "CompressedImage") => Self::CompressedImage,
+            ("foxglove_msgs", "CompressedVideo") => Self::Video,
+            ("ffmpeg_image_transport_msgs", "FFMPEGPacket") => Self::Video,
             ("stereo_msgs", "DisparityImage") => Self::DisparityImage,
             ("sensor_msgs", "PointCloud2") => Self::PointCloud,
             ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
@@ -362,6 +367,7 @@ impl Gathering {
         let done = match topic.kind {
             Type::Image => topic.take_image(&channel.topic, message.data, unit),
             Type::CompressedImage => topic.take_compressed(&channel.topic, message.data),
+            Type::Video => topic.take_video(message.data),
             Type::DisparityImage => topic.take_disparity(message.data),
             Type::PointCloud => self.take_cloud(&channel.topic, message.data),
             Type::Odometry => topic.take_odometry(message.data),
@@ -542,11 +548,34 @@ impl Topic {
             self.pixels = Some(image.format);
         }
         // Video under any label.
-        if let Some(codec) = crate::images::video_codec(image.data) {
-            (self.content, self.pixels) = (Content::Unknown, Some(codec.to_owned()));
+        if let Some(codec) = video_codec(image.data) {
+            self.kind = Type::Video;
+            self.take_packet(codec, image.data);
         }
         self.take_header(image.header);
         Some(())
+    }
+
+    fn take_video(&mut self, data: &[u8]) -> Option<()> {
+        let packet = Packet::of(&self.schema, data).ok()?;
+        let codec = video_codec(packet.data).unwrap_or(&packet.codec);
+        self.take_packet(codec, packet.data);
+        self.take_header(packet.header);
+        Some(())
+    }
+
+    /// Takes in a packet of video: the first parameters tell the size of the pictures.
+    fn take_packet(&mut self, codec: &str, data: &[u8]) {
+        if codec != H264 {
+            (self.content, self.pixels) = (Content::Unknown, Some(codec.to_owned()));
+            return;
+        }
+        self.pixels = Some(codec.to_owned());
+        if self.size.is_none() {
+            self.size = size_of_video(data, &Limits::default()).ok().flatten();
+        }
+        // Without its parameters there is no picture.
+        self.content = if self.size.is_some() { Content::Picture } else { Content::Unknown };
     }
 
     fn take_disparity(&mut self, data: &[u8]) -> Option<()> {

@@ -9,6 +9,7 @@ mod cloud;
 mod compressed;
 mod deep_png;
 mod disparity;
+mod h264;
 mod raw;
 mod rvl;
 mod video;
@@ -24,9 +25,10 @@ pub use disparity::{
     DepthFromDisparity, StereoGeometry, decode_compressed_disparity, decode_disparity,
     decode_plain_disparity,
 };
+pub(crate) use h264::{Picture, VideoDecoder, size_of_video};
 pub use raw::{decode_raw, size_of_raw};
 use tagalong_core::{DepthImage, GreyImage, RgbImage};
-pub(crate) use video::video_codec;
+pub(crate) use video::{H264, Packet, video_codec};
 
 use crate::Limits;
 
@@ -169,7 +171,7 @@ pub(crate) fn refusal_of(pixels: &str) -> String {
 }
 
 /// Remedy for video in a log.
-pub(crate) const VIDEO_REMEDY: &str = "video is not decoded: record the camera's jpeg images (a topic `.../compressed`) instead; the video \
+pub(crate) const VIDEO_REMEDY: &str = "of video H.264 alone is decoded: record the camera's jpeg images (a topic `.../compressed`) instead; the video \
      of a log that exists can be republished as jpeg while it plays (`ros2 run image_transport republish \
      ffmpeg compressed`, or with `foxglove` or `theora` in place of `ffmpeg`) and recorded again";
 

@@ -1,6 +1,42 @@
 //! Video in image messages, told by its bytes: some drivers publish it as `sensor_msgs/CompressedImage`
 //! with any format, also with `jpeg` or none.
 
+use crate::msgs::{CdrError, CompressedImage, CompressedVideo, FfmpegPacket, Header, decode};
+
+/// Name of the codec that is decoded.
+pub(crate) const H264: &str = "h264";
+
+/// Packet of video, whatever message it came in.
+pub(crate) struct Packet<'a> {
+    /// Time of the picture, and frame of the camera.
+    pub(crate) header: Header,
+    /// Codec as the message names it.
+    pub(crate) codec: String,
+    /// Bytes of the packet.
+    pub(crate) data: &'a [u8],
+}
+
+impl<'a> Packet<'a> {
+    /// Reads a message of a type with packets.
+    pub(crate) fn of(schema: &str, message: &'a [u8]) -> Result<Self, CdrError> {
+        match schema.rsplit('/').next() {
+            Some("CompressedVideo") => {
+                let video: CompressedVideo<'a> = decode(message)?;
+                let header = Header { stamp: video.timestamp, frame_id: video.frame_id };
+                Ok(Self { header, codec: video.format, data: video.data })
+            }
+            Some("FFMPEGPacket") => {
+                let packet: FfmpegPacket<'a> = decode(message)?;
+                Ok(Self { header: packet.header, codec: packet.encoding, data: packet.data })
+            }
+            _ => {
+                let image: CompressedImage<'a> = decode(message)?;
+                Ok(Self { header: image.header, codec: image.format, data: image.data })
+            }
+        }
+    }
+}
+
 /// Returns the codec of a packet of video; `None` for everything else.
 ///
 /// The packets of H.264 and H.265 begin with a start code and a unit that begins a picture (ITU-T H.264
@@ -25,7 +61,7 @@ pub(crate) fn video_codec(data: &[u8]) -> Option<&'static str> {
     // The highest bit is always 0.
     match (is_h264, is_h265) {
         _ if first & 0x80 != 0 => None,
-        (true, _) => Some("h264"),
+        (true, _) => Some(H264),
         (false, true) => Some("h265"),
         (false, false) => None,
     }

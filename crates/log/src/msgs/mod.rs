@@ -15,6 +15,7 @@ mod people;
 mod ros1;
 mod scene;
 mod sensor;
+mod video;
 mod vision;
 
 pub use common::{BoolMsg, Float32Msg, Header, StringMsg, Time};
@@ -36,6 +37,7 @@ pub use sensor::{
     PointField, Range, RegionOfInterest,
 };
 use serde::{Deserialize, Serialize};
+pub use video::{CompressedVideo, FfmpegPacket};
 pub use vision::{
     BoundingBox2D, BoundingBox3D, Detection2D, Detection2DArray, Detection3D, Detection3DArray,
     ObjectHypothesis, ObjectHypothesisWithPose, Point2D, Pose2D,

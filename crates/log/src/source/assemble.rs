@@ -645,7 +645,8 @@ fn read<T>(
 ) -> Option<T> {
     let kind = plan.scan.topics.get(topic).map(|topic| topic.kind);
     let message = match kind {
-        Some(Type::Image) => decode(&image.data).map(AnyImage::Raw),
+        // Pictures of video are decoded as they come.
+        Some(Type::Image | Type::Video) => decode(&image.data).map(AnyImage::Raw),
         Some(Type::DisparityImage) => decode(&image.data).map(AnyImage::Disparity),
         Some(Type::PointCloud) => decode(&image.data).map(AnyImage::Cloud),
         _ => decode(&image.data).map(AnyImage::Compressed),

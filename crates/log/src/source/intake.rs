@@ -1,10 +1,13 @@
 //! Distribution of the messages of a log to the parts of a frame.
 
+use std::collections::BTreeMap;
+
 use tagalong_core::{Stamp, planar_pose};
 
 use super::changes::CameraWatch;
 use super::plan::Plan;
 use super::restamp::restamp;
+use crate::images::{Packet, Picture, VideoDecoder};
 use crate::msgs::{
     CdrError, CompressedImage, DisparityImage, Image, Odometry, PointCloud2, TFMessage, decode,
 };
@@ -43,6 +46,8 @@ pub(super) struct Intake {
     heard: Option<(Stamp, u64)>,
     pub(super) tf: TfBuffer,
     pub(super) poses: PoseBuffer,
+    /// Decoders of the topics with video.
+    videos: BTreeMap<String, VideoDecoder>,
     /// True if messages have the times of their recording in place of their stamps.
     has_recording_times: bool,
 }
@@ -68,6 +73,7 @@ impl Intake {
             heard: None,
             tf,
             poses: PoseBuffer::default(),
+            videos: videos(plan),
             has_recording_times: plan.has_recording_times,
         }
     }
@@ -86,14 +92,19 @@ impl Intake {
         self.take_obstacles(message, tally);
         let topic = Some(&message.channel.topic);
         let outcome = if *message.channel.topic == self.primary {
-            payload(message).map(|image| {
+            self.payload(message, tally).map(|image| {
+                let Some(image) = image else { return };
                 self.heard = Some((image.stamp, message.log_time));
                 self.take_frame(image, tally);
             })
         } else if topic == self.chosen.depth.as_ref() {
             payload(message).map(|image| self.depth.push(image))
         } else if topic == self.chosen.right.as_ref() {
-            payload(message).map(|image| self.right.push(image))
+            self.payload(message, tally).map(|image| {
+                if let Some(image) = image {
+                    self.right.push(image);
+                }
+            })
         } else if let Some(reader) = self.reader(&message.channel.topic) {
             reader.take(message, tally)
         } else if topic == self.chosen.odometry.as_ref() {
@@ -115,6 +126,32 @@ impl Intake {
         if let Err(error) = outcome {
             tally.lose("messages_undecodable", || format!("{}: {error}", message.channel.topic));
         }
+    }
+
+    /// Returns the stamp, the frame and the bytes of an image or a scan, of a packet of video those of
+    /// its picture; `None` for a packet without one.
+    fn payload(
+        &mut self,
+        message: &Message<'_>,
+        tally: &mut Tally,
+    ) -> Result<Option<Payload>, CdrError> {
+        let topic = &message.channel.topic;
+        let Some(decoder) = self.videos.get_mut(topic) else { return payload(message).map(Some) };
+        let packet = Packet::of(&message.channel.schema_name, message.data)?;
+        match decoder.decode(packet.data, packet.header.clone()) {
+            Ok(Picture::Whole(image)) => return Ok(Some(Payload::new(packet.header, &image))),
+            Ok(Picture::Parameters) => {}
+            Ok(Picture::Waits) => tally.lose("video_without_key_picture", || {
+                format!(
+                    "{topic} at {}: the picture refers to one that is not in the log; the next key \
+                     picture is waited for",
+                    packet.header.stamp()
+                )
+            }),
+            Err(error) => tally
+                .lose(error.counter(), || format!("{topic} at {}: {error}", packet.header.stamp())),
+        }
+        Ok(None)
     }
 
     /// Hands a message to the sources of obstacles on its topic, which may also be one of the frames.
@@ -243,6 +280,13 @@ impl Intake {
             self.sensors.iter_mut().for_each(|(_, sensor)| sensor.restore());
         }
     }
+}
+
+/// Creates a decoder for each topic with video.
+fn videos(plan: &Plan) -> BTreeMap<String, VideoDecoder> {
+    let topics = plan.scan.topics.iter();
+    let videos = topics.filter(|(_, topic)| topic.kind == Type::Video);
+    videos.map(|(name, _)| (name.clone(), VideoDecoder::new(&plan.limits))).collect()
 }
 
 /// Creates the readers of the chosen topics; the topic that makes the frames has none.

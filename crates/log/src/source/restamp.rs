@@ -14,6 +14,7 @@ pub(super) fn restamp(message: &Message<'_>) -> Option<Vec<u8>> {
     let has_header = match Type::of(schema) {
         Type::Image
         | Type::CompressedImage
+        | Type::Video
         | Type::DisparityImage
         | Type::PointCloud
         | Type::CameraInfo
@@ -29,7 +30,9 @@ pub(super) fn restamp(message: &Message<'_>) -> Option<Vec<u8>> {
     let time = Time::from(Stamp::from_nanos(message.log_time));
     // The encapsulation, in ROS 1 a mark and the sequence number, stands in front of the stamp.
     let is_ros1 = data.starts_with(&ROS1_MARK);
-    let at = if is_ros1 { 8 } else { 4 };
+    // A message of video alone begins with the stamp itself.
+    let has_sequence = is_ros1 && !schema.ends_with("/CompressedVideo");
+    let at = if has_sequence { 8 } else { 4 };
     let is_big_endian = !is_ros1 && data.get(1) == Some(&0);
     let (sec, nanosec) = if is_big_endian {
         (time.sec.to_be_bytes(), time.nanosec.to_be_bytes())

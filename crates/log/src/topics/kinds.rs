@@ -1,12 +1,12 @@
 //! Kinds of topics, as far as types, encodings and first messages tell them, and their ranks by name.
 
 use crate::InputSettings;
-use crate::images::{Content, VIDEO_REMEDY, may_be_disparity, refusal_of};
+use crate::images::{Content, H264, VIDEO_REMEDY, may_be_disparity, refusal_of};
 use crate::scan::{Topic, Type};
 use crate::sensors::SensorType;
 
 pub(super) fn is_picture(topic: &Topic) -> bool {
-    matches!(topic.kind, Type::Image | Type::CompressedImage)
+    matches!(topic.kind, Type::Image | Type::CompressedImage | Type::Video)
 }
 
 /// Returns true for images, those of disparity and the points of depth cameras included.
@@ -56,6 +56,9 @@ const SENSOR_MESSAGES: [&str; 5] =
     ["Image", "RawImage", "CompressedImage", "DisparityImage", "LaserScan"];
 /// Names of messages with video.
 const VIDEO_MESSAGES: [&str; 3] = ["CompressedVideo", "FFMPEGPacket", "H264Packet"];
+/// Remedy for video whose first parameters are not in the log.
+const NO_KEY_REMEDY: &str = "no key picture with its parameters is in the log, and those after it refer to \
+                             one: record from the start of the stream, or let the encoder repeat them";
 
 /// Remedy for depth as JPEG.
 const JPEG_REMEDY: &str = "JPEG keeps 8 of the 16 bits of depth, so that no distances are left: \
@@ -69,7 +72,11 @@ const DEEP_REMEDY: &str = "grey images of 16 bits are no colour images; they cou
 /// for those that can, and for all other topics.
 pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
     let name = topic.schema.rsplit(['/', '.']).next().unwrap_or_default();
-    if VIDEO_MESSAGES.contains(&name) {
+    let is_decoded = topic.kind == Type::Video && topic.pixels.as_deref() == Some(H264);
+    if is_decoded && topic.size.is_none() {
+        return Some(NO_KEY_REMEDY.to_owned());
+    }
+    if VIDEO_MESSAGES.contains(&name) && !is_decoded {
         return Some(VIDEO_REMEDY.to_owned());
     }
     match (&topic.pixels, topic.kind) {
@@ -125,6 +132,8 @@ pub(super) fn colour_rank(name: &str, topic: &Topic) -> Option<i32> {
         &["infra", "/ir", "depth", "disparity", "fisheye", "mono", "debug"],
     ));
     rank += i32::from(topic.kind == Type::Image);
+    // Its pictures are coarser than those of the same camera in a topic beside it.
+    rank -= i32::from(topic.kind == Type::Video);
     Some(rank)
 }
 

@@ -15,8 +15,8 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use tagalong_core::{DepthImage, Stamp};
 use tagalong_geometry::Camera;
 use tagalong_log::msgs::{
-    CameraInfo, CompressedImage, DisparityImage, Header, Image, LaserScan, Message,
-    encode_big_endian,
+    CameraInfo, CompressedImage, CompressedVideo, DisparityImage, FfmpegPacket, Header, Image,
+    LaserScan, Message, encode_big_endian,
 };
 use tagalong_log::{
     CameraSettings, DisparitySettings, FrameSource, Input, InputSettings, Inputs, Limits, LogError,

@@ -104,9 +104,11 @@ fn images_in_an_encoding_that_is_not_read_are_named_with_the_remedy() {
     log.foreign("/video", "foxglove_msgs/msg/CompressedVideo", "cdr", at(0.1), &[0, 1, 0, 0]);
     assert!(refusal(log, &input, colour).to_string().contains("image_transport republish"));
     // Some drivers publish video as compressed images of any format.
-    for (format, first, codec) in
-        [("jpeg", 0x67, "h264"), ("", 0x40, "h265"), ("h264", 0x65, "h264")]
-    {
+    for (format, first, codec, remedy) in [
+        ("jpeg", 0x67, "h264", "no key picture with its parameters"),
+        ("", 0x40, "h265", "image_transport republish"),
+        ("h264", 0x65, "h264", "no key picture with its parameters"),
+    ] {
         let mut log = started();
         let data = [0, 0, 0, 1, first, 1, 2, 3];
         let header = Header::new(at(0.1), "camera");
@@ -115,13 +117,83 @@ fn images_in_an_encoding_that_is_not_read_are_named_with_the_remedy() {
         let error = refusal(log, &input, colour).to_string();
         let named =
             format!("/cam/compressed (sensor_msgs/msg/CompressedImage, {codec}) cannot be read");
-        assert!(error.contains(&named) && error.contains("republish"), "{error}");
+        assert!(error.contains(&named) && error.contains(remedy), "{error}");
     }
     let mut log = started();
     log.foreign("/image", "foxglove.CompressedImage", "protobuf", at(0.1), &[8, 1]);
     let error = refusal(log, &input, colour).to_string();
     assert!(error.contains("/image (foxglove.CompressedImage, protobuf)"), "{error}");
     assert!(error.contains("its messages are in `protobuf`"), "{error}");
+}
+
+/// Twelve pictures of video, of which each sixth is a key picture.
+const WALK: &[u8] = include_bytes!("../data/walk.h264");
+
+/// Returns the packets of the pictures; each begins with a delimiter.
+fn packets() -> Vec<&'static [u8]> {
+    let is_start = |at: &usize| WALK[*at..].starts_with(&[0, 0, 0, 1, 9]);
+    let starts: Vec<usize> = (0..WALK.len()).filter(is_start).collect();
+    let ends = starts.iter().copied().skip(1).chain([WALK.len()]);
+    starts.iter().zip(ends).map(|(start, end)| &WALK[*start..end]).collect()
+}
+
+/// Writes packets of video as one of the messages in which they are found.
+fn with_video(kind: &str, packets: &[&[u8]]) -> LogWriter {
+    let mut log = started();
+    log.info("/cam/camera_info", "camera", &camera(160, 120, 140.0));
+    for (index, data) in packets.iter().enumerate() {
+        let stamp = at(0.1 * index as f64);
+        let header = Header::new(stamp, "camera");
+        match kind {
+            "foxglove" => {
+                let (timestamp, frame_id) = (header.stamp, header.frame_id);
+                let video = CompressedVideo { timestamp, frame_id, data, format: "h264".into() };
+                log.message("/cam/video", stamp, &video);
+            }
+            "ffmpeg" => {
+                let encoding = "libx264".into();
+                let video = FfmpegPacket { header, encoding, data, ..FfmpegPacket::default() };
+                log.message("/cam/ffmpeg", stamp, &video);
+            }
+            _ => {
+                let image = CompressedImage { header, format: "jpeg".into(), data };
+                log.message("/cam/compressed", stamp, &image);
+            }
+        }
+    }
+    log
+}
+
+#[test]
+fn video_makes_the_frames_like_any_other_images() {
+    let colour = Inputs::ANY.require(Input::Colour);
+    for kind in ["foxglove", "ffmpeg", "compressed"] {
+        let (mut source, _saved) = open(with_video(kind, &packets()), colour);
+        let found = frames(&mut source);
+        assert_eq!(found.len(), 12, "{kind}");
+        let image = found[11].frame.colour().unwrap();
+        assert_eq!((image.width(), image.height()), (160, 120));
+        assert!(!source.data_lost(), "{kind}: {:?}", source.notes());
+        let brightness = |found: &LogFrame| {
+            let grey = found.frame.grey().unwrap();
+            grey.pixels().iter().map(|v| u64::from(*v)).sum::<u64>() / (160 * 120)
+        };
+        assert!((60..200).contains(&brightness(&found[0])), "{}", brightness(&found[0]));
+    }
+}
+
+#[test]
+fn video_that_begins_in_the_middle_waits_for_a_key_picture_and_says_so() {
+    let colour = Inputs::ANY.require(Input::Colour);
+    let (mut source, _saved) = open(with_video("foxglove", &packets()[2..]), colour);
+    assert_eq!(frames(&mut source).len(), 6);
+    assert_eq!(count(&source, "video_without_key_picture"), 4);
+    assert!(source.data_lost());
+    let told = source.notes().iter().find(|note| note.contains("key picture")).unwrap();
+    assert!(told.starts_with("/cam/video at 17000000"), "{told}");
+    let error =
+        refusal(with_video("foxglove", &packets()[1..6]), &InputSettings::default(), colour);
+    assert!(error.to_string().contains("no key picture with its parameters"), "{error}");
 }
 
 #[test]

@@ -1,0 +1,304 @@
+//! Video in H.264 (ITU-T H.264, annex B), packet by packet: each is one picture, which may refer to those
+//! before it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use rust_h264::decoder::{ChromaFormat, Decoder, Frame};
+use rust_h264::nal::{NalUnit, NalUnitType, parse_annex_b};
+use rust_h264::sps::{Sps, parse_sps};
+
+use super::{ImageError, check_size};
+use crate::Limits;
+use crate::msgs::{Header, Image, encode};
+
+/// Outcome of a packet.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Picture {
+    /// An `nv12` image as the bytes of a `sensor_msgs/Image`.
+    Whole(Vec<u8>),
+    /// The packet refers to pictures that are not there: none until the next key picture.
+    Waits,
+    /// The packet has no picture, but parameters alone.
+    Parameters,
+}
+
+/// Decoder of one topic, which takes all of its packets in their order.
+pub(crate) struct VideoDecoder {
+    decoder: Decoder,
+    limits: Limits,
+    sps: Option<Sps>,
+    /// True after a key picture, as long as each packet followed on the one before it.
+    is_whole: bool,
+    /// Number of the last picture to which others refer.
+    last: u32,
+}
+
+impl VideoDecoder {
+    pub(crate) fn new(limits: &Limits) -> Self {
+        let limits = limits.clone();
+        Self { decoder: Decoder::new(), limits, sps: None, is_whole: false, last: 0 }
+    }
+
+    /// Decodes a packet to an image with this header.
+    ///
+    /// # Errors
+    /// [`ImageError`]: a damaged packet, a size beyond the limits, or pixels of another kind than 8
+    /// bits with halved colours. No picture follows until the next key picture.
+    pub(crate) fn decode(&mut self, packet: &[u8], header: Header) -> Result<Picture, ImageError> {
+        // The decoder is a young one, and a log may hold any bytes: a panic is a damaged packet.
+        match catch_unwind(AssertUnwindSafe(|| self.take(packet))) {
+            Ok(Ok(Some(frame))) => self.image_of(&frame, header).map(Picture::Whole),
+            Ok(Ok(None)) if self.is_whole || !has_picture(packet) => Ok(Picture::Parameters),
+            Ok(Ok(None)) => Ok(Picture::Waits),
+            Ok(Err(error)) => {
+                self.is_whole = false;
+                Err(error)
+            }
+            Err(_) => {
+                *self = Self::new(&self.limits);
+                Err(damaged("the decoder failed"))
+            }
+        }
+    }
+
+    fn take(&mut self, packet: &[u8]) -> Result<Option<Frame>, ImageError> {
+        let mut outcome = Ok(());
+        for unit in parse_annex_b(packet) {
+            outcome = outcome.and_then(|()| self.take_unit(&unit));
+        }
+        // What is left of a damaged picture must not become part of the next one.
+        let picture = self.decoder.flush();
+        outcome.map(|()| picture)
+    }
+
+    fn take_unit(&mut self, unit: &NalUnit<'_>) -> Result<(), ImageError> {
+        match unit.nal_unit_type {
+            NalUnitType::Sps => self.sps = Some(checked(unit, &self.limits)?),
+            NalUnitType::SliceIdr => (self.is_whole, self.last) = (true, 0),
+            NalUnitType::Slice => self.is_whole = self.follows_on(unit)?,
+            _ => {}
+        }
+        if is_picture(unit) && !self.is_whole {
+            return Ok(());
+        }
+        self.decoder.decode_nal(unit).map(|_| ()).map_err(damaged)
+    }
+
+    /// Returns the bytes of a `sensor_msgs/Image` with the pixels of a picture.
+    fn image_of(&self, frame: &Frame, header: Header) -> Result<Vec<u8>, ImageError> {
+        if frame.bit_depth != 8 || frame.chroma_format != ChromaFormat::Yuv420 {
+            return Err(ImageError::Layout(format!(
+                "video with {} bits and colours as {:?}: record it with 8 bits and yuv420p",
+                frame.bit_depth, frame.chroma_format
+            )));
+        }
+        let size = self.sps.as_ref().map(|sps| (sps.width(), sps.height()));
+        if size != Some((frame.width, frame.height)) {
+            let why = "video in half pictures (interlaced): record it as progressive";
+            return Err(ImageError::Layout(why.to_owned()));
+        }
+        let mut pixels = Vec::with_capacity(frame.y.len() + 2 * frame.u.len());
+        pixels.extend_from_slice(&frame.y);
+        for (u, v) in frame.u.iter().zip(&frame.v) {
+            pixels.extend([*u, *v]);
+        }
+        let image = Image::packed(header, "nv12", frame.width, frame.height, &pixels);
+        // The rows of colour pairs count as rows of bytes, and not as rows of the image.
+        Ok(encode(&Image { step: frame.width, ..image }))
+    }
+
+    /// Returns true if a picture follows on the last one: the numbers of pictures to which others refer
+    /// count up, and a gap means that a packet was lost.
+    fn follows_on(&mut self, unit: &NalUnit<'_>) -> Result<bool, ImageError> {
+        let Some(sps) = &self.sps else { return Ok(false) };
+        let bits = sps.log2_max_frame_num_minus4 + 4;
+        let number =
+            picture_number(&unit.rbsp, bits).ok_or_else(|| damaged("its end is missing"))?;
+        let next = (self.last + 1) % (1 << bits.min(16));
+        let follows = number == self.last || number == next;
+        if unit.nal_ref_idc != 0 {
+            self.last = number;
+        }
+        Ok(self.is_whole && follows)
+    }
+}
+
+/// Returns columns and rows of the pictures of a packet with a sequence parameter set; `None` without
+/// one.
+///
+/// # Errors
+/// [`ImageError`]: damaged parameters, or a size beyond the limits.
+pub(crate) fn size_of_video(
+    packet: &[u8],
+    limits: &Limits,
+) -> Result<Option<(u32, u32)>, ImageError> {
+    let units = parse_annex_b(packet);
+    let Some(unit) = units.iter().find(|unit| unit.nal_unit_type == NalUnitType::Sps) else {
+        return Ok(None);
+    };
+    let sps = checked(unit, limits)?;
+    Ok(Some((sps.width(), sps.height())))
+}
+
+/// Reads a sequence parameter set whose pictures are within the limits.
+fn checked(unit: &NalUnit<'_>, limits: &Limits) -> Result<Sps, ImageError> {
+    let sps = parse_sps(&unit.rbsp).map_err(damaged)?;
+    // Without the part that is cut off, for which the decoder takes memory as well.
+    let width = 16 * (u64::from(sps.pic_width_in_mbs_minus1) + 1);
+    let height = 16 * (u64::from(sps.pic_height_in_map_units_minus1) + 1);
+    let fields = if sps.frame_mbs_only_flag { 1 } else { 2 };
+    check_size(width, fields * height, 3, limits)?;
+    Ok(sps)
+}
+
+fn is_picture(unit: &NalUnit<'_>) -> bool {
+    matches!(unit.nal_unit_type, NalUnitType::Slice | NalUnitType::SliceIdr)
+}
+
+fn has_picture(packet: &[u8]) -> bool {
+    parse_annex_b(packet).iter().any(is_picture)
+}
+
+fn damaged(why: impl std::fmt::Debug) -> ImageError {
+    ImageError::Codec(format!("a packet of H.264: {why:?}"))
+}
+
+/// Returns the number of a picture from the header of its slice (7.3.3); `bits` long.
+fn picture_number(rbsp: &[u8], bits: u32) -> Option<u32> {
+    let mut reader = Bits { bytes: rbsp, at: 0 };
+    // The first block, the type of the slice and its picture parameters stand before it.
+    for _ in 0..3 {
+        reader.skip_exponential()?;
+    }
+    reader.number(bits)
+}
+
+/// Reader of single bits.
+struct Bits<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl Bits<'_> {
+    fn bit(&mut self) -> Option<u32> {
+        let byte = self.bytes.get(self.at / 8)?;
+        let bit = byte >> (7 - self.at % 8) & 1;
+        self.at += 1;
+        Some(bit.into())
+    }
+
+    fn number(&mut self, bits: u32) -> Option<u32> {
+        let mut value = 0;
+        for _ in 0..bits.min(16) {
+            value = 2 * value + self.bit()?;
+        }
+        Some(value)
+    }
+
+    /// Skips a number in the code of Golomb: as many bits behind the first one as zeros before it.
+    fn skip_exponential(&mut self) -> Option<()> {
+        let mut zeros = 0;
+        while self.bit()? == 0 {
+            zeros += 1;
+        }
+        self.at += zeros;
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::msgs::decode;
+
+    /// Twelve pictures of 160 x 120 pixels, of which each sixth is a key picture.
+    const WALK: &[u8] = include_bytes!("../../tests/data/walk.h264");
+    /// Checksums of their pixels as `nv12`, as ffmpeg decodes them.
+    const PICTURES: [u32; 12] = [
+        0x4155_231e,
+        0x0b92_bc02,
+        0xa376_841a,
+        0x2104_0b0d,
+        0x6e94_5844,
+        0xff42_b01d,
+        0xa74c_b1a8,
+        0xe6e7_b7bc,
+        0xf58e_dae9,
+        0xe4fb_b6b1,
+        0x085f_27e0,
+        0x95f7_b36b,
+    ];
+
+    /// Returns the packets of the pictures; each begins with a delimiter.
+    fn packets() -> Vec<&'static [u8]> {
+        let is_start = |at: &usize| WALK[*at..].starts_with(&[0, 0, 0, 1, 9]);
+        let starts: Vec<usize> = (0..WALK.len()).filter(is_start).collect();
+        let ends = starts.iter().copied().skip(1).chain([WALK.len()]);
+        starts.iter().zip(ends).map(|(start, end)| &WALK[*start..end]).collect()
+    }
+
+    /// Returns the number of the picture that each packet gives, from 0; `None` where one is waited for.
+    fn numbers<'a>(packets: impl IntoIterator<Item = &'a [u8]>) -> Vec<Option<usize>> {
+        let mut decoder = VideoDecoder::new(&Limits::default());
+        let mut found = Vec::new();
+        for packet in packets {
+            match decoder.decode(packet, Header::default()).unwrap() {
+                Picture::Whole(image) => {
+                    let image: Image<'_> = decode(&image).unwrap();
+                    assert_eq!((image.width, image.height, &*image.encoding), (160, 120, "nv12"));
+                    let sum = crc32fast::hash(image.data);
+                    found.push(PICTURES.iter().position(|known| *known == sum));
+                }
+                Picture::Waits => found.push(None),
+                Picture::Parameters => panic!("each packet has a picture"),
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn each_packet_gives_its_picture_to_the_last_bit() {
+        let all: Vec<Option<usize>> = (0..12).map(Some).collect();
+        assert_eq!(numbers(packets()), all);
+        assert_eq!(size_of_video(packets()[0], &Limits::default()), Ok(Some((160, 120))));
+        assert_eq!(size_of_video(packets()[1], &Limits::default()), Ok(None));
+    }
+
+    #[test]
+    fn pictures_whose_predecessor_is_lost_are_left_out_until_the_next_key_picture() {
+        let cut: Vec<&[u8]> = packets().into_iter().skip(2).collect();
+        let late = [None, None, None, None, Some(6), Some(7), Some(8), Some(9), Some(10), Some(11)];
+        assert_eq!(numbers(cut), late);
+        let mut gap = packets();
+        gap.remove(3);
+        let found = numbers(gap);
+        assert_eq!(found[..6], [Some(0), Some(1), Some(2), None, None, Some(6)]);
+    }
+
+    #[test]
+    fn pictures_beyond_the_limits_are_refused_before_memory_is_taken() {
+        let limits = Limits { image_side_px: 120, ..Limits::default() };
+        let mut decoder = VideoDecoder::new(&limits);
+        let refused = decoder.decode(packets()[0], Header::default());
+        assert!(matches!(refused, Err(ImageError::TooLarge { .. })), "{refused:?}");
+    }
+
+    proptest! {
+        #[test]
+        fn damaged_packets_are_errors_or_other_pictures(
+            damage in proptest::collection::vec((0..WALK.len(), any::<u8>()), 1..8),
+        ) {
+            let mut bytes = WALK.to_vec();
+            for (at, value) in damage {
+                bytes[at] = value;
+            }
+            let mut decoder = VideoDecoder::new(&Limits::default());
+            for packet in bytes.chunks(300) {
+                let _ = decoder.decode(packet, Header::default());
+            }
+            let _ = decoder.decode(&bytes, Header::default());
+        }
+    }
+}
