@@ -1,5 +1,7 @@
 //! P3: joint particles that weigh scenes of overlapping silhouettes.
 
+mod fair;
+
 use nalgebra::Point3;
 use tagalong_core::Track;
 use tagalong_geometry::Camera;
@@ -34,6 +36,16 @@ pub const SYSTEM: System = System {
             run: misprints,
         },
         Experiment {
+            name: "fair",
+            about: "what leads the printed form away, in our rooms and in an empty one",
+            run: fair::causes,
+        },
+        Experiment {
+            name: "choices",
+            about: "choices of the particles that make a likelihood map",
+            run: fair::choices,
+        },
+        Experiment {
             name: "figure-9",
             about: "Fig. 9: two people of different height cross while their depths change",
             run: oblique,
@@ -47,6 +59,11 @@ pub const SYSTEM: System = System {
             name: "fit",
             about: "free parameters of the printed form, on the split validation",
             run: fit,
+        },
+        Experiment {
+            name: "fit-fair",
+            about: "free parameters of the printed form in an empty room, on the split validation",
+            run: fair::fit,
         },
     ],
 };

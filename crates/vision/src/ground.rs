@@ -302,6 +302,23 @@ mod tests {
     }
 
     #[test]
+    fn some_readings_below_the_floor_are_mistakes_and_many_are_another_floor() {
+        let lens =
+            Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        let camera = Camera::mounted(lens, 160, 120, 1.2, 0.4, 0.0);
+        let depth = room(&camera);
+        // Each n-th column has readings twice as far as they may be.
+        let with_holes = |every: usize| {
+            DepthImage::from_fn(160, 120, |x, y| {
+                depth.row(y)[x] * if x % every == 0 { 2.0 } else { 1.0 }
+            })
+        };
+        let few = factor_of_depth(&with_holes(80), &camera).unwrap();
+        assert!((few - 1.0).abs() < 0.03, "{few}");
+        assert_eq!(factor_of_depth(&with_holes(3), &camera), None);
+    }
+
+    #[test]
     fn a_measured_unit_is_written_as_a_round_number_near_it() {
         for (measured_m, written_m) in [
             (0.000_099_5, 0.0001),

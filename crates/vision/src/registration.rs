@@ -306,6 +306,27 @@ mod tests {
     }
 
     #[test]
+    fn the_gain_is_what_the_offset_adds_to_none() {
+        let gain = |offset| {
+            let mut overlap = EdgeOverlap::new(OverlapSettings::default());
+            let (grey, depth) = scene(offset, &[(40, 30, 24), (85, 45, 30)]);
+            overlap.add(&grey, &depth);
+            overlap.offset().unwrap().gain
+        };
+        assert_eq!(gain([0, 0]), 0.0);
+        assert!(gain([6, 4]) > 1.0, "{}", gain([6, 4]));
+    }
+
+    #[test]
+    fn the_error_of_a_figure_is_told_by_leaving_parts_out() {
+        // Squares around the mean 2: 1 + 0 + 1, times (3 - 1) / 3.
+        let error = jackknife([1.0, 2.0, 3.0].into_iter());
+        assert!((error - (4.0f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert_eq!(jackknife([5.0, 5.0].into_iter()), 0.0);
+        assert_eq!(jackknife(std::iter::empty()), 0.0);
+    }
+
+    #[test]
     fn an_outline_is_on_the_nearer_side_of_a_shadow() {
         let nan = f32::NAN;
         let row = [4.0, 4.0, nan, nan, 1.5, 1.5, nan, 4.0, 4.1];

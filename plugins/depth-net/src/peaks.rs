@@ -96,7 +96,7 @@ mod tests {
         let map = FloorMap {
             fine: Map::new(128, 128),
             coarse: Map::new(64, 64),
-            in_view: (0..64 * 64).map(|cell| cell % 64 < 60).collect(),
+            in_view: (0..64 * 64).map(|cell| cell % 64 < 60 && cell / 64 < 60).collect(),
         };
         pass.answer.values.as_chunks_mut::<4>().0.iter_mut().for_each(|cell| cell[0] = -9.0);
         for (row, column, logit) in [
@@ -106,14 +106,16 @@ mod tests {
             (30, 30, 3.0),
             (40, 62, 5.0),
             (50, 5, -1.0),
+            (59, 20, 2.5),
+            (60, 20, 4.0),
         ] {
             *pass.answer.at_mut(row, column) = [logit, 0.02, -0.03, 0.25];
         }
         let found = peaks(&map, &pass, 0.0, 0.35);
         let logits: Vec<f64> = found.iter().map(|peak| peak.logit).collect();
-        assert_eq!(logits, [3.0, 2.0], "one is beside, one near, one out of view, one too low");
+        assert_eq!(logits, [3.0, 2.5, 2.0], "beside, near, out of view, too low are none");
         let head = found[0].head - Point3::new(0.2 + 3.05 + 0.02, -3.2 + 3.05 - 0.03, 1.75);
         assert!(head.norm() < 1e-6, "{head}");
-        assert_eq!(peaks(&map, &pass, 0.0, 0.25).len(), 3);
+        assert_eq!(peaks(&map, &pass, 0.0, 0.25).len(), 4);
     }
 }

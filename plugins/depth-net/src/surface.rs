@@ -349,6 +349,19 @@ mod tests {
     }
 
     #[test]
+    fn an_area_is_shared_among_the_layers_that_it_touches() {
+        let size_m = [0.02, 1.5 * LAYER_M];
+        let sample = Sample { point: Point3::new(2.0, 0.0, 3.0 * LAYER_M), size_m };
+        let mut areas_m2 = [0.0; LAYERS];
+        sample.add_to(&mut areas_m2, 0.0);
+        // From 2.25 to 3.75 layers.
+        let parts = [0.0, 0.0, 0.75, 0.75, 0.0].map(|part| part * 0.02 * LAYER_M);
+        for (area_m2, expected_m2) in areas_m2.iter().zip(parts) {
+            assert!((area_m2 - expected_m2).abs() < 1e-12, "{areas_m2:?}");
+        }
+    }
+
+    #[test]
     fn what_does_not_end_above_the_head_is_no_head() {
         let wall = DepthImage::filled(WIDTH, HEIGHT, 2.95);
         assert_eq!(measured(Point3::new(3.0, 0.0, 1.4), &wall), None);

@@ -338,7 +338,11 @@ mod training {
 
     #[test]
     fn without_simulated_rooms_there_is_nothing_to_begin_with() {
-        let mut trainer = DepthNetTrainer::new(Training::default(), 1).unwrap();
+        let training = Training { steps: 1, real_steps: 1, ..Training::default() };
+        let mut trainer = DepthNetTrainer::new(training, 1).unwrap();
+        assert!(trainer.fit(&mut |_| {}).unwrap_err().to_string().contains("simulated"));
+        let (frame, truth) = room(1.2, NEAR_AND_FAR);
+        trainer.add_frame(&frame, &people(&truth), Some("another"), 0).unwrap();
         assert!(trainer.fit(&mut |_| {}).unwrap_err().to_string().contains("simulated"));
     }
 }

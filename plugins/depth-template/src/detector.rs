@@ -463,6 +463,8 @@ mod tests {
         assert!((of(&depth(&|_| 2.1)) - 2.1).abs() < 1e-6);
         let nose = |x: usize| if x == 30 { 1.9 } else { 2.0 };
         assert!((of(&depth(&nose)) - 2.0).abs() < 1e-6);
+        let turned = |x: usize| if x < 32 { 2.1 } else { 2.0 };
+        assert!((of(&depth(&turned)) - 2.1).abs() < 1e-6, "eight of thirteen columns");
         let beside = |x: usize| if x < 33 { 3.0 } else { 1.8 };
         assert!((of(&depth(&beside)) - 1.8).abs() < 1e-6, "what is 0.25 m off is no face");
         assert_eq!(of(&depth(&|_| f32::NAN)), 2.0);

@@ -170,6 +170,12 @@ mod tests {
     }
 
     #[test]
+    fn the_row_above_which_a_part_lies_is_interpolated_and_the_last_one_without_pixels() {
+        assert_eq!(above(&[0, 4, 4, 0], 0.75), 1.5);
+        assert_eq!(above(&[0, 0, 0, 0], 0.75), 3.0);
+    }
+
+    #[test]
     fn too_little_is_nothing() {
         let thin = Run { first: 5, length: 2 };
         assert_eq!(Blob::measure(thin, &counts(), &[7; 3 * 12 * 40]), None);

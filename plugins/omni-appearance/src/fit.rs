@@ -249,6 +249,19 @@ mod tests {
     }
 
     #[test]
+    fn the_first_weights_are_small_and_of_both_signs() {
+        let (inputs, targets) = samples(20);
+        let network = Fit { hidden: 40, ..FIT }.random(&inputs, &targets, 3);
+        let hidden: Vec<f64> = network.hidden.concat();
+        // Two inputs and a bias.
+        for (weights, reach) in [(&hidden, 1.0 / 3.0_f64.sqrt()), (&network.output, 0.5)] {
+            assert!(weights.iter().all(|weight| weight.abs() <= reach), "{weights:?}");
+            assert!(weights.iter().any(|weight| *weight > 0.5 * reach), "{weights:?}");
+            assert!(weights.iter().any(|weight| *weight < -0.5 * reach), "{weights:?}");
+        }
+    }
+
+    #[test]
     fn a_smooth_function_is_learned_and_the_same_seed_learns_the_same() {
         let (inputs, targets) = samples(150);
         let half = inputs[..100].to_vec();

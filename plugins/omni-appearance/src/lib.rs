@@ -37,7 +37,9 @@ pub use blob::{Blob, FEATURES, Features};
 pub use config::{AfterMeasuring, Config, Distance};
 pub use detector::OmniAppearance;
 pub use eyes::Eyes;
-pub use model::{Geometry, Head, Line, Model, PanoramaGeometry, Person, Ridge, Signature};
+pub use model::{
+    Geometry, Head, Line, Model, PanoramaGeometry, Person, Ridge, Signature, recognised,
+};
 pub use network::Network;
 pub use segment::{Counts, Segmenter};
 use tagalong_config::{Registry, Remedy};

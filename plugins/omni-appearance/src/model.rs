@@ -50,6 +50,13 @@ impl Signature {
 /// Largest misfit of a known person.
 const KNOWN: f64 = 2.0;
 
+/// Returns the person with the closest appearance, if it is close enough to tell who it is.
+pub fn recognised<'a>(people: &'a [Person], looks: &[f64; 4]) -> Option<&'a Person> {
+    let misfit = |known: &&Person| known.signature.misfit(looks);
+    let best = people.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
+    best.filter(|known| misfit(known) < KNOWN)
+}
+
 /// Regressions of the distance, each with its standard deviation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -273,10 +280,8 @@ impl Model {
             return named.map_or(&self.general, |known| &known.head);
         }
         let (distance_m, _) = self.general.distance(&blob.features, view, how);
-        let looks = view.looks(blob, distance_m);
-        let misfit = |known: &&Person| known.signature.misfit(&looks);
-        let best = self.people.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
-        best.filter(|known| misfit(known) < KNOWN).map_or(&self.general, |known| &known.head)
+        let known = recognised(&self.people, &view.looks(blob, distance_m));
+        known.map_or(&self.general, |known| &known.head)
     }
 
     /// Formats the model file.

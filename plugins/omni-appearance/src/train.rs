@@ -326,7 +326,7 @@ fn ridge(samples: &[Sample], weight: f64) -> Ridge {
 }
 
 /// Returns mean and standard deviation of the appearance in some samples.
-fn signature(samples: &[Sample]) -> Signature {
+pub fn signature(samples: &[Sample]) -> Signature {
     let of = |i: usize| mean_and_scale(samples.iter().map(move |s| s.looks[i]));
     let all = [of(0), of(1), of(2), of(3)];
     Signature { mean: all.map(|(mean, _)| mean), sigma: all.map(|(_, sigma)| sigma) }

@@ -40,6 +40,9 @@ pub struct Config {
     /// `printed` and `rms`, m. P3 sets it "experientially".
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub likelihood_sigma: f64,
+    /// For the weighings `printed` and `rms`: all scenes are compared in one window, the whole image,
+    /// and not each in the window around its people. P3 does not say which window it takes.
+    pub whole_image: bool,
     /// Settings of `depth-template`.
     #[serde(flatten)]
     pub base: DepthTemplateConfig,
@@ -51,6 +54,7 @@ impl Default for Config {
             dissimilarity: false,
             weighing: Weighing::Printed,
             likelihood_sigma: 0.005,
+            whole_image: false,
             base: DepthTemplateConfig::default(),
         }
     }
@@ -62,7 +66,7 @@ impl Default for Config {
 /// Settings outside their ranges.
 pub fn detector(config: Config) -> Result<DepthTemplate> {
     check_settings(&config)?;
-    let Config { dissimilarity, weighing, likelihood_sigma, base } = config;
+    let Config { dissimilarity, weighing, likelihood_sigma, whole_image, base } = config;
     let background_percentile = base.background_percentile;
     let min_foreground_valid = base.min_foreground_valid;
     let mut detector = DepthTemplate::new(base)?;
@@ -72,7 +76,8 @@ pub fn detector(config: Config) -> Result<DepthTemplate> {
     }
     if weighing != Weighing::Ratio {
         let is_rms = weighing == Weighing::Rms;
-        let settings = Settings { sigma_m: likelihood_sigma, background_percentile, is_rms };
+        let sigma_m = likelihood_sigma;
+        let settings = Settings { sigma_m, background_percentile, is_rms, whole_image };
         detector = detector.with_likelihood(Box::new(PrintedLikelihood::new(settings)));
     }
     Ok(detector)

@@ -26,6 +26,8 @@ pub struct Settings {
     pub background_percentile: f64,
     /// The size of the window stands inside of the root.
     pub is_rms: bool,
+    /// All scenes of a frame are compared in one window, the whole image.
+    pub whole_image: bool,
 }
 
 /// The depths of a frame with running sums along each row, m: the papers compare depths,
@@ -142,8 +144,12 @@ impl FrameLikelihood for Canvas {
 impl Canvas {
     /// Returns the dissimilarity of a scene, m; `None` without a reading.
     fn dissimilarity(&self, scene: &[PlacedPerson]) -> Option<f64> {
-        let columns = bounds(scene.iter().map(PlacedPerson::columns))?;
-        let lines = bounds(scene.iter().map(PlacedPerson::lines))?;
+        let mut columns = bounds(scene.iter().map(PlacedPerson::columns))?;
+        let mut lines = bounds(scene.iter().map(PlacedPerson::lines))?;
+        if self.settings.whole_image {
+            columns = (0, self.metres.width);
+            lines = (0, self.metres.height);
+        }
         let mut count = 0.0;
         let mut error = 0.0;
         let lines = lines.0.max(0)..lines.1.min(self.metres.height);
@@ -203,13 +209,14 @@ mod tests {
         Frame::new(1, Stamp::default(), Arc::new(camera()), EgoMotion::at_rest(0.1), images)
     }
 
-    fn likelihood(sigma_m: f64, is_rms: bool) -> PrintedLikelihood {
-        PrintedLikelihood::new(Settings { sigma_m, background_percentile: 90.0, is_rms })
+    fn likelihood(sigma_m: f64, is_rms: bool, whole_image: bool) -> PrintedLikelihood {
+        let background_percentile = 90.0;
+        PrintedLikelihood::new(Settings { sigma_m, background_percentile, is_rms, whole_image })
     }
 
     fn weigher(sigma_m: f64, is_rms: bool) -> Weigher {
         let weigher = Weigher::new(&DepthTemplateConfig::default());
-        weigher.with_likelihood(Box::new(likelihood(sigma_m, is_rms)))
+        weigher.with_likelihood(Box::new(likelihood(sigma_m, is_rms, false)))
     }
 
     fn standing(x: f64, y: f64) -> Person {
@@ -251,14 +258,22 @@ mod tests {
         })
     }
 
-    /// P3's dissimilarity pixel by pixel.
-    fn slow(frame: &Frame, cast: &[Painted], background_m: f64, is_rms: bool) -> Option<f64> {
+    /// P3's dissimilarity pixel by pixel, in the window around the cast or in the whole image.
+    fn slow(
+        frame: &Frame,
+        cast: &[Painted],
+        background_m: f64,
+        [is_rms, whole_image]: [bool; 2],
+    ) -> Option<f64> {
         let image = frame.derived::<Working>().unwrap();
         let half = |p: &Painted| p.template.half_width;
-        let left = cast.iter().map(|p| p.x - half(p)).min()?;
-        let right = cast.iter().map(|p| p.x + half(p)).max()?;
-        let top = cast.iter().map(|p| p.y + p.template.rows[0].dy).min()?;
-        let bottom = cast.iter().map(|p| p.y + p.template.rows.last().unwrap().dy).max()?;
+        let mut left = cast.iter().map(|p| p.x - half(p)).min()?;
+        let mut right = cast.iter().map(|p| p.x + half(p)).max()?;
+        let mut top = cast.iter().map(|p| p.y + p.template.rows[0].dy).min()?;
+        let mut bottom = cast.iter().map(|p| p.y + p.template.rows.last().unwrap().dy).max()?;
+        if whole_image {
+            [left, right, top, bottom] = [0, 79, 0, 59];
+        }
         let mut sum = 0.0;
         let mut count = 0.0;
         for (x, y) in (top..=bottom).flat_map(|y| (left..=right).map(move |x| (x, y))) {
@@ -280,15 +295,19 @@ mod tests {
         fn the_printed_likelihood_is_that_of_the_pixels(
             pixels in prop::collection::vec(
                 prop_oneof![Just(f32::NAN), 1.0f32..2.5, 2.0f32..6.0], 80 * 60),
-            near in -0.8f64..0.8, far in -1.2f64..1.2, is_rms in any::<bool>(),
+            near in -0.8f64..0.8, far in -1.2f64..1.2,
+            is_rms in any::<bool>(), whole in any::<bool>(),
         ) {
             let frame = frame(DepthImage::from_pixels(80, 60, pixels).unwrap());
-            let background_m = likelihood(0.1, is_rms).canvas(&frame).unwrap().background_m;
+            let likelihood = likelihood(0.1, is_rms, whole);
+            let background_m = likelihood.canvas(&frame).unwrap().background_m;
             let scene = [standing(3.0, far), standing(1.8, near)];
             let cast = [&scene[0], &scene[1]].map(|p| Painted::new(p, Direction::Along));
-            let d = slow(&frame, &cast, background_m, is_rms).unwrap();
+            let d = slow(&frame, &cast, background_m, [is_rms, whole]).unwrap();
             let log = -(0.1 * (2.0 * PI).sqrt()).ln() - d * d / (2.0 * 0.01);
-            let found = weigher(0.1, is_rms).log_likelihood(&frame, &scene).unwrap();
+            let weigher = Weigher::new(&DepthTemplateConfig::default());
+            let weigher = weigher.with_likelihood(Box::new(likelihood));
+            let found = weigher.log_likelihood(&frame, &scene).unwrap();
             prop_assert!((found - log.max(LEAST)).abs() < 1e-6 * log.abs().max(1.0), "{} {}", found, log);
         }
     }

@@ -488,6 +488,19 @@ fn a_jump_of_the_clock_does_not_forget_which_sensors_there_were() {
     assert_eq!(monitor.stop_reason(0.5), Some(Reason::Silent));
 }
 
+#[test]
+fn after_a_jump_of_the_clock_no_place_is_known() {
+    let mut monitor = monitor();
+    for index in 0..20 {
+        let scan = scan_at(index, 0.0, 0.0, |deg: i32| (deg.abs() < 10).then_some(0.8));
+        let frame = frame(index, EgoMotion::at_rest(0.1), None, Some(scan));
+        monitor.update(&frame, &frame.motion, &[], None);
+    }
+    assert!(speed(&monitor) < 0.5, "{}", speed(&monitor));
+    monitor.clear();
+    assert_eq!(speed(&monitor), Allowance::FREE.most);
+}
+
 /// A wall is 4 m away; a scan meets something at 0.9 m.
 #[test]
 fn something_in_a_polygon_stops_or_slows_the_robot() {

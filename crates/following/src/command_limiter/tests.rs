@@ -104,6 +104,16 @@ fn a_modest_wish_comes_true() {
 }
 
 #[test]
+fn a_wish_at_the_very_limit_is_not_limited() {
+    let mut limiter = limiter();
+    let wish = wish(1, 0.3, 0.3);
+    limiter.allowed_mps = limiter.within_drive(wish.wheels).0.linear_mps;
+    let (twist, reason, is_limited) = limiter.wanted(&wish);
+    assert_eq!((twist.linear_mps, reason), (limiter.allowed_mps, Reason::Follow));
+    assert!(!is_limited);
+}
+
+#[test]
 fn too_fast_a_wish_keeps_its_curvature() {
     let (_, command) = at_speed(1.0, 2.0);
     let WheelSpeeds { left, right } = command.wheels;

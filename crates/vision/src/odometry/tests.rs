@@ -210,3 +210,12 @@ fn images_of_any_size_are_taken() {
         assert!(motion.is_some_and(|motion| motion.isometry().translation.x.is_finite()));
     }
 }
+
+#[test]
+fn a_halved_image_has_the_rounded_means_of_four_pixels() {
+    let rows = [[1, 2, 9, 9], [2, 2, 9, 8]];
+    let image = GreyImage::from_fn(4, 2, |x, y| rows[y][x]);
+    let mut half = GreyImage::default();
+    super::halve(&image, &mut half);
+    assert_eq!(half.row(0), [2, 9], "of 1.75 and 8.75");
+}

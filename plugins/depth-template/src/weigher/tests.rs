@@ -248,6 +248,21 @@ fn what_is_shown_of_somebody_is_what_nobody_hides() {
 }
 
 #[test]
+fn the_lines_of_a_window_are_those_that_have_a_row() {
+    let weigher = Weigher::new(&DepthTemplateConfig::default());
+    let frame = painted(&[]);
+    let image = frame.derived::<Working>().unwrap();
+    let mut tools = weigher.tools();
+    let view = tools.view_of(&frame, &image);
+    let person = standing(2.0, 0.0);
+    let placed = tools.place(&person, direction(&person, &frame.camera), &frame.camera, &view);
+    let placed = placed.unwrap();
+    let (first, end) = placed.lines();
+    let has_row = [first - 1, first, end - 1, end].map(|line| placed.row(line).is_some());
+    assert_eq!(has_row, [false, true, true, false]);
+}
+
+#[test]
 fn pixels_that_are_hidden_twice_are_hidden_once() {
     let mut masks = Vec::new();
     union_of(&mut masks, [(5, 9), (1, 3), (2, 6)].into_iter());

@@ -445,3 +445,26 @@ fn a_fall_that_was_seen_too_briefly_is_not_remembered() {
         assert_eq!(look(&nothing) != Some(Ahead::Free), is_remembered, "{images}");
     }
 }
+
+#[test]
+fn without_a_new_image_what_is_old_and_what_is_far_away_are_forgotten() {
+    let settings = CollisionMonitorSettings { memory_s: 2.0, ..settings() };
+    let far_m = settings.range_m + 5.0;
+    for (x, unseen_s, is_kept) in
+        [(2.0, 0.5, true), (2.0, 1.95, false), (far_m, 0.5, false), (far_m, 1.95, false)]
+    {
+        let mut surroundings = memory();
+        let thing = Obstacle::new(Point2::new(x, 0.0), Heights::of(0.5));
+        surroundings.things.push(Obstacle { seen_s: STANDS_S, unseen_s, ..thing });
+        surroundings.hold(&settings, &EgoMotion::at_rest(0.1));
+        assert_eq!(surroundings.things.len(), usize::from(is_kept), "{x} m, {unseen_s} s");
+    }
+}
+
+#[test]
+fn a_slope_is_the_mean_of_three_rows_of_which_the_middle_counts_twice() {
+    let image =
+        |differences: [u8; 3]| GreyImage::from_fn(3, 3, |x, y| differences[y] * (x / 2) as u8);
+    let slopes = [[8, 8, 8], [0, 20, 0], [20, 0, 0], [0, 0, 0]];
+    assert_eq!(slopes.map(|rows| slope_at(&image(rows), 1, 1)), [8, 10, 5, 0]);
+}

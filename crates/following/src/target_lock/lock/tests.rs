@@ -81,6 +81,17 @@ fn who_comes_back_has_to_look_like_the_person_five_times() {
     assert_eq!(lock.why, "looks like somebody else");
 }
 
+#[test]
+fn nobody_is_told_apart_from_a_person_who_is_out_of_sight() {
+    let is_known = |seen: bool| {
+        let mut lock = new_lock(settings());
+        steps(&mut lock, 20, &tall(1.6));
+        step(&mut lock, &[Track { seen, ..tall(1.6) }, somebody(2, 2.0, 1.5)]);
+        lock.others.contains(&TrackId(2))
+    };
+    assert!(is_known(true) && !is_known(false));
+}
+
 /// A quarter of a second out of sight is no reason to doubt a track.
 #[test]
 fn a_blink_is_no_reason_for_doubt() {

@@ -246,6 +246,23 @@ mod tests {
         assert!((found.swing.zoom - 1.0).abs() < 3.0 * found.sigma_zoom, "{found:?}");
     }
 
+    /// Two numbers of a point less the four of the motion: nine points have 14, twice as many 32.
+    #[test]
+    fn few_points_are_the_less_certain_by_the_numbers_that_the_motion_takes() {
+        let pairs: Vec<Pair> = rays()
+            .take(9)
+            .enumerate()
+            .map(|(i, at)| [at, at + Vector2::new((i % 3) as f64 - 1.0, 0.0) * 1e-3])
+            .collect();
+        let once: Vec<&Pair> = pairs.iter().collect();
+        let twice = [&once[..], &once[..]].concat();
+        let variance = |agreeing: &[&Pair]| {
+            SwingFit::of(known([0.0; 3], 1.0), agreeing).unwrap().sigma_pan.powi(2)
+        };
+        let ratio = variance(&twice) / variance(&once);
+        assert!((ratio - 14.0 / 32.0).abs() < 1e-9, "{ratio}");
+    }
+
     #[test]
     fn too_few_points_and_points_in_one_place_have_no_motion() {
         let here = [Vector2::new(0.1, 0.1); 2];

@@ -195,6 +195,15 @@ fn a_person_who_is_known_is_left_out() {
 }
 
 #[test]
+fn the_outline_of_an_upper_body_reaches_to_the_feet() {
+    let upper = Rect::new(100.0, 40.0, 60.0, 85.0);
+    assert_eq!(outline(&upper), upper.standing_of_upper_body(TALL_M).inflated(LIMBS));
+    assert!(outline(&upper).height > 2.0 * upper.height);
+    let whole = Rect { height: 95.0, ..upper };
+    assert_eq!(outline(&whole), whole.inflated(LIMBS));
+}
+
+#[test]
 fn a_camera_at_rest_stays_at_rest() {
     let images = [STRAIGHT, panned(0.0005)].map(|look| image(look, 1.0));
     let moved = seen(settings(), &images).0;
