@@ -1,17 +1,29 @@
 //! Conversion of messages from DDS to the frame source.
 //!
 //! DDS delivers messages that own their bytes; the log reader takes them as they lie on the wire.
-//! Images, which it borrows, therefore have a counterpart here that owns its pixels, and received
-//! messages are encoded again: a copy of an image, a tenth of a millisecond.
+//! Images and points, which it borrows, therefore have counterparts here that own their bytes, and
+//! received messages are encoded again: a copy of an image, a tenth of a millisecond.
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
-use tagalong::log::msgs::{CompressedImage, Header, Image, encode};
+use tagalong::log::msgs::{
+    CompressedImage, Header, Image, LaserScan, PointCloud2, PointField, encode,
+};
+
+/// A message of which frames can be made.
+pub(crate) trait FrameMessage: DeserializeOwned + Send + 'static {
+    /// Returns time and frame.
+    fn header(&self) -> &Header;
+
+    /// Returns the message as it lies on the wire.
+    fn encode(&self) -> Vec<u8>;
+}
 
 /// `sensor_msgs/Image` that owns its pixels; field by field as [`Image`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct OwnedImage {
-    pub(crate) header: Header,
+    header: Header,
     height: u32,
     width: u32,
     encoding: String,
@@ -23,9 +35,23 @@ pub(crate) struct OwnedImage {
 /// `sensor_msgs/CompressedImage` that owns its bytes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct OwnedCompressedImage {
-    pub(crate) header: Header,
+    header: Header,
     format: String,
     data: ByteBuf,
+}
+
+/// `sensor_msgs/PointCloud2` that owns its points.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct OwnedPointCloud {
+    header: Header,
+    height: u32,
+    width: u32,
+    fields: Vec<PointField>,
+    is_bigendian: bool,
+    point_step: u32,
+    row_step: u32,
+    data: ByteBuf,
+    is_dense: bool,
 }
 
 /// `std_msgs/Bool`.
@@ -87,8 +113,12 @@ pub(crate) struct KeyValue {
     pub(crate) value: String,
 }
 
-impl OwnedImage {
-    pub(crate) fn encode(&self) -> Vec<u8> {
+impl FrameMessage for OwnedImage {
+    fn header(&self) -> &Header {
+        &self.header
+    }
+
+    fn encode(&self) -> Vec<u8> {
         encode(&Image {
             header: self.header.clone(),
             height: self.height,
@@ -101,11 +131,45 @@ impl OwnedImage {
     }
 }
 
-impl OwnedCompressedImage {
-    pub(crate) fn encode(&self) -> Vec<u8> {
+impl FrameMessage for OwnedCompressedImage {
+    fn header(&self) -> &Header {
+        &self.header
+    }
+
+    fn encode(&self) -> Vec<u8> {
         let header = self.header.clone();
         let format = self.format.clone();
         encode(&CompressedImage { header, format, data: &self.data })
+    }
+}
+
+impl FrameMessage for OwnedPointCloud {
+    fn header(&self) -> &Header {
+        &self.header
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        encode(&PointCloud2 {
+            header: self.header.clone(),
+            height: self.height,
+            width: self.width,
+            fields: self.fields.clone(),
+            is_bigendian: self.is_bigendian,
+            point_step: self.point_step,
+            row_step: self.row_step,
+            data: self.data.as_slice().into(),
+            is_dense: self.is_dense,
+        })
+    }
+}
+
+impl FrameMessage for LaserScan {
+    fn header(&self) -> &Header {
+        &self.header
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        encode(self)
     }
 }
 
@@ -128,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_owns_its_pixels_lies_on_the_wire_as_what_borrows_them() {
+    fn what_owns_its_bytes_lies_on_the_wire_as_what_borrows_them() {
         let header = Header::new(Stamp::from_nanos(7), "camera");
         let image = OwnedImage {
             header: header.clone(),
@@ -145,6 +209,9 @@ mod tests {
         let data = ByteBuf::from([9; 5]);
         let compressed = OwnedCompressedImage { header, format: "jpeg".into(), data };
         assert_eq!(compressed.encode(), encode(&compressed));
+        let header = Header::new(Stamp::from_nanos(7), "lidar");
+        let cloud = encode(&PointCloud2::of_points(header, &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]));
+        assert_eq!(decode::<OwnedPointCloud>(&cloud).unwrap().encode(), cloud);
     }
 
     #[test]

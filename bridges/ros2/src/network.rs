@@ -14,7 +14,6 @@ use ros2_client::{
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use tagalong::core::Stamp;
 use tagalong::log::msgs::{
     CameraInfo, Detection2DArray, Detection3DArray, LaserScan, Message, Odometry, TFMessage, encode,
 };
@@ -22,13 +21,14 @@ use tagalong::log::msgs::{
 use crate::BridgeError;
 use crate::inbox::Inbox;
 use crate::messages::{
-    Bool, Empty, OwnedCompressedImage, OwnedImage, SpeedLimit, ros_topic, ros_type,
+    Bool, Empty, FrameMessage, OwnedCompressedImage, OwnedImage, OwnedPointCloud, SpeedLimit,
+    ros_topic, ros_type,
 };
 use crate::publishers::Origin;
 use crate::raw::RawAdapter;
 use crate::stamps::StampClock;
 
-/// Number of images that wait for the thread that makes frames.
+/// Number of images, or clouds of points, that wait for the thread that makes frames.
 const IMAGES: usize = 2;
 /// Number of other messages that wait.
 const OTHERS: usize = 64;
@@ -129,33 +129,20 @@ impl Network {
         inbox: &Arc<Inbox>,
         clock: &Arc<StampClock>,
     ) -> Result<Option<Ear>, BridgeError> {
-        let clock = Arc::clone(clock);
-        let hear = move |stamp: Stamp| clock.record_arrival(stamp);
         let ear = match message_type {
             "sensor_msgs/msg/Image" => {
-                let encode = move |image: OwnedImage| {
-                    hear(image.header.stamp());
-                    image.encode()
-                };
-                self.ear(topic, message_type, sensor(IMAGES), IMAGES, inbox, encode)
+                self.frames::<OwnedImage>(topic, message_type, IMAGES, inbox, clock)
             }
             "sensor_msgs/msg/CompressedImage" => {
-                let encode = move |image: OwnedCompressedImage| {
-                    hear(image.header.stamp());
-                    image.encode()
-                };
-                self.ear(topic, message_type, sensor(IMAGES), IMAGES, inbox, encode)
+                self.frames::<OwnedCompressedImage>(topic, message_type, IMAGES, inbox, clock)
+            }
+            // As large as an image.
+            "sensor_msgs/msg/PointCloud2" => {
+                self.frames::<OwnedPointCloud>(topic, message_type, IMAGES, inbox, clock)
             }
             CameraInfo::TYPE => self.plain::<CameraInfo>(topic, sensor(OTHERS), inbox),
             Odometry::TYPE => self.plain::<Odometry>(topic, sensor(OTHERS), inbox),
-            LaserScan::TYPE => {
-                // A pipeline without a camera makes its frames of scans.
-                let encode = move |scan: LaserScan| {
-                    hear(scan.header.stamp());
-                    encode(&scan)
-                };
-                self.ear(topic, message_type, sensor(OTHERS), OTHERS, inbox, encode)
-            }
+            LaserScan::TYPE => self.frames::<LaserScan>(topic, message_type, OTHERS, inbox, clock),
             // Static transforms are sent once, usually before the bridge joins.
             TFMessage::TYPE if topic.ends_with("tf_static") => {
                 self.plain::<TFMessage>(topic, latched(), inbox)
@@ -272,6 +259,24 @@ impl Network {
             });
             theirs.count()
         })
+    }
+
+    /// Puts messages of which frames can be made into the inbox: images, and the scans and points of a
+    /// pipeline without a camera. Their stamps set the clock.
+    fn frames<M: FrameMessage>(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+        room: usize,
+        inbox: &Arc<Inbox>,
+        clock: &Arc<StampClock>,
+    ) -> Result<Ear, BridgeError> {
+        let clock = Arc::clone(clock);
+        let encode = move |message: M| {
+            clock.record_arrival(message.header().stamp());
+            message.encode()
+        };
+        self.ear(topic, message_type, sensor(room), room, inbox, encode)
     }
 
     fn plain<M: Message + Serialize + DeserializeOwned + Send + 'static>(

@@ -1,5 +1,7 @@
 //! Messages as they arrive on a robot, up to the frames that are made of them.
 
+use std::cell::RefCell;
+use std::ops::Range;
 use std::path::Path;
 
 use tagalong_core::Stamp;
@@ -8,16 +10,19 @@ use tagalong_log::msgs::{
     self, BoundingBox2D, Detection2D, Detection2DArray, Header, ObjectHypothesis,
     ObjectHypothesisWithPose, Point2D, PointCloud2, Pose2D, decode, encode,
 };
-use tagalong_log::{Input, InputSettings, Inputs, Limits, Listening, LogFrame};
+use tagalong_log::{Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogFrame};
 
 const IMAGES: &str = "/image";
 const DETECTIONS: &str = "/detections";
+const CAMERA: &str = "camera";
+/// Bytes of the stamp in a message, after the four that tell the encoding.
+const STAMP: Range<usize> = 4..12;
 /// Types of messages with detections whose layout is known without a definition.
 const DETECTION_TYPES: [&str; 2] =
     ["vision_msgs/msg/Detection2DArray", "vision_msgs/msg/Detection3DArray"];
 
 fn header() -> Header {
-    Header::new(Stamp::from_nanos(1_000_000_000), "camera")
+    Header::new(Stamp::from_nanos(1_000_000_000), CAMERA)
 }
 
 /// Returns messages of two detections.
@@ -42,27 +47,59 @@ pub(crate) fn detections() -> Vec<Vec<u8>> {
     vec![encode(&flat), encode(&msgs::Detection3DArray::default())]
 }
 
-/// Makes frames of an image with the detections in some bytes, of each type.
+/// Makes frames of images with the detections in some bytes, of each type.
 pub(crate) fn frame_of_detections(bytes: &[u8], _: &Path) {
-    for kind in DETECTION_TYPES {
-        drop(frame(bytes, kind));
+    FEEDS.with_borrow_mut(|feeds| {
+        for feed in feeds {
+            drop(feed.frame(bytes));
+        }
+    });
+}
+
+thread_local! {
+    /// A feed for each type, kept over all files, because the choice of the inputs takes many times
+    /// as long as a message.
+    static FEEDS: RefCell<Vec<Feed>> =
+        RefCell::new(DETECTION_TYPES.iter().filter_map(|kind| Feed::new(kind)).collect());
+}
+
+/// A robot with a camera and a detector.
+struct Feed {
+    source: LiveSource,
+    stamp: Stamp,
+}
+
+impl Feed {
+    fn new(kind: &str) -> Option<Self> {
+        let settings =
+            InputSettings { detections_topic: Some(DETECTIONS.into()), ..InputSettings::default() };
+        let inputs = Inputs::NONE.require(Input::Detections);
+        let mut listening = Listening::new("fuzz", &settings, &Limits::default(), inputs).ok()?;
+        listening.announce(IMAGES, "sensor_msgs/msg/Image");
+        listening.announce(DETECTIONS, kind);
+        listening.take(IMAGES, &image(header()));
+        listening.take(DETECTIONS, &encode(&Detection2DArray::default()));
+        Some(Self { source: listening.start().ok()?, stamp: header().stamp() })
+    }
+
+    /// Returns the frame of the next image and a message, if there is one. The message has the stamp
+    /// of the image unless it has another one than the seeds.
+    fn frame(&mut self, detections: &[u8]) -> Option<LogFrame> {
+        let mut detections = detections.to_vec();
+        let now = Header::new(self.stamp, CAMERA);
+        let [seed, stamp] = [&header(), &now].map(|header| encode(header)[STAMP].to_vec());
+        if let Some(place) = detections.get_mut(STAMP).filter(|place| **place == *seed) {
+            place.copy_from_slice(&stamp);
+        }
+        self.stamp = self.stamp.plus_seconds(0.1);
+        self.source.take(IMAGES, &image(now));
+        self.source.take(DETECTIONS, &detections);
+        self.source.newest_frame()
     }
 }
 
-fn frame(detections: &[u8], kind: &str) -> Option<LogFrame> {
-    let settings =
-        InputSettings { detections_topic: Some(DETECTIONS.into()), ..InputSettings::default() };
-    let inputs = Inputs::NONE.require(Input::Detections);
-    let mut listening = Listening::new("fuzz", &settings, &Limits::default(), inputs).ok()?;
-    let image = encode(&msgs::Image::packed(header(), "mono8", 2, 2, &[0; 4]));
-    listening.announce(IMAGES, "sensor_msgs/msg/Image");
-    listening.announce(DETECTIONS, kind);
-    listening.take(IMAGES, &image);
-    listening.take(DETECTIONS, detections);
-    let mut source = listening.start().ok()?;
-    source.take(IMAGES, &image);
-    source.take(DETECTIONS, detections);
-    source.newest_frame()
+fn image(header: Header) -> Vec<u8> {
+    encode(&msgs::Image::packed(header, "mono8", 2, 2, &[0; 4]))
 }
 
 /// Returns messages of points in one row, and in rows and columns.
@@ -92,7 +129,10 @@ mod tests {
         let seeds = clouds();
         let cloud: PointCloud2<'_> = decode(&seeds[0]).unwrap();
         assert_eq!(points_of_cloud(&cloud, &Limits::default()).unwrap().len(), 120);
-        let made = frame(&detections()[0], DETECTION_TYPES[0]).unwrap();
-        assert_eq!(made.frame.recorded().unwrap().len(), 1, "the chair is nobody");
+        let mut feed = Feed::new(DETECTION_TYPES[0]).unwrap();
+        for file in 0..3 {
+            let made = feed.frame(&detections()[0]).unwrap();
+            assert_eq!(made.frame.recorded().unwrap().len(), 1, "the chair is nobody: {file}");
+        }
     }
 }

@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
 
 mod faults;
+mod lidar;
 mod peers;
 mod skill;
 

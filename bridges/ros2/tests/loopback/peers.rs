@@ -41,8 +41,8 @@ pub(crate) const LAST_MOVE_S: f64 = 0.5 + 0.04 + 0.2;
 
 /// Returns a domain that no other run of this test is likely to use.
 pub(crate) fn domain(offset: u32) -> u16 {
-    // Thirteen domains per process, below the limit of 232.
-    (100 + 13 * (std::process::id() % 10) + offset) as u16
+    // Fourteen domains per process, below the limit of 232.
+    (100 + 14 * (std::process::id() % 9) + offset) as u16
 }
 
 /// Returns a guard for a test that runs alone, or `None` where participants do not hear each other.

@@ -1,13 +1,11 @@
 //! Laser scans: the nearest one to an image in time, or frames of their own.
 
-use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
 use nalgebra::{Isometry2, Isometry3, Point3, UnitQuaternion, Vector3};
-use tagalong_core::{
-    FurtherScans, Input, LaserScan as Scan, RayReading, Sensors, Stamp, UnreadRay,
-};
+use tagalong_core::{FurtherScans, Input, LaserScan as Scan, RayReading, Sensors, UnreadRay};
 
+use super::recent::Recent;
 use super::{Moment, SensorReader, SensorType};
 use crate::msgs::{CdrError, LaserScan, decode};
 use crate::tally::Tally;
@@ -29,17 +27,15 @@ fn rank(topic: &str) -> i32 {
     2 * i32::from(topic.ends_with("/scan")) - i32::from(is_rear)
 }
 
-/// Maximum time between a scan and an image, s.
-const NEAR_S: f64 = 0.25;
 /// Maximum number of scans kept: those of the frames that wait for their turn.
 const KEPT: usize = 64;
 /// Maximum number of rays of a scan.
 const MAX_RAYS: usize = 65_536;
 
-/// Scans of the last seconds, in the order of arrival.
+/// Scans of the last seconds.
 #[derive(Default)]
 pub(crate) struct Scans {
-    scans: VecDeque<LaserScan>,
+    recent: Recent<LaserScan, KEPT>,
     /// True for a further scanner of the robot.
     is_further: bool,
 }
@@ -49,7 +45,7 @@ impl SensorReader for Scans {
         let scan = decode(message.data)?;
         match scan_fault(&scan) {
             Some(why) => lose_scan(&message.channel.topic, &why, tally),
-            None => self.push(scan),
+            None => self.recent.push(scan),
         }
         Ok(())
     }
@@ -82,7 +78,7 @@ impl Scans {
 
     /// Returns the scan of a moment in the frame of the robot; `None`, counted, without one.
     fn seen(&self, moment: &Moment<'_>, tally: &mut Tally) -> Option<Scan> {
-        let Some(scan) = self.near(moment.stamp) else {
+        let Some(scan) = self.recent.near(moment.stamp) else {
             tally.count("frames_without_laser");
             return None;
         };
@@ -96,22 +92,6 @@ impl Scans {
             return None;
         };
         Some(seen_from(scan, &mount, &moment.robot_from(then)))
-    }
-
-    /// Adds a scan.
-    fn push(&mut self, scan: LaserScan) {
-        self.scans.push_back(scan);
-        if self.scans.len() > KEPT {
-            self.scans.pop_front();
-        }
-    }
-
-    /// Returns the scan nearest to an image in time, if it is near enough.
-    fn near(&self, image: Stamp) -> Option<&LaserScan> {
-        let aged =
-            self.scans.iter().map(|scan| (scan.header.stamp().seconds_since(image).abs(), scan));
-        let (off_s, nearest) = aged.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
-        (off_s <= NEAR_S).then_some(nearest)
     }
 }
 
@@ -254,6 +234,7 @@ fn unread(scan: &LaserScan) -> impl Iterator<Item = UnreadRay> {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
+    use tagalong_core::Stamp;
 
     use super::*;
     use crate::msgs::Header;
@@ -330,26 +311,11 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_scan_counts_and_one_of_long_ago_does_not() {
-        let mut scans = Scans::default();
-        (0..100).for_each(|i| scans.push(scan(0.1 * f64::from(i), &[1.0])));
-        // The scans of long ago are dropped, and later on it is silent.
-        for (seconds, expected) in [(7.03, Some(7.0)), (9.99, Some(9.9)), (1.0, None), (12.0, None)]
-        {
-            let found = scans.near(Stamp::default().plus_seconds(seconds));
-            let stamp = expected.map(|seconds| Stamp::default().plus_seconds(seconds));
-            assert_eq!(found.map(|scan| scan.header.stamp()), stamp, "{seconds} s");
-        }
-    }
-
-    #[test]
     fn points_move_with_the_robot() {
-        let mut scans = Scans::default();
-        scans.push(scan(1.0, &[f32::NAN, 2.0]));
-        let scan = scans.near(Stamp::default().plus_seconds(1.0)).unwrap();
+        let scan = scan(1.0, &[f32::NAN, 2.0]);
         let mount = Isometry3::new(Vector3::new(0.1, 0.0, 0.2), Vector3::zeros());
         let driven = Isometry2::translation(-0.5, 0.0);
-        let scan = seen_from(scan, &mount, &driven);
+        let scan = seen_from(&scan, &mount, &driven);
         assert!((scan.points[0] - Point3::new(1.6, 0.0, 0.2)).norm() < 1e-6, "{scan:?}");
         let origin = scan.robot_from_scanner.translation.vector;
         assert!((origin - Vector3::new(-0.4, 0.0, 0.2)).norm() < 1e-12, "{origin}");

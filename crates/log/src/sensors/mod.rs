@@ -8,14 +8,15 @@
 //! 2. `crates/log/src/sensors/NAME.rs`: the message (a struct with the fields of the ROS message in
 //!    their order), a [`SensorReader`] that makes the data of it, and the entry for [`SENSORS`].
 //!
-//! `laser.rs` and `points.rs` keep the message nearest in time, `detections.rs` pairs one message with
-//! each frame.
+//! `laser.rs` and `points.rs` take the message nearest in time (`recent.rs`), `detections.rs` pairs one
+//! message with each frame.
 //! A topic is found by type, or named as `topics.NAME` under `[input]`. Images are no entries: they
 //! make the frames, and their calibrations the cameras.
 
 mod detections;
 pub(crate) mod laser;
 pub(crate) mod points;
+mod recent;
 
 use std::sync::Arc;
 

@@ -1,11 +1,10 @@
 //! Points of 3-D lidars: the nearest cloud to an image in time, or frames of their own.
 
-use std::collections::VecDeque;
-
 use nalgebra::{Isometry2, Isometry3, Point3};
-use tagalong_core::{Input, PointCloud as Cloud, Sensors, Stamp};
+use tagalong_core::{Input, PointCloud as Cloud, Sensors};
 
 use super::laser::on_floor;
+use super::recent::Recent;
 use super::{Moment, SensorReader, SensorType};
 use crate::Limits;
 use crate::images::points_of_cloud;
@@ -32,26 +31,21 @@ fn rank(topic: &str) -> i32 {
     -i32::from(is_part.iter().any(|word| topic.contains(word)))
 }
 
-/// Maximum time between a cloud and an image, s.
-const NEAR_S: f64 = 0.25;
 /// Maximum number of clouds kept: those of the frames that wait for their turn.
 const KEPT: usize = 16;
 
-/// Clouds of the last seconds, in the order of arrival, not yet decoded.
+/// Clouds of the last seconds, not yet decoded.
 #[derive(Default)]
-struct Clouds(VecDeque<Payload>);
+struct Clouds(Recent<Payload, KEPT>);
 
 impl SensorReader for Clouds {
     fn take(&mut self, message: &Message<'_>, _: &mut Tally) -> Result<(), CdrError> {
-        self.0.push_back(Payload::of_headed(message)?);
-        if self.0.len() > KEPT {
-            self.0.pop_front();
-        }
+        self.0.push(Payload::of_headed(message)?);
         Ok(())
     }
 
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
-        let Some(cloud) = self.near(moment.stamp) else {
+        let Some(cloud) = self.0.near(moment.stamp) else {
             tally.count("frames_without_points");
             return sensors;
         };
@@ -68,15 +62,6 @@ impl SensorReader for Clouds {
             Some(cloud) => sensors.with(cloud),
             None => sensors,
         }
-    }
-}
-
-impl Clouds {
-    /// Returns the cloud nearest to an image in time, if it is near enough.
-    fn near(&self, image: Stamp) -> Option<&Payload> {
-        let off_s = |cloud: &&Payload| cloud.stamp.seconds_since(image).abs();
-        let nearest = self.0.iter().min_by(|a, b| off_s(a).total_cmp(&off_s(b)));
-        nearest.filter(|cloud| off_s(cloud) <= NEAR_S)
     }
 }
 
