@@ -159,7 +159,7 @@ def test_tracks_have_the_joints_that_a_pose_network_finds():
     (track,) = report.tracks
     assert len(track.joints) == 17
     x, y, score = track.joints["left_wrist"]
-    assert 192 <= x <= 288 and 96 <= y <= 288 and 0.0 < score <= 1.0
+    assert 191 <= x <= 289 and 95 <= y <= 289 and 0.0 < score <= 1.0
     assert track.raised_hand in (True, False)
 
 
