@@ -135,7 +135,7 @@ impl Joints {
         JointName::LeftEar,
         JointName::RightEar,
     ];
-    /// Distance of the shoulders of a person who faces the camera, in heights of the trunk from the
+    /// Distance of the shoulders of a person facing the camera, in heights of the trunk from the
     /// hips to the shoulders: means of grown-ups are 0.36 m and 0.50 m between these joints.
     const SHOULDERS_OF_TRUNK: f64 = 0.72;
     /// Cosine of the turn from which on its side does not matter: within 25 degrees.
@@ -231,7 +231,7 @@ impl Joints {
         if trunk < 1.0 {
             return None;
         }
-        // The left shoulder of a person who faces the camera is on the right of the image.
+        // The left shoulder of a person facing the camera is on the right of the image.
         let cosine = ((left.x - right.x) / (Self::SHOULDERS_OF_TRUNK * trunk)).clamp(-1.0, 1.0);
         let side = if cosine.abs() >= Self::FRONTAL {
             1.0
@@ -256,7 +256,7 @@ impl Joints {
 mod tests {
     use super::*;
 
-    /// A person 100 pixels wide and with a trunk of 100 pixels, who faces the camera.
+    /// A person 100 pixels wide and with a trunk of 100 pixels, facing the camera.
     fn person() -> [Joint; 17] {
         let mut all = [Joint { at: Point2::new(100.0, 300.0), score: 0.9 }; 17];
         for name in Joints::HEAD {

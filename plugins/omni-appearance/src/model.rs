@@ -50,7 +50,7 @@ impl Signature {
 /// Largest misfit of a known person.
 const KNOWN: f64 = 2.0;
 
-/// Returns the person with the closest appearance, if it is close enough to tell who it is.
+/// Returns the person with the closest appearance, if it is close enough to tell the person.
 pub fn recognised<'a>(people: &'a [Person], looks: &[f64; 4]) -> Option<&'a Person> {
     let misfit = |known: &&Person| known.signature.misfit(looks);
     let best = people.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));

@@ -1,4 +1,4 @@
-//! What leads the printed form of P3 away from people, step by step, in our rooms and in an empty
+//! Causes that lead the printed form of P3 away from people, step by step, in our rooms and in an empty
 //! one.
 
 use tagalong_sim::{Scene, Split};
@@ -35,7 +35,7 @@ const SAMPLING: (&str, &str) = ("filter.config.condensation", "false");
 const TOP: (&str, &str) = ("filter.config.top", "false");
 const AXES: (&str, &str) = ("filter.config.printed_axes", "false");
 
-/// What is changed of the printed form.
+/// Changes of the printed form.
 const STEPS: [(&str, &[&Values]); 9] = [
     ("one window for all scenes", &[&WINDOW]),
     ("weighed by a likelihood ratio", &[&[RATIO]]),
@@ -51,7 +51,7 @@ const STEPS: [(&str, &[&Values]); 9] = [
     ),
 ];
 
-/// What became of one crossing.
+/// Outcome of one crossing.
 #[derive(Default)]
 struct Fate {
     /// Every person had a track before silhouettes overlapped.

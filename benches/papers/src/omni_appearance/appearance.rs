@@ -322,7 +322,7 @@ const WHOSE: [&str; 5] = [
     "both persons', and the own of whom the image shows as far as it tells",
 ];
 
-/// Images that tell who it is, and those of them that tell it rightly.
+/// Images that tell the person, and those of them that tell it rightly.
 #[derive(Default)]
 struct Recognised {
     images: usize,
@@ -330,7 +330,7 @@ struct Recognised {
     right: usize,
 }
 
-/// Returns the errors of the general head, and of a person's own where the image tells who it is
+/// Returns the errors of the general head, and of a person's own where the image tells the person
 /// (section 7).
 fn switched(
     samples: &[Sample],
@@ -351,7 +351,7 @@ fn switched(
     errors_m
 }
 
-/// Fits a head and an appearance to each person of these samples who has enough of them.
+/// Fits a head and an appearance to each person of these samples with enough of them.
 fn persons(samples: &[Sample]) -> Result<Vec<Person>, ReproduceError> {
     let names: BTreeSet<u64> = samples.iter().map(|sample| sample.person).collect();
     let mut people = Vec::new();

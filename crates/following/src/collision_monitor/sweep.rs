@@ -242,7 +242,7 @@ impl<'a> Sweep<'a> {
     fn comes_m(&self, closing_mps: f64, time_s: f64) -> f64 {
         match self.path {
             Path::Arc { .. } => reach_m(self.settings, closing_mps, time_s),
-            // The robot stays where it is: only a person who is on the way already meets it while it
+            // The robot stays where it is: only a person on the way already meets it while it
             // turns. Otherwise nobody could stand beside a robot that looks for the person it lost.
             Path::Turn { .. } => closing_mps.clamp(0.0, self.settings.people_mps) * time_s,
         }
@@ -491,7 +491,7 @@ mod tests {
         assert!(gap_m > CollisionMonitorSettings::default().protective_m);
         assert_eq!(allowed(moving(0.65, 0.0, 0.0), AHEAD, 0.9).most, 0.0);
         assert_eq!(allowed(moving(0.65, 0.0, 0.0), turn, 0.5), Allowance::FREE);
-        // One who comes, or is nearer than the protective distance, stops the turn, too.
+        // One that comes, or is nearer than the protective distance, stops the turn, too.
         assert_eq!(allowed(moving(0.65, 0.0, 1.2), turn, 0.5).most, 0.0);
         assert_eq!(allowed(moving(0.4, 0.0, 0.0), turn, 0.5).most, 0.0);
     }

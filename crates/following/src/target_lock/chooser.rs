@@ -297,7 +297,7 @@ mod tests {
         (TrackId(id), Arc::new(Joints::new(all)))
     }
 
-    /// Returns the frame in which the person of track 2 is chosen, who raises a hand where `raised` says
+    /// Returns the frame in which the person of track 2 is chosen, raising a hand where `raised` says
     /// so; `None`: no joints are found in that frame.
     fn chosen_by_hand(raised: &[Option<bool>]) -> Option<usize> {
         let settings = TargetSettings { choose: ChoiceRule::RaisedHand, ..approaching() };
