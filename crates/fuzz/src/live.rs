@@ -135,4 +135,19 @@ mod tests {
             assert_eq!(made.frame.recorded().unwrap().len(), 1, "the chair is nobody: {file}");
         }
     }
+
+    #[test]
+    fn a_file_does_not_spoil_those_after_it() {
+        let mut feed = Feed::new(DETECTION_TYPES[0]).unwrap();
+        for broken in [&[0xff_u8; 8][..], &[0; 8], &[0xff, 0xff, 0xff, 0x7f, 0, 0, 0, 0]] {
+            let mut message = detections().remove(0);
+            message[STAMP].copy_from_slice(broken);
+            for message in [&message[..], &message[..20], &[]] {
+                drop(feed.frame(message));
+                drop(feed.frame(message));
+            }
+            let made = feed.frame(&detections()[0]).unwrap();
+            assert_eq!(made.frame.recorded().unwrap().len(), 1, "{broken:?}");
+        }
+    }
 }
