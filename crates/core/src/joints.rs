@@ -194,10 +194,9 @@ impl Joints {
 
     /// Returns true if every number is finite.
     pub fn is_sane(&self) -> bool {
-        let is_finite = |joint: &Joint| {
-            joint.at.x.is_finite() && joint.at.y.is_finite() && joint.score.is_finite()
-        };
-        self.0.iter().all(is_finite)
+        self.0.iter().all(|Joint { at, score }| {
+            at.iter().all(|place| place.is_finite()) && score.is_finite()
+        })
     }
 
     /// Returns true if a wrist is above the head: above the highest sure one of nose, eyes and ears.

@@ -66,7 +66,7 @@ impl VideoDecoder {
         for unit in parse_annex_b(packet) {
             outcome = outcome.and_then(|()| self.take_unit(&unit));
         }
-        // What is left of a damaged picture must not become part of the next one.
+        // The rest of a damaged picture must not become part of the next one.
         let picture = self.decoder.flush();
         outcome.map(|()| picture)
     }
