@@ -7,17 +7,29 @@
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
+use tagalong::core::Stamp;
 use tagalong::log::msgs::{
-    CompressedImage, Header, Image, LaserScan, PointCloud2, PointField, encode,
+    CompressedImage, CompressedVideo, FfmpegPacket, Header, Image, LaserScan, PointCloud2,
+    PointField, Time, encode,
 };
+
+/// Number of images, or clouds of points, that wait for the thread that makes frames.
+pub(crate) const IMAGES: usize = 2;
+/// Number of other messages that wait.
+pub(crate) const OTHERS: usize = 64;
 
 /// A message of which frames can be made.
 pub(crate) trait FrameMessage: DeserializeOwned + Send + 'static {
-    /// Returns time and frame.
-    fn header(&self) -> &Header;
+    /// Returns the time of the measurement.
+    fn stamp(&self) -> Stamp;
 
     /// Returns the message as it lies on the wire.
     fn encode(&self) -> Vec<u8>;
+
+    /// Returns the number of messages like this one that wait; of images the newest alone are of use.
+    fn room(&self) -> usize {
+        IMAGES
+    }
 }
 
 /// `sensor_msgs/Image` that owns its pixels; field by field as [`Image`].
@@ -37,6 +49,28 @@ pub(crate) struct OwnedImage {
 pub(crate) struct OwnedCompressedImage {
     header: Header,
     format: String,
+    data: ByteBuf,
+}
+
+/// `foxglove_msgs/CompressedVideo` that owns its packet.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct OwnedVideo {
+    timestamp: Time,
+    frame_id: String,
+    data: ByteBuf,
+    format: String,
+}
+
+/// `ffmpeg_image_transport_msgs/FFMPEGPacket` that owns its packet.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct OwnedFfmpegPacket {
+    header: Header,
+    width: i32,
+    height: i32,
+    encoding: String,
+    pts: u64,
+    flags: u8,
+    is_bigendian: bool,
     data: ByteBuf,
 }
 
@@ -114,8 +148,8 @@ pub(crate) struct KeyValue {
 }
 
 impl FrameMessage for OwnedImage {
-    fn header(&self) -> &Header {
-        &self.header
+    fn stamp(&self) -> Stamp {
+        self.header.stamp()
     }
 
     fn encode(&self) -> Vec<u8> {
@@ -132,8 +166,8 @@ impl FrameMessage for OwnedImage {
 }
 
 impl FrameMessage for OwnedCompressedImage {
-    fn header(&self) -> &Header {
-        &self.header
+    fn stamp(&self) -> Stamp {
+        self.header.stamp()
     }
 
     fn encode(&self) -> Vec<u8> {
@@ -141,11 +175,60 @@ impl FrameMessage for OwnedCompressedImage {
         let format = self.format.clone();
         encode(&CompressedImage { header, format, data: &self.data })
     }
+
+    fn room(&self) -> usize {
+        // Some drivers publish packets of video as images, and each refers to those before it.
+        let is_video =
+            [&[0, 0, 0, 1][..], &[0, 0, 1]].iter().any(|code| self.data.starts_with(code));
+        if is_video { OTHERS } else { IMAGES }
+    }
+}
+
+impl FrameMessage for OwnedVideo {
+    fn stamp(&self) -> Stamp {
+        self.timestamp.into()
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        encode(&CompressedVideo {
+            timestamp: self.timestamp,
+            frame_id: self.frame_id.clone(),
+            data: &self.data,
+            format: self.format.clone(),
+        })
+    }
+
+    fn room(&self) -> usize {
+        OTHERS
+    }
+}
+
+impl FrameMessage for OwnedFfmpegPacket {
+    fn stamp(&self) -> Stamp {
+        self.header.stamp()
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        encode(&FfmpegPacket {
+            header: self.header.clone(),
+            width: self.width,
+            height: self.height,
+            encoding: self.encoding.clone(),
+            pts: self.pts,
+            flags: self.flags,
+            is_bigendian: self.is_bigendian,
+            data: &self.data,
+        })
+    }
+
+    fn room(&self) -> usize {
+        OTHERS
+    }
 }
 
 impl FrameMessage for OwnedPointCloud {
-    fn header(&self) -> &Header {
-        &self.header
+    fn stamp(&self) -> Stamp {
+        self.header.stamp()
     }
 
     fn encode(&self) -> Vec<u8> {
@@ -164,12 +247,16 @@ impl FrameMessage for OwnedPointCloud {
 }
 
 impl FrameMessage for LaserScan {
-    fn header(&self) -> &Header {
-        &self.header
+    fn stamp(&self) -> Stamp {
+        self.header.stamp()
     }
 
     fn encode(&self) -> Vec<u8> {
         encode(self)
+    }
+
+    fn room(&self) -> usize {
+        OTHERS
     }
 }
 
@@ -186,7 +273,6 @@ pub(crate) fn ros_topic(dds: &str) -> Option<&str> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong::core::Stamp;
     use tagalong::log::msgs::decode;
 
     use super::*;
@@ -208,7 +294,17 @@ mod tests {
         assert_eq!(decode::<Image<'_>>(&bytes).unwrap().data, [1, 2, 3]);
         let data = ByteBuf::from([9; 5]);
         let compressed = OwnedCompressedImage { header, format: "jpeg".into(), data };
-        assert_eq!(compressed.encode(), encode(&compressed));
+        assert_eq!((compressed.encode(), compressed.room()), (encode(&compressed), IMAGES));
+        let packet = OwnedCompressedImage { data: ByteBuf::from([0, 0, 1, 0x65]), ..compressed };
+        assert_eq!(packet.room(), OTHERS);
+        let stamp = Stamp::from_nanos(7);
+        let data = ByteBuf::from([0, 0, 1, 0x65]);
+        let video = OwnedVideo { timestamp: stamp.into(), data, ..OwnedVideo::default() };
+        assert_eq!((video.encode(), video.stamp()), (encode(&video), stamp));
+        let data = ByteBuf::from([0, 0, 1, 0x65]);
+        let header = Header::new(stamp, "camera");
+        let packet = OwnedFfmpegPacket { header, pts: 5, data, ..OwnedFfmpegPacket::default() };
+        assert_eq!((packet.encode(), packet.stamp()), (encode(&packet), stamp));
         let header = Header::new(Stamp::from_nanos(7), "lidar");
         let cloud = encode(&PointCloud2::of_points(header, &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]));
         assert_eq!(decode::<OwnedPointCloud>(&cloud).unwrap().encode(), cloud);

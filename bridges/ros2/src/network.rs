@@ -21,17 +21,13 @@ use tagalong::log::msgs::{
 use crate::BridgeError;
 use crate::inbox::Inbox;
 use crate::messages::{
-    Bool, Empty, FrameMessage, OwnedCompressedImage, OwnedImage, OwnedPointCloud, SpeedLimit,
-    ros_topic, ros_type,
+    Bool, Empty, FrameMessage, IMAGES, OTHERS, OwnedCompressedImage, OwnedFfmpegPacket, OwnedImage,
+    OwnedPointCloud, OwnedVideo, SpeedLimit, ros_topic, ros_type,
 };
 use crate::publishers::Origin;
 use crate::raw::RawAdapter;
 use crate::stamps::StampClock;
 
-/// Number of images, or clouds of points, that wait for the thread that makes frames.
-const IMAGES: usize = 2;
-/// Number of other messages that wait.
-const OTHERS: usize = 64;
 /// Number of answers of a service that are kept for callers that missed them.
 const ANSWERS: usize = 10;
 
@@ -134,7 +130,13 @@ impl Network {
                 self.frames::<OwnedImage>(topic, message_type, IMAGES, inbox, clock)
             }
             "sensor_msgs/msg/CompressedImage" => {
-                self.frames::<OwnedCompressedImage>(topic, message_type, IMAGES, inbox, clock)
+                self.frames::<OwnedCompressedImage>(topic, message_type, OTHERS, inbox, clock)
+            }
+            "foxglove_msgs/msg/CompressedVideo" => {
+                self.frames::<OwnedVideo>(topic, message_type, OTHERS, inbox, clock)
+            }
+            "ffmpeg_image_transport_msgs/msg/FFMPEGPacket" => {
+                self.frames::<OwnedFfmpegPacket>(topic, message_type, OTHERS, inbox, clock)
             }
             // As large as an image.
             "sensor_msgs/msg/PointCloud2" => {
@@ -267,16 +269,16 @@ impl Network {
         &mut self,
         topic: &str,
         message_type: &str,
-        room: usize,
+        depth: usize,
         inbox: &Arc<Inbox>,
         clock: &Arc<StampClock>,
     ) -> Result<Ear, BridgeError> {
         let clock = Arc::clone(clock);
         let encode = move |message: M| {
-            clock.record_arrival(message.header().stamp());
-            message.encode()
+            clock.record_arrival(message.stamp());
+            (message.encode(), message.room())
         };
-        self.ear(topic, message_type, sensor(room), room, inbox, encode)
+        self.ear(topic, message_type, sensor(depth), inbox, encode)
     }
 
     fn plain<M: Message + Serialize + DeserializeOwned + Send + 'static>(
@@ -285,17 +287,18 @@ impl Network {
         qos: QosProfile,
         inbox: &Arc<Inbox>,
     ) -> Result<Ear, BridgeError> {
-        self.ear(topic, M::TYPE, qos, OTHERS, inbox, |message: M| encode(&message))
+        self.ear(topic, M::TYPE, qos, inbox, |message: M| (encode(&message), OTHERS))
     }
 
+    /// Puts the messages of a topic into the inbox. `encode` returns the bytes of one, and the number of
+    /// messages of its topic that may wait.
     fn ear<M: DeserializeOwned + Send + 'static>(
         &mut self,
         topic: &str,
         message_type: &str,
         qos: QosProfile,
-        room: usize,
         inbox: &Arc<Inbox>,
-        encode: impl Fn(M) -> Vec<u8> + Send + 'static,
+        encode: impl Fn(M) -> (Vec<u8>, usize) + Send + 'static,
     ) -> Result<Ear, BridgeError> {
         let inbox = Arc::clone(inbox);
         let name = topic.to_owned();
@@ -303,7 +306,10 @@ impl Network {
         let put = move |message: Option<(M, MessageInfo)>| match message {
             // The transforms that this node publishes itself are no input.
             Some((_, info)) if participant_of(info.publisher_gid()) == ours => {}
-            Some((message, _)) => inbox.push(&name, encode(message), room),
+            Some((message, _)) => {
+                let (bytes, room) = encode(message);
+                inbox.push(&name, bytes, room);
+            }
             None => inbox.count_malformed(&name),
         };
         self.hear(topic, message_type, qos, put)

@@ -7,7 +7,7 @@ use std::path::Path;
 use tagalong_core::Stamp;
 use tagalong_log::images::{CloudAxes, camera_of_cloud, decode_cloud, points_of_cloud};
 use tagalong_log::msgs::{
-    self, BoundingBox2D, Detection2D, Detection2DArray, Header, ObjectHypothesis,
+    self, BoundingBox2D, CompressedVideo, Detection2D, Detection2DArray, Header, ObjectHypothesis,
     ObjectHypothesisWithPose, Point2D, PointCloud2, Pose2D, decode, encode,
 };
 use tagalong_log::{Input, InputSettings, Inputs, Limits, Listening, LiveSource, LogFrame};
@@ -120,9 +120,75 @@ pub(crate) fn points(bytes: &[u8], _: &Path) {
     drop(points_of_cloud(&cloud, &limits));
 }
 
+const VIDEO: &str = "/video";
+/// Streams of H.264: pictures of 48 x 32 pixels, and such of 32 x 32 with some between two others.
+const STREAMS: [&[u8]; 2] = [
+    include_bytes!("../../log/tests/data/small.h264"),
+    include_bytes!("../../log/tests/data/between.h264"),
+];
+
+/// Returns streams of video.
+pub(crate) fn streams() -> Vec<Vec<u8>> {
+    STREAMS.map(<[u8]>::to_vec).to_vec()
+}
+
+thread_local! {
+    /// A robot with a camera that publishes video, of which one key picture was heard.
+    static WATCHING: Option<Listening> = watching();
+}
+
+fn watching() -> Option<Listening> {
+    let inputs = Inputs::NONE.require(Input::Colour);
+    let limits = Limits { image_side_px: 256, ..Limits::default() };
+    let settings = InputSettings::default();
+    let mut listening = Listening::new("fuzz", &settings, &limits, inputs).ok()?;
+    listening.announce(VIDEO, "foxglove_msgs/msg/CompressedVideo");
+    listening.take(VIDEO, &packet(header().stamp(), STREAMS[0]));
+    Some(listening)
+}
+
+fn packet(stamp: Stamp, data: &[u8]) -> Vec<u8> {
+    encode(&CompressedVideo {
+        timestamp: stamp.into(),
+        frame_id: CAMERA.into(),
+        data,
+        format: "h264".into(),
+    })
+}
+
+/// Makes frames of a stream of video, a packet for each delimiter.
+pub(crate) fn frames_of_video(bytes: &[u8], _: &Path) {
+    WATCHING.with(|listening| frames_of_stream(listening.as_ref(), bytes));
+}
+
+/// Returns the number of frames that a stream gives.
+fn frames_of_stream(listening: Option<&Listening>, stream: &[u8]) -> usize {
+    let Some(mut source) = listening.and_then(|listening| listening.start().ok()) else { return 0 };
+    let starts = (0..stream.len()).filter(|at| stream[*at..].starts_with(&[0, 0, 0, 1, 9]));
+    let mut begin = 0;
+    let mut frames = 0;
+    let mut stamp = header().stamp();
+    for end in starts.chain([stream.len()]) {
+        source.take(VIDEO, &packet(stamp, &stream[begin..end]));
+        frames += usize::from(source.newest_frame().is_some());
+        begin = end;
+        stamp = stamp.plus_seconds(0.1);
+    }
+    frames
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn streams_become_frames() {
+        let listening = watching();
+        let frames = STREAMS.map(|stream| frames_of_stream(listening.as_ref(), stream));
+        // Of the second one, pictures between others are left out.
+        assert_eq!(frames, [4, 3]);
+        assert_eq!(frames_of_stream(listening.as_ref(), b"no video"), 0);
+    }
 
     #[test]
     fn the_seeds_are_read_to_the_end() {

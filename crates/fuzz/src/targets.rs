@@ -117,6 +117,12 @@ pub fn targets() -> Vec<Target> {
         Target { name: "cdr", about: "ROS messages", seeds: payloads(), parse: messages },
         Target { name: "images", about: "image messages", seeds: pictures(), parse: images },
         Target {
+            name: "video",
+            about: "streams of H.264",
+            seeds: live::streams(),
+            parse: live::frames_of_video,
+        },
+        Target {
             name: "points",
             about: "clouds of points",
             seeds: live::clouds(),

@@ -8,6 +8,7 @@ mod faults;
 mod lidar;
 mod peers;
 mod skill;
+mod video;
 
 use std::path::Path;
 use std::sync::Arc;

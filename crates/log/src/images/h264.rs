@@ -6,10 +6,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use rust_h264::decoder::{ChromaFormat, Decoder, Frame};
 use rust_h264::nal::{NalUnit, NalUnitType, parse_annex_b};
 use rust_h264::sps::{Sps, parse_sps};
+use tagalong_core::Stamp;
 
 use super::{ImageError, check_size};
 use crate::Limits;
 use crate::msgs::{Header, Image, encode};
+
+/// Most places by which a picture between two others lies before the one that was shown last: sixteen
+/// pictures, each of which may count as two halves. A place farther back is a count that began anew.
+const MOST_BACK: i32 = 32;
 
 /// Outcome of a packet.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,6 +23,8 @@ pub(crate) enum Picture {
     Whole(Vec<u8>),
     /// The packet refers to pictures that are not there: none until the next key picture.
     Waits,
+    /// The picture belongs before one with an earlier stamp: the stamps are those of the packets.
+    OutOfOrder,
     /// The packet has no picture, but parameters alone.
     Parameters,
 }
@@ -31,12 +38,14 @@ pub(crate) struct VideoDecoder {
     is_whole: bool,
     /// Number of the last picture to which others refer.
     last: u32,
+    /// Place in the order of display, and stamp, of the last picture shown since the key picture.
+    shown: Option<(i32, Stamp)>,
 }
 
 impl VideoDecoder {
     pub(crate) fn new(limits: &Limits) -> Self {
         let limits = limits.clone();
-        Self { decoder: Decoder::new(), limits, sps: None, is_whole: false, last: 0 }
+        Self { decoder: Decoder::new(), limits, sps: None, is_whole: false, last: 0, shown: None }
     }
 
     /// Decodes a packet to an image with this header.
@@ -47,6 +56,9 @@ impl VideoDecoder {
     pub(crate) fn decode(&mut self, packet: &[u8], header: Header) -> Result<Picture, ImageError> {
         // The decoder is a young one, and a log may hold any bytes: a panic is a damaged packet.
         match catch_unwind(AssertUnwindSafe(|| self.take(packet))) {
+            Ok(Ok(Some(frame))) if self.is_out_of_order(&frame, header.stamp()) => {
+                Ok(Picture::OutOfOrder)
+            }
             Ok(Ok(Some(frame))) => self.image_of(&frame, header).map(Picture::Whole),
             Ok(Ok(None)) if self.is_whole || !has_picture(packet) => Ok(Picture::Parameters),
             Ok(Ok(None)) => Ok(Picture::Waits),
@@ -74,7 +86,11 @@ impl VideoDecoder {
     fn take_unit(&mut self, unit: &NalUnit<'_>) -> Result<(), ImageError> {
         match unit.nal_unit_type {
             NalUnitType::Sps => self.sps = Some(checked(unit, &self.limits)?),
-            NalUnitType::SliceIdr => (self.is_whole, self.last) = (true, 0),
+            NalUnitType::SliceIdr => {
+                self.is_whole = true;
+                self.last = 0;
+                self.shown = None;
+            }
             NalUnitType::Slice => self.is_whole = self.follows_on(unit)?,
             _ => {}
         }
@@ -82,6 +98,19 @@ impl VideoDecoder {
             return Ok(());
         }
         self.decoder.decode_nal(unit).map(|_| ()).map_err(damaged)
+    }
+
+    /// Returns true if a picture is shown before the last one and has a later stamp, as where packets
+    /// with pictures between two others (B-frames) are stamped when they are published.
+    fn is_out_of_order(&mut self, frame: &Frame, stamp: Stamp) -> bool {
+        let place = frame.pic_order_cnt;
+        let is_out = self.shown.is_some_and(|(shown, last)| {
+            (1..=MOST_BACK).contains(&shown.saturating_sub(place)) && stamp > last
+        });
+        if !is_out {
+            self.shown = Some((place, stamp));
+        }
+        is_out
     }
 
     /// Returns the bytes of a `sensor_msgs/Image` with the pixels of a picture.
@@ -231,12 +260,30 @@ mod tests {
         0x95f7_b36b,
     ];
 
-    /// Returns the packets of the pictures; each begins with a delimiter.
+    /// Six pictures of 32 x 32 pixels in the order 0, 3, 1, 2, 5, 4: B-frames lie between others.
+    const BETWEEN: &[u8] = include_bytes!("../../tests/data/between.h264");
+    /// Order of their packets.
+    const SHOWN: [u64; 6] = [0, 3, 1, 2, 5, 4];
+    /// Checksums of their pixels in the order of display, as ffmpeg decodes them.
+    const PICTURES_BETWEEN: [u32; 6] =
+        [0x9ece_98c5, 0x8f51_ea02, 0x2bfb_bace, 0xbbc8_4846, 0x3bc6_f17c, 0x00f8_c701];
+    /// Four pictures of 48 x 32 pixels, of which each second is a key picture.
+    const SMALL: &[u8] = include_bytes!("../../tests/data/small.h264");
+
     fn packets() -> Vec<&'static [u8]> {
-        let is_start = |at: &usize| WALK[*at..].starts_with(&[0, 0, 0, 1, 9]);
-        let starts: Vec<usize> = (0..WALK.len()).filter(is_start).collect();
-        let ends = starts.iter().copied().skip(1).chain([WALK.len()]);
-        starts.iter().zip(ends).map(|(start, end)| &WALK[*start..end]).collect()
+        split(WALK)
+    }
+
+    /// Returns the packets of the pictures; each begins with a delimiter.
+    fn split(stream: &[u8]) -> Vec<&[u8]> {
+        let is_start = |at: &usize| stream[*at..].starts_with(&[0, 0, 0, 1, 9]);
+        let starts: Vec<usize> = (0..stream.len()).filter(is_start).collect();
+        let ends = starts.iter().copied().skip(1).chain([stream.len()]);
+        starts.iter().zip(ends).map(|(start, end)| &stream[*start..end]).collect()
+    }
+
+    fn at(stamp_ns: u64) -> Header {
+        Header::new(Stamp::from_nanos(stamp_ns), "camera")
     }
 
     /// Returns the number of the picture that each packet gives, from 0; `None` where one is waited for.
@@ -252,7 +299,7 @@ mod tests {
                     found.push(PICTURES.iter().position(|known| *known == sum));
                 }
                 Picture::Waits => found.push(None),
-                Picture::Parameters => panic!("each packet has a picture"),
+                other => panic!("each packet has a picture, in order: {other:?}"),
             }
         }
         found
@@ -277,6 +324,51 @@ mod tests {
         assert_eq!(found[..6], [Some(0), Some(1), Some(2), None, None, Some(6)]);
     }
 
+    /// Returns stamp and checksum of the pixels of each picture of a stream, whose packets have these
+    /// stamps.
+    fn shown(stream: &[u8], stamps: impl IntoIterator<Item = u64>) -> Vec<Option<(u64, u32)>> {
+        let mut decoder = VideoDecoder::new(&Limits::default());
+        let packets = split(stream).into_iter().zip(stamps);
+        let pictures = packets.map(|(packet, stamp)| match decoder.decode(packet, at(stamp)) {
+            Ok(Picture::Whole(image)) => {
+                let image: Image<'_> = decode(&image).unwrap();
+                Some((stamp, crc32fast::hash(image.data)))
+            }
+            Ok(Picture::OutOfOrder) => None,
+            other => panic!("{other:?}"),
+        });
+        pictures.collect()
+    }
+
+    #[test]
+    fn a_picture_between_two_others_has_its_own_stamp_or_is_left_out() {
+        // Each packet has the stamp of its picture.
+        let whole = shown(BETWEEN, SHOWN);
+        let wanted = SHOWN.map(|picture| Some((picture, PICTURES_BETWEEN[picture as usize])));
+        assert_eq!(whole, wanted);
+        // Stamps of the publication: the pictures that are left come in their order.
+        let left = shown(BETWEEN, 0..6);
+        let kept: Vec<usize> = (0..6).filter(|packet| left[*packet].is_some()).collect();
+        assert_eq!(kept, [0, 1, 4]);
+        // A count that begins anew is no order.
+        let mut decoder = VideoDecoder::new(&Limits::default());
+        assert!(matches!(decoder.decode(split(BETWEEN)[0], at(2)), Ok(Picture::Whole(_))));
+        decoder.shown = Some((1000, Stamp::from_nanos(1)));
+        assert!(matches!(decoder.decode(split(BETWEEN)[1], at(3)), Ok(Picture::Whole(_))));
+    }
+
+    #[test]
+    fn a_stream_may_change_its_size_at_a_key_picture() {
+        let mut decoder = VideoDecoder::new(&Limits::default());
+        let mut sizes = Vec::new();
+        for packet in [split(SMALL), packets()].concat() {
+            let Picture::Whole(image) = decoder.decode(packet, at(1)).unwrap() else { panic!() };
+            let image: Image<'_> = decode(&image).unwrap();
+            sizes.push((image.width, image.height));
+        }
+        assert_eq!(sizes, [[(48, 32); 4].as_slice(), &[(160, 120); 12]].concat());
+    }
+
     #[test]
     fn pictures_beyond_the_limits_are_refused_before_memory_is_taken() {
         let limits = Limits { image_side_px: 120, ..Limits::default() };
@@ -288,14 +380,14 @@ mod tests {
     proptest! {
         #[test]
         fn damaged_packets_are_errors_or_other_pictures(
-            damage in proptest::collection::vec((0..WALK.len(), any::<u8>()), 1..8),
+            damage in proptest::collection::vec((0..BETWEEN.len(), any::<u8>()), 1..8),
         ) {
-            let mut bytes = WALK.to_vec();
+            let mut bytes = BETWEEN.to_vec();
             for (at, value) in damage {
                 bytes[at] = value;
             }
             let mut decoder = VideoDecoder::new(&Limits::default());
-            for packet in bytes.chunks(300) {
+            for packet in bytes.chunks(100) {
                 let _ = decoder.decode(packet, Header::default());
             }
             let _ = decoder.decode(&bytes, Header::default());

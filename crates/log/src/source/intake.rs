@@ -141,6 +141,13 @@ impl Intake {
         match decoder.decode(packet.data, packet.header.clone()) {
             Ok(Picture::Whole(image)) => return Ok(Some(Payload::new(packet.header, &image))),
             Ok(Picture::Parameters) => {}
+            Ok(Picture::OutOfOrder) => tally.lose("video_out_of_order", || {
+                format!(
+                    "{topic} at {}: the picture belongs before one with an earlier stamp, so that its \
+                     time is not known; record video without B-frames",
+                    packet.header.stamp()
+                )
+            }),
             Ok(Picture::Waits) => tally.lose("video_without_key_picture", || {
                 format!(
                     "{topic} at {}: the picture refers to one that is not in the log; the next key \
