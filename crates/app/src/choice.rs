@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tagalong_config::Registry;
-use tagalong_log::{FrameSource, InputAccount, Inspection, Limits};
+use tagalong_log::{FrameSource, Input, InputAccount, Inputs, Inspection, Limits};
 
 use crate::config_file::{ConfigFile, OuterSettings};
 use crate::input_args::InputArgs;
@@ -53,10 +53,7 @@ pub const CHOICES: [Choice; 11] = [
         reason: "it sees people all around by the points of the lidar; it was tried on simulated \
                  ones alone",
     },
-    Choice {
-        config: WITHOUT_NETWORK,
-        reason: "nothing else works without depth; places in metres are rough",
-    },
+    Choice { config: WITHOUT_NETWORK, reason: "it needs no depth; places in metres are rough" },
     Choice {
         config: "laser-legs",
         reason: "it believes in what moves where nothing was; people who stand may be missed",
@@ -82,10 +79,19 @@ pub struct Fittings {
     pub fitting: Vec<Fitting>,
     /// Use of the topics of the log by a pipeline that takes all inputs.
     pub account: InputAccount,
-    /// A line for each of the others.
-    pub refusals: String,
+    /// The others that were tried.
+    refusals: Vec<Refusal>,
     /// A line about lost data; nothing for a whole log.
     damage: String,
+}
+
+/// A pipeline that does not fit a log.
+struct Refusal {
+    config: &'static str,
+    /// Reason, with the remedy where there is one.
+    why: String,
+    /// Inputs of a pipeline that fails on them; `None` where the log is of a kind that it is not made for.
+    inputs: Option<Inputs>,
 }
 
 impl Fittings {
@@ -95,11 +101,24 @@ impl Fittings {
             self.account.lines().iter().map(|line| format!("\n  {line}")).collect();
         let account = if account.is_empty() { account } else { format!("\nits topics:{account}") };
         let log = log.display();
-        let Self { refusals, damage, .. } = self;
+        if let Some(why) = self.common_reason() {
+            return Failure::failed(format!("{log}: {why}"));
+        }
+        let refusals = self.refusals.iter();
+        let refusals: String =
+            refusals.map(|refusal| format!("\n  {}: {}", refusal.config, refusal.why)).collect();
+        let damage = &self.damage;
         let hint = format!("`tagalong inspect {log}` lists its topics");
         Failure::failed(format!(
             "{log}: no built-in pipeline fits:{refusals}{account}\n{damage}{hint}"
         ))
+    }
+
+    /// Returns the reason of all refusals, if it is the same, as of a file that is no log.
+    fn common_reason(&self) -> Option<&str> {
+        let (first, others) = self.refusals.split_first()?;
+        let is_common = others.iter().all(|other| other.why == first.why);
+        (is_common && !others.is_empty()).then_some(&*first.why)
     }
 
     /// Returns what the log has, in words: the inputs that can be used, and how many topics cannot.
@@ -126,16 +145,15 @@ impl Fittings {
     /// Returns the pipeline that would be taken if a topic could be used, with the reason why it
     /// cannot and the remedy; `None` if nothing in the log stands in the way of a better one.
     pub fn better(&self) -> Option<String> {
-        let place = |name: &str| CHOICES.iter().position(|choice| choice.config == name);
-        let taken = place(self.fitting.first()?.choice.config)?;
+        let best = CHOICES[0].config;
+        if self.fitting.first()?.choice.config == best {
+            return None;
+        }
         let topic = self.account.curable().find(|topic| {
             // These two are what the first of all needs.
             matches!(topic.could_be, Some("depth" | "colour"))
-        })?;
-        let best = CHOICES[0].config;
-        if taken == 0 {
-            return None;
-        }
+        });
+        let Some(topic) = topic else { return self.refused_though_there() };
         let could_be = topic.could_be.unwrap_or_default();
         let why = topic.problem.as_deref().unwrap_or_default();
         let remedy = topic.remedy.as_ref().map(|it| format!("; {it}")).unwrap_or_default();
@@ -144,6 +162,25 @@ impl Fittings {
             topic.topic, topic.kind
         ))
     }
+
+    /// Returns the first pipeline whose inputs the log has and that fails on them, with the reason.
+    fn refused_though_there(&self) -> Option<String> {
+        let usable = self.account.usable();
+        let place = |name: &str| CHOICES.iter().position(|choice| choice.config == name);
+        let taken = place(self.fitting.first()?.choice.config)?;
+        let refusal = self.refusals.iter().find(|refusal| {
+            place(refusal.config) < Some(taken)
+                && refusal.inputs.is_some_and(|inputs| has_required(&usable, inputs))
+        })?;
+        Some(format!("{} would do better, but: {}", refusal.config, refusal.why))
+    }
+}
+
+/// Returns true if all inputs that a pipeline cannot do without are among the usable ones.
+fn has_required(usable: &[&str], inputs: Inputs) -> bool {
+    let known = Input::ALL.into_iter().chain([Input::POINTS]);
+    let mut required = known.filter(|input| inputs.requires(*input));
+    required.all(|input| usable.contains(&input.name()))
 }
 
 /// Returns a line about a log of which part was lost; nothing for a whole one.
@@ -171,18 +208,36 @@ pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -
         }
         match try_config(&config, log, registry, args) {
             Ok(()) => found.fitting.push(Fitting { choice, config }),
-            Err(why) => found.refusals += &refusal(choice.config, log, &why),
+            Err(misfit) => found.refusals.push(Refusal {
+                config: choice.config,
+                why: reason(log, &misfit.why),
+                inputs: misfit.inputs,
+            }),
         }
     }
     found
 }
 
-/// Returns a line that says why a config does not fit: without the path of the log and the list of
-/// its topics, which would be the same in each.
-fn refusal(config: &str, log: &Path, why: &Failure) -> String {
+/// Failure of a trial.
+struct Misfit {
+    why: Failure,
+    /// As those of a [`Refusal`].
+    inputs: Option<Inputs>,
+}
+
+impl From<Failure> for Misfit {
+    fn from(why: Failure) -> Self {
+        Self { why, inputs: None }
+    }
+}
+
+/// Returns the reason of a failure: without the path of the log and the list of its topics, which would
+/// be the same in each.
+fn reason(log: &Path, why: &Failure) -> String {
     let reason = why.message.lines().next().unwrap_or_default();
-    let reason = reason.replacen(&format!("`{}` ", log.display()), "the log ", 1);
-    format!("\n  {config}: {reason}")
+    let log = log.display();
+    let reason = reason.replacen(&format!("`{log}`, "), "", 1);
+    reason.replacen(&format!("`{log}` "), "the log ", 1).replacen(&format!("`{log}`: "), "", 1)
 }
 
 /// Takes the first frame of a log through a pipeline.
@@ -191,26 +246,29 @@ fn try_config(
     log: &Path,
     registry: &Registry,
     args: &InputArgs,
-) -> Result<(), Failure> {
+) -> Result<(), Misfit> {
     let (mut pipeline, settings) = config.pipeline(registry, None)?;
+    let inputs = Some(pipeline.inputs());
     let outer = args.applied(config.outer_for(&pipeline)?);
-    let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
+    let opened = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs());
+    let mut source = opened.map_err(|error| Misfit { why: error.into(), inputs })?;
     let Some(item) = source.next_frame() else {
         let account = source.account();
         let failing = account.topics.iter().find(|it| it.used_as.is_some() && it.problem.is_some());
         let lost = source.notes().last().filter(|_| source.data_lost());
         let why = failing.map(|topic| format!(": {topic}"));
         let why = why.or_else(|| lost.map(|note| format!(": {note}"))).unwrap_or_default();
-        return Err(Failure::failed(format!("no frame that can be used{why}")));
+        let why = Failure::failed(format!("no frame that can be used{why}"));
+        return Err(Misfit { why, inputs });
     };
     // Any colour image passes for a panorama, and a panorama for any image.
     if item.frame.camera.panorama().is_some() != (config.stem() == PANORAMIC) {
-        return Err(Failure::failed("another kind of camera"));
+        return Err(Failure::failed("another kind of camera").into());
     }
     // Without odometry the robot is taken to be at rest, and all things seem to move.
     if settings.suits.odometry && !source.has_odometry() {
-        return Err(Failure::failed("no odometry"));
+        return Err(Failure::failed("no odometry").into());
     }
-    pipeline.step(&item.frame).map_err(Failure::failed)?;
-    Ok(())
+    let stepped = pipeline.step(&item.frame).map(drop);
+    stepped.map_err(|error| Misfit { why: Failure::failed(error), inputs })
 }

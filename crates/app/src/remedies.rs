@@ -293,7 +293,11 @@ impl Remedy {
             return;
         }
         let config = table.get("config").and_then(Value::as_table);
-        for key in &self.settings {
+        for setting in &self.settings {
+            let (place, key) = setting.split_once('.').unwrap_or(("", setting));
+            if !place.is_empty() && name != format!("[{place}]") {
+                continue;
+            }
             let value = match plugin {
                 Some(_) => config.and_then(|config| config.get(key)),
                 None => table.get(key),

@@ -9,8 +9,8 @@ use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
 use crate::images::{
-    CloudAxes, CloudCamera, Codec, Content, H264, Packet, camera_of_cloud, content_of_encoding,
-    content_of_format, may_be_disparity, points_of_cloud, size_of_compressed, size_of_video,
+    CloudAxes, CloudCamera, Codec, Content, H264, Packet, camera_of_cloud, content_of_compressed,
+    content_of_encoding, may_be_disparity, points_of_cloud, size_of_compressed, size_of_video,
     video_codec,
 };
 use crate::log_files::LogFiles;
@@ -400,6 +400,10 @@ impl Gathering {
     /// Takes in a cloud. The first one with enough points tells the camera, and so is its calibration.
     fn take_cloud(&mut self, name: &str, data: &[u8]) -> Option<()> {
         let topic = self.topic(name, "", "");
+        if is_own_output(name) {
+            topic.kind = Type::Other;
+            return Some(());
+        }
         let cloud: PointCloud2<'_> = decode(data).ok()?;
         if topic.cloud.is_none() {
             let camera = camera_of_cloud(&cloud, &Limits::default());
@@ -530,7 +534,7 @@ impl Topic {
             let size = size_of_compressed(&image, &Limits::default());
             self.size = size.ok().map(|(width, height)| (width as u32, height as u32));
             let codec = Codec::of(&image);
-            let declared = content_of_format(&image.format);
+            let declared = content_of_compressed(&image);
             self.is_deep_grey = codec == Codec::DeepPng && declared != Content::Depth;
             let is_named_depth = is_named_depth(name);
             // Three channels may be depth that was coloured for people to look at.
@@ -636,6 +640,11 @@ impl Topic {
 /// Returns the name of the calibration that the points of a cloud tell.
 pub(crate) fn calibration_by_points(topic: &str) -> String {
     format!("{topic} (by its points)")
+}
+
+/// Returns true for the points of a person that a run writes into its log of tracks for viewers.
+fn is_own_output(topic: &str) -> bool {
+    topic.strip_prefix("/people/person_").is_some_and(|rest| rest.ends_with("/body"))
 }
 
 /// Returns true if the name of a topic says that its images are depth.

@@ -243,7 +243,7 @@ fn cases() -> Vec<Case> {
             Changes { without: &["camera_info"], ..Changes::default() },
             "needs",
             "bad",
-            "colour_info_topic",
+            "record its topic with the images",
         ),
     ]
 }

@@ -111,6 +111,20 @@ fn a_pipeline_without_depth_is_the_same_on_a_real_log_that_has_it() {
 }
 
 #[test]
+fn the_reason_for_which_a_better_pipeline_fails_is_told() {
+    let home = Home::simulated();
+    let changes = Changes { without: &["camera_info"], ..Changes::default() };
+    broken::write(&home.path("with.mcap"), &home.path("uncalibrated.mcap"), &changes);
+    let (code, said) = home.tell(&["run", "uncalibrated.mcap", "-o", "out"]);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("the log has colour and depth: taking mono"), "{said}");
+    let reason = "depth-verified would do better, but: the log has no calibration \
+                  (sensor_msgs/CameraInfo) of ";
+    assert!(said.contains(reason), "{said}");
+    assert!(said.contains("; record its topic with the images"), "{said}");
+}
+
+#[test]
 fn a_pipeline_that_requires_depth_is_refused_without() {
     let home = Home::simulated();
     fs::write(home.path("config.toml"), config("depth-ekf")).unwrap();

@@ -9,7 +9,10 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::raw::exact;
-use super::{ImageError, Pixels, check_size, deep_png, metres, metres_of_float, rvl, video_codec};
+use super::{
+    Content, ImageError, Pixels, check_size, content_of_format, deep_png, metres, metres_of_float,
+    rvl, video_codec,
+};
 use crate::Limits;
 use crate::mcap::record::u32_at;
 use crate::msgs::CompressedImage;
@@ -19,6 +22,10 @@ const MAX_JPEG_SCANS: usize = 64;
 
 /// Length of the `compressedDepth` header, bytes: format, quantisation a and b.
 const DEPTH_HEADER: usize = 12;
+/// First bytes of a PNG.
+const PNG: &[u8] = &[0x89, b'P', b'N', b'G'];
+/// First bytes of a JPEG.
+const JPEG: &[u8] = &[0xff, 0xd8];
 
 /// Decodes a compressed image. Except for `compressedDepth`, the codec follows from the first
 /// bytes, not from the format string, which drivers fill in differently. Depth is scaled as in
@@ -31,8 +38,8 @@ pub fn decode_compressed(
     depth_unit_m: Option<f64>,
     limits: &Limits,
 ) -> Result<Pixels, ImageError> {
-    if image.format.to_ascii_lowercase().contains("compresseddepth") {
-        return compressed_depth(image, depth_unit_m, limits).map(Pixels::Depth);
+    if let Some(packet) = DepthPacket::of(image) {
+        return packet.decode(&image.format, depth_unit_m, limits).map(Pixels::Depth);
     }
     match image.data {
         [0xff, 0xd8, ..] => jpeg(image.data, limits),
@@ -62,13 +69,7 @@ pub(crate) enum Codec {
 impl Codec {
     /// Returns the codec of an image, also behind the header of `compressedDepth`.
     pub(crate) fn of(image: &CompressedImage<'_>) -> Self {
-        let data = image.data;
-        let has_no_header =
-            data.starts_with(&[0xff, 0xd8]) || data.starts_with(&[0x89, b'P', b'N', b'G']);
-        let body = match data.get(DEPTH_HEADER..) {
-            Some(body) if !has_no_header && is_compressed_depth(image) => body,
-            _ => data,
-        };
+        let body = DepthPacket::of(image).map_or(image.data, |packet| packet.body);
         match body {
             [0xff, 0xd8, ..] => {
                 let mut decoder = JpegDecoder::new(ZCursor::new(body));
@@ -78,8 +79,7 @@ impl Codec {
                     _ => Self::Jpeg,
                 }
             }
-            // Bits and channels stand at a fixed place of the first chunk.
-            [0x89, b'P', b'N', b'G', ..] if body.get(24..26) == Some(&[16, 0]) => Self::DeepPng,
+            _ if is_deep_png(body) => Self::DeepPng,
             [0x89, b'P', b'N', b'G', ..] => Self::Png,
             _ => Self::Unknown,
         }
@@ -90,8 +90,18 @@ impl Codec {
     }
 }
 
-fn is_compressed_depth(image: &CompressedImage<'_>) -> bool {
-    image.format.to_ascii_lowercase().contains("compresseddepth")
+/// Returns true for a PNG with one channel of 16 bits.
+fn is_deep_png(data: &[u8]) -> bool {
+    // Bits and channels stand at a fixed place of the first chunk.
+    data.starts_with(PNG) && data.get(24..26) == Some(&[16, 0])
+}
+
+/// Returns the content of a compressed image, from its format and its first bytes.
+pub(crate) fn content_of_compressed(image: &CompressedImage<'_>) -> Content {
+    match DepthPacket::of(image) {
+        Some(_) => Content::Depth,
+        None => content_of_format(&image.format),
+    }
 }
 
 /// Returns the columns and rows of a compressed image, from its header.
@@ -102,11 +112,8 @@ pub fn size_of_compressed(
     image: &CompressedImage<'_>,
     limits: &Limits,
 ) -> Result<(usize, usize), ImageError> {
-    let is_depth = image.format.to_ascii_lowercase().contains("compresseddepth");
-    let data = match image.data.split_at_checked(DEPTH_HEADER) {
-        Some((_, body)) if is_depth => body,
-        _ => image.data,
-    };
+    let packet = DepthPacket::of(image);
+    let data = packet.as_ref().map_or(image.data, |packet| packet.body);
     match data {
         [0xff, 0xd8, ..] => {
             let mut decoder = JpegDecoder::new(ZCursor::new(data));
@@ -122,12 +129,14 @@ pub fn size_of_compressed(
             check_size(width.into(), height.into(), 4, limits)?;
             Ok((width as usize, height as usize))
         }
-        _ if is_depth => {
-            // RVL has its size in a header of its own, which decoding reads and checks.
-            let values = compressed_depth(image, None, limits)?;
-            Ok((values.width(), values.height()))
-        }
-        _ => Err(ImageError::Encoding(image.format.clone())),
+        // RVL has its size in a header of its own, which decoding reads and checks.
+        _ => match packet {
+            Some(packet) => {
+                let values = packet.decode(&image.format, None, limits)?;
+                Ok((values.width(), values.height()))
+            }
+            None => Err(ImageError::Encoding(image.format.clone())),
+        },
     }
 }
 
@@ -245,28 +254,63 @@ impl PngPixels {
     }
 }
 
-/// Decodes depth as `compressed_depth_image_transport` writes it: a header of 12 bytes, then 16-bit
-/// PNG or RVL. `32FC1` is quantised as inverse depth, `a / (v - b)`.
-fn compressed_depth(
-    image: &CompressedImage<'_>,
-    depth_unit_m: Option<f64>,
-    limits: &Limits,
-) -> Result<DepthImage, ImageError> {
-    let Some((header, body)) = image.data.split_at_checked(DEPTH_HEADER) else {
-        return Err(ImageError::Codec("shorter than its 12-byte header".into()));
-    };
-    let is_rvl = image.format.to_ascii_lowercase().contains("rvl");
-    if image.format.starts_with("32FC1") {
-        let a = f32::from_bits(u32_at(header, 4));
-        let b = f32::from_bits(u32_at(header, 8));
+/// Depth as `compressed_depth_image_transport` writes it: a header of 12 bytes, then 16-bit PNG or RVL.
+struct DepthPacket<'a> {
+    /// Format, and the numbers a and b of the quantisation; some drivers leave the header out.
+    header: Option<&'a [u8]>,
+    body: &'a [u8],
+}
+
+impl<'a> DepthPacket<'a> {
+    /// Returns the packet of an image whose format names it, or that has the header before a 16-bit PNG
+    /// under any other format; `None` for every other image.
+    fn of(image: &CompressedImage<'a>) -> Option<Self> {
+        let data = image.data;
+        let is_declared = image.format.to_ascii_lowercase().contains("compresseddepth");
+        if data.starts_with(PNG) || data.starts_with(JPEG) {
+            return is_declared.then_some(Self { header: None, body: data });
+        }
+        match data.split_at_checked(DEPTH_HEADER) {
+            Some((header, body)) if is_declared || is_deep_png(body) => {
+                Some(Self { header: Some(header), body })
+            }
+            Some(_) => None,
+            None => is_declared.then_some(Self { header: None, body: data }),
+        }
+    }
+
+    /// Returns the numbers a and b of floats, which are quantised as inverse depth, `a / (v - b)`; `None`
+    /// for whole units.
+    fn quantisation(&self, format: &str) -> Option<[f32; 2]> {
+        let header = self.header?;
+        let [a, b] = [4, 8].map(|at| f32::from_bits(u32_at(header, at)));
+        let format = format.to_ascii_uppercase();
+        let is_float = if format.contains("32FC1") {
+            true
+        } else {
+            // Without the encoding the numbers tell, which are not set before whole units: a is some
+            // ten thousand, and b is 1 - a by the largest depth.
+            !format.contains("16UC1") && (1.0..1e8).contains(&a) && (-1e8..1.0).contains(&b)
+        };
+        is_float.then_some([a, b])
+    }
+
+    fn decode(
+        &self,
+        format: &str,
+        depth_unit_m: Option<f64>,
+        limits: &Limits,
+    ) -> Result<DepthImage, ImageError> {
+        let is_rvl = format.to_ascii_lowercase().contains("rvl");
+        let Some([a, b]) = self.quantisation(format) else {
+            let unit = depth_unit_m.unwrap_or(0.001) as f32;
+            return depth_of(self.body, is_rvl, limits, |v| metres(v, unit));
+        };
         let unit = depth_unit_m.unwrap_or(1.0) as f32;
-        depth_of(body, is_rvl, limits, |v| {
+        depth_of(self.body, is_rvl, limits, |v| {
             let depth = if v == 0 { f32::NAN } else { a / (f32::from(v) - b) };
             metres_of_float(depth, unit)
         })
-    } else {
-        let unit = depth_unit_m.unwrap_or(0.001) as f32;
-        depth_of(body, is_rvl, limits, |v| metres(v, unit))
     }
 }
 

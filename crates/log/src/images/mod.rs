@@ -18,7 +18,7 @@ mod yuv;
 pub use cloud::{
     CloudAxes, CloudCamera, camera_of_cloud, decode_cloud, points_of_cloud, size_of_cloud,
 };
-pub(crate) use compressed::Codec;
+pub(crate) use compressed::{Codec, content_of_compressed};
 pub use compressed::{decode_compressed, encode_rvl, size_of_compressed};
 pub(crate) use disparity::may_be_disparity;
 pub use disparity::{
@@ -60,9 +60,9 @@ impl Pixels {
 pub enum ImageError {
     /// The encoding is unknown, or unknown for depth.
     #[error(
-        "encoding `{0}`; known: rgb8, bgr8, rgba8, bgra8, mono8, mono16, 8UC1, 8UC3, 8UC4, bayer_*8, \
-         yuv422 (uyvy), yuv422_yuy2 (yuyv), nv12, nv21, nv24, and for depth 16UC1, 32FC1 (mono16 where \
-         `depth_unit_m` is set); jpeg, png, compressedDepth"
+        "encoding `{0}` is not known: let the driver publish rgb8, bgr8, rgba8, bgra8, mono8, bayer_*8, \
+         yuv422 (uyvy), yuv422_yuy2 (yuyv), nv12, nv21 or nv24, and depth as 16UC1 or 32FC1 (mono16 \
+         where `depth_unit_m` is set); compressed as jpeg, png or compressedDepth"
     )]
     Encoding(String),
     /// Colour with 16 bits a channel.

@@ -123,7 +123,7 @@ fn deep_colour_says_so() {
         assert!(refusal_of(encoding).contains("16 bits a channel"));
     }
     assert!(refusal_of("h264").contains("image_transport republish"));
-    assert!(refusal_of("yuv999").contains("`yuv999`; known: rgb8"));
+    assert!(refusal_of("yuv999").contains("`yuv999` is not known: let the driver publish rgb8"));
 }
 
 /// Pixels as OpenCV 4.10 decodes them: `tests/clients/encodings_opencv.py` prints this table.
@@ -416,6 +416,29 @@ fn quantised_float_depth_is_inverted() {
     data.extend(png_16(4, 1, &[52, 102, 0, 2]));
     let depth = depth_of(compressed("32FC1; compressedDepth", &data).unwrap());
     assert!(same_depth(&depth, &[2.0, 1.0, f32::NAN, f32::NAN]), "{depth:?}");
+}
+
+#[test]
+fn compressed_depth_is_told_by_its_bytes_and_its_numbers() {
+    let png = png_16(2, 1, &[1500, 0]);
+    // Of whole units the numbers of the header are those of the memory before.
+    let unset = [[0, 0, 0, 0], [0xcd; 4], [0xcd; 4]].concat();
+    let whole = [unset, png.clone()].concat();
+    for format in ["png", "", "16UC1", "16UC1; compressedDepth", "compressedDepth"] {
+        let depth = depth_of(compressed(format, &whole).unwrap());
+        assert!(same_depth(&depth, &[1.5, f32::NAN]), "{format}: {depth:?}");
+    }
+    // Without the header of 12 bytes.
+    let depth = depth_of(compressed("16UC1; compressedDepth png", &png).unwrap());
+    assert!(same_depth(&depth, &[1.5, f32::NAN]), "{depth:?}");
+
+    // The numbers of `depth_quantization` 100 and `depth_max` 10 m.
+    let quantised = [&[1, 0, 0, 0][..], &10_100_f32.to_le_bytes(), &(-1009_f32).to_le_bytes()];
+    let floats = [quantised.concat(), png_16(2, 1, &[1011, 0])].concat();
+    for format in ["32FC1; compressedDepth png", "32fc1; compressedDepth", "compressedDepth"] {
+        let depth = depth_of(compressed(format, &floats).unwrap());
+        assert!(same_depth(&depth, &[5.0, f32::NAN]), "{format}: {depth:?}");
+    }
 }
 
 #[test]

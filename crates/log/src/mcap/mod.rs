@@ -267,6 +267,9 @@ fn describe_start(start: &[u8]) -> String {
             "it is a ROS 1 bag of another version than 2.0; convert it with `rosbag fix`".into()
         }
         [0x28, 0xb5, 0x2f, 0xfd, ..] => "it is compressed by zstd, twice or as a stream".into(),
-        _ => format!("it starts with {start:02x?}"),
+        _ => {
+            let text: String = start.iter().map(|byte| byte.escape_ascii().to_string()).collect();
+            format!("it starts with `{text}`")
+        }
     }
 }

@@ -194,9 +194,16 @@ pub(super) fn plan(
         }
         found => found?,
     };
-    let lens = match chosen.colour {
-        Some(_) => lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref(), false)?,
-        None => depth_lens,
+    let is_metric = inputs.requires(Input::Depth) || inputs.requires(Input::Right);
+    let lens = match lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref(), false)
+    {
+        _ if chosen.colour.is_none() => depth_lens,
+        // As without any. On a robot a driver may be about to publish another one.
+        Err(why) if !is_metric && input.colour_info_topic.is_none() && !scan.is_live() => {
+            tally.note(format!("the calibration of the images is not used: {why}"));
+            None
+        }
+        found => found?,
     };
     let right = lens_of(&scan, chosen.right.as_deref(), chosen.right_info.as_deref(), false)?;
     let sources = if inputs.uses(Input::OBSTACLES) {
@@ -421,18 +428,36 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
     if plan.inputs.requires(Input::Right) && plan.baseline_m.is_none_or(|baseline| baseline <= 0.0)
     {
         let wanted = "calibration of the right camera with a positive baseline (P[3] = -fx B)";
-        let hint = "; name its camera_info as `right_info_topic` under [input]".to_owned();
-        return Err(missing(&plan.scan, wanted.into(), hint));
+        return Err(missing(&plan.scan, wanted.into(), baseline_hint(plan)));
     }
     if plan.lens.is_none() && metric {
         let wanted = format!("calibration (sensor_msgs/CameraInfo) of {}", plan.primary());
-        let hint = "; name it as `colour_info_topic` under [input]".to_owned();
-        return Err(missing(&plan.scan, wanted, hint));
+        let hint = if plan.scan.infos.is_empty() {
+            "; record its topic with the images"
+        } else {
+            "; name it as `colour_info_topic` under [input]"
+        };
+        return Err(missing(&plan.scan, wanted, hint.to_owned()));
     }
     if plan.lens.is_none() && !plan.is_of_scans() {
         tally.note("no calibration: a lens with a view of 53 degrees is assumed");
     }
     Ok(())
+}
+
+/// Returns the remedy for a right camera whose calibration has no positive baseline.
+fn baseline_hint(plan: &Plan) -> String {
+    let topic = plan.chosen.right_info.as_ref();
+    let info = topic.and_then(|topic| Some((topic, plan.scan.infos.get(topic)?)));
+    let Some((topic, info)) = info else {
+        return "; record its camera_info with the images, or name it as `right_info_topic` under \
+                [input]"
+            .to_owned();
+    };
+    let offset = info.p[3];
+    format!(
+        ": {topic} has P[3] = {offset}; calibrate the two cameras as a pair, the left one first"
+    )
 }
 
 /// Returns the odometry topic, else the tf frames if they are connected.

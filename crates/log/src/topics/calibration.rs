@@ -34,6 +34,14 @@ impl Relation {
 pub(crate) struct FoundCalibration {
     pub(crate) topic: String,
     pub(crate) relation: Relation,
+    /// A nearer one, with the reason for which it cannot be used.
+    pub(crate) instead_of: Option<String>,
+}
+
+impl FoundCalibration {
+    pub(crate) fn new(topic: &str, relation: Relation) -> Self {
+        Self { topic: topic.to_owned(), relation, instead_of: None }
+    }
 }
 
 /// Returns the calibration of an image topic: the nearest one that can be used for its images, else
@@ -44,12 +52,25 @@ pub(crate) fn calibration_of(
     is_disparity: bool,
 ) -> Option<FoundCalibration> {
     let mut found = candidates(scan, image, is_disparity);
-    let fitting = found.iter().position(|candidate| {
-        let lens = intrinsics_of(scan, image, &candidate.topic, is_disparity);
-        lens.is_ok_and(|lens| misfit(scan, image, &lens).is_none())
-    });
-    let first = fitting.unwrap_or(0);
-    (first < found.len()).then(|| found.swap_remove(first))
+    let mut nearer: Option<String> = None;
+    for at in 0..found.len() {
+        match unfit(scan, image, &found[at].topic, is_disparity) {
+            None => {
+                let fitting = found.swap_remove(at);
+                return Some(FoundCalibration { instead_of: nearer, ..fitting });
+            }
+            Some(why) => nearer = nearer.or(Some(why)),
+        }
+    }
+    found.into_iter().next()
+}
+
+/// Returns the reason for which a calibration cannot be used for images; `None` for one that can.
+fn unfit(scan: &Scan, image: &str, topic: &str, is_disparity: bool) -> Option<String> {
+    match intrinsics_of(scan, image, topic, is_disparity) {
+        Err(why) => Some(format!("{topic}: {why}")),
+        Ok(lens) => misfit(scan, image, &lens).map(|size| format!("{topic} is {size}")),
+    }
 }
 
 /// Returns the calibrations that may be those of an image topic, the nearest first.
@@ -58,7 +79,7 @@ fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibrat
     let mut add = |topic: &str, relation| {
         let is_new = !found.iter().any(|known| known.topic == topic);
         if is_new && scan.infos.contains_key(topic) {
-            found.push(FoundCalibration { topic: topic.to_owned(), relation });
+            found.push(FoundCalibration::new(topic, relation));
         }
     };
     let folder = folder_of(image);
@@ -93,7 +114,7 @@ fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibrat
     if found.is_empty()
         && let Some(only) = only_of_size(scan, image)
     {
-        found.push(FoundCalibration { topic: only, relation: Relation::SameSize });
+        found.push(FoundCalibration::new(&only, Relation::SameSize));
     }
     found
 }

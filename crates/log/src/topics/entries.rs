@@ -1,12 +1,12 @@
 //! Reasons for which topics are used or not.
 
 use super::account::{InputAccount, TopicUse};
-use super::kinds::{is_image, is_odometry, is_of, kind_of, unreadable};
+use super::kinds::{depth_as_picture, is_image, is_odometry, is_of, kind_of, unreadable};
 use super::problems::{SCANNER_REMEDY, depth_problem, scanner_problem};
 use super::rigs::{Rig, rigs};
 use super::{Chosen, Relation, Stream, TopicName, named_topic};
 use crate::images::Content;
-use crate::scan::{Scan, Topic};
+use crate::scan::{Scan, Topic, Type};
 use crate::sensors::{SENSORS, SensorType};
 use crate::{Input, InputSettings, Inputs};
 
@@ -95,7 +95,8 @@ impl Judge<'_> {
             return (is_image(topic) && is_free).then_some("depth");
         }
         let is_free = self.inputs.uses(Input::Colour) && colour.is_none();
-        (unreadable(topic).is_some() && is_free).then_some("colour")
+        let is_scan = topic.kind == Type::PointCloud || topic.schema.ends_with("LaserScan");
+        (unreadable(topic).is_some() && is_free && !is_scan).then_some("colour")
     }
 
     fn kind(&self, topic: &Topic) -> String {
@@ -148,7 +149,9 @@ impl Judge<'_> {
             }
             _ => String::new(),
         };
-        Some(format!("{}{scaled}{words}", found.topic))
+        let instead = found.instead_of.as_ref();
+        let instead = instead.map(|why| format!(", in place of {why}")).unwrap_or_default();
+        Some(format!("{}{scaled}{words}{instead}", found.topic))
     }
 
     fn rig_of(&self, name: &str) -> Option<&Rig> {
@@ -158,6 +161,9 @@ impl Judge<'_> {
     fn unused_image(&self, name: &str, topic: &Topic) -> Reason {
         if let Some(reason) = empty(topic) {
             return reason;
+        }
+        if let Some((why, remedy)) = depth_as_picture(name, topic) {
+            return (why.to_owned(), Some(remedy.to_owned()));
         }
         if let Some(why) = unreadable(topic) {
             return match why.split_once(": ") {

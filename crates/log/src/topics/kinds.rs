@@ -1,5 +1,6 @@
 //! Kinds of topics, as far as types, encodings and first messages tell them, and their ranks by name.
 
+use super::name::{Stream, TopicName};
 use crate::InputSettings;
 use crate::images::{Content, H264, VIDEO_REMEDY, may_be_disparity, refusal_of};
 use crate::scan::{Topic, Type};
@@ -60,6 +61,11 @@ const VIDEO_MESSAGES: [&str; 3] = ["CompressedVideo", "FFMPEGPacket", "H264Packe
 const NO_KEY_REMEDY: &str = "no key picture with its parameters is in the log, and those after it refer to \
                              one: record from the start of the stream, or let the encoder repeat them";
 
+/// Reason for pictures of depth, as coloured for people to look at, and their remedy.
+const DEPTH_AS_PICTURE: &str = "its name says depth, and its pixels are a picture, from which no distances \
+                                can be read";
+const DEPTH_AS_PICTURE_REMEDY: &str = "record the raw topic, or its compressedDepth";
+
 /// Remedy for depth as JPEG.
 const JPEG_REMEDY: &str = "JPEG keeps 8 of the 16 bits of depth, so that no distances are left: \
                            record the raw topic, or its compressedDepth";
@@ -97,6 +103,25 @@ pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
     }
 }
 
+/// Returns the reason and the remedy for pictures or video under a name of depth; `None` for all other
+/// topics, and for those that a setting makes disparities of.
+pub(super) fn depth_as_picture(name: &str, topic: &Topic) -> Option<(&'static str, &'static str)> {
+    let is_picture = topic.content == Content::Picture && !topic.is_deep_grey;
+    let is_named = TopicName::of(name).stream == Stream::Depth;
+    let may_be_disparity = disparity_rank(name, topic).is_some();
+    if !is_named || may_be_disparity || !(is_picture || is_video(topic)) {
+        return None;
+    }
+    Some((DEPTH_AS_PICTURE, DEPTH_AS_PICTURE_REMEDY))
+}
+
+/// Returns true for video, whether or not it is decoded.
+fn is_video(topic: &Topic) -> bool {
+    let name = topic.schema.rsplit(['/', '.']).next().unwrap_or_default();
+    let is_theora = topic.pixels.as_deref().is_some_and(|pixels| pixels.contains("theora"));
+    topic.kind == Type::Video || VIDEO_MESSAGES.contains(&name) || is_theora
+}
+
 pub(super) fn is_info(topic: &Topic) -> bool {
     topic.kind == Type::CameraInfo
 }
@@ -122,6 +147,9 @@ pub(super) fn colour_rank(name: &str, topic: &Topic) -> Option<i32> {
     if !is_picture(topic) || topic.content != Content::Picture {
         return None;
     }
+    if depth_as_picture(name, topic).is_some() {
+        return None;
+    }
     let name = &name.to_lowercase();
     // A name for colour decides before one for a side, and before an uncompressed image.
     let mut rank = -2 * i32::from(has(name, &["rear", "back"]));
@@ -131,6 +159,7 @@ pub(super) fn colour_rank(name: &str, topic: &Topic) -> Option<i32> {
         name,
         &["infra", "/ir", "depth", "disparity", "fisheye", "mono", "debug"],
     ));
+    rank -= 6 * i32::from(has(name, &["annotated", "overlay", "result", "detection"]));
     rank += i32::from(topic.kind == Type::Image);
     // Its pictures are coarser than those of the same camera in a topic beside it.
     rank -= i32::from(topic.kind == Type::Video);

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 pub use account::{InputAccount, TopicUse};
 pub(crate) use calibration::{FoundCalibration, Relation, calibration_of, intrinsics_of};
 use kinds::{
-    could_be_depth, disparity_rank, is_info, is_odometry, is_of, is_usable_depth,
+    could_be_depth, depth_as_picture, disparity_rank, is_info, is_odometry, is_of, is_usable_depth,
     is_usable_picture, odometry_rank, remedy_as_depth,
 };
 pub(crate) use kinds::{kind_of, unreadable};
@@ -150,7 +150,7 @@ pub(crate) fn choose(
         let is_disparity = key == "depth_info_topic" && input.disparity.is_some();
         let named = named(scan, key, wanted.as_deref(), is_info)?;
         let Some(image) = image else { return Ok::<_, LogError>(named) };
-        let own = named.map(|topic| FoundCalibration { topic, relation: Relation::Own });
+        let own = named.map(|topic| FoundCalibration::new(&topic, Relation::Own));
         let Some(found) = own.or_else(|| calibration_of(scan, image, is_disparity)) else {
             return Ok(None);
         };
@@ -257,7 +257,10 @@ fn wanted_rigs<'a>(
             let hint = format!("; `camera` under [input] can be one of: {}", names.join(", "));
             return Err(missing(scan, format!("camera `{camera}`"), hint));
         }
-        return Ok(called);
+        // The name that the account gives a rig means that one alone.
+        let label = camera.trim_matches('/');
+        let own = called.iter().copied().find(|rig| rig.label.trim_matches('/') == label);
+        return Ok(own.map_or(called, |own| vec![own]));
     }
     for topic in [&named.colour, &named.right, &named.depth].into_iter().flatten() {
         let Some(own) = all.iter().find(|rig| rig.has(topic)) else { continue };
@@ -379,7 +382,9 @@ impl Requirement<'_> {
             Some(format!("; {name} ({}) cannot be read: {why}", kind_of(topic)))
         });
         let mut free = scan.topics.iter().filter(|(name, _)| *taken != Some(name.as_str()));
-        let meant = free.find(|(_, topic)| fits(topic)).map(|(name, topic)| {
+        let fitting =
+            free.find(|(name, topic)| fits(topic) && depth_as_picture(name, topic).is_none());
+        let meant = fitting.map(|(name, topic)| {
             let kind = topic.pixels.as_deref().unwrap_or(&topic.schema);
             let of_camera = account.topics.iter().find(|entry| {
                 let is_other = entry.problem.as_deref() == Some(entries::OTHER_CAMERA);

@@ -41,6 +41,7 @@ pub(super) fn rigs(scan: &Scan) -> Vec<Rig> {
     }
     let mut found: Vec<Rig> = groups.into_values().flat_map(|group| by_side(scan, group)).collect();
     join_streams(scan, &mut found);
+    join_copies(scan, &mut found);
     for rig in &mut found {
         rig.label = label_of(&rig.topics);
     }
@@ -100,6 +101,27 @@ fn join_streams(scan: &Scan, rigs: &mut Vec<Rig>) {
     }
 }
 
+/// Joins pictures that other programs made of a camera's images, as with boxes drawn into them, with that
+/// camera: they stand in its folder and have its frame.
+fn join_copies(scan: &Scan, rigs: &mut Vec<Rig>) {
+    let mut at = 0;
+    while at < rigs.len() {
+        let original = rigs.iter().position(|rig| {
+            rig.topics != rigs[at].topics
+                && has_colour_alone(scan, &rigs[at])
+                && rigs[at].topics.iter().all(|copy| rig.holds_original(scan, copy))
+        });
+        match original {
+            Some(original) => {
+                let copies = std::mem::take(&mut rigs[at].topics);
+                rigs[original].topics.extend(copies);
+                rigs.remove(at);
+            }
+            None => at += 1,
+        }
+    }
+}
+
 fn has_depth_alone(scan: &Scan, rig: &Rig) -> bool {
     has_content(scan, rig, Content::Depth) && !has_content(scan, rig, Content::Picture)
 }
@@ -142,6 +164,11 @@ fn is_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
     Some(is_near && pose.rotation.angle() <= ONE_MOUNT_RAD)
 }
 
+/// Returns the folder of a topic; empty at the root.
+fn parent(topic: &str) -> &str {
+    topic.rsplit_once('/').map_or("", |(folder, _)| folder)
+}
+
 /// Returns the folder that the topics of a rig share, else the folder of the first one.
 fn label_of(topics: &[String]) -> String {
     let mut shared: Option<Vec<&str>> = None;
@@ -165,6 +192,25 @@ fn label_of(topics: &[String]) -> String {
 impl Rig {
     pub(super) fn has(&self, topic: &str) -> bool {
         self.topics.iter().any(|own| own == topic)
+    }
+
+    /// Returns true if a picture may be made of one of this rig: by its folder, its frame, and a name with
+    /// more words.
+    fn holds_original(&self, scan: &Scan, copy: &str) -> bool {
+        let name = TopicName::of(copy);
+        let frame = scan.frame_of(copy).filter(|frame| !frame.is_empty());
+        self.topics.iter().any(|original| {
+            let of_original = TopicName::of(original);
+            let is_longer = name.device.len() > of_original.device.len();
+            let is_beside = parent(copy) == parent(original) && !parent(copy).is_empty();
+            let is_same_stream = name.stream == of_original.stream && name.side == of_original.side;
+            let is_same_frame = frame.is_some() && frame == scan.frame_of(original);
+            is_longer
+                && is_beside
+                && is_same_stream
+                && is_same_frame
+                && !name.contradicts(&of_original)
+        })
     }
 
     /// Returns true if the user may mean this rig by a name: its folder, a part of it, or the words

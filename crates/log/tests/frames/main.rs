@@ -20,7 +20,7 @@ use tagalong_log::msgs::{
 };
 use tagalong_log::{
     CameraSettings, DisparitySettings, FrameSource, Input, InputSettings, Inputs, Limits, LogError,
-    LogFrame, MountSettings,
+    LogFrame, MountSettings, TopicUse,
 };
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);

@@ -88,7 +88,7 @@ fn images_in_an_encoding_that_is_not_read_are_named_with_the_remedy() {
     let colour = Inputs::ANY.require(Input::Colour);
     for (encoding, remedy) in [
         ("rgb16", "let the driver publish 8 bits"),
-        ("bayer_rggb12", "encoding `bayer_rggb12`; known: rgb8"),
+        ("bayer_rggb12", "encoding `bayer_rggb12` is not known: let the driver publish rgb8"),
         ("h264", "image_transport republish"),
     ] {
         let error = refusal(log_with("/cam/image_raw", encoding), &input, colour).to_string();
@@ -124,6 +124,84 @@ fn images_in_an_encoding_that_is_not_read_are_named_with_the_remedy() {
     let error = refusal(log, &input, colour).to_string();
     assert!(error.contains("/image (foxglove.CompressedImage, protobuf)"), "{error}");
     assert!(error.contains("its messages are in `protobuf`"), "{error}");
+}
+
+#[test]
+fn pictures_of_depth_are_neither_depth_nor_colour() {
+    let depth_topic = "/camera/depth/image_raw/compressed";
+    let mut log = started();
+    log.foreign(depth_topic, "foxglove_msgs/msg/CompressedVideo", "cdr", at(0.1), &[0, 1, 0, 0]);
+    let error = refusal(log, &InputSettings::default(), Inputs::ANY.require(Input::Colour));
+    assert!(!error.to_string().contains("colour_topic"), "{error}");
+    for encoding in ["8UC3", "rgb8"] {
+        let mut log = log_with("/camera/depth/image_colored", encoding);
+        log.message("/camera/color/image_raw", at(0.1), &disparities("rgb8", &[0; 16 * 12 * 3]));
+        let (source, _saved) = open(log, Inputs::ANY);
+        let account = source.account();
+        assert_eq!(account.used_as("colour").unwrap().topic, "/camera/color/image_raw");
+        let named = |topic: &&TopicUse| topic.topic == "/camera/depth/image_colored";
+        let entry = account.topics.iter().find(named).unwrap();
+        assert!(entry.problem.as_ref().unwrap().starts_with("its name says depth"), "{entry}");
+        assert_eq!(
+            entry.remedy.as_deref(),
+            Some("record the raw topic, or its compressedDepth"),
+            "{entry}"
+        );
+    }
+}
+
+#[test]
+fn pictures_that_were_made_of_a_cameras_images_are_of_that_camera() {
+    let mut log = started();
+    for topic in ["/camera/color/image_annotated", "/camera/color/image_raw"] {
+        log.message(topic, at(0.1), &disparities("rgb8", &[0; 16 * 12 * 3]));
+    }
+    let (source, _saved) = open(log, Inputs::ANY);
+    let account = source.account();
+    assert_eq!(account.used_as("colour").unwrap().topic, "/camera/color/image_raw");
+    let is_copy = |topic: &&TopicUse| topic.topic.ends_with("annotated");
+    let copy = account.topics.iter().find(is_copy).unwrap();
+    assert_eq!(copy.problem.as_deref(), Some("/camera/color/image_raw is used"));
+    assert!(!source.notes().iter().any(|note| note.contains("camera =")), "{:?}", source.notes());
+}
+
+#[test]
+fn a_calibration_in_place_of_a_nearer_one_is_told_with_the_reason() {
+    let mut log = LogWriter::plain();
+    log.info("/cam/camera_info", "colour", &camera(50, 30, 40.0));
+    log.info("/elsewhere/camera_info", "colour", &camera(16, 12, 14.0));
+    log.fixed("base_link", "colour", &level_pose());
+    log.message("/cam/image_raw", at(0.1), &disparities("rgb8", &[0; 16 * 12 * 3]));
+    let (source, _saved) = open(log, Inputs::NONE.require(Input::Colour));
+    let used = source.account().used_as("colour").unwrap();
+    let calibration = used.calibration.as_deref().unwrap();
+    let told = "/elsewhere/camera_info, 16x12, of the same frame, in place of /cam/camera_info is ";
+    assert!(calibration.starts_with(told), "{calibration}");
+}
+
+#[test]
+fn a_calibration_that_cannot_be_used_is_none_for_a_pipeline_without_metres() {
+    let mut info = info_of("colour", &camera(16, 12, 14.0));
+    info.k[0] = f64::NAN;
+    info.p[0] = f64::NAN;
+    let log = || {
+        let mut log = LogWriter::plain();
+        log.message("/cam/camera_info", at(0.0), &info);
+        log.fixed("base_link", "colour", &level_pose());
+        log.message("/cam/image_raw", at(0.1), &disparities("rgb8", &[0; 16 * 12 * 3]));
+        log
+    };
+    let (mut source, _saved) = open(log(), Inputs::NONE.require(Input::Colour));
+    assert_eq!(frames(&mut source).len(), 1);
+    let told = "the calibration of the images is not used: ";
+    assert!(source.notes().iter().any(|note| note.starts_with(told)), "{:?}", source.notes());
+    // What the settings name is not left out.
+    let named = InputSettings {
+        colour_info_topic: Some("/cam/camera_info".into()),
+        ..InputSettings::default()
+    };
+    let error = refusal(log(), &named, Inputs::NONE.require(Input::Colour));
+    assert!(matches!(error, LogError::Calibration { .. }), "{error}");
 }
 
 /// Twelve pictures of video, of which each sixth is a key picture.
