@@ -4,14 +4,14 @@
 #[path = "common/mod.rs"]
 mod common;
 
-use common::{LogWriter, at, started};
+use common::{LogWriter, SavedLog, at, started};
 use serde::Serialize;
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{
     BoundingBox2D, Detection2D, Detection2DArray, Header, ObjectHypothesis,
     ObjectHypothesisWithPose, Point2D, Pose2D, PoseWithCovariance, encode,
 };
-use tagalong_log::{FrameSource, Input, InputSettings, Inputs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, StampSource};
 
 const TOPIC: &str = "/detections";
 
@@ -90,6 +90,77 @@ fn no_message_is_no_look_and_an_empty_one_is_nobody() {
             assert_eq!(*count, expected, "frame {index}, every {every}");
         }
     }
+}
+
+/// Writes eight images, and detections of each with these stamps behind them.
+fn stamped(stamp_of: impl Fn(u32) -> Stamp, is_set_in_header: bool) -> SavedLog {
+    let mut log = started();
+    for index in 0..8 {
+        let mut message = array(stamp_of(index), &["person"]);
+        if !is_set_in_header {
+            message.header.stamp = Stamp::default().into();
+        }
+        log.message(TOPIC, stamp(index).plus_seconds(0.05), &message);
+    }
+    (0..8).for_each(|index| log.colour(stamp(index)));
+    log.save()
+}
+
+/// Reads a log to its end; returns the number of frames with detections.
+fn read_saved(saved: &SavedLog, input: &InputSettings) -> (usize, FrameSource) {
+    let topic = Some(TOPIC.to_owned());
+    let input = InputSettings { detections_topic: topic, ..input.clone() };
+    let inputs = Inputs::NONE.require(Input::Colour).require(Input::Detections);
+    let mut source = saved.open(&input, inputs).unwrap();
+    let frames = std::iter::from_fn(|| source.next_frame());
+    (frames.filter(|found| found.frame.recorded().is_some()).count(), source)
+}
+
+#[test]
+fn detections_that_belong_to_no_frame_are_lost_with_the_offset_and_the_remedy() {
+    for (offset_s, offset, remedy) in [
+        (0.04, "0.040 s after", "`pair_tolerance_s = 0.06`"),
+        (-2.0, "2.000 s before", "`pair_tolerance_s = 2."),
+        (3600.0, "3600.000 s after", "`--stamps recording`"),
+        (-1.6e9, "s before it, by another clock", "and set `pair_tolerance_s = 0.07`"),
+    ] {
+        let saved = stamped(|index| stamp(index).plus_seconds(offset_s), true);
+        let (seen, source) = read_saved(&saved, &InputSettings::default());
+        assert_eq!(seen, 0, "{offset_s}");
+        assert!(source.data_lost(), "{offset_s}: {:?}", source.notes());
+        assert_eq!(source.counters()["detections_without_frame"], 8);
+        let told = source.account().used_as("detections").unwrap().to_string();
+        assert!(told.contains(offset) && told.contains(remedy), "{offset_s}: {told}");
+        assert!(source.notes().contains(&told), "{:?}", source.notes());
+    }
+}
+
+#[test]
+fn the_remedy_for_another_clock_works() {
+    let saved = stamped(|index| Stamp::default().plus_seconds(10.0 + 0.1 * f64::from(index)), true);
+    let stamps = StampSource::Recording;
+    let input = InputSettings { stamps, pair_tolerance_s: 0.07, ..InputSettings::default() };
+    let (seen, source) = read_saved(&saved, &input);
+    assert_eq!(seen, 8);
+    assert!(!source.data_lost(), "{:?}", source.notes());
+    // Where it is not enough, it is not told again.
+    let input = InputSettings { stamps, ..InputSettings::default() };
+    let (seen, source) = read_saved(&saved, &input);
+    let told = source.account().used_as("detections").unwrap().to_string();
+    assert_eq!(seen, 0);
+    assert!(told.contains("by their times of recording") && !told.contains("--stamps"), "{told}");
+}
+
+#[test]
+fn stamps_of_the_detections_stand_in_for_one_that_the_array_lacks() {
+    let (seen, source) = read_saved(&stamped(stamp, false), &InputSettings::default());
+    assert_eq!(seen, 8, "{:?}", source.notes());
+    assert!(!source.data_lost());
+    let unset = stamped(|_| Stamp::default(), false);
+    let (seen, source) = read_saved(&unset, &InputSettings::default());
+    assert_eq!(seen, 0);
+    let told = source.account().used_as("detections").unwrap().to_string();
+    assert!(source.data_lost() && told.contains("its stamps are not set"), "{told}");
 }
 
 /// Foxy's hypothesis: a text and a score beside the pose.

@@ -8,7 +8,9 @@ use tagalong_geometry::{HALF_HEAD_M, Rect};
 
 use super::{Moment, SensorReader, SensorType, is_type};
 use crate::InputSettings;
-use crate::msgs::{CdrError, Definition, Detection2DArray, Detection3DArray, Value};
+use crate::msgs::{
+    CdrError, Definition, Detection2DArray, Detection3DArray, Header, Time, Value, decode,
+};
 use crate::pairing::{Payload, Waiting};
 use crate::tally::Tally;
 use crate::walk::{Channel, Message};
@@ -24,7 +26,7 @@ pub(super) const ENTRY: SensorType = SensorType {
     messages: &[BOXES, SPACE, YOLO[0], YOLO[1]],
     wanted: "recorded detections that `detections_topic` under [input] names",
     rank: None,
-    header: |_| Ok(None),
+    header: header_of,
     fault: |_| None,
     reader: |schema, input| Box::new(Recorded::new(schema, input)),
 };
@@ -56,6 +58,9 @@ struct Recorded {
     waiting: Waiting,
     /// Message of the frame that is being made.
     paired: Option<Payload>,
+    /// Number of messages that were read, and of those that belong to a frame.
+    read: u64,
+    used: u64,
 }
 
 impl Recorded {
@@ -66,6 +71,8 @@ impl Recorded {
             layouts: Vec::new(),
             waiting: Waiting::default(),
             paired: None,
+            read: 0,
+            used: 0,
         }
     }
 }
@@ -75,12 +82,18 @@ impl SensorReader for Recorded {
         if self.layouts.is_empty() {
             self.layouts = layouts(message.channel);
         }
-        self.waiting.push(Payload::of_headed(message)?);
+        let mut payload = Payload::of_headed(message)?;
+        if payload.stamp == Stamp::default() {
+            payload.stamp = stamp_of_first(&self.layouts, message.data).unwrap_or_default();
+        }
+        self.read += 1;
+        self.waiting.push(payload);
         Ok(())
     }
 
     fn pair(&mut self, stamp: Stamp, next: Option<Stamp>, tolerance_s: f64) {
         self.paired = self.waiting.take(stamp, next, tolerance_s);
+        self.used += u64::from(self.paired.is_some());
     }
 
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
@@ -104,6 +117,50 @@ impl SensorReader for Recorded {
     fn restore(&mut self) {
         self.waiting.restore();
     }
+
+    fn close(&mut self, topic: &str, tally: &mut Tally) {
+        tally.add("detections_without_frame", self.waiting.leave());
+        if self.read > 0 && self.used == 0 {
+            let read = self.read;
+            tally.lose("detections_lost", || {
+                format!(
+                    "{topic}: none of the {read} messages belongs to a frame, so that nobody is seen"
+                )
+            });
+        }
+    }
+}
+
+/// Returns the header of a message. Some drivers set the stamps of the detections alone, which is then
+/// that of the message.
+fn header_of(message: &Message<'_>) -> Result<Option<Header>, CdrError> {
+    let header: Header = decode(message.data)?;
+    if header.stamp() != Stamp::default() {
+        return Ok(Some(header));
+    }
+    let stamp = stamp_of_first(&layouts(message.channel), message.data).unwrap_or_default();
+    Ok(Some(Header::new(stamp, header.frame_id)))
+}
+
+/// Returns the stamp of the first detection of a message; `None` without one.
+fn stamp_of_first(layouts: &[Definition], data: &[u8]) -> Option<Stamp> {
+    let value = read(layouts, data).ok()?;
+    let first = value.list("detections").first()?;
+    let seconds = first.number(&["header.stamp.sec"])?;
+    let nanos = first.number(&["header.stamp.nanosec"])?;
+    Some(Time { sec: seconds as i32, nanosec: nanos as u32 }.into())
+}
+
+/// Reads a message by the first of several layouts that fits.
+fn read(layouts: &[Definition], data: &[u8]) -> Result<Value, String> {
+    let mut first = None;
+    for layout in layouts {
+        match layout.read(data) {
+            Ok(value) => return Ok(value),
+            Err(why) => first = first.or(Some(why)),
+        }
+    }
+    Err(first.unwrap_or_else(|| "the log does not define it".to_owned()))
 }
 
 /// Returns the layouts that the messages of a channel may have: that which the log defines, else all
@@ -134,7 +191,7 @@ impl Recorded {
         moment: &Moment<'_>,
         tally: &mut Tally,
     ) -> Option<Vec<ExternalDetection>> {
-        let value = match self.read(&message.data) {
+        let value = match read(&self.layouts, &message.data) {
             Ok(value) => value,
             Err(why) => {
                 let topic = moment.topic;
@@ -150,17 +207,6 @@ impl Recorded {
         } else {
             Some(people.iter().filter_map(|(it, score)| in_image(it, *score)).collect())
         }
-    }
-
-    fn read(&self, data: &[u8]) -> Result<Value, String> {
-        let mut first = None;
-        for layout in &self.layouts {
-            match layout.read(data) {
-                Ok(value) => return Ok(value),
-                Err(why) => first = first.or(Some(why)),
-            }
-        }
-        Err(first.unwrap_or_else(|| "the log does not define it".to_owned()))
     }
 
     /// Returns the detections of people with their scores; the others are counted, and their classes

@@ -17,7 +17,7 @@ pub(super) const ENTRY: SensorType = SensorType {
     messages: &["sensor_msgs/LaserScan"],
     wanted: "laser scans",
     rank: Some(rank),
-    header: |data| decode::<LaserScan>(data).map(|scan| Some(scan.header)),
+    header: |message| decode::<LaserScan>(message.data).map(|scan| Some(scan.header)),
     fault: |data| scan_fault(&decode(data).ok()?),
     reader: |_, _| Box::<Scans>::default(),
 };

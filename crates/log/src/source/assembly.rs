@@ -28,11 +28,20 @@ pub(super) struct Assembly {
     intake: Intake,
     assembler: Assembler,
     ended: bool,
+    /// True once what found no frame is counted.
+    is_closed: bool,
 }
 
 impl Assembly {
     pub(super) fn new(plan: Plan, tally: Tally) -> Self {
-        Self { intake: Intake::new(&plan), assembler: Assembler::new(), plan, tally, ended: false }
+        Self {
+            intake: Intake::new(&plan),
+            assembler: Assembler::new(),
+            plan,
+            tally,
+            ended: false,
+            is_closed: false,
+        }
     }
 
     /// Returns true for topics with messages that are used.
@@ -70,9 +79,9 @@ impl Assembly {
             }
         }
         // Partners that still wait at the end have none.
-        if self.ended {
-            self.tally.add("depth_without_colour", self.intake.depth.leave());
-            self.tally.add("right_without_left", self.intake.right.leave());
+        if self.ended && !self.is_closed {
+            self.is_closed = true;
+            self.intake.close(&mut self.tally);
         }
         None
     }

@@ -287,6 +287,15 @@ impl Intake {
             self.sensors.iter_mut().for_each(|(_, sensor)| sensor.restore());
         }
     }
+
+    /// Counts at the end of a log what found no frame.
+    pub(super) fn close(&mut self, tally: &mut Tally) {
+        tally.add("depth_without_colour", self.depth.leave());
+        tally.add("right_without_left", self.right.leave());
+        for (topic, sensor) in &mut self.sensors {
+            sensor.close(topic, tally);
+        }
+    }
 }
 
 /// Creates a decoder for each topic with video.

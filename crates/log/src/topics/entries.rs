@@ -131,7 +131,11 @@ impl Judge<'_> {
             ));
         }
         let is_depth = self.chosen.depth.as_deref() == Some(name);
-        let problem = self.chosen.depth_problem.as_ref().filter(|_| is_depth)?;
+        let mut sensors = self.chosen.sensors.iter();
+        let sensor = sensors.find(|(_, topic)| *topic == name).map(|(input, _)| input);
+        let of_sensor = sensor.and_then(|input| self.chosen.sensor_problems.get(input));
+        let of_depth = self.chosen.depth_problem.as_ref().filter(|_| is_depth);
+        let problem = of_sensor.or(of_depth)?;
         Some((problem.why.clone(), Some(problem.remedy.clone())))
     }
 

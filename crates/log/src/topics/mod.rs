@@ -23,7 +23,7 @@ use kinds::{
 pub(crate) use kinds::{kind_of, unreadable};
 pub(crate) use name::{Stream, TopicName};
 pub(crate) use problems::Problem;
-use problems::{odometry_problem, scanner_problem};
+use problems::{detections_problem, odometry_problem, scanner_problem};
 use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
@@ -54,6 +54,8 @@ pub(crate) struct Chosen {
     pub(crate) unused_odometry: Option<(String, Problem)>,
     /// Topics of the sensors beside the images.
     pub(crate) sensors: BTreeMap<Input, String>,
+    /// Reasons for which chosen sensors give nothing.
+    pub(crate) sensor_problems: BTreeMap<Input, Problem>,
     /// Topics of further laser scanners on the robot.
     pub(crate) further_scans: Vec<String>,
 }
@@ -172,6 +174,7 @@ pub(crate) fn choose(
         camera,
         depth_problem,
         unused_odometry: None,
+        sensor_problems: BTreeMap::new(),
         further_scans: further_scans(scan, input, sensors.get(&Input::Laser)),
         sensors,
     };
@@ -181,6 +184,11 @@ pub(crate) fn choose(
             Some(problem) => chosen.unused_odometry = Some((odometry, problem)),
             None => chosen.odometry = Some(odometry),
         }
+    }
+    if let Some(detections) = chosen.sensor(Input::Detections)
+        && let Some(problem) = detections_problem(scan, input, &primary, detections)
+    {
+        chosen.sensor_problems.insert(Input::Detections, problem);
     }
     Ok(chosen)
 }

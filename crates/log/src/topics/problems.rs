@@ -20,12 +20,17 @@ impl Problem {
     }
 }
 
+/// Share of the messages that a remedy has to bring together with frames.
+const MOST_PAIRED: f64 = 0.5;
 /// Offset beyond which two topics have different clocks, s.
 const OTHER_CLOCK_S: f64 = 5.0;
 
 /// Remedy for clocks that differ.
 pub(super) const RECORDING: &str = "take the times of recording in place of the stamps: `--stamps recording`, or \
      `stamps = \"recording\"` under [input]";
+
+/// Remedy for messages that were recorded at another time.
+const TOGETHER: &str = "record it together with the sensor that makes the frames";
 
 /// Returns the reason for which depth cannot be brought together with the colour images.
 pub(crate) fn depth_problem(
@@ -38,7 +43,7 @@ pub(crate) fn depth_problem(
     let of_depth = scan.topics.get(depth)?;
     // On a robot, the first messages tell nothing about those to come.
     if !scan.is_live()
-        && let Some(problem) = pairing_problem(of_colour, of_depth, input.pair_tolerance_s)
+        && let Some(problem) = pairing_problem(scan, of_colour, of_depth, input.pair_tolerance_s)
     {
         return Some(problem);
     }
@@ -46,7 +51,12 @@ pub(crate) fn depth_problem(
 }
 
 /// Returns the reason for which no image of a second topic is near one of the first in time.
-fn pairing_problem(first: &Topic, second: &Topic, tolerance_s: f64) -> Option<Problem> {
+fn pairing_problem(
+    scan: &Scan,
+    first: &Topic,
+    second: &Topic,
+    tolerance_s: f64,
+) -> Option<Problem> {
     if second.has_constant_stamps() && !first.has_constant_stamps() {
         return Problem::new("its stamps never change", RECORDING);
     }
@@ -56,20 +66,80 @@ fn pairing_problem(first: &Topic, second: &Topic, tolerance_s: f64) -> Option<Pr
     }
     let off_s = skew.median_s;
     let size_s = off_s.abs();
-    let side = if off_s > 0.0 { "after" } else { "before" };
+    let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
     let why = format!(
-        "none of its images is within {:.0} ms of a colour image: by their stamps they come \
-         {size_s:.3} s {side} it",
-        1e3 * tolerance_s
+        "none of its images is within {:.0} ms of a colour image: by their {times} they come {} it",
+        1e3 * tolerance_s,
+        offset(off_s)
     );
-    if size_s > OTHER_CLOCK_S {
-        return Problem::new(format!("{why}, by another clock"), RECORDING);
+    match (size_s > OTHER_CLOCK_S, scan.has_recording_times) {
+        (true, true) => Problem::new(why, TOGETHER),
+        (true, false) => Problem::new(format!("{why}, by another clock"), RECORDING),
+        (false, true) => Problem::new(why, wider_tolerance(size_s)),
+        (false, false) => Problem::new(why, format!("{}, or {RECORDING}", wider_tolerance(size_s))),
     }
-    let wider_s = 1.2 * size_s + 0.01;
-    Problem::new(
-        why,
-        format!("set `pair_tolerance_s = {wider_s:.2}` under [input], or {RECORDING}"),
-    )
+}
+
+/// Returns a time offset in words.
+fn offset(off_s: f64) -> String {
+    let side = if off_s > 0.0 { "after" } else { "before" };
+    format!("{:.3} s {side}", off_s.abs())
+}
+
+/// Returns the setting that pairs messages in spite of an offset.
+fn wider_tolerance(size_s: f64) -> String {
+    format!("set `pair_tolerance_s = {:.2}` under [input]", 1.2 * size_s + 0.01)
+}
+
+/// Returns the reason for which no recorded detections belong to a frame.
+pub(super) fn detections_problem(
+    scan: &Scan,
+    input: &InputSettings,
+    primary: &str,
+    detections: &str,
+) -> Option<Problem> {
+    // On a robot, the first messages tell nothing about those to come.
+    if scan.is_live() {
+        return None;
+    }
+    let frames = scan.topics.get(primary)?;
+    let messages = scan.topics.get(detections)?;
+    let tolerance_s = input.pair_tolerance_s;
+    if messages.has_constant_stamps() && !frames.has_constant_stamps() {
+        let stamp = messages.stamps.first()?;
+        let why = format!("its stamps are not set: all are {stamp}");
+        return Problem::new(why, recording_of(frames, messages, tolerance_s));
+    }
+    // Detections may be slower than images, so that each of them counts and not each image.
+    let skew = Skew::between(&messages.stamps, &frames.stamps, tolerance_s)?;
+    if skew.paired > 0.0 {
+        return None;
+    }
+    let off_s = -skew.median_s;
+    let size_s = off_s.abs();
+    let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
+    let why = format!(
+        "none of its messages is within {:.0} ms of a frame: by their {times} they come {} it",
+        1e3 * tolerance_s,
+        offset(off_s)
+    );
+    match (size_s > OTHER_CLOCK_S, scan.has_recording_times) {
+        (true, true) => Problem::new(why, TOGETHER),
+        (true, false) => Problem::new(
+            format!("{why}, by another clock"),
+            recording_of(frames, messages, tolerance_s),
+        ),
+        (false, _) => Problem::new(why, wider_tolerance(size_s)),
+    }
+}
+
+/// Returns the remedy by the times of recording, with a tolerance for a detector that takes its time.
+fn recording_of(frames: &Topic, messages: &Topic, tolerance_s: f64) -> String {
+    let skew = Skew::between(&messages.recorded, &frames.recorded, tolerance_s);
+    match skew.filter(|skew| skew.paired < MOST_PAIRED) {
+        Some(skew) => format!("{RECORDING}, and {}", wider_tolerance(skew.median_s.abs())),
+        None => RECORDING.to_owned(),
+    }
 }
 
 /// Returns the reason for which depth cannot be moved into the view of the colour camera.
@@ -191,10 +261,7 @@ pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Op
         off_s.abs()
     );
     if is_other_time {
-        Problem::new(
-            format!("{why}, because it was recorded at another time"),
-            "record it together with the sensor that makes the frames",
-        )
+        Problem::new(format!("{why}, because it was recorded at another time"), TOGETHER)
     } else {
         Problem::new(
             format!("{why}, by another clock (simulated time against that of the computer?)"),
