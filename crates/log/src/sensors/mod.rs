@@ -17,6 +17,7 @@ mod detections;
 pub(crate) mod laser;
 pub(crate) mod points;
 mod recent;
+mod scan_faults;
 
 use std::sync::Arc;
 
