@@ -479,6 +479,47 @@ fn all_scanners_of_the_robot_are_used_and_others_are_told() {
     }
 }
 
+#[test]
+fn a_scanner_of_another_clock_is_told_with_the_offset() {
+    let unset = |_| Stamp::default();
+    let simulated = |index| Stamp::default().plus_seconds(12.0 + 0.1 * f64::from(index));
+    let hour = |index| recorded(index).plus_seconds(3600.0);
+    let clocks: [(&str, &dyn Fn(u32) -> Stamp); 3] = [
+        ("its stamps are not set", &unset),
+        ("s before it, by another clock", &simulated),
+        ("3600.000 s after it", &hour),
+    ];
+    for (words, stamp_of) in clocks {
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
+        log.fixed("base_link", "front", &Isometry3::translation(0.2, 0.0, 0.3));
+        log.fixed("base_link", "rear", &Isometry3::translation(-0.2, 0.0, 0.3));
+        for index in 0..4 {
+            log.message("/scan", recorded(index), &sweep(stamp_of(index), "front"));
+            log.message("/scan_rear", recorded(index), &sweep(stamp_of(index), "rear"));
+            log.message("/scan_side", recorded(index), &sweep(recorded(index), "base_link"));
+        }
+        colour("/cam/color", "optical").write(&mut log, recorded);
+        let saved = log.save();
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
+        // By name it would be another.
+        assert_eq!(used(&source, "laser"), "/scan_side");
+        for topic in ["/scan", "/scan_rear"] {
+            let told = entry(&source, topic);
+            assert!(told.used_as.is_none() && told.to_string().contains(words), "{told}");
+            assert!(told.remedy.as_ref().unwrap().contains("`--stamps recording`"), "{told}");
+        }
+        // One that the settings name is told as well.
+        let named = InputSettings { laser_topic: Some("/scan".into()), ..InputSettings::default() };
+        let source = saved.open(&named, Inputs::ANY).unwrap();
+        assert!(entry(&source, "/scan").to_string().contains(words));
+        assert!(!source.account().usable().contains(&"laser"));
+        let input = InputSettings { stamps: StampSource::Recording, ..InputSettings::default() };
+        let mut source = saved.open(&input, Inputs::ANY).unwrap();
+        let frame = source.next_frame().unwrap().frame;
+        assert_eq!(frame.scans().count(), 3, "{words}");
+    }
+}
+
 fn sweep(stamp: Stamp, frame: &str) -> LaserScan {
     LaserScan {
         header: Header::new(stamp, frame),

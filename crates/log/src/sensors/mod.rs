@@ -16,7 +16,7 @@
 mod detections;
 pub(crate) mod laser;
 pub(crate) mod points;
-mod recent;
+pub(crate) mod recent;
 mod scan_faults;
 
 use std::sync::Arc;

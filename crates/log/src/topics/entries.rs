@@ -228,7 +228,8 @@ impl Judge<'_> {
         let takes = format!("`{key} = \"{name}\"` under [input] takes this one");
         if let Some(other) = self.chosen.sensor(sensor.input) {
             let is_scan = sensor.input == Input::Laser && self.input.laser_topic.is_none();
-            let problem = scanner_problem(self.scan, self.input, other, name);
+            let primary = self.chosen.primary();
+            let problem = scanner_problem(self.scan, self.input, primary, other, name);
             if let Some(problem) = problem.filter(|_| is_scan) {
                 let remedy = Some(problem.remedy).filter(|remedy| !remedy.is_empty());
                 return (problem.why, remedy);

@@ -4,6 +4,7 @@ use super::calibration::{calibration_of, calibrations, intrinsics_of, misfit};
 use crate::InputSettings;
 use crate::camera_info::Intrinsics;
 use crate::scan::{Scan, Topic};
+use crate::sensors::recent::NEAR_S as NEAR_SCAN_S;
 use crate::source::robot_frame;
 use crate::timing::Skew;
 
@@ -115,22 +116,63 @@ pub(super) fn detections_problem(
     if skew.paired > 0.0 {
         return None;
     }
-    let off_s = -skew.median_s;
-    let size_s = off_s.abs();
+    let other_clock_s = other_clock(frames, messages);
+    let off_s = other_clock_s.unwrap_or(-skew.median_s);
     let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
     let why = format!(
         "none of its messages is within {:.0} ms of a frame: by their {times} they come {} it",
         1e3 * tolerance_s,
         offset(off_s)
     );
-    match (size_s > OTHER_CLOCK_S, scan.has_recording_times) {
-        (true, true) => Problem::new(why, TOGETHER),
-        (true, false) => Problem::new(
-            format!("{why}, by another clock"),
-            recording_of(frames, messages, tolerance_s),
-        ),
-        (false, _) => Problem::new(why, wider_tolerance(size_s)),
+    let is_recorded_apart = scan.has_recording_times || is_recorded_apart(frames, messages);
+    match (other_clock_s, is_recorded_apart) {
+        (Some(_), true) => Problem::new(why, TOGETHER),
+        (Some(_), false) => {
+            let remedy = recording_of(frames, messages, tolerance_s);
+            Problem::new(format!("{why}, by another clock"), remedy)
+        }
+        (None, _) => Problem::new(why, wider_tolerance(off_s.abs())),
     }
+}
+
+/// Returns the time from the first frame to the first of other messages, s, if all of them lie apart
+/// from all frames in time.
+fn other_clock(frames: &Topic, messages: &Topic) -> Option<f64> {
+    let (first, last) = frames.stamp_range()?;
+    let (begin, end) = messages.stamp_range()?;
+    let is_apart = begin.seconds_since(last) > NEAR_S || first.seconds_since(end) > NEAR_S;
+    is_apart.then(|| begin.seconds_since(first))
+}
+
+/// Returns true if two topics were recorded one after the other.
+fn is_recorded_apart(first: &Topic, second: &Topic) -> bool {
+    second.first_log_time > first.last_log_time || second.last_log_time < first.first_log_time
+}
+
+/// Returns the reason for which no scan of a scanner is near a frame in time.
+pub(super) fn scan_times_problem(scan: &Scan, primary: &str, scanner: &str) -> Option<Problem> {
+    if scan.is_live() || primary == scanner {
+        return None;
+    }
+    let frames = scan.topics.get(primary)?;
+    let scans = scan.topics.get(scanner)?;
+    if scans.has_constant_stamps() && !frames.has_constant_stamps() {
+        let stamp = scans.stamps.first()?;
+        return Problem::new(format!("its stamps are not set: all are {stamp}"), RECORDING);
+    }
+    let skew = Skew::between(&scans.stamps, &frames.stamps, NEAR_SCAN_S)?;
+    if skew.paired > 0.0 {
+        return None;
+    }
+    let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
+    let why = format!(
+        "none of its scans is within {NEAR_SCAN_S} s of a frame: by their {times} they come {} it",
+        offset(other_clock(frames, scans).unwrap_or(-skew.median_s))
+    );
+    if scan.has_recording_times || is_recorded_apart(frames, scans) {
+        return Problem::new(why, TOGETHER);
+    }
+    Problem::new(format!("{why}, by another clock"), RECORDING)
 }
 
 /// Returns the remedy by the times of recording, with a tolerance for a detector that takes its time.
@@ -215,6 +257,7 @@ pub(super) const SCANNER_REMEDY: &str = "correct the driver's settings of the sc
 pub(super) fn scanner_problem(
     scan: &Scan,
     input: &InputSettings,
+    primary: &str,
     first: &str,
     topic: &str,
 ) -> Option<Problem> {
@@ -235,7 +278,7 @@ pub(super) fn scanner_problem(
         let why = format!("tf does not connect its frame `{frame}` with `{robot}`");
         return Problem::new(why, "record /tf_static with its mount");
     }
-    None
+    scan_times_problem(scan, primary, topic)
 }
 
 /// Returns the reason for which odometry cannot give the poses of the frames.
@@ -254,13 +297,11 @@ pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Op
     }
     let off_s = begin.seconds_since(first);
     let side = if off_s > 0.0 { "later" } else { "earlier" };
-    let is_other_time =
-        poses.first_log_time > frames.last_log_time || poses.last_log_time < frames.first_log_time;
     let why = format!(
         "no stamp of it is within {NEAR_S} s of any frame: it begins {:.1} s {side}",
         off_s.abs()
     );
-    if is_other_time {
+    if is_recorded_apart(frames, poses) {
         Problem::new(format!("{why}, because it was recorded at another time"), TOGETHER)
     } else {
         Problem::new(
