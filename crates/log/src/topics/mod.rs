@@ -11,6 +11,7 @@ mod kinds;
 mod name;
 mod problems;
 mod rigs;
+mod unpaired;
 
 use std::collections::BTreeMap;
 
@@ -27,6 +28,7 @@ use problems::{detections_problem, odometry_problem, scan_times_problem, scanner
 use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
+pub(crate) use unpaired::{is_unusual, unpaired};
 
 use crate::obstacles::ObstacleTopic;
 use crate::scan::{Scan, Topic};

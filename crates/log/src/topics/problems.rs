@@ -31,7 +31,7 @@ pub(super) const RECORDING: &str = "take the times of recording in place of the 
      `stamps = \"recording\"` under [input]";
 
 /// Remedy for messages that were recorded at another time.
-const TOGETHER: &str = "record it together with the sensor that makes the frames";
+pub(super) const TOGETHER: &str = "record it together with the sensor that makes the frames";
 
 /// Returns the reason for which depth cannot be brought together with the colour images.
 pub(crate) fn depth_problem(
@@ -52,7 +52,7 @@ pub(crate) fn depth_problem(
 }
 
 /// Returns the reason for which no image of a second topic is near one of the first in time.
-fn pairing_problem(
+pub(super) fn pairing_problem(
     scan: &Scan,
     first: &Topic,
     second: &Topic,
@@ -88,7 +88,7 @@ fn offset(off_s: f64) -> String {
 }
 
 /// Returns the setting that pairs messages in spite of an offset.
-fn wider_tolerance(size_s: f64) -> String {
+pub(super) fn wider_tolerance(size_s: f64) -> String {
     format!("set `pair_tolerance_s = {:.2}` under [input]", 1.2 * size_s + 0.01)
 }
 
