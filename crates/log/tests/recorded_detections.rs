@@ -228,12 +228,36 @@ struct Yolo {
     bbox: YoloBox,
 }
 
-fn yolo() -> Vec<u8> {
+fn yolo_of(classes: &[(i32, &str)]) -> Vec<u8> {
     let center = Pose2D { position: Point2D { x: 8.0, y: 6.0 }, theta: 0.0 };
-    let bbox = YoloBox { center, size: Point2D { x: 4.0, y: 6.0 } };
-    let one =
-        Yolo { class_id: 0, class_name: "person".into(), score: 0.9, id: String::new(), bbox };
-    encode(&(Header::new(stamp(0), "colour"), vec![one]))
+    let detections = classes.iter().map(|(class_id, class_name)| Yolo {
+        class_id: *class_id,
+        class_name: (*class_name).to_owned(),
+        score: 0.9,
+        id: "7".into(),
+        bbox: YoloBox { center, size: Point2D { x: 4.0, y: 6.0 } },
+    });
+    encode(&(Header::new(stamp(0), "colour"), detections.collect::<Vec<_>>()))
+}
+
+fn yolo() -> Vec<u8> {
+    yolo_of(&[(0, "person")])
+}
+
+#[test]
+fn a_class_without_a_name_is_that_of_its_number() {
+    for (classes, people) in [
+        (&[(0, ""), (56, ""), (2, "")][..], 1),
+        (&[(0, "person"), (56, "chair")], 1),
+        (&[(0, "chair"), (1, "person")], 1),
+        (&[(3, ""), (4, "")], 0),
+    ] {
+        let mut log = started();
+        let kind = ("yolo_msgs/msg/DetectionArray", YOLO);
+        log.defined(TOPIC, kind, "cdr", stamp(0), &yolo_of(classes));
+        let (counts, source) = read(log, 1, &[]);
+        assert_eq!(counts, [Some(people)], "{classes:?}: {:?}", source.notes());
+    }
 }
 
 const YOLO: &str = "std_msgs/Header header\nyolo_msgs/Detection[] detections\n====\n\

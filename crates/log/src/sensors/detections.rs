@@ -268,18 +268,28 @@ fn best_hypothesis(detection: &Value) -> (String, f64) {
     for hypothesis in hypotheses {
         let score = hypothesis.number(&["hypothesis.score", "score"]);
         let score = score.filter(|score| score.is_finite()).unwrap_or(1.0);
-        let class = hypothesis.text(&[
-            "hypothesis.class_id",
-            "hypothesis.id",
-            "class_name",
-            "class_id",
-            "id",
-        ]);
+        let class = class_of(hypothesis);
         if best.as_ref().is_none_or(|(_, highest)| score > *highest) {
-            best = Some((class.unwrap_or_default(), score));
+            best = Some((class, score));
         }
     }
     best.unwrap_or_else(|| (String::new(), 1.0))
+}
+
+/// Names of the fields of a class, by preference.
+const CLASS_FIELDS: [&str; 5] =
+    ["hypothesis.class_id", "hypothesis.id", "class_name", "class_id", "id"];
+
+/// Returns the class of a hypothesis: the first field that is not empty, as the number beside a name
+/// that the detector does not know.
+fn class_of(hypothesis: &Value) -> String {
+    for field in CLASS_FIELDS {
+        match hypothesis.text(&[field]) {
+            Some(class) if !class.is_empty() => return class,
+            _ => {}
+        }
+    }
+    String::new()
 }
 
 fn in_image(detection: &Value, score: f64) -> Option<ExternalDetection> {
