@@ -76,6 +76,29 @@ fn people_are_taken_and_other_classes_are_named() {
 }
 
 #[test]
+fn boxes_that_cannot_be_are_lost_with_the_cause() {
+    let nan = f64::NAN;
+    for (x, y, width, height, counter) in [
+        (8.0, nan, 4.0, 6.0, "detections_invalid"),
+        (8.0, 6.0, f64::INFINITY, 6.0, "detections_invalid"),
+        (8.0, 6.0, 0.0, 0.0, "detections_invalid"),
+        (8.0, 6.0, 4.0, -6.0, "detections_invalid"),
+        (0.5, 0.5, 0.2, 0.6, "detections_as_fractions"),
+        (0.1, 0.9, 1.0, 1.0, "detections_as_fractions"),
+    ] {
+        let mut message = array(stamp(0), &["person", "person"]);
+        let center = Pose2D { position: Point2D { x, y }, theta: 0.0 };
+        message.detections[0].bbox = BoundingBox2D { center, size_x: width, size_y: height };
+        let mut log = started();
+        log.message(TOPIC, stamp(0), &message);
+        let (counts, source) = read(log, 1, &[]);
+        assert_eq!(counts, [Some(1)], "{x} {y} {width} {height}");
+        assert_eq!(source.counters().get(counter), Some(&1), "{:?}", source.counters());
+        assert!(source.data_lost(), "{:?}", source.notes());
+    }
+}
+
+#[test]
 fn no_message_is_no_look_and_an_empty_one_is_nobody() {
     for every in [1, 2, 3, 5, 7] {
         let mut log = started();

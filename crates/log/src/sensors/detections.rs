@@ -205,7 +205,7 @@ impl Recorded {
         if self.in_space {
             Some(in_space(&people, message, moment, tally))
         } else {
-            Some(people.iter().filter_map(|(it, score)| in_image(it, *score)).collect())
+            Some(in_image(&people, moment, tally))
         }
     }
 
@@ -292,13 +292,58 @@ fn class_of(hypothesis: &Value) -> String {
     String::new()
 }
 
-fn in_image(detection: &Value, score: f64) -> Option<ExternalDetection> {
+/// Returns the people in an image. Boxes that are none are counted as lost.
+fn in_image(
+    people: &[(&Value, f64)],
+    moment: &Moment<'_>,
+    tally: &mut Tally,
+) -> Vec<ExternalDetection> {
+    let topic = moment.topic;
+    let mut found = Vec::new();
+    for (detection, score) in people {
+        let Some(region) = region_of(detection) else {
+            lose_box(topic, tally);
+            continue;
+        };
+        if is_fraction(&region) {
+            tally.lose("detections_as_fractions", || {
+                format!(
+                    "{topic}: a box of {:.3} x {:.3} is a fraction of the image: let the detector \
+                     write boxes in pixels",
+                    region.width, region.height
+                )
+            });
+            continue;
+        }
+        found.push(ExternalDetection { region: Some(region), head: None, score: *score });
+    }
+    found
+}
+
+/// Returns the box of a detection; `None` for one with numbers that are not finite, or without a size.
+fn region_of(detection: &Value) -> Option<Rect> {
     let width = detection.number(&["bbox.size_x", "bbox.size.x"])?;
     let height = detection.number(&["bbox.size_y", "bbox.size.y"])?;
     let x = detection.number(&["bbox.center.position.x", "bbox.center.x"])? - 0.5 * width;
     let y = detection.number(&["bbox.center.position.y", "bbox.center.y"])? - 0.5 * height;
     let region = Rect { x, y, width, height };
-    region.is_sane().then_some(ExternalDetection { region: Some(region), head: None, score })
+    let has_size = width > 0.0 && height > 0.0;
+    (region.is_sane() && has_size).then_some(region)
+}
+
+/// Counts a person whose place cannot be as lost.
+fn lose_box(topic: &str, tally: &mut Tally) {
+    tally.lose("detections_invalid", || {
+        format!("{topic}: a box has no size, or a number that is not finite")
+    });
+}
+
+/// Returns true for a box within the first pixel, which is a share of the image and no place in it.
+fn is_fraction(region: &Rect) -> bool {
+    region.width <= 1.0
+        && region.height <= 1.0
+        && (-1.0..=1.0).contains(&region.x)
+        && (-1.0..=1.0).contains(&region.y)
 }
 
 fn in_space(
@@ -317,11 +362,16 @@ fn in_space(
         tally.count("detections_without_transform");
         return Vec::new();
     };
-    let each = people.iter().filter_map(|(detection, score)| {
-        let head = head_of(detection, &robot_from_message)?;
-        Some(ExternalDetection { region: None, head: Some(head), score: *score })
-    });
-    each.collect()
+    let mut found = Vec::new();
+    for (detection, score) in people {
+        match head_of(detection, &robot_from_message) {
+            Some(head) => {
+                found.push(ExternalDetection { region: None, head: Some(head), score: *score });
+            }
+            None => lose_box(moment.topic, tally),
+        }
+    }
+    found
 }
 
 /// Returns the centre of the head of a person in a box: below the upper end of the box.
