@@ -480,6 +480,32 @@ fn all_scanners_of_the_robot_are_used_and_others_are_told() {
 }
 
 #[test]
+fn detections_of_types_that_are_not_read_are_listed_with_those_that_are() {
+    for kind in [
+        "darknet_ros_msgs/msg/BoundingBoxes",
+        "darknet_ros_msgs/BoundingBoxes",
+        "depthai_ros_msgs/msg/SpatialDetectionArray",
+        "people_msgs/msg/People",
+        "my_msgs/msg/Detection2DArray",
+    ] {
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
+        colour("/cam/color", "optical").write(&mut log, recorded);
+        log.foreign("/found", kind, "cdr", recorded(0), &[0, 1, 0, 0]);
+        let saved = log.save();
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
+        let told = entry(&source, "/found");
+        assert_eq!((told.used_as.as_ref(), told.could_be), (None, None), "{told}");
+        assert!(told.kind == kind && told.to_string().contains("Detection3DArray"), "{told}");
+        let detections_topic = Some("/found".to_owned());
+        let input = InputSettings { detections_topic, ..InputSettings::default() };
+        let inputs = Inputs::ANY.require(Input::Detections);
+        let error = saved.open(&input, inputs).err().unwrap().to_string();
+        assert!(error.contains(kind) && error.contains("vision_msgs/Detection2DArray"), "{error}");
+        assert!(!error.contains("leave the key out"), "{error}");
+    }
+}
+
+#[test]
 fn a_scanner_of_another_clock_is_told_with_the_offset() {
     let unset = |_| Stamp::default();
     let simulated = |index| Stamp::default().plus_seconds(12.0 + 0.1 * f64::from(index));

@@ -1,7 +1,7 @@
 //! Reasons for which topics are used or not.
 
 use super::account::{InputAccount, TopicUse};
-use super::kinds::{is_image, is_odometry, is_of, kind_of, unreadable};
+use super::kinds::{is_image, is_odometry, is_of, kind_of, unread_detections, unreadable};
 use super::problems::{SCANNER_REMEDY, depth_problem, scanner_problem};
 use super::rigs::{Rig, rigs};
 use super::{Chosen, Relation, Stream, TopicName, named_topic};
@@ -47,7 +47,8 @@ impl Judge<'_> {
         let lacks_depth = self.inputs.uses(Input::Depth) && self.chosen.depth.is_none();
         let sensor = sensor.filter(|_| !(topic.is_lidar() && lacks_depth));
         let is_known = is_image(topic) || is_odometry(topic) || sensor.is_some();
-        if !is_known && unreadable(topic).is_none() {
+        let unread = unread_detections(topic);
+        if !is_known && unreadable(topic).is_none() && unread.is_none() {
             return None;
         }
         let used_as = self.use_of(name);
@@ -56,7 +57,10 @@ impl Judge<'_> {
             None => Some(match sensor {
                 Some(sensor) => self.unused_sensor(name, topic, sensor),
                 None if is_odometry(topic) => self.unused_odometry(name, topic),
-                None => self.unused_image(name, topic),
+                None => match unread {
+                    Some(why) => empty(topic).unwrap_or((why, None)),
+                    None => self.unused_image(name, topic),
+                },
             }),
         };
         let (problem, remedy) = match reason {

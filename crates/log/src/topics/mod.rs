@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 pub use account::{InputAccount, TopicUse};
 pub(crate) use calibration::{FoundCalibration, Relation, calibration_of, intrinsics_of};
 use kinds::{
-    could_be_depth, disparity_rank, is_info, is_odometry, is_of, is_usable_depth,
+    could_be_depth, detection_types, disparity_rank, is_info, is_odometry, is_of, is_usable_depth,
     is_usable_picture, odometry_rank, remedy_as_depth,
 };
 pub(crate) use kinds::{kind_of, unreadable};
@@ -467,6 +467,10 @@ fn named(
         let remedy = unreadable(topic)
             .or_else(|| as_depth.map(|remedy| format!("if it is meant, {remedy}")))
             .or_else(|| other.map(|other| format!("{other} would fit")))
+            .or_else(|| {
+                let types = format!("read are {}", detection_types());
+                (key == "detections_topic").then(|| format!("{types}: convert it to one of them"))
+            })
             .unwrap_or_else(|| "no topic of the log would fit: leave the key out".to_owned());
         let path = scan.path.clone();
         let kind = kind_of(topic);
