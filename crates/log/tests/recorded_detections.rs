@@ -5,10 +5,11 @@
 mod common;
 
 use common::{LogWriter, SavedLog, at, started};
+use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{
-    BoundingBox2D, Detection2D, Detection2DArray, Header, ObjectHypothesis,
+    BoundingBox2D, Detection2D, Detection2DArray, Header, Image, ObjectHypothesis,
     ObjectHypothesisWithPose, Point2D, Pose2D, PoseWithCovariance, encode,
 };
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, StampSource};
@@ -159,6 +160,48 @@ fn detections_that_belong_to_no_frame_are_lost_with_the_offset_and_the_remedy() 
 }
 
 #[test]
+fn boxes_in_images_of_another_camera_are_left_out() {
+    let beside = Isometry3::translation(0.05, 0.0, 0.0);
+    let behind = Isometry3::rotation(Vector3::new(0.0, 3.0, 0.0));
+    for (frame, taken) in [
+        ("colour", 4),
+        ("/colour", 4),
+        ("", 4),
+        ("camera_link", 4),
+        ("base_link", 4),
+        ("yolo", 4),
+        ("beside_optical_frame", 4),
+        ("unknown_optical_frame", 4),
+        ("behind_optical_frame", 0),
+        ("/behind_optical_frame", 0),
+        ("rear", 0),
+    ] {
+        let mut log = started();
+        log.fixed("colour", "beside_optical_frame", &beside);
+        log.fixed("colour", "behind_optical_frame", &behind);
+        log.fixed("colour", "camera_link", &behind);
+        for index in 0..4 {
+            let mut message = array(stamp(index), &["person"]);
+            message.header.frame_id = frame.to_owned();
+            log.message(TOPIC, stamp(index), &message);
+            let header = Header::new(stamp(index), "rear");
+            let image = Image::packed(header, "rgb8", 2, 1, &[0; 6]);
+            log.message("/rear_camera/color/image_raw", stamp(index), &image);
+        }
+        (0..4).for_each(|index| log.colour(stamp(index)));
+        let colour_topic = Some("/camera/color/image_raw".to_owned());
+        let input = InputSettings { colour_topic, ..InputSettings::default() };
+        let (seen, source) = read_saved(&log.save(), &input);
+        assert_eq!(seen, taken, "{frame}: {:?}", source.notes());
+        assert_eq!(source.data_lost(), taken == 0, "{frame}");
+        let told = source.notes().iter().any(|note| note.contains("of another camera, whose"));
+        assert_eq!(told, taken == 0, "{frame}: {:?}", source.notes());
+        let told = source.notes().iter().any(|note| note.contains("is in no other message"));
+        assert_eq!(told, frame.starts_with("unknown"), "{frame}: {:?}", source.notes());
+    }
+}
+
+#[test]
 fn the_remedy_for_another_clock_works() {
     let saved = stamped(|index| Stamp::default().plus_seconds(10.0 + 0.1 * f64::from(index)), true);
     let stamps = StampSource::Recording;
@@ -216,7 +259,7 @@ struct Foxy<'a> {
     header: Header,
     results: Vec<FoxyHypothesis>,
     bbox: FlatBox,
-    source_img: tagalong_log::msgs::Image<'a>,
+    source_img: Image<'a>,
     is_tracking: bool,
     tracking_id: String,
 }
@@ -229,7 +272,7 @@ fn foxy() -> Vec<u8> {
         header: header.clone(),
         results: vec![hypothesis],
         bbox: FLAT_BOX,
-        source_img: tagalong_log::msgs::Image::default(),
+        source_img: Image::default(),
         is_tracking: false,
         tracking_id: String::new(),
     };

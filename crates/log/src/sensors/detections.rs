@@ -13,6 +13,7 @@ use crate::msgs::{
 };
 use crate::pairing::{Payload, Waiting};
 use crate::tally::Tally;
+use crate::topics::CameraFrames;
 use crate::walk::{Channel, Message};
 
 const BOXES: &str = "vision_msgs/Detection2DArray";
@@ -55,6 +56,7 @@ struct Recorded {
     /// Classes that are people; empty: [`PEOPLE`].
     classes: Vec<String>,
     layouts: Vec<Definition>,
+    cameras: CameraFrames,
     waiting: Waiting,
     /// Message of the frame that is being made.
     paired: Option<Payload>,
@@ -69,6 +71,7 @@ impl Recorded {
             in_space: is_type(schema, SPACE),
             classes: input.detection_classes.clone(),
             layouts: Vec::new(),
+            cameras: CameraFrames::default(),
             waiting: Waiting::default(),
             paired: None,
             read: 0,
@@ -78,7 +81,7 @@ impl Recorded {
 }
 
 impl SensorReader for Recorded {
-    fn take(&mut self, message: &Message<'_>, _: &mut Tally) -> Result<(), CdrError> {
+    fn take(&mut self, message: &Message<'_>, tally: &mut Tally) -> Result<(), CdrError> {
         if self.layouts.is_empty() {
             self.layouts = layouts(message.channel);
         }
@@ -87,6 +90,17 @@ impl SensorReader for Recorded {
             payload.stamp = stamp_of_first(&self.layouts, message.data).unwrap_or_default();
         }
         self.read += 1;
+        if !self.in_space && self.cameras.is_other(&payload.frame_id) {
+            self.leave_out(&message.channel.topic, &payload.frame_id, tally);
+            return Ok(());
+        }
+        if !self.in_space && self.cameras.is_unknown(&payload.frame_id) {
+            tally.note(format!(
+                "{}: the detections have the frame_id `{}`, which is in no other message, and are \
+                 taken to be of the images with `{}`",
+                message.channel.topic, payload.frame_id, self.cameras.own
+            ));
+        }
         self.waiting.push(payload);
         Ok(())
     }
@@ -116,6 +130,10 @@ impl SensorReader for Recorded {
 
     fn restore(&mut self) {
         self.waiting.restore();
+    }
+
+    fn know_cameras(&mut self, cameras: &CameraFrames) {
+        self.cameras = cameras.clone();
     }
 
     fn close(&mut self, topic: &str, tally: &mut Tally) {
@@ -184,6 +202,18 @@ fn layouts(channel: &Channel) -> Vec<Definition> {
 }
 
 impl Recorded {
+    /// Counts a message with boxes in the images of another camera.
+    fn leave_out(&self, topic: &str, frame: &str, tally: &mut Tally) {
+        let own = &self.cameras.own;
+        tally.remark("detections_of_other_camera", || {
+            format!(
+                "{topic}: detections in images of another camera, whose frame is `{frame}`, are left \
+                 out, because the images that are used have `{own}`: name the detections in those as \
+                 `detections_topic` under [input]"
+            )
+        });
+    }
+
     /// Returns the people in a message; `None`, counted, if it cannot be read.
     fn detections(
         &self,

@@ -29,6 +29,7 @@ use tagalong_geometry::Camera;
 use crate::msgs::{CdrError, Header};
 use crate::tally::Tally;
 use crate::tf::TfBuffer;
+use crate::topics::CameraFrames;
 use crate::walk::Message;
 use crate::{InputSettings, LogError};
 
@@ -86,6 +87,11 @@ pub(crate) trait SensorReader: Send + Sync {
 
     /// Returns to the messages that were set aside.
     fn restore(&mut self) {}
+
+    /// Learns the frames of the cameras of a log, before the first message.
+    fn know_cameras(&mut self, cameras: &CameraFrames) {
+        let _ = cameras;
+    }
 
     /// Counts at the end of a log what found no frame.
     fn close(&mut self, topic: &str, tally: &mut Tally) {

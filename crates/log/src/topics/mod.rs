@@ -25,6 +25,7 @@ pub(crate) use kinds::{kind_of, unreadable};
 pub(crate) use name::{Stream, TopicName};
 pub(crate) use problems::Problem;
 use problems::{detections_problem, odometry_problem, scan_times_problem, scanner_problem};
+pub(crate) use rigs::CameraFrames;
 use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
