@@ -314,6 +314,22 @@ fn depth_at_other_times_is_told_with_the_offset() {
 }
 
 #[test]
+fn the_times_of_recording_are_no_remedy_where_they_are_taken() {
+    for (late_s, remedy) in [(0.05, "`pair_tolerance_s = 0.07`"), (60.0, "record it together")] {
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
+        Stream { count: 1, ..colour("/cam/color", "optical") }.write(&mut log, recorded);
+        let header = Header::new(recorded(0), "optical");
+        let image = Image::packed(header, "16UC1", 16, 12, &[1; 16 * 12 * 2]);
+        log.bytes::<Image<'_>>("/cam/depth", at(late_s), &encode(&image));
+        let input = InputSettings { stamps: StampSource::Recording, ..InputSettings::default() };
+        let (source, _saved) = open_with(log, &input, Inputs::ANY).unwrap();
+        let told = entry(&source, "/cam/depth");
+        assert!(told.remedy.as_ref().unwrap().contains(remedy), "{late_s}: {told}");
+        assert!(!told.to_string().contains("--stamps"), "{late_s}: {told}");
+    }
+}
+
+#[test]
 fn stamps_that_are_never_set_are_replaced_by_the_times_of_recording() {
     for stamp in [0.0, 1.0, 1e-9, 1.7e9, 2e9] {
         let stamp = Stamp::default().plus_seconds(stamp);

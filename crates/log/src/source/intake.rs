@@ -191,10 +191,15 @@ impl Intake {
             Arrival::Duplicate => tally.count("duplicate_frames"),
             Arrival::SameStamp => {
                 let topic = self.primary.clone();
+                let remedy = if self.has_recording_times {
+                    "the recorder gave them one time"
+                } else {
+                    "`--stamps recording` takes the times of recording"
+                };
                 tally.lose("frames_of_same_stamp", || {
                     format!(
                         "{topic}: different images have the same stamp, and only the first of them \
-                         makes a frame: `--stamps recording` takes the times of recording"
+                         makes a frame: {remedy}"
                     )
                 });
             }
