@@ -120,6 +120,8 @@ pub(crate) struct Scan {
     pub(crate) counters: Counters,
     pub(crate) notes: Vec<String>,
     pub(crate) data_lost: bool,
+    /// True if the times of recording stand in place of all stamps.
+    pub(crate) has_recording_times: bool,
 }
 
 /// One file of a log.
@@ -263,6 +265,7 @@ impl Scan {
     /// Returns the contents with the times of recording in place of all stamps.
     pub(crate) fn with_recording_times(&self) -> Self {
         let mut scan = self.clone();
+        scan.has_recording_times = true;
         for topic in scan.topics.values_mut() {
             topic.stamps = topic.recorded.clone();
         }
@@ -323,6 +326,7 @@ impl Gathering {
             counters: Counters::new(),
             notes: Vec::new(),
             data_lost: false,
+            has_recording_times: false,
         }
     }
 
@@ -371,7 +375,7 @@ impl Gathering {
             Type::DisparityImage => topic.take_disparity(message.data),
             Type::PointCloud => self.take_cloud(&channel.topic, message.data),
             Type::Odometry => topic.take_odometry(message.data),
-            Type::Sensor => topic.take_sensor(message.data),
+            Type::Sensor => topic.take_sensor(message),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
             Type::Number => self.take_number(&channel.topic, message.data),
             Type::Tf => self.take_tf(&channel.topic, message.data),
@@ -618,10 +622,10 @@ impl Topic {
         Some(())
     }
 
-    fn take_sensor(&mut self, data: &[u8]) -> Option<()> {
+    fn take_sensor(&mut self, message: &Message<'_>) -> Option<()> {
         let sensor = SensorType::of_message(&self.schema)?;
-        let header = (sensor.header)(data).ok()?;
-        if let Some(fault) = (sensor.fault)(data) {
+        let header = (sensor.header)(message).ok()?;
+        if let Some(fault) = (sensor.fault)(message.data) {
             self.faulty += 1;
             self.fault.get_or_insert(fault);
         }

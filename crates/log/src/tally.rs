@@ -33,6 +33,12 @@ impl Tally {
         }
     }
 
+    /// Describes lost data that are counted already.
+    pub(crate) fn lose_counted(&mut self, what: String) {
+        self.lost = true;
+        self.note(what);
+    }
+
     /// Counts an event that is no loss, and describes it once per name.
     pub(crate) fn remark(&mut self, name: &'static str, what: impl FnOnce() -> String) {
         self.count(name);

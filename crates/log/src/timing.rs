@@ -59,7 +59,7 @@ impl Skew {
 }
 
 /// Returns the offset from a given time to the nearest of sorted stamps, s.
-fn nearest(sorted: &[Stamp], at: Stamp) -> Option<f64> {
+pub(crate) fn nearest(sorted: &[Stamp], at: Stamp) -> Option<f64> {
     let after = sorted.partition_point(|stamp| *stamp < at);
     let around = &sorted[after.saturating_sub(1)..(after + 1).min(sorted.len())];
     around.iter().map(|s| s.seconds_since(at)).min_by(|a, b| a.abs().total_cmp(&b.abs()))

@@ -314,6 +314,22 @@ fn depth_at_other_times_is_told_with_the_offset() {
 }
 
 #[test]
+fn the_times_of_recording_are_no_remedy_where_they_are_taken() {
+    for (late_s, remedy) in [(0.05, "`pair_tolerance_s = 0.07`"), (60.0, "record it together")] {
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
+        Stream { count: 1, ..colour("/cam/color", "optical") }.write(&mut log, recorded);
+        let header = Header::new(recorded(0), "optical");
+        let image = Image::packed(header, "16UC1", 16, 12, &[1; 16 * 12 * 2]);
+        log.bytes::<Image<'_>>("/cam/depth", at(late_s), &encode(&image));
+        let input = InputSettings { stamps: StampSource::Recording, ..InputSettings::default() };
+        let (source, _saved) = open_with(log, &input, Inputs::ANY).unwrap();
+        let told = entry(&source, "/cam/depth");
+        assert!(told.remedy.as_ref().unwrap().contains(remedy), "{late_s}: {told}");
+        assert!(!told.to_string().contains("--stamps"), "{late_s}: {told}");
+    }
+}
+
+#[test]
 fn stamps_that_are_never_set_are_replaced_by_the_times_of_recording() {
     for stamp in [0.0, 1.0, 1e-9, 1.7e9, 2e9] {
         let stamp = Stamp::default().plus_seconds(stamp);
@@ -476,6 +492,73 @@ fn all_scanners_of_the_robot_are_used_and_others_are_told() {
         let told = entry(&source, second);
         assert_eq!(told.used_as.is_some() && told.problem.is_none(), is_used, "{told}");
         assert_eq!(told.problem.is_none(), is_used, "{told}");
+    }
+}
+
+#[test]
+fn detections_of_types_that_are_not_read_are_listed_with_those_that_are() {
+    for kind in [
+        "darknet_ros_msgs/msg/BoundingBoxes",
+        "darknet_ros_msgs/BoundingBoxes",
+        "depthai_ros_msgs/msg/SpatialDetectionArray",
+        "people_msgs/msg/People",
+        "my_msgs/msg/Detection2DArray",
+    ] {
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
+        colour("/cam/color", "optical").write(&mut log, recorded);
+        log.foreign("/found", kind, "cdr", recorded(0), &[0, 1, 0, 0]);
+        let saved = log.save();
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
+        let told = entry(&source, "/found");
+        assert_eq!((told.used_as.as_ref(), told.could_be), (None, None), "{told}");
+        assert!(told.kind == kind && told.to_string().contains("Detection3DArray"), "{told}");
+        let detections_topic = Some("/found".to_owned());
+        let input = InputSettings { detections_topic, ..InputSettings::default() };
+        let inputs = Inputs::ANY.require(Input::Detections);
+        let error = saved.open(&input, inputs).err().unwrap().to_string();
+        assert!(error.contains(kind) && error.contains("vision_msgs/Detection2DArray"), "{error}");
+        assert!(!error.contains("leave the key out"), "{error}");
+    }
+}
+
+#[test]
+fn a_scanner_of_another_clock_is_told_with_the_offset() {
+    let unset = |_| Stamp::default();
+    let simulated = |index| Stamp::default().plus_seconds(12.0 + 0.1 * f64::from(index));
+    let hour = |index| recorded(index).plus_seconds(3600.0);
+    let clocks: [(&str, &dyn Fn(u32) -> Stamp); 3] = [
+        ("its stamps are not set", &unset),
+        ("s before it, by another clock", &simulated),
+        ("3600.000 s after it", &hour),
+    ];
+    for (words, stamp_of) in clocks {
+        let mut log = log_of_camera("/cam/camera_info", (16, 12));
+        log.fixed("base_link", "front", &Isometry3::translation(0.2, 0.0, 0.3));
+        log.fixed("base_link", "rear", &Isometry3::translation(-0.2, 0.0, 0.3));
+        for index in 0..4 {
+            log.message("/scan", recorded(index), &sweep(stamp_of(index), "front"));
+            log.message("/scan_rear", recorded(index), &sweep(stamp_of(index), "rear"));
+            log.message("/scan_side", recorded(index), &sweep(recorded(index), "base_link"));
+        }
+        colour("/cam/color", "optical").write(&mut log, recorded);
+        let saved = log.save();
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
+        // By name it would be another.
+        assert_eq!(used(&source, "laser"), "/scan_side");
+        for topic in ["/scan", "/scan_rear"] {
+            let told = entry(&source, topic);
+            assert!(told.used_as.is_none() && told.to_string().contains(words), "{told}");
+            assert!(told.remedy.as_ref().unwrap().contains("`--stamps recording`"), "{told}");
+        }
+        // One that the settings name is told as well.
+        let named = InputSettings { laser_topic: Some("/scan".into()), ..InputSettings::default() };
+        let source = saved.open(&named, Inputs::ANY).unwrap();
+        assert!(entry(&source, "/scan").to_string().contains(words));
+        assert!(!source.account().usable().contains(&"laser"));
+        let input = InputSettings { stamps: StampSource::Recording, ..InputSettings::default() };
+        let mut source = saved.open(&input, Inputs::ANY).unwrap();
+        let frame = source.next_frame().unwrap().frame;
+        assert_eq!(frame.scans().count(), 3, "{words}");
     }
 }
 

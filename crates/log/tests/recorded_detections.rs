@@ -4,14 +4,15 @@
 #[path = "common/mod.rs"]
 mod common;
 
-use common::{LogWriter, at, started};
+use common::{LogWriter, SavedLog, at, started};
+use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{
-    BoundingBox2D, Detection2D, Detection2DArray, Header, ObjectHypothesis,
+    BoundingBox2D, Detection2D, Detection2DArray, Header, Image, ObjectHypothesis,
     ObjectHypothesisWithPose, Point2D, Pose2D, PoseWithCovariance, encode,
 };
-use tagalong_log::{FrameSource, Input, InputSettings, Inputs};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, StampSource};
 
 const TOPIC: &str = "/detections";
 
@@ -76,6 +77,29 @@ fn people_are_taken_and_other_classes_are_named() {
 }
 
 #[test]
+fn boxes_that_cannot_be_are_lost_with_the_cause() {
+    let nan = f64::NAN;
+    for (x, y, width, height, counter) in [
+        (8.0, nan, 4.0, 6.0, "detections_invalid"),
+        (8.0, 6.0, f64::INFINITY, 6.0, "detections_invalid"),
+        (8.0, 6.0, 0.0, 0.0, "detections_invalid"),
+        (8.0, 6.0, 4.0, -6.0, "detections_invalid"),
+        (0.5, 0.5, 0.2, 0.6, "detections_as_fractions"),
+        (0.1, 0.9, 1.0, 1.0, "detections_as_fractions"),
+    ] {
+        let mut message = array(stamp(0), &["person", "person"]);
+        let center = Pose2D { position: Point2D { x, y }, theta: 0.0 };
+        message.detections[0].bbox = BoundingBox2D { center, size_x: width, size_y: height };
+        let mut log = started();
+        log.message(TOPIC, stamp(0), &message);
+        let (counts, source) = read(log, 1, &[]);
+        assert_eq!(counts, [Some(1)], "{x} {y} {width} {height}");
+        assert_eq!(source.counters().get(counter), Some(&1), "{:?}", source.counters());
+        assert!(source.data_lost(), "{:?}", source.notes());
+    }
+}
+
+#[test]
 fn no_message_is_no_look_and_an_empty_one_is_nobody() {
     for every in [1, 2, 3, 5, 7] {
         let mut log = started();
@@ -90,6 +114,119 @@ fn no_message_is_no_look_and_an_empty_one_is_nobody() {
             assert_eq!(*count, expected, "frame {index}, every {every}");
         }
     }
+}
+
+/// Writes eight images, and detections of each with these stamps behind them.
+fn stamped(stamp_of: impl Fn(u32) -> Stamp, is_set_in_header: bool) -> SavedLog {
+    let mut log = started();
+    for index in 0..8 {
+        let mut message = array(stamp_of(index), &["person"]);
+        if !is_set_in_header {
+            message.header.stamp = Stamp::default().into();
+        }
+        log.message(TOPIC, stamp(index).plus_seconds(0.05), &message);
+    }
+    (0..8).for_each(|index| log.colour(stamp(index)));
+    log.save()
+}
+
+/// Reads a log to its end; returns the number of frames with detections.
+fn read_saved(saved: &SavedLog, input: &InputSettings) -> (usize, FrameSource) {
+    let topic = Some(TOPIC.to_owned());
+    let input = InputSettings { detections_topic: topic, ..input.clone() };
+    let inputs = Inputs::NONE.require(Input::Colour).require(Input::Detections);
+    let mut source = saved.open(&input, inputs).unwrap();
+    let frames = std::iter::from_fn(|| source.next_frame());
+    (frames.filter(|found| found.frame.recorded().is_some()).count(), source)
+}
+
+#[test]
+fn detections_that_belong_to_no_frame_are_lost_with_the_offset_and_the_remedy() {
+    for (offset_s, offset, remedy) in [
+        (0.04, "0.040 s after", "`pair_tolerance_s = 0.06`"),
+        (-2.0, "2.000 s before", "and set `pair_tolerance_s = 0.07`"),
+        (3600.0, "3600.000 s after", "`--stamps recording`"),
+        (-1.6e9, "s before it, by another clock", "and set `pair_tolerance_s = 0.07`"),
+    ] {
+        let saved = stamped(|index| stamp(index).plus_seconds(offset_s), true);
+        let (seen, source) = read_saved(&saved, &InputSettings::default());
+        assert_eq!(seen, 0, "{offset_s}");
+        assert!(source.data_lost(), "{offset_s}: {:?}", source.notes());
+        assert_eq!(source.counters()["detections_without_frame"], 8);
+        let told = source.account().used_as("detections").unwrap().to_string();
+        assert!(told.contains(offset) && told.contains(remedy), "{offset_s}: {told}");
+        assert!(source.notes().contains(&told), "{:?}", source.notes());
+    }
+}
+
+#[test]
+fn boxes_in_images_of_another_camera_are_left_out() {
+    let beside = Isometry3::translation(0.05, 0.0, 0.0);
+    let behind = Isometry3::rotation(Vector3::new(0.0, 3.0, 0.0));
+    for (frame, taken) in [
+        ("colour", 4),
+        ("/colour", 4),
+        ("", 4),
+        ("camera_link", 4),
+        ("base_link", 4),
+        ("yolo", 4),
+        ("beside_optical_frame", 4),
+        ("unknown_optical_frame", 4),
+        ("behind_optical_frame", 0),
+        ("/behind_optical_frame", 0),
+        ("rear", 0),
+    ] {
+        let mut log = started();
+        log.fixed("colour", "beside_optical_frame", &beside);
+        log.fixed("colour", "behind_optical_frame", &behind);
+        log.fixed("colour", "camera_link", &behind);
+        for index in 0..4 {
+            let mut message = array(stamp(index), &["person"]);
+            message.header.frame_id = frame.to_owned();
+            log.message(TOPIC, stamp(index), &message);
+            let header = Header::new(stamp(index), "rear");
+            let image = Image::packed(header, "rgb8", 2, 1, &[0; 6]);
+            log.message("/rear_camera/color/image_raw", stamp(index), &image);
+        }
+        (0..4).for_each(|index| log.colour(stamp(index)));
+        let colour_topic = Some("/camera/color/image_raw".to_owned());
+        let input = InputSettings { colour_topic, ..InputSettings::default() };
+        let (seen, source) = read_saved(&log.save(), &input);
+        assert_eq!(seen, taken, "{frame}: {:?}", source.notes());
+        assert_eq!(source.data_lost(), taken == 0, "{frame}");
+        let told = source.notes().iter().any(|note| note.contains("of another camera, whose"));
+        assert_eq!(told, taken == 0, "{frame}: {:?}", source.notes());
+        let told = source.notes().iter().any(|note| note.contains("is in no other message"));
+        assert_eq!(told, frame.starts_with("unknown"), "{frame}: {:?}", source.notes());
+    }
+}
+
+#[test]
+fn the_remedy_for_another_clock_works() {
+    let saved = stamped(|index| Stamp::default().plus_seconds(10.0 + 0.1 * f64::from(index)), true);
+    let stamps = StampSource::Recording;
+    let input = InputSettings { stamps, pair_tolerance_s: 0.07, ..InputSettings::default() };
+    let (seen, source) = read_saved(&saved, &input);
+    assert_eq!(seen, 8);
+    assert!(!source.data_lost(), "{:?}", source.notes());
+    // Where it is not enough, it is not told again.
+    let input = InputSettings { stamps, ..InputSettings::default() };
+    let (seen, source) = read_saved(&saved, &input);
+    let told = source.account().used_as("detections").unwrap().to_string();
+    assert_eq!(seen, 0);
+    assert!(told.contains("by their times of recording") && !told.contains("--stamps"), "{told}");
+}
+
+#[test]
+fn stamps_of_the_detections_stand_in_for_one_that_the_array_lacks() {
+    let (seen, source) = read_saved(&stamped(stamp, false), &InputSettings::default());
+    assert_eq!(seen, 8, "{:?}", source.notes());
+    assert!(!source.data_lost());
+    let unset = stamped(|_| Stamp::default(), false);
+    let (seen, source) = read_saved(&unset, &InputSettings::default());
+    assert_eq!(seen, 0);
+    let told = source.account().used_as("detections").unwrap().to_string();
+    assert!(source.data_lost() && told.contains("its stamps are not set"), "{told}");
 }
 
 /// Foxy's hypothesis: a text and a score beside the pose.
@@ -122,7 +259,7 @@ struct Foxy<'a> {
     header: Header,
     results: Vec<FoxyHypothesis>,
     bbox: FlatBox,
-    source_img: tagalong_log::msgs::Image<'a>,
+    source_img: Image<'a>,
     is_tracking: bool,
     tracking_id: String,
 }
@@ -135,7 +272,7 @@ fn foxy() -> Vec<u8> {
         header: header.clone(),
         results: vec![hypothesis],
         bbox: FLAT_BOX,
-        source_img: tagalong_log::msgs::Image::default(),
+        source_img: Image::default(),
         is_tracking: false,
         tracking_id: String::new(),
     };
@@ -157,12 +294,36 @@ struct Yolo {
     bbox: YoloBox,
 }
 
-fn yolo() -> Vec<u8> {
+fn yolo_of(classes: &[(i32, &str)]) -> Vec<u8> {
     let center = Pose2D { position: Point2D { x: 8.0, y: 6.0 }, theta: 0.0 };
-    let bbox = YoloBox { center, size: Point2D { x: 4.0, y: 6.0 } };
-    let one =
-        Yolo { class_id: 0, class_name: "person".into(), score: 0.9, id: String::new(), bbox };
-    encode(&(Header::new(stamp(0), "colour"), vec![one]))
+    let detections = classes.iter().map(|(class_id, class_name)| Yolo {
+        class_id: *class_id,
+        class_name: (*class_name).to_owned(),
+        score: 0.9,
+        id: "7".into(),
+        bbox: YoloBox { center, size: Point2D { x: 4.0, y: 6.0 } },
+    });
+    encode(&(Header::new(stamp(0), "colour"), detections.collect::<Vec<_>>()))
+}
+
+fn yolo() -> Vec<u8> {
+    yolo_of(&[(0, "person")])
+}
+
+#[test]
+fn a_class_without_a_name_is_that_of_its_number() {
+    for (classes, people) in [
+        (&[(0, ""), (56, ""), (2, "")][..], 1),
+        (&[(0, "person"), (56, "chair")], 1),
+        (&[(0, "chair"), (1, "person")], 1),
+        (&[(3, ""), (4, "")], 0),
+    ] {
+        let mut log = started();
+        let kind = ("yolo_msgs/msg/DetectionArray", YOLO);
+        log.defined(TOPIC, kind, "cdr", stamp(0), &yolo_of(classes));
+        let (counts, source) = read(log, 1, &[]);
+        assert_eq!(counts, [Some(people)], "{classes:?}: {:?}", source.notes());
+    }
 }
 
 const YOLO: &str = "std_msgs/Header header\nyolo_msgs/Detection[] detections\n====\n\

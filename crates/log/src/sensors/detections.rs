@@ -8,9 +8,12 @@ use tagalong_geometry::{HALF_HEAD_M, Rect};
 
 use super::{Moment, SensorReader, SensorType, is_type};
 use crate::InputSettings;
-use crate::msgs::{CdrError, Definition, Detection2DArray, Detection3DArray, Value};
+use crate::msgs::{
+    CdrError, Definition, Detection2DArray, Detection3DArray, Header, Time, Value, decode,
+};
 use crate::pairing::{Payload, Waiting};
 use crate::tally::Tally;
+use crate::topics::CameraFrames;
 use crate::walk::{Channel, Message};
 
 const BOXES: &str = "vision_msgs/Detection2DArray";
@@ -24,7 +27,7 @@ pub(super) const ENTRY: SensorType = SensorType {
     messages: &[BOXES, SPACE, YOLO[0], YOLO[1]],
     wanted: "recorded detections that `detections_topic` under [input] names",
     rank: None,
-    header: |_| Ok(None),
+    header: header_of,
     fault: |_| None,
     reader: |schema, input| Box::new(Recorded::new(schema, input)),
 };
@@ -53,9 +56,13 @@ struct Recorded {
     /// Classes that are people; empty: [`PEOPLE`].
     classes: Vec<String>,
     layouts: Vec<Definition>,
+    cameras: CameraFrames,
     waiting: Waiting,
     /// Message of the frame that is being made.
     paired: Option<Payload>,
+    /// Number of messages that were read, and of those that belong to a frame.
+    read: u64,
+    used: u64,
 }
 
 impl Recorded {
@@ -64,23 +71,43 @@ impl Recorded {
             in_space: is_type(schema, SPACE),
             classes: input.detection_classes.clone(),
             layouts: Vec::new(),
+            cameras: CameraFrames::default(),
             waiting: Waiting::default(),
             paired: None,
+            read: 0,
+            used: 0,
         }
     }
 }
 
 impl SensorReader for Recorded {
-    fn take(&mut self, message: &Message<'_>, _: &mut Tally) -> Result<(), CdrError> {
+    fn take(&mut self, message: &Message<'_>, tally: &mut Tally) -> Result<(), CdrError> {
         if self.layouts.is_empty() {
             self.layouts = layouts(message.channel);
         }
-        self.waiting.push(Payload::of_headed(message)?);
+        let mut payload = Payload::of_headed(message)?;
+        if payload.stamp == Stamp::default() {
+            payload.stamp = stamp_of_first(&self.layouts, message.data).unwrap_or_default();
+        }
+        self.read += 1;
+        if !self.in_space && self.cameras.is_other(&payload.frame_id) {
+            self.leave_out(&message.channel.topic, &payload.frame_id, tally);
+            return Ok(());
+        }
+        if !self.in_space && self.cameras.is_unknown(&payload.frame_id) {
+            tally.note(format!(
+                "{}: the detections have the frame_id `{}`, which is in no other message, and are \
+                 taken to be of the images with `{}`",
+                message.channel.topic, payload.frame_id, self.cameras.own
+            ));
+        }
+        self.waiting.push(payload);
         Ok(())
     }
 
     fn pair(&mut self, stamp: Stamp, next: Option<Stamp>, tolerance_s: f64) {
         self.paired = self.waiting.take(stamp, next, tolerance_s);
+        self.used += u64::from(self.paired.is_some());
     }
 
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
@@ -104,6 +131,54 @@ impl SensorReader for Recorded {
     fn restore(&mut self) {
         self.waiting.restore();
     }
+
+    fn know_cameras(&mut self, cameras: &CameraFrames) {
+        self.cameras = cameras.clone();
+    }
+
+    fn close(&mut self, topic: &str, tally: &mut Tally) {
+        tally.add("detections_without_frame", self.waiting.leave());
+        if self.read > 0 && self.used == 0 {
+            let read = self.read;
+            tally.lose("detections_lost", || {
+                format!(
+                    "{topic}: none of the {read} messages belongs to a frame, so that nobody is seen"
+                )
+            });
+        }
+    }
+}
+
+/// Returns the header of a message. Some drivers set the stamps of the detections alone, which is then
+/// that of the message.
+fn header_of(message: &Message<'_>) -> Result<Option<Header>, CdrError> {
+    let header: Header = decode(message.data)?;
+    if header.stamp() != Stamp::default() {
+        return Ok(Some(header));
+    }
+    let stamp = stamp_of_first(&layouts(message.channel), message.data).unwrap_or_default();
+    Ok(Some(Header::new(stamp, header.frame_id)))
+}
+
+/// Returns the stamp of the first detection of a message; `None` without one.
+fn stamp_of_first(layouts: &[Definition], data: &[u8]) -> Option<Stamp> {
+    let value = read(layouts, data).ok()?;
+    let first = value.list("detections").first()?;
+    let seconds = first.number(&["header.stamp.sec"])?;
+    let nanos = first.number(&["header.stamp.nanosec"])?;
+    Some(Time { sec: seconds as i32, nanosec: nanos as u32 }.into())
+}
+
+/// Reads a message by the first of several layouts that fits.
+fn read(layouts: &[Definition], data: &[u8]) -> Result<Value, String> {
+    let mut first = None;
+    for layout in layouts {
+        match layout.read(data) {
+            Ok(value) => return Ok(value),
+            Err(why) => first = first.or(Some(why)),
+        }
+    }
+    Err(first.unwrap_or_else(|| "the log does not define it".to_owned()))
 }
 
 /// Returns the layouts that the messages of a channel may have: that which the log defines, else all
@@ -127,6 +202,18 @@ fn layouts(channel: &Channel) -> Vec<Definition> {
 }
 
 impl Recorded {
+    /// Counts a message with boxes in the images of another camera.
+    fn leave_out(&self, topic: &str, frame: &str, tally: &mut Tally) {
+        let own = &self.cameras.own;
+        tally.remark("detections_of_other_camera", || {
+            format!(
+                "{topic}: detections in images of another camera, whose frame is `{frame}`, are left \
+                 out, because the images that are used have `{own}`: name the detections in those as \
+                 `detections_topic` under [input]"
+            )
+        });
+    }
+
     /// Returns the people in a message; `None`, counted, if it cannot be read.
     fn detections(
         &self,
@@ -134,7 +221,7 @@ impl Recorded {
         moment: &Moment<'_>,
         tally: &mut Tally,
     ) -> Option<Vec<ExternalDetection>> {
-        let value = match self.read(&message.data) {
+        let value = match read(&self.layouts, &message.data) {
             Ok(value) => value,
             Err(why) => {
                 let topic = moment.topic;
@@ -148,19 +235,8 @@ impl Recorded {
         if self.in_space {
             Some(in_space(&people, message, moment, tally))
         } else {
-            Some(people.iter().filter_map(|(it, score)| in_image(it, *score)).collect())
+            Some(in_image(&people, moment, tally))
         }
-    }
-
-    fn read(&self, data: &[u8]) -> Result<Value, String> {
-        let mut first = None;
-        for layout in &self.layouts {
-            match layout.read(data) {
-                Ok(value) => return Ok(value),
-                Err(why) => first = first.or(Some(why)),
-            }
-        }
-        Err(first.unwrap_or_else(|| "the log does not define it".to_owned()))
     }
 
     /// Returns the detections of people with their scores; the others are counted, and their classes
@@ -222,27 +298,82 @@ fn best_hypothesis(detection: &Value) -> (String, f64) {
     for hypothesis in hypotheses {
         let score = hypothesis.number(&["hypothesis.score", "score"]);
         let score = score.filter(|score| score.is_finite()).unwrap_or(1.0);
-        let class = hypothesis.text(&[
-            "hypothesis.class_id",
-            "hypothesis.id",
-            "class_name",
-            "class_id",
-            "id",
-        ]);
+        let class = class_of(hypothesis);
         if best.as_ref().is_none_or(|(_, highest)| score > *highest) {
-            best = Some((class.unwrap_or_default(), score));
+            best = Some((class, score));
         }
     }
     best.unwrap_or_else(|| (String::new(), 1.0))
 }
 
-fn in_image(detection: &Value, score: f64) -> Option<ExternalDetection> {
+/// Names of the fields of a class, by preference.
+const CLASS_FIELDS: [&str; 5] =
+    ["hypothesis.class_id", "hypothesis.id", "class_name", "class_id", "id"];
+
+/// Returns the class of a hypothesis: the first field that is not empty, as the number beside a name
+/// that the detector does not know.
+fn class_of(hypothesis: &Value) -> String {
+    for field in CLASS_FIELDS {
+        match hypothesis.text(&[field]) {
+            Some(class) if !class.is_empty() => return class,
+            _ => {}
+        }
+    }
+    String::new()
+}
+
+/// Returns the people in an image. Boxes that are none are counted as lost.
+fn in_image(
+    people: &[(&Value, f64)],
+    moment: &Moment<'_>,
+    tally: &mut Tally,
+) -> Vec<ExternalDetection> {
+    let topic = moment.topic;
+    let mut found = Vec::new();
+    for (detection, score) in people {
+        let Some(region) = region_of(detection) else {
+            lose_box(topic, tally);
+            continue;
+        };
+        if is_fraction(&region) {
+            tally.lose("detections_as_fractions", || {
+                format!(
+                    "{topic}: a box of {:.3} x {:.3} is a fraction of the image: let the detector \
+                     write boxes in pixels",
+                    region.width, region.height
+                )
+            });
+            continue;
+        }
+        found.push(ExternalDetection { region: Some(region), head: None, score: *score });
+    }
+    found
+}
+
+/// Returns the box of a detection; `None` for one with numbers that are not finite, or without a size.
+fn region_of(detection: &Value) -> Option<Rect> {
     let width = detection.number(&["bbox.size_x", "bbox.size.x"])?;
     let height = detection.number(&["bbox.size_y", "bbox.size.y"])?;
     let x = detection.number(&["bbox.center.position.x", "bbox.center.x"])? - 0.5 * width;
     let y = detection.number(&["bbox.center.position.y", "bbox.center.y"])? - 0.5 * height;
     let region = Rect { x, y, width, height };
-    region.is_sane().then_some(ExternalDetection { region: Some(region), head: None, score })
+    let has_size = width > 0.0 && height > 0.0;
+    (region.is_sane() && has_size).then_some(region)
+}
+
+/// Counts a person whose place cannot be as lost.
+fn lose_box(topic: &str, tally: &mut Tally) {
+    tally.lose("detections_invalid", || {
+        format!("{topic}: a box has no size, or a number that is not finite")
+    });
+}
+
+/// Returns true for a box within the first pixel, which is a share of the image and no place in it.
+fn is_fraction(region: &Rect) -> bool {
+    region.width <= 1.0
+        && region.height <= 1.0
+        && (-1.0..=1.0).contains(&region.x)
+        && (-1.0..=1.0).contains(&region.y)
 }
 
 fn in_space(
@@ -261,11 +392,16 @@ fn in_space(
         tally.count("detections_without_transform");
         return Vec::new();
     };
-    let each = people.iter().filter_map(|(detection, score)| {
-        let head = head_of(detection, &robot_from_message)?;
-        Some(ExternalDetection { region: None, head: Some(head), score: *score })
-    });
-    each.collect()
+    let mut found = Vec::new();
+    for (detection, score) in people {
+        match head_of(detection, &robot_from_message) {
+            Some(head) => {
+                found.push(ExternalDetection { region: None, head: Some(head), score: *score });
+            }
+            None => lose_box(moment.topic, tally),
+        }
+    }
+    found
 }
 
 /// Returns the centre of the head of a person in a box: below the upper end of the box.

@@ -6,6 +6,7 @@ use nalgebra::{Isometry2, Isometry3, Point3, UnitQuaternion, Vector3};
 use tagalong_core::{FurtherScans, Input, LaserScan as Scan, RayReading, Sensors, UnreadRay};
 
 use super::recent::Recent;
+pub(crate) use super::scan_faults::scan_fault;
 use super::{Moment, SensorReader, SensorType};
 use crate::msgs::{CdrError, LaserScan, decode};
 use crate::tally::Tally;
@@ -17,7 +18,7 @@ pub(super) const ENTRY: SensorType = SensorType {
     messages: &["sensor_msgs/LaserScan"],
     wanted: "laser scans",
     rank: Some(rank),
-    header: |data| decode::<LaserScan>(data).map(|scan| Some(scan.header)),
+    header: |message| decode::<LaserScan>(message.data).map(|scan| Some(scan.header)),
     fault: |data| scan_fault(&decode(data).ok()?),
     reader: |_, _| Box::<Scans>::default(),
 };
@@ -29,8 +30,6 @@ fn rank(topic: &str) -> i32 {
 
 /// Maximum number of scans kept: those of the frames that wait for their turn.
 const KEPT: usize = 64;
-/// Maximum number of rays of a scan.
-const MAX_RAYS: usize = 65_536;
 
 /// Scans of the last seconds.
 #[derive(Default)]
@@ -128,77 +127,8 @@ pub(crate) fn on_floor(motion: &Isometry2<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Vector3::new(x, y, 0.0).into(), turn)
 }
 
-/// Rounding of the angles by drivers, in rays and as a share of the view.
-const ROUNDED_RAYS: f64 = 2.0;
-const ROUNDED_SHARE: f64 = 0.02;
-/// Largest view of a scanner, rad: one turn, and a little for rays that overlap.
-const WIDEST_RAD: f64 = 1.1 * std::f64::consts::TAU;
-
-/// Returns the field of a scan that cannot be, with its value; `None` for a scan that can be used.
-pub(crate) fn scan_fault(scan: &LaserScan) -> Option<String> {
-    let fields = [
-        ("angle_min", scan.angle_min),
-        ("angle_increment", scan.angle_increment),
-        ("range_min", scan.range_min),
-    ];
-    if let Some((name, value)) = fields.iter().find(|(_, value)| !value.is_finite()) {
-        return Some(format!("{name} is {value}"));
-    }
-    if limits(scan).is_empty() || scan.range_max.is_nan() {
-        let min = scan.range_min;
-        let max = scan.range_max;
-        return Some(format!("range_max is {max} and range_min {min}"));
-    }
-    let rays = scan.ranges.len();
-    if rays == 0 {
-        return Some("ranges is empty".into());
-    }
-    if rays > MAX_RAYS {
-        return Some(format!("ranges has {rays} values, more than {MAX_RAYS}"));
-    }
-    let increment = f64::from(scan.angle_increment);
-    if rays > 1 && increment == 0.0 {
-        return Some(format!("angle_increment is 0 with {rays} ranges: all lie in one direction"));
-    }
-    let view_rad = increment.abs() * (rays - 1) as f64;
-    if view_rad > WIDEST_RAD {
-        return Some(format!(
-            "angle_increment is {increment} with {rays} ranges, a view of {view_rad:.1} rad"
-        ));
-    }
-    told_view_fault(scan, view_rad)
-}
-
-/// Returns the contradiction between the last angle of a scan and the number of its rays.
-fn told_view_fault(scan: &LaserScan, view_rad: f64) -> Option<String> {
-    let told_rad = f64::from(scan.angle_max) - f64::from(scan.angle_min);
-    // Some drivers leave it out, and some turn it by whole turns.
-    if !told_rad.is_finite() || told_rad == 0.0 || scan.ranges.len() < 2 {
-        return None;
-    }
-    let step_rad = f64::from(scan.angle_increment).abs();
-    let slack_rad = ROUNDED_RAYS * step_rad + ROUNDED_SHARE * view_rad;
-    let turned_rad = std::f64::consts::TAU - told_rad.abs();
-    let off_rad = (told_rad.abs() - view_rad).abs();
-    if off_rad <= slack_rad || (turned_rad.abs() - view_rad).abs() <= slack_rad {
-        return None;
-    }
-    // A tenth is beyond all rounding; less is told by the ranges as they are.
-    (off_rad > 0.1 * view_rad.max(told_rad.abs())).then(|| {
-        format!(
-            "angle_min {:.3} to angle_max {:.3} is {:.3} rad, and {} ranges with angle_increment {} \
-             are {view_rad:.3} rad",
-            scan.angle_min,
-            scan.angle_max,
-            told_rad.abs(),
-            scan.ranges.len(),
-            scan.angle_increment
-        )
-    })
-}
-
 /// Returns the valid ranges of the scanner, m.
-fn limits(scan: &LaserScan) -> RangeInclusive<f32> {
+pub(super) fn limits(scan: &LaserScan) -> RangeInclusive<f32> {
     scan.range_min.max(0.0)..=scan.range_max
 }
 
@@ -262,52 +192,6 @@ mod tests {
         assert!((right - Point3::new(0.0, -2.0, 0.0)).norm() < 1e-6);
         assert!((left - Point3::new(0.0, 3.0, 0.0)).norm() < 1e-6);
         assert_eq!(points(&scan(1.0, &[0.05, f32::NAN, 11.0])).count(), 0);
-    }
-
-    fn base() -> LaserScan {
-        LaserScan {
-            angle_increment: 0.01,
-            angle_min: -0.5,
-            angle_max: 0.5,
-            ..scan(1.0, &[1.0; 101])
-        }
-    }
-
-    #[test]
-    fn a_header_that_cannot_be_is_refused_with_its_field() {
-        assert_eq!(scan_fault(&base()), None);
-        let nan = f32::NAN;
-        for (field, broken) in [
-            ("angle_min is NaN", LaserScan { angle_min: nan, ..base() }),
-            ("angle_increment is inf", LaserScan { angle_increment: f32::INFINITY, ..base() }),
-            ("angle_increment is 0", LaserScan { angle_increment: 0.0, ..base() }),
-            ("angle_increment is 0.1", LaserScan { angle_increment: 0.1, ..base() }),
-            ("angle_max 3.000", LaserScan { angle_max: 3.0, ..base() }),
-            ("range_max is NaN", LaserScan { range_max: nan, ..base() }),
-            ("range_max is 0.01", LaserScan { range_max: 0.01, ..base() }),
-            ("range_min is NaN", LaserScan { range_min: nan, ..base() }),
-            ("ranges is empty", LaserScan { ranges: vec![], ..base() }),
-            ("ranges has 65537", LaserScan { ranges: vec![1.0; MAX_RAYS + 1], ..base() }),
-        ] {
-            let why = scan_fault(&broken).unwrap_or_default();
-            assert!(why.contains(field), "{field}: {why}");
-        }
-    }
-
-    #[test]
-    fn headers_of_real_drivers_are_taken() {
-        for fine in [
-            // One ray more or less than the angles say, both ends of a turn, a turn the other way,
-            // no last angle, no largest range.
-            LaserScan { ranges: vec![1.0; 102], ..base() },
-            LaserScan { ranges: vec![1.0; 100], ..base() },
-            LaserScan { angle_min: 0.5, angle_max: -0.5, angle_increment: -0.01, ..base() },
-            LaserScan { angle_min: 0.0, angle_max: 0.0, ..base() },
-            LaserScan { range_max: f32::INFINITY, ..base() },
-            LaserScan { ranges: vec![1.0], angle_increment: 0.0, ..base() },
-        ] {
-            assert_eq!(scan_fault(&fine), None, "{fine:?}");
-        }
     }
 
     #[test]

@@ -16,7 +16,8 @@
 mod detections;
 pub(crate) mod laser;
 pub(crate) mod points;
-mod recent;
+pub(crate) mod recent;
+mod scan_faults;
 
 use std::sync::Arc;
 
@@ -28,6 +29,7 @@ use tagalong_geometry::Camera;
 use crate::msgs::{CdrError, Header};
 use crate::tally::Tally;
 use crate::tf::TfBuffer;
+use crate::topics::CameraFrames;
 use crate::walk::Message;
 use crate::{InputSettings, LogError};
 
@@ -47,7 +49,7 @@ pub(crate) struct SensorType {
     /// another. `None`: only a named topic is read.
     pub(crate) rank: Option<fn(&str) -> i32>,
     /// Reads the header of a message in the first pass; `None` if the message is only counted.
-    pub(crate) header: fn(&[u8]) -> Result<Option<Header>, CdrError>,
+    pub(crate) header: fn(&Message<'_>) -> Result<Option<Header>, CdrError>,
     /// Returns the field of a message that cannot be, for the account of the topics.
     pub(crate) fault: fn(&[u8]) -> Option<String>,
     /// Creates the reader of a topic from the type of its messages.
@@ -85,6 +87,16 @@ pub(crate) trait SensorReader: Send + Sync {
 
     /// Returns to the messages that were set aside.
     fn restore(&mut self) {}
+
+    /// Learns the frames of the cameras of a log, before the first message.
+    fn know_cameras(&mut self, cameras: &CameraFrames) {
+        let _ = cameras;
+    }
+
+    /// Counts at the end of a log what found no frame.
+    fn close(&mut self, topic: &str, tally: &mut Tally) {
+        let _ = (topic, tally);
+    }
 }
 
 /// The moment of a frame, and the transforms that are known of it.

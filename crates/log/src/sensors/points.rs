@@ -20,7 +20,7 @@ pub(super) const ENTRY: SensorType = SensorType {
     messages: &["sensor_msgs/PointCloud2"],
     wanted: "points of a lidar",
     rank: Some(rank),
-    header: |data| decode::<PointCloud2<'_>>(data).map(|cloud| Some(cloud.header)),
+    header: |message| decode::<PointCloud2<'_>>(message.data).map(|cloud| Some(cloud.header)),
     fault: |_| None,
     reader: |_, _| Box::<Clouds>::default(),
 };

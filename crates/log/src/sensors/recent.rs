@@ -8,7 +8,7 @@ use crate::msgs::LaserScan;
 use crate::pairing::Payload;
 
 /// Maximum time between a message and an image, s.
-const NEAR_S: f64 = 0.25;
+pub(crate) const NEAR_S: f64 = 0.25;
 
 /// A message with a time.
 pub(super) trait Stamped {

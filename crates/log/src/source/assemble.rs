@@ -54,6 +54,11 @@ impl Assembler {
         }
     }
 
+    /// Returns the number of messages that were to make a frame.
+    pub(super) fn count(&self) -> u64 {
+        self.index
+    }
+
     /// Returns the camera of the last frame.
     pub(super) fn camera(&self) -> Option<&Arc<Camera>> {
         self.camera.as_ref()

@@ -13,6 +13,7 @@ use super::{LogFacts, LogFrame};
 use crate::camera_info::CalibrationError;
 use crate::scan::Type;
 use crate::tally::Tally;
+use crate::topics::{is_unusual, unpaired};
 use crate::walk::{Channel, Message};
 
 /// Sequence of messages.
@@ -28,11 +29,20 @@ pub(super) struct Assembly {
     intake: Intake,
     assembler: Assembler,
     ended: bool,
+    /// True once what found no frame is counted.
+    is_closed: bool,
 }
 
 impl Assembly {
     pub(super) fn new(plan: Plan, tally: Tally) -> Self {
-        Self { intake: Intake::new(&plan), assembler: Assembler::new(), plan, tally, ended: false }
+        Self {
+            intake: Intake::new(&plan),
+            assembler: Assembler::new(),
+            plan,
+            tally,
+            ended: false,
+            is_closed: false,
+        }
     }
 
     /// Returns true for topics with messages that are used.
@@ -70,11 +80,42 @@ impl Assembly {
             }
         }
         // Partners that still wait at the end have none.
-        if self.ended {
-            self.tally.add("depth_without_colour", self.intake.depth.leave());
-            self.tally.add("right_without_left", self.intake.right.leave());
+        if self.ended && !self.is_closed {
+            self.is_closed = true;
+            self.intake.close(&mut self.tally);
+            self.tell_unpaired();
         }
         None
+    }
+
+    /// Tells why many frames have no image of a second topic: as a loss where they are useless without.
+    fn tell_unpaired(&mut self) {
+        let plan = &self.plan;
+        let chosen = &plan.chosen;
+        let frames = self.assembler.count();
+        let depth = chosen.depth.as_ref().filter(|_| plan.has_second_depth());
+        for (input, topic, counter) in [
+            (Input::Depth, depth, "colour_without_depth"),
+            (Input::Right, chosen.right.as_ref(), "left_without_right"),
+        ] {
+            let without = self.tally.counters.get(counter).copied().unwrap_or(0);
+            let Some(topic) = topic.filter(|_| is_unusual(without, frames)) else { continue };
+            let tolerance_s = plan.input.pair_tolerance_s;
+            let Some(problem) = unpaired(&plan.scan, plan.primary(), topic, tolerance_s) else {
+                continue;
+            };
+            let note = format!(
+                "{without} of {frames} frames have no image of {topic} within {:.0} ms: {}; {}",
+                1e3 * tolerance_s,
+                problem.why,
+                problem.remedy
+            );
+            if plan.inputs.requires(input) {
+                self.tally.lose_counted(note);
+            } else if plan.inputs.uses(input) && chosen.depth_problem.is_none() {
+                self.tally.note(note);
+            }
+        }
     }
 
     /// Returns the newest frame with all its images; older ones are skipped and counted.

@@ -19,7 +19,7 @@ use crate::sensors::laser::Scans;
 use crate::sensors::{SENSORS, SensorReader};
 use crate::tally::Tally;
 use crate::tf::TfBuffer;
-use crate::topics::Chosen;
+use crate::topics::{CameraFrames, Chosen};
 use crate::walk::Message;
 
 /// Time of recording of a live message whose arrival is not told.
@@ -191,10 +191,15 @@ impl Intake {
             Arrival::Duplicate => tally.count("duplicate_frames"),
             Arrival::SameStamp => {
                 let topic = self.primary.clone();
+                let remedy = if self.has_recording_times {
+                    "the recorder gave them one time"
+                } else {
+                    "`--stamps recording` takes the times of recording"
+                };
                 tally.lose("frames_of_same_stamp", || {
                     format!(
                         "{topic}: different images have the same stamp, and only the first of them \
-                         makes a frame: `--stamps recording` takes the times of recording"
+                         makes a frame: {remedy}"
                     )
                 });
             }
@@ -287,6 +292,15 @@ impl Intake {
             self.sensors.iter_mut().for_each(|(_, sensor)| sensor.restore());
         }
     }
+
+    /// Counts at the end of a log what found no frame.
+    pub(super) fn close(&mut self, tally: &mut Tally) {
+        tally.add("depth_without_colour", self.depth.leave());
+        tally.add("right_without_left", self.right.leave());
+        for (topic, sensor) in &mut self.sensors {
+            sensor.close(topic, tally);
+        }
+    }
 }
 
 /// Creates a decoder for each topic with video.
@@ -307,6 +321,8 @@ fn readers(plan: &Plan, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
             (name.to_owned(), (sensor.reader)(schema, input))
         })
         .collect();
+    let cameras = CameraFrames::of(scan, primary);
+    readers.iter_mut().for_each(|(_, reader)| reader.know_cameras(&cameras));
     for topic in &chosen.further_scans {
         readers.push((topic.clone(), Box::new(Scans::further())));
     }

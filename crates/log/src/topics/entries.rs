@@ -1,7 +1,9 @@
 //! Reasons for which topics are used or not.
 
 use super::account::{InputAccount, TopicUse};
-use super::kinds::{depth_as_picture, is_image, is_odometry, is_of, kind_of, unreadable};
+use super::kinds::{
+    depth_as_picture, is_image, is_odometry, is_of, kind_of, unread_detections, unreadable,
+};
 use super::problems::{SCANNER_REMEDY, depth_problem, scanner_problem};
 use super::rigs::{Rig, rigs};
 use super::{Chosen, Relation, Stream, TopicName, named_topic};
@@ -47,7 +49,8 @@ impl Judge<'_> {
         let lacks_depth = self.inputs.uses(Input::Depth) && self.chosen.depth.is_none();
         let sensor = sensor.filter(|_| !(topic.is_lidar() && lacks_depth));
         let is_known = is_image(topic) || is_odometry(topic) || sensor.is_some();
-        if !is_known && unreadable(topic).is_none() {
+        let unread = unread_detections(topic);
+        if !is_known && unreadable(topic).is_none() && unread.is_none() {
             return None;
         }
         let used_as = self.use_of(name);
@@ -56,7 +59,10 @@ impl Judge<'_> {
             None => Some(match sensor {
                 Some(sensor) => self.unused_sensor(name, topic, sensor),
                 None if is_odometry(topic) => self.unused_odometry(name, topic),
-                None => self.unused_image(name, topic),
+                None => match unread {
+                    Some(why) => empty(topic).unwrap_or((why, None)),
+                    None => self.unused_image(name, topic),
+                },
             }),
         };
         let (problem, remedy) = match reason {
@@ -132,7 +138,11 @@ impl Judge<'_> {
             ));
         }
         let is_depth = self.chosen.depth.as_deref() == Some(name);
-        let problem = self.chosen.depth_problem.as_ref().filter(|_| is_depth)?;
+        let mut sensors = self.chosen.sensors.iter();
+        let sensor = sensors.find(|(_, topic)| *topic == name).map(|(input, _)| input);
+        let of_sensor = sensor.and_then(|input| self.chosen.sensor_problems.get(input));
+        let of_depth = self.chosen.depth_problem.as_ref().filter(|_| is_depth);
+        let problem = of_sensor.or(of_depth)?;
         Some((problem.why.clone(), Some(problem.remedy.clone())))
     }
 
@@ -230,7 +240,8 @@ impl Judge<'_> {
         let takes = format!("`{key} = \"{name}\"` under [input] takes this one");
         if let Some(other) = self.chosen.sensor(sensor.input) {
             let is_scan = sensor.input == Input::Laser && self.input.laser_topic.is_none();
-            let problem = scanner_problem(self.scan, self.input, other, name);
+            let primary = self.chosen.primary();
+            let problem = scanner_problem(self.scan, self.input, primary, other, name);
             if let Some(problem) = problem.filter(|_| is_scan) {
                 let remedy = Some(problem.remedy).filter(|remedy| !remedy.is_empty());
                 return (problem.why, remedy);

@@ -1,10 +1,12 @@
 //! Kinds of topics, as far as types, encodings and first messages tell them, and their ranks by name.
 
+use tagalong_core::Input;
+
 use super::name::{Stream, TopicName};
 use crate::InputSettings;
 use crate::images::{Content, H264, VIDEO_REMEDY, may_be_disparity, refusal_of};
 use crate::scan::{Topic, Type};
-use crate::sensors::SensorType;
+use crate::sensors::{SENSORS, SensorType};
 
 pub(super) fn is_picture(topic: &Topic) -> bool {
     matches!(topic.kind, Type::Image | Type::CompressedImage | Type::Video)
@@ -120,6 +122,35 @@ fn is_video(topic: &Topic) -> bool {
     let name = topic.schema.rsplit(['/', '.']).next().unwrap_or_default();
     let is_theora = topic.pixels.as_deref().is_some_and(|pixels| pixels.contains("theora"));
     topic.kind == Type::Video || VIDEO_MESSAGES.contains(&name) || is_theora
+}
+
+/// Names of messages with detections of objects or people, whatever their package.
+const DETECTION_MESSAGES: [&str; 10] = [
+    "BoundingBoxes",
+    "Detection2DArray",
+    "Detection3DArray",
+    "DetectionArray",
+    "SpatialDetectionArray",
+    "DetectedObjects",
+    "DetectedPersons",
+    "ObjectsStamped",
+    "People",
+    "PositionMeasurementArray",
+];
+
+/// Returns the reason for which detections of a topic cannot be read; `None` for those that can, and
+/// for all other topics.
+pub(super) fn unread_detections(topic: &Topic) -> Option<String> {
+    let name = topic.schema.rsplit('/').next().unwrap_or_default();
+    let is_message = matches!(topic.encoding.as_str(), "cdr" | "ros1");
+    let is_unread = topic.kind == Type::Other && is_message && DETECTION_MESSAGES.contains(&name);
+    is_unread.then(|| format!("its type is not read; {} are", detection_types()))
+}
+
+/// Returns the types of detections that are read.
+pub(super) fn detection_types() -> String {
+    let sensor = SENSORS.iter().find(|sensor| sensor.input == Input::Detections);
+    sensor.map(|sensor| sensor.messages.join(", ")).unwrap_or_default()
 }
 
 pub(super) fn is_info(topic: &Topic) -> bool {

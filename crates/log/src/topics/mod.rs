@@ -11,22 +11,25 @@ mod kinds;
 mod name;
 mod problems;
 mod rigs;
+mod unpaired;
 
 use std::collections::BTreeMap;
 
 pub use account::{InputAccount, TopicUse};
 pub(crate) use calibration::{FoundCalibration, Relation, calibration_of, intrinsics_of};
 use kinds::{
-    could_be_depth, depth_as_picture, disparity_rank, is_info, is_odometry, is_of, is_usable_depth,
-    is_usable_picture, odometry_rank, remedy_as_depth,
+    could_be_depth, depth_as_picture, detection_types, disparity_rank, is_info, is_odometry, is_of,
+    is_usable_depth, is_usable_picture, odometry_rank, remedy_as_depth,
 };
 pub(crate) use kinds::{kind_of, unreadable};
 pub(crate) use name::{Stream, TopicName};
 pub(crate) use problems::Problem;
-use problems::{odometry_problem, scanner_problem};
+use problems::{detections_problem, odometry_problem, scan_times_problem, scanner_problem};
+pub(crate) use rigs::CameraFrames;
 use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
+pub(crate) use unpaired::{is_unusual, unpaired};
 
 use crate::obstacles::ObstacleTopic;
 use crate::scan::{Scan, Topic};
@@ -54,6 +57,8 @@ pub(crate) struct Chosen {
     pub(crate) unused_odometry: Option<(String, Problem)>,
     /// Topics of the sensors beside the images.
     pub(crate) sensors: BTreeMap<Input, String>,
+    /// Reasons for which chosen sensors give nothing.
+    pub(crate) sensor_problems: BTreeMap<Input, Problem>,
     /// Topics of further laser scanners on the robot.
     pub(crate) further_scans: Vec<String>,
 }
@@ -138,9 +143,10 @@ pub(crate) fn choose(
         choose_images(scan, input, inputs)?
     };
     let (Pick { colour, depth, right, depth_problem }, camera) = images;
+    let images = colour.as_ref().or(depth.as_ref()).cloned();
     let mut sensors = BTreeMap::new();
     for sensor in SENSORS.iter().filter(|sensor| inputs.uses(sensor.input)) {
-        let topic = choose_sensor(scan, sensor, input)?;
+        let topic = choose_sensor(scan, sensor, input, images.as_deref())?;
         sensors.extend(topic.map(|topic| (sensor.input, topic)));
     }
     let odometry = named(scan, "odometry_topic", input.odometry_topic.as_deref(), is_odometry)?
@@ -172,15 +178,27 @@ pub(crate) fn choose(
         camera,
         depth_problem,
         unused_odometry: None,
-        further_scans: further_scans(scan, input, sensors.get(&Input::Laser)),
+        sensor_problems: BTreeMap::new(),
+        further_scans: Vec::new(),
         sensors,
     };
     let primary = chosen.primary().to_owned();
+    chosen.further_scans = further_scans(scan, input, &primary, chosen.sensor(Input::Laser));
     if let Some(odometry) = chosen.odometry.take() {
         match odometry_problem(scan, &primary, &odometry) {
             Some(problem) => chosen.unused_odometry = Some((odometry, problem)),
             None => chosen.odometry = Some(odometry),
         }
+    }
+    if let Some(detections) = chosen.sensor(Input::Detections)
+        && let Some(problem) = detections_problem(scan, input, &primary, detections)
+    {
+        chosen.sensor_problems.insert(Input::Detections, problem);
+    }
+    if let Some(scanner) = chosen.sensor(Input::Laser)
+        && let Some(problem) = scan_times_problem(scan, &primary, scanner)
+    {
+        chosen.sensor_problems.insert(Input::Laser, problem);
     }
     Ok(chosen)
 }
@@ -274,13 +292,18 @@ fn wanted_rigs<'a>(
 }
 
 /// Returns the topics of the scanners beside the first one, unless the settings name one.
-fn further_scans(scan: &Scan, input: &InputSettings, first: Option<&String>) -> Vec<String> {
+fn further_scans(
+    scan: &Scan,
+    input: &InputSettings,
+    primary: &str,
+    first: Option<&str>,
+) -> Vec<String> {
     let Some(first) = first.filter(|_| input.laser_topic.is_none()) else { return Vec::new() };
     let further = scan.topics.iter().filter(|(name, topic)| {
         let is_scan =
             SENSORS.iter().any(|sensor| sensor.input == Input::Laser && is_of(sensor, topic))
                 && *name != first;
-        is_scan && topic.count > 0 && scanner_problem(scan, input, first, name).is_none()
+        is_scan && topic.count > 0 && scanner_problem(scan, input, primary, first, name).is_none()
     });
     further.map(|(name, _)| name.clone()).collect()
 }
@@ -290,17 +313,21 @@ fn choose_sensor(
     scan: &Scan,
     sensor: &SensorType,
     input: &InputSettings,
+    images: Option<&str>,
 ) -> Result<Option<String>, LogError> {
     let named = named(scan, &sensor.key(), named_topic(sensor, input), |it| is_of(sensor, it))?;
     let robot = robot_frame(scan, input);
     Ok(named.or_else(|| {
         best_of(scan, &input.sources, scan.names(), |name, topic| {
             let rank = sensor.rank.filter(|_| is_of(sensor, topic))?(&name.to_lowercase());
-            // Any scanner is better than one whose scans cannot be, or whose place is not known.
+            // Any scanner is better than one whose scans cannot be, or without a place or a time.
             let frame = topic.frame_id.as_ref();
             let has_place = frame.is_none_or(|frame| scan.tf.connects(robot, frame));
             let is_possible = topic.impossible().is_none();
-            Some(rank - 100 * i32::from(!is_possible) - 50 * i32::from(!has_place))
+            let has_time =
+                images.is_none_or(|images| scan_times_problem(scan, images, name).is_none());
+            let lacks = 50 * (i32::from(!has_place) + i32::from(!has_time));
+            Some(rank - 100 * i32::from(!is_possible) - lacks)
         })
     }))
 }
@@ -446,6 +473,10 @@ fn named(
         let remedy = unreadable(topic)
             .or_else(|| as_depth.map(|remedy| format!("if it is meant, {remedy}")))
             .or_else(|| other.map(|other| format!("{other} would fit")))
+            .or_else(|| {
+                let types = format!("read are {}", detection_types());
+                (key == "detections_topic").then(|| format!("{types}: convert it to one of them"))
+            })
             .unwrap_or_else(|| "no topic of the log would fit: leave the key out".to_owned());
         let path = scan.path.clone();
         let kind = kind_of(topic);

@@ -4,6 +4,7 @@ use super::calibration::{calibration_of, calibrations, intrinsics_of, misfit};
 use crate::InputSettings;
 use crate::camera_info::Intrinsics;
 use crate::scan::{Scan, Topic};
+use crate::sensors::recent::NEAR_S as NEAR_SCAN_S;
 use crate::source::robot_frame;
 use crate::timing::Skew;
 
@@ -20,12 +21,17 @@ impl Problem {
     }
 }
 
+/// Share of the messages that a remedy has to bring together with frames.
+const MOST_PAIRED: f64 = 0.5;
 /// Offset beyond which two topics have different clocks, s.
 const OTHER_CLOCK_S: f64 = 5.0;
 
 /// Remedy for clocks that differ.
 pub(super) const RECORDING: &str = "take the times of recording in place of the stamps: `--stamps recording`, or \
      `stamps = \"recording\"` under [input]";
+
+/// Remedy for messages that were recorded at another time.
+pub(super) const TOGETHER: &str = "record it together with the sensor that makes the frames";
 
 /// Returns the reason for which depth cannot be brought together with the colour images.
 pub(crate) fn depth_problem(
@@ -38,7 +44,7 @@ pub(crate) fn depth_problem(
     let of_depth = scan.topics.get(depth)?;
     // On a robot, the first messages tell nothing about those to come.
     if !scan.is_live()
-        && let Some(problem) = pairing_problem(of_colour, of_depth, input.pair_tolerance_s)
+        && let Some(problem) = pairing_problem(scan, of_colour, of_depth, input.pair_tolerance_s)
     {
         return Some(problem);
     }
@@ -46,7 +52,12 @@ pub(crate) fn depth_problem(
 }
 
 /// Returns the reason for which no image of a second topic is near one of the first in time.
-fn pairing_problem(first: &Topic, second: &Topic, tolerance_s: f64) -> Option<Problem> {
+pub(super) fn pairing_problem(
+    scan: &Scan,
+    first: &Topic,
+    second: &Topic,
+    tolerance_s: f64,
+) -> Option<Problem> {
     if second.has_constant_stamps() && !first.has_constant_stamps() {
         return Problem::new("its stamps never change", RECORDING);
     }
@@ -56,20 +67,121 @@ fn pairing_problem(first: &Topic, second: &Topic, tolerance_s: f64) -> Option<Pr
     }
     let off_s = skew.median_s;
     let size_s = off_s.abs();
-    let side = if off_s > 0.0 { "after" } else { "before" };
+    let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
     let why = format!(
-        "none of its images is within {:.0} ms of a colour image: by their stamps they come \
-         {size_s:.3} s {side} it",
-        1e3 * tolerance_s
+        "none of its images is within {:.0} ms of a colour image: by their {times} they come {} it",
+        1e3 * tolerance_s,
+        offset(off_s)
     );
-    if size_s > OTHER_CLOCK_S {
-        return Problem::new(format!("{why}, by another clock"), RECORDING);
+    match (size_s > OTHER_CLOCK_S, scan.has_recording_times) {
+        (true, true) => Problem::new(why, TOGETHER),
+        (true, false) => Problem::new(format!("{why}, by another clock"), RECORDING),
+        (false, true) => Problem::new(why, wider_tolerance(size_s)),
+        (false, false) => Problem::new(why, format!("{}, or {RECORDING}", wider_tolerance(size_s))),
     }
-    let wider_s = 1.2 * size_s + 0.01;
-    Problem::new(
-        why,
-        format!("set `pair_tolerance_s = {wider_s:.2}` under [input], or {RECORDING}"),
-    )
+}
+
+/// Returns a time offset in words.
+fn offset(off_s: f64) -> String {
+    let side = if off_s > 0.0 { "after" } else { "before" };
+    format!("{:.3} s {side}", off_s.abs())
+}
+
+/// Returns the setting that pairs messages in spite of an offset.
+pub(super) fn wider_tolerance(size_s: f64) -> String {
+    format!("set `pair_tolerance_s = {:.2}` under [input]", 1.2 * size_s + 0.01)
+}
+
+/// Returns the reason for which no recorded detections belong to a frame.
+pub(super) fn detections_problem(
+    scan: &Scan,
+    input: &InputSettings,
+    primary: &str,
+    detections: &str,
+) -> Option<Problem> {
+    // On a robot, the first messages tell nothing about those to come.
+    if scan.is_live() {
+        return None;
+    }
+    let frames = scan.topics.get(primary)?;
+    let messages = scan.topics.get(detections)?;
+    let tolerance_s = input.pair_tolerance_s;
+    if messages.has_constant_stamps() && !frames.has_constant_stamps() {
+        let stamp = messages.stamps.first()?;
+        let why = format!("its stamps are not set: all are {stamp}");
+        return Problem::new(why, recording_of(frames, messages, tolerance_s));
+    }
+    // Detections may be slower than images, so that each of them counts and not each image.
+    let skew = Skew::between(&messages.stamps, &frames.stamps, tolerance_s)?;
+    if skew.paired > 0.0 {
+        return None;
+    }
+    let other_clock_s = other_clock(frames, messages);
+    let off_s = other_clock_s.unwrap_or(-skew.median_s);
+    let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
+    let why = format!(
+        "none of its messages is within {:.0} ms of a frame: by their {times} they come {} it",
+        1e3 * tolerance_s,
+        offset(off_s)
+    );
+    let is_recorded_apart = scan.has_recording_times || is_recorded_apart(frames, messages);
+    match (other_clock_s, is_recorded_apart) {
+        (Some(_), true) => Problem::new(why, TOGETHER),
+        (Some(_), false) => {
+            let remedy = recording_of(frames, messages, tolerance_s);
+            Problem::new(format!("{why}, by another clock"), remedy)
+        }
+        (None, _) => Problem::new(why, wider_tolerance(off_s.abs())),
+    }
+}
+
+/// Returns the time from the first frame to the first of other messages, s, if all of them lie apart
+/// from all frames in time.
+fn other_clock(frames: &Topic, messages: &Topic) -> Option<f64> {
+    let (first, last) = frames.stamp_range()?;
+    let (begin, end) = messages.stamp_range()?;
+    let is_apart = begin.seconds_since(last) > NEAR_S || first.seconds_since(end) > NEAR_S;
+    is_apart.then(|| begin.seconds_since(first))
+}
+
+/// Returns true if two topics were recorded one after the other.
+fn is_recorded_apart(first: &Topic, second: &Topic) -> bool {
+    second.first_log_time > first.last_log_time || second.last_log_time < first.first_log_time
+}
+
+/// Returns the reason for which no scan of a scanner is near a frame in time.
+pub(super) fn scan_times_problem(scan: &Scan, primary: &str, scanner: &str) -> Option<Problem> {
+    if scan.is_live() || primary == scanner {
+        return None;
+    }
+    let frames = scan.topics.get(primary)?;
+    let scans = scan.topics.get(scanner)?;
+    if scans.has_constant_stamps() && !frames.has_constant_stamps() {
+        let stamp = scans.stamps.first()?;
+        return Problem::new(format!("its stamps are not set: all are {stamp}"), RECORDING);
+    }
+    let skew = Skew::between(&scans.stamps, &frames.stamps, NEAR_SCAN_S)?;
+    if skew.paired > 0.0 {
+        return None;
+    }
+    let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
+    let why = format!(
+        "none of its scans is within {NEAR_SCAN_S} s of a frame: by their {times} they come {} it",
+        offset(other_clock(frames, scans).unwrap_or(-skew.median_s))
+    );
+    if scan.has_recording_times || is_recorded_apart(frames, scans) {
+        return Problem::new(why, TOGETHER);
+    }
+    Problem::new(format!("{why}, by another clock"), RECORDING)
+}
+
+/// Returns the remedy by the times of recording, with a tolerance for a detector that takes its time.
+fn recording_of(frames: &Topic, messages: &Topic, tolerance_s: f64) -> String {
+    let skew = Skew::between(&messages.recorded, &frames.recorded, tolerance_s);
+    match skew.filter(|skew| skew.paired < MOST_PAIRED) {
+        Some(skew) => format!("{RECORDING}, and {}", wider_tolerance(skew.median_s.abs())),
+        None => RECORDING.to_owned(),
+    }
 }
 
 /// Returns the reason for which depth cannot be moved into the view of the colour camera.
@@ -145,6 +257,7 @@ pub(super) const SCANNER_REMEDY: &str = "correct the driver's settings of the sc
 pub(super) fn scanner_problem(
     scan: &Scan,
     input: &InputSettings,
+    primary: &str,
     first: &str,
     topic: &str,
 ) -> Option<Problem> {
@@ -165,7 +278,7 @@ pub(super) fn scanner_problem(
         let why = format!("tf does not connect its frame `{frame}` with `{robot}`");
         return Problem::new(why, "record /tf_static with its mount");
     }
-    None
+    scan_times_problem(scan, primary, topic)
 }
 
 /// Returns the reason for which odometry cannot give the poses of the frames.
@@ -184,17 +297,12 @@ pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Op
     }
     let off_s = begin.seconds_since(first);
     let side = if off_s > 0.0 { "later" } else { "earlier" };
-    let is_other_time =
-        poses.first_log_time > frames.last_log_time || poses.last_log_time < frames.first_log_time;
     let why = format!(
         "no stamp of it is within {NEAR_S} s of any frame: it begins {:.1} s {side}",
         off_s.abs()
     );
-    if is_other_time {
-        Problem::new(
-            format!("{why}, because it was recorded at another time"),
-            "record it together with the sensor that makes the frames",
-        )
+    if is_recorded_apart(frames, poses) {
+        Problem::new(format!("{why}, because it was recorded at another time"), TOGETHER)
     } else {
         Problem::new(
             format!("{why}, by another clock (simulated time against that of the computer?)"),

@@ -1,12 +1,13 @@
 //! Groups of topics that belong to one device: a camera with its streams.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::kinds::{colour_rank, depth_rank, is_image, is_usable_picture};
 use super::name::{Side, Stream, TopicName};
 use super::problems::{Problem, depth_problem};
 use crate::images::Content;
 use crate::scan::{Scan, Topic};
+use crate::tf::plain;
 use crate::{Input, InputSettings, Inputs};
 
 /// Images of one device.
@@ -151,8 +152,12 @@ pub(super) fn may_be_one(scan: &Scan, colour: &Rig, depth: &Rig) -> bool {
 /// Returns true if two cameras sit together and look the same way, by their frames and tf; `None` if
 /// these do not tell.
 fn is_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
-    let a = scan.frame_of(a)?;
-    let b = scan.frame_of(b)?;
+    are_one_mount(scan, scan.frame_of(a)?, scan.frame_of(b)?)
+}
+
+/// Returns true if two frames of cameras sit together and look the same way; `None` if tf does not
+/// tell.
+fn are_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
     if a == b {
         return (!a.is_empty()).then_some(true);
     }
@@ -167,6 +172,62 @@ fn is_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
 /// Returns the folder of a topic; empty at the root.
 fn parent(topic: &str) -> &str {
     topic.rsplit_once('/').map_or("", |(folder, _)| folder)
+}
+
+/// Frames of the cameras of a log, by which detections tell their images.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct CameraFrames {
+    /// Frame of the images that make the frames; empty without one.
+    pub(crate) own: String,
+    /// Frames of that camera and of those beside it.
+    beside: BTreeSet<String>,
+    /// Frames of cameras in other places.
+    others: BTreeSet<String>,
+}
+
+impl CameraFrames {
+    /// Finds the frames of other cameras: those of images of other devices, and optical ones in tf,
+    /// unless tf puts them beside the own camera.
+    pub(crate) fn of(scan: &Scan, primary: &str) -> Self {
+        let Some(own) = scan.frame_of(primary).filter(|own| !own.is_empty()) else {
+            return Self::default();
+        };
+        let mut others = BTreeSet::new();
+        let mut beside = BTreeSet::from([plain(own).to_owned()]);
+        for rig in rigs(scan) {
+            let frames = rig.topics.iter().filter_map(|topic| scan.frame_of(topic));
+            for frame in frames.filter(|frame| !frame.is_empty()) {
+                if rig.has(primary) || are_one_mount(scan, own, frame) == Some(true) {
+                    beside.insert(plain(frame).to_owned());
+                } else {
+                    others.insert(plain(frame).to_owned());
+                }
+            }
+        }
+        for frame in scan.tf.parents().into_keys() {
+            // Other frames are of no camera, as that of a robot whose detector names it.
+            if !frame.contains("optical") {
+                continue;
+            }
+            match are_one_mount(scan, own, &frame) {
+                Some(false) => others.insert(frame),
+                _ => beside.insert(frame),
+            };
+        }
+        let others = others.difference(&beside).cloned().collect();
+        Self { own: own.to_owned(), beside, others }
+    }
+
+    /// Returns true for the frame of a camera of which the log knows nothing.
+    pub(crate) fn is_unknown(&self, frame: &str) -> bool {
+        let is_camera = frame.contains("optical") && !self.own.is_empty();
+        is_camera && !self.beside.contains(plain(frame)) && !self.is_other(frame)
+    }
+
+    /// Returns true for the frame of a camera in another place.
+    pub(crate) fn is_other(&self, frame: &str) -> bool {
+        self.others.contains(plain(frame))
+    }
 }
 
 /// Returns the folder that the topics of a rig share, else the folder of the first one.

@@ -5,6 +5,7 @@ mod cameras;
 mod clouds;
 #[path = "../common/mod.rs"]
 mod common;
+mod lost_pairs;
 mod obstacles;
 mod odometry_age;
 mod topics;

@@ -1,0 +1,122 @@
+//! Frames that are lost because no image of another topic belongs to them.
+
+use tagalong_core::Stamp;
+use tagalong_math::median;
+
+use super::problems::{Problem, RECORDING, TOGETHER, pairing_problem, wider_tolerance};
+use crate::scan::{Scan, Topic};
+use crate::timing::{Skew, Timing, nearest};
+
+/// Number and share of the frames without a partner that are usual: cameras leave out an image now and
+/// then.
+const USUAL_COUNT: u64 = 3;
+const USUAL_SHARE: f64 = 0.1;
+/// Ratio of the periods of two topics from which on one is slower.
+const SLOWER: f64 = 1.5;
+/// Shortest step of a topic that is slower by itself, in periods.
+const EVEN: f64 = 0.75;
+/// Longest gap of a topic that is slower and whole, in periods.
+const LONGEST_GAP: f64 = 3.0;
+/// Share of the images of a slower topic that belong to a frame.
+const MOST_PAIRED: f64 = 0.9;
+
+/// Returns true for more frames without a partner than cameras leave out.
+pub(crate) fn is_unusual(without: u64, frames: u64) -> bool {
+    without > USUAL_COUNT && without as f64 > USUAL_SHARE * frames as f64
+}
+
+/// Returns the reason for which many frames of a topic have no image of a second one; `None` if that is
+/// slower by itself, so that nothing is lost.
+pub(crate) fn unpaired(
+    scan: &Scan,
+    first: &str,
+    second: &str,
+    tolerance_s: f64,
+) -> Option<Problem> {
+    let frames = scan.topics.get(first)?;
+    let partners = scan.topics.get(second)?;
+    if let Some(problem) = pairing_problem(scan, frames, partners, tolerance_s) {
+        return Some(problem);
+    }
+    if are_whole_seconds(partners) && !are_whole_seconds(frames) {
+        let why = "its stamps are in whole seconds".to_owned();
+        return Some(Problem { why, remedy: RECORDING.to_owned() });
+    }
+    for (topic, stamps) in [(first, &frames.stamps), (second, &partners.stamps)] {
+        let back = stamps.windows(2).filter(|pair| pair[1] < pair[0]).count();
+        if is_unusual(back as u64, stamps.len() as u64) && !scan.has_recording_times {
+            let why = format!("the stamps of {topic} go back {back} times");
+            return Some(Problem { why, remedy: RECORDING.to_owned() });
+        }
+    }
+    if let Some(why) = is_short(&frames.stamps, partners, tolerance_s) {
+        return Some(Problem { why, remedy: TOGETHER.to_owned() });
+    }
+    if is_slower(frames, partners, tolerance_s) {
+        return None;
+    }
+    Some(missing_or_apart(frames, partners, tolerance_s))
+}
+
+/// Returns true for stamps without fractions of a second that several messages share.
+fn are_whole_seconds(topic: &Topic) -> bool {
+    let stamps = &topic.stamps;
+    let is_shared = stamps.windows(2).any(|pair| pair[0] == pair[1]);
+    is_shared && stamps.iter().all(|stamp| stamp.nanos() % 1_000_000_000 == 0)
+}
+
+/// Returns the words for partners that begin late or end early, if most frames without one lie there.
+fn is_short(frames: &[Stamp], partners: &Topic, tolerance_s: f64) -> Option<String> {
+    let (begin, end) = partners.stamp_range()?;
+    let period_s = Timing::of(&partners.stamps).map_or(0.0, |timing| timing.median_period_s);
+    let margin_s = period_s.max(tolerance_s);
+    let mut sorted = partners.stamps.clone();
+    sorted.sort();
+    let without = frames
+        .iter()
+        .filter(|at| nearest(&sorted, **at).is_none_or(|offset_s| offset_s.abs() > tolerance_s));
+    let without: Vec<Stamp> = without.copied().collect();
+    let early = without.iter().filter(|at| begin.seconds_since(**at) > margin_s).count();
+    let late = without.iter().filter(|at| at.seconds_since(end) > margin_s).count();
+    if 2 * (early + late) <= without.len() {
+        return None;
+    }
+    let first = frames.iter().min()?;
+    let last = frames.iter().max()?;
+    Some(if early > late {
+        format!("it begins {:.1} s after the first frame", begin.seconds_since(*first))
+    } else {
+        format!("it ends {:.1} s before the last frame", last.seconds_since(end))
+    })
+}
+
+/// Returns true if the partners come at a lower rate, evenly, and each of them belongs to a frame.
+fn is_slower(frames: &Topic, partners: &Topic, tolerance_s: f64) -> bool {
+    let (Some(fast), Some(slow)) = (Timing::of(&frames.stamps), Timing::of(&partners.stamps))
+    else {
+        return false;
+    };
+    let paired = Skew::between(&partners.stamps, &frames.stamps, tolerance_s);
+    // Where images were dropped, the others come at the rate of the frames.
+    let steps = partners.stamps.windows(2).map(|pair| pair[1].seconds_since(pair[0]));
+    let short = steps.filter(|step_s| *step_s < EVEN * slow.median_period_s).count();
+    !is_unusual(short as u64, partners.stamps.len() as u64)
+        && slow.median_period_s >= SLOWER * fast.median_period_s
+        && slow.longest_gap_s <= LONGEST_GAP * slow.median_period_s
+        && paired.is_some_and(|skew| skew.paired >= MOST_PAIRED)
+}
+
+/// Returns the problem of partners that are missing, or of stamps that are too far apart.
+fn missing_or_apart(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Problem {
+    let mut sorted = partners.stamps.clone();
+    sorted.sort();
+    let offsets = frames.stamps.iter().filter_map(|at| nearest(&sorted, *at)).map(f64::abs);
+    let apart_s = median(offsets.filter(|offset_s| *offset_s > tolerance_s)).unwrap_or(0.0);
+    if partners.count as f64 >= MOST_PAIRED * frames.count as f64 {
+        let why = format!("the stamps of half of them are {:.0} ms or more apart", 1e3 * apart_s);
+        return Problem { why, remedy: wider_tolerance(apart_s) };
+    }
+    let why = format!("it has {} images, and there are {} frames", partners.count, frames.count);
+    let remedy = "record fewer or compressed topics, so that none of its images is dropped";
+    Problem { why, remedy: remedy.to_owned() }
+}

@@ -1,0 +1,92 @@
+//! Frames that are lost because no depth or right image belongs to them.
+
+use super::*;
+
+/// Number of frames of a ride, ten times a second.
+const FRAMES: u32 = 20;
+
+/// Writes colour images, and in front of each one depth where `depth` gives a stamp for it, s.
+fn ride(depth: impl Fn(u32, f64) -> Option<f64>) -> SavedLog {
+    let mut log = started();
+    for index in 0..FRAMES {
+        let t = 0.1 * f64::from(index);
+        if let Some(stamp) = depth(index, t) {
+            log.depth(at(stamp), "colour", 2.0);
+        }
+        log.colour(at(t));
+    }
+    log.save()
+}
+
+fn read(saved: &SavedLog, inputs: Inputs) -> (usize, FrameSource) {
+    let mut source = saved.open(&InputSettings::default(), inputs).unwrap();
+    (frames(&mut source).len(), source)
+}
+
+fn told(source: &FrameSource) -> String {
+    source
+        .notes()
+        .iter()
+        .find(|note| note.contains("have no image of"))
+        .cloned()
+        .unwrap_or_default()
+}
+
+#[test]
+fn frames_without_depth_are_lost_with_the_measured_cause() {
+    type Depth<'a> = (&'a dyn Fn(u32, f64) -> Option<f64>, &'a str, &'a str);
+    let cases: [Depth<'_>; 6] = [
+        (&|_, t| Some(t.floor()), "its stamps are in whole seconds", "--stamps recording"),
+        (&|_, t| (t < 0.95).then_some(t), "it ends 1.0 s before the last frame", "record it"),
+        (&|_, t| (t > 0.95).then_some(t), "it begins 1.0 s after the first frame", "record it"),
+        (
+            &|index, t| Some(if index % 2 == 0 { t } else { t + 0.045 }),
+            "are 45 ms or more apart",
+            "`pair_tolerance_s = 0.06`",
+        ),
+        (&|index, t| (index % 3 > 0).then_some(t), "it has 13 images, and there are 20", "record"),
+        (&|_, t| Some(t + 3600.0), "by another clock", "--stamps recording"),
+    ];
+    for (depth, cause, remedy) in cases {
+        let saved = ride(depth);
+        let (made, source) = read(&saved, DEPTH);
+        let told = told(&source);
+        assert!(made < FRAMES as usize && source.data_lost(), "{cause}: {:?}", source.notes());
+        assert!(told.contains(cause) && told.contains(remedy), "{cause}: {told}");
+        // No frame is lost where depth may be missing.
+        let (made, source) = read(&saved, Inputs::ANY.require(Input::Colour));
+        assert_eq!(made, FRAMES as usize);
+        assert!(!source.data_lost(), "{cause}: {:?}", source.notes());
+    }
+}
+
+#[test]
+fn stamps_that_go_back_are_told() {
+    let mut log = started();
+    for index in 0..FRAMES {
+        let stamp = at(5.0 - 0.1 * f64::from(index));
+        log.colour(stamp);
+        log.depth(stamp, "colour", 2.0);
+    }
+    let (made, source) = read(&log.save(), DEPTH);
+    assert!(made < FRAMES as usize && source.data_lost(), "{made}: {:?}", source.notes());
+    assert!(told(&source).contains("go back 19 times"), "{:?}", source.notes());
+}
+
+#[test]
+fn a_missing_partner_now_and_then_and_a_slower_camera_lose_nothing() {
+    let cases: [&dyn Fn(u32, f64) -> Option<f64>; 5] = [
+        &|_, t| Some(t),
+        &|index, t| (index >= 3).then_some(t),
+        &|index, t| (index % 9 > 0).then_some(t),
+        &|index, t| (index % 2 == 0).then_some(t),
+        &|index, t| (index % 5 == 0).then_some(t + 0.01),
+    ];
+    for (case, depth) in cases.iter().enumerate() {
+        let (made, source) = read(&ride(depth), DEPTH);
+        let without = count(&source, "colour_without_depth") as usize;
+        assert_eq!(made + without, FRAMES as usize, "{case}");
+        assert!(!source.data_lost(), "{case}: {:?}", source.notes());
+        assert_eq!(told(&source), "", "{case}");
+    }
+}
