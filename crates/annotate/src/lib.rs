@@ -106,7 +106,7 @@ pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
     say(&origin);
     let app = app(args, film, people, &output, origin);
     print(&format!(
-        "{}\nopen this address in a browser on this computer; it is the key to the page\nevery change \
+        "{}\nopen this address in a browser on this computer; whoever has it may edit\nevery change \
          is written to {}; Ctrl-C ends\n",
         server.address(),
         output.display()

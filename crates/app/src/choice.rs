@@ -126,6 +126,7 @@ impl Fittings {
         let usable = self.account.usable();
         // "Alone" only if nothing else is there.
         let is_alone = self.account.topics.len() == usable.len();
+        let usable: Vec<&str> = usable.into_iter().map(words_of).collect();
         let usable = match usable.split_last() {
             None => "nothing usable".to_owned(),
             Some((last, [])) if is_alone => format!("{last} alone"),
@@ -173,6 +174,16 @@ impl Fittings {
                 && refusal.inputs.is_some_and(|inputs| has_required(&usable, inputs))
         })?;
         Some(format!("{} would do better, but: {}", refusal.config, refusal.why))
+    }
+}
+
+/// Returns an input in words.
+fn words_of(input: &str) -> &str {
+    match input {
+        "right" => "right images of a stereo pair",
+        "laser" => "laser scans",
+        "points" => "points of a lidar",
+        other => other,
     }
 }
 

@@ -213,7 +213,10 @@ fn serve(
             "cannot serve on {at}: {error}; name another port with --serve=PORT"
         ))
     })?;
-    say(&format!("live: open {} in a browser; it is the key to the page", live.address()));
+    say(&format!(
+        "live: open {} in a browser; whoever has this address sees the page",
+        live.address()
+    ));
     if !at.ip().is_loopback() {
         say("live: others in this network who know the address see the images; open it there \
              by the number of this computer in place of 0.0.0.0");

@@ -231,7 +231,14 @@ pub(super) fn plan(
     check_calibration(&plan, tally)?;
     plan.disparity = stereo_geometry(&plan)?;
     plan.mount = find_mount(&plan, reread)?;
-    tally.note(format!("the pose of the camera comes from {}", plan.mount.source()));
+    let sensor = if plan.is_of_points() {
+        "lidar"
+    } else if plan.is_of_scans() {
+        "scanner"
+    } else {
+        "camera"
+    };
+    tally.note(format!("the pose of the {sensor} comes from {}", plan.mount.source()));
     if let Some(unit_m) = measured_unit_m(&plan, reread)? {
         take_measured_unit(&mut plan, unit_m, tally);
     }
