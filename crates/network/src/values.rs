@@ -11,6 +11,8 @@ const MAX_RAW: f32 = 16.0;
 const ROUNDING: f32 = 1e-3;
 /// Rounding of corners, pixels.
 const ROUNDING_PX: f32 = 1.0;
+/// Part of the boxes of a grid that have a size. Networks without distributions make some below zero.
+const MOST: f64 = 0.9;
 /// Columns of COCO's classes after four of the box: in a list of scores, and with an objectness.
 const COCO_COLUMNS: [usize; 2] = [84, 85];
 
@@ -20,19 +22,31 @@ pub(crate) fn fits(family: Family, outputs: &[(&str, &Tensor)], input: InputSize
         // Several outputs have names, or a shape for each stride.
         return family != Family::NanoDetM || scores_and_sides(outputs, input).is_some();
     };
+    if is_empty(output) {
+        return true;
+    }
     match family {
         Family::Yolox => is_raw_grid(output) || has_pixels(output, 5),
         Family::YoloV8 if is_transposed(output, input) => has_pixels(output, 4),
+        Family::YoloV8 => is_grid_of_columns(output),
         Family::NanoDetM => bins_of(output).is_some(),
         Family::YoloV10 => is_list(output, input),
         _ => true,
     }
 }
 
-/// Returns true if the output of YOLOv8 has a row for each box.
+/// Returns true for an output of zeros alone. Lists in which nothing was found are such, and nothing
+/// tells of which family they are.
+pub(crate) fn is_empty(output: &Tensor) -> bool {
+    output.values().iter().all(|value| *value == 0.0)
+}
+
+/// Returns true if the output of YOLOv8 has a row for each box. The numbers tell where it has as many
+/// columns.
 pub(crate) fn is_transposed(output: &Tensor, input: InputSize) -> bool {
     let cells = count_cells(input, &STRIDES);
-    matches!(*output.shape(), [1, n, width] if n == cells && width != cells)
+    let &[1, rows, width] = output.shape() else { return false };
+    rows == cells && (width != cells || has_pixels(output, 4))
 }
 
 /// Returns true for a probability, but for its rounding.
@@ -62,6 +76,22 @@ fn has_pixels(output: &Tensor, first: usize) -> bool {
         && width != other
         && is_pixel_grid(output)
         && output.rows().all(|row| row[4..].iter().copied().all(is_score))
+}
+
+/// Returns true for a grid with a column for each box: middles and sizes in pixels, and scores of the
+/// first class. The rows below may be those of other classes, of joints, or of an angle.
+fn is_grid_of_columns(output: &Tensor) -> bool {
+    let rows: Vec<&[f32]> = output.rows().collect();
+    let [x, y, widths, heights, scores, ..] = rows[..] else { return false };
+    let mut sane = 0;
+    let mut is_middle = false;
+    for (column, (width, height)) in widths.iter().zip(heights).enumerate() {
+        sane += usize::from(*width >= 0.0 && *height >= 0.0);
+        is_middle |= *width < x[column] || *height < y[column];
+    }
+    let is_beyond = x.iter().chain(y).any(|place| *place > MAX_RAW);
+    let has_sizes = sane as f64 >= MOST * widths.len() as f64;
+    has_sizes && is_beyond && is_middle && scores.iter().copied().all(is_score)
 }
 
 /// Returns the bins of a distribution in the rows of NanoDet before Plus, which begin with scores.
@@ -167,6 +197,55 @@ mod tests {
         assert_eq!(list(&[10.0, 5.0, 30.0, 60.0, 0.8, 0.0]), Ok(Family::YoloV10));
         assert!(list(&[0.2, -0.1, 0.3, 0.6, 0.1, -0.2, 0.8]).is_err());
         assert!(list(&[0.2, 0.1, 0.1, 0.6, 0.1, 0.2]).is_err());
+    }
+
+    /// A list in which nothing was found is zeros alone, whatever grid has as many rows.
+    #[test]
+    fn zeros_are_those_of_every_family_with_the_shape() {
+        for (width, families) in [
+            (6, ["`yolox`", "`yolov8`", "`yolov10`"].as_slice()),
+            (7, &["`yolox`", "`yolov8`", "`yolov10`"]),
+            (85, &["`yolox`", "`yolov8`", "`nanodet-m`"]),
+        ] {
+            let why = of_rows(&[1, 84, width], |_| vec![0.0; width]).unwrap_err();
+            assert!(families.iter().all(|family| why.contains(family)), "{why}");
+            assert!(why.contains("all zero") && why.contains("set `family`"), "{why}");
+        }
+    }
+
+    #[test]
+    fn lists_of_one_image_may_begin_with_its_number() {
+        let row = |cell: usize| match cell {
+            0 => vec![0.0, 15.0, 5.0, 35.0, 60.0, 0.0, 0.9],
+            _ => vec![0.0; 7],
+        };
+        assert_eq!(of_rows(&[1, 84, 7], row), Ok(Family::YoloV10), "as many as cells");
+        assert_eq!(of_rows(&[1, 30, 7], row), Ok(Family::YoloV10));
+    }
+
+    /// Returns the family of a grid with a column for each box, of these scores and other rows.
+    fn of_columns(place: impl Fn(usize) -> Vec<f32>, others: &[f32]) -> Result<Family, String> {
+        let boxes: Vec<Vec<f32>> = (0..84).map(|cell| with(place(cell), others)).collect();
+        let height = 4 + others.len();
+        let values = (0..height).flat_map(|part| boxes.iter().map(move |row| row[part])).collect();
+        recognise(&[("output", &Tensor::new(vec![1, height, 84], values).unwrap())], INPUT)
+    }
+
+    #[test]
+    fn grids_of_columns_have_boxes_and_scores() {
+        assert_eq!(of_columns(pixels, &[0.1, 0.4]), Ok(Family::YoloV8));
+        assert_eq!(of_columns(pixels, &[0.1, 30.0, 20.0]), Ok(Family::YoloV8), "a joint");
+        for (place, scores) in [
+            (&pixels as &dyn Fn(usize) -> Vec<f32>, [-6.0, 3.0]),
+            (&offsets, [0.1, 0.4]),
+            (&|_| vec![-900.0; 4], [0.1, 0.4]),
+        ] {
+            let why = of_columns(place, &scores).unwrap_err();
+            assert!(
+                why.contains("the shape of `yolov8`") && why.contains("not its numbers"),
+                "{why}"
+            );
+        }
     }
 
     #[test]
