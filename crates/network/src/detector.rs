@@ -9,9 +9,11 @@ use tagalong_core::RgbImage;
 use crate::decode::{Wanted, decode, suppress};
 use crate::family::{OutputShape, recognise, shapes_of};
 use crate::network::rten;
+use crate::unit::{unit_of_columns, unit_of_rows};
 use crate::worker::Worker;
 use crate::{
-    Element, Family, InputSize, Limits, Network, Port, Preparation, Runtime, ScoredBox, Tensor,
+    BoxUnit, Element, Family, InputSize, Limits, Network, Port, Preparation, Runtime, ScoredBox,
+    Tensor,
 };
 
 /// Columns and rows of an input that the file leaves open.
@@ -42,6 +44,8 @@ pub struct Choices {
     pub size: Option<[usize; 2]>,
     /// Classes of people; by default that of the family.
     pub classes: Vec<usize>,
+    /// Unit of the boxes; by default that of the outputs.
+    pub unit: Option<BoxUnit>,
 }
 
 /// Description of a network file.
@@ -57,6 +61,8 @@ pub struct About {
     pub run: Result<Vec<OutputShape>, String>,
     /// Family by those outputs.
     family: Result<Family, String>,
+    /// Unit of the boxes of a grid by those outputs.
+    unit: Option<BoxUnit>,
 }
 
 impl About {
@@ -69,13 +75,23 @@ impl About {
             let found = first_run(network, input)?;
             let named = outputs.iter().map(|port| port.name.as_str()).zip(&found);
             let named: Vec<(&str, &Tensor)> = named.collect();
-            Ok((shapes_of(&named), recognise(&named, input)))
+            let unit = match &found[..] {
+                [output] => unit_of_rows(output, input).or_else(|| unit_of_columns(output, input)),
+                _ => None,
+            };
+            Ok((shapes_of(&named), recognise(&named, input), unit))
         });
-        let (run, family) = match run {
-            Ok((shapes, family)) => (Ok(shapes), family),
-            Err(why) => (Err(why.clone()), Err(why)),
+        let (run, family, unit) = match run {
+            Ok((shapes, family, unit)) => (Ok(shapes), family, unit),
+            Err(why) => (Err(why.clone()), Err(why), None),
         };
-        Self { inputs, outputs, input: image, run, family }
+        Self { inputs, outputs, input: image, run, family, unit }
+    }
+
+    /// Returns the unit of the boxes, as far as the outputs of the first call tell it: lists of boxes
+    /// do only where something is found.
+    fn unit(&self, family: Family) -> Option<BoxUnit> {
+        self.unit.filter(|_| matches!(family, Family::Yolox | Family::YoloV8))
     }
 
     /// Returns the family of the network.
@@ -199,6 +215,7 @@ pub struct PersonNetwork {
     family: Family,
     input: InputSize,
     classes: Vec<usize>,
+    unit: Option<BoxUnit>,
     limits: Limits,
 }
 
@@ -244,7 +261,11 @@ impl PersonNetwork {
         if let Some(beyond) = classes.iter().find(|class| known > 0 && **class >= known) {
             return Err(format!("has {known} classes from 0, and no {beyond}: set `classes`"));
         }
-        Ok(Self { worker, about, family, input, classes, limits: *limits })
+        if choices.unit.is_some() && !family.has_unit() {
+            return Err(format!("boxes of the family {family} have one unit: remove `box_unit`"));
+        }
+        let unit = choices.unit.or_else(|| about.unit(family));
+        Ok(Self { worker, about, family, input, classes, unit, limits: *limits })
     }
 
     /// Returns the description of the file.
@@ -283,7 +304,7 @@ impl PersonNetwork {
             return Err("its outputs change their shape from call to call".into());
         }
         let wanted = Wanted { classes: &self.classes, min_score };
-        let found = decode(self.family, &outputs, self.input, wanted);
+        let found = decode(self.family, &outputs, self.input, self.unit, wanted);
         // Lists without doubles are sorted all the same.
         let iou = if self.family.needs_suppression(&shapes) { iou } else { 1.0 };
         let mut people = suppress(found, iou);

@@ -249,6 +249,11 @@ impl Family {
         }
     }
 
+    /// Returns true if exports of the family differ in the unit of their boxes.
+    pub(crate) const fn has_unit(self) -> bool {
+        matches!(self, Self::Yolox | Self::YoloV8 | Self::YoloV10 | Self::RtDetr | Self::RtmDet)
+    }
+
     /// Returns true if several boxes of one person are left to the caller. Lists of final boxes
     /// are without doubles, but for those with a box for each cell of a grid.
     pub fn needs_suppression(self, outputs: &[OutputShape]) -> bool {

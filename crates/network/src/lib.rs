@@ -43,6 +43,7 @@ mod rewriting;
 mod runtime;
 mod survey;
 mod tensor;
+mod unit;
 mod values;
 mod worker;
 
@@ -57,3 +58,4 @@ pub use network::{Network, Runtime, check_file, rten};
 pub use preparation::{Colours, Fit, InputSize, Placement, Preparation};
 pub use runtime::RtenNetwork;
 pub use tensor::{Element, Port, Tensor};
+pub use unit::BoxUnit;

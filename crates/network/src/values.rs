@@ -1,8 +1,9 @@
 //! Families told apart by the numbers of their outputs, where shapes are alike.
 
-use crate::decode::{Columns, columns_of, is_pixel_grid, scores_and_sides};
+use crate::decode::{Columns, columns_of, scores_and_sides};
 use crate::family::{NANODET_M_BINS, STRIDES, count_cells};
-use crate::{Family, InputSize, Tensor};
+use crate::unit::{unit_of_columns, unit_of_rows};
+use crate::{BoxUnit, Family, InputSize, Tensor};
 
 /// Largest offset in cells, and largest logarithm of a size in cells, of a raw grid: a box is not
 /// `exp(16)` cells wide, and pixels exceed this in all but the first cells.
@@ -11,8 +12,6 @@ const MAX_RAW: f32 = 16.0;
 const ROUNDING: f32 = 1e-3;
 /// Rounding of corners, pixels.
 const ROUNDING_PX: f32 = 1.0;
-/// Part of the boxes of a grid that have a size. Networks without distributions make some below zero.
-const MOST: f64 = 0.9;
 /// Columns of COCO's classes after four of the box: in a list of scores, and with an objectness.
 const COCO_COLUMNS: [usize; 2] = [84, 85];
 
@@ -26,9 +25,9 @@ pub(crate) fn fits(family: Family, outputs: &[(&str, &Tensor)], input: InputSize
         return true;
     }
     match family {
-        Family::Yolox => is_raw_grid(output) || has_pixels(output, 5),
-        Family::YoloV8 if is_transposed(output, input) => has_pixels(output, 4),
-        Family::YoloV8 => is_grid_of_columns(output),
+        Family::Yolox => is_raw_grid(output, input) || has_boxes(output, 5, input),
+        Family::YoloV8 if is_transposed(output, input) => has_boxes(output, 4, input),
+        Family::YoloV8 => is_grid_of_columns(output, input),
         Family::NanoDetM => bins_of(output).is_some(),
         Family::YoloV10 => is_list(output, input),
         _ => true,
@@ -46,7 +45,7 @@ pub(crate) fn is_empty(output: &Tensor) -> bool {
 pub(crate) fn is_transposed(output: &Tensor, input: InputSize) -> bool {
     let cells = count_cells(input, &STRIDES);
     let &[1, rows, width] = output.shape() else { return false };
-    rows == cells && (width != cells || has_pixels(output, 4))
+    rows == cells && (width != cells || has_boxes(output, 4, input))
 }
 
 /// Returns true for a probability, but for its rounding.
@@ -60,38 +59,30 @@ fn is_label(value: f32) -> bool {
 }
 
 /// Returns true for a grid with offsets and logarithms of sizes in cells, and scores.
-fn is_raw_grid(output: &Tensor) -> bool {
-    output.rows().all(|row| {
+fn is_raw_grid(output: &Tensor, input: InputSize) -> bool {
+    let is_raw = output.rows().all(|row| {
         let (place, scores) = row.split_at(4);
         place.iter().all(|value| value.abs() <= MAX_RAW) && scores.iter().copied().all(is_score)
-    })
+    });
+    is_raw && unit_of_rows(output, input) != Some(BoxUnit::Fractions)
 }
 
-/// Returns true for a grid with middles and sizes in pixels, and scores of which `first` is the
-/// first column of a class.
-fn has_pixels(output: &Tensor, first: usize) -> bool {
+/// Returns true for a grid with middles and sizes, and scores of which `first` is the first column of
+/// a class.
+fn has_boxes(output: &Tensor, first: usize, input: InputSize) -> bool {
     let width = output.shape().last().copied().unwrap_or(0);
     let other = COCO_COLUMNS[usize::from(first == 4)];
     width > first
         && width != other
-        && is_pixel_grid(output)
+        && unit_of_rows(output, input).is_some()
         && output.rows().all(|row| row[4..].iter().copied().all(is_score))
 }
 
-/// Returns true for a grid with a column for each box: middles and sizes in pixels, and scores of the
-/// first class. The rows below may be those of other classes, of joints, or of an angle.
-fn is_grid_of_columns(output: &Tensor) -> bool {
-    let rows: Vec<&[f32]> = output.rows().collect();
-    let [x, y, widths, heights, scores, ..] = rows[..] else { return false };
-    let mut sane = 0;
-    let mut is_middle = false;
-    for (column, (width, height)) in widths.iter().zip(heights).enumerate() {
-        sane += usize::from(*width >= 0.0 && *height >= 0.0);
-        is_middle |= *width < x[column] || *height < y[column];
-    }
-    let is_beyond = x.iter().chain(y).any(|place| *place > MAX_RAW);
-    let has_sizes = sane as f64 >= MOST * widths.len() as f64;
-    has_sizes && is_beyond && is_middle && scores.iter().copied().all(is_score)
+/// Returns true for a grid with a column for each box: middles and sizes, and scores of the first
+/// class. The rows below may be those of other classes, of joints, or of an angle.
+fn is_grid_of_columns(output: &Tensor, input: InputSize) -> bool {
+    let has_scores = output.rows().nth(4).is_some_and(|row| row.iter().copied().all(is_score));
+    has_scores && unit_of_columns(output, input).is_some()
 }
 
 /// Returns the bins of a distribution in the rows of NanoDet before Plus, which begin with scores.
@@ -246,6 +237,23 @@ mod tests {
                 "{why}"
             );
         }
+    }
+
+    /// Returns the middle and the size of a box at a cell as fractions of the image.
+    fn fractions(cell: usize) -> Vec<f32> {
+        pixels(cell).into_iter().map(|part| part / 64.0).collect()
+    }
+
+    #[test]
+    fn grids_in_fractions_of_the_image_are_no_offsets() {
+        let of = |width: usize| {
+            of_rows(&[1, 84, width], |cell| with(fractions(cell), &vec![0.1; width - 4]))
+        };
+        assert_eq!((of(84), of(85)), (Ok(Family::YoloV8), Ok(Family::Yolox)));
+        assert_eq!(of(5), Ok(Family::YoloV8));
+        let why = of(6).unwrap_err();
+        assert!(why.contains("`yolox` (YOLOX) or `yolov8`"), "{why}");
+        assert_eq!(of_columns(fractions, &[0.1, 0.4]), Ok(Family::YoloV8));
     }
 
     #[test]

@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{OrAuto, check_settings};
 use tagalong_core::{Error, Result};
-use tagalong_network::{Choices, Colours, Family, Fit, LimitSettings, Preparation};
+use tagalong_network::{BoxUnit, Choices, Colours, Family, Fit, LimitSettings, Preparation};
 use tagalong_vision::BoxSettings;
 
 /// Number that leaves a setting to the family of the network.
@@ -34,6 +34,9 @@ pub struct Config {
     pub size: Vec<usize>,
     /// Classes of people; empty: that of the family (0, and 1 for `rf-detr`).
     pub classes: Vec<usize>,
+    /// Unit of the boxes: `auto` (by the outputs), `pixels` of the input or `fractions` of its sides;
+    /// for `yolox`, `yolov8`, `yolov10`, `rt-detr` and `rtmdet`.
+    pub box_unit: OrAuto<BoxUnit>,
     /// Probability from which a box is a new person; -1: that of the family. Below a half, scores
     /// are log-odds above it, so that it also is what `start_score = 0.0` of a track manager means.
     #[schemars(range(min = -1.0, max = 1.0))]
@@ -75,6 +78,7 @@ impl Default for Config {
             family: OrAuto::Auto,
             size: Vec::new(),
             classes: Vec::new(),
+            box_unit: OrAuto::Auto,
             discover_score: BY_FAMILY,
             track_score: BY_FAMILY,
             suppress_iou: 0.6,
@@ -107,7 +111,12 @@ impl Config {
 
     pub(crate) fn choices(&self) -> Choices {
         let size = <[usize; 2]>::try_from(&self.size[..]).ok();
-        Choices { family: self.family.chosen(), size, classes: self.classes.clone() }
+        Choices {
+            family: self.family.chosen(),
+            size,
+            classes: self.classes.clone(),
+            unit: self.box_unit.chosen(),
+        }
     }
 
     /// Returns the thresholds: those of the family, but for those that are set.
