@@ -197,6 +197,37 @@ fn choices_that_do_not_fit_are_refused() {
     assert!(why.contains("2 classes from 0, and no 2"), "{why}");
 }
 
+/// Returns the file of YOLOX, of which the first of two classes is that of the blob, with these names
+/// in its metadata.
+fn with_names(names: &str) -> Vec<u8> {
+    let field = |number: u8, bytes: &[u8]| [&[number << 3 | 2, bytes.len() as u8], bytes].concat();
+    let entry = [field(1, b"names"), field(2, names.as_bytes())].concat();
+    [fs::read(path("yolox.onnx")).unwrap(), field(14, &entry)].concat()
+}
+
+#[test]
+fn people_are_the_class_that_the_file_calls_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("named.onnx");
+    let found = |names: &str, classes: Vec<usize>| {
+        fs::write(&file, with_names(names)).unwrap();
+        let choices = Choices { classes, ..Choices::default() };
+        let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
+        let found = network.find(&scene(1), &Family::Yolox.preparation(), 0.5, 0.5);
+        found.unwrap().unwrap().len()
+    };
+    assert_eq!(found("{0: 'Person', 1: 'helmet'}", vec![]), 1);
+    assert_eq!(found("{0: 'helmet', 1: 'person'}", vec![]), 0);
+    assert_eq!(found("{0: 'helmet', 1: 'person'}", vec![0]), 1, "the setting is obeyed");
+    assert_eq!(found("{0: 'helmet', 1: 'vest'}", vec![0]), 1);
+    let why =
+        refusal(&with_names("{0: 'helmet', 1: 'vest'}"), &Choices::default(), &Limits::default());
+    assert!(why.contains("0 helmet, 1 vest") && why.contains("set `classes`"), "{why}");
+    let beyond = with_names("{0: 'helmet', 3: 'person'}");
+    let why = refusal(&beyond, &Choices::default(), &Limits::default());
+    assert!(why.contains("2 classes from 0, and no 3"), "{why}");
+}
+
 #[test]
 fn the_unit_of_boxes_is_for_families_that_have_several() {
     let whole = fs::read(path("nanodet.onnx")).unwrap();

@@ -32,7 +32,8 @@ pub struct Config {
     /// Columns and rows of the input where the file leaves them open, for example `[640, 640]`,
     /// which is also taken for an empty list (256 x 256 for `movenet`).
     pub size: Vec<usize>,
-    /// Classes of people; empty: that of the family (0, and 1 for `rf-detr`).
+    /// Classes of people; empty: those that the file calls person, pedestrian or people, and without
+    /// names that of the family (0, and 1 for `rf-detr`).
     pub classes: Vec<usize>,
     /// Unit of the boxes: `auto` (by the outputs), `pixels` of the input or `fractions` of its sides;
     /// for `yolox`, `yolov8`, `yolov10`, `rt-detr` and `rtmdet`.
