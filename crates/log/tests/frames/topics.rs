@@ -268,6 +268,23 @@ fn depth_is_taken_alone_where_video_cannot_be_decoded() {
     assert!(error.contains("10 bits") && error.contains("record it with 8 bits"), "{error}");
 }
 
+/// A loss that follows from another one is not the cause.
+#[test]
+fn the_first_loss_is_told() {
+    let colour = Inputs::ANY.require(Input::Colour);
+    let mut bytes = Vec::new();
+    for unit in units(packets()[0]).into_iter().filter(|unit| unit[0] & 0x1f != 8) {
+        bytes.extend([&[0, 0, 0, 1], unit].concat());
+    }
+    let mut all = packets();
+    all[0] = &bytes;
+    let (mut source, _saved) = open(with_video("foxglove", &all), colour);
+    let _ = frames(&mut source);
+    let first = source.first_loss().unwrap();
+    assert!(first.contains("a packet of H.264"), "{first}");
+    assert!(source.notes().last().unwrap().contains("key picture"), "{:?}", source.notes());
+}
+
 #[test]
 fn a_named_topic_of_a_wrong_kind_is_an_error_of_the_settings() {
     let named = InputSettings { depth_topic: Some("/cam".into()), ..InputSettings::default() };
