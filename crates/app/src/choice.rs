@@ -266,7 +266,8 @@ fn try_config(
     let Some(item) = source.next_frame() else {
         let account = source.account();
         let failing = account.topics.iter().find(|it| it.used_as.is_some() && it.problem.is_some());
-        let lost = source.notes().last().filter(|_| source.data_lost());
+        let last = source.notes().last().filter(|_| source.data_lost());
+        let lost = source.first_loss().or(last.map(String::as_str));
         let why = failing.map(|topic| format!(": {topic}"));
         let why = why.or_else(|| lost.map(|note| format!(": {note}"))).unwrap_or_default();
         let why = Failure::failed(format!("no frame that can be used{why}"));

@@ -9,9 +9,9 @@ use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
 use crate::images::{
-    CloudAxes, CloudCamera, Codec, Content, H264, Packet, camera_of_cloud, content_of_compressed,
-    content_of_encoding, may_be_disparity, points_of_cloud, size_of_compressed, size_of_video,
-    video_codec,
+    CloudAxes, CloudCamera, Codec, Content, H264, ImageError, NO_PARAMETERS, Packet,
+    camera_of_cloud, content_of_compressed, content_of_encoding, has_lengths, may_be_disparity,
+    points_of_cloud, size_of_compressed, size_of_video, video_codec,
 };
 use crate::log_files::LogFiles;
 use crate::msgs::{
@@ -94,6 +94,8 @@ pub(crate) struct Topic {
     /// Camera of a point cloud in rows and columns, and the reason for which there is none.
     pub(crate) cloud: Option<CloudCamera>,
     pub(crate) cloud_fault: Option<String>,
+    /// Reason for which the packets of H.264 so far give no picture.
+    pub(crate) video_fault: Option<String>,
     /// True for points that can be read, also if they are not those of a camera.
     pub(crate) has_points: bool,
     pub(crate) frame_id: Option<String>,
@@ -354,6 +356,7 @@ impl Gathering {
             size: None,
             cloud: None,
             cloud_fault: None,
+            video_fault: None,
             has_points: false,
             frame_id: None,
             stamps: Vec::new(),
@@ -580,7 +583,15 @@ impl Topic {
         }
         self.pixels = Some(codec.to_owned());
         if self.size.is_none() {
-            self.size = size_of_video(data, &Limits::default()).ok().flatten();
+            match size_of_video(data, &Limits::default()) {
+                Ok(None) if self.video_fault.is_none() && has_lengths(data) => {
+                    self.video_fault = Some(NO_PARAMETERS.to_owned());
+                }
+                Ok(size) => self.size = size,
+                // Of damaged parameters others may follow.
+                Err(ImageError::Codec(_)) => {}
+                Err(error) => self.video_fault = Some(error.to_string()),
+            }
         }
         // Without its parameters there is no picture.
         self.content = if self.size.is_some() { Content::Picture } else { Content::Unknown };

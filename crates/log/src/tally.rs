@@ -6,6 +6,8 @@ pub(crate) struct Tally {
     pub(crate) counters: BTreeMap<&'static str, u64>,
     pub(crate) notes: Vec<String>,
     pub(crate) lost: bool,
+    /// Description of the first loss. Others may follow from it.
+    pub(crate) first_loss: Option<String>,
 }
 
 /// Maximum number of sentences kept; repeated ones are only counted.
@@ -29,7 +31,9 @@ impl Tally {
         self.lost = true;
         self.count(name);
         if self.counters.get(name) == Some(&1) {
-            self.note(what());
+            let what = what();
+            self.first_loss.get_or_insert_with(|| what.clone());
+            self.note(what);
         }
     }
 

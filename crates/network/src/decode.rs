@@ -5,11 +5,10 @@ use tagalong_core::{Joint, Joints};
 use tagalong_geometry::Rect;
 
 use crate::family::{NANODET_BINS, NANODET_M_BINS, NANODET_STRIDES, STRIDES, count_cells};
+use crate::unit::{unit_of_list, unit_of_rows};
 use crate::values::{bins_of, is_score, is_transposed};
-use crate::{Family, InputSize, Tensor};
+use crate::{BoxUnit, Family, InputSize, Tensor};
 
-/// Largest offset from a cell, in cells.
-const MAX_OFFSET: f32 = 16.0;
 /// Joints of a person.
 const JOINTS: usize = 17;
 /// Rows of YOLOv8 for people with joints: the box, the score, and column, row and score of each joint.
@@ -65,17 +64,20 @@ impl Wanted<'_> {
 }
 
 /// Returns the boxes of people in outputs whose shapes fit the family ([`Family::classes`]), in
-/// pixels of the input.
+/// pixels of the input. Without a unit of the boxes the numbers of lists tell it.
 pub(crate) fn decode(
     family: Family,
     outputs: &[(&str, &Tensor)],
     input: InputSize,
+    unit: Option<BoxUnit>,
     wanted: Wanted<'_>,
 ) -> Vec<ScoredBox> {
     let named = |name: &str| outputs.iter().find(|(known, _)| *known == name).map(|(_, out)| *out);
     let first = outputs.first().map(|(_, output)| *output);
+    let list = first.filter(|_| family == Family::YoloV10);
+    let unit = unit.or_else(|| unit_of_list(list?, wanted.min_score));
     let found = match family {
-        Family::Yolox => first.map(|output| yolox(output, input, wanted)),
+        Family::Yolox => first.map(|output| yolox(output, input, unit, wanted)),
         Family::YoloV8 => first.map(|output| {
             if is_transposed(output, input) {
                 yolo_v8_rows(output, wanted)
@@ -93,7 +95,21 @@ pub(crate) fn decode(
         Family::RfDetr => (|| Some(rf_detr(named("dets")?, named("labels")?, input, wanted)))(),
         Family::RtmDet => (|| Some(rtmdet(named("dets")?, named("labels")?, wanted)))(),
     };
-    found.unwrap_or_default()
+    let mut found = found.unwrap_or_default();
+    if family.has_unit() && unit == Some(BoxUnit::Fractions) {
+        found.iter_mut().for_each(|person| scale(person, input));
+    }
+    found
+}
+
+/// Changes a box and its joints from fractions of the input to pixels.
+fn scale(person: &mut ScoredBox, input: InputSize) {
+    let [columns, rows] = [input.width as f64, input.height as f64];
+    let Rect { x, y, width, height } = person.rect;
+    person.rect = Rect::new(x * columns, y * rows, width * columns, height * rows);
+    let joints = person.joints.take();
+    person.joints =
+        joints.map(|joints| joints.moved(|at| Point2::new(at.x * columns, at.y * rows)));
 }
 
 /// Returns column, row and stride of each grid cell, in the order of the outputs.
@@ -121,24 +137,13 @@ fn between(corners: &[f32]) -> Rect {
     Rect::new(left, top, right - left, bottom - top)
 }
 
-/// Returns true if the boxes of a grid are middles and sizes in pixels rather than in its cells:
-/// their places exceed those of offsets, and near the far end of the image a middle exceeds the
-/// size of its box, as it never does where corners are meant.
-pub(crate) fn is_pixel_grid(output: &Tensor) -> bool {
-    let mut is_beyond = false;
-    let mut is_middle = false;
-    for row in output.rows() {
-        if row[2] < 0.0 || row[3] < 0.0 {
-            return false;
-        }
-        is_beyond |= row[0].max(row[1]) > MAX_OFFSET;
-        is_middle |= row[2] < row[0] || row[3] < row[1];
-    }
-    is_beyond && is_middle
-}
-
-fn yolox(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredBox> {
-    if is_pixel_grid(output) {
+fn yolox(
+    output: &Tensor,
+    input: InputSize,
+    unit: Option<BoxUnit>,
+    wanted: Wanted<'_>,
+) -> Vec<ScoredBox> {
+    if unit.or_else(|| unit_of_rows(output, input)).is_some() {
         let found = output.rows().filter_map(|row| {
             let score = row[4] * wanted.best(|class| row.get(5 + class).copied());
             wanted.take(score, || around_row(row))
@@ -434,7 +439,7 @@ mod tests {
         // Column 2, row 1 of the second grid.
         let row = &mut values[(64 + 6) * 7..][..7];
         row.copy_from_slice(&[0.5, 0.25, 0.0, 2.0_f32.ln(), 0.9, 0.8, 1.0]);
-        let found = yolox(&tensor(&[1, 84, 7], &values), INPUT, PEOPLE);
+        let found = yolox(&tensor(&[1, 84, 7], &values), INPUT, None, PEOPLE);
         assert_eq!(found.len(), 1);
         let [x, y, width, height] = rects(&found)[0];
         assert_eq!([x, y, width], [40.0 - 8.0, 20.0 - height / 2.0, 16.0]);
@@ -467,14 +472,29 @@ mod tests {
     }
 
     #[test]
+    fn boxes_in_fractions_of_the_input_become_pixels() {
+        let row = [0.25, 0.5, 0.5, 1.0, 0.9, 0.0];
+        let list = tensor(&[1, 2, 6], &[row, [0.0; 6]].concat());
+        let of = |unit: Option<BoxUnit>| {
+            rects(&decode(Family::YoloV10, &[("output", &list)], WIDE, unit, PEOPLE))
+        };
+        assert_eq!(of(None), [[16.0, 16.0, 16.0, 16.0]], "its numbers tell");
+        assert_eq!(of(Some(BoxUnit::Pixels)), [[0.25, 0.5, 0.25, 0.5]], "the setting is obeyed");
+        let one = tensor(&[1, 5, 1], &[0.5, 0.5, 0.25, 0.5, 0.9]);
+        let unit = Some(BoxUnit::Fractions);
+        let found = decode(Family::YoloV8, &[("output", &one)], WIDE, unit, PEOPLE);
+        assert_eq!(rects(&found), [[24.0, 8.0, 16.0, 16.0]]);
+    }
+
+    #[test]
     fn outputs_are_found_by_name_in_any_order() {
         let labels = tensor(&[1, 2], &[0.0, 0.0]);
         let scores = tensor(&[1, 2], &[0.9, 0.1]);
         let boxes = tensor(&[1, 2, 4], &[1.0, 2.0, 5.0, 10.0, 0.0, 0.0, 9.0, 9.0]);
         let outputs = [("scores", &scores), ("labels", &labels), ("boxes", &boxes)];
-        let found = decode(Family::RtDetr, &outputs, INPUT, PEOPLE);
+        let found = decode(Family::RtDetr, &outputs, INPUT, None, PEOPLE);
         assert_eq!(rects(&found), [[1.0, 2.0, 4.0, 8.0]]);
-        assert!(decode(Family::RtDetr, &outputs[..2], INPUT, PEOPLE).is_empty());
+        assert!(decode(Family::RtDetr, &outputs[..2], INPUT, None, PEOPLE).is_empty());
     }
 
     #[test]

@@ -9,9 +9,11 @@ use tagalong_core::RgbImage;
 use crate::decode::{Wanted, decode, suppress};
 use crate::family::{OutputShape, recognise, shapes_of};
 use crate::network::rten;
+use crate::unit::{unit_of_columns, unit_of_rows};
 use crate::worker::Worker;
 use crate::{
-    Element, Family, InputSize, Limits, Network, Port, Preparation, Runtime, ScoredBox, Tensor,
+    BoxUnit, ClassNames, Element, Family, InputSize, Limits, Network, Port, Preparation, Runtime,
+    ScoredBox, Tensor,
 };
 
 /// Columns and rows of an input that the file leaves open.
@@ -40,8 +42,10 @@ pub struct Choices {
     pub family: Option<Family>,
     /// Columns and rows of the input, where the file leaves them open.
     pub size: Option<[usize; 2]>,
-    /// Classes of people; by default that of the family.
+    /// Classes of people; by default those that the file calls so, otherwise that of the family.
     pub classes: Vec<usize>,
+    /// Unit of the boxes; by default that of the outputs.
+    pub unit: Option<BoxUnit>,
 }
 
 /// Description of a network file.
@@ -55,13 +59,17 @@ pub struct About {
     pub input: Result<InputSize, String>,
     /// Outputs of a first call; an error is a sentence.
     pub run: Result<Vec<OutputShape>, String>,
+    /// Names of its classes, where the file has them.
+    pub class_names: ClassNames,
     /// Family by those outputs.
     family: Result<Family, String>,
+    /// Unit of the boxes of a grid by those outputs.
+    unit: Option<BoxUnit>,
 }
 
 impl About {
     /// Describes a network, and runs it once.
-    fn of(network: &mut impl Network, size: OpenSize) -> Self {
+    fn of(network: &mut impl Network, class_names: ClassNames, size: OpenSize) -> Self {
         let inputs = network.inputs().to_vec();
         let outputs = network.outputs().to_vec();
         let image = image_port(&inputs).and_then(|image| input_size(&inputs[image], size));
@@ -69,13 +77,43 @@ impl About {
             let found = first_run(network, input)?;
             let named = outputs.iter().map(|port| port.name.as_str()).zip(&found);
             let named: Vec<(&str, &Tensor)> = named.collect();
-            Ok((shapes_of(&named), recognise(&named, input)))
+            let unit = match &found[..] {
+                [output] => unit_of_rows(output, input).or_else(|| unit_of_columns(output, input)),
+                _ => None,
+            };
+            Ok((shapes_of(&named), recognise(&named, input), unit))
         });
-        let (run, family) = match run {
-            Ok((shapes, family)) => (Ok(shapes), family),
-            Err(why) => (Err(why.clone()), Err(why)),
+        let (run, family, unit) = match run {
+            Ok((shapes, family, unit)) => (Ok(shapes), family, unit),
+            Err(why) => (Err(why.clone()), Err(why), None),
         };
-        Self { inputs, outputs, input: image, run, family }
+        Self { inputs, outputs, input: image, run, class_names, family, unit }
+    }
+
+    /// Returns the classes of people: those that the file calls so, and without names that of the
+    /// family.
+    ///
+    /// # Errors
+    /// Names of which none is that of a person: a sentence with the names and the remedy.
+    pub fn people(&self, family: Family) -> Result<Vec<usize>, String> {
+        if self.class_names.is_empty() || family == Family::MoveNet {
+            return Ok(vec![family.person_class()]);
+        }
+        let people = self.class_names.people();
+        if people.is_empty() {
+            return Err(format!(
+                "names its classes {}, and none of them person, pedestrian or people: set `classes` \
+                 to the numbers of those that are people",
+                self.class_names.shown()
+            ));
+        }
+        Ok(people)
+    }
+
+    /// Returns the unit of the boxes, as far as the outputs of the first call tell it: lists of boxes
+    /// do only where something is found.
+    fn unit(&self, family: Family) -> Option<BoxUnit> {
+        self.unit.filter(|_| matches!(family, Family::Yolox | Family::YoloV8))
     }
 
     /// Returns the family of the network.
@@ -110,9 +148,10 @@ pub(crate) fn start(
     runtime: Runtime,
 ) -> Result<(Worker, About), String> {
     let bytes = read(path, limits)?;
+    let names = ClassNames::of(&bytes);
     let own = *limits;
     let load = move || runtime(bytes, &own);
-    let about = move |network: &mut Box<dyn Network>| Ok(About::of(network, size));
+    let about = move |network: &mut Box<dyn Network>| Ok(About::of(network, names, size));
     Worker::start(load, about, limits.load_deadline)
 }
 
@@ -199,6 +238,7 @@ pub struct PersonNetwork {
     family: Family,
     input: InputSize,
     classes: Vec<usize>,
+    unit: Option<BoxUnit>,
     limits: Limits,
 }
 
@@ -207,7 +247,8 @@ impl PersonNetwork {
     ///
     /// # Errors
     /// A file that [`inspect`] refuses, outputs of another family than the chosen one or of none,
-    /// and classes that the network does not have; the message is a sentence about the file.
+    /// classes that the network does not have, and names of classes of which none is a person; the
+    /// message is a sentence about the file.
     pub fn load(path: &Path, choices: &Choices, limits: &Limits) -> Result<Self, String> {
         Self::load_with(rten, path, choices, limits)
     }
@@ -237,14 +278,18 @@ impl PersonNetwork {
             return Err(format!("is not of the family {family}: it has {shown}, not {needs}"));
         };
         let classes = if choices.classes.is_empty() {
-            vec![family.person_class()]
+            about.people(family)?
         } else {
             choices.classes.clone()
         };
         if let Some(beyond) = classes.iter().find(|class| known > 0 && **class >= known) {
             return Err(format!("has {known} classes from 0, and no {beyond}: set `classes`"));
         }
-        Ok(Self { worker, about, family, input, classes, limits: *limits })
+        if choices.unit.is_some() && !family.has_unit() {
+            return Err(format!("boxes of the family {family} have one unit: remove `box_unit`"));
+        }
+        let unit = choices.unit.or_else(|| about.unit(family));
+        Ok(Self { worker, about, family, input, classes, unit, limits: *limits })
     }
 
     /// Returns the description of the file.
@@ -283,7 +328,7 @@ impl PersonNetwork {
             return Err("its outputs change their shape from call to call".into());
         }
         let wanted = Wanted { classes: &self.classes, min_score };
-        let found = decode(self.family, &outputs, self.input, wanted);
+        let found = decode(self.family, &outputs, self.input, self.unit, wanted);
         // Lists without doubles are sorted all the same.
         let iou = if self.family.needs_suppression(&shapes) { iou } else { 1.0 };
         let mut people = suppress(found, iou);

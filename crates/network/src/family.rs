@@ -5,7 +5,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::values::fits;
+use crate::values::{fits, is_empty};
 use crate::{Colours, Fit, InputSize, Preparation, Tensor};
 
 /// Mean and deviation of ImageNet in red, green, blue, 0 to 255.
@@ -180,7 +180,7 @@ impl Family {
             }
             Self::YoloV10 => {
                 "one output [1, boxes, 6] or [boxes, 6] with corners, score and class, or \
-                 [boxes, 7] with the number of the image before them"
+                 [1, boxes, 7] or [boxes, 7] with the number of the image before them"
             }
             Self::RtDetr => {
                 "outputs `labels` [1, n], `boxes` [1, n, 4], `scores` [1, n], and an input \
@@ -249,6 +249,11 @@ impl Family {
         }
     }
 
+    /// Returns true if exports of the family differ in the unit of their boxes.
+    pub(crate) const fn has_unit(self) -> bool {
+        matches!(self, Self::Yolox | Self::YoloV8 | Self::YoloV10 | Self::RtDetr | Self::RtmDet)
+    }
+
     /// Returns true if several boxes of one person are left to the caller. Lists of final boxes
     /// are without doubles, but for those with a box for each cell of a grid.
     pub fn needs_suppression(self, outputs: &[OutputShape]) -> bool {
@@ -278,7 +283,7 @@ impl Family {
                 return (width > 4 * NANODET_M_BINS[0]).then_some(0);
             }
             (Self::NanoDetM, None) => return outputs.classes_by_stride(input),
-            (Self::YoloV10, Some(&[1, _, 6] | &[_, 6 | 7])) => return Some(0),
+            (Self::YoloV10, Some(&[1, _, 6 | 7] | &[_, 6 | 7])) => return Some(0),
             (Self::MoveNet, Some(&[1, 1, 17, 3] | &[1, _, 56])) if input.channels_last => {
                 return Some(1);
             }
@@ -352,6 +357,11 @@ pub(crate) fn recognise(outputs: &[(&str, &Tensor)], input: InputSize) -> Result
              know that it is one of them, or export it as its authors do",
             any_of(&by_shape)
         )),
+        _ if outputs.iter().all(|(_, output)| is_empty(output)) => Err(format!(
+            "the outputs {shown} are all zero for an image without anything in it, and may be those \
+             of {}: set `family` to the one that it is",
+            any_of(&by_value)
+        )),
         _ => Err(format!(
             "the outputs {shown} may be those of {}: set `family` to the one that it is",
             any_of(&by_value)
@@ -372,7 +382,7 @@ mod tests {
 
     const INPUT: InputSize = InputSize { width: 640, height: 640, channels_last: false };
 
-    /// Returns the family of outputs of zeros.
+    /// Returns the family of outputs of zeros, which every family with their shapes may have.
     fn of_shapes(shapes: &[(&str, &[usize])], input: InputSize) -> Result<Family, String> {
         let zeros = |(_, shape): &(&str, &[usize])| {
             Tensor::new(shape.to_vec(), vec![0.0; shape.iter().product()]).unwrap()
@@ -386,7 +396,6 @@ mod tests {
     #[test]
     fn published_networks_are_recognised() {
         let only = |shape: &[usize]| of_shapes(&[("output", shape)], INPUT).unwrap();
-        assert_eq!(only(&[1, 8400, 85]), Family::Yolox);
         assert_eq!(only(&[1, 84, 8400]), Family::YoloV8);
         assert_eq!(only(&[1, 5, 8400]), Family::YoloV8, "a single class");
         assert_eq!(only(&[1, 300, 6]), Family::YoloV10);
@@ -420,7 +429,7 @@ mod tests {
     #[test]
     fn shapes_of_several_families_are_refused_with_their_names_where_numbers_do_not_decide() {
         let why = of_shapes(&[("output", &[1, 8400, 6])], INPUT).unwrap_err();
-        assert!(why.contains("`yolox` (YOLOX) or `yolov10`"), "{why}");
+        assert!(why.contains("`yolox` (YOLOX) or `yolov8`") && why.contains("`yolov10`"), "{why}");
         assert!(why.contains("set `family`") && !why.contains("rf-detr"), "{why}");
     }
 

@@ -1,8 +1,9 @@
 //! Families told apart by the numbers of their outputs, where shapes are alike.
 
-use crate::decode::{Columns, columns_of, is_pixel_grid, scores_and_sides};
+use crate::decode::{Columns, columns_of, scores_and_sides};
 use crate::family::{NANODET_M_BINS, STRIDES, count_cells};
-use crate::{Family, InputSize, Tensor};
+use crate::unit::{unit_of_columns, unit_of_rows};
+use crate::{BoxUnit, Family, InputSize, Tensor};
 
 /// Largest offset in cells, and largest logarithm of a size in cells, of a raw grid: a box is not
 /// `exp(16)` cells wide, and pixels exceed this in all but the first cells.
@@ -20,19 +21,31 @@ pub(crate) fn fits(family: Family, outputs: &[(&str, &Tensor)], input: InputSize
         // Several outputs have names, or a shape for each stride.
         return family != Family::NanoDetM || scores_and_sides(outputs, input).is_some();
     };
+    if is_empty(output) {
+        return true;
+    }
     match family {
-        Family::Yolox => is_raw_grid(output) || has_pixels(output, 5),
-        Family::YoloV8 if is_transposed(output, input) => has_pixels(output, 4),
+        Family::Yolox => is_raw_grid(output, input) || has_boxes(output, 5, input),
+        Family::YoloV8 if is_transposed(output, input) => has_boxes(output, 4, input),
+        Family::YoloV8 => is_grid_of_columns(output, input),
         Family::NanoDetM => bins_of(output).is_some(),
         Family::YoloV10 => is_list(output, input),
         _ => true,
     }
 }
 
-/// Returns true if the output of YOLOv8 has a row for each box.
+/// Returns true for an output of zeros alone. Lists in which nothing was found are such, and nothing
+/// tells of which family they are.
+pub(crate) fn is_empty(output: &Tensor) -> bool {
+    output.values().iter().all(|value| *value == 0.0)
+}
+
+/// Returns true if the output of YOLOv8 has a row for each box. The numbers tell where it has as many
+/// columns.
 pub(crate) fn is_transposed(output: &Tensor, input: InputSize) -> bool {
     let cells = count_cells(input, &STRIDES);
-    matches!(*output.shape(), [1, n, width] if n == cells && width != cells)
+    let &[1, rows, width] = output.shape() else { return false };
+    rows == cells && (width != cells || has_boxes(output, 4, input))
 }
 
 /// Returns true for a probability, but for its rounding.
@@ -46,22 +59,30 @@ fn is_label(value: f32) -> bool {
 }
 
 /// Returns true for a grid with offsets and logarithms of sizes in cells, and scores.
-fn is_raw_grid(output: &Tensor) -> bool {
-    output.rows().all(|row| {
+fn is_raw_grid(output: &Tensor, input: InputSize) -> bool {
+    let is_raw = output.rows().all(|row| {
         let (place, scores) = row.split_at(4);
         place.iter().all(|value| value.abs() <= MAX_RAW) && scores.iter().copied().all(is_score)
-    })
+    });
+    is_raw && unit_of_rows(output, input) != Some(BoxUnit::Fractions)
 }
 
-/// Returns true for a grid with middles and sizes in pixels, and scores of which `first` is the
-/// first column of a class.
-fn has_pixels(output: &Tensor, first: usize) -> bool {
+/// Returns true for a grid with middles and sizes, and scores of which `first` is the first column of
+/// a class.
+fn has_boxes(output: &Tensor, first: usize, input: InputSize) -> bool {
     let width = output.shape().last().copied().unwrap_or(0);
     let other = COCO_COLUMNS[usize::from(first == 4)];
     width > first
         && width != other
-        && is_pixel_grid(output)
+        && unit_of_rows(output, input).is_some()
         && output.rows().all(|row| row[4..].iter().copied().all(is_score))
+}
+
+/// Returns true for a grid with a column for each box: middles and sizes, and scores of the first
+/// class. The rows below may be those of other classes, of joints, or of an angle.
+fn is_grid_of_columns(output: &Tensor, input: InputSize) -> bool {
+    let has_scores = output.rows().nth(4).is_some_and(|row| row.iter().copied().all(is_score));
+    has_scores && unit_of_columns(output, input).is_some()
 }
 
 /// Returns the bins of a distribution in the rows of NanoDet before Plus, which begin with scores.
@@ -167,6 +188,72 @@ mod tests {
         assert_eq!(list(&[10.0, 5.0, 30.0, 60.0, 0.8, 0.0]), Ok(Family::YoloV10));
         assert!(list(&[0.2, -0.1, 0.3, 0.6, 0.1, -0.2, 0.8]).is_err());
         assert!(list(&[0.2, 0.1, 0.1, 0.6, 0.1, 0.2]).is_err());
+    }
+
+    /// A list in which nothing was found is zeros alone, whatever grid has as many rows.
+    #[test]
+    fn zeros_are_those_of_every_family_with_the_shape() {
+        for (width, families) in [
+            (6, ["`yolox`", "`yolov8`", "`yolov10`"].as_slice()),
+            (7, &["`yolox`", "`yolov8`", "`yolov10`"]),
+            (85, &["`yolox`", "`yolov8`", "`nanodet-m`"]),
+        ] {
+            let why = of_rows(&[1, 84, width], |_| vec![0.0; width]).unwrap_err();
+            assert!(families.iter().all(|family| why.contains(family)), "{why}");
+            assert!(why.contains("all zero") && why.contains("set `family`"), "{why}");
+        }
+    }
+
+    #[test]
+    fn lists_of_one_image_may_begin_with_its_number() {
+        let row = |cell: usize| match cell {
+            0 => vec![0.0, 15.0, 5.0, 35.0, 60.0, 0.0, 0.9],
+            _ => vec![0.0; 7],
+        };
+        assert_eq!(of_rows(&[1, 84, 7], row), Ok(Family::YoloV10), "as many as cells");
+        assert_eq!(of_rows(&[1, 30, 7], row), Ok(Family::YoloV10));
+    }
+
+    /// Returns the family of a grid with a column for each box, of these scores and other rows.
+    fn of_columns(place: impl Fn(usize) -> Vec<f32>, others: &[f32]) -> Result<Family, String> {
+        let boxes: Vec<Vec<f32>> = (0..84).map(|cell| with(place(cell), others)).collect();
+        let height = 4 + others.len();
+        let values = (0..height).flat_map(|part| boxes.iter().map(move |row| row[part])).collect();
+        recognise(&[("output", &Tensor::new(vec![1, height, 84], values).unwrap())], INPUT)
+    }
+
+    #[test]
+    fn grids_of_columns_have_boxes_and_scores() {
+        assert_eq!(of_columns(pixels, &[0.1, 0.4]), Ok(Family::YoloV8));
+        assert_eq!(of_columns(pixels, &[0.1, 30.0, 20.0]), Ok(Family::YoloV8), "a joint");
+        for (place, scores) in [
+            (&pixels as &dyn Fn(usize) -> Vec<f32>, [-6.0, 3.0]),
+            (&offsets, [0.1, 0.4]),
+            (&|_| vec![-900.0; 4], [0.1, 0.4]),
+        ] {
+            let why = of_columns(place, &scores).unwrap_err();
+            assert!(
+                why.contains("the shape of `yolov8`") && why.contains("not its numbers"),
+                "{why}"
+            );
+        }
+    }
+
+    /// Returns the middle and the size of a box at a cell as fractions of the image.
+    fn fractions(cell: usize) -> Vec<f32> {
+        pixels(cell).into_iter().map(|part| part / 64.0).collect()
+    }
+
+    #[test]
+    fn grids_in_fractions_of_the_image_are_no_offsets() {
+        let of = |width: usize| {
+            of_rows(&[1, 84, width], |cell| with(fractions(cell), &vec![0.1; width - 4]))
+        };
+        assert_eq!((of(84), of(85)), (Ok(Family::YoloV8), Ok(Family::Yolox)));
+        assert_eq!(of(5), Ok(Family::YoloV8));
+        let why = of(6).unwrap_err();
+        assert!(why.contains("`yolox` (YOLOX) or `yolov8`"), "{why}");
+        assert_eq!(of_columns(fractions, &[0.1, 0.4]), Ok(Family::YoloV8));
     }
 
     #[test]

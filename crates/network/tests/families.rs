@@ -10,7 +10,7 @@ use std::time::Duration;
 use serde::Deserialize;
 use tagalong_core::RgbImage;
 use tagalong_geometry::Rect;
-use tagalong_network::{Choices, Family, Limits, PersonNetwork, inspect};
+use tagalong_network::{BoxUnit, Choices, Family, Limits, PersonNetwork, inspect};
 
 /// Output of onnxruntime.
 #[derive(Deserialize)]
@@ -44,11 +44,14 @@ fn scene(scale: usize) -> RgbImage {
 }
 
 /// Files as tools write them, with the families that they are of: decoded in the network, with rows
-/// for boxes, channels last, open sizes, half precision, the outputs side by side, the score after
-/// the class, a row for each cell, no dimension for images, and their numbers in a column.
-const LAYOUTS: [(&str, Family); 11] = [
+/// for boxes, as fractions of the image, channels last, open sizes, half precision, the outputs side
+/// by side, the score after the class, a row for each cell, no dimension for images, and their numbers
+/// in a column.
+const LAYOUTS: [(&str, Family); 13] = [
     ("yolox-decoded", Family::Yolox),
     ("yolov8-rows", Family::YoloV8),
+    ("yolov8-fractions", Family::YoloV8),
+    ("fractions", Family::YoloV10),
     ("yolov8-last", Family::YoloV8),
     ("yolov8-open", Family::YoloV8),
     ("yolov8-half", Family::YoloV8),
@@ -192,6 +195,50 @@ fn choices_that_do_not_fit_are_refused() {
     assert!(why.contains("fixed size: remove `size`"), "{why}");
     let why = refused(Choices { classes: vec![0, 2], ..Choices::default() });
     assert!(why.contains("2 classes from 0, and no 2"), "{why}");
+}
+
+/// Returns the file of YOLOX, of which the first of two classes is that of the blob, with these names
+/// in its metadata.
+fn with_names(names: &str) -> Vec<u8> {
+    let field = |number: u8, bytes: &[u8]| [&[number << 3 | 2, bytes.len() as u8], bytes].concat();
+    let entry = [field(1, b"names"), field(2, names.as_bytes())].concat();
+    [fs::read(path("yolox.onnx")).unwrap(), field(14, &entry)].concat()
+}
+
+#[test]
+fn people_are_the_class_that_the_file_calls_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("named.onnx");
+    let found = |names: &str, classes: Vec<usize>| {
+        fs::write(&file, with_names(names)).unwrap();
+        let choices = Choices { classes, ..Choices::default() };
+        let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
+        let found = network.find(&scene(1), &Family::Yolox.preparation(), 0.5, 0.5);
+        found.unwrap().unwrap().len()
+    };
+    assert_eq!(found("{0: 'Person', 1: 'helmet'}", vec![]), 1);
+    assert_eq!(found("{0: 'helmet', 1: 'person'}", vec![]), 0);
+    assert_eq!(found("{0: 'helmet', 1: 'person'}", vec![0]), 1, "the setting is obeyed");
+    assert_eq!(found("{0: 'helmet', 1: 'vest'}", vec![0]), 1);
+    let why =
+        refusal(&with_names("{0: 'helmet', 1: 'vest'}"), &Choices::default(), &Limits::default());
+    assert!(why.contains("0 helmet, 1 vest") && why.contains("set `classes`"), "{why}");
+    let beyond = with_names("{0: 'helmet', 3: 'person'}");
+    let why = refusal(&beyond, &Choices::default(), &Limits::default());
+    assert!(why.contains("2 classes from 0, and no 3"), "{why}");
+}
+
+#[test]
+fn the_unit_of_boxes_is_for_families_that_have_several() {
+    let whole = fs::read(path("nanodet.onnx")).unwrap();
+    let choices = Choices { unit: Some(BoxUnit::Fractions), ..Choices::default() };
+    let why = refusal(&whole, &choices, &Limits::default());
+    assert!(why.contains("family nanodet") && why.contains("remove `box_unit`"), "{why}");
+    // What the user sets is obeyed: pixels of which none is within the image.
+    let file = path("yolov8-rows.onnx");
+    let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
+    let found = network.find(&scene(1), &Family::YoloV8.preparation(), 0.5, 0.5).unwrap().unwrap();
+    assert!(found[0].rect.x > 1000.0, "{found:?}");
 }
 
 #[test]

@@ -233,9 +233,17 @@ def nanodet_m_concat(graph):
     return {"output": [1, 84, 112]}
 
 
-def final(graph, columns, boxes=3, batch=True):
+def yolov8_fractions(graph):
+    boxes, person = pixel_rows(graph, graph.scores([0] * 3, [255] * 3))
+    fractions = graph.add("Div", boxes, graph.constant(SIDE))
+    graph.add("Concat", fractions, person, axis=2, outputs=["output0"])
+    return {"output0": [1, 84, 5]}
+
+
+def final(graph, columns, boxes=3, batch=True, unit=1):
     """The three best regions as a list of boxes with these columns, and rows of zeros."""
-    scores, corners = best(graph, graph.scores([0] * 3, [255] * 3), graph.constant(CORNERS))
+    corners = graph.constant(np.asarray(CORNERS, np.float32) / unit)
+    scores, corners = best(graph, graph.scores([0] * 3, [255] * 3), corners)
     parts = {"box": corners, "score": graph.reshape(scores, [1, 3, 1]),
              "label": graph.zeros(1, 3, 1), "image": graph.zeros(1, 3, 1)}
     rows = graph.add("Concat", *[parts[column] for column in columns], axis=2)
@@ -251,11 +259,13 @@ def final(graph, columns, boxes=3, batch=True):
 LAYOUTS = {
     "yolox-decoded": ("yolox", yolox_decoded, {}),
     "yolov8-rows": ("yolov8", yolov8_rows, {}),
+    "yolov8-fractions": ("yolov8", yolov8_fractions, {}),
     "yolov8-last": ("yolov8", yolov8, {"last": True}),
     "yolov8-open": ("yolov8", yolov8, {"open": True}),
     "yolov8-half": ("yolov8", yolov8, {"half": True}),
     "nanodet-m-concat": ("nanodet-m", nanodet_m_concat, {}),
     "score-last": ("yolov10", lambda graph: final(graph, ["box", "label", "score"]), {}),
+    "fractions": ("yolov10", lambda graph: final(graph, ["box", "score", "label"], unit=SIDE), {}),
     "deepstream": ("yolov10", lambda graph: final(graph, ["box", "score", "label"], 84), {}),
     "no-batch": ("yolov10", lambda graph: final(graph, ["box", "score", "label"], batch=False), {}),
     "yolov7": ("yolov10", lambda graph: final(graph, ["image", "box", "label", "score"],

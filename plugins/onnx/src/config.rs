@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{OrAuto, check_settings};
 use tagalong_core::{Error, Result};
-use tagalong_network::{Choices, Colours, Family, Fit, LimitSettings, Preparation};
+use tagalong_network::{BoxUnit, Choices, Colours, Family, Fit, LimitSettings, Preparation};
 use tagalong_vision::BoxSettings;
 
 /// Number that leaves a setting to the family of the network.
@@ -32,8 +32,12 @@ pub struct Config {
     /// Columns and rows of the input where the file leaves them open, for example `[640, 640]`,
     /// which is also taken for an empty list (256 x 256 for `movenet`).
     pub size: Vec<usize>,
-    /// Classes of people; empty: that of the family (0, and 1 for `rf-detr`).
+    /// Classes of people; empty: those that the file calls person, pedestrian or people, and without
+    /// names that of the family (0, and 1 for `rf-detr`).
     pub classes: Vec<usize>,
+    /// Unit of the boxes: `auto` (by the outputs), `pixels` of the input or `fractions` of its sides;
+    /// for `yolox`, `yolov8`, `yolov10`, `rt-detr` and `rtmdet`.
+    pub box_unit: OrAuto<BoxUnit>,
     /// Probability from which a box is a new person; -1: that of the family. Below a half, scores
     /// are log-odds above it, so that it also is what `start_score = 0.0` of a track manager means.
     #[schemars(range(min = -1.0, max = 1.0))]
@@ -75,6 +79,7 @@ impl Default for Config {
             family: OrAuto::Auto,
             size: Vec::new(),
             classes: Vec::new(),
+            box_unit: OrAuto::Auto,
             discover_score: BY_FAMILY,
             track_score: BY_FAMILY,
             suppress_iou: 0.6,
@@ -107,7 +112,12 @@ impl Config {
 
     pub(crate) fn choices(&self) -> Choices {
         let size = <[usize; 2]>::try_from(&self.size[..]).ok();
-        Choices { family: self.family.chosen(), size, classes: self.classes.clone() }
+        Choices {
+            family: self.family.chosen(),
+            size,
+            classes: self.classes.clone(),
+            unit: self.box_unit.chosen(),
+        }
     }
 
     /// Returns the thresholds: those of the family, but for those that are set.

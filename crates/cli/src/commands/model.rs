@@ -252,10 +252,26 @@ impl KnownDetector<'_> {
         let Self { family, input, .. } = self;
         let _ = writeln!(out, "# family   {family} ({})", family.networks());
         describe_input(*input, &family.preparation(), out);
-        let _ = writeln!(out, "# people   class {} (`classes` if not)", family.person_class());
+        let people = match self.about.people(*family) {
+            Ok(classes) => format!("class {} (`classes` if not)", self.named(&classes)),
+            Err(why) => format!("none: the file {why}"),
+        };
+        let _ = writeln!(out, "# people   {people}");
         if self.call_ms > 0.0 {
             let _ = writeln!(out, "# time     {:.1} ms a call, on one thread", self.call_ms);
         }
+    }
+
+    /// Returns classes with the names that the file has for them.
+    fn named(&self, classes: &[usize]) -> String {
+        let mut named = Vec::new();
+        for class in classes {
+            named.push(match self.about.class_names.get(*class) {
+                Some(name) => format!("{class}, `{}`", name.escape_debug()),
+                None => class.to_string(),
+            });
+        }
+        named.join(" and ")
     }
 
     fn write_config(&self, file: &Path, out: &mut String) {

@@ -3,11 +3,12 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use rust_h264::decoder::{ChromaFormat, Decoder, Frame};
+use rust_h264::decoder::{Decoder, Frame};
 use rust_h264::nal::{NalUnit, NalUnitType, parse_annex_b};
 use rust_h264::sps::{Sps, parse_sps};
 use tagalong_core::Stamp;
 
+use super::video::with_start_codes;
 use super::{ImageError, check_size};
 use crate::Limits;
 use crate::msgs::{Header, Image, encode};
@@ -54,6 +55,7 @@ impl VideoDecoder {
     /// [`ImageError`]: a damaged packet, a size beyond the limits, or pixels of another kind than 8
     /// bits with halved colours. No picture follows until the next key picture.
     pub(crate) fn decode(&mut self, packet: &[u8], header: Header) -> Result<Picture, ImageError> {
+        let packet = &*with_start_codes(packet);
         // The decoder is a young one, and a log may hold any bytes: a panic is a damaged packet.
         match catch_unwind(AssertUnwindSafe(|| self.take(packet))) {
             Ok(Ok(Some(frame))) if self.is_out_of_order(&frame, header.stamp()) => {
@@ -115,12 +117,6 @@ impl VideoDecoder {
 
     /// Returns the bytes of a `sensor_msgs/Image` with the pixels of a picture.
     fn image_of(&self, frame: &Frame, header: Header) -> Result<Vec<u8>, ImageError> {
-        if frame.bit_depth != 8 || frame.chroma_format != ChromaFormat::Yuv420 {
-            return Err(ImageError::Layout(format!(
-                "video with {} bits and colours as {:?}: record it with 8 bits and yuv420p",
-                frame.bit_depth, frame.chroma_format
-            )));
-        }
         let size = self.sps.as_ref().map(|sps| (sps.width(), sps.height()));
         if size != Some((frame.width, frame.height)) {
             let why = "video in half pictures (interlaced): record it as progressive";
@@ -156,12 +152,13 @@ impl VideoDecoder {
 /// one.
 ///
 /// # Errors
-/// [`ImageError`]: damaged parameters, or a size beyond the limits.
+/// [`ImageError`]: damaged parameters, a size beyond the limits, or pixels that are not decoded.
 pub(crate) fn size_of_video(
     packet: &[u8],
     limits: &Limits,
 ) -> Result<Option<(u32, u32)>, ImageError> {
-    let units = parse_annex_b(packet);
+    let packet = with_start_codes(packet);
+    let units = parse_annex_b(&packet);
     let Some(unit) = units.iter().find(|unit| unit.nal_unit_type == NalUnitType::Sps) else {
         return Ok(None);
     };
@@ -169,9 +166,23 @@ pub(crate) fn size_of_video(
     Ok(Some((sps.width(), sps.height())))
 }
 
-/// Reads a sequence parameter set whose pictures are within the limits.
+/// Reads a sequence parameter set whose pictures are within the limits, and have 8 bits and halved
+/// colours.
 fn checked(unit: &NalUnit<'_>, limits: &Limits) -> Result<Sps, ImageError> {
     let sps = parse_sps(&unit.rbsp).map_err(damaged)?;
+    let deepest = sps.bit_depth_luma_minus8.max(sps.bit_depth_chroma_minus8);
+    let colours = match sps.chroma_format_idc {
+        0 => "4:0:0",
+        1 => "4:2:0",
+        2 => "4:2:2",
+        _ => "4:4:4",
+    };
+    if deepest > 0 || sps.chroma_format_idc != 1 {
+        return Err(ImageError::Layout(format!(
+            "video with {} bits and colours as {colours}: record it with 8 bits and 4:2:0 (yuv420p)",
+            8 + deepest
+        )));
+    }
     // Without the part that is cut off, for which the decoder takes memory as well.
     let width = 16 * (u64::from(sps.pic_width_in_mbs_minus1) + 1);
     let height = 16 * (u64::from(sps.pic_height_in_map_units_minus1) + 1);
@@ -355,6 +366,42 @@ mod tests {
         assert!(matches!(decoder.decode(split(BETWEEN)[0], at(2)), Ok(Picture::Whole(_))));
         decoder.shown = Some((1000, Stamp::from_nanos(1)));
         assert!(matches!(decoder.decode(split(BETWEEN)[1], at(3)), Ok(Picture::Whole(_))));
+    }
+
+    /// Parameters of 4:4:4, of 10 bits and of grey, as x264 writes them.
+    const OTHER_PIXELS: [(&[u8], &str); 3] = [
+        (
+            &[
+                0x67, 0xf4, 0x00, 0x0a, 0x91, 0x96, 0x42, 0x5a, 0x10, 0x00, 0x00, 0x03, 0x00, 0x10,
+                0x00, 0x00, 0x03, 0x01, 0x40, 0xf1, 0x22, 0x64, 0x80,
+            ],
+            "8 bits and colours as 4:4:4",
+        ),
+        (
+            &[
+                0x67, 0x6e, 0x00, 0x0a, 0xa6, 0xcb, 0x21, 0x2d, 0x08, 0x00, 0x00, 0x03, 0x00, 0x08,
+                0x00, 0x00, 0x03, 0x00, 0xa0, 0x78, 0x91, 0x32, 0x40,
+            ],
+            "10 bits and colours as 4:2:0",
+        ),
+        (
+            &[
+                0x67, 0x64, 0x00, 0x0a, 0xf2, 0xc8, 0x4b, 0x4d, 0x90, 0x00, 0x00, 0x03, 0x00, 0x10,
+                0x00, 0x00, 0x03, 0x01, 0x40, 0xf1, 0x22, 0x64, 0x80,
+            ],
+            "8 bits and colours as 4:0:0",
+        ),
+    ];
+
+    #[test]
+    fn pixels_that_are_not_decoded_are_told_by_the_parameters() {
+        for (parameters, pixels) in OTHER_PIXELS {
+            let packet = [&[0, 0, 0, 1], parameters].concat();
+            let why = size_of_video(&packet, &Limits::default()).unwrap_err().to_string();
+            assert!(why.contains(pixels) && why.contains("yuv420p"), "{why}");
+            let refused = VideoDecoder::new(&Limits::default()).decode(&packet, at(1));
+            assert!(matches!(refused, Err(ImageError::Layout(_))), "{refused:?}");
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub use disparity::{
 pub(crate) use h264::{Picture, VideoDecoder, size_of_video};
 pub use raw::{decode_raw, size_of_raw};
 use tagalong_core::{DepthImage, GreyImage, RgbImage};
-pub(crate) use video::{H264, Packet, video_codec};
+pub(crate) use video::{H264, NO_PARAMETERS, Packet, has_lengths, video_codec};
 
 use crate::Limits;
 

@@ -1,6 +1,8 @@
 //! Video in image messages, told by its bytes: some drivers publish it as `sensor_msgs/CompressedImage`
 //! with any format, also with `jpeg` or none.
 
+use std::borrow::Cow;
+
 use crate::msgs::{CdrError, CompressedImage, CompressedVideo, FfmpegPacket, Header, decode};
 
 /// Name of the codec that is decoded.
@@ -37,12 +39,54 @@ impl<'a> Packet<'a> {
     }
 }
 
+/// Start code before each unit of a packet (ITU-T H.264 and H.265, annex B).
+const START_CODE: [u8; 4] = [0, 0, 0, 1];
+
+/// Reason for which packets with lengths alone give no picture, with the remedy.
+pub(crate) const NO_PARAMETERS: &str = "its packets have lengths in place of start codes (AVCC), and the parameters of the stream are not \
+     among them: let the encoder write start codes (annex B), and parameters before each key picture";
+
+/// Returns the units of a packet with their lengths in place of start codes, as in MP4 files (ISO/IEC
+/// 14496-15); `None` unless the lengths add up to the whole packet.
+fn units_by_length(packet: &[u8]) -> Option<Vec<&[u8]>> {
+    let mut units = Vec::new();
+    let mut rest = packet;
+    while let Some((length, behind)) = rest.split_first_chunk::<4>() {
+        let length = usize::try_from(u32::from_be_bytes(*length)).ok()?;
+        // A length of one is a start code.
+        if length < 2 {
+            return None;
+        }
+        let (unit, behind) = behind.split_at_checked(length)?;
+        units.push(unit);
+        rest = behind;
+    }
+    (rest.is_empty() && !units.is_empty()).then_some(units)
+}
+
+/// Returns true for a packet with lengths in place of start codes.
+pub(crate) fn has_lengths(packet: &[u8]) -> bool {
+    units_by_length(packet).is_some()
+}
+
+/// Returns a packet with start codes in place of lengths.
+pub(crate) fn with_start_codes(packet: &[u8]) -> Cow<'_, [u8]> {
+    let Some(units) = units_by_length(packet) else { return Cow::Borrowed(packet) };
+    let mut bytes = Vec::with_capacity(packet.len());
+    for unit in units {
+        bytes.extend_from_slice(&START_CODE);
+        bytes.extend_from_slice(unit);
+    }
+    Cow::Owned(bytes)
+}
+
 /// Returns the codec of a packet of video; `None` for everything else.
 ///
-/// The packets of H.264 and H.265 begin with a start code and a unit that begins a picture (ITU-T H.264
-/// and H.265, annex B).
+/// The packets of H.264 and H.265 begin with a start code, or the length of a unit, and a unit that
+/// begins a picture.
 pub(crate) fn video_codec(data: &[u8]) -> Option<&'static str> {
-    let unit = data.strip_prefix(&[0, 0, 0, 1]).or_else(|| data.strip_prefix(&[0, 0, 1]))?;
+    let data = &*with_start_codes(data);
+    let unit = data.strip_prefix(&START_CODE).or_else(|| data.strip_prefix(&[0, 0, 1]))?;
     let &[first, second, ..] = unit else { return None };
     // The kind of a unit says whether others refer to it.
     let is_reference = first & 0x60 != 0;
@@ -85,6 +129,11 @@ mod tests {
             (&[0, 0, 0, 1, 0x46, 0x01], Some("h265")),
             (&[0, 0, 1, 0x26, 0x01], Some("h265")),
             (&[0, 0, 1, 0x02, 0x01], Some("h265")),
+            // Lengths: a delimiter and a key picture, and video parameters.
+            (&[0, 0, 0, 2, 0x09, 0xf0, 0, 0, 0, 3, 0x65, 0x88, 0x80], Some("h264")),
+            (&[0, 0, 0, 3, 0x40, 0x01, 0x0c], Some("h265")),
+            (&[0, 0, 0, 2, 0x09, 0xf0, 0], None),
+            (&[0, 0, 0, 4, 0x09, 0xf0], None),
             (&[0xff, 0xd8, 0xff, 0xe0], None),
             (&[0, 0, 0, 1], None),
             (&[0, 0, 0, 1, 0xe7, 1], None),
@@ -93,5 +142,18 @@ mod tests {
         ] {
             assert_eq!(video_codec(data), codec, "{data:02x?}");
         }
+    }
+
+    #[test]
+    fn lengths_become_start_codes_where_they_add_up() {
+        let whole = [0, 0, 0, 2, 0x09, 0xf0, 0, 0, 0, 3, 0x65, 0x88, 0x80];
+        let codes = [0, 0, 0, 1, 0x09, 0xf0, 0, 0, 0, 1, 0x65, 0x88, 0x80];
+        assert_eq!(*with_start_codes(&whole), codes);
+        assert_eq!(*with_start_codes(&codes), codes);
+        assert_eq!(*with_start_codes(&whole[..12]), whole[..12]);
+        assert!(has_lengths(&whole) && !has_lengths(&codes) && !has_lengths(&[]));
+        // Three bytes of a start code may be those of a length.
+        let long = [&[0, 0, 1, 0x02, 0x65][..], &[0x88; 0x101]].concat();
+        assert_eq!(with_start_codes(&long)[..5], [0, 0, 0, 1, 0x65]);
     }
 }

@@ -196,6 +196,12 @@ impl FrameSource {
         self.assembly.tally.lost
     }
 
+    /// Returns the remark about what was lost first since the log was opened, of which other losses may
+    /// be the consequence.
+    pub fn first_loss(&self) -> Option<&str> {
+        self.assembly.tally.first_loss.as_deref()
+    }
+
     /// Returns true if there is odometry: a topic, or transforms.
     pub fn has_odometry(&self) -> bool {
         self.assembly.plan.odom_frames.is_some()

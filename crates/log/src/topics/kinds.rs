@@ -82,7 +82,7 @@ pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
     let name = topic.schema.rsplit(['/', '.']).next().unwrap_or_default();
     let is_decoded = topic.kind == Type::Video && topic.pixels.as_deref() == Some(H264);
     if is_decoded && topic.size.is_none() {
-        return Some(NO_KEY_REMEDY.to_owned());
+        return Some(topic.video_fault.clone().unwrap_or_else(|| NO_KEY_REMEDY.to_owned()));
     }
     if VIDEO_MESSAGES.contains(&name) && !is_decoded {
         return Some(VIDEO_REMEDY.to_owned());

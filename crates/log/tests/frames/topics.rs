@@ -274,6 +274,95 @@ fn video_that_begins_in_the_middle_waits_for_a_key_picture_and_says_so() {
     assert!(error.to_string().contains("no key picture with its parameters"), "{error}");
 }
 
+/// Returns a packet with lengths in place of its start codes.
+fn with_lengths(packet: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for unit in units(packet) {
+        bytes.extend((unit.len() as u32).to_be_bytes());
+        bytes.extend(unit);
+    }
+    bytes
+}
+
+/// Returns the units of a packet, which begin after start codes of three or four bytes.
+fn units(packet: &[u8]) -> Vec<&[u8]> {
+    let starts: Vec<usize> =
+        (3..packet.len()).filter(|at| packet[at - 3..].starts_with(&[0, 0, 1])).collect();
+    let mut units = Vec::new();
+    for (index, start) in starts.iter().enumerate() {
+        let end = starts.get(index + 1).map_or(packet.len(), |next| next - 3);
+        let unit = &packet[*start..end];
+        units.push(unit.strip_suffix(&[0]).unwrap_or(unit));
+    }
+    units
+}
+
+#[test]
+fn video_with_lengths_is_read_where_its_parameters_are_in_the_packets() {
+    let colour = Inputs::ANY.require(Input::Colour);
+    let whole: Vec<Vec<u8>> = packets().into_iter().map(with_lengths).collect();
+    let whole: Vec<&[u8]> = whole.iter().map(Vec::as_slice).collect();
+    for kind in ["foxglove", "ffmpeg", "compressed"] {
+        let (mut source, _saved) = open(with_video(kind, &whole), colour);
+        assert_eq!(frames(&mut source).len(), 12, "{kind}");
+        assert!(!source.data_lost(), "{kind}: {:?}", source.notes());
+    }
+    // Key pictures without parameters, as in a file whose header has them.
+    let mut bare = Vec::new();
+    for packet in packets() {
+        let pictures: Vec<&[u8]> =
+            units(packet).into_iter().filter(|unit| matches!(unit[0] & 0x1f, 1 | 5)).collect();
+        bare.push(with_lengths(&[&[0, 0, 1], &pictures.join(&[0, 0, 1][..])[..]].concat()));
+    }
+    let bare: Vec<&[u8]> = bare.iter().map(Vec::as_slice).collect();
+    let error = refusal(with_video("foxglove", &bare), &InputSettings::default(), colour);
+    let error = error.to_string();
+    assert!(error.contains("lengths in place of start codes (AVCC)"), "{error}");
+    assert!(error.contains("annex B") && !error.contains("no key picture"), "{error}");
+}
+
+/// Parameters of video with 10 bits, as x264 writes them.
+const TEN_BITS: [u8; 23] = [
+    0x67, 0x6e, 0x00, 0x0a, 0xa6, 0xcb, 0x21, 0x2d, 0x08, 0x00, 0x00, 0x03, 0x00, 0x08, 0x00, 0x00,
+    0x03, 0x00, 0xa0, 0x78, 0x91, 0x32, 0x40,
+];
+
+#[test]
+fn depth_is_taken_alone_where_video_cannot_be_decoded() {
+    let packet = [&[0, 0, 0, 1][..], &TEN_BITS, &[0, 0, 0, 1, 0x65, 0x88, 0x84]].concat();
+    let mut log = with_video("foxglove", &[&packet[..]; 3]);
+    log.info("/camera/depth/camera_info", "depth", &camera(16, 12, 14.0));
+    log.fixed("base_link", "depth", &level_pose());
+    (0..3).for_each(|i| log.depth(at(0.1 * f64::from(i)), "depth", 3.0));
+    let (mut source, _saved) = open(log, Inputs::ANY.require(Input::Depth));
+    let found = frames(&mut source);
+    assert_eq!(found.len(), 3);
+    assert!(found[0].frame.depth().is_ok() && found[0].frame.colour().is_err());
+    let told = source.notes().iter().find(|note| note.contains("/cam/video")).unwrap();
+    assert!(told.contains("10 bits and colours as 4:2:0"), "{told}");
+    let log = with_video("foxglove", &[&packet[..]; 3]);
+    let colour = Inputs::ANY.require(Input::Colour);
+    let error = refusal(log, &InputSettings::default(), colour).to_string();
+    assert!(error.contains("10 bits") && error.contains("record it with 8 bits"), "{error}");
+}
+
+/// A loss that follows from another one is not the cause.
+#[test]
+fn the_first_loss_is_told() {
+    let colour = Inputs::ANY.require(Input::Colour);
+    let mut bytes = Vec::new();
+    for unit in units(packets()[0]).into_iter().filter(|unit| unit[0] & 0x1f != 8) {
+        bytes.extend([&[0, 0, 0, 1], unit].concat());
+    }
+    let mut all = packets();
+    all[0] = &bytes;
+    let (mut source, _saved) = open(with_video("foxglove", &all), colour);
+    let _ = frames(&mut source);
+    let first = source.first_loss().unwrap();
+    assert!(first.contains("a packet of H.264"), "{first}");
+    assert!(source.notes().last().unwrap().contains("key picture"), "{:?}", source.notes());
+}
+
 #[test]
 fn a_named_topic_of_a_wrong_kind_is_an_error_of_the_settings() {
     let named = InputSettings { depth_topic: Some("/cam".into()), ..InputSettings::default() };
