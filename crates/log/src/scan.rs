@@ -111,7 +111,7 @@ pub(crate) struct Scan {
     /// Files of the log; none for a source that is no file.
     pub(crate) parts: Vec<LogPart>,
     pub(crate) topics: BTreeMap<String, Topic>,
-    /// First calibration of each topic that is not all zero.
+    /// First calibration of each topic that is not blank.
     pub(crate) infos: BTreeMap<String, CameraInfo>,
     /// Metres per unit of depth, by the topics on which depth cameras say so.
     pub(crate) depth_units: BTreeMap<String, f64>,
@@ -476,9 +476,12 @@ fn short(number: f32) -> f64 {
     number.to_string().parse().unwrap_or_else(|_| f64::from(number))
 }
 
-/// Returns true for a calibration without numbers, which by REP 104 means uncalibrated.
+/// Returns true for a calibration without focal lengths, neither in K nor in P, which by REP 104 means
+/// uncalibrated. Drivers may fill other places of it: ones on the diagonal.
 pub(crate) fn is_blank(info: &CameraInfo) -> bool {
-    info.k.iter().chain(&info.p).all(|value| *value == 0.0)
+    let has_k = info.k[0] != 0.0 && info.k[4] != 0.0;
+    let has_p = info.p[0] != 0.0 && info.p[5] != 0.0;
+    !has_k && !has_p
 }
 
 /// Returns true for static transforms, which have a topic of their own.
