@@ -8,6 +8,7 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
+use crate::clock::Times;
 use crate::images::{
     CloudAxes, CloudCamera, Codec, Content, H264, Packet, camera_of_cloud, content_of_encoding,
     content_of_format, may_be_disparity, points_of_cloud, size_of_compressed, size_of_video,
@@ -20,7 +21,7 @@ use crate::msgs::{
 };
 use crate::packed::LogFile;
 use crate::sensors::SensorType;
-use crate::tf::TfBuffer;
+use crate::tf::{TfBuffer, plain};
 use crate::topics::{Stream, TopicName};
 use crate::walk::{Channel, Counters, Message};
 use crate::walker::LogWalker;
@@ -117,6 +118,8 @@ pub(crate) struct Scan {
     pub(crate) depth_units: BTreeMap<String, f64>,
     /// All static transforms, and of the moving ones the frames that they connect.
     pub(crate) tf: TfBuffer,
+    /// Times of the moving transforms, by the frame that moves.
+    pub(crate) link_times: BTreeMap<String, Times>,
     pub(crate) counters: Counters,
     pub(crate) notes: Vec<String>,
     pub(crate) data_lost: bool,
@@ -207,12 +210,13 @@ impl Scan {
             (scan.bytes, hash) = (scan.bytes + bytes, so_far);
         }
         let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-        let Gathering { topics, infos, depth_units, mut tf, replaced, .. } = gathering;
+        let Gathering { topics, infos, depth_units, mut tf, link_times, replaced, .. } = gathering;
         // The frames begin with the first ones, and meet the others on the way.
         for first in replaced.values() {
             tf.insert(first, true);
         }
-        Ok(Self { path: path.to_owned(), sha256, topics, infos, depth_units, tf, ..scan })
+        let path = path.to_owned();
+        Ok(Self { path, sha256, topics, infos, depth_units, tf, link_times, ..scan })
     }
 
     /// Adds the walk through one file.
@@ -266,6 +270,9 @@ impl Scan {
         for topic in scan.topics.values_mut() {
             topic.stamps = topic.recorded.clone();
         }
+        for times in scan.link_times.values_mut() {
+            *times = times.as_recorded();
+        }
         scan
     }
 
@@ -299,6 +306,7 @@ pub(crate) struct Gathering {
     depth_units: BTreeMap<String, f64>,
     tf: TfBuffer,
     linked: BTreeSet<(String, String)>,
+    link_times: BTreeMap<String, Times>,
     /// First static transform of each frame that has several.
     replaced: BTreeMap<String, TransformStamped>,
     depth_unit_m: Option<f64>,
@@ -320,6 +328,7 @@ impl Gathering {
             infos: self.infos.clone(),
             depth_units: self.depth_units.clone(),
             tf: self.tf.clone(),
+            link_times: self.link_times.clone(),
             counters: Counters::new(),
             notes: Vec::new(),
             data_lost: false,
@@ -374,7 +383,7 @@ impl Gathering {
             Type::Sensor => topic.take_sensor(message.data),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
             Type::Number => self.take_number(&channel.topic, message.data),
-            Type::Tf => self.take_tf(&channel.topic, message.data),
+            Type::Tf => self.take_tf(&channel.topic, message.data, message.log_time),
             Type::Other => Some(()),
         };
         let topic = self.topic(&channel.topic, "", "");
@@ -438,19 +447,33 @@ impl Gathering {
         Some(())
     }
 
-    fn take_tf(&mut self, topic: &str, data: &[u8]) -> Option<()> {
+    fn take_tf(&mut self, topic: &str, data: &[u8], log_time: u64) -> Option<()> {
         let message: TFMessage = decode(data).ok()?;
         let is_static = is_static(topic);
         for transform in &message.transforms {
             let link = (transform.child_frame_id.clone(), transform.header.frame_id.clone());
             if is_static {
                 self.take_static(transform);
-            } else if self.linked.insert(link) {
+                continue;
+            }
+            if self.linked.insert(link) {
                 // One sample of a moving transform is enough to know the link.
                 self.tf.insert(transform, false);
             }
+            self.take_times(transform, Stamp::from_nanos(log_time));
         }
         Some(())
+    }
+
+    /// Takes in the times of a moving transform.
+    fn take_times(&mut self, transform: &TransformStamped, recorded: Stamp) {
+        let child = plain(&transform.child_frame_id);
+        let stamp = transform.header.stamp();
+        if let Some(times) = self.link_times.get_mut(child) {
+            times.add(stamp, recorded);
+        } else if self.tf.knows_child(child) {
+            self.link_times.insert(child.to_owned(), Times::new(stamp, recorded));
+        }
     }
 
     /// Takes in a static transform, and keeps the one that it replaces if that is the first.
@@ -507,9 +530,13 @@ impl Topic {
         self.has_points && self.cloud.is_none()
     }
 
-    /// Returns the first and the last stamp in time.
-    pub(crate) fn stamp_range(&self) -> Option<(Stamp, Stamp)> {
-        Some((*self.stamps.iter().min()?, *self.stamps.iter().max()?))
+    /// Returns the ranges of its times; `None` without a stamp.
+    pub(crate) fn times(&self) -> Option<Times> {
+        let mut times = Times::of(&self.stamps, &self.recorded)?;
+        // Stamps are kept of a number of messages only.
+        times.first_recorded = Stamp::from_nanos(self.first_log_time);
+        times.last_recorded = Stamp::from_nanos(self.last_log_time);
+        Some(times)
     }
 
     fn take_image(&mut self, name: &str, data: &[u8], depth_unit_m: Option<f64>) -> Option<()> {

@@ -10,7 +10,7 @@ use tagalong_vision::ground::{
 };
 
 use super::assembly::{Assembly, Messages};
-use super::mount::{Mount, robot_frame};
+use super::mount::Mount;
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::images::StereoGeometry;
 use crate::input::StampSource;
@@ -210,7 +210,7 @@ pub(super) fn plan(
         depth_lens,
         baseline_m: right.and_then(|right| right.baseline_m),
         disparity: None,
-        odom_frames: odom_frames(&scan, &chosen, input),
+        odom_frames: odom_frames(&chosen),
         depth_unit_m: depth_unit_m(&scan, &chosen, input, tally),
         has_recording_times,
         scan,
@@ -318,7 +318,7 @@ fn note_choices(plan: &Plan, tally: &mut Tally) {
              `camera = \"{camera}\"` under [input] takes them"
         ));
     }
-    if let Some((odometry, problem)) = &plan.chosen.unused_odometry {
+    for (odometry, problem) in &plan.chosen.unused_odometry {
         tally.count("odometry_not_used");
         tally.note(format!("{odometry} is not used: {}; {}", problem.why, problem.remedy));
     }
@@ -435,18 +435,12 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
     Ok(())
 }
 
-/// Returns the odometry topic, else the tf frames if they are connected.
-fn odom_frames(
-    scan: &Scan,
-    chosen: &Chosen,
-    input: &InputSettings,
-) -> Option<Option<(String, String)>> {
+/// Returns the source of the odometry: its topic, else the tf frames.
+fn odom_frames(chosen: &Chosen) -> Option<Option<(String, String)>> {
     if chosen.odometry.is_some() {
         return Some(None);
     }
-    let robot = robot_frame(scan, input);
-    let connected = scan.tf.knows(&input.odom_frame) && scan.tf.connects(&input.odom_frame, robot);
-    connected.then(|| Some((input.odom_frame.clone(), robot.to_owned())))
+    chosen.odom_frames.clone().map(Some)
 }
 
 /// Returns the mount from tf, the settings, or the floor in the first depth images.

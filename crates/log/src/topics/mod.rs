@@ -9,6 +9,7 @@ mod calibration;
 mod entries;
 mod kinds;
 mod name;
+mod odometry;
 mod problems;
 mod rigs;
 
@@ -17,13 +18,15 @@ use std::collections::BTreeMap;
 pub use account::{InputAccount, TopicUse};
 pub(crate) use calibration::{FoundCalibration, Relation, calibration_of, intrinsics_of};
 use kinds::{
-    could_be_depth, disparity_rank, is_info, is_odometry, is_of, is_usable_depth,
-    is_usable_picture, odometry_rank, remedy_as_depth,
+    could_be_depth, disparity_rank, is_info, is_of, is_usable_depth, is_usable_picture,
+    remedy_as_depth,
 };
 pub(crate) use kinds::{kind_of, unreadable};
 pub(crate) use name::{Stream, TopicName};
+pub(crate) use odometry::transform_problem;
+use odometry::{choose_odometry, odometry_problem};
 pub(crate) use problems::Problem;
-use problems::{odometry_problem, scanner_problem};
+use problems::scanner_problem;
 use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
@@ -50,8 +53,10 @@ pub(crate) struct Chosen {
     pub(crate) camera: Option<String>,
     /// Reason for which the depth images cannot be used.
     pub(crate) depth_problem: Option<Problem>,
-    /// Odometry that cannot be used, with the reason.
-    pub(crate) unused_odometry: Option<(String, Problem)>,
+    /// Frames of tf that give the odometry where no topic does: odometry frame and robot frame.
+    pub(crate) odom_frames: Option<(String, String)>,
+    /// Odometry that would have been chosen and cannot be used, with the reasons.
+    pub(crate) unused_odometry: Vec<(String, Problem)>,
     /// Topics of the sensors beside the images.
     pub(crate) sensors: BTreeMap<Input, String>,
     /// Topics of further laser scanners on the robot.
@@ -143,8 +148,6 @@ pub(crate) fn choose(
         let topic = choose_sensor(scan, sensor, input)?;
         sensors.extend(topic.map(|topic| (sensor.input, topic)));
     }
-    let odometry = named(scan, "odometry_topic", input.odometry_topic.as_deref(), is_odometry)?
-        .or_else(|| best_of(scan, &input.sources, scan.names(), odometry_rank));
     let mut calibrations = BTreeMap::new();
     let mut info = |key, wanted: &Option<String>, image: &Option<String>| {
         let is_disparity = key == "depth_info_topic" && input.disparity.is_some();
@@ -167,21 +170,19 @@ pub(crate) fn choose(
         colour_info,
         depth_info,
         right_info,
-        odometry,
+        odometry: None,
+        odom_frames: None,
         calibrations,
         camera,
         depth_problem,
-        unused_odometry: None,
+        unused_odometry: Vec::new(),
         further_scans: further_scans(scan, input, sensors.get(&Input::Laser)),
         sensors,
     };
-    let primary = chosen.primary().to_owned();
-    if let Some(odometry) = chosen.odometry.take() {
-        match odometry_problem(scan, &primary, &odometry) {
-            Some(problem) => chosen.unused_odometry = Some((odometry, problem)),
-            None => chosen.odometry = Some(odometry),
-        }
-    }
+    let odometry = choose_odometry(scan, input, chosen.primary())?;
+    chosen.odometry = odometry.topic;
+    chosen.odom_frames = odometry.frames;
+    chosen.unused_odometry = odometry.unused;
     Ok(chosen)
 }
 
