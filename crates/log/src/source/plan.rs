@@ -19,7 +19,8 @@ use crate::obstacles::{PlannedSource, planned_sources};
 use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
 use crate::topics::{
-    Chosen, InputAccount, TopicUse, choose, decide, intrinsics_of, kind_of, missing, unreadable,
+    Chosen, InputAccount, Problem, TopicUse, choose, decide, intrinsics_of, kind_of, missing,
+    transform_problem, unreadable,
 };
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
@@ -80,6 +81,16 @@ impl Plan {
         self.lens?;
         let own = if self.chosen.colour.is_some() { &self.chosen.colour_info } else { &None };
         own.as_ref().or(self.chosen.depth_info.as_ref())
+    }
+
+    /// Returns the reason for which tf has no pose of the sensor that makes the frames: its clock.
+    pub(super) fn mount_problem(&self) -> Option<Problem> {
+        match &self.mount {
+            Mount::Tf { base, camera } => {
+                transform_problem(&self.scan, self.primary(), base, camera)
+            }
+            Mount::Fixed { .. } => None,
+        }
     }
 
     /// Returns true if depth comes beside another image.
