@@ -7,7 +7,7 @@ mod common;
 use common::{LogWriter, SavedLog, at, camera, level_pose};
 use nalgebra::{Isometry3, Vector3};
 use tagalong_core::Stamp;
-use tagalong_log::msgs::{CompressedImage, Header, Image, LaserScan, Pose, encode};
+use tagalong_log::msgs::{CompressedImage, Float32Msg, Header, Image, LaserScan, Pose, encode};
 use tagalong_log::{
     CameraSettings, FrameSource, Input, InputSettings, Inputs, LogError, StampSource, TopicUse,
 };
@@ -450,6 +450,36 @@ fn grey_images_of_16_bits_are_depth_by_their_name() {
         if !is_depth {
             assert!(entry(&source, topic).problem.as_ref().unwrap().contains("could be depth"));
         }
+    }
+}
+
+#[test]
+fn the_unit_of_depth_is_that_of_its_own_camera() {
+    const SECOND: [&str; 2] =
+        ["/device_1/sensor_1/Color_0/image/data", "/device_1/sensor_0/Depth_0/image/data"];
+    for (units, expected_m) in [
+        (&[("/device_0/sensor_0/option/Depth_Units/value", 0.002)][..], 2.0),
+        (
+            &[
+                ("/device_0/sensor_0/option/Depth_Units/value", 0.002),
+                ("/device_1/sensor_0/option/Depth_Units/value", 0.0001),
+            ],
+            0.2,
+        ),
+        (&[("/depth_units", 0.0001)], 0.2),
+        (&[("/other/depth_units", 0.0001)], 2.0),
+        (&[("/device_1/a/depth_units", 0.0001), ("/device_1/b/depth_units", 0.002)], 2.0),
+    ] {
+        let mut log = log_of_camera("/device_1/sensor_1/Color_0/info/camera_info", (16, 12));
+        for (topic, unit_m) in units {
+            log.message(topic, recorded(0), &Float32Msg { data: *unit_m });
+        }
+        colour(SECOND[0], "optical").write(&mut log, recorded);
+        depth(SECOND[1], "optical").write(&mut log, recorded);
+        let (mut source, _saved) = open(log, DEPTH);
+        let found = source.next_frame().unwrap();
+        let depth_m = found.frame.depth().unwrap().get(3, 3).unwrap();
+        assert!((depth_m - expected_m).abs() < 1e-4, "{units:?}: {depth_m} m");
     }
 }
 

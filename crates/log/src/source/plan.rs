@@ -20,7 +20,7 @@ use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
 use crate::topics::{
     Chosen, InputAccount, Problem, TopicUse, choose, decide, intrinsics_of, kind_of, missing,
-    transform_problem, unreadable,
+    told_unit, transform_problem, unreadable,
 };
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
@@ -294,7 +294,7 @@ fn depth_unit_m(
     if topic.kind == Type::PointCloud {
         return None;
     }
-    let told = scan.depth_units.iter().next();
+    let told = told_unit(scan, name);
     if topic.is_deep_grey {
         let kind = kind_of(topic);
         let unit = match told {
@@ -305,7 +305,7 @@ fn depth_unit_m(
         };
         tally.note(format!("{name} ({kind}) is taken for depth, in units of {unit}"));
     }
-    told.map(|(_, unit_m)| *unit_m).or(topic.is_deep_grey.then_some(MILLIMETRE))
+    told.map(|(_, unit_m)| unit_m).or(topic.is_deep_grey.then_some(MILLIMETRE))
 }
 
 /// Unit of depth by convention, m.
@@ -531,7 +531,8 @@ fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogEr
 fn take_measured_unit(plan: &mut Plan, unit_m: f64, tally: &mut Tally) {
     let name = plan.chosen.depth.clone().unwrap_or_default();
     let topic = plan.scan.topics.get(&name);
-    let is_open = topic.is_some_and(|topic| topic.is_deep_grey) && plan.scan.depth_units.is_empty();
+    let is_told = told_unit(&plan.scan, &name).is_some();
+    let is_open = topic.is_some_and(|topic| topic.is_deep_grey) && !is_told;
     if is_open {
         plan.depth_unit_m = Some(unit_m);
         tally.note(format!(

@@ -12,6 +12,7 @@ mod name;
 mod odometry;
 mod problems;
 mod rigs;
+mod units;
 
 use std::collections::BTreeMap;
 
@@ -30,6 +31,7 @@ use problems::scanner_problem;
 use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
+pub(crate) use units::told_unit;
 
 use crate::obstacles::ObstacleTopic;
 use crate::scan::{Scan, Topic};
