@@ -454,6 +454,22 @@ fn grey_images_of_16_bits_are_depth_by_their_name() {
 }
 
 #[test]
+fn depth_in_the_frame_of_colour_comes_before_any_name() {
+    for (registered, other) in [
+        ("/depth_to_rgb/image_raw", "/depth/image_raw"),
+        ("/cam/depth_to_rgb/image_raw", "/cam/depth/image_raw"),
+        ("/cam/depth/image", "/cam/aligned_depth/image"),
+    ] {
+        let mut log = log_of_camera("/rgb/camera_info", (16, 12));
+        colour("/rgb/image_raw", "optical").write(&mut log, recorded);
+        depth(other, "depth_camera_link").write(&mut log, recorded);
+        depth(registered, "optical").write(&mut log, recorded);
+        let (source, _saved) = open(log, DEPTH);
+        assert_eq!(used(&source, "depth"), registered);
+    }
+}
+
+#[test]
 fn the_unit_of_depth_is_that_of_its_own_camera() {
     const SECOND: [&str; 2] =
         ["/device_1/sensor_1/Color_0/image/data", "/device_1/sensor_0/Depth_0/image/data"];
