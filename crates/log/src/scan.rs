@@ -88,6 +88,8 @@ pub(crate) struct Topic {
     pub(crate) content: Content,
     /// True for grey images of 16 bits whose encoding leaves open whether they are depth.
     pub(crate) is_deep_grey: bool,
+    /// True for images with the encoding of depth and a name of another stream: infrared or confidence.
+    pub(crate) is_other_stream: bool,
     /// True for depth that was compressed as JPEG, which keeps 8 bits.
     pub(crate) is_jpeg_depth: bool,
     /// Columns and rows of the first image.
@@ -355,6 +357,7 @@ impl Gathering {
             pixels: None,
             content: Content::Unknown,
             is_deep_grey: false,
+            is_other_stream: false,
             is_jpeg_depth: false,
             size: None,
             cloud: None,
@@ -542,11 +545,14 @@ impl Topic {
     fn take_image(&mut self, name: &str, data: &[u8], depth_unit_m: Option<f64>) -> Option<()> {
         let image: Image<'_> = decode(data).ok()?;
         if self.pixels.is_none() {
-            self.content = content_of_encoding(&image.encoding, depth_unit_m);
+            // A unit makes depth of grey images, but not of infrared ones.
+            let unit = depth_unit_m.filter(|_| !is_named_other(name));
+            self.content = content_of_encoding(&image.encoding, unit);
             self.is_deep_grey = image.encoding == "mono16";
             if self.is_deep_grey && is_named_depth(name) {
                 self.content = Content::Depth;
             }
+            self.doubt_depth(name);
             self.size = Some((image.width, image.height));
             self.pixels = Some(image.encoding);
         }
@@ -575,6 +581,7 @@ impl Topic {
                 Content::Unknown if codec != Codec::Unknown => Content::Picture,
                 content => content,
             };
+            self.doubt_depth(name);
             self.pixels = Some(image.format);
         }
         // Video under any label.
@@ -584,6 +591,15 @@ impl Topic {
         }
         self.take_header(image.header);
         Some(())
+    }
+
+    /// Takes images with the encoding of depth for none if their name says infrared or confidence,
+    /// which have 16 bits or floating-point numbers, too.
+    fn doubt_depth(&mut self, name: &str) {
+        if self.content == Content::Depth && is_named_other(name) {
+            self.content = Content::Unknown;
+            self.is_other_stream = true;
+        }
     }
 
     fn take_video(&mut self, data: &[u8]) -> Option<()> {
@@ -671,4 +687,9 @@ pub(crate) fn calibration_by_points(topic: &str) -> String {
 /// Returns true if the name of a topic says that its images are depth.
 fn is_named_depth(topic: &str) -> bool {
     TopicName::of(topic).stream == Stream::Depth
+}
+
+/// Returns true if the name of a topic says that its images are infrared, confidences and the like.
+fn is_named_other(topic: &str) -> bool {
+    TopicName::of(topic).stream == Stream::Other
 }

@@ -454,6 +454,31 @@ fn grey_images_of_16_bits_are_depth_by_their_name() {
 }
 
 #[test]
+fn images_of_other_streams_are_depth_only_if_they_are_named() {
+    for (topic, encoding) in [
+        ("/cam/ir/image_raw", "16UC1"),
+        ("/cam/infra1/image_rect_raw", "16UC1"),
+        ("/zed/confidence/confidence_map", "32FC1"),
+    ] {
+        let mut log = log_of_camera("/cam/color/camera_info", (16, 12));
+        colour("/cam/color/image_raw", "optical").write(&mut log, recorded);
+        Stream { encoding, ..depth(topic, "optical") }.write(&mut log, recorded);
+        let saved = log.save();
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
+        assert_eq!(used(&source, "depth"), "", "{topic}");
+        let told = entry(&source, topic);
+        assert!(told.to_string().contains("its name says infrared or confidence"), "{told}");
+        assert!(told.remedy.as_ref().unwrap().contains("`depth_topic`"), "{told}");
+        assert_eq!(told.could_be, Some("depth"));
+        let error = saved.open(&InputSettings::default(), DEPTH).err().unwrap().to_string();
+        assert!(error.contains(&format!("if {topic} (")) && error.contains("is meant"), "{error}");
+        let input = InputSettings { depth_topic: Some(topic.into()), ..InputSettings::default() };
+        let found = saved.open(&input, DEPTH).unwrap().next_frame().unwrap();
+        assert!((found.frame.depth().unwrap().get(3, 3).unwrap() - 2.0).abs() < 1e-4, "{topic}");
+    }
+}
+
+#[test]
 fn depth_in_the_frame_of_colour_comes_before_any_name() {
     for (registered, other) in [
         ("/depth_to_rgb/image_raw", "/depth/image_raw"),

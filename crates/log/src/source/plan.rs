@@ -350,6 +350,7 @@ fn note_unread_images(plan: &Plan, tally: &mut Tally) {
     for (name, topic) in &plan.scan.topics {
         // Points of lidars are nothing that the pipeline would use in place of colour.
         if topic.kind != Type::PointCloud
+            && !plan.chosen.has(name)
             && let Some(why) = unreadable(topic)
         {
             tally.add("messages_not_read", topic.count);

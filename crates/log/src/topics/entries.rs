@@ -90,7 +90,7 @@ impl Judge<'_> {
         }
         let parts = TopicName::of(name);
         let is_depth = topic.content == Content::Depth || topic.is_jpeg_depth || topic.is_deep_grey;
-        let is_depth = is_depth || parts.stream == Stream::Depth;
+        let is_depth = is_depth || topic.is_other_stream || parts.stream == Stream::Depth;
         if is_depth {
             let is_free = self.inputs.uses(Input::Depth) && !has_depth;
             return (is_image(topic) && is_free).then_some("depth");

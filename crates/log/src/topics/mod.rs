@@ -378,7 +378,7 @@ impl Requirement<'_> {
         let Self { wanted, key, types, fits, taken, .. } = self;
         let is_image = key.ends_with("_topic") && types.contains("Image");
         let unreadable = scan.topics.iter().find_map(|(name, topic)| {
-            let why = unreadable(topic).filter(|_| is_image)?;
+            let why = unreadable(topic).filter(|_| is_image && !topic.is_other_stream)?;
             Some(format!("; {name} ({}) cannot be read: {why}", kind_of(topic)))
         });
         let mut free = scan.topics.iter().filter(|(name, _)| *taken != Some(name.as_str()));
