@@ -159,8 +159,10 @@ pub fn intrinsics(info: &CameraInfo, rectified: bool) -> Result<Intrinsics, Cali
     let k = &info.k;
     let p = &info.p;
     let is_k_blank = k.iter().all(|v| *v == 0.0);
-    // P holds for rectified images; where K is left out, it is all there is.
-    let rectified = rectified || is_k_blank && p[0] != 0.0;
+    // P holds for rectified images; where K is left out, or has ones on its diagonal alone, it is all
+    // there is.
+    let has_no_k = k[0] == 0.0 && k[4] == 0.0;
+    let rectified = rectified || has_no_k && p[0] != 0.0;
     let use_p = rectified && p[0] != 0.0;
     if !use_p && is_k_blank {
         return Err(CalibrationError::Uncalibrated);
@@ -219,6 +221,14 @@ pub fn check_size(
         width,
         height,
     })
+}
+
+/// Returns true for a calibration without focal lengths, neither in K nor in P, which by REP 104 means
+/// uncalibrated. Drivers may fill other places of it: ones on the diagonal.
+pub(crate) fn is_blank(info: &CameraInfo) -> bool {
+    let has_k = info.k[0] != 0.0 && info.k[4] != 0.0;
+    let has_p = info.p[0] != 0.0 && info.p[5] != 0.0;
+    !has_k && !has_p
 }
 
 fn check_finite(info: &CameraInfo) -> Result<(), CalibrationError> {
@@ -449,9 +459,13 @@ mod tests {
 
     #[test]
     fn p_stands_in_for_a_k_that_is_left_out() {
-        let seen = intrinsics(&CameraInfo { k: [0.0; 9], ..info() }, false).unwrap();
-        assert_eq!((seen.lens.fx, seen.lens.cx), (480.0, 321.0));
-        assert_eq!(seen.lens.distortion, Distortion::None);
+        for corner in [0.0, 1.0] {
+            let mut k = [0.0; 9];
+            k[8] = corner;
+            let seen = intrinsics(&CameraInfo { k, ..info() }, false).unwrap();
+            assert_eq!((seen.lens.fx, seen.lens.cx), (480.0, 321.0));
+            assert_eq!(seen.lens.distortion, Distortion::None);
+        }
     }
 
     #[test]

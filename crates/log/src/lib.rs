@@ -17,6 +17,7 @@ mod attachment;
 mod bag;
 pub mod camera_info;
 mod camera_settings;
+mod clock;
 mod database;
 mod error;
 pub mod images;

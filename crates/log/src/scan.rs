@@ -8,6 +8,8 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
 
+use crate::camera_info::is_blank;
+use crate::clock::Times;
 use crate::images::{
     CloudAxes, CloudCamera, Codec, Content, H264, ImageError, NO_PARAMETERS, Packet,
     camera_of_cloud, content_of_compressed, content_of_encoding, has_lengths, may_be_disparity,
@@ -20,8 +22,8 @@ use crate::msgs::{
 };
 use crate::packed::LogFile;
 use crate::sensors::SensorType;
-use crate::tf::TfBuffer;
-use crate::topics::{Stream, TopicName};
+use crate::tf::{TfBuffer, plain};
+use crate::topics::{is_named_depth, is_named_other, is_own_output};
 use crate::walk::{Channel, Counters, Message};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
@@ -87,6 +89,8 @@ pub(crate) struct Topic {
     pub(crate) content: Content,
     /// True for grey images of 16 bits whose encoding leaves open whether they are depth.
     pub(crate) is_deep_grey: bool,
+    /// True for images with the encoding of depth and a name of another stream: infrared or confidence.
+    pub(crate) is_other_stream: bool,
     /// True for depth that was compressed as JPEG, which keeps 8 bits.
     pub(crate) is_jpeg_depth: bool,
     /// Columns and rows of the first image.
@@ -113,12 +117,14 @@ pub(crate) struct Scan {
     /// Files of the log; none for a source that is no file.
     pub(crate) parts: Vec<LogPart>,
     pub(crate) topics: BTreeMap<String, Topic>,
-    /// First calibration of each topic that is not all zero.
+    /// First calibration of each topic that is not blank.
     pub(crate) infos: BTreeMap<String, CameraInfo>,
     /// Metres per unit of depth, by the topics on which depth cameras say so.
     pub(crate) depth_units: BTreeMap<String, f64>,
     /// All static transforms, and of the moving ones the frames that they connect.
     pub(crate) tf: TfBuffer,
+    /// Times of the moving transforms, by the frame that moves.
+    pub(crate) link_times: BTreeMap<String, Times>,
     pub(crate) counters: Counters,
     pub(crate) notes: Vec<String>,
     pub(crate) data_lost: bool,
@@ -211,12 +217,13 @@ impl Scan {
             (scan.bytes, hash) = (scan.bytes + bytes, so_far);
         }
         let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-        let Gathering { topics, infos, depth_units, mut tf, replaced, .. } = gathering;
+        let Gathering { topics, infos, depth_units, mut tf, link_times, replaced, .. } = gathering;
         // The frames begin with the first ones, and meet the others on the way.
         for first in replaced.values() {
             tf.insert(first, true);
         }
-        Ok(Self { path: path.to_owned(), sha256, topics, infos, depth_units, tf, ..scan })
+        let path = path.to_owned();
+        Ok(Self { path, sha256, topics, infos, depth_units, tf, link_times, ..scan })
     }
 
     /// Adds the walk through one file.
@@ -271,6 +278,9 @@ impl Scan {
         for topic in scan.topics.values_mut() {
             topic.stamps = topic.recorded.clone();
         }
+        for times in scan.link_times.values_mut() {
+            *times = times.as_recorded();
+        }
         scan
     }
 
@@ -304,6 +314,7 @@ pub(crate) struct Gathering {
     depth_units: BTreeMap<String, f64>,
     tf: TfBuffer,
     linked: BTreeSet<(String, String)>,
+    link_times: BTreeMap<String, Times>,
     /// First static transform of each frame that has several.
     replaced: BTreeMap<String, TransformStamped>,
     depth_unit_m: Option<f64>,
@@ -325,6 +336,7 @@ impl Gathering {
             infos: self.infos.clone(),
             depth_units: self.depth_units.clone(),
             tf: self.tf.clone(),
+            link_times: self.link_times.clone(),
             counters: Counters::new(),
             notes: Vec::new(),
             data_lost: false,
@@ -352,6 +364,7 @@ impl Gathering {
             pixels: None,
             content: Content::Unknown,
             is_deep_grey: false,
+            is_other_stream: false,
             is_jpeg_depth: false,
             size: None,
             cloud: None,
@@ -381,7 +394,7 @@ impl Gathering {
             Type::Sensor => topic.take_sensor(message),
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
             Type::Number => self.take_number(&channel.topic, message.data),
-            Type::Tf => self.take_tf(&channel.topic, message.data),
+            Type::Tf => self.take_tf(&channel.topic, message.data, message.log_time),
             Type::Other => Some(()),
         };
         let topic = self.topic(&channel.topic, "", "");
@@ -449,19 +462,33 @@ impl Gathering {
         Some(())
     }
 
-    fn take_tf(&mut self, topic: &str, data: &[u8]) -> Option<()> {
+    fn take_tf(&mut self, topic: &str, data: &[u8], log_time: u64) -> Option<()> {
         let message: TFMessage = decode(data).ok()?;
         let is_static = is_static(topic);
         for transform in &message.transforms {
             let link = (transform.child_frame_id.clone(), transform.header.frame_id.clone());
             if is_static {
                 self.take_static(transform);
-            } else if self.linked.insert(link) {
+                continue;
+            }
+            if self.linked.insert(link) {
                 // One sample of a moving transform is enough to know the link.
                 self.tf.insert(transform, false);
             }
+            self.take_times(transform, Stamp::from_nanos(log_time));
         }
         Some(())
+    }
+
+    /// Takes in the times of a moving transform.
+    fn take_times(&mut self, transform: &TransformStamped, recorded: Stamp) {
+        let child = plain(&transform.child_frame_id);
+        let stamp = transform.header.stamp();
+        if let Some(times) = self.link_times.get_mut(child) {
+            times.add(stamp, recorded);
+        } else if self.tf.knows_child(child) {
+            self.link_times.insert(child.to_owned(), Times::new(stamp, recorded));
+        }
     }
 
     /// Takes in a static transform, and keeps the one that it replaces if that is the first.
@@ -487,11 +514,6 @@ fn short(number: f32) -> f64 {
     number.to_string().parse().unwrap_or_else(|_| f64::from(number))
 }
 
-/// Returns true for a calibration without numbers, which by REP 104 means uncalibrated.
-pub(crate) fn is_blank(info: &CameraInfo) -> bool {
-    info.k.iter().chain(&info.p).all(|value| *value == 0.0)
-}
-
 /// Returns true for static transforms, which have a topic of their own.
 pub(crate) fn is_static(tf_topic: &str) -> bool {
     tf_topic.ends_with("tf_static")
@@ -515,19 +537,26 @@ impl Topic {
         self.has_points && self.cloud.is_none()
     }
 
-    /// Returns the first and the last stamp in time.
-    pub(crate) fn stamp_range(&self) -> Option<(Stamp, Stamp)> {
-        Some((*self.stamps.iter().min()?, *self.stamps.iter().max()?))
+    /// Returns the ranges of its times; `None` without a stamp.
+    pub(crate) fn times(&self) -> Option<Times> {
+        let mut times = Times::of(&self.stamps, &self.recorded)?;
+        // Stamps are kept of a number of messages only.
+        times.first_recorded = Stamp::from_nanos(self.first_log_time);
+        times.last_recorded = Stamp::from_nanos(self.last_log_time);
+        Some(times)
     }
 
     fn take_image(&mut self, name: &str, data: &[u8], depth_unit_m: Option<f64>) -> Option<()> {
         let image: Image<'_> = decode(data).ok()?;
         if self.pixels.is_none() {
-            self.content = content_of_encoding(&image.encoding, depth_unit_m);
+            // A unit makes depth of grey images, but not of infrared ones.
+            let unit = depth_unit_m.filter(|_| !is_named_other(name));
+            self.content = content_of_encoding(&image.encoding, unit);
             self.is_deep_grey = image.encoding == "mono16";
             if self.is_deep_grey && is_named_depth(name) {
                 self.content = Content::Depth;
             }
+            self.doubt_depth(name);
             self.size = Some((image.width, image.height));
             self.pixels = Some(image.encoding);
         }
@@ -556,6 +585,7 @@ impl Topic {
                 Content::Unknown if codec != Codec::Unknown => Content::Picture,
                 content => content,
             };
+            self.doubt_depth(name);
             self.pixels = Some(image.format);
         }
         // Video under any label.
@@ -565,6 +595,15 @@ impl Topic {
         }
         self.take_header(image.header);
         Some(())
+    }
+
+    /// Takes images with the encoding of depth for none if their name says infrared or confidence,
+    /// which have 16 bits or floating-point numbers, too.
+    fn doubt_depth(&mut self, name: &str) {
+        if self.content == Content::Depth && is_named_other(name) {
+            self.content = Content::Unknown;
+            self.is_other_stream = true;
+        }
     }
 
     fn take_video(&mut self, data: &[u8]) -> Option<()> {
@@ -655,14 +694,4 @@ impl Topic {
 /// Returns the name of the calibration that the points of a cloud tell.
 pub(crate) fn calibration_by_points(topic: &str) -> String {
     format!("{topic} (by its points)")
-}
-
-/// Returns true for the points of a person that a run writes into its log of tracks for viewers.
-fn is_own_output(topic: &str) -> bool {
-    topic.strip_prefix("/people/person_").is_some_and(|rest| rest.ends_with("/body"))
-}
-
-/// Returns true if the name of a topic says that its images are depth.
-fn is_named_depth(topic: &str) -> bool {
-    TopicName::of(topic).stream == Stream::Depth
 }

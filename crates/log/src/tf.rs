@@ -110,6 +110,11 @@ impl TfBuffer {
         self.links.contains_key(frame) || self.links.values().any(|link| link.parent == frame)
     }
 
+    /// Returns true if the frame has a parent.
+    pub(crate) fn knows_child(&self, frame: &str) -> bool {
+        self.links.contains_key(plain(frame))
+    }
+
     /// Returns true if the two frames are connected, at any time.
     pub fn connects(&self, a: &str, b: &str) -> bool {
         let up_a = self.ancestors(plain(a));
@@ -146,21 +151,46 @@ impl TfBuffer {
         (ahead_s > AHEAD_S).then_some(ahead_s)
     }
 
+    /// Returns the frames between two others that move in their parent and have no static transform
+    /// beside that, with the parent.
+    pub(crate) fn moving_frames<'a>(
+        &'a self,
+        target: &'a str,
+        source: &'a str,
+    ) -> Vec<(&'a str, &'a str)> {
+        let mut found = Vec::new();
+        for frame in self.frames_between(target, source) {
+            if let Some(link) = self.links.get(frame)
+                && link.fixed.is_none()
+            {
+                found.push((frame, link.parent.as_str()));
+            }
+        }
+        found
+    }
+
     /// Yields the links between two frames; nothing if they are not connected.
     fn moving_between<'a>(
         &'a self,
         target: &'a str,
         source: &'a str,
     ) -> impl Iterator<Item = &'a Link> {
+        self.frames_between(target, source).filter_map(|frame| self.links.get(frame))
+    }
+
+    /// Yields the frames from two frames up to their common one, without it.
+    fn frames_between<'a>(
+        &'a self,
+        target: &'a str,
+        source: &'a str,
+    ) -> impl Iterator<Item = &'a str> {
         let up_t = self.ancestors(plain(target));
         let up_s = self.ancestors(plain(source));
         let common = up_s.iter().find(|frame| up_t.contains(frame)).copied();
         let ways = common.map(|common| [(up_t, common), (up_s, common)]);
-        let frames = ways
-            .into_iter()
+        ways.into_iter()
             .flatten()
-            .flat_map(|(up, common)| up.into_iter().take_while(move |frame| *frame != common));
-        frames.filter_map(|frame| self.links.get(frame))
+            .flat_map(|(up, common)| up.into_iter().take_while(move |frame| *frame != common))
     }
 
     /// Returns the pose of frame `source` in frame `target` by the static transforms between them

@@ -7,7 +7,7 @@ mod common;
 use common::{LogWriter, SavedLog, at, camera, level_pose};
 use nalgebra::{Isometry3, Vector3};
 use tagalong_core::Stamp;
-use tagalong_log::msgs::{CompressedImage, Header, Image, LaserScan, Pose, encode};
+use tagalong_log::msgs::{CompressedImage, Float32Msg, Header, Image, LaserScan, Pose, encode};
 use tagalong_log::{
     CameraSettings, FrameSource, Input, InputSettings, Inputs, LogError, StampSource, TopicUse,
 };
@@ -466,6 +466,77 @@ fn grey_images_of_16_bits_are_depth_by_their_name() {
         if !is_depth {
             assert!(entry(&source, topic).problem.as_ref().unwrap().contains("could be depth"));
         }
+    }
+}
+
+#[test]
+fn images_of_other_streams_are_depth_only_if_they_are_named() {
+    for (topic, encoding) in [
+        ("/cam/ir/image_raw", "16UC1"),
+        ("/cam/infra1/image_rect_raw", "16UC1"),
+        ("/zed/confidence/confidence_map", "32FC1"),
+    ] {
+        let mut log = log_of_camera("/cam/color/camera_info", (16, 12));
+        colour("/cam/color/image_raw", "optical").write(&mut log, recorded);
+        Stream { encoding, ..depth(topic, "optical") }.write(&mut log, recorded);
+        let saved = log.save();
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
+        assert_eq!(used(&source, "depth"), "", "{topic}");
+        let told = entry(&source, topic);
+        assert!(told.to_string().contains("its name says infrared or confidence"), "{told}");
+        assert!(told.remedy.as_ref().unwrap().contains("`depth_topic`"), "{told}");
+        assert_eq!(told.could_be, Some("depth"));
+        let error = saved.open(&InputSettings::default(), DEPTH).err().unwrap().to_string();
+        assert!(error.contains(&format!("if {topic} (")) && error.contains("is meant"), "{error}");
+        let input = InputSettings { depth_topic: Some(topic.into()), ..InputSettings::default() };
+        let found = saved.open(&input, DEPTH).unwrap().next_frame().unwrap();
+        assert!((found.frame.depth().unwrap().get(3, 3).unwrap() - 2.0).abs() < 1e-4, "{topic}");
+    }
+}
+
+#[test]
+fn depth_in_the_frame_of_colour_comes_before_any_name() {
+    for (registered, other) in [
+        ("/depth_to_rgb/image_raw", "/depth/image_raw"),
+        ("/cam/depth_to_rgb/image_raw", "/cam/depth/image_raw"),
+        ("/cam/depth/image", "/cam/aligned_depth/image"),
+    ] {
+        let mut log = log_of_camera("/rgb/camera_info", (16, 12));
+        colour("/rgb/image_raw", "optical").write(&mut log, recorded);
+        depth(other, "depth_camera_link").write(&mut log, recorded);
+        depth(registered, "optical").write(&mut log, recorded);
+        let (source, _saved) = open(log, DEPTH);
+        assert_eq!(used(&source, "depth"), registered);
+    }
+}
+
+#[test]
+fn the_unit_of_depth_is_that_of_its_own_camera() {
+    const SECOND: [&str; 2] =
+        ["/device_1/sensor_1/Color_0/image/data", "/device_1/sensor_0/Depth_0/image/data"];
+    for (units, expected_m) in [
+        (&[("/device_0/sensor_0/option/Depth_Units/value", 0.002)][..], 2.0),
+        (
+            &[
+                ("/device_0/sensor_0/option/Depth_Units/value", 0.002),
+                ("/device_1/sensor_0/option/Depth_Units/value", 0.0001),
+            ],
+            0.2,
+        ),
+        (&[("/depth_units", 0.0001)], 0.2),
+        (&[("/other/depth_units", 0.0001)], 2.0),
+        (&[("/device_1/a/depth_units", 0.0001), ("/device_1/b/depth_units", 0.002)], 2.0),
+    ] {
+        let mut log = log_of_camera("/device_1/sensor_1/Color_0/info/camera_info", (16, 12));
+        for (topic, unit_m) in units {
+            log.message(topic, recorded(0), &Float32Msg { data: *unit_m });
+        }
+        colour(SECOND[0], "optical").write(&mut log, recorded);
+        depth(SECOND[1], "optical").write(&mut log, recorded);
+        let (mut source, _saved) = open(log, DEPTH);
+        let found = source.next_frame().unwrap();
+        let depth_m = found.frame.depth().unwrap().get(3, 3).unwrap();
+        assert!((depth_m - expected_m).abs() < 1e-4, "{units:?}: {depth_m} m");
     }
 }
 

@@ -1,5 +1,6 @@
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
+use super::depth::is_unit_in_doubt;
 
 /// Way below which a robot stands, m: noise of the odometry adds up.
 const STANDS_M: f64 = 0.3;
@@ -26,6 +27,12 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     let source = evidence.inspection.facts.odometry_topic.as_deref();
     let (severity, measured) = match (source, gaps + jumps) {
         (_, 1..) => (Severity::Warn, format!("silent at {gaps} frames, jumps at {jumps}; {way}")),
+        // Readings in a wrong unit are beyond the walls, or between floor and ceiling at random.
+        _ if all_moves && is_unit_in_doubt(evidence) => {
+            let measured =
+                "not known: the unit of depth is in doubt, by which a camera that moves is told";
+            (Severity::Unknown, measured.to_owned())
+        }
         _ if all_moves => {
             let share = 100.0 * evidence.changed.unwrap_or(0.0);
             let told = if source.is_some() { "the robot stands still" } else { "there is none" };

@@ -30,6 +30,7 @@ use crate::sensors::Moment;
 use crate::sensors::laser::{lose_scan, scan_fault, seen_from};
 use crate::sensors::points::cloud_in_robot;
 use crate::tally::Tally;
+use crate::topics::Problem;
 
 /// State that is carried from frame to frame.
 pub(super) struct Assembler {
@@ -143,7 +144,7 @@ impl Assembler {
             return None;
         }
         let Some(pose) = plan.mount.at(&intake.tf, scan.stamp) else {
-            tally.count("laser_scans_without_pose");
+            count_without_pose(plan, "laser_scans_without_pose", tally);
             return None;
         };
         let seen = seen_from(&sweep, &pose, &Isometry2::identity());
@@ -162,7 +163,7 @@ impl Assembler {
         tally: &mut Tally,
     ) -> Option<LogFrame> {
         let Some(pose) = plan.mount.at(&intake.tf, cloud.stamp) else {
-            tally.count("clouds_without_pose");
+            count_without_pose(plan, "clouds_without_pose", tally);
             return None;
         };
         let seen = cloud_in_robot(cloud, plan.primary(), &pose, &Isometry2::identity(), tally)?;
@@ -254,7 +255,13 @@ impl Assembler {
         }
         let Some(robot_from_camera) = known else {
             tally.lose("frames_before_camera_pose", || {
-                format!("no camera pose in {} at the first images", plan.mount.source())
+                let source = plan.mount.source();
+                match plan.mount_problem() {
+                    Some(Problem { why, remedy }) => {
+                        format!("no camera pose in {source}: {why}; {remedy}")
+                    }
+                    None => format!("no camera pose in {source} at the first images"),
+                }
             });
             return None;
         };
@@ -493,6 +500,17 @@ fn watch_frame(
     if let Some(topic) = topic {
         let first = plan.scan.frame_of(topic);
         intake.watch.watch_frame(topic, first, image, frame_stamp, tally);
+    }
+}
+
+/// Counts a message that makes no frame for want of a pose, and tells once if the clock of tf is the
+/// reason.
+fn count_without_pose(plan: &Plan, name: &'static str, tally: &mut Tally) {
+    tally.count(name);
+    if tally.counters.get(name) == Some(&1)
+        && let Some(Problem { why, remedy }) = plan.mount_problem()
+    {
+        tally.note(format!("no pose in {}: {why}; {remedy}", plan.mount.source()));
     }
 }
 

@@ -7,6 +7,7 @@ use tagalong_core::{Input, Stamp};
 
 use super::mount::{Mount, robot_frame};
 use super::plan::Plan;
+use crate::camera_info::is_blank;
 use crate::msgs::CameraInfo;
 use crate::pairing::Payload;
 use crate::tally::Tally;
@@ -53,8 +54,12 @@ impl CameraWatch {
         self.infos.contains_key(topic)
     }
 
-    /// Compares a calibration with the first one of its topic.
+    /// Compares a calibration with the first one of its topic. A blank one says nothing, and is no
+    /// change.
     pub(super) fn watch_info(&mut self, topic: &str, info: &CameraInfo, tally: &mut Tally) {
+        if is_blank(info) {
+            return;
+        }
         // Field by field, because the header differs in each message.
         let changed = self.infos.get(topic).is_some_and(|first| {
             first.k != info.k || first.d != info.d || first.p != info.p || first.roi != info.roi

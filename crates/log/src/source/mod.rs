@@ -210,7 +210,7 @@ impl FrameSource {
     /// Returns true if the log has odometry that cannot be used, and no other.
     pub fn lacks_usable_odometry(&self) -> bool {
         let plan = &self.assembly.plan;
-        plan.chosen.unused_odometry.is_some() && plan.odom_frames.is_none()
+        !plan.chosen.unused_odometry.is_empty() && plan.odom_frames.is_none()
     }
 
     /// Returns the use of each topic, with the reasons for those that are not used.

@@ -10,7 +10,7 @@ use tagalong_vision::ground::{
 };
 
 use super::assembly::{Assembly, Messages};
-use super::mount::{Mount, robot_frame};
+use super::mount::Mount;
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::images::StereoGeometry;
 use crate::input::StampSource;
@@ -19,7 +19,8 @@ use crate::obstacles::{PlannedSource, planned_sources};
 use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
 use crate::topics::{
-    Chosen, InputAccount, TopicUse, choose, decide, intrinsics_of, kind_of, missing, unreadable,
+    Chosen, InputAccount, Problem, TopicUse, choose, decide, intrinsics_of, kind_of, missing,
+    told_unit, transform_problem, unreadable,
 };
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
@@ -80,6 +81,16 @@ impl Plan {
         self.lens?;
         let own = if self.chosen.colour.is_some() { &self.chosen.colour_info } else { &None };
         own.as_ref().or(self.chosen.depth_info.as_ref())
+    }
+
+    /// Returns the reason for which tf has no pose of the sensor that makes the frames: its clock.
+    pub(super) fn mount_problem(&self) -> Option<Problem> {
+        match &self.mount {
+            Mount::Tf { base, camera } => {
+                transform_problem(&self.scan, self.primary(), base, camera)
+            }
+            Mount::Fixed { .. } => None,
+        }
     }
 
     /// Returns true if depth comes beside another image.
@@ -217,7 +228,7 @@ pub(super) fn plan(
         depth_lens,
         baseline_m: right.and_then(|right| right.baseline_m),
         disparity: None,
-        odom_frames: odom_frames(&scan, &chosen, input),
+        odom_frames: odom_frames(&chosen),
         depth_unit_m: depth_unit_m(&scan, &chosen, input, tally),
         has_recording_times,
         scan,
@@ -297,7 +308,7 @@ fn depth_unit_m(
     if topic.kind == Type::PointCloud {
         return None;
     }
-    let told = scan.depth_units.iter().next();
+    let told = told_unit(scan, name);
     if topic.is_deep_grey {
         let kind = kind_of(topic);
         let unit = match told {
@@ -308,7 +319,7 @@ fn depth_unit_m(
         };
         tally.note(format!("{name} ({kind}) is taken for depth, in units of {unit}"));
     }
-    told.map(|(_, unit_m)| *unit_m).or(topic.is_deep_grey.then_some(MILLIMETRE))
+    told.map(|(_, unit_m)| unit_m).or(topic.is_deep_grey.then_some(MILLIMETRE))
 }
 
 /// Unit of depth by convention, m.
@@ -332,7 +343,7 @@ fn note_choices(plan: &Plan, tally: &mut Tally) {
              `camera = \"{camera}\"` under [input] takes them"
         ));
     }
-    if let Some((odometry, problem)) = &plan.chosen.unused_odometry {
+    for (odometry, problem) in &plan.chosen.unused_odometry {
         tally.count("odometry_not_used");
         tally.note(format!("{odometry} is not used: {}; {}", problem.why, problem.remedy));
     }
@@ -353,6 +364,7 @@ fn note_unread_images(plan: &Plan, tally: &mut Tally) {
     for (name, topic) in &plan.scan.topics {
         // Points of lidars are nothing that the pipeline would use in place of colour.
         if topic.kind != Type::PointCloud
+            && !plan.chosen.has(name)
             && let Some(why) = unreadable(topic)
         {
             tally.add("messages_not_read", topic.count);
@@ -467,18 +479,12 @@ fn baseline_hint(plan: &Plan) -> String {
     )
 }
 
-/// Returns the odometry topic, else the tf frames if they are connected.
-fn odom_frames(
-    scan: &Scan,
-    chosen: &Chosen,
-    input: &InputSettings,
-) -> Option<Option<(String, String)>> {
+/// Returns the source of the odometry: its topic, else the tf frames.
+fn odom_frames(chosen: &Chosen) -> Option<Option<(String, String)>> {
     if chosen.odometry.is_some() {
         return Some(None);
     }
-    let robot = robot_frame(scan, input);
-    let connected = scan.tf.knows(&input.odom_frame) && scan.tf.connects(&input.odom_frame, robot);
-    connected.then(|| Some((input.odom_frame.clone(), robot.to_owned())))
+    chosen.odom_frames.clone().map(Some)
 }
 
 /// Returns the mount from tf, the settings, or the floor in the first depth images.
@@ -558,7 +564,8 @@ fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogEr
 fn take_measured_unit(plan: &mut Plan, unit_m: f64, tally: &mut Tally) {
     let name = plan.chosen.depth.clone().unwrap_or_default();
     let topic = plan.scan.topics.get(&name);
-    let is_open = topic.is_some_and(|topic| topic.is_deep_grey) && plan.scan.depth_units.is_empty();
+    let is_told = told_unit(&plan.scan, &name).is_some();
+    let is_open = topic.is_some_and(|topic| topic.is_deep_grey) && !is_told;
     if is_open {
         plan.depth_unit_m = Some(unit_m);
         tally.note(format!(

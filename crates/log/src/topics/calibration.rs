@@ -146,12 +146,12 @@ fn folder_of(image: &str) -> &str {
 }
 
 /// Returns the number of folders at the start that two topics share.
-fn common_folders(a: &str, b: &str) -> usize {
+pub(super) fn common_folders(a: &str, b: &str) -> usize {
     folders(a).zip(folders(b)).take_while(|(a, b)| a == b).count()
 }
 
 /// Returns the folders of a topic, without its last name.
-fn folders(topic: &str) -> impl Iterator<Item = &str> {
+pub(super) fn folders(topic: &str) -> impl Iterator<Item = &str> {
     let (path, _) = topic.trim_matches('/').rsplit_once('/').unwrap_or_default();
     path.split('/').filter(move |_| !path.is_empty())
 }

@@ -6,7 +6,7 @@ use super::kinds::{
 };
 use super::problems::{SCANNER_REMEDY, depth_problem, scanner_problem};
 use super::rigs::{Rig, rigs};
-use super::{Chosen, Relation, Stream, TopicName, named_topic};
+use super::{Chosen, Relation, Stream, TopicName, named_topic, odometry_problem};
 use crate::images::Content;
 use crate::scan::{Scan, Topic, Type};
 use crate::sensors::{SENSORS, SensorType};
@@ -84,18 +84,19 @@ impl Judge<'_> {
     /// Returns the input that a topic could serve as, if its problem were cured and no other topic
     /// does so.
     fn could_be(&self, name: &str, topic: &Topic) -> Option<&'static str> {
-        let Chosen { colour, depth, depth_problem, unused_odometry, .. } = self.chosen;
+        let Chosen { colour, depth, depth_problem, odometry, .. } = self.chosen;
+        let Chosen { odom_frames, unused_odometry, .. } = self.chosen;
         let has_depth = depth.is_some() && depth_problem.is_none();
         let is_empty = topic.count == 0 || topic.undecodable == topic.count;
         if is_empty {
             return None;
         }
-        if unused_odometry.as_ref().is_some_and(|(unused, _)| unused == name) {
-            return Some("odometry");
+        if unused_odometry.iter().any(|(unused, _)| unused == name) {
+            return (odometry.is_none() && odom_frames.is_none()).then_some("odometry");
         }
         let parts = TopicName::of(name);
         let is_depth = topic.content == Content::Depth || topic.is_jpeg_depth || topic.is_deep_grey;
-        let is_depth = is_depth || parts.stream == Stream::Depth;
+        let is_depth = is_depth || topic.is_other_stream || parts.stream == Stream::Depth;
         if is_depth {
             let is_free = self.inputs.uses(Input::Depth) && !has_depth;
             return (is_image(topic) && is_free).then_some("depth");
@@ -219,17 +220,19 @@ impl Judge<'_> {
     }
 
     fn unused_odometry(&self, name: &str, topic: &Topic) -> Reason {
-        if let Some((unused, problem)) = &self.chosen.unused_odometry
-            && unused == name
-        {
-            return (problem.why.clone(), Some(problem.remedy.clone()));
-        }
         if let Some(reason) = empty(topic) {
             return reason;
         }
-        let used = self.chosen.odometry.as_deref().unwrap_or("another topic");
+        if let Some(problem) = odometry_problem(self.scan, self.chosen.primary(), name) {
+            return (problem.why, Some(problem.remedy));
+        }
         let remedy = format!("`odometry_topic = \"{name}\"` under [input] takes this one");
-        (format!("{used} is used"), Some(remedy))
+        let why = match (&self.chosen.odometry, &self.input.odometry_topic) {
+            (Some(used), _) => format!("{used} is used"),
+            (None, Some(named)) => format!("`odometry_topic` names {named}"),
+            (None, None) => "no topic is used as odometry".to_owned(),
+        };
+        (why, Some(remedy))
     }
 
     fn unused_sensor(&self, name: &str, topic: &Topic, sensor: &SensorType) -> Reason {

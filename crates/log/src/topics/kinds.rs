@@ -24,10 +24,11 @@ pub(super) fn is_usable_picture(topic: &Topic) -> bool {
 }
 
 /// Returns true for images that can be read as depth if the settings name them. Grey images of 16
-/// bits are among them: what the user names is obeyed.
+/// bits are among them, and those of infrared: what the user names is obeyed.
 pub(super) fn is_usable_depth(topic: &Topic, input: &InputSettings) -> bool {
     let is_disparity = input.disparity.is_some() && disparity_rank("disparity", topic).is_some();
-    let is_depth = topic.content == Content::Depth || topic.pixels.is_none() || topic.is_deep_grey;
+    let may_be = topic.is_deep_grey || topic.is_other_stream;
+    let is_depth = topic.content == Content::Depth || topic.pixels.is_none() || may_be;
     is_image(topic) && (is_depth || is_disparity)
 }
 
@@ -39,7 +40,9 @@ pub(super) fn could_be_depth(topic: &Topic) -> bool {
 /// Returns the setting that makes depth of images that look like others.
 pub(super) fn remedy_as_depth(topic: &Topic) -> Option<&'static str> {
     match topic.pixels.as_deref()? {
-        _ if topic.is_deep_grey => Some("name it as `depth_topic` under [input]"),
+        _ if topic.is_deep_grey || topic.is_other_stream => {
+            Some("name it as `depth_topic` under [input]")
+        }
         "mono8" | "8UC1" | "16SC1" => Some("and its pixels are disparities, add [input.disparity]"),
         _ => None,
     }
@@ -76,6 +79,10 @@ const DEEP_REMEDY: &str = "grey images of 16 bits are no colour images; they cou
                            they are, name the topic as `depth_topic` under [input], with its unit \
                            as `depth_unit_m`";
 
+/// Remedy for images with the encoding of depth whose name says that they are something else.
+const OTHER_STREAM_REMEDY: &str = "its name says infrared or confidence, and its encoding would be that of depth, too: \
+                                   if it is depth, name the topic as `depth_topic` under [input]";
+
 /// Returns the reason for which images or scans of a topic cannot be read, with the remedy; `None`
 /// for those that can, and for all other topics.
 pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
@@ -93,6 +100,7 @@ pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
         (Some(_), _) if topic.is_deep_grey && topic.content == Content::Unknown => {
             Some(DEEP_REMEDY.to_owned())
         }
+        (Some(_), _) if topic.is_other_stream => Some(OTHER_STREAM_REMEDY.to_owned()),
         (Some(pixels), _) if topic.content == Content::Unknown => Some(refusal_of(pixels)),
         (None, Type::Other) if SENSOR_MESSAGES.contains(&name) => Some(match &*topic.encoding {
             "cdr" | "ros1" => format!("its type is not read; {name} of sensor_msgs is"),

@@ -9,8 +9,10 @@ mod calibration;
 mod entries;
 mod kinds;
 mod name;
+mod odometry;
 mod problems;
 mod rigs;
+mod units;
 mod unpaired;
 
 use std::collections::BTreeMap;
@@ -18,17 +20,20 @@ use std::collections::BTreeMap;
 pub use account::{InputAccount, TopicUse};
 pub(crate) use calibration::{FoundCalibration, Relation, calibration_of, intrinsics_of};
 use kinds::{
-    could_be_depth, depth_as_picture, detection_types, disparity_rank, is_info, is_odometry, is_of,
-    is_usable_depth, is_usable_picture, odometry_rank, remedy_as_depth,
+    could_be_depth, depth_as_picture, detection_types, disparity_rank, is_info, is_of,
+    is_usable_depth, is_usable_picture, remedy_as_depth,
 };
 pub(crate) use kinds::{kind_of, unreadable};
-pub(crate) use name::{Stream, TopicName};
+pub(crate) use name::{Stream, TopicName, is_named_depth, is_named_other, is_own_output};
+pub(crate) use odometry::transform_problem;
+use odometry::{choose_odometry, odometry_problem};
 pub(crate) use problems::Problem;
-use problems::{detections_problem, odometry_problem, scan_times_problem, scanner_problem};
+use problems::{detections_problem, scan_times_problem, scanner_problem};
 pub(crate) use rigs::CameraFrames;
 use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
+pub(crate) use units::told_unit;
 pub(crate) use unpaired::{is_unusual, unpaired};
 
 use crate::obstacles::ObstacleTopic;
@@ -53,8 +58,10 @@ pub(crate) struct Chosen {
     pub(crate) camera: Option<String>,
     /// Reason for which the depth images cannot be used.
     pub(crate) depth_problem: Option<Problem>,
-    /// Odometry that cannot be used, with the reason.
-    pub(crate) unused_odometry: Option<(String, Problem)>,
+    /// Frames of tf that give the odometry where no topic does: odometry frame and robot frame.
+    pub(crate) odom_frames: Option<(String, String)>,
+    /// Odometry that would have been chosen and cannot be used, with the reasons.
+    pub(crate) unused_odometry: Vec<(String, Problem)>,
     /// Topics of the sensors beside the images.
     pub(crate) sensors: BTreeMap<Input, String>,
     /// Reasons for which chosen sensors give nothing.
@@ -149,8 +156,6 @@ pub(crate) fn choose(
         let topic = choose_sensor(scan, sensor, input, images.as_deref())?;
         sensors.extend(topic.map(|topic| (sensor.input, topic)));
     }
-    let odometry = named(scan, "odometry_topic", input.odometry_topic.as_deref(), is_odometry)?
-        .or_else(|| best_of(scan, &input.sources, scan.names(), odometry_rank));
     let mut calibrations = BTreeMap::new();
     let mut info = |key, wanted: &Option<String>, image: &Option<String>| {
         let is_disparity = key == "depth_info_topic" && input.disparity.is_some();
@@ -173,23 +178,22 @@ pub(crate) fn choose(
         colour_info,
         depth_info,
         right_info,
-        odometry,
+        odometry: None,
+        odom_frames: None,
         calibrations,
         camera,
         depth_problem,
-        unused_odometry: None,
+        unused_odometry: Vec::new(),
         sensor_problems: BTreeMap::new(),
         further_scans: Vec::new(),
         sensors,
     };
     let primary = chosen.primary().to_owned();
     chosen.further_scans = further_scans(scan, input, &primary, chosen.sensor(Input::Laser));
-    if let Some(odometry) = chosen.odometry.take() {
-        match odometry_problem(scan, &primary, &odometry) {
-            Some(problem) => chosen.unused_odometry = Some((odometry, problem)),
-            None => chosen.odometry = Some(odometry),
-        }
-    }
+    let odometry = choose_odometry(scan, input, &primary)?;
+    chosen.odometry = odometry.topic;
+    chosen.odom_frames = odometry.frames;
+    chosen.unused_odometry = odometry.unused;
     if let Some(detections) = chosen.sensor(Input::Detections)
         && let Some(problem) = detections_problem(scan, input, &primary, detections)
     {
@@ -405,7 +409,7 @@ impl Requirement<'_> {
         let Self { wanted, key, types, fits, taken, .. } = self;
         let is_image = key.ends_with("_topic") && types.contains("Image");
         let unreadable = scan.topics.iter().find_map(|(name, topic)| {
-            let why = unreadable(topic).filter(|_| is_image)?;
+            let why = unreadable(topic).filter(|_| is_image && !topic.is_other_stream)?;
             Some(format!("; {name} ({}) cannot be read: {why}", kind_of(topic)))
         });
         let mut free = scan.topics.iter().filter(|(name, _)| *taken != Some(name.as_str()));

@@ -3,6 +3,7 @@
 use super::calibration::{calibration_of, calibrations, intrinsics_of, misfit};
 use crate::InputSettings;
 use crate::camera_info::Intrinsics;
+use crate::clock::Times;
 use crate::scan::{Scan, Topic};
 use crate::sensors::recent::NEAR_S as NEAR_SCAN_S;
 use crate::source::robot_frame;
@@ -16,7 +17,7 @@ pub(crate) struct Problem {
 }
 
 impl Problem {
-    fn new(why: impl Into<String>, remedy: impl Into<String>) -> Option<Self> {
+    pub(super) fn new(why: impl Into<String>, remedy: impl Into<String>) -> Option<Self> {
         Some(Self { why: why.into(), remedy: remedy.into() })
     }
 }
@@ -138,10 +139,11 @@ pub(super) fn detections_problem(
 /// Returns the time from the first frame to the first of other messages, s, if all of them lie apart
 /// from all frames in time.
 fn other_clock(frames: &Topic, messages: &Topic) -> Option<f64> {
-    let (first, last) = frames.stamp_range()?;
-    let (begin, end) = messages.stamp_range()?;
-    let is_apart = begin.seconds_since(last) > NEAR_S || first.seconds_since(end) > NEAR_S;
-    is_apart.then(|| begin.seconds_since(first))
+    let frames = frames.times()?;
+    let messages = messages.times()?;
+    let is_apart = messages.first.seconds_since(frames.last) > NEAR_S
+        || frames.first.seconds_since(messages.last) > NEAR_S;
+    is_apart.then(|| messages.first.seconds_since(frames.first))
 }
 
 /// Returns true if two topics were recorded one after the other.
@@ -281,27 +283,22 @@ pub(super) fn scanner_problem(
     scan_times_problem(scan, primary, topic)
 }
 
-/// Returns the reason for which odometry cannot give the poses of the frames.
-pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Option<Problem> {
-    if scan.is_live() {
-        return None;
-    }
-    let frames = scan.topics.get(primary)?;
-    let poses = scan.topics.get(odometry)?;
-    let (first, last) = frames.stamp_range()?;
-    let (begin, end) = poses.stamp_range()?;
-    let behind_s = begin.seconds_since(last);
-    let ahead_s = first.seconds_since(end);
+/// Returns the problem of poses of which none is near a frame in time. `subject` names them.
+pub(super) fn clock_problem(frames: &Times, poses: &Times, subject: &str) -> Option<Problem> {
+    let behind_s = poses.first.seconds_since(frames.last);
+    let ahead_s = frames.first.seconds_since(poses.last);
     if behind_s <= NEAR_S && ahead_s <= NEAR_S {
         return None;
     }
-    let off_s = begin.seconds_since(first);
+    let off_s = poses.first.seconds_since(frames.first);
     let side = if off_s > 0.0 { "later" } else { "earlier" };
+    let is_other_time =
+        poses.first_recorded > frames.last_recorded || poses.last_recorded < frames.first_recorded;
     let why = format!(
-        "no stamp of it is within {NEAR_S} s of any frame: it begins {:.1} s {side}",
+        "no stamp of {subject} is within {NEAR_S} s of any frame: it begins {:.1} s {side}",
         off_s.abs()
     );
-    if is_recorded_apart(frames, poses) {
+    if is_other_time {
         Problem::new(format!("{why}, because it was recorded at another time"), TOGETHER)
     } else {
         Problem::new(
@@ -311,5 +308,5 @@ pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Op
     }
 }
 
-/// Time between a frame and odometry beyond which the two have nothing to do with each other, s.
+/// Time between a frame and a pose beyond which the two have nothing to do with each other, s.
 const NEAR_S: f64 = 1.0;

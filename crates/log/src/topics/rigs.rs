@@ -6,7 +6,7 @@ use super::kinds::{colour_rank, depth_rank, is_image, is_usable_picture};
 use super::name::{Side, Stream, TopicName};
 use super::problems::{Problem, depth_problem};
 use crate::images::Content;
-use crate::scan::{Scan, Topic};
+use crate::scan::{Scan, Topic, Type};
 use crate::tf::plain;
 use crate::{Input, InputSettings, Inputs};
 
@@ -230,6 +230,18 @@ impl CameraFrames {
     }
 }
 
+/// Rank of depth that is registered to colour: more than any name gives.
+const REGISTERED_RANK: i32 = 16;
+
+/// Returns the rank of depth images by their frame: those in the frame of the colour images are
+/// registered to them. Points are in that frame, too, where the images that they come from are not.
+fn registered_rank(scan: &Scan, colour: Option<&str>, depth: &str) -> i32 {
+    let of_colour = colour.and_then(|colour| scan.frame_of(colour));
+    let is_cloud = scan.topics.get(depth).is_some_and(|topic| topic.kind == Type::PointCloud);
+    let is_known = of_colour.is_some_and(|frame| !frame.is_empty());
+    if is_known && !is_cloud && scan.frame_of(depth) == of_colour { REGISTERED_RANK } else { 0 }
+}
+
 /// Returns the folder that the topics of a rig share, else the folder of the first one.
 fn label_of(topics: &[String]) -> String {
     let mut shared: Option<Vec<&str>> = None;
@@ -310,7 +322,8 @@ impl Rig {
         };
         let depth = named.depth.clone().or_else(|| {
             self.best(scan, input, |name, topic| {
-                let rank = depth_rank(name, topic)?;
+                let rank =
+                    depth_rank(name, topic)? + registered_rank(scan, colour.as_deref(), name);
                 // Any depth that can be used is better than one that cannot.
                 Some(if problem(name).is_some() { rank - 100 } else { rank })
             })

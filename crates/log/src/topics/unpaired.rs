@@ -67,7 +67,7 @@ fn are_whole_seconds(topic: &Topic) -> bool {
 
 /// Returns the words for partners that begin late or end early, if most frames without one lie there.
 fn is_short(frames: &[Stamp], partners: &Topic, tolerance_s: f64) -> Option<String> {
-    let (begin, end) = partners.stamp_range()?;
+    let times = partners.times()?;
     let period_s = Timing::of(&partners.stamps).map_or(0.0, |timing| timing.median_period_s);
     let margin_s = period_s.max(tolerance_s);
     let mut sorted = partners.stamps.clone();
@@ -76,17 +76,17 @@ fn is_short(frames: &[Stamp], partners: &Topic, tolerance_s: f64) -> Option<Stri
         .iter()
         .filter(|at| nearest(&sorted, **at).is_none_or(|offset_s| offset_s.abs() > tolerance_s));
     let without: Vec<Stamp> = without.copied().collect();
-    let early = without.iter().filter(|at| begin.seconds_since(**at) > margin_s).count();
-    let late = without.iter().filter(|at| at.seconds_since(end) > margin_s).count();
+    let early = without.iter().filter(|at| times.first.seconds_since(**at) > margin_s).count();
+    let late = without.iter().filter(|at| at.seconds_since(times.last) > margin_s).count();
     if 2 * (early + late) <= without.len() {
         return None;
     }
     let first = frames.iter().min()?;
     let last = frames.iter().max()?;
     Some(if early > late {
-        format!("it begins {:.1} s after the first frame", begin.seconds_since(*first))
+        format!("it begins {:.1} s after the first frame", times.first.seconds_since(*first))
     } else {
-        format!("it ends {:.1} s before the last frame", last.seconds_since(end))
+        format!("it ends {:.1} s before the last frame", last.seconds_since(times.last))
     })
 }
 

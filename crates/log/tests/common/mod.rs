@@ -159,6 +159,17 @@ impl LogWriter {
         self.message("/tf", stamp, &transform(parent, child, stamp, pose));
     }
 
+    /// Writes a moving transform with any stamp at a time of the log.
+    pub fn moving_of(
+        &mut self,
+        written: Stamp,
+        (parent, child): (&str, &str),
+        stamp: Stamp,
+        pose: &Isometry3<f64>,
+    ) {
+        self.message("/tf", written, &transform(parent, child, stamp, pose));
+    }
+
     pub fn odometry(&mut self, stamp: Stamp, x: f64, yaw: f64) {
         let pose = Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::new(0.0, 0.0, yaw));
         self.odometry_of(stamp, stamp, Pose::from(&pose));
@@ -166,10 +177,15 @@ impl LogWriter {
 
     /// Writes a pose of odometry with any stamp and any numbers at a time of the log.
     pub fn odometry_of(&mut self, written: Stamp, stamp: Stamp, pose: Pose) {
+        self.odometry_on("/odom", written, stamp, pose);
+    }
+
+    /// Writes a pose of odometry on a topic.
+    pub fn odometry_on(&mut self, topic: &str, written: Stamp, stamp: Stamp, pose: Pose) {
         let mut odometry = Odometry { header: Header::new(stamp, "odom"), ..Odometry::default() };
         odometry.child_frame_id = "base_link".into();
         odometry.pose.pose = pose;
-        self.message("/odom", written, &odometry);
+        self.message(topic, written, &odometry);
     }
 
     pub fn attachment(&mut self, data: &[u8]) {

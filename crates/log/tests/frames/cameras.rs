@@ -152,3 +152,35 @@ fn c1_a_calibration_of_depth_that_changes_marks_the_frames_after_it() {
     let told = notes_with(&source, "/camera/depth/camera_info: the calibration changes");
     assert_eq!(told.len(), 1, "{:?}", source.notes());
 }
+
+/// Writes ten frames of colour, of which some have this calibration without focal lengths.
+fn with_blank(blank: &CameraInfo, is_blank: impl Fn(u32) -> bool) -> (FrameSource, SavedLog) {
+    let mut log = LogWriter::plain();
+    log.fixed("base_link", "colour", &level_pose());
+    for i in 0..10 {
+        let stamp = at(0.1 * f64::from(i));
+        let info = info_of("colour", &camera(16, 12, 14.0));
+        let info = if is_blank(i) { blank.clone() } else { info };
+        let header = Header::new(stamp, "colour");
+        log.message(INFO, stamp, &CameraInfo { header, ..info });
+        log.colour(stamp);
+    }
+    open(log, Inputs::ANY)
+}
+
+#[test]
+fn calibrations_without_focal_lengths_say_nothing() {
+    let zeros = CameraInfo { width: 16, height: 12, ..CameraInfo::default() };
+    let mut ones = zeros.clone();
+    ones.k[8] = 1.0;
+    ones.p[10] = 1.0;
+    for blank in [zeros, ones] {
+        for is_late in [true, false] {
+            let (mut source, _saved) = with_blank(&blank, |i| (i < 5) == is_late);
+            let found = frames(&mut source);
+            assert_eq!((found.len(), changed(&found).len()), (10, 0), "{:?}", source.notes());
+            assert!((found[0].frame.camera.focal_px() - 14.0).abs() < 1e-9);
+            assert!(!source.data_lost(), "{:?}", source.notes());
+        }
+    }
+}

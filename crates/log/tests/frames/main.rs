@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 mod cameras;
+mod clocks;
 mod clouds;
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,0 +1,142 @@
+//! Times of the messages of one source: their stamps, and the times at which they were recorded.
+
+use tagalong_core::Stamp;
+use tagalong_math::{median, percentile};
+
+/// Time over which messages of one stamp are recorded beyond which the stamp is not that of each, s.
+const COARSE_S: f64 = 0.3;
+/// Number of messages below which a lag is not measured.
+const LEAST_MESSAGES: usize = 5;
+/// Largest spread of a constant lag, s: from the tenth to the ninetieth percentile.
+const CONSTANT_S: f64 = 0.2;
+/// Nanoseconds of a second.
+const SECOND_NS: u64 = 1_000_000_000;
+
+/// Ranges of the stamps and of the times of recording of a topic, or of one transform.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Times {
+    /// Earliest and latest stamp.
+    pub(crate) first: Stamp,
+    pub(crate) last: Stamp,
+    /// Earliest and latest time of recording.
+    pub(crate) first_recorded: Stamp,
+    pub(crate) last_recorded: Stamp,
+    /// Number of runs of messages with one stamp.
+    runs: u64,
+    /// Number of them that were recorded over more than [`COARSE_S`].
+    coarse_runs: u64,
+    /// True if all stamps are whole seconds.
+    is_whole: bool,
+    /// Stamp of the last run, and the time of recording of its first message.
+    run: (Stamp, Stamp),
+    is_run_coarse: bool,
+}
+
+impl Times {
+    /// Starts with one message.
+    pub(crate) fn new(stamp: Stamp, recorded: Stamp) -> Self {
+        Self {
+            first: stamp,
+            last: stamp,
+            first_recorded: recorded,
+            last_recorded: recorded,
+            runs: 1,
+            coarse_runs: 0,
+            is_whole: stamp.nanos().is_multiple_of(SECOND_NS),
+            run: (stamp, recorded),
+            is_run_coarse: false,
+        }
+    }
+
+    /// Returns the times of messages in the order of recording; `None` without any.
+    pub(crate) fn of(stamps: &[Stamp], recorded: &[Stamp]) -> Option<Self> {
+        let mut times: Option<Self> = None;
+        for (stamp, recorded) in stamps.iter().zip(recorded) {
+            match &mut times {
+                Some(times) => times.add(*stamp, *recorded),
+                None => times = Some(Self::new(*stamp, *recorded)),
+            }
+        }
+        times
+    }
+
+    /// Adds the next message.
+    pub(crate) fn add(&mut self, stamp: Stamp, recorded: Stamp) {
+        self.first = self.first.min(stamp);
+        self.last = self.last.max(stamp);
+        self.first_recorded = self.first_recorded.min(recorded);
+        self.last_recorded = self.last_recorded.max(recorded);
+        self.is_whole &= stamp.nanos().is_multiple_of(SECOND_NS);
+        if stamp != self.run.0 {
+            self.runs += 1;
+            self.run = (stamp, recorded);
+            self.is_run_coarse = false;
+        }
+        if !self.is_run_coarse && recorded.seconds_since(self.run.1) > COARSE_S {
+            self.coarse_runs += 1;
+            self.is_run_coarse = true;
+        }
+    }
+
+    /// Returns the times with those of recording in place of the stamps.
+    pub(crate) fn as_recorded(&self) -> Self {
+        let mut times = Self::new(self.first_recorded, self.first_recorded);
+        times.add(self.last_recorded, self.last_recorded);
+        times
+    }
+
+    /// Returns true if one stamp stands for messages of many times, most of the time.
+    pub(crate) fn are_coarse(&self) -> bool {
+        2 * self.coarse_runs > self.runs
+    }
+
+    /// Returns true if the stamps are whole seconds, and stand for messages of many times.
+    pub(crate) fn are_whole_seconds(&self) -> bool {
+        self.is_whole && self.are_coarse()
+    }
+}
+
+/// Returns the time by which the stamps of messages are later than their recording, s, which is
+/// negative by the time that they take; `None` if it varies, or is that of a few messages only.
+pub(crate) fn constant_lag_s(stamps: &[Stamp], recorded: &[Stamp]) -> Option<f64> {
+    let both = stamps.iter().zip(recorded);
+    let lags_s: Vec<f64> = both.map(|(stamp, recorded)| stamp.seconds_since(*recorded)).collect();
+    let spread_s = percentile(&lags_s, 0.9)? - percentile(&lags_s, 0.1)?;
+    let is_constant = lags_s.len() >= LEAST_MESSAGES && spread_s <= CONSTANT_S;
+    median(lags_s).filter(|_| is_constant)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(seconds: &[f64]) -> Vec<Stamp> {
+        seconds.iter().map(|s| Stamp::default().plus_seconds(100.0 + s)).collect()
+    }
+
+    #[test]
+    fn stamps_of_whole_seconds_are_told_from_those_that_come_once_a_second() {
+        let recorded = at(&[0.0, 0.4, 0.8, 1.2, 1.6, 2.0]);
+        let rounded = Times::of(&at(&[0.0, 0.0, 0.0, 1.0, 1.0, 2.0]), &recorded).unwrap();
+        assert!(rounded.are_whole_seconds());
+        assert!(!rounded.as_recorded().are_coarse());
+        assert_eq!(rounded.as_recorded().last, recorded[5]);
+        let tenths = Times::of(&at(&[0.1, 0.1, 0.1, 1.1, 1.1, 2.1]), &recorded).unwrap();
+        assert!(tenths.are_coarse() && !tenths.are_whole_seconds());
+        let slow = Times::of(&at(&[0.0, 1.0, 2.0]), &at(&[0.01, 1.01, 2.01])).unwrap();
+        assert!(!slow.are_coarse());
+        // Two publishers of the same odometry.
+        let twice = Times::of(&at(&[0.0, 0.0, 1.0, 1.0]), &at(&[0.01, 0.02, 1.01, 1.02])).unwrap();
+        assert!(!twice.are_coarse());
+        assert_eq!(Times::of(&[], &[]), None);
+    }
+
+    #[test]
+    fn a_lag_is_the_median_where_it_is_constant() {
+        let recorded = at(&[0.0, 0.1, 0.2, 0.3, 0.4]);
+        let lag = |stamps: &[f64]| constant_lag_s(&at(stamps), &recorded);
+        assert!((lag(&[0.9, 1.0, 1.1, 1.2, 1.3]).unwrap() - 0.9).abs() < 1e-6);
+        assert_eq!(lag(&[0.9, 1.0, 1.1, 2.2, 2.3]), None);
+        assert_eq!(lag(&[0.9, 1.0]), None);
+    }
+}

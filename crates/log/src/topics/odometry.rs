@@ -1,0 +1,163 @@
+//! Choice of the odometry: of several topics the best one whose times are those of the frames, else
+//! transforms.
+
+use super::kinds::{is_odometry, odometry_rank};
+use super::problems::{Problem, RECORDING, clock_problem};
+use super::{best_of, named};
+use crate::clock::constant_lag_s;
+use crate::scan::{Scan, Topic};
+use crate::source::robot_frame;
+use crate::{InputSettings, LogError};
+
+/// Odometry of a log.
+#[derive(Clone, Debug, Default)]
+pub(super) struct FoundOdometry {
+    pub(super) topic: Option<String>,
+    /// Frames of tf that give the poses where no topic does: odometry frame and robot frame.
+    pub(super) frames: Option<(String, String)>,
+    /// Odometry that would have come before and cannot be used, with the reasons.
+    pub(super) unused: Vec<(String, Problem)>,
+}
+
+/// Chooses the odometry for frames that the topic `primary` makes: the topic that the settings name,
+/// else the best one that can be used, else transforms.
+///
+/// # Errors
+/// A topic that the settings name and that is no odometry.
+pub(super) fn choose_odometry(
+    scan: &Scan,
+    input: &InputSettings,
+    primary: &str,
+) -> Result<FoundOdometry, LogError> {
+    let mut found = FoundOdometry::default();
+    let mut next = named(scan, "odometry_topic", input.odometry_topic.as_deref(), is_odometry)?;
+    let is_named = next.is_some();
+    if !is_named {
+        next = best_of(scan, &input.sources, scan.names(), odometry_rank);
+    }
+    while let Some(topic) = next {
+        let Some(problem) = odometry_problem(scan, primary, &topic) else {
+            found.topic = Some(topic);
+            return Ok(found);
+        };
+        found.unused.push((topic, problem));
+        if is_named {
+            break;
+        }
+        let is_left = |name: &&str| found.unused.iter().all(|(unused, _)| unused != name);
+        next = best_of(scan, &input.sources, scan.names().filter(is_left), odometry_rank);
+    }
+    let odom = &input.odom_frame;
+    let robot = robot_frame(scan, input);
+    if scan.tf.knows(odom) && scan.tf.connects(odom, robot) {
+        match transform_odometry_problem(scan, primary, odom, robot) {
+            Some(problem) => found.unused.push((format!("tf ({odom} to {robot})"), problem)),
+            None => found.frames = Some((odom.clone(), robot.to_owned())),
+        }
+    }
+    Ok(found)
+}
+
+/// Lead of the stamps of odometry over those of the frames beyond which its clock is another one, s.
+const LEAD_S: f64 = 0.5;
+/// Time by which stamps are later than their recording beyond which their clock is not that of the
+/// recording, s.
+const FUTURE_S: f64 = 0.25;
+/// Delay of the stamps of odometry behind those of the frames beyond which its clock is another one,
+/// s. Odometry that is computed from images may come late by less, with right stamps.
+const DELAY_S: f64 = 1.0;
+
+/// Returns the reason for which odometry cannot give the poses of the frames.
+pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Option<Problem> {
+    if scan.is_live() {
+        return None;
+    }
+    let frames = scan.topics.get(primary)?;
+    let poses = scan.topics.get(odometry)?;
+    let times = poses.times()?;
+    if let Some(problem) = clock_problem(&frames.times()?, &times, "it") {
+        return Some(problem);
+    }
+    if poses.has_constant_stamps() {
+        return Problem::new("its stamps never change", RECORDING);
+    }
+    if times.are_whole_seconds() {
+        return Problem::new(WHOLE_SECONDS, RECORDING);
+    }
+    if times.are_coarse() {
+        return Problem::new(
+            "most of its stamps are those of several messages, which were recorded one after the \
+             other",
+            RECORDING,
+        );
+    }
+    lag_problem(frames, poses)
+}
+
+/// Reason for stamps that are rounded to seconds.
+const WHOLE_SECONDS: &str = "its stamps are rounded to whole seconds";
+
+/// Returns the problem of odometry whose stamps are all too early or too late by one time, which the
+/// times of recording tell.
+fn lag_problem(frames: &Topic, poses: &Topic) -> Option<Problem> {
+    let of_frames_s = constant_lag_s(&frames.stamps, &frames.recorded)?;
+    let of_poses_s = constant_lag_s(&poses.stamps, &poses.recorded)?;
+    let off_s = of_poses_s - of_frames_s;
+    // Frames may come late by any time. Nothing has a stamp of the future, unless the clock of the
+    // recording is late itself.
+    let is_ahead = off_s > LEAD_S && of_poses_s > FUTURE_S && of_frames_s < FUTURE_S;
+    if !is_ahead && off_s > -DELAY_S {
+        return None;
+    }
+    let side = if off_s > 0.0 { "later" } else { "earlier" };
+    Problem::new(
+        format!(
+            "its stamps are {:.2} s {side} than those of the frames, by the times of recording: \
+             another clock",
+            off_s.abs()
+        ),
+        RECORDING,
+    )
+}
+
+/// Returns the reason for which transforms cannot be the odometry. Their lag tells nothing, because
+/// localisation gives its transforms later stamps on purpose.
+fn transform_odometry_problem(
+    scan: &Scan,
+    primary: &str,
+    odom: &str,
+    robot: &str,
+) -> Option<Problem> {
+    if let Some(problem) = transform_problem(scan, primary, odom, robot) {
+        return Some(problem);
+    }
+    for (frame, _) in scan.tf.moving_frames(odom, robot) {
+        let times = scan.link_times.get(frame).filter(|_| !scan.is_live());
+        if times.is_some_and(|times| times.are_whole_seconds()) {
+            return Problem::new(WHOLE_SECONDS, RECORDING);
+        }
+    }
+    None
+}
+
+/// Returns the reason for which tf has no pose of frame `source` in frame `target` at the times of
+/// the frames that the topic `primary` makes: a moving transform of another clock.
+pub(crate) fn transform_problem(
+    scan: &Scan,
+    primary: &str,
+    target: &str,
+    source: &str,
+) -> Option<Problem> {
+    if scan.is_live() {
+        return None;
+    }
+    let frames = scan.topics.get(primary)?.times()?;
+    for (frame, parent) in scan.tf.moving_frames(target, source) {
+        let Some(times) = scan.link_times.get(frame) else { continue };
+        let subject = format!("the transform {parent} to {frame}");
+        if let Some(problem) = clock_problem(&frames, times, &subject) {
+            return Some(problem);
+        }
+    }
+    None
+}

@@ -1,0 +1,44 @@
+//! Units of depth that cameras tell, and the depth images that they are for.
+
+use super::calibration::{common_folders, folders};
+use super::name::TopicName;
+use crate::images::Content;
+use crate::scan::Scan;
+
+/// Returns the unit of depth that the camera of a depth topic tells, m, with the topic that says so:
+/// that which shares most folders with it. `None` if only other cameras tell theirs, or several could
+/// be meant that differ.
+pub(crate) fn told_unit<'a>(scan: &'a Scan, depth: &str) -> Option<(&'a str, f64)> {
+    let mut best: Option<(usize, &str, f64)> = None;
+    let mut is_open = false;
+    for (topic, unit_m) in &scan.depth_units {
+        if !is_unit_of(scan, topic, depth) {
+            continue;
+        }
+        let common = common_folders(topic, depth);
+        match best {
+            Some((most, ..)) if most > common => {}
+            Some((most, _, other_m)) if most == common => is_open |= other_m != *unit_m,
+            _ => {
+                best = Some((common, topic.as_str(), *unit_m));
+                is_open = false;
+            }
+        }
+    }
+    best.filter(|_| !is_open).map(|(_, topic, unit_m)| (topic, unit_m))
+}
+
+/// Returns true if the topic of a unit may be of the device of a depth topic: it stands in the root or
+/// shares a folder, and no other device with depth is nearer to it.
+fn is_unit_of(scan: &Scan, unit: &str, depth: &str) -> bool {
+    let common = common_folders(unit, depth);
+    let has_folder = folders(unit).next().is_some();
+    let name = TopicName::of(depth);
+    if common == 0 && has_folder || name.contradicts(&TopicName::of(unit)) {
+        return false;
+    }
+    let mut others = scan.topics.iter().filter(|(other, topic)| {
+        topic.content == Content::Depth && TopicName::of(other).device != name.device
+    });
+    others.all(|(other, _)| common_folders(unit, other) <= common)
+}
