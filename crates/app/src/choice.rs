@@ -90,8 +90,9 @@ struct Refusal {
     config: &'static str,
     /// Reason, with the remedy where there is one.
     why: String,
-    /// Inputs of a pipeline that fails on them; `None` where the log is of a kind that it is not made for.
-    inputs: Option<Inputs>,
+    /// Inputs that the pipeline requires and fails on; `None` where the log is of a kind that it is not made
+    /// for.
+    required: Option<Vec<Input>>,
 }
 
 impl Fittings {
@@ -171,7 +172,9 @@ impl Fittings {
         let taken = place(self.fitting.first()?.choice.config)?;
         let refusal = self.refusals.iter().find(|refusal| {
             place(refusal.config) < Some(taken)
-                && refusal.inputs.is_some_and(|inputs| has_required(&usable, inputs))
+                && refusal.required.as_ref().is_some_and(|required| {
+                    required.iter().all(|input| usable.contains(&input.name()))
+                })
         })?;
         Some(format!("{} would do better, but: {}", refusal.config, refusal.why))
     }
@@ -187,11 +190,10 @@ fn words_of(input: &str) -> &str {
     }
 }
 
-/// Returns true if all inputs that a pipeline cannot do without are among the usable ones.
-fn has_required(usable: &[&str], inputs: Inputs) -> bool {
+/// Returns the inputs that a pipeline cannot do without.
+fn required(inputs: Inputs) -> Vec<Input> {
     let known = Input::ALL.into_iter().chain([Input::POINTS]);
-    let mut required = known.filter(|input| inputs.requires(*input));
-    required.all(|input| usable.contains(&input.name()))
+    known.filter(|input| inputs.requires(*input)).collect()
 }
 
 /// Returns a line about a log of which part was lost; nothing for a whole one.
@@ -222,7 +224,7 @@ pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -
             Err(misfit) => found.refusals.push(Refusal {
                 config: choice.config,
                 why: reason(log, &misfit.why),
-                inputs: misfit.inputs,
+                required: misfit.required,
             }),
         }
     }
@@ -233,12 +235,12 @@ pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -
 struct Misfit {
     why: Failure,
     /// As those of a [`Refusal`].
-    inputs: Option<Inputs>,
+    required: Option<Vec<Input>>,
 }
 
 impl From<Failure> for Misfit {
     fn from(why: Failure) -> Self {
-        Self { why, inputs: None }
+        Self { why, required: None }
     }
 }
 
@@ -259,10 +261,11 @@ fn try_config(
     args: &InputArgs,
 ) -> Result<(), Misfit> {
     let (mut pipeline, settings) = config.pipeline(registry, None)?;
-    let inputs = Some(pipeline.inputs());
+    let required = Some(required(pipeline.inputs()));
     let outer = args.applied(config.outer_for(&pipeline)?);
     let opened = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs());
-    let mut source = opened.map_err(|error| Misfit { why: error.into(), inputs })?;
+    let mut source =
+        opened.map_err(|error| Misfit { why: error.into(), required: required.clone() })?;
     let Some(item) = source.next_frame() else {
         let account = source.account();
         let failing = account.topics.iter().find(|it| it.used_as.is_some() && it.problem.is_some());
@@ -271,7 +274,7 @@ fn try_config(
         let why = failing.map(|topic| format!(": {topic}"));
         let why = why.or_else(|| lost.map(|note| format!(": {note}"))).unwrap_or_default();
         let why = Failure::failed(format!("no frame that can be used{why}"));
-        return Err(Misfit { why, inputs });
+        return Err(Misfit { why, required });
     };
     // Any colour image passes for a panorama, and a panorama for any image.
     if item.frame.camera.panorama().is_some() != (config.stem() == PANORAMIC) {
@@ -282,5 +285,5 @@ fn try_config(
         return Err(Failure::failed("no odometry").into());
     }
     let stepped = pipeline.step(&item.frame).map(drop);
-    stepped.map_err(|error| Misfit { why: Failure::failed(error), inputs })
+    stepped.map_err(|error| Misfit { why: Failure::failed(error), required })
 }

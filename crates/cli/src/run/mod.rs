@@ -134,17 +134,16 @@ impl Job {
         let inputs = if wants_pictures { inputs.accept(Input::Colour) } else { inputs };
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
             .map_err(|error| refused_log(error, pipeline.config()))?;
+        // A config that the program chose is for the tracks alone; no robot follows its commands.
+        if is_named {
+            pipeline
+                .check_sources(sources_of(&source))
+                .map_err(|why| Failure::failed(format!("`{}`: {why}", args.log().display())))?;
+        }
         let resolved = outer.resolved_with(pipeline.config())?;
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
         let mut report = blank_report(&config, settings.seed, log);
         report.inputs = source.account().clone();
-        // No robot follows the commands of a run over a log, and of a config that the program chose they
-        // are of no interest.
-        if let Err(why) = pipeline.check_sources(sources_of(&source))
-            && is_named
-        {
-            report.notes.push(format!("the commands of this run are of no use: {why}"));
-        }
         if !args.quiet {
             report.inputs.lines().iter().for_each(|line| say(line));
         }

@@ -117,7 +117,7 @@ fn the_reason_for_which_a_better_pipeline_fails_is_told() {
     broken::write(&home.path("with.mcap"), &home.path("uncalibrated.mcap"), &changes);
     let (code, said) = home.tell(&["run", "uncalibrated.mcap", "-o", "out"]);
     assert_eq!(code, 0, "{said}");
-    assert!(said.contains("the log has colour and depth: taking mono"), "{said}");
+    assert!(said.contains("the log has colour, depth and odometry: taking mono"), "{said}");
     let reason = "depth-verified would do better, but: the log has no calibration \
                   (sensor_msgs/CameraInfo) of ";
     assert!(said.contains(reason), "{said}");

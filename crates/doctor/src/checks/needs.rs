@@ -7,8 +7,8 @@ use super::super::finding::{Finding, Severity};
 pub fn needs(evidence: &Evidence) -> Option<Finding> {
     let usable = evidence.inspection.usable.join(", ");
     if let Some(missing) = &evidence.missing {
-        let finding = Finding::new("needs", Severity::Warn, missing.to_string());
-        return Some(finding.why("the tracks are as good as any; a robot refuses this pipeline"));
+        let finding = Finding::new("needs", Severity::Bad, missing.to_string());
+        return Some(finding.why("`tagalong run` and a robot refuse this pipeline"));
     }
     let Some(LogError::Missing { wanted, hint, .. }) = &evidence.refusal else {
         let measured = format!("the config needs {}; the log has {usable}", words(evidence.inputs));
