@@ -210,7 +210,7 @@ pub(super) fn plan(
     {
         _ if chosen.colour.is_none() => depth_lens,
         // As without any. On a robot a driver may be about to publish another one.
-        Err(why) if !is_metric && input.colour_info_topic.is_none() && !scan.is_live() => {
+        Err(why) if !is_metric && is_uncalibrated(&why) && !scan.is_live() => {
             tally.note(format!("the calibration of the images is not used: {why}"));
             None
         }
@@ -396,6 +396,11 @@ fn lens_of(
         topic: topic.to_owned(),
         source,
     })
+}
+
+/// Returns true for a camera without a calibration, as opposed to one with a wrong calibration.
+fn is_uncalibrated(error: &LogError) -> bool {
+    matches!(error, LogError::Calibration { source: CalibrationError::Uncalibrated, .. })
 }
 
 /// Returns true for images of disparities, which are those of the rectified left camera.
