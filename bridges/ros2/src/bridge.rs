@@ -150,7 +150,10 @@ fn serve(
     let input = format!("ROS domain {}", options.domain);
     let live = Live::start(at, &name, &input, config, registry);
     let live = live.map_err(|error| BridgeError::Serve(at, error))?;
-    tell(&format!("live: open {} in a browser; whoever has this address sees the page", live.address()));
+    tell(&format!(
+        "live: open {} in a browser; whoever has this address sees the page",
+        live.address()
+    ));
     Ok(live)
 }
 

@@ -1,5 +1,6 @@
 //! A camera that publishes video in H.264.
 
+use std::fmt::Debug;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -49,11 +50,11 @@ fn packets_of_ffmpeg_image_transport_become_frames() {
 /// hear each other.
 fn watched<M>(offset: u32, message: impl Fn(Header, &'static [u8]) -> M) -> Option<Summary>
 where
-    M: Message + Serialize,
+    M: Message + Serialize + Debug,
 {
     let _alone = alone()?;
     let stop = Arc::new(AtomicBool::new(false));
-    let lens = Pinhole { fx: 140.0, fy: 140.0, cx: 80.0, cy: 60.0 };
+    let lens = Pinhole::centred(140.0, 160, 120);
     let camera = Camera::mounted(lens, 160, 120, 1.0, 0.0, 0.0);
     let mut robot = Robot::new(domain(offset), &camera);
     let video = robot.peer.publisher::<M>(TOPIC, reliable());
