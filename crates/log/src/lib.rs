@@ -15,6 +15,7 @@
 
 mod attachment;
 mod bag;
+mod camera_frames;
 pub mod camera_info;
 mod camera_settings;
 mod clock;

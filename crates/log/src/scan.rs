@@ -23,7 +23,7 @@ use crate::msgs::{
 use crate::packed::LogFile;
 use crate::sensors::SensorType;
 use crate::tf::{TfBuffer, plain};
-use crate::topics::{is_named_depth, is_named_other, is_own_output};
+use crate::topics::{Stream, TopicName};
 use crate::walk::{Channel, Counters, Message};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
@@ -420,7 +420,7 @@ impl Gathering {
     /// Takes in a cloud. The first one with enough points tells the camera, and so is its calibration.
     fn take_cloud(&mut self, name: &str, data: &[u8]) -> Option<()> {
         let topic = self.topic(name, "", "");
-        if is_own_output(name) {
+        if TopicName::is_own_output(name) {
             topic.kind = Type::Other;
             return Some(());
         }
@@ -550,10 +550,10 @@ impl Topic {
         let image: Image<'_> = decode(data).ok()?;
         if self.pixels.is_none() {
             // A unit makes depth of grey images, but not of infrared ones.
-            let unit = depth_unit_m.filter(|_| !is_named_other(name));
+            let unit = depth_unit_m.filter(|_| TopicName::of(name).stream != Stream::Other);
             self.content = content_of_encoding(&image.encoding, unit);
             self.is_deep_grey = image.encoding == "mono16";
-            if self.is_deep_grey && is_named_depth(name) {
+            if self.is_deep_grey && TopicName::of(name).stream == Stream::Depth {
                 self.content = Content::Depth;
             }
             self.doubt_depth(name);
@@ -572,7 +572,7 @@ impl Topic {
             let codec = Codec::of(&image);
             let declared = content_of_compressed(&image);
             self.is_deep_grey = codec == Codec::DeepPng && declared != Content::Depth;
-            let is_named_depth = is_named_depth(name);
+            let is_named_depth = TopicName::of(name).stream == Stream::Depth;
             // Three channels may be depth that was coloured for people to look at.
             self.is_jpeg_depth = codec.is_jpeg()
                 && (declared == Content::Depth || codec == Codec::GreyJpeg && is_named_depth);
@@ -600,7 +600,7 @@ impl Topic {
     /// Takes images with the encoding of depth for none if their name says infrared or confidence,
     /// which have 16 bits or floating-point numbers, too.
     fn doubt_depth(&mut self, name: &str) {
-        if self.content == Content::Depth && is_named_other(name) {
+        if self.content == Content::Depth && TopicName::of(name).stream == Stream::Other {
             self.content = Content::Unknown;
             self.is_other_stream = true;
         }

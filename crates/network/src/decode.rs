@@ -5,8 +5,7 @@ use tagalong_core::{Joint, Joints};
 use tagalong_geometry::Rect;
 
 use crate::family::{NANODET_BINS, NANODET_M_BINS, NANODET_STRIDES, STRIDES, count_cells};
-use crate::unit::{unit_of_list, unit_of_rows};
-use crate::values::{bins_of, is_score, is_transposed};
+use crate::values::{bins_of, is_score, is_transposed, unit_of_list, unit_of_rows};
 use crate::{BoxUnit, Family, InputSize, Tensor};
 
 /// Joints of a person.

@@ -9,7 +9,7 @@ use tagalong_core::RgbImage;
 use crate::decode::{Wanted, decode, suppress};
 use crate::family::{OutputShape, recognise, shapes_of};
 use crate::network::rten;
-use crate::unit::{unit_of_columns, unit_of_rows};
+use crate::values::{unit_of_columns, unit_of_rows};
 use crate::worker::Worker;
 use crate::{
     BoxUnit, ClassNames, Element, Family, InputSize, Limits, Network, Port, Preparation, Runtime,

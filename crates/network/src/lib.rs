@@ -44,7 +44,6 @@ mod rewriting;
 mod runtime;
 mod survey;
 mod tensor;
-mod unit;
 mod values;
 mod worker;
 
@@ -60,4 +59,4 @@ pub use network::{Network, Runtime, check_file, rten};
 pub use preparation::{Colours, Fit, InputSize, Placement, Preparation};
 pub use runtime::RtenNetwork;
 pub use tensor::{Element, Port, Tensor};
-pub use unit::BoxUnit;
+pub use values::BoxUnit;

@@ -8,12 +8,12 @@ use tagalong_geometry::{HALF_HEAD_M, Rect};
 
 use super::{Moment, SensorReader, SensorType, is_type};
 use crate::InputSettings;
+use crate::camera_frames::CameraFrames;
 use crate::msgs::{
     CdrError, Definition, Detection2DArray, Detection3DArray, Header, Time, Value, decode,
 };
 use crate::pairing::{Payload, Waiting};
 use crate::tally::Tally;
-use crate::topics::CameraFrames;
 use crate::walk::{Channel, Message};
 
 const BOXES: &str = "vision_msgs/Detection2DArray";

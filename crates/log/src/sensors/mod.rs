@@ -26,10 +26,10 @@ use tagalong_config::check_settings;
 use tagalong_core::{Input, Sensors, Stamp};
 use tagalong_geometry::Camera;
 
+use crate::camera_frames::CameraFrames;
 use crate::msgs::{CdrError, Header};
 use crate::tally::Tally;
 use crate::tf::TfBuffer;
-use crate::topics::CameraFrames;
 use crate::walk::Message;
 use crate::{InputSettings, LogError};
 

@@ -19,7 +19,7 @@ use crate::sensors::laser::Scans;
 use crate::sensors::{SENSORS, SensorReader};
 use crate::tally::Tally;
 use crate::tf::TfBuffer;
-use crate::topics::{CameraFrames, Chosen};
+use crate::topics::{Chosen, camera_frames};
 use crate::walk::Message;
 
 /// Time of recording of a live message whose arrival is not told.
@@ -321,7 +321,7 @@ fn readers(plan: &Plan, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
             (name.to_owned(), (sensor.reader)(schema, input))
         })
         .collect();
-    let cameras = CameraFrames::of(scan, primary);
+    let cameras = camera_frames(scan, primary);
     readers.iter_mut().for_each(|(_, reader)| reader.know_cameras(&cameras));
     for topic in &chosen.further_scans {
         readers.push((topic.clone(), Box::new(Scans::further())));

@@ -24,12 +24,12 @@ use kinds::{
     is_usable_depth, is_usable_picture, remedy_as_depth,
 };
 pub(crate) use kinds::{kind_of, unreadable};
-pub(crate) use name::{Stream, TopicName, is_named_depth, is_named_other, is_own_output};
+pub(crate) use name::{Stream, TopicName};
 pub(crate) use odometry::transform_problem;
 use odometry::{choose_odometry, odometry_problem};
 pub(crate) use problems::Problem;
 use problems::{detections_problem, scan_times_problem, scanner_problem};
-pub(crate) use rigs::CameraFrames;
+pub(crate) use rigs::camera_frames;
 use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};

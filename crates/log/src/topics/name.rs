@@ -110,6 +110,11 @@ impl TopicName {
         parts
     }
 
+    /// Returns true for the points of a person that a run writes into its log of tracks for viewers.
+    pub(crate) fn is_own_output(topic: &str) -> bool {
+        topic.strip_prefix("/people/person_").is_some_and(|rest| rest.ends_with("/body"))
+    }
+
     /// Takes in a word; returns true if a number behind it counts streams and not devices.
     fn take(&mut self, word: &str, follows_stream: bool) -> bool {
         let stem = word.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -169,21 +174,6 @@ impl TopicName {
         });
         places.collect()
     }
-}
-
-/// Returns true for the points of a person that a run writes into its log of tracks for viewers.
-pub(crate) fn is_own_output(topic: &str) -> bool {
-    topic.strip_prefix("/people/person_").is_some_and(|rest| rest.ends_with("/body"))
-}
-
-/// Returns true if the name of a topic says that its images are depth.
-pub(crate) fn is_named_depth(topic: &str) -> bool {
-    TopicName::of(topic).stream == Stream::Depth
-}
-
-/// Returns true if the name of a topic says that its images are infrared, confidences and the like.
-pub(crate) fn is_named_other(topic: &str) -> bool {
-    TopicName::of(topic).stream == Stream::Other
 }
 
 /// Returns a name in lower case, with `leftImage` as two words.

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::kinds::{colour_rank, depth_rank, is_image, is_usable_picture};
 use super::name::{Side, Stream, TopicName};
 use super::problems::{Problem, depth_problem};
+use crate::camera_frames::CameraFrames;
 use crate::images::Content;
 use crate::scan::{Scan, Topic, Type};
 use crate::tf::plain;
@@ -174,60 +175,35 @@ fn parent(topic: &str) -> &str {
     topic.rsplit_once('/').map_or("", |(folder, _)| folder)
 }
 
-/// Frames of the cameras of a log, by which detections tell their images.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct CameraFrames {
-    /// Frame of the images that make the frames; empty without one.
-    pub(crate) own: String,
-    /// Frames of that camera and of those beside it.
-    beside: BTreeSet<String>,
-    /// Frames of cameras in other places.
-    others: BTreeSet<String>,
-}
-
-impl CameraFrames {
-    /// Finds the frames of other cameras: those of images of other devices, and optical ones in tf,
-    /// unless tf puts them beside the own camera.
-    pub(crate) fn of(scan: &Scan, primary: &str) -> Self {
-        let Some(own) = scan.frame_of(primary).filter(|own| !own.is_empty()) else {
-            return Self::default();
+/// Finds the frames of other cameras: those of images of other devices, and optical ones in tf,
+/// unless tf puts them beside the own camera.
+pub(crate) fn camera_frames(scan: &Scan, primary: &str) -> CameraFrames {
+    let Some(own) = scan.frame_of(primary).filter(|own| !own.is_empty()) else {
+        return CameraFrames::default();
+    };
+    let mut others = BTreeSet::new();
+    let mut beside = BTreeSet::from([plain(own).to_owned()]);
+    for rig in rigs(scan) {
+        let frames = rig.topics.iter().filter_map(|topic| scan.frame_of(topic));
+        for frame in frames.filter(|frame| !frame.is_empty()) {
+            if rig.has(primary) || are_one_mount(scan, own, frame) == Some(true) {
+                beside.insert(plain(frame).to_owned());
+            } else {
+                others.insert(plain(frame).to_owned());
+            }
+        }
+    }
+    for frame in scan.tf.parents().into_keys() {
+        // Other frames are of no camera, as that of a robot whose detector names it.
+        if !frame.contains("optical") {
+            continue;
+        }
+        match are_one_mount(scan, own, &frame) {
+            Some(false) => others.insert(frame),
+            _ => beside.insert(frame),
         };
-        let mut others = BTreeSet::new();
-        let mut beside = BTreeSet::from([plain(own).to_owned()]);
-        for rig in rigs(scan) {
-            let frames = rig.topics.iter().filter_map(|topic| scan.frame_of(topic));
-            for frame in frames.filter(|frame| !frame.is_empty()) {
-                if rig.has(primary) || are_one_mount(scan, own, frame) == Some(true) {
-                    beside.insert(plain(frame).to_owned());
-                } else {
-                    others.insert(plain(frame).to_owned());
-                }
-            }
-        }
-        for frame in scan.tf.parents().into_keys() {
-            // Other frames are of no camera, as that of a robot whose detector names it.
-            if !frame.contains("optical") {
-                continue;
-            }
-            match are_one_mount(scan, own, &frame) {
-                Some(false) => others.insert(frame),
-                _ => beside.insert(frame),
-            };
-        }
-        let others = others.difference(&beside).cloned().collect();
-        Self { own: own.to_owned(), beside, others }
     }
-
-    /// Returns true for the frame of a camera of which the log knows nothing.
-    pub(crate) fn is_unknown(&self, frame: &str) -> bool {
-        let is_camera = frame.contains("optical") && !self.own.is_empty();
-        is_camera && !self.beside.contains(plain(frame)) && !self.is_other(frame)
-    }
-
-    /// Returns true for the frame of a camera in another place.
-    pub(crate) fn is_other(&self, frame: &str) -> bool {
-        self.others.contains(plain(frame))
-    }
+    CameraFrames::new(own, beside, others)
 }
 
 /// Rank of depth that is registered to colour: more than any name gives.
