@@ -103,7 +103,8 @@ impl Fittings {
         let account = if account.is_empty() { account } else { format!("\nits topics:{account}") };
         let log = log.display();
         if let Some(why) = self.common_reason() {
-            return Failure::failed(format!("{log}: {why}"));
+            let whole = format!("{log}: {why}\n{}", self.damage);
+            return Failure::failed(whole.trim_end());
         }
         let refusals = self.refusals.iter();
         let refusals: String =
@@ -168,16 +169,20 @@ impl Fittings {
     /// Returns the first pipeline whose inputs the log has and that fails on them, with the reason.
     fn refused_though_there(&self) -> Option<String> {
         let usable = self.account.usable();
-        let place = |name: &str| CHOICES.iter().position(|choice| choice.config == name);
-        let taken = place(self.fitting.first()?.choice.config)?;
+        let taken = self.fitting.first()?.choice.config;
         let refusal = self.refusals.iter().find(|refusal| {
-            place(refusal.config) < Some(taken)
+            place_of(refusal.config) < place_of(taken)
                 && refusal.required.as_ref().is_some_and(|required| {
                     required.iter().all(|input| usable.contains(&input.name()))
                 })
         })?;
         Some(format!("{} would do better, but: {}", refusal.config, refusal.why))
     }
+}
+
+/// Returns the place of a config among the choices.
+fn place_of(config: &str) -> Option<usize> {
+    CHOICES.iter().position(|choice| choice.config == config)
 }
 
 /// Returns an input in words.

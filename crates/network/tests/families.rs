@@ -234,7 +234,7 @@ fn the_unit_of_boxes_is_for_families_that_have_several() {
     let choices = Choices { unit: Some(BoxUnit::Fractions), ..Choices::default() };
     let why = refusal(&whole, &choices, &Limits::default());
     assert!(why.contains("family nanodet") && why.contains("remove `box_unit`"), "{why}");
-    // What the user sets is obeyed: pixels of which none is within the image.
+    // A unit that is set is obeyed: pixels, of which none is within the image.
     let file = path("yolov8-rows.onnx");
     let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
     let found = network.find(&scene(1), &Family::YoloV8.preparation(), 0.5, 0.5).unwrap().unwrap();

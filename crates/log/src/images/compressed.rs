@@ -322,7 +322,7 @@ fn depth_of(
     pixel: impl Fn(u16) -> f32,
 ) -> Result<DepthImage, ImageError> {
     let lost = |why: &str| ImageError::Codec(why.into());
-    if body.starts_with(&[0x89, b'P', b'N', b'G']) {
+    if body.starts_with(PNG) {
         if let Some(depth) = deep_png::decode(body, limits, &pixel) {
             return Ok(depth);
         }

@@ -205,12 +205,11 @@ pub(super) fn plan(
         }
         found => found?,
     };
-    let is_metric = inputs.requires(Input::Depth) || inputs.requires(Input::Right);
     let lens = match lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref(), false)
     {
         _ if chosen.colour.is_none() => depth_lens,
         // As without any. On a robot a driver may be about to publish another one.
-        Err(why) if !is_metric && is_uncalibrated(&why) && !scan.is_live() => {
+        Err(why) if !is_metric(inputs) && is_uncalibrated(&why) && !scan.is_live() => {
             tally.note(format!("the calibration of the images is not used: {why}"));
             None
         }
@@ -398,6 +397,11 @@ fn lens_of(
     })
 }
 
+/// Returns true for a pipeline whose places in metres need a calibration.
+fn is_metric(inputs: Inputs) -> bool {
+    inputs.requires(Input::Depth) || inputs.requires(Input::Right)
+}
+
 /// Returns true for a camera without a calibration, as opposed to one with a wrong calibration.
 fn is_uncalibrated(error: &LogError) -> bool {
     matches!(error, LogError::Calibration { source: CalibrationError::Uncalibrated, .. })
@@ -448,13 +452,12 @@ fn positive_baseline_m(info: &CameraInfo) -> Option<f64> {
 /// Checks that there is a calibration if positions in metres need it; a monocular pipeline works
 /// without.
 fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
-    let metric = plan.inputs.requires(Input::Depth) || plan.inputs.requires(Input::Right);
     if plan.inputs.requires(Input::Right) && plan.baseline_m.is_none_or(|baseline| baseline <= 0.0)
     {
         let wanted = "calibration of the right camera with a positive baseline (P[3] = -fx B)";
         return Err(missing(&plan.scan, wanted.into(), baseline_hint(plan)));
     }
-    if plan.lens.is_none() && metric {
+    if plan.lens.is_none() && is_metric(plan.inputs) {
         let wanted = format!("calibration (sensor_msgs/CameraInfo) of {}", plan.primary());
         let hint = if plan.scan.infos.is_empty() {
             "; record its topic with the images"

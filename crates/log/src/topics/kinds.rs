@@ -83,10 +83,15 @@ const DEEP_REMEDY: &str = "grey images of 16 bits are no colour images; they cou
 const OTHER_STREAM_REMEDY: &str = "its name says infrared or confidence, and its encoding would be that of depth, too: \
                                    if it is depth, name the topic as `depth_topic` under [input]";
 
+/// Returns the name of the messages of a topic without their package.
+fn message_name(topic: &Topic) -> &str {
+    topic.schema.rsplit(['/', '.']).next().unwrap_or_default()
+}
+
 /// Returns the reason for which images or scans of a topic cannot be read, with the remedy; `None`
 /// for those that can, and for all other topics.
 pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
-    let name = topic.schema.rsplit(['/', '.']).next().unwrap_or_default();
+    let name = message_name(topic);
     let is_decoded = topic.kind == Type::Video && topic.pixels.as_deref() == Some(H264);
     if is_decoded && topic.size.is_none() {
         return Some(topic.video_fault.clone().unwrap_or_else(|| NO_KEY_REMEDY.to_owned()));
@@ -127,7 +132,7 @@ pub(super) fn depth_as_picture(name: &str, topic: &Topic) -> Option<(&'static st
 
 /// Returns true for video, whether or not it is decoded.
 fn is_video(topic: &Topic) -> bool {
-    let name = topic.schema.rsplit(['/', '.']).next().unwrap_or_default();
+    let name = message_name(topic);
     let is_theora = topic.pixels.as_deref().is_some_and(|pixels| pixels.contains("theora"));
     topic.kind == Type::Video || VIDEO_MESSAGES.contains(&name) || is_theora
 }

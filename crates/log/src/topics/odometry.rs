@@ -44,8 +44,9 @@ pub(super) fn choose_odometry(
         if is_named {
             break;
         }
-        let is_left = |name: &&str| found.unused.iter().all(|(unused, _)| unused != name);
-        next = best_of(scan, &input.sources, scan.names().filter(is_left), odometry_rank);
+        let unused: Vec<&String> = found.unused.iter().map(|(unused, _)| unused).collect();
+        let left = scan.names().filter(|name| unused.iter().all(|unused| unused != name));
+        next = best_of(scan, &input.sources, left, odometry_rank);
     }
     let odom = &input.odom_frame;
     let robot = robot_frame(scan, input);
