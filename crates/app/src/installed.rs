@@ -1,7 +1,8 @@
 //! Networks that the user has installed, with their configs.
 //!
-//! The folder of networks holds for each the file `NAME.onnx`, its config `NAME.toml` and its card
-//! `NAME.card.toml`. The file `default` names the one that is taken for a log with colour alone.
+//! The folder of networks holds for each the file `NAME.onnx`, its config `NAME.toml`, the config
+//! `NAME-depth.toml` that joins it with depth, and its card `NAME.card.toml`. The file `default` names
+//! the one that is taken for a log with colour alone.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,6 +14,8 @@ use tagalong_network::networks_folder;
 pub const NETWORK: &str = "network";
 /// File with the name of the default network.
 const DEFAULT: &str = "default";
+/// End of the name of a config that joins a network with depth.
+pub const WITH_DEPTH: &str = "-depth";
 
 /// Files of a network in a folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,6 +24,8 @@ pub struct NetworkFiles {
     pub onnx: PathBuf,
     /// Config that runs it.
     pub config: PathBuf,
+    /// Config that joins it with depth.
+    pub depth_config: PathBuf,
     /// Card with its hash and licence.
     pub card: PathBuf,
     /// File with the name of the default network.
@@ -34,25 +39,28 @@ impl NetworkFiles {
         Self {
             onnx: file("onnx"),
             config: file("toml"),
+            depth_config: folder.join(format!("{name}{WITH_DEPTH}.toml")),
             card: file("card.toml"),
             default: folder.join(DEFAULT),
         }
     }
 }
 
-/// Returns the config of an installed network by its name, or that of the default one for
-/// [`NETWORK`]; `None` if there is none.
+/// Returns the config of an installed network by its name, with [`WITH_DEPTH`] behind it the config
+/// that joins it with depth, or that of the default one for [`NETWORK`]; `None` if there is none.
 pub fn config_file(name: &str) -> Option<PathBuf> {
     config_in(&networks_folder()?, name)
 }
 
 fn config_in(folder: &Path, name: &str) -> Option<PathBuf> {
     let installed = installed_in(folder);
-    let taken = match name {
-        NETWORK => default_in(folder, &installed)?,
-        name => installed.into_iter().find(|known| known == name)?,
-    };
-    Some(NetworkFiles::of(folder, &taken).config)
+    if name == NETWORK {
+        return Some(NetworkFiles::of(folder, &default_in(folder, &installed)?).config);
+    }
+    let network = name.strip_suffix(WITH_DEPTH).unwrap_or(name);
+    let files = NetworkFiles::of(folder, installed.iter().find(|known| *known == network)?);
+    let config = if network == name { files.config } else { files.depth_config };
+    config.is_file().then_some(config)
 }
 
 /// Returns the names of the installed networks that have a config, in the order of the alphabet.
@@ -105,6 +113,15 @@ mod tests {
         let config = |name: &str| config_in(folder, name);
         assert_eq!(config("yolox"), Some(folder.join("yolox.toml")));
         assert_eq!(config("alone"), None, "an embedding has no config");
+        assert_eq!(
+            config("yolox-depth"),
+            None,
+            "a network that was installed before there were any"
+        );
+        let with_depth = folder.join("yolox-depth.toml");
+        fs::write(&with_depth, "").unwrap();
+        assert_eq!(config("yolox-depth"), Some(with_depth));
+        assert_eq!(config("other-depth"), None);
         assert_eq!(config(NETWORK), Some(folder.join("movenet.toml")), "the first");
         fs::write(folder.join(DEFAULT), "yolox\n").unwrap();
         assert_eq!(config(NETWORK), Some(folder.join("yolox.toml")));

@@ -15,7 +15,7 @@ use tagalong_simulate::SimulateArgs;
 use tagalong_training::TrainArgs;
 use tagalong_view::{HELP as VIEW_HELP, ViewArgs};
 
-use crate::commands::{BlurArgs, EvalArgs, ModelArgs};
+use crate::commands::{AlterArgs, BlurArgs, EvalArgs, ModelArgs};
 use crate::demo::DemoArgs;
 use crate::run::RunArgs;
 
@@ -129,6 +129,9 @@ pub enum Command {
     /// Says what a neural network in an ONNX file is, and how to use it
     #[command(after_help = MODEL_HELP)]
     Model(ModelArgs),
+    /// Copies a log with one thing changed: half the rate, mirrored, scaled depth, wrong pixels
+    #[command(after_help = ALTER_HELP)]
+    Alter(AlterArgs),
     /// Copies a log with the heads of its people blurred, to share it
     #[command(after_help = BLUR_HELP)]
     Blur(BlurArgs),
@@ -162,6 +165,18 @@ Examples:
   tagalong blur robot.mcap -o shared/robot.mcap
   tagalong run depth-verified robot.mcap -o runs/robot && tagalong blur robot.mcap --run runs/robot
   tagalong run robot-blurred.mcap --overlay      # pictures in which no person is recognised";
+
+const ALTER_HELP: &str = "\
+The copy has the frames that a pipeline would see: colour or grey images, depth registered to them, the
+pose of the camera, and the odometry of the log. Right images, laser scans and all else are left out.
+LOG.people.csv, if it is there, is changed alike. A pipeline whose figures on the copy are much worse
+than those on the log depends on what was changed.
+
+Examples:
+  tagalong alter robot.mcap --every 2                        # half the images per second
+  tagalong alter robot.mcap --mirror -o mirrored.mcap
+  tagalong alter robot.mcap --scale-depth 1.02 --salt 0.02   # a depth camera that is a little off
+  tagalong bench --logs robot.mcap robot-altered.mcap -o out";
 
 const MODEL_HELP: &str = "\
 Prints inputs and outputs of the file, the family of detectors that its outputs have the shapes of,

@@ -112,6 +112,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Import(args) => tagalong_import::import(args),
         Command::Follow(args) => tagalong_benchmark::experiments::follow::follow(args, registry),
         Command::Eval(args) => commands::eval(args),
+        Command::Alter(args) => commands::alter(args),
         Command::Blur(args) => commands::blur(args, registry),
         Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
         Command::Boxes(args) => tagalong_benchmark::experiments::boxes::boxes(args, registry),

@@ -126,9 +126,11 @@ pub fn read(path: &Path, variant: &Variant) -> Result<Scene, Failure> {
         }
         Err(error) => {
             let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-            let named = nearest(&stem, scenes::names());
-            let hint = named.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
-            return Err(Failure::usage(format!("cannot read scene {shown}: {error}{hint}")));
+            let hint = match nearest(&stem, scenes::names()) {
+                Some(name) => format!("did you mean `{name}`?"),
+                None => format!("there are: {}", scenes::names().collect::<Vec<_>>().join(", ")),
+            };
+            return Err(Failure::usage(format!("cannot read scene {shown}: {error}; {hint}")));
         }
     };
     Scene::parse_with(&text, variant)

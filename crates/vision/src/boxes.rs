@@ -3,14 +3,14 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::{Detection, Frame, Track};
 use tagalong_geometry::{Camera, FaceDepth, ImageBox, PointEstimate, Rect, UPPER_BODY_SIDE_M};
 
+use crate::measured_body::{CUT_OFF_PX, MeasuredBody};
+
 /// Distance of probabilities from 0 and 1 at least.
 const SURE: f64 = 1e-3;
 
 /// Least distance of a face from the camera, m: nearer ones are numbers gone wrong.
 const NEAREST_M: f64 = 0.05;
 
-/// Distance of a box from the lower border of the image up to which its feet may be cut off, pixels.
-const CUT_OFF_PX: f64 = 3.0;
 /// Width of a person with the arms, m.
 const PERSON_WIDTH_M: f64 = 0.63;
 
@@ -37,11 +37,12 @@ pub struct BoxSettings {
     /// square is tracked; `full-box`, the whole person, and the box is tracked as it is; `upper`,
     /// head and shoulders, as a square.
     pub body: BoxedBody,
-    /// Find the upper body in the box of a whole person by the floor: the feet are where the box
-    /// ends, and a person whose feet the image border cuts off is as wide as the box. For cameras
-    /// whose height and direction are known, above all those that look down.
+    /// Find the upper body in the box of a whole person by the floor, where the depth image does not
+    /// show the trunk: the feet are where the box ends, and a person whose feet the image border cuts
+    /// off is as wide as the box. For cameras whose height and direction are known, above all those
+    /// that look down.
     pub floor: bool,
-    /// Assumed height of a person whose whole body is in a box, m.
+    /// Assumed height of a person whose whole body is in a box, or whose head is above the image, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub height_m: f64,
     /// Standard deviation of the position of a box, pixels.
@@ -88,14 +89,28 @@ impl BoxSettings {
         score: f64,
         source: &'static str,
     ) -> Option<Detection> {
-        let upper_body = self.upper_body(&frame.camera, region);
-        let PointEstimate { position, covariance } = self.locate(frame, &upper_body)?;
+        let (upper_body, face) = self.person_in(frame, region);
+        let PointEstimate { position, covariance } = self.locate(frame, &upper_body, face)?;
         let image = match self.body {
             BoxedBody::FullBox => ImageBox::full_body(*region),
             BoxedBody::Full | BoxedBody::Upper => ImageBox::upper_body(upper_body),
         };
         let detection = Detection::new(source, position, covariance, score).with_image(image);
         is_shown(&frame.camera, &detection).then_some(detection)
+    }
+
+    /// Returns the upper body of the person in a box, and the depth of the face where that is
+    /// measured: with depth by what is as near as the trunk, otherwise by the box alone.
+    fn person_in(&self, frame: &Frame, region: &Rect) -> (Rect, Option<f64>) {
+        let depth = frame.depth().ok();
+        let whole = depth.filter(|_| self.body != BoxedBody::Upper);
+        let measured = whole
+            .and_then(|depth| MeasuredBody::in_box(&frame.camera, depth, region, self.height_m));
+        if let Some(MeasuredBody { upper_body, face_m }) = measured {
+            return (upper_body, Some(face_m));
+        }
+        let upper_body = self.upper_body(&frame.camera, region);
+        (upper_body, depth.and_then(|depth| depth.face_m(&upper_body)))
     }
 
     fn upper_body(&self, camera: &Camera, region: &Rect) -> Rect {
@@ -121,11 +136,15 @@ impl BoxSettings {
         whole.upper_body_of_standing(self.height_m)
     }
 
-    /// Returns the head position for an upper-body square: from the depth image where that shows
-    /// the face, otherwise from the size of the square.
-    fn locate(&self, frame: &Frame, upper_body: &Rect) -> Option<PointEstimate> {
+    /// Returns the head position for an upper-body square: by the measured depth of the face,
+    /// otherwise from the size of the square.
+    fn locate(
+        &self,
+        frame: &Frame,
+        upper_body: &Rect,
+        measured: Option<f64>,
+    ) -> Option<PointEstimate> {
         let camera = &*frame.camera;
-        let measured = frame.depth().ok().and_then(|depth| depth.face_m(upper_body));
         let side_px = upper_body.width;
         let face = FaceDepth::by_size(camera, UPPER_BODY_SIDE_M, side_px, self.sigma_distance)
             .or_measured(measured, self.sigma_depth_m);

@@ -9,6 +9,7 @@ mod gallery;
 pub mod ground;
 mod integral;
 mod islands;
+mod measured_body;
 pub mod odometry;
 mod panorama;
 pub mod quality;

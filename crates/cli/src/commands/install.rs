@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use sha2::{Digest, Sha256};
-use tagalong_app::installed::NetworkFiles;
+use tagalong_app::installed::{NetworkFiles, WITH_DEPTH};
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, write_file};
 use tagalong_config::{FileLimit, read_bytes};
 use tagalong_network::{About, DATA_FOLDER, Limits, networks_folder};
 
-use super::model::{Known, as_text};
+use super::model::{Known, NetworkConfig, as_text};
 use super::networks::{self, KnownNetwork};
 
 /// Network that a user installs.
@@ -45,12 +45,18 @@ impl Install<'_> {
         match self.known {
             Known::Detector(known) => {
                 let file = PathBuf::from(files.onnx.file_name().unwrap_or_default());
-                write_file(&files.config, as_text(&file, self.about, Some(self.known)))?;
+                let text = |config| as_text(&file, self.about, Some(self.known), config);
+                write_file(&files.config, text(NetworkConfig::Colour))?;
+                write_file(&files.depth_config, text(NetworkConfig::Depth))?;
                 write_file(&files.default, format!("{name}\n"))?;
                 let family = known.family.networks();
                 let ms = known.call_ms;
                 let _ = writeln!(out, "family {} ({family}), {ms:.0} ms a call", known.family);
                 let _ = writeln!(out, "`tagalong run LOG` takes it for a log with colour alone");
+                let _ = writeln!(
+                    out,
+                    "`tagalong run {name}{WITH_DEPTH} LOG` joins it with depth, where a log has both"
+                );
                 let _ = writeln!(out, "a config names it: model = \"{name}\"");
             }
             Known::Embedding(known) => {
@@ -75,6 +81,11 @@ impl Install<'_> {
         };
         let is_plain =
             name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
+        if name.ends_with(WITH_DEPTH) {
+            return Err(Failure::usage(format!(
+                "`{name}` ends as the config that joins a network with depth: give another --name"
+            )));
+        }
         if name.is_empty() || !is_plain {
             return Err(Failure::usage(format!(
                 "a network is called by lower-case letters, digits and `-`, not `{name}`: give \

@@ -1,5 +1,6 @@
 //! Subcommands that answer a question.
 
+mod alter;
 mod blur;
 mod check;
 mod config;
@@ -12,6 +13,7 @@ mod model;
 mod networks;
 mod shell;
 
+pub use alter::{AlterArgs, alter};
 pub use blur::{BlurArgs, blur};
 pub use check::check;
 pub use config::{config, schema};

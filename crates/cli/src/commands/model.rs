@@ -19,11 +19,28 @@ use super::export::Export;
 use super::install::{Install, hash_of, read_network};
 use super::networks::{self, KnownNetwork};
 
-/// The config for a network of the user, without a network.
-const COLOUR_NET: &str = include_str!("../../configs/colour-net.toml");
-/// First line of its detectors, before which it says what it is for.
-const DETECTORS: &str = "[[detectors]]\n";
-/// Line of it below which the settings of the network stand.
+/// Config for a network of the user.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NetworkConfig {
+    /// The network alone.
+    Colour,
+    /// The network beside detectors in depth.
+    Depth,
+}
+
+impl NetworkConfig {
+    /// Returns the config without a network, and without the comments before it.
+    fn text(self) -> &'static str {
+        let text = match self {
+            Self::Colour => include_str!("../../configs/colour-net.toml"),
+            Self::Depth => include_str!("../../configs/depth-network.toml"),
+        };
+        let comments: usize =
+            text.split_inclusive('\n').take_while(|line| line.starts_with('#')).map(str::len).sum();
+        text[comments..].trim_start()
+    }
+}
+/// Line of a config below which the settings of the network stand.
 const SETTINGS: &str = "[detectors.config]\n";
 
 /// Calls of which the fastest is told.
@@ -123,13 +140,15 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
         let known = known.map_err(refused)?;
         make_room_for(config)?;
         let name = relative_to(config, file)?;
-        write_file(config, as_text(&name, &about, Some(&known)))?;
+        write_file(config, as_text(&name, &about, Some(&known), NetworkConfig::Colour))?;
         print(&format!("written: {}\n", config.display()))?;
         return Ok(Ended::Well);
     }
     print(&match args.format {
         // The text may become a config anywhere, so it names the file from the root on.
-        Format::Text => as_text(&absolute(file)?, &about, known.as_ref().ok()),
+        Format::Text => {
+            as_text(&absolute(file)?, &about, known.as_ref().ok(), NetworkConfig::Colour)
+        }
         Format::Json => to_json("the network", &as_json(&about, known.as_ref().ok()))?,
     })?;
     known.map(|_| Ended::Well).map_err(refused)
@@ -196,7 +215,12 @@ fn list(ports: &[Port]) -> String {
 }
 
 /// Returns a part of a config, with the description as comments.
-pub(super) fn as_text(file: &Path, about: &About, known: Option<&Known<'_>>) -> String {
+pub(super) fn as_text(
+    file: &Path,
+    about: &About,
+    known: Option<&Known<'_>>,
+    config: NetworkConfig,
+) -> String {
     let mut out = String::new();
     // Writing to a string cannot fail.
     let _ = writeln!(out, "# inputs   {}", list(&about.inputs));
@@ -208,7 +232,7 @@ pub(super) fn as_text(file: &Path, about: &About, known: Option<&Known<'_>>) -> 
     match known {
         Some(Known::Detector(known)) => {
             known.describe(&mut out);
-            known.write_config(file, &mut out);
+            known.write_config(file, config, &mut out);
         }
         Some(Known::Embedding(known)) => known.describe(file, &mut out),
         None => {}
@@ -274,7 +298,7 @@ impl KnownDetector<'_> {
         named.join(" and ")
     }
 
-    fn write_config(&self, file: &Path, out: &mut String) {
+    fn write_config(&self, file: &Path, config: NetworkConfig, out: &mut String) {
         // A string of JSON is one of TOML.
         let mut lines = format!("model = {}\n", json!(file.to_string_lossy()));
         let _ = writeln!(lines, "family = \"{}\"", self.family);
@@ -282,7 +306,8 @@ impl KnownDetector<'_> {
         if shapes.any(|shape| shape.len() == 4 && shape[1..].contains(&None)) {
             let _ = writeln!(lines, "size = [{}, {}]", self.input.width, self.input.height);
         }
-        if let Some(network) = self.published {
+        // Beside other detectors and their verifiers the scores of its family do.
+        if let Some(network) = self.published.filter(|_| config == NetworkConfig::Colour) {
             let scores =
                 [("discover_score", network.discover_score), ("track_score", network.track_score)];
             for (key, score) in scores {
@@ -290,9 +315,8 @@ impl KnownDetector<'_> {
                 let _ = score.map(|score| writeln!(lines, "{key} = {score:?}"));
             }
         }
-        let config = COLOUR_NET.find(DETECTORS).map_or("", |at| &COLOUR_NET[at..]);
         let settings = format!("{SETTINGS}{lines}");
-        let _ = write!(out, "\n{}", config.replacen(SETTINGS, &settings, 1));
+        let _ = write!(out, "\n{}", config.text().replacen(SETTINGS, &settings, 1));
     }
 }
 

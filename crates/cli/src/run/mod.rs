@@ -440,16 +440,15 @@ fn no_frame(report: &RunReport) -> String {
     format!("not one frame could be made of {name}: {why}; `tagalong doctor` tells more")
 }
 
-/// Returns the message about a run that could detect nobody, because a detector has no model.
+/// Returns the message about a run with a detector that could detect nobody, because it has no model.
 fn without_model(report: &RunReport, remedies: &Remedies) -> Option<String> {
     let lacks = report.funnel.iter().any(|line| line.test == NO_MODEL);
-    let remedy = remedies.of(NO_MODEL).filter(|_| lacks && report.persons.is_empty())?;
+    let remedy = remedies.of(NO_MODEL).filter(|_| lacks)?;
     let name = &report.config.name;
     let key = remedy.settings.join(", ");
-    Some(format!(
-        "{name}: a detector has no model (`{key}`), so no person was detected: {}",
-        remedy.look
-    ))
+    let result =
+        if report.persons.is_empty() { "no person was detected" } else { "it found nobody" };
+    Some(format!("{name}: a detector has no model (`{key}`), so {result}: {}", remedy.look))
 }
 
 /// Test of the funnel by which a detector says that it has no model.

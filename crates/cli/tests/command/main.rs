@@ -4,6 +4,7 @@
 
 mod common;
 
+mod alter;
 mod annotate;
 mod answers;
 mod bad_input;

@@ -89,7 +89,7 @@ fn an_installed_network_has_a_name() {
     let own = "[[detectors]]\nplugin = \"onnx\"\nconfig = { model = \"blob-finder\" }\n\
                [filter]\nplugin = \"image-kalman\"\n";
     fs::write(place("own.toml"), own).unwrap();
-    for config in ["own.toml", "blob-finder", "network"] {
+    for config in ["own.toml", "blob-finder", "blob-finder-depth", "network"] {
         let checked = run(&["check", config]);
         assert_eq!(code(&checked), 0, "{config}: {}", text(&checked.stderr));
     }
@@ -99,6 +99,13 @@ fn an_installed_network_has_a_name() {
     assert!(why.contains("another network is installed as `blob-finder`"), "{why}");
     let odd = run(&["model", "--install", &other, "--name", "a/b"]);
     assert_eq!(code(&odd), 2, "{}", text(&odd.stderr));
+    let twin = run(&["model", "--install", &other, "--name", "blob-finder-depth"]);
+    assert_eq!(code(&twin), 2, "{}", text(&twin.stderr));
+    let joined = fs::read_to_string(place("data/networks/blob-finder-depth.toml")).unwrap();
+    let joined: toml::Table = joined.parse().unwrap();
+    let plugins: Vec<_> =
+        joined["detectors"].as_array().unwrap().iter().map(|d| d["plugin"].as_str()).collect();
+    assert_eq!(plugins, [Some("onnx"), Some("depth-template"), Some("depth-net")]);
     let unknown = network("depth.onnx").display().to_string();
     assert_eq!(code(&run(&["model", "--install", &unknown])), 1);
     let list = text(&run(&["model", "--list"]).stdout);
@@ -130,6 +137,33 @@ fn an_installed_network_tracks_a_recorded_log() {
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let with_person = report["frames"]["with_person"].as_u64().unwrap();
     assert!(with_person >= 170, "people are in all of 179 frames: {with_person}");
+}
+
+/// People who pass a low camera, most of them without head or feet in the image.
+#[test]
+fn a_network_joined_with_depth_finds_people_close_by() {
+    let find = tagalong_conformance::testdata::find;
+    let Some(file) = find("networks/yolox_nano.onnx") else { return };
+    let Some(log) = find("logs/lab2-camera1.mcap") else { return };
+    let home = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = tagalong();
+        command.args(arguments).env("TAGALONG_HOME", home.path()).current_dir(home.path());
+        let done = command.output().unwrap();
+        assert_eq!(code(&done), 0, "{arguments:?}: {}", text(&done.stderr));
+        text(&done.stdout)
+    };
+    run(&["model", "--install", file.to_str().unwrap()]);
+    let truth = log.with_extension("people.csv");
+    let recall = |config: &str| -> f64 {
+        run(&["run", config, log.to_str().unwrap(), "-o", config]);
+        let scored = run(&["eval", "--truth", truth.to_str().unwrap(), "--tracks", config]);
+        let line = scored.lines().find(|line| line.starts_with("recall ")).unwrap();
+        line.split_whitespace().last().unwrap().parse().unwrap()
+    };
+    let alone = recall("depth-verified");
+    let joined = recall("yolox-nano-depth");
+    assert!(alone < 0.5 && joined > 0.75, "{alone} {joined}");
 }
 
 #[test]

@@ -116,7 +116,7 @@ mod tests {
             }
         }
         left_out.sort();
-        assert_eq!(left_out, ["colour-net", "onnx"]);
+        assert_eq!(left_out, ["colour-net", "depth-network", "onnx"]);
     }
 
     #[test]

@@ -1,0 +1,92 @@
+//! `tagalong alter` as a user calls it.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use tagalong_log::{FrameSource, InputSettings, Inputs, Limits, LogFrame};
+
+use crate::common::{Drawn, code, tagalong, text};
+
+fn alter(folder: &Path, arguments: &[&str]) -> Output {
+    tagalong().current_dir(folder).arg("alter").args(arguments).output().unwrap()
+}
+
+fn frames(path: &Path) -> Vec<LogFrame> {
+    let open = FrameSource::open(path, &InputSettings::default(), &Limits::default(), Inputs::ANY);
+    let mut source = open.unwrap();
+    std::iter::from_fn(|| source.next_frame()).collect()
+}
+
+/// A log of twelve frames with truth.
+fn home() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    Drawn::of(12).write(&folder.path().join("walk.mcap"));
+    let rows = (1..=12).map(|frame| format!("{frame},1,100,50,80,80\n"));
+    let truth = format!("frame,id,ub_x,ub_y,ub_w,ub_h\n{}", rows.collect::<String>());
+    fs::write(folder.path().join("walk.people.csv"), truth).unwrap();
+    folder
+}
+
+#[test]
+fn every_third_frame_is_kept_with_its_truth() {
+    let folder = home();
+    let done = alter(folder.path(), &["walk.mcap", "--every", "3"]);
+    assert_eq!(code(&done), 0, "{}", text(&done.stderr));
+    assert!(text(&done.stdout).contains("walk-altered.mcap: 4 frames"), "{}", text(&done.stdout));
+    let all = frames(&folder.path().join("walk.mcap"));
+    let kept = frames(&folder.path().join("walk-altered.mcap"));
+    assert_eq!(kept.len(), 4);
+    for (number, frame) in kept.iter().enumerate() {
+        let same = &all[3 * number];
+        assert_eq!(frame.frame.stamp, same.frame.stamp);
+        assert_eq!(frame.frame.images().colour, same.frame.images().colour, "the same pixels");
+        let away =
+            frame.frame.camera.robot_from_camera.inverse() * same.frame.camera.robot_from_camera;
+        assert!(away.translation.vector.norm() < 1e-9 && away.rotation.angle() < 1e-6, "{away}");
+    }
+    let truth = fs::read_to_string(folder.path().join("walk-altered.people.csv")).unwrap();
+    let numbers: Vec<&str> =
+        truth.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(numbers, ["1", "2", "3", "4"]);
+}
+
+#[test]
+fn a_mirrored_log_mirrored_again_is_the_log() {
+    let folder = home();
+    for (log, copy) in [("walk.mcap", "once.mcap"), ("once.mcap", "twice.mcap")] {
+        let done = alter(folder.path(), &[log, "--mirror", "-o", copy]);
+        assert_eq!(code(&done), 0, "{}", text(&done.stderr));
+    }
+    let all = frames(&folder.path().join("walk.mcap"));
+    let once = frames(&folder.path().join("once.mcap"));
+    let twice = frames(&folder.path().join("twice.mcap"));
+    assert_eq!((once.len(), twice.len()), (all.len(), all.len()));
+    for (frame, same) in twice.iter().zip(&all) {
+        assert_eq!(frame.frame.images().colour, same.frame.images().colour);
+    }
+    assert_ne!(once[0].frame.images().colour, all[0].frame.images().colour);
+    let truth = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    assert!(truth("once.people.csv").lines().nth(1).unwrap() != "1,1,100,50,80,80");
+    assert!(
+        truth("twice.people.csv").contains("1,1,100,50,80,80"),
+        "{}",
+        truth("twice.people.csv")
+    );
+}
+
+#[test]
+fn what_cannot_be_altered_is_refused() {
+    let folder = home();
+    for (arguments, part) in [
+        (&["walk.mcap"][..], "nothing to alter"),
+        (&["walk.mcap", "--salt", "1.5"], "from 0 to 1"),
+        (&["walk.mcap", "--scale-depth", "0"], "above zero"),
+        (&["walk.mcap", "--mirror", "-o", "walk.mcap", "--overwrite"], "replace the log itself"),
+        (&["walk.mcap", "--mirror", "-o", "walk.people.csv"], "exists"),
+    ] {
+        let done = alter(folder.path(), arguments);
+        assert_eq!(code(&done), 2, "{arguments:?}: {}", text(&done.stderr));
+        assert!(text(&done.stderr).contains(part), "{arguments:?}: {}", text(&done.stderr));
+    }
+}
