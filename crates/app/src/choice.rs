@@ -16,6 +16,9 @@ const PANORAMIC: &str = "omni-rich";
 /// The config for colour alone where no network is installed.
 pub const WITHOUT_NETWORK: &str = "mono";
 
+/// The config for colour and depth, with which an installed network can be joined.
+pub const COLOUR_AND_DEPTH: &str = "depth-verified";
+
 /// A pipeline for logs of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Choice {
@@ -28,7 +31,10 @@ pub struct Choice {
 /// The pipelines; the first that fits a log is taken. Where several fit, the order is that of
 /// `tagalong bench --leave-one-room-out` in docs/benchmarks.md.
 pub const CHOICES: [Choice; 11] = [
-    Choice { config: "depth-verified", reason: "it has the best HOTA in leave-one-room-out tests" },
+    Choice {
+        config: COLOUR_AND_DEPTH,
+        reason: "of those that need no network it has the best HOTA in leave-one-room-out tests",
+    },
     Choice {
         config: "depth-alone",
         reason: "of those that need no colour it has the best HOTA in leave-one-room-out tests; \

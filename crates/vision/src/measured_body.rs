@@ -15,6 +15,12 @@ const TRUNK_WIDTH: f64 = 0.4;
 const TRUNK_ROWS: (f64, f64) = (0.1, 0.6);
 /// Heights below the top of the head between which a head is wider than long hair is thin, m.
 const HEAD_ROWS_M: (f64, f64) = (0.04, 0.2);
+/// Parts of the height of a box between which a head is whose body something hides, ...
+const HIDDEN_HEAD_ROWS: (f64, f64) = (0.02, 0.12);
+/// ... and part of the width.
+const HIDDEN_HEAD_WIDTH: f64 = 0.3;
+/// Height of the tallest people, as a part of the assumed height.
+const TALLEST: f64 = 1.3;
 /// Width of a head, m.
 const HEAD_WIDTH_M: f64 = 0.16;
 /// Least number of readings on the trunk.
@@ -45,8 +51,9 @@ impl MeasuredBody {
     /// perspective.
     ///
     /// The depth of the trunk gives the scale, so that feet or legs that are hidden or cut off do
-    /// no harm; the head is what is as near as the trunk below the upper edge of the box. A head
-    /// above the image is where a standing person has it.
+    /// no harm; the head is what is as near as the trunk below the upper edge of the box, or
+    /// farther, if something hides the trunk. A head above the image is where a standing person has
+    /// it.
     pub fn in_box(
         camera: &Camera,
         depth: &DepthImage,
@@ -60,32 +67,65 @@ impl MeasuredBody {
         let trunk = trunk(&readings(depth, &trunk_area(&shown)))?;
         let trunk_m = median(trunk.iter().map(|reading| reading.depth_m))?;
         if whole.y < CUT_OFF_PX {
-            return Some(Self::below_border(camera, &trunk, trunk_m, height_m));
+            return Self::below_border(camera, &trunk, height_m);
         }
-        let px_per_m = camera.focal_px() / trunk_m;
-        let head = head_area(whole, px_per_m);
-        let mut head = readings(depth, &head.clipped(depth.width(), depth.height()));
-        head.retain(|reading| (reading.depth_m - trunk_m).abs() < 0.5 * TRUNK_DEPTH_M);
-        let is_seen = head.len() >= LEAST_READINGS;
-        let face_m = median(head.iter().filter(|_| is_seen).map(|reading| reading.depth_m));
-        let column = median(head.iter().filter(|_| is_seen).map(|reading| reading.column));
-        let face_m = face_m.unwrap_or(trunk_m);
+        let head = head_near(camera, depth, whole, trunk_m)
+            .or_else(|| head_behind(camera, depth, whole, trunk_m, height_m));
+        let face_m = head.map_or(trunk_m, |head| head.depth_m);
         let px_per_m = camera.focal_px() / face_m;
         let side = UPPER_BODY_SIDE_M * px_per_m;
         let top = whole.y - (HEAD_BELOW_TOP_M - HALF_HEAD_M) * px_per_m;
-        let left = column.unwrap_or(whole.centre().x) - 0.5 * side;
+        let left = head.map_or(whole.centre().x, |head| head.column) - 0.5 * side;
         Some(Self { upper_body: Rect::new(left, top, side, side), face_m })
     }
 
     /// The upper body of somebody whose head the upper border of the image may cut off.
-    fn below_border(camera: &Camera, trunk: &[Reading], trunk_m: f64, height_m: f64) -> Self {
-        let middle = |of: fn(&Reading) -> f64| median(trunk.iter().map(of)).unwrap_or_default();
-        let pixel = Point2::new(middle(|reading| reading.column), middle(|reading| reading.row));
-        let mut head = camera.back_project(pixel, trunk_m + HEAD_RADIUS_M);
+    fn below_border(camera: &Camera, trunk: &[Reading], height_m: f64) -> Option<Self> {
+        let Reading { column, row, depth_m } = middle(trunk)?;
+        let mut head = camera.back_project(Point2::new(column, row), depth_m + HEAD_RADIUS_M);
         head.z = height_m - HALF_HEAD_M;
         let face_m = camera.depth_of(&head) - HEAD_RADIUS_M;
-        Self { upper_body: camera.upper_body(&head), face_m }
+        Some(Self { upper_body: camera.upper_body(&head), face_m })
     }
+}
+
+/// Returns the medians of some readings; `None` of none.
+fn middle(readings: &[Reading]) -> Option<Reading> {
+    Some(Reading {
+        column: median(readings.iter().map(|reading| reading.column))?,
+        row: median(readings.iter().map(|reading| reading.row))?,
+        depth_m: median(readings.iter().map(|reading| reading.depth_m))?,
+    })
+}
+
+/// Returns the head below the upper edge of a box that is as near as the trunk.
+fn head_near(camera: &Camera, depth: &DepthImage, whole: &Rect, trunk_m: f64) -> Option<Reading> {
+    let area = head_area(whole, camera.focal_px() / trunk_m);
+    let mut head = readings(depth, &area.clipped(depth.width(), depth.height()));
+    head.retain(|reading| (reading.depth_m - trunk_m).abs() < 0.5 * TRUNK_DEPTH_M);
+    middle(&head).filter(|_| head.len() >= LEAST_READINGS)
+}
+
+/// Returns the head at the upper edge of a box whose middle shows somebody or something before the
+/// person.
+fn head_behind(
+    camera: &Camera,
+    depth: &DepthImage,
+    whole: &Rect,
+    before_m: f64,
+    height_m: f64,
+) -> Option<Reading> {
+    let (first, last) = HIDDEN_HEAD_ROWS;
+    let width = HIDDEN_HEAD_WIDTH * whole.width;
+    let top = whole.y + first * whole.height;
+    let area = Rect::new(whole.centre().x - 0.5 * width, top, width, (last - first) * whole.height);
+    let all = readings(depth, &area.clipped(depth.width(), depth.height()));
+    let head = trunk(&all)?;
+    let middle = middle(&head)?;
+    // The wall beside a head is so far away that the box would be that of a giant.
+    let shown_m = whole.height * middle.depth_m / camera.focal_px();
+    let is_head = 2 * head.len() > all.len() && shown_m < TALLEST * height_m;
+    (is_head && middle.depth_m > before_m).then_some(middle)
 }
 
 fn trunk_area(shown: &Rect) -> Rect {
@@ -210,6 +250,23 @@ mod tests {
         let expected = camera().upper_body(&Point3::new(1.0 + HEAD_RADIUS_M, 0.2298, 1.585));
         assert!(found.upper_body.iou(&expected) > 0.95, "{:?} {expected:?}", found.upper_body);
         assert!((found.face_m - 1.0).abs() < 1e-6, "{}", found.face_m);
+    }
+
+    #[test]
+    fn a_head_behind_another_person_is_at_its_own_depth() {
+        // Somebody at 2 m hides all of a person at 3 m but the head.
+        let mut depth = person(3.0, 320.0, 150.0);
+        for row in 200..480 {
+            depth.pixels_mut()[row * 640 + 250..row * 640 + 400].fill(2.0);
+        }
+        let whole = boxed(3.0, 320.0, 150.0, 440.0);
+        let found = MeasuredBody::in_box(&camera(), &depth, &whole, 1.7).unwrap();
+        assert_eq!(found.face_m, 3.0);
+        // Without the head there is the wall, which is nobody.
+        let mut hidden = depth.clone();
+        hidden.pixels_mut()[..200 * 640].fill(6.0);
+        let found = MeasuredBody::in_box(&camera(), &hidden, &whole, 1.7).unwrap();
+        assert_eq!(found.face_m, 2.0);
     }
 
     #[test]

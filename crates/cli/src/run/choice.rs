@@ -1,8 +1,9 @@
 use std::path::Path;
 
-use tagalong_app::choice::{Choice, Fitting, WITHOUT_NETWORK, fitting};
+use tagalong_app::choice::{COLOUR_AND_DEPTH, Choice, Fitting, WITHOUT_NETWORK, fitting};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::input_args::InputArgs;
+use tagalong_app::installed::{WITH_DEPTH, default_network};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_config::Registry;
 
@@ -25,6 +26,17 @@ pub(super) fn choose(
     say(&format!("the log has {contents}: taking {}, because {reason}", config.stem()));
     if let Some(better) = better {
         say(&better);
+    }
+    if name == COLOUR_AND_DEPTH
+        && let Some(network) = default_network()
+    {
+        let joined = format!("{network}{WITH_DEPTH}");
+        if ConfigFile::named(&joined).is_some() {
+            say(&format!(
+                "`tagalong run {joined} LOG` finds more people, and takes a call of the network per \
+                 frame longer"
+            ));
+        }
     }
     if name == WITHOUT_NETWORK {
         say(

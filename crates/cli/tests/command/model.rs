@@ -161,6 +161,11 @@ fn a_network_joined_with_depth_finds_people_close_by() {
         let line = scored.lines().find(|line| line.starts_with("recall ")).unwrap();
         line.split_whitespace().last().unwrap().parse().unwrap()
     };
+    let mut by_itself = tagalong();
+    by_itself.args(["run", log.to_str().unwrap(), "-o", "by-itself"]);
+    let chosen = by_itself.env("TAGALONG_HOME", home.path()).current_dir(home.path()).output();
+    let chosen = text(&chosen.unwrap().stderr);
+    assert!(chosen.contains("tagalong run yolox-nano-depth LOG"), "{chosen}");
     let alone = recall("depth-verified");
     let joined = recall("yolox-nano-depth");
     assert!(alone < 0.5 && joined > 0.75, "{alone} {joined}");

@@ -105,7 +105,7 @@ mod tests {
         assert_eq!(turned.row(1), [9, 8, 7, 6, 5, 4, 3, 2, 1, 0]);
         let text = "frame,id,ub_x,ub_y,ub_w,ub_h,head_x,head_y,head_z\n1,1,2,0,3,1,0.5,1,2\n";
         let rows = tagalong_eval::formats::people::parse(text, "made").unwrap();
-        let row = super::row(&rows[0], 10);
+        let row = row(&rows[0], 10);
         // From pixel 2 to pixel 5 is from pixel 4 to pixel 7 of the mirrored image.
         assert_eq!(row.upper_body, Some(Region::new(4.0, 0.0, 3.0, 1.0)));
         assert_eq!(row.head_in_camera_m, Some([-0.5, 1.0, 2.0]));
