@@ -54,7 +54,8 @@ pub struct Config {
     /// uncertainty explains.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub moved_m: f64,
-    /// A track that is not confirmed and did not move ends after this time, s.
+    /// A track that did not move ends after this time, s, if it is not confirmed, or after so long in
+    /// which it was less likely a person than not.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub undecided_s: f64,
     /// Clutter is remembered with this time constant, s.

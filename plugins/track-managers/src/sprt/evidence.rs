@@ -30,6 +30,8 @@ pub(crate) struct Evidence {
     age_s: f64,
     /// Time for which it was seen without having moved, s.
     still_s: f64,
+    /// Time for which it has been less likely a person than not, without having moved, s.
+    doubted_s: f64,
     /// Time for which it was seen by the filter alone, s.
     unverified_s: f64,
     missed_s: f64,
@@ -50,6 +52,7 @@ impl Evidence {
             away: 0,
             age_s: 0.0,
             still_s: 0.0,
+            doubted_s: 0.0,
             unverified_s: 0.0,
             missed_s: 0.0,
             misses: 0,
@@ -125,7 +128,10 @@ impl Evidence {
             self.add_motion(track, config);
             self.still_s += if self.moved { 0.0 } else { dt_s };
         }
-        self.confirmed |= self.log_odds(config) >= config.confirm_log_odds;
+        let log_odds = self.log_odds(config);
+        let is_doubted = !self.moved && log_odds < config.start_log_odds;
+        self.doubted_s = if is_doubted { self.doubted_s + dt_s } else { 0.0 };
+        self.confirmed |= log_odds >= config.confirm_log_odds;
     }
 
     /// Notes that the track moved, once.
@@ -159,7 +165,8 @@ impl Evidence {
         if !self.confirmed && self.misses >= config.tentative_misses {
             return Some("track: not confirmed");
         }
-        if !self.confirmed && !self.moved && self.age_s > config.undecided_s {
+        let is_undecided = !self.confirmed && !self.moved && self.age_s > config.undecided_s;
+        if is_undecided || self.doubted_s > config.undecided_s {
             return Some(NEVER_MOVED);
         }
         let (limit_s, test) = match observation {

@@ -227,6 +227,20 @@ fn verifiers_keep_a_person_who_stands_from_the_first_frame_and_no_thing() {
     assert!(confirmed_s(10.0) > 29.0 && confirmed_s(6.0) < 2.3);
 }
 
+/// What was sure at first and is less likely a person than not from then on, without moving, is a
+/// thing: the bound of an end alone would leave it for ever.
+#[test]
+fn a_thing_that_was_believed_once_ends_when_it_is_doubted() {
+    let mut scene = Scene::new(verified());
+    for i in 0..300 {
+        let score = if i < 5 { 9.0 } else { 5.0 };
+        scene.frame(still(), Some(detection(3.0, score)));
+    }
+    let (ended_s, test) = scene.ends[0];
+    assert!(ended_s < 8.0 && test == "track: never moved", "{:?}", scene.ends);
+    assert!(scene.confirmed_s < 8.0, "{}", scene.confirmed_s);
+}
+
 /// A person walks to a wall and out of sight, and the detector goes on finding the wall.
 #[test]
 fn a_track_that_changes_over_to_a_thing_ends() {
