@@ -54,10 +54,13 @@ pub struct Config {
     /// uncertainty explains.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub moved_m: f64,
-    /// A track that did not move ends after this time, s, if it is not confirmed, or after so long in
-    /// which it was less likely a person than not.
+    /// A track that is not confirmed and did not move ends after this time, s.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub undecided_s: f64,
+    /// A confirmed track that did not move ends after this time, s, in which it was less likely a
+    /// person than not.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub doubted_s: f64,
     /// Clutter is remembered with this time constant, s.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub clutter_s: f64,
@@ -103,6 +106,7 @@ impl Default for Config {
             moved_log_odds: 3.0,
             moved_m: 0.5,
             undecided_s: 2.0,
+            doubted_s: 5.0,
             clutter_s: 60.0,
             clutter_m: 0.3,
             min_clutter: 3.0,

@@ -166,7 +166,7 @@ impl Evidence {
             return Some("track: not confirmed");
         }
         let is_undecided = !self.confirmed && !self.moved && self.age_s > config.undecided_s;
-        if is_undecided || self.doubted_s > config.undecided_s {
+        if is_undecided || self.doubted_s > config.doubted_s {
             return Some(NEVER_MOVED);
         }
         let (limit_s, test) = match observation {

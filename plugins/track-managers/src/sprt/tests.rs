@@ -237,8 +237,8 @@ fn a_thing_that_was_believed_once_ends_when_it_is_doubted() {
         scene.frame(still(), Some(detection(3.0, score)));
     }
     let (ended_s, test) = scene.ends[0];
-    assert!(ended_s < 8.0 && test == "track: never moved", "{:?}", scene.ends);
-    assert!(scene.confirmed_s < 8.0, "{}", scene.confirmed_s);
+    assert!(ended_s < 11.0 && test == "track: never moved", "{:?}", scene.ends);
+    assert!(scene.confirmed_s < 11.0, "{}", scene.confirmed_s);
 }
 
 /// A person walks to a wall and out of sight, and the detector goes on finding the wall.
