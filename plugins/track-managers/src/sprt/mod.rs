@@ -33,7 +33,14 @@ const REMEDIES: &[Remedy] = &[
     },
     Remedy {
         test: "track: never moved",
-        settings: &["undecided_s", "still_log_odds", "max_still", "moved_m", "confirm_log_odds"],
+        settings: &[
+            "undecided_s",
+            "still_log_odds",
+            "max_still",
+            "moved_m",
+            "confirm_log_odds",
+            "doubted_s",
+        ],
         look: "things; people who stand still and are doubtful to all verifiers",
     },
     Remedy {
