@@ -21,6 +21,8 @@ const HIDDEN_HEAD_ROWS: (f64, f64) = (0.02, 0.12);
 const HIDDEN_HEAD_WIDTH: f64 = 0.3;
 /// Height of the tallest people, as a part of the assumed height.
 const TALLEST: f64 = 1.3;
+/// A head fills at least one part in so many of the area below the upper edge of a box.
+const HEAD_PART: usize = 8;
 /// Width of a head, m.
 const HEAD_WIDTH_M: f64 = 0.16;
 /// Least number of readings on the trunk.
@@ -60,7 +62,7 @@ impl MeasuredBody {
         whole: &Rect,
         height_m: f64,
     ) -> Option<Self> {
-        if !matches!(camera.lens, Lens::Pinhole(_)) {
+        if !matches!(camera.lens, Lens::Pinhole(_)) || !whole.is_sane() {
             return None;
         }
         let shown = whole.clipped(depth.width(), depth.height());
@@ -101,9 +103,11 @@ fn middle(readings: &[Reading]) -> Option<Reading> {
 /// Returns the head below the upper edge of a box that is as near as the trunk.
 fn head_near(camera: &Camera, depth: &DepthImage, whole: &Rect, trunk_m: f64) -> Option<Reading> {
     let area = head_area(whole, camera.focal_px() / trunk_m);
-    let mut head = readings(depth, &area.clipped(depth.width(), depth.height()));
+    let all = readings(depth, &area.clipped(depth.width(), depth.height()));
+    let mut head = all.clone();
     head.retain(|reading| (reading.depth_m - trunk_m).abs() < 0.5 * TRUNK_DEPTH_M);
-    middle(&head).filter(|_| head.len() >= LEAST_READINGS)
+    let is_seen = head.len() >= LEAST_READINGS.max(all.len() / HEAD_PART);
+    middle(&head).filter(|_| is_seen)
 }
 
 /// Returns the head at the upper edge of a box whose middle shows somebody or something before the
@@ -247,7 +251,7 @@ mod tests {
         let depth = person(1.0, 200.0, -40.0);
         let whole = boxed(1.0, 200.0, 0.0, 479.0);
         let found = MeasuredBody::in_box(&camera(), &depth, &whole, 1.7).unwrap();
-        let expected = camera().upper_body(&Point3::new(1.0 + HEAD_RADIUS_M, 0.2298, 1.585));
+        let expected = camera().upper_body(&Point3::new(1.0 + HEAD_RADIUS_M, 0.2482, 1.585));
         assert!(found.upper_body.iou(&expected) > 0.95, "{:?} {expected:?}", found.upper_body);
         assert!((found.face_m - 1.0).abs() < 1e-6, "{}", found.face_m);
     }

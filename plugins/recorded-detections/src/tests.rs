@@ -313,12 +313,17 @@ fn a_square_of_head_and_shoulders_is_taken_as_it_is() {
     assert!((sigma - 0.2 * (ahead_m - HEAD_RADIUS_M)).abs() < 1e-3, "a fifth: {sigma}");
 }
 
-/// The face is 14 cm high and wide, its middle 14 cm below the upper edge of the square.
+/// The face is 14 cm high and wide, its middle 14 cm below the upper edge of the square: in a box of
+/// head and shoulders, which shows no trunk.
 #[test]
 fn the_depth_is_that_of_the_face_alone() {
     let head = Point3::new(3.0, 0.0, 1.585);
-    let mut detector = of_file(&whole_body(head), Config::default()).unwrap();
     let square = camera().upper_body(&head);
+    let Rect { x, y, width, height } = square;
+    let upper = BoxSettings { body: BoxedBody::Upper, ..BoxSettings::default() };
+    let config = Config { boxes: upper, ..Config::default() };
+    let mut detector =
+        of_file(&format!("2,-1,{x},{y},{width},{height},0.9,-1,-1,-1\n"), config).unwrap();
     let px_per_m = square.width / 0.57;
     let x = square.centre().x;
     let y = square.y + 0.14 * px_per_m;

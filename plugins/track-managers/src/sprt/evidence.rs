@@ -129,8 +129,11 @@ impl Evidence {
             self.still_s += if self.moved { 0.0 } else { dt_s };
         }
         let log_odds = self.log_odds(config);
-        let is_doubted = !self.moved && log_odds < config.start_log_odds;
-        self.doubted_s = if is_doubted { self.doubted_s + dt_s } else { 0.0 };
+        if self.moved || log_odds >= config.start_log_odds {
+            self.doubted_s = 0.0;
+        } else if matches!(observation, Observation::Detected { .. }) {
+            self.doubted_s += dt_s;
+        }
         self.confirmed |= log_odds >= config.confirm_log_odds;
     }
 
