@@ -42,7 +42,7 @@ pub struct BoxSettings {
     /// off is as wide as the box. For cameras whose height and direction are known, above all those
     /// that look down.
     pub floor: bool,
-    /// Assumed height of a person whose whole body is in a box, or whose head is above the image, m.
+    /// Assumed height of a person with the whole body in a box, or with the head above the image, m.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub height_m: f64,
     /// Standard deviation of the position of a box, pixels.

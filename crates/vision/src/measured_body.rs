@@ -15,7 +15,7 @@ const TRUNK_WIDTH: f64 = 0.4;
 const TRUNK_ROWS: (f64, f64) = (0.1, 0.6);
 /// Heights below the top of the head between which a head is wider than long hair is thin, m.
 const HEAD_ROWS_M: (f64, f64) = (0.04, 0.2);
-/// Parts of the height of a box between which a head is whose body something hides, ...
+/// Parts of the height of a box between which the head of a hidden body is, ...
 const HIDDEN_HEAD_ROWS: (f64, f64) = (0.02, 0.12);
 /// ... and part of the width.
 const HIDDEN_HEAD_WIDTH: f64 = 0.3;
@@ -81,7 +81,7 @@ impl MeasuredBody {
         Some(Self { upper_body: Rect::new(left, top, side, side), face_m })
     }
 
-    /// The upper body of somebody whose head the upper border of the image may cut off.
+    /// The upper body of a person with a head that the upper border of the image may cut off.
     fn below_border(camera: &Camera, trunk: &[Reading], height_m: f64) -> Option<Self> {
         let Reading { column, row, depth_m } = middle(trunk)?;
         let mut head = camera.back_project(Point2::new(column, row), depth_m + HEAD_RADIUS_M);
@@ -110,8 +110,7 @@ fn head_near(camera: &Camera, depth: &DepthImage, whole: &Rect, trunk_m: f64) ->
     middle(&head).filter(|_| is_seen)
 }
 
-/// Returns the head at the upper edge of a box whose middle shows somebody or something before the
-/// person.
+/// Returns the head at the upper edge of a box with another person or a thing in its middle.
 fn head_behind(
     camera: &Camera,
     depth: &DepthImage,
@@ -258,7 +257,7 @@ mod tests {
 
     #[test]
     fn a_head_behind_another_person_is_at_its_own_depth() {
-        // Somebody at 2 m hides all of a person at 3 m but the head.
+        // A person at 2 m hides all of another one at 3 m but the head.
         let mut depth = person(3.0, 320.0, 150.0);
         for row in 200..480 {
             depth.pixels_mut()[row * 640 + 250..row * 640 + 400].fill(2.0);
@@ -266,7 +265,7 @@ mod tests {
         let whole = boxed(3.0, 320.0, 150.0, 440.0);
         let found = MeasuredBody::in_box(&camera(), &depth, &whole, 1.7).unwrap();
         assert_eq!(found.face_m, 3.0);
-        // Without the head there is the wall, which is nobody.
+        // Without the head there is the wall alone.
         let mut hidden = depth.clone();
         hidden.pixels_mut()[..200 * 640].fill(6.0);
         let found = MeasuredBody::in_box(&camera(), &hidden, &whole, 1.7).unwrap();

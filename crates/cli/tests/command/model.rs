@@ -139,7 +139,7 @@ fn an_installed_network_tracks_a_recorded_log() {
     assert!(with_person >= 170, "people are in all of 179 frames: {with_person}");
 }
 
-/// People who pass a low camera, most of them without head or feet in the image.
+/// People pass a low camera, most of them without head or feet in the image.
 #[test]
 fn a_network_joined_with_depth_finds_people_close_by() {
     let find = tagalong_conformance::testdata::find;

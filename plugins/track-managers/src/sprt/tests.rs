@@ -227,8 +227,8 @@ fn verifiers_keep_a_person_who_stands_from_the_first_frame_and_no_thing() {
     assert!(confirmed_s(10.0) > 29.0 && confirmed_s(6.0) < 2.3);
 }
 
-/// What was sure at first and is less likely a person than not from then on, without moving, is a
-/// thing: the bound of an end alone would leave it for ever.
+/// A track that was sure at first, and is less likely a person than not from then on without moving,
+/// is a thing: the bound of an end alone would leave it for ever.
 #[test]
 fn a_thing_that_was_believed_once_ends_when_it_is_doubted() {
     let mut scene = Scene::new(verified());
