@@ -45,9 +45,12 @@ impl Install<'_> {
         match self.known {
             Known::Detector(known) => {
                 let file = PathBuf::from(files.onnx.file_name().unwrap_or_default());
-                let text = |config| as_text(&file, self.about, Some(self.known), config);
-                write_file(&files.config, text(NetworkConfig::Colour))?;
-                write_file(&files.depth_config, text(NetworkConfig::Depth))?;
+                for (path, config) in [
+                    (&files.config, NetworkConfig::Colour),
+                    (&files.depth_config, NetworkConfig::Depth),
+                ] {
+                    write_file(path, as_text(&file, self.about, Some(self.known), config))?;
+                }
                 write_file(&files.default, format!("{name}\n"))?;
                 let family = known.family.networks();
                 let ms = known.call_ms;

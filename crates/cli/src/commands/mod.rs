@@ -4,6 +4,7 @@ mod alter;
 mod blur;
 mod check;
 mod config;
+mod copies;
 mod eval;
 mod export;
 mod inspect;

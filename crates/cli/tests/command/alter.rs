@@ -83,6 +83,7 @@ fn what_cannot_be_altered_is_refused() {
         (&["walk.mcap", "--salt", "1.5"], "from 0 to 1"),
         (&["walk.mcap", "--scale-depth", "0"], "above zero"),
         (&["walk.mcap", "--mirror", "-o", "walk.mcap", "--overwrite"], "replace the log itself"),
+        (&["walk.mcap", "--mirror", "-o", "./walk.mcap", "--overwrite"], "replace the log itself"),
         (&["walk.mcap", "--mirror", "-o", "walk.people.csv"], "exists"),
     ] {
         let done = alter(folder.path(), arguments);

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use clap::Args;
 use tagalong_app::input_args::InputArgs;
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, spare, write_file};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, write_file};
 use tagalong_app::progress::Progress;
 use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
@@ -21,6 +21,7 @@ use tagalong_eval::formats::people::{self, Row};
 use tagalong_geometry::Lens;
 use tagalong_log::{FrameSource, Inputs, LogFacts, LogFrame};
 
+use super::copies::copy_of;
 use recording::Recording;
 use salt::Salt;
 
@@ -80,11 +81,7 @@ impl AlterArgs {
 pub fn alter(args: &AlterArgs) -> Outcome {
     args.check()?;
     check_log_path(&args.log)?;
-    let copy = args.output.clone().unwrap_or_else(|| altered_name(&args.log));
-    spare(&copy, args.overwrite)?;
-    if args.output.as_ref() == Some(&args.log) {
-        return Err(Failure::usage("the copy would replace the log itself; name another file"));
-    }
+    let copy = copy_of(&args.log, args.output.as_deref(), "altered", args.overwrite)?;
     let signals = Signals::listen()?;
     let outer = args.input.applied(Default::default());
     let mut source = FrameSource::open(&args.log, &outer.input, &outer.limits, Inputs::ANY)?;
@@ -120,12 +117,6 @@ pub fn alter(args: &AlterArgs) -> Outcome {
     }
     print(&told)?;
     Ok(Ended::Well)
-}
-
-fn altered_name(log: &Path) -> PathBuf {
-    let mut name = log.file_stem().unwrap_or_default().to_owned();
-    name.push("-altered.mcap");
-    log.with_file_name(name)
 }
 
 /// Refuses alterations that the images of a log do not allow.

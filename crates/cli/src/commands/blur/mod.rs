@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tagalong_app::input_args::InputArgs;
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, spare};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused};
 use tagalong_app::progress::Progress;
 use tagalong_app::scoring::{Shot, Shots, Tracks};
 use tagalong_app::signals::Signals;
@@ -24,6 +24,7 @@ use tagalong_log::write::{MessageLog, WriteError};
 use tagalong_log::{FrameSource, Inputs, Limits, LogFacts, LogFiles, LogWalker, Message};
 use tagalong_render::jpeg;
 
+use super::copies::copy_of;
 use crate::run::{RunArgs, run_until};
 use heads::Heads;
 use mosaic::pixelate;
@@ -58,11 +59,7 @@ pub struct BlurArgs {
 /// A log that cannot be read, a run of another log, a file that cannot be written.
 pub fn blur(args: &BlurArgs, registry: &Registry) -> Outcome {
     check_log_path(&args.log)?;
-    let copy = args.output.clone().unwrap_or_else(|| blurred_name(&args.log));
-    spare(&copy, args.overwrite)?;
-    if same_file(&copy, &args.log) {
-        return Err(Failure::usage("the copy would replace the log itself; name another file"));
-    }
+    let copy = copy_of(&args.log, args.output.as_deref(), "blurred", args.overwrite)?;
     let signals = Signals::listen()?;
     let tracks = match &args.run {
         Some(run) => Tracks::read(run, None)?,
@@ -126,17 +123,6 @@ fn check_run(args: &BlurArgs, tracks: &Tracks) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
-}
-
-fn blurred_name(log: &Path) -> PathBuf {
-    let mut name = log.file_stem().unwrap_or_default().to_owned();
-    name.push("-blurred.mcap");
-    log.with_file_name(name)
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    // A copy that does not exist yet is no file at all.
-    fs::canonicalize(a).is_ok_and(|a| fs::canonicalize(b).is_ok_and(|b| a == b))
 }
 
 /// Pass over a log that writes its copy.

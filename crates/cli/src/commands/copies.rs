@@ -1,0 +1,35 @@
+//! Copies of logs that lie beside them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tagalong_app::outcome::{Failure, spare};
+
+/// Returns the file of a copy: the one that is named, or `LOG-KIND.mcap` beside the log.
+///
+/// # Errors
+/// A file that exists without `overwrite`, and the log itself.
+pub(super) fn copy_of(
+    log: &Path,
+    named: Option<&Path>,
+    kind: &str,
+    overwrite: bool,
+) -> Result<PathBuf, Failure> {
+    let copy = named.map_or_else(|| beside(log, kind), Path::to_owned);
+    spare(&copy, overwrite)?;
+    if same_file(&copy, log) {
+        return Err(Failure::usage("the copy would replace the log itself; name another file"));
+    }
+    Ok(copy)
+}
+
+fn beside(log: &Path, kind: &str) -> PathBuf {
+    let mut name = log.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{kind}.mcap"));
+    log.with_file_name(name)
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    // A copy that does not exist yet is no file at all.
+    fs::canonicalize(a).is_ok_and(|a| fs::canonicalize(b).is_ok_and(|b| a == b))
+}
