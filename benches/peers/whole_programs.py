@@ -56,29 +56,51 @@ def people(session, image):
     return np.concatenate((boxes[:, :2], boxes[:, :2] + boxes[:, 2:]), 1), scores
 
 
-def script(network, log, out):
-    """The usual script: reads the log, finds people, tracks them by ByteTrack."""
+def network(path):
+    """A network on one thread of onnxruntime."""
     import cv2
-    import numpy as np
     import onnxruntime
-    import supervision
-    import trackers
-    from mcap.reader import make_reader
-    from mcap_ros2.decoder import DecoderFactory
 
     cv2.setNumThreads(1)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
-    session = onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
-    # Its defaults but for the threshold: YOLOX-Nano is seldom as sure as 0.7.
-    tracker = trackers.ByteTrackTracker(track_activation_threshold=SCORE)
-    frame = 0
-    with open(log, "rb") as file, open(out, "w", buffering=1) as rows:
+    return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+
+
+def images(log):
+    """The colour images of a log, one after the other."""
+    import cv2
+    import numpy as np
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    with open(log, "rb") as file:
         for schema, _, _, message in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
             if schema.name != "sensor_msgs/msg/CompressedImage" or "depth" in message.format.lower():
                 continue
-            frame += 1
-            image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+            yield cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+
+
+def upper_body_row(frame, track, box, score):
+    """A line of tracks.csv: the upper body in the box of a whole person."""
+    height = box[3] - box[1]
+    side = UPPER * height
+    left = 0.5 * (box[0] + box[2]) - 0.5 * side
+    top = box[1] - 0.025 / 1.7 * height
+    return f"{frame},{track},{left:.2f},{top:.2f},{side:.2f},{side:.2f},{score:.4f},-1,-1,-1\n"
+
+
+def script(path, log, out):
+    """The usual script: reads the log, finds people, tracks them by ByteTrack."""
+    import numpy as np
+    import supervision
+    import trackers
+
+    session = network(path)
+    # Its defaults but for the threshold: YOLOX-Nano is seldom as sure as 0.7.
+    tracker = trackers.ByteTrackTracker(track_activation_threshold=SCORE)
+    with open(out, "w", buffering=1) as rows:
+        for frame, image in enumerate(images(log), 1):
             boxes, scores = people(session, image)
             found = supervision.Detections(
                 xyxy=boxes.astype(np.float32).reshape(-1, 4),
@@ -87,13 +109,8 @@ def script(network, log, out):
             )
             found = tracker.update(found)
             for box, score, track in zip(found.xyxy, found.confidence, found.tracker_id):
-                if track < 0:
-                    continue  # not confirmed yet
-                height = box[3] - box[1]
-                side = UPPER * height
-                left = 0.5 * (box[0] + box[2]) - 0.5 * side
-                top = box[1] - 0.025 / 1.7 * height
-                rows.write(f"{frame},{track},{left:.2f},{top:.2f},{side:.2f},{side:.2f},{score:.4f},-1,-1,-1\n")
+                if track >= 0:  # otherwise it is not confirmed yet
+                    rows.write(upper_body_row(frame, track, box, score))
 
 
 def timed(command, rows):
@@ -119,7 +136,10 @@ def timed(command, rows):
 
 
 def scores(program, log, tracks):
-    command = [program, "eval", "--truth", log.with_suffix(".people.csv"), "--tracks", tracks]
+    """Figures of tracks of upper bodies."""
+    people_csv = log.with_suffix(".people.csv")
+    truth = [people_csv] if people_csv.exists() else [log.with_suffix(".boxes.csv"), "--upper-body"]
+    command = [program, "eval", "--tracks", tracks, "--truth", *truth]
     out = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=True).stdout
     words = (line.split() for line in out.splitlines())
     return {line[0]: line[1] for line in words if len(line) == 2}
@@ -130,7 +150,7 @@ def main():
         return script(*sys.argv[2:])
     if len(sys.argv) < 3:
         sys.exit(__doc__)
-    network, logs = Path(sys.argv[1]).resolve(), [Path(log).resolve() for log in sys.argv[2:]]
+    onnx, logs = Path(sys.argv[1]).resolve(), [Path(log).resolve() for log in sys.argv[2:]]
     program = str(Path(os.environ.get("TAGALONG", "target/release/tagalong")).resolve())
     figures = ["HOTA", "IDF1", "fp_per_frame", "recall"]
     print("| log | program | frames/s | MiB | first row s | " + " | ".join(figures) + " |")
@@ -138,12 +158,12 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         os.environ["TAGALONG_HOME"] = str(home / "data")
-        subprocess.run([program, "model", "--install", network, "--name", "network"], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([program, "model", "--install", onnx, "--name", "network"], check=True, stdout=subprocess.DEVNULL)
         for log in logs:
             rows = home / f"{log.stem}.csv"
             programs = {
                 "Python: OpenCV, YOLOX-Nano (onnxruntime), ByteTrack": (
-                    [sys.executable, __file__, "--script", network, log, rows],
+                    [sys.executable, __file__, "--script", onnx, log, rows],
                     rows,
                 )
             }

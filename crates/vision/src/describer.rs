@@ -86,17 +86,14 @@ impl Describer {
     /// # Errors
     /// Those of [`Embedder::embed`].
     pub fn at(&self, region: &Rect, head: &Point3<f64>, frame: &Frame) -> Result<Appearance> {
-        let Some(shared) = &self.shared else { return Ok(Appearance::at(region, head, frame)) };
+        let Some(shared) = &self.shared else {
+            return Ok(Appearance::at(&upper_body(region, head), head, frame));
+        };
         let vector = match person_box(region, head, frame) {
             Some(person) => shared.vector(frame, &person)?,
             None => None,
         };
         Ok(Appearance::of_vector(head.z, vector))
-    }
-
-    /// Returns true if regions of whole people have an appearance.
-    pub fn takes_whole_people(&self) -> bool {
-        self.shared.is_some()
     }
 
     /// Returns the number of people since the last call of this function whose vector was not
@@ -130,13 +127,28 @@ fn unit(vector: &[f32]) -> Option<Vector> {
     has_direction.then(|| vector.iter().map(|value| value / length).collect())
 }
 
+fn is_whole_person(region: &Rect) -> bool {
+    region.height >= WHOLE_FROM * region.width
+}
+
+/// Returns the height of a standing person with the head at a position, m.
+fn height_m(head: &Point3<f64>) -> f64 {
+    let [least_m, most_m] = HEIGHTS_M;
+    head.z.clamp(least_m, most_m)
+}
+
+/// Returns the upper body of the person in a region, which is that of an upper body or of a whole
+/// person.
+fn upper_body(region: &Rect, head: &Point3<f64>) -> Rect {
+    if is_whole_person(region) { region.upper_body_of_standing(height_m(head)) } else { *region }
+}
+
 /// Returns the box of a whole person inside the image; `None` if too little of it is there.
 fn person_box(region: &Rect, head: &Point3<f64>, frame: &Frame) -> Option<Rect> {
-    let whole = if region.height >= WHOLE_FROM * region.width {
+    let whole = if is_whole_person(region) {
         *region
     } else {
-        let [least_m, most_m] = HEIGHTS_M;
-        region.standing_of_upper_body(head.z.clamp(least_m, most_m))
+        region.standing_of_upper_body(height_m(head))
     };
     let inside = whole.clipped(frame.camera.width, frame.camera.height);
     let enough = inside.area() >= LEAST_INSIDE * whole.area() && inside.height >= LEAST_PX;
@@ -147,7 +159,7 @@ fn person_box(region: &Rect, head: &Point3<f64>, frame: &Frame) -> Option<Rect> 
 mod tests {
     use nalgebra::Vector2;
     use tagalong_conformance::target;
-    use tagalong_core::{EgoMotion, Error, Images, Stamp};
+    use tagalong_core::{EgoMotion, Error, Images, RgbImage, Stamp};
     use tagalong_geometry::{Camera, Distortion, Pinhole};
 
     use super::*;
@@ -173,10 +185,14 @@ mod tests {
     }
 
     fn frame() -> Frame {
+        frame_of(Images::default())
+    }
+
+    fn frame_of(images: Images) -> Frame {
         let lens =
             Pinhole { fx: 200.0, fy: 200.0, cx: 160.0, cy: 60.0, distortion: Distortion::None };
         let camera = Arc::new(Camera::mounted(lens, 320, 240, 1.6, 0.0, 0.0));
-        Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), Images::default())
+        Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)
     }
 
     /// The upper body of a person of 1.6 m to the centre of the head, 57 pixels wide.
@@ -231,9 +247,24 @@ mod tests {
     #[test]
     fn without_a_network_people_are_described_by_colours_and_edges() {
         let describer = Describer::default();
-        assert!(!describer.takes_whole_people());
         let track = target(2.0, 0.0, Vector2::zeros());
         let seen = describer.of(&track.estimate, &frame()).unwrap();
         assert_eq!(seen.difference(&seen).vector, None);
+    }
+
+    fn shirt_and_trousers(_: usize, row: usize) -> [u8; 3] {
+        if row < 85 { [200, 30, 30] } else { [30, 30, 160] }
+    }
+
+    #[test]
+    fn the_upper_part_of_a_whole_person_has_the_colours_of_the_upper_body() {
+        let image = RgbImage::from_fn(320, 240, shirt_and_trousers);
+        let describer = Describer::default();
+        let frame = frame_of(Images { colour: Some(image.into()), ..Images::default() });
+        let upper = upper(100.0);
+        let part = at(&describer, upper, &frame).unwrap();
+        let whole = at(&describer, upper.standing_of_upper_body(1.6), &frame).unwrap();
+        let difference = part.difference(&whole);
+        assert_eq!((difference.torso, difference.legs), (Some(0.0), Some(0.0)));
     }
 }

@@ -17,7 +17,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point2;
 use tagalong_core::{Detection, EgoMotion, Frame, Result, Track, TrackId};
-use tagalong_geometry::Extent;
 use tagalong_vision::{Appearance, Describer};
 
 use person::{Identity, Person};
@@ -131,8 +130,7 @@ impl Reidentifier {
     /// Returns the appearance of a detection; `None` without a box that shows one.
     fn describe(&self, frame: &Frame, detection: &Detection) -> Result<Option<Appearance>> {
         let Some(image) = &detection.image else { return Ok(None) };
-        let is_shown = image.extent == Extent::UpperBody || self.describer.takes_whole_people();
-        is_shown.then(|| self.describer.at(&image.rect, &detection.position, frame)).transpose()
+        self.describer.at(&image.rect, &detection.position, frame).map(Some)
     }
 
     /// Takes in a jump of the clock, which ended all tracks.
