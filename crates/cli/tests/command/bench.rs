@@ -111,12 +111,12 @@ fn results_and_times_of_another_task_are_not_taken() {
     assert_eq!(code(&refused), 1, "{}", text(&refused.stdout));
     assert!(text(&refused.stderr).contains("the first is 2"), "{}", text(&refused.stderr));
     let told = ok(home.bench(&arguments));
-    assert!(told.contains("1 tasks run, 1 had their results"), "{told}");
+    assert!(told.contains("1 task run, 1 had their results"), "{told}");
     assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
     // A damaged result is computed again, too.
     fs::write(home.path("out/results").join(format!("{first}.json")), "{").unwrap();
     let told = ok(home.bench(&arguments[..4]));
-    assert!(told.contains("1 tasks run, 1 had their results"), "{told}");
+    assert!(told.contains("1 task run, 1 had their results"), "{told}");
     assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
 }
 
