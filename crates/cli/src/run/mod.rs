@@ -33,6 +33,7 @@ use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
 use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
+use tagalong_app::unable::unable;
 use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input, InputAccount};
@@ -440,20 +441,6 @@ fn no_frame(report: &RunReport) -> String {
     format!("not one frame could be made of {name}: {why}; `tagalong doctor` tells more")
 }
 
-/// Returns the message about a run with a detector that could detect nobody, because it has no model.
-fn without_model(report: &RunReport, remedies: &Remedies) -> Option<String> {
-    let lacks = report.funnel.iter().any(|line| line.test == NO_MODEL);
-    let remedy = remedies.of(NO_MODEL).filter(|_| lacks)?;
-    let name = &report.config.name;
-    let key = remedy.settings.join(", ");
-    let result =
-        if report.persons.is_empty() { "no person was detected" } else { "it found nobody" };
-    Some(format!("{name}: a detector has no model (`{key}`), so {result}: {}", remedy.look))
-}
-
-/// Test of the funnel by which a detector says that it has no model.
-const NO_MODEL: &str = "no model";
-
 /// Returns the exit code, and the reason for a failure.
 fn verdict(
     args: &RunArgs,
@@ -479,7 +466,8 @@ fn verdict(
     if report.frames.read == 0 {
         return Err(Failure::failed(no_frame(report)));
     }
-    if let Some(why) = without_model(report, remedies) {
+    let tests = report.funnel.iter().map(|line| line.test);
+    if let Some(why) = unable(&report.config.name, tests, !report.persons.is_empty(), remedies) {
         return Err(Failure::failed(why));
     }
     match (report.data_lost, args.strict) {

@@ -238,6 +238,38 @@ fn a_log_that_lacks_depth_is_skipped_with_the_reason() {
 }
 
 #[test]
+fn a_pipeline_that_can_detect_nothing_is_skipped_with_the_reason_that_run_gives() {
+    let home = Home::new();
+    for config in ["omni-rich", "onnx"] {
+        let shipped = format!("{}/../../configs/{config}.toml", env!("CARGO_MANIFEST_DIR"));
+        let text = fs::read_to_string(shipped).unwrap();
+        fs::write(home.path(&format!("unable/{config}.toml")), text).unwrap();
+    }
+    let configs = ["unable/omni-rich.toml", "unable/onnx.toml", "configs/near.toml"];
+    let given = [&["--logs", "logs/short.mcap", "-o", "out", "--configs"][..], &configs].concat();
+    let output = home.bench(&given);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    for task in home.report("out")["tasks"].as_array().unwrap() {
+        let name = task["pipeline"].as_str().unwrap();
+        let ended = task["outcome"]["ended"].as_str().unwrap();
+        if name == "near" {
+            assert_eq!(ended, "done");
+            continue;
+        }
+        assert_eq!(ended, "skipped", "{name}");
+        let why = task["outcome"]["why"].as_str().unwrap();
+        let reason = why.split_once(": ").unwrap().1;
+        let config = format!("unable/{name}.toml");
+        let mut run = own_plugin();
+        run.args(["run", &config, "logs/short.mcap", "-o", name]).current_dir(home.folder.path());
+        let run = run.output().unwrap();
+        let told = text(&run.stderr);
+        assert_eq!(code(&run), 1, "{told}");
+        assert!(told.contains(reason), "{told}\nis not: {reason}");
+    }
+}
+
+#[test]
 fn a_hash_changes_with_what_matters_and_with_nothing_else() {
     let home = Home::new();
     let plan = |out: &str| -> Vec<String> {
