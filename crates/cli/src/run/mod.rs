@@ -20,6 +20,7 @@ use frames::{Frames, Item};
 use pace::Pace;
 use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
+use summary::quoted;
 use tagalong::logs::sources_of;
 use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
 use tagalong_app::format::Format;
@@ -37,7 +38,7 @@ use tagalong_app::unable::unable;
 use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input, InputAccount};
-use tagalong_pipeline::{FrameReport, Pipeline, ResolvedConfig, StepError};
+use tagalong_pipeline::{FrameReport, MissingSource, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
 use tagalong_view::Live;
@@ -139,7 +140,7 @@ impl Job {
         if is_named {
             pipeline
                 .check_sources(sources_of(&source))
-                .map_err(|why| Failure::failed(format!("`{}`: {why}", args.log().display())))?;
+                .map_err(|why| unsteered(args.log(), &why))?;
         }
         let resolved = outer.resolved_with(pipeline.config())?;
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
@@ -154,6 +155,17 @@ impl Job {
         let remedies = Remedies::new(registry);
         Ok(Self { pipeline, outer, source, resolved, folder, report, remedies })
     }
+}
+
+/// Returns the failure of a log that lacks a source of the controller, with the command that tracks the
+/// log all the same.
+fn unsteered(log: &Path, why: &MissingSource) -> Failure {
+    let shown = log.display();
+    let command = quoted(&shown.to_string());
+    Failure::failed(format!(
+        "`{shown}`: {why}; to track the log alone, `tagalong run {command}` takes a config by itself, \
+         and no robot follows its commands"
+    ))
 }
 
 /// Returns the note on a config for a robot with odometry and a log without.
@@ -379,9 +391,7 @@ impl Desk {
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,
-            Format::Text => {
-                print(&summary::text(&report, &self.timings, &folder, args.overlay.is_some()))?
-            }
+            Format::Text => print(&summary::text(&report, &self.timings, &folder, args))?,
         }
         verdict(args, &report, stopped, signals, &self.remedies)
     }
