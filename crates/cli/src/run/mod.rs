@@ -20,7 +20,7 @@ use frames::{Frames, Item};
 use pace::Pace;
 use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
-use summary::quoted;
+use summary::{doctor, quoted};
 use tagalong::logs::sources_of;
 use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
 use tagalong_app::format::Format;
@@ -438,7 +438,7 @@ const NO_REASON: [&str; 6] = [
 ];
 
 /// Returns the message about a log of which no frame could be made.
-fn no_frame(report: &RunReport) -> String {
+fn no_frame(report: &RunReport, args: &RunArgs) -> String {
     let telling = report.counters.iter().filter(|(name, _)| !NO_REASON.contains(&name.as_str()));
     let reasons: Vec<String> =
         telling.map(|(name, count)| format!("{} {count}", name.replace('_', " "))).collect();
@@ -448,7 +448,7 @@ fn no_frame(report: &RunReport) -> String {
         reasons.join(", ")
     };
     let name = &report.log.name;
-    format!("not one frame could be made of {name}: {why}; `tagalong doctor` tells more")
+    format!("not one frame could be made of {name}: {why}; `{}` tells more", doctor(report, args))
 }
 
 /// Returns the exit code, and the reason for a failure.
@@ -474,7 +474,7 @@ fn verdict(
         return Ok(Ended::BySignal(signal));
     }
     if report.frames.read == 0 {
-        return Err(Failure::failed(no_frame(report)));
+        return Err(Failure::failed(no_frame(report, args)));
     }
     let tests = report.funnel.iter().map(|line| line.test);
     if let Some(why) = unable(&report.config.name, tests, !report.persons.is_empty(), remedies) {

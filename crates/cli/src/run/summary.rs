@@ -4,7 +4,7 @@ use std::path::Path;
 use tagalong_app::timings::{Timings, WHOLE_FRAME};
 use tagalong_math::counted;
 
-use super::RunArgs;
+use super::args::RunArgs;
 use super::report::RunReport;
 
 /// Lines of the funnel that are shown.
@@ -64,7 +64,7 @@ fn persons(out: &mut String, report: &RunReport, args: &RunArgs) {
 }
 
 /// Returns the command that looks for the cause of a result, for the config and the log of the run.
-fn doctor(report: &RunReport, args: &RunArgs) -> String {
+pub fn doctor(report: &RunReport, args: &RunArgs) -> String {
     let log = quoted(&args.log().display().to_string());
     // A config that the program chose is known by its name alone.
     let config = match args.config() {
