@@ -192,6 +192,11 @@ impl ConfigFile {
 impl From<BuildError> for Failure {
     /// Converts the error of a config: exit code 2. A config that is not there gets a suggestion.
     fn from(error: BuildError) -> Self {
+        if let BuildError::Unreadable { path, kind: ErrorKind::NotFound, .. } = &error
+            && let Some(remedy) = path.to_str().and_then(installed::missing_network)
+        {
+            return Self::usage(remedy);
+        }
         let hint = match &error {
             // A config in the directory is suggested: `x` stands for any name in it.
             BuildError::Unreadable { path, kind: ErrorKind::IsADirectory, .. } => {

@@ -14,6 +14,10 @@ use tagalong_network::networks_folder;
 pub const NETWORK: &str = "network";
 /// File with the name of the default network.
 const DEFAULT: &str = "default";
+/// Config of the repository that joins the network of a file with depth.
+const OF_A_FILE_AND_DEPTH: &str = "depth-network";
+/// Configs of the repository that are not built in, because they run the network of a file.
+const OF_A_FILE: [&str; 3] = ["colour-net", OF_A_FILE_AND_DEPTH, "onnx"];
 /// End of the name of a config that joins a network with depth.
 pub const WITH_DEPTH: &str = "-depth";
 
@@ -61,6 +65,29 @@ fn config_in(folder: &Path, name: &str) -> Option<PathBuf> {
     let files = NetworkFiles::of(folder, installed.iter().find(|known| *known == network)?);
     let config = if network == name { files.config } else { files.depth_config };
     config.is_file().then_some(config)
+}
+
+/// Returns the remedy for a name that stands for the config of a network and leads to none; `None` for
+/// any other name.
+pub fn missing_network(name: &str) -> Option<String> {
+    remedy(&installed_networks(), name)
+}
+
+fn remedy(installed: &[String], name: &str) -> Option<String> {
+    if name != NETWORK && !OF_A_FILE.contains(&name) {
+        return None;
+    }
+    let Some(first) = installed.first() else {
+        return Some(format!(
+            "`{name}` runs a neural network, and none is installed: `tagalong model --install FILE.onnx` \
+             installs one, and `tagalong model --list` names some"
+        ));
+    };
+    let with_depth = if name == OF_A_FILE_AND_DEPTH { WITH_DEPTH } else { "" };
+    Some(format!(
+        "`{name}` runs the neural network of a file, and is not built in: name one that is installed, as \
+         `{first}{with_depth}`"
+    ))
 }
 
 /// Returns the names of the installed networks that have a config, in the order of the alphabet.
@@ -128,5 +155,19 @@ mod tests {
         fs::write(folder.join(DEFAULT), "removed").unwrap();
         assert_eq!(config(NETWORK), Some(folder.join("movenet.toml")));
         assert_eq!(installed_in(folder), ["movenet", "yolox"]);
+    }
+
+    #[test]
+    fn the_name_of_a_config_for_networks_leads_to_one_that_is_installed() {
+        assert_eq!(remedy(&[], "depth-ekf"), None);
+        for name in ["colour-net", "depth-network", "onnx", NETWORK] {
+            let none = remedy(&[], name).unwrap();
+            assert!(none.contains(name) && none.contains("`tagalong model --install"), "{none}");
+        }
+        let installed = ["movenet".to_owned()];
+        let named = remedy(&installed, "colour-net").unwrap();
+        assert!(named.contains("`movenet`"), "{named}");
+        let named = remedy(&installed, "depth-network").unwrap();
+        assert!(named.contains("`movenet-depth`"), "{named}");
     }
 }

@@ -20,3 +20,4 @@ pub mod signals;
 pub mod suggest;
 pub mod threads;
 pub mod timings;
+pub mod unable;

@@ -30,6 +30,7 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::serialize::to_json_line;
 use tagalong_config::Registry;
+use tagalong_math::counted;
 use work::Tally;
 
 /// Runs `tagalong bench`.
@@ -109,14 +110,17 @@ fn make_report(folder: &FolderArgs, format: Format, gate: Option<&Gate>) -> Resu
 
 fn verdict(tally: Tally) -> Outcome {
     let Tally { asked, ran, failed, lost, signal } = tally;
-    say(&format!("{ran} tasks run, {} had their results", asked - ran));
+    say(&format!("{} run, {} had their results", counted(ran, "task"), asked - ran));
     if let Some(signal) = signal {
         return Ok(Ended::BySignal(signal));
     }
     match (failed, lost) {
         (0, false) => Ok(Ended::Well),
         (0, true) => Ok(Ended::WithLoss),
-        _ => Err(Failure::failed(format!("{failed} of {asked} tasks failed; the report says why"))),
+        _ => Err(Failure::failed(format!(
+            "{failed} of {} failed; the report says why",
+            counted(asked, "task")
+        ))),
     }
 }
 

@@ -302,7 +302,7 @@ fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
 
 fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     suggest::mcap_files(folder)
-        .map_err(|error| Failure::usage(format!("cannot read {}: {error}", folder.display())))
+        .map_err(|error| Failure::failed(format!("cannot read {}: {error}", folder.display())))
 }
 
 /// Returns the log with its truth.

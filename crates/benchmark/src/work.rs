@@ -11,6 +11,7 @@ use tagalong_app::progress::Forecast;
 use tagalong_app::remedies::Remedies;
 use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions};
 use tagalong_app::signals::Signals;
+use tagalong_app::unable::unable;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, Inputs};
 use tagalong_pipeline::Pipeline;
@@ -345,6 +346,11 @@ impl Lane {
         });
         match scored {
             Ok((result, recording)) => {
+                let tests = result.funnel.iter().map(|dropped| dropped.test.as_str());
+                let has_people = !result.tracks.is_empty();
+                if let Some(why) = unable(&task.pipeline, tests, has_people, remedies) {
+                    return without_figures(task, Outcome::Skipped { why });
+                }
                 let deciding = deciding(&self.pipeline, &result, remedies);
                 let reasons = reasons(&self.pipeline, &result, remedies);
                 let result = TaskResult { deciding, reasons, ..result };
@@ -369,7 +375,10 @@ pub fn blank(task: &Task) -> TaskResult {
 }
 
 fn failed(task: &Task, why: &str) -> Kept {
-    let outcome = Outcome::Failed { why: why.to_owned() };
+    without_figures(task, Outcome::Failed { why: why.to_owned() })
+}
+
+fn without_figures(task: &Task, outcome: Outcome) -> Kept {
     let result = TaskResult { outcome, ..blank(task) };
     (Stored { result, ..Stored::default() }, None)
 }

@@ -1,5 +1,7 @@
 use std::fmt::Write as _;
 
+use tagalong_math::counted;
+
 use super::coverage::{Alternative, Coverage};
 use super::diagnosis::{Diagnosis, Drop, Row};
 use super::finding::{Finding, Severity};
@@ -16,7 +18,7 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     let config = diagnosis.config.display();
     let log = diagnosis.log.display();
     pipelines(&mut out, diagnosis);
-    let _ = writeln!(out, "{log} through {config}, {} frames", diagnosis.frames);
+    let _ = writeln!(out, "{log} through {config}, {}", counted(diagnosis.frames, "frame"));
     out.push('\n');
     for line in diagnosis.inputs.lines() {
         let _ = writeln!(out, "{line}");
@@ -43,8 +45,8 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
     if diagnosis.pipelines.is_empty() {
         return;
     }
-    let frames = diagnosis.frames;
-    let _ = writeln!(out, "pipelines that fit {}, on {frames} frames:\n", diagnosis.log.display());
+    let frames = counted(diagnosis.frames, "frame");
+    let _ = writeln!(out, "pipelines that fit {}, on {frames}:\n", diagnosis.log.display());
     let _ = writeln!(out, "  {}  {:>7}  pipeline", heading(), "ms");
     for Row { config, taken, coverage, frame_ms, failure, .. } in &diagnosis.pipelines {
         let mark = if *taken { " (taken by `run`)" } else { "" };

@@ -23,6 +23,7 @@ use tagalong_app::outcome::{
 };
 use tagalong_app::signals::Signals;
 use tagalong_config::PathText;
+use tagalong_math::counted;
 
 pub use self::args::{ImportArgs, Kind};
 pub use self::cvat::people_of_cvat;
@@ -75,7 +76,7 @@ pub fn import(args: &ImportArgs) -> Outcome {
             } else {
                 String::new()
             };
-            format!("{images} images are in {log}{next}\n")
+            format!("{log}: {}{next}\n", counted(images, "image"))
         }
         Format::Json => {
             format!("{:#}\n", serde_json::json!({ "log": PathText(&log), "images": images }))

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::Input;
 
 use crate::camera_settings::{CameraSettings, MountSettings};
 use crate::obstacles::ObstacleTopic;
@@ -114,6 +115,18 @@ impl InputSettings {
         match self.camera.as_ref()? {
             CameraSettings::Named(name) => Some(name),
             CameraSettings::Mounted(mount) => mount.name.as_deref(),
+        }
+    }
+
+    /// Returns the topic that the settings name for an input. A log without it is refused.
+    pub fn topic_of(&self, input: Input) -> Option<&str> {
+        match input {
+            Input::Colour => self.colour_topic.as_deref(),
+            Input::Depth => self.depth_topic.as_deref(),
+            Input::Right => self.right_topic.as_deref(),
+            Input::Laser => self.laser_topic.as_deref(),
+            Input::Detections => self.detections_topic.as_deref(),
+            other => self.topics.get(other.name()).map(String::as_str),
         }
     }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde::Serialize;
+use tagalong_math::counted;
 
 use crate::images::Content;
 use crate::scan::{Scan, Topic};
@@ -263,7 +264,7 @@ impl Inspection {
 
 impl fmt::Display for TopicFacts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}  {}  {} messages", self.topic, self.schema, self.count)?;
+        write!(f, "{}  {}  {}", self.topic, self.schema, counted(self.count, "message"))?;
         if let Some(rate) = self.rate_hz {
             write!(f, ", {rate:.2} Hz")?;
         }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 use tagalong_core::Stamp;
+use tagalong_math::counted;
 
 use crate::camera_info::is_blank;
 use crate::clock::Times;
@@ -295,7 +296,8 @@ impl Scan {
         for (name, topic) in &self.topics {
             let pixels =
                 topic.pixels.as_ref().map(|pixels| format!(", {pixels}")).unwrap_or_default();
-            lines.push(format!("  {name} ({}{pixels}; {} messages)", topic.schema, topic.count));
+            let messages = counted(topic.count, "message");
+            lines.push(format!("  {name} ({}{pixels}; {messages})", topic.schema));
         }
         if lines.is_empty() { "  nothing".into() } else { lines.join("\n") }
     }

@@ -11,9 +11,11 @@
 //! * [`matching`]: the assignment of rows to columns with the greatest weight, for metrics and for
 //!   associators.
 //! * [`exp2_of_negative`]: an exponential function for loops over many numbers.
+//! * [`counted`]: a number with its noun, for everything that is printed.
 //!
 //! There is no clock and no global generator: the same seed gives the same bytes.
 
+mod counted;
 mod intervals;
 pub mod matching;
 mod power;
@@ -21,6 +23,7 @@ mod random;
 mod significance;
 mod summary;
 
+pub use counted::counted;
 pub use intervals::{
     CONFIDENCE, Interval, clustered_share, draws_interval, exact_upper_bound, mean_interval, wilson,
 };

@@ -123,9 +123,10 @@ pub enum Outcome {
         /// Error message.
         why: String,
     },
-    /// The task was not started, because the log lacks an input of the pipeline.
+    /// The task was not started, because the log lacks an input of the pipeline, or its figures say
+    /// nothing, because a detector has no model or is for another kind of camera.
     Skipped {
-        /// Missing input.
+        /// Missing input or model.
         why: String,
     },
 }

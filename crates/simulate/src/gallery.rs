@@ -5,6 +5,7 @@ use nalgebra::Point2;
 use tagalong_app::outcome::{Failure, make_folder, say};
 use tagalong_core::{DepthImage, Images, RgbImage};
 use tagalong_geometry::Rect;
+use tagalong_math::counted;
 use tagalong_render::canvas::{Canvas, Ink, LINE_PX};
 use tagalong_render::write_png;
 use tagalong_sim::{Event, Joint, Scene, Shot, Simulation, Truth};
@@ -59,7 +60,7 @@ pub fn paint(mut simulation: Simulation, scene: &Scene, folder: &Path) -> Result
             save(&folder.join(format!("{name}-webcams.png")), &beside(&webcams))?;
         }
     }
-    say(&format!("{drawn} pictures are in {}", folder.display()));
+    say(&format!("{}: {}", folder.display(), counted(drawn, "picture")));
     Ok(())
 }
 

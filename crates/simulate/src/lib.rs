@@ -21,6 +21,7 @@ use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
 use tagalong_config::{FileLimit, PathText, Registry, nearest, read_text};
 use tagalong_log::write::WriteError;
+use tagalong_math::counted;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
 
 use crate::realism::realism;
@@ -95,7 +96,10 @@ fn write(simulation: Simulation, scene: &Scene, log: &Path, format: Format) -> O
         return Ok(Ended::BySignal(signal));
     }
     match format {
-        Format::Text => say(&format!("{images} images and the truth are in {}", log.display())),
+        Format::Text => {
+            let images = counted(images, "image");
+            say(&format!("{images} and the truth are in {}", log.display()));
+        }
         Format::Json => {
             let told = serde_json::json!({ "log": PathText(log), "images": images });
             print(&format!("{told:#}\n"))?;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare};
 use tagalong_app::progress::Progress;
+use tagalong_math::counted;
 use tagalong_render::Animation;
 
 use crate::ViewArgs;
@@ -39,8 +40,8 @@ pub fn write(args: &ViewArgs, file: &Path) -> Outcome {
     Progress::waiting("encoding", || animation.write(&pictures, file)).map_err(Failure::failed)?;
     let bytes = fs::metadata(file).map_or(0, |facts| facts.len());
     let shown = file.display();
-    let count = pictures.len();
-    print(&format!("{shown}: {count} pictures, {:.1} MB\n", bytes as f64 / 1e6))?;
+    let pictures = counted(pictures.len(), "picture");
+    print(&format!("{shown}: {pictures}, {:.1} MB\n", bytes as f64 / 1e6))?;
     Ok(Ended::Well)
 }
 

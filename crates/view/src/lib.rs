@@ -24,6 +24,7 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
 use tagalong_app::remedies::Remedies;
 use tagalong_app::scoring::TruthFile;
 use tagalong_config::Registry;
+use tagalong_math::counted;
 
 use crate::assemble::{run_data, stamps, times};
 use crate::film::Film;
@@ -141,7 +142,8 @@ pub fn view(args: &ViewArgs, registry: &Registry) -> Outcome {
     write_file(&output, &page.text)?;
     let shown = output.display();
     let megabytes = page.text.len() as f64 / 1e6;
-    let mut said = format!("{shown}: {} frames, {megabytes:.1} MB\n", page.frames);
+    let frames = counted(page.frames, "frame");
+    let mut said = format!("{shown}: {frames}, {megabytes:.1} MB\n");
     page.notes.iter().for_each(|note| said += &format!("  {note}\n"));
     print(&(said + "open it in a browser; it needs no network\n"))?;
     Ok(Ended::Well)
@@ -194,10 +196,10 @@ impl Page {
 fn heading(runs: &[Recording], data: &PageData, notes: &[String]) -> Heading {
     let log = runs.first().map(|run| run.report.log.name.clone()).unwrap_or_default();
     let described = runs.iter().zip(&data.runs).map(|(run, shown)| {
-        let frames = shown.frames.iter().flatten().count();
+        let frames = counted(shown.frames.iter().flatten().count(), "frame");
         let name = &shown.name;
         let folder = run.folder.display();
-        format!("{name}: {frames} frames, {}, from {folder}", run.report.ended)
+        format!("{name}: {frames}, {}, from {folder}", run.report.ended)
     });
     let rides = runs.iter().filter_map(|run| run.report.ride.as_ref());
     let lines = described.chain(rides.map(RideFacts::summary)).collect();

@@ -3,6 +3,7 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use tagalong_core::RgbImage;
+use tagalong_math::counted;
 use tagalong_render::jpeg;
 
 /// Widths and qualities of JPEG, best first.
@@ -51,11 +52,15 @@ impl Pictures {
         let count = self.images.iter().filter(|text| !text.is_empty()).count();
         let bytes: usize = self.images.iter().map(String::len).sum();
         let width = self.width;
-        let whole = format!("{count} images, {width} px wide, {:.1} MB", bytes as f64 / 1e6);
+        let images = counted(count, "image");
+        let whole = format!("{images}, {width} px wide, {:.1} MB", bytes as f64 / 1e6);
         match (count, self.left_out) {
             (0, _) => None,
             (_, 0) => Some(whole),
-            (_, more) => Some(format!("{whole}; {more} images more than --max-mb allows left out")),
+            (_, more) => {
+                let more = counted(more, "image");
+                Some(format!("{whole}; {more} more than --max-mb allows left out"))
+            }
         }
     }
 

@@ -8,6 +8,7 @@ use serde::Deserialize;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
 use tagalong_app::progress::Forecast;
 use tagalong_app::remedies::Remedies;
+use tagalong_math::counted;
 use tagalong_report::document;
 
 use crate::page::html::style;
@@ -91,7 +92,7 @@ pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
     print(&format!(
         "{}: {}, the worst first, each with its page\nopen it in a browser; it needs no network\n",
         index.display(),
-        counted(rides.len())
+        counted(rides.len(), "ride")
     ))?;
     Ok(Ended::Well)
 }
@@ -145,11 +146,6 @@ fn encoded(letter: char) -> String {
     }
 }
 
-/// Returns a number of rides in words.
-fn counted(rides: usize) -> String {
-    if rides == 1 { "1 ride".to_owned() } else { format!("{rides} rides") }
-}
-
 fn list(folder: &Path, from: Option<&Path>, rides: &[Ride]) -> String {
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let contacts = rides.iter().filter(|ride| ride.facts.touches()).count();
@@ -159,7 +155,7 @@ fn list(folder: &Path, from: Option<&Path>, rides: &[Ride]) -> String {
         header class="top" {
             h1 { "Rides in " (name) }
             ul class="facts" {
-                li { (counted(rides.len())) }
+                li { (counted(rides.len(), "ride")) }
                 li { (kept) " kept the person" }
                 li { (contacts) " with a contact" }
             }

@@ -18,6 +18,7 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::scoring::read_text;
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
+use tagalong_math::counted;
 use work::Desk;
 
 use super::plan;
@@ -33,7 +34,8 @@ pub fn rooms(args: &RoomsArgs, registry: &Registry) -> Outcome {
     let store = Store::new(&args.folder.output);
     let desk = Desk::new(&store, registry, &contestants, &locations)?;
     let done = desk.work(usize::from(args.jobs))?;
-    say(&format!("{} runs done, {} had their results", done.ran, done.asked - done.ran));
+    let ran = counted(done.ran, "run");
+    say(&format!("{ran} done, {} had their results", done.asked - done.ran));
     if let Some(signal) = done.signal {
         return Ok(Ended::BySignal(signal));
     }

@@ -13,6 +13,7 @@ use tagalong_app::outcome::Failure;
 use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions};
 use tagalong_app::signals::Signals;
 use tagalong_config::Registry;
+use tagalong_math::counted;
 use tagalong_report::TaskResult;
 
 use super::contest::{Contestant, Location, Variant};
@@ -267,8 +268,8 @@ impl Shift<'_> {
         let Some((run, why)) = failed.first_key_value() else { return Ok(()) };
         let contestant = &self.desk.contestants[run.contestant];
         Err(Failure::failed(format!(
-            "{} runs failed; the first is {} on {}, with {}: {why}",
-            failed.len(),
+            "{} failed; the first is {} on {}, with {}: {why}",
+            counted(failed.len(), "run"),
             contestant.name(),
             self.desk.logs[run.log].1.name,
             contestant.words(run.setting)

@@ -7,7 +7,7 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::{PathText, Registry};
-use tagalong_log::{FrameSource, Inputs, Usage};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Usage};
 use tagalong_pipeline::{BlindZone, Pipeline, SafetyDistances};
 
 /// Frames of the log that are tried.
@@ -23,7 +23,14 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     file.check_tuning(registry)?;
     let outer = file.outer_for(&pipeline)?;
     let inputs = pipeline.inputs();
+    let needs = names(inputs, &outer.input, Usage::Required);
+    let uses = names(inputs, &outer.input, Usage::Optional);
     let distances = pipeline.safety_distances();
+    if format == Format::Text {
+        // Told before the log is tried, for a log that does not fit changes nothing about the config.
+        let distances = distances.as_ref().map(told).unwrap_or_default();
+        print(&format!("{}: valid; {}\n{distances}", config.display(), in_words(&needs, &uses)))?;
+    }
     let suited_m = pipeline.config().suits.camera_height_m;
     let fit = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
     let blind_zone = fit.as_ref().and_then(|fit| fit.blind_zone);
@@ -32,15 +39,11 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     let height_m = seen_m.or_else(|| outer.input.mount().map(|mount| mount.height_m));
     let unsuited = height_m.zip(suited_m).and_then(|(height_m, range)| unsuited(height_m, range));
     let notes = fit.map(|fit| fit.notes);
-    let config = config.display();
     print(&match format {
         Format::Text => {
-            let mut out = format!("{config}: valid; {}\n", in_words(inputs));
+            let mut out = String::new();
             if let Some(unsuited) = &unsuited {
                 let _ = writeln!(out, "  {unsuited}");
-            }
-            if let Some(distances) = &distances {
-                out += &told(distances);
             }
             if let Some(zone) = &blind_zone {
                 out += &told_zone(zone);
@@ -52,12 +55,10 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
             out
         }
         Format::Json => {
-            let needs = names(inputs, Usage::Required);
-            let uses = names(inputs, Usage::Optional);
             let answer = serde_json::json!({
-                "config": config.to_string(), "needs": needs, "uses": uses, "log": log.map(PathText),
-                "notes": notes, "unsuited": unsuited, "distances": distances,
-                "blind_zone": blind_zone,
+                "config": config.display().to_string(), "needs": needs, "uses": uses,
+                "log": log.map(PathText), "notes": notes, "unsuited": unsuited,
+                "distances": distances, "blind_zone": blind_zone,
             });
             format!("{answer:#}\n")
         }
@@ -174,14 +175,33 @@ fn is_pose_assumed(source: &FrameSource) -> bool {
     source.notes().iter().any(|note| note.contains("comes from an assumption"))
 }
 
-fn names(inputs: Inputs, usage: Usage) -> Vec<&'static str> {
-    inputs.of(usage).map(|input| input.name()).collect()
+/// Returns the names of the inputs that a log has to have, or that are used where it has them.
+fn names(inputs: Inputs, settings: &InputSettings, wanted: Usage) -> Vec<&'static str> {
+    let mut names = Vec::new();
+    for declared in [Usage::Required, Usage::Optional] {
+        for input in inputs.of(declared) {
+            if usage_of(input, declared, settings) == Some(wanted) {
+                names.push(input.name());
+            }
+        }
+    }
+    names
+}
+
+/// Returns the usage of an input under the settings of a config. `None` for sources of obstacles where
+/// the config has none.
+fn usage_of(input: Input, declared: Usage, settings: &InputSettings) -> Option<Usage> {
+    if input == Input::OBSTACLES {
+        // Without a message of each the robot stands still.
+        return (!settings.sources.is_empty()).then_some(Usage::Required);
+    }
+    // A log without a topic that is named is refused.
+    let is_named = settings.topic_of(input).is_some();
+    Some(if is_named { Usage::Required } else { declared })
 }
 
 /// Formats inputs as "needs colour and depth; uses laser where the log has it".
-fn in_words(inputs: Inputs) -> String {
-    let needs = names(inputs, Usage::Required);
-    let uses = names(inputs, Usage::Optional);
+fn in_words(needs: &[&str], uses: &[&str]) -> String {
     let needs =
         if needs.is_empty() { "no particular image".to_owned() } else { needs.join(" and ") };
     if uses.is_empty() {

@@ -16,11 +16,27 @@ pub(super) fn copy_of(
     overwrite: bool,
 ) -> Result<PathBuf, Failure> {
     let copy = named.map_or_else(|| beside(log, kind), Path::to_owned);
-    spare(&copy, overwrite)?;
-    if same_file(&copy, log) {
-        return Err(Failure::usage("the copy would replace the log itself; name another file"));
-    }
+    check_place(&copy, log, "log", overwrite)?;
     Ok(copy)
+}
+
+/// Refuses a place of a copy: a file that exists without `overwrite`, and the original itself, which is
+/// named by its kind.
+///
+/// # Errors
+/// Such a place.
+pub(super) fn check_place(
+    copy: &Path,
+    original: &Path,
+    kind: &str,
+    overwrite: bool,
+) -> Result<(), Failure> {
+    spare(copy, overwrite)?;
+    if same_file(copy, original) {
+        let why = format!("the copy would replace the {kind} itself; name another file");
+        return Err(Failure::usage(why));
+    }
+    Ok(())
 }
 
 fn beside(log: &Path, kind: &str) -> PathBuf {

@@ -20,6 +20,7 @@ use frames::{Frames, Item};
 use pace::Pace;
 use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
+use summary::{doctor, quoted};
 use tagalong::logs::sources_of;
 use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
 use tagalong_app::format::Format;
@@ -33,10 +34,11 @@ use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
 use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
+use tagalong_app::unable::unable;
 use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input, InputAccount};
-use tagalong_pipeline::{FrameReport, Pipeline, ResolvedConfig, StepError};
+use tagalong_pipeline::{FrameReport, MissingSource, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
 use tagalong_view::Live;
@@ -138,7 +140,7 @@ impl Job {
         if is_named {
             pipeline
                 .check_sources(sources_of(&source))
-                .map_err(|why| Failure::failed(format!("`{}`: {why}", args.log().display())))?;
+                .map_err(|why| unsteered(args.log(), &why))?;
         }
         let resolved = outer.resolved_with(pipeline.config())?;
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
@@ -153,6 +155,17 @@ impl Job {
         let remedies = Remedies::new(registry);
         Ok(Self { pipeline, outer, source, resolved, folder, report, remedies })
     }
+}
+
+/// Returns the failure of a log that lacks a source of the controller, with the command that tracks the
+/// log all the same.
+fn unsteered(log: &Path, why: &MissingSource) -> Failure {
+    let shown = log.display();
+    let command = quoted(&shown.to_string());
+    Failure::failed(format!(
+        "`{shown}`: {why}; to track the log alone, `tagalong run {command}` takes a config by itself, \
+         and no robot follows its commands"
+    ))
 }
 
 /// Returns the note on a config for a robot with odometry and a log without.
@@ -378,9 +391,7 @@ impl Desk {
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,
-            Format::Text => {
-                print(&summary::text(&report, &self.timings, &folder, args.overlay.is_some()))?
-            }
+            Format::Text => print(&summary::text(&report, &self.timings, &folder, args))?,
         }
         verdict(args, &report, stopped, signals, &self.remedies)
     }
@@ -427,7 +438,7 @@ const NO_REASON: [&str; 6] = [
 ];
 
 /// Returns the message about a log of which no frame could be made.
-fn no_frame(report: &RunReport) -> String {
+fn no_frame(report: &RunReport, args: &RunArgs) -> String {
     let telling = report.counters.iter().filter(|(name, _)| !NO_REASON.contains(&name.as_str()));
     let reasons: Vec<String> =
         telling.map(|(name, count)| format!("{} {count}", name.replace('_', " "))).collect();
@@ -437,22 +448,8 @@ fn no_frame(report: &RunReport) -> String {
         reasons.join(", ")
     };
     let name = &report.log.name;
-    format!("not one frame could be made of {name}: {why}; `tagalong doctor` tells more")
+    format!("not one frame could be made of {name}: {why}; `{}` tells more", doctor(report, args))
 }
-
-/// Returns the message about a run with a detector that could detect nobody, because it has no model.
-fn without_model(report: &RunReport, remedies: &Remedies) -> Option<String> {
-    let lacks = report.funnel.iter().any(|line| line.test == NO_MODEL);
-    let remedy = remedies.of(NO_MODEL).filter(|_| lacks)?;
-    let name = &report.config.name;
-    let key = remedy.settings.join(", ");
-    let result =
-        if report.persons.is_empty() { "no person was detected" } else { "it found nobody" };
-    Some(format!("{name}: a detector has no model (`{key}`), so {result}: {}", remedy.look))
-}
-
-/// Test of the funnel by which a detector says that it has no model.
-const NO_MODEL: &str = "no model";
 
 /// Returns the exit code, and the reason for a failure.
 fn verdict(
@@ -477,9 +474,10 @@ fn verdict(
         return Ok(Ended::BySignal(signal));
     }
     if report.frames.read == 0 {
-        return Err(Failure::failed(no_frame(report)));
+        return Err(Failure::failed(no_frame(report, args)));
     }
-    if let Some(why) = without_model(report, remedies) {
+    let tests = report.funnel.iter().map(|line| line.test);
+    if let Some(why) = unable(&report.config.name, tests, !report.persons.is_empty(), remedies) {
         return Err(Failure::failed(why));
     }
     match (report.data_lost, args.strict) {

@@ -2,7 +2,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use tagalong_app::timings::{Timings, WHOLE_FRAME};
+use tagalong_math::counted;
 
+use super::args::RunArgs;
 use super::report::RunReport;
 
 /// Lines of the funnel that are shown.
@@ -18,36 +20,36 @@ const STAGE_LINES: usize = 3;
 const NO_LOSS: [&str; 3] = ["chunks_verified", "frames", "messages"];
 
 /// Returns the results of a run, for a terminal.
-pub fn text(report: &RunReport, timings: &Timings, folder: &Path, overlay: bool) -> String {
+pub fn text(report: &RunReport, timings: &Timings, folder: &Path, args: &RunArgs) -> String {
     let mut out = String::new();
     let frames = &report.frames;
     let _ = writeln!(
         out,
-        "{}: {} frames, people in {} of them ({}{})",
+        "{}: {}, people in {} of them ({}{})",
         report.log.name,
-        frames.read,
+        counted(frames.read, "frame"),
         frames.with_person,
         report.ended,
         // The end that was reached is not the one of the recording.
         if report.data_lost { ", but part of the log was lost" } else { "" }
     );
-    persons(&mut out, report);
+    persons(&mut out, report, args);
     funnel(&mut out, report);
     times(&mut out, timings);
     losses(&mut out, report);
-    files(&mut out, folder, overlay);
+    files(&mut out, folder, args.overlay.is_some());
     out
 }
 
-fn persons(out: &mut String, report: &RunReport) {
+fn persons(out: &mut String, report: &RunReport, args: &RunArgs) {
     let _ = match report.persons.len() {
         0 => writeln!(
             out,
-            "no person was found; `tagalong doctor LOG` looks for the cause, and --overlay=debug shows \
-             the test that dropped each candidate"
+            "no person was found; `{}` looks for the cause, and --overlay=debug shows the test that \
+             dropped each candidate",
+            doctor(report, args)
         ),
-        1 => writeln!(out, "1 person:"),
-        many => writeln!(out, "{many} persons:"),
+        count => writeln!(out, "{}:", counted(count, "person")),
     };
     for (id, person) in report.persons.iter().take(PERSON_LINES) {
         let _ = writeln!(
@@ -61,8 +63,23 @@ fn persons(out: &mut String, report: &RunReport) {
     }
 }
 
+/// Returns the command that looks for the cause of a result, for the config and the log of the run.
+pub fn doctor(report: &RunReport, args: &RunArgs) -> String {
+    let log = quoted(&args.log().display().to_string());
+    // A config that the program chose is known by its name alone.
+    let config = match args.config() {
+        Some(path) => quoted(&path.display().to_string()),
+        None => report.config.name.trim_end_matches(".toml").to_owned(),
+    };
+    let camera = match &args.input.camera {
+        Some(camera) => format!(" --camera {}", quoted(camera)),
+        None => String::new(),
+    };
+    format!("tagalong doctor {config} {log}{camera}")
+}
+
 /// Returns a path as one word of a POSIX shell.
-fn quoted(path: &str) -> String {
+pub fn quoted(path: &str) -> String {
     let is_plain = path.chars().all(|c| c.is_ascii_alphanumeric() || "/._-+=:@%,".contains(c));
     if is_plain && !path.is_empty() {
         return path.to_owned();

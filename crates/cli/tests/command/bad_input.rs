@@ -43,7 +43,7 @@ const FINE: [&str; 6] = [
 ];
 
 /// Other mistakes: command, exit code, and parts of the message.
-const OTHERS: [(&str, i32, &[&str]); 51] = [
+const OTHERS: [(&str, i32, &[&str]); 54] = [
     ("run nearest.toml no-depth.mcap -o out", 1, &["depth"]),
     ("check nearest.toml no-depth.mcap", 1, &["depth"]),
     ("run typo.toml good.mcap -o out", 2, &["typo.toml:4", "did you mean `roles`"]),
@@ -67,6 +67,7 @@ const OTHERS: [(&str, i32, &[&str]); 51] = [
     ("train svm-pitch", 2, &["svm-patch"]),
     ("import tmu folder.csv", 2, &["tum"]),
     ("run steered.toml good.mcap", 1, &["odometry = \"none\"` in [robot]"]),
+    ("run steered.toml good.mcap", 1, &["`tagalong run good.mcap` takes a config by itself"]),
     ("check steered.toml good.mcap", 1, &["odometry = \"none\"` in [robot]"]),
     ("check sparse-model.toml", 2, &["at most 67108864 are read"]),
     ("check pipe-model.toml", 2, &["is a pipe or a device"]),
@@ -77,6 +78,8 @@ const OTHERS: [(&str, i32, &[&str]); 51] = [
     ("rum a b", 2, &["rum", "run"]),
     ("run a b --overly", 2, &["--overlay"]),
     ("run a b --threads 0", 2, &["--threads"]),
+    ("run colour-net good.mcap", 2, &["`colour-net` runs", "neural network"]),
+    ("bench --configs nearest.toml --logs-dir none -o out", 1, &["cannot read none"]),
     ("run neerest.toml good.mcap", 2, &["did you mean", "nearest.toml"]),
     ("run full good.mcap", 2, &["full is a directory"]),
     ("run empty.toml good.mcap", 2, &["empty.toml", "filter"]),

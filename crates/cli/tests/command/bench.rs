@@ -111,12 +111,12 @@ fn results_and_times_of_another_task_are_not_taken() {
     assert_eq!(code(&refused), 1, "{}", text(&refused.stdout));
     assert!(text(&refused.stderr).contains("the first is 2"), "{}", text(&refused.stderr));
     let told = ok(home.bench(&arguments));
-    assert!(told.contains("1 tasks run, 1 had their results"), "{told}");
+    assert!(told.contains("1 task run, 1 had their results"), "{told}");
     assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
     // A damaged result is computed again, too.
     fs::write(home.path("out/results").join(format!("{first}.json")), "{").unwrap();
     let told = ok(home.bench(&arguments[..4]));
-    assert!(told.contains("1 tasks run, 1 had their results"), "{told}");
+    assert!(told.contains("1 task run, 1 had their results"), "{told}");
     assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
 }
 
@@ -235,6 +235,38 @@ fn a_log_that_lacks_depth_is_skipped_with_the_reason() {
     assert!(skipped[0]["skip"].as_str().unwrap().contains("depth"), "{}", skipped[0]["skip"]);
     let tasks = home.report("out")["tasks"].as_array().unwrap().clone();
     assert_eq!(tasks.iter().filter(|t| t["outcome"]["ended"] == "skipped").count(), 2);
+}
+
+#[test]
+fn a_pipeline_that_can_detect_nothing_is_skipped_with_the_reason_that_run_gives() {
+    let home = Home::new();
+    for config in ["omni-rich", "onnx"] {
+        let shipped = format!("{}/../../configs/{config}.toml", env!("CARGO_MANIFEST_DIR"));
+        let text = fs::read_to_string(shipped).unwrap();
+        fs::write(home.path(&format!("unable/{config}.toml")), text).unwrap();
+    }
+    let configs = ["unable/omni-rich.toml", "unable/onnx.toml", "configs/near.toml"];
+    let given = [&["--logs", "logs/short.mcap", "-o", "out", "--configs"][..], &configs].concat();
+    let output = home.bench(&given);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    for task in home.report("out")["tasks"].as_array().unwrap() {
+        let name = task["pipeline"].as_str().unwrap();
+        let ended = task["outcome"]["ended"].as_str().unwrap();
+        if name == "near" {
+            assert_eq!(ended, "done");
+            continue;
+        }
+        assert_eq!(ended, "skipped", "{name}");
+        let why = task["outcome"]["why"].as_str().unwrap();
+        let reason = why.split_once(": ").unwrap().1;
+        let config = format!("unable/{name}.toml");
+        let mut run = own_plugin();
+        run.args(["run", &config, "logs/short.mcap", "-o", name]).current_dir(home.folder.path());
+        let run = run.output().unwrap();
+        let told = text(&run.stderr);
+        assert_eq!(code(&run), 1, "{told}");
+        assert!(told.contains(reason), "{told}\nis not: {reason}");
+    }
 }
 
 #[test]

@@ -56,7 +56,7 @@ fn heads_are_blurred_and_all_else_is_as_it_was() {
     let done = blur(folder.path(), &["walk.mcap", "--run", "out"]);
     assert_eq!(code(&done), 0, "{}", text(&done.stderr));
     let said = text(&done.stdout);
-    assert!(said.contains("left out: 1 messages of /rear/image_raw"), "{said}");
+    assert!(said.contains("left out: 1 message of /rear/image_raw"), "{said}");
     assert!(said.contains("look through the copy"), "{said}");
     let mut before = messages(&folder.path().join("walk.mcap"));
     let mut after = messages(&folder.path().join("walk-blurred.mcap"));

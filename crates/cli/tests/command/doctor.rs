@@ -398,7 +398,7 @@ fn a_tracked_thing_and_an_untracked_person_are_criticised() {
     let still = finding(&said, "still");
     assert_eq!(still["severity"], "bad", "{still:#}");
     assert_eq!(still["figures"]["still_tracks"], 1.0, "{still:#}");
-    assert!(still["measured"].as_str().unwrap().contains("1 of 1 tracks never moved"), "{still:#}");
+    assert!(still["measured"].as_str().unwrap().contains("1 of 1 track never moved"), "{still:#}");
     let missed = finding(&said, "missed");
     assert_eq!(missed["severity"], "bad", "{missed:#}");
     assert!(missed["measured"].as_str().unwrap().contains("m away"), "{missed:#}");

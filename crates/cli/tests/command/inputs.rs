@@ -135,6 +135,10 @@ fn a_pipeline_that_requires_depth_is_refused_without() {
     assert!(!home.path("out").exists(), "a refused run leaves nothing behind");
     let (code, said) = home.tell(&["check", "config.toml", "without.mcap"]);
     assert_eq!(code, 1, "{said}");
+    assert!(
+        said.contains("config.toml: valid; needs depth\n"),
+        "the config itself is right: {said}"
+    );
 }
 
 #[test]
@@ -149,6 +153,16 @@ fn check_says_what_is_needed_and_what_is_used() {
     assert!(mono.contains("valid; needs colour\n"), "{mono}");
     let both = said(&config("rgbd-compressive"));
     assert!(both.contains("needs colour; uses depth where the log has it"), "{both}");
+    let named = format!("{}[input]\ndepth_topic = \"/depth\"\n", config("rgbd-compressive"));
+    let named = said(&named);
+    assert!(named.contains("valid; needs colour and depth\n"), "a named topic: {named}");
+    let steered = config("follow-depth");
+    let plain = said(&steered);
+    assert!(plain.contains("valid; needs depth; uses colour and laser where"), "{plain}");
+    let bumper = "[[collision_monitor.sources]]\nname = \"hazards\"\ntype = \"bumper\"\n\
+                  topic = \"/hazards\"\n";
+    let bumper = said(&format!("{steered}\n{bumper}"));
+    assert!(bumper.contains("valid; needs depth and obstacle-sources; uses colour"), "{bumper}");
     let refused = said(&format!("without = [\"depth\"]\n{}", config("rgbd-ekf")));
     assert!(refused.contains("`depth-template` requires depth images"), "{refused}");
 }

@@ -123,7 +123,7 @@ fn a_second_time_computes_nothing_and_jobs_change_no_byte() {
     let lost = home.results("two").into_keys().next().unwrap();
     fs::write(home.path("two").join("rooms").join(lost), "{\"figures\":").unwrap();
     let repaired = home.rooms(&["-o", "two"]);
-    assert!(text(&repaired.stderr).contains("1 runs done, 3 had"), "{}", text(&repaired.stderr));
+    assert!(text(&repaired.stderr).contains("1 run done, 3 had"), "{}", text(&repaired.stderr));
     assert!(first.stdout == repaired.stdout && home.results("one") == home.results("two"));
 }
 

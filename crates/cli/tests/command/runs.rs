@@ -47,6 +47,18 @@ fn cells(path: &Path) -> Vec<Vec<String>> {
 }
 
 #[test]
+fn a_run_that_found_no_person_says_which_command_looks_for_the_cause() {
+    let log = Drawn::of(1);
+    // Nothing is nearer than this.
+    let home = Home::new(&log, "config = { max_depth_m = 1.0 }");
+    let output = home.run("out", &[]);
+    let said = text(&output.stdout);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert!(said.contains("walk.mcap: 1 frame, people in 0 of them"), "{said}");
+    assert!(said.contains("`tagalong doctor nearest.toml walk.mcap` looks for"), "{said}");
+}
+
+#[test]
 fn a_run_writes_whole_files_and_says_what_it_found() {
     let home = Home::new(&Drawn::of(20), "");
     let output = home.run("out", &[]);

@@ -1,3 +1,5 @@
+use tagalong_math::counted;
+
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
@@ -21,7 +23,8 @@ pub fn people(evidence: &Evidence) -> Option<Finding> {
     let tracks = coverage.moving + coverage.still + coverage.unclear;
     let frames = trial.frames;
     let with = coverage.frames_with_people;
-    let measured = format!("{tracks} tracks, seen in {with} of {frames} frames");
+    let measured =
+        format!("{}, seen in {with} of {}", counted(tracks, "track"), counted(frames, "frame"));
     let severity = match (frames, with) {
         (0, _) => Severity::Bad,
         (_, 1..) => Severity::Ok,

@@ -1,3 +1,5 @@
+use tagalong_math::counted;
+
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
@@ -31,8 +33,9 @@ pub fn reading(evidence: &Evidence) -> Option<Finding> {
         _ => Severity::beyond(lost, 0.05, 0.5),
     };
     let is_of_scans = evidence.samples.camera.as_ref().is_some_and(|camera| camera.is_blind());
-    let sources = if is_of_scans { "scans" } else { "images" };
-    let measured = format!("{made} frames of {wanted} {sources}{}", reasons(evidence, lost));
+    let sources = counted(wanted, if is_of_scans { "scan" } else { "image" });
+    let frames = counted(made, "frame");
+    let measured = format!("{frames} of {sources}{}", reasons(evidence, lost));
     let finding = Finding::new("frames-read", severity, measured)
         .figure("frames", made as f64)
         .figure("wanted", wanted as f64)

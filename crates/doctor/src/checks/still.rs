@@ -1,3 +1,5 @@
+use tagalong_math::counted;
+
 use super::super::coverage::STILL_S;
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
@@ -24,9 +26,13 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
         severity = severity.min(Severity::Warn);
     }
     let mut measured = match coverage.still {
-        0 => format!("each of {tracks} tracks moved or lived less than {STILL_S:.0} s"),
+        0 => {
+            let tracks = counted(tracks, "track");
+            format!("each of {tracks} moved or lived less than {STILL_S:.0} s")
+        }
         still => format!(
-            "{still} of {tracks} tracks never moved; they fill {:.0} % of the boxes",
+            "{still} of {} never moved; they fill {:.0} % of the boxes",
+            counted(tracks, "track"),
             100.0 * still_share
         ),
     };

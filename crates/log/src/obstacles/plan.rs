@@ -1,5 +1,7 @@
 //! Sources of obstacles that a log or a robot has.
 
+use tagalong_math::counted;
+
 use super::bumper::Contact;
 use super::{ObstacleKind, ObstacleTopic};
 use crate::camera_info::{Intrinsics, intrinsics};
@@ -111,8 +113,9 @@ fn may_be_silent(topic: &Topic) -> bool {
 /// Returns the topics that a source of this kind could have, as text.
 fn alternatives(scan: &Scan, kind: ObstacleKind) -> String {
     let fitting = scan.topics.iter().filter(|(_, topic)| kind.reads(topic));
-    let names: Vec<String> =
-        fitting.map(|(name, topic)| format!("{name} ({} messages)", topic.count)).collect();
+    let names: Vec<String> = fitting
+        .map(|(name, topic)| format!("{name} ({})", counted(topic.count, "message")))
+        .collect();
     if names.is_empty() {
         format!("no topic has {}", kind.type_names())
     } else {

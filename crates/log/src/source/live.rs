@@ -14,7 +14,6 @@ use super::plan::{plan, tally_of};
 use super::{LogFacts, LogFrame};
 use crate::scan::{Gathering, Type};
 use crate::sensors::SensorType;
-use crate::topics::named_topic;
 use crate::walk::{Channel, Message};
 use crate::{InputSettings, Inputs, Limits, LogError};
 
@@ -93,7 +92,7 @@ impl Listening {
         match Type::of(&channel.schema_name) {
             Type::Other => false,
             Type::Sensor => SensorType::of_message(&channel.schema_name).is_some_and(|sensor| {
-                sensor.rank.is_some() || named_topic(sensor, &self.input) == Some(topic)
+                sensor.rank.is_some() || self.input.topic_of(sensor.input) == Some(topic)
             }),
             _ => true,
         }

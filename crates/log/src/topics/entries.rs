@@ -6,7 +6,7 @@ use super::kinds::{
 };
 use super::problems::{SCANNER_REMEDY, depth_problem, scanner_problem};
 use super::rigs::{Rig, rigs};
-use super::{Chosen, Relation, Stream, TopicName, named_topic, odometry_problem};
+use super::{Chosen, Relation, Stream, TopicName, odometry_problem};
 use crate::images::Content;
 use crate::scan::{Scan, Topic, Type};
 use crate::sensors::{SENSORS, SensorType};
@@ -251,7 +251,7 @@ impl Judge<'_> {
             }
             return (format!("{other} is used"), Some(takes));
         }
-        let is_named = named_topic(sensor, self.input).is_some();
+        let is_named = self.input.topic_of(sensor.input).is_some();
         if sensor.rank.is_none() && !is_named {
             let remedy =
                 format!("`tagalong run recorded LOG` uses them, with `{key} = \"{name}\"`");

@@ -319,7 +319,7 @@ fn choose_sensor(
     input: &InputSettings,
     images: Option<&str>,
 ) -> Result<Option<String>, LogError> {
-    let named = named(scan, &sensor.key(), named_topic(sensor, input), |it| is_of(sensor, it))?;
+    let named = named(scan, &sensor.key(), input.topic_of(sensor.input), |it| is_of(sensor, it))?;
     let robot = robot_frame(scan, input);
     Ok(named.or_else(|| {
         best_of(scan, &input.sources, scan.names(), |name, topic| {
@@ -334,15 +334,6 @@ fn choose_sensor(
             Some(rank - 100 * i32::from(!is_possible) - lacks)
         })
     }))
-}
-
-/// Returns the topic that the settings name for a sensor.
-pub(crate) fn named_topic<'a>(sensor: &SensorType, input: &'a InputSettings) -> Option<&'a str> {
-    match sensor.input {
-        Input::Laser => input.laser_topic.as_deref(),
-        Input::Detections => input.detections_topic.as_deref(),
-        other => input.topics.get(other.name()).map(String::as_str),
-    }
 }
 
 /// Requirement of a pipeline or of the frames, with the topics that could meet it.

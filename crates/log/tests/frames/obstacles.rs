@@ -353,7 +353,7 @@ fn t6_a_source_without_messages_is_told_with_the_topics_that_have_them() {
     assert_eq!(count(&source, "sources_without_messages"), 2);
     let told = source.notes().join("\n");
     let sonar = "no message of source `sonar` on /sonar; of sensor_msgs/Range there are \
-                 /ultrasound (1 messages)";
+                 /ultrasound (1 message)";
     assert!(told.contains(sonar), "{told}");
     let rear = "no message of source `rear` on /rear; no topic has sensor_msgs/LaserScan";
     assert!(told.contains(rear), "{told}");

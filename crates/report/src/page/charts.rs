@@ -1,8 +1,9 @@
 use std::collections::BTreeMap;
 
 use maud::{Markup, html};
+use tagalong_math::counted;
 
-use super::{MOST_DRAWN, Page, amount, cell, column, number, table};
+use super::{MOST_DRAWN, Page, cell, column, number, table};
 use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan, series_class};
 use crate::model::TaskResult;
 
@@ -131,8 +132,8 @@ impl Page<'_> {
 fn plan_of(task: &TaskResult, extent: Extent, series: usize) -> Markup {
     let title = format!("{} on {} from above", task.pipeline, task.log);
     let says = match task.truth.len() {
-        1 => format!("{} and 1 person.", amount(task.tracks.len(), "track")),
-        people => format!("{} and {people} people.", amount(task.tracks.len(), "track")),
+        1 => format!("{} and 1 person.", counted(task.tracks.len(), "track")),
+        people => format!("{} and {people} people.", counted(task.tracks.len(), "track")),
     };
     html! {
         figure {

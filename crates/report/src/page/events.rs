@@ -1,8 +1,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use maud::{Markup, html};
+use tagalong_math::counted;
 
-use super::{Page, amount, cell, column, number, optional_cell, table};
+use super::{Page, cell, column, number, optional_cell, table};
 use crate::chart::key;
 use crate::model::{EventRow, TaskResult};
 use crate::view::OrderedBenchmark;
@@ -65,7 +66,7 @@ impl Page<'_> {
                 (self.event_counts(&tasks))
                 div class="filters" hidden { span class="unseen" { "Show kinds of events" } }
                 @for (number, task) in numbered { (self.events_of(number, task)) }
-                @if more > 0 { p { "The events of " (amount(more, "task")) " of the last pipelines are in report.json." } }
+                @if more > 0 { p { "The events of " (counted(more, "task")) " of the last pipelines are in report.json." } }
             }
         })
     }
@@ -110,7 +111,7 @@ impl Page<'_> {
             details class="events" {
                 summary {
                     (key(self.series(&task.pipeline), &task.pipeline)) " on " (task.log) ", seed " (task.seed)
-                    span class="aside" { (amount(task.events.len(), "event")) }
+                    span class="aside" { (counted(task.events.len(), "event")) }
                 }
                 (table(&name, &caption, &head, &body))
             }

@@ -1,7 +1,8 @@
 use maud::{Markup, html};
+use tagalong_math::counted;
 
 use super::pairs::p_text;
-use super::{Page, amount, cell, column, no_cell, number, table};
+use super::{Page, cell, column, no_cell, number, table};
 use crate::chart::{interval, key, series_class};
 use crate::figures::{ComparisonSpace, Figure, MAIN};
 use crate::summary::{Estimate, PairSummary, PipelineSummary, per_log};
@@ -47,7 +48,7 @@ impl Page<'_> {
             .iter()
             .any(|p| p.figures.get(&key).is_some_and(|e| e.logs < first.1.logs));
         Some(html! {
-            @if left_out { "Of the pipelines with " (amount(first.1.logs as usize, "log")) ", " }
+            @if left_out { "Of the pipelines with " (counted(first.1.logs, "log")) ", " }
             strong { (first.0.pipeline) } " has the highest " (MAIN.name) " " (place_where(place)) ", "
             (number(first.1.mean, 3)) ", then " strong { (second.0.pipeline) } " with "
             (number(second.1.mean, 3)) ". "
@@ -55,7 +56,7 @@ impl Page<'_> {
                 "The difference is clear (" (p_of(pair)) ")."
             } @else if let Some(pair) = pair {
                 "These logs do not tell the two apart (" (p_of(pair)) ", "
-                (amount(pair.logs as usize, "log")) " in common; it takes at least six)."
+                (counted(pair.logs, "log")) " in common; it takes at least six)."
             } @else { "No log in common tells the two apart." }
             @if let Some(why) = self.why_of_pair(&first.0.pipeline, &second.0.pipeline) { " " (why) "." }
         })
@@ -127,7 +128,7 @@ impl Page<'_> {
                     @if estimate.best { span class="unseen" { " best" } }
                 }
                 @if let Some(ends) = estimate.interval.filter(informs) { " " (ends_of(ends, figure.decimals)) }
-                @if estimate.logs < most { span class="fewer" { (amount(estimate.logs as usize, "log")) " only" } }
+                @if estimate.logs < most { span class="fewer" { (counted(estimate.logs, "log")) " only" } }
                 @if let Some(picture) = picture { (picture) }
             },
         )

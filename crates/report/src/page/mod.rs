@@ -11,6 +11,7 @@ mod speed;
 mod tasks;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use tagalong_math::counted;
 
 use crate::chart::minus;
 use crate::model::{Benchmark, Moment, Outcome, Timings};
@@ -157,9 +158,9 @@ impl Page<'_> {
         let failed = count(|o| matches!(o, Outcome::Failed { .. }));
         let skipped = count(|o| matches!(o, Outcome::Skipped { .. }));
         html! {
-            (amount(self.view.pipelines.len(), "pipeline")) " on "
-            (amount(self.view.logs.len(), "log")) ", "
-            (amount(self.view.tasks.len(), "task")) ": "
+            (counted(self.view.pipelines.len(), "pipeline")) " on "
+            (counted(self.view.logs.len(), "log")) ", "
+            (counted(self.view.tasks.len(), "task")) ": "
             (count(|o| *o == Outcome::Done)) " done"
             @if failed > 0 { ", " strong class="bad" { (failed) " failed" } }
             @if skipped > 0 { ", " (skipped) " skipped" }
@@ -171,10 +172,6 @@ impl Page<'_> {
     fn series(&self, pipeline: &str) -> usize {
         self.view.pipelines.iter().position(|p| *p == pipeline).unwrap_or(0)
     }
-}
-
-fn amount(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Formats a number; a dash if it is not finite.

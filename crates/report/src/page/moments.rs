@@ -1,9 +1,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use maud::{Markup, html};
+use tagalong_math::counted;
 
 use super::events::is_base64;
-use super::{MOST_DRAWN, Page, amount, cell, column, no_cell, number, table};
+use super::{MOST_DRAWN, Page, cell, column, no_cell, number, table};
 use crate::chart::{key, px, series_class};
 use crate::model::{MissedPerson, Moment, TaskResult};
 use crate::view::OrderedBenchmark;
@@ -119,7 +120,7 @@ impl Page<'_> {
                 summary {
                     (moment.log) ", frame " (moment.frame) " at " (number(moment.t_s, 2)) " s"
                     span class="aside" {
-                        @if names.len() == 1 { "person " } @else { "people " } (names.join(", ")) " missed by " (amount(by.len(), "pipeline"))
+                        @if names.len() == 1 { "person " } @else { "people " } (names.join(", ")) " missed by " (counted(by.len(), "pipeline"))
                     }
                 }
                 div class="moment-body" {

@@ -1,11 +1,12 @@
 use std::collections::BTreeMap;
 
 use maud::{Markup, html};
+use tagalong_math::counted;
 
 use super::events::{event_id, kind};
 use super::headline::{ends_of, place_where};
 use super::moments::NO_CANDIDATE;
-use super::{Page, amount, cell, column, no_cell, number, signed, table};
+use super::{Page, cell, column, no_cell, number, signed, table};
 use crate::chart::key;
 use crate::compare::{Difference, SAME_EVENT_S, compare_in};
 use crate::figures::{ComparisonSpace, Figure, MAIN};
@@ -155,7 +156,7 @@ impl Page<'_> {
                     (key(self.series(a), a)) " against " (key(self.series(b), b))
                     span class="aside" {
                         @if rows.is_empty() { "no log in common" }
-                        @else { (clear) " of " (amount(rows.len(), "figure")) " clear, " (amount(differences.len(), "event")) " differ" }
+                        @else { (clear) " of " (counted(rows.len(), "figure")) " clear, " (counted(differences.len(), "event")) " differ" }
                     }
                 }
                 @if !rows.is_empty() { (gain_table(a, b, &rows)) }

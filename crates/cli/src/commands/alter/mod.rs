@@ -20,10 +20,14 @@ use tagalong_core::{DepthImage, Images};
 use tagalong_eval::formats::people::{self, Row};
 use tagalong_geometry::Lens;
 use tagalong_log::{FrameSource, Inputs, LogFacts, LogFrame};
+use tagalong_math::counted;
 
-use super::copies::copy_of;
+use super::copies::{check_place, copy_of};
 use recording::Recording;
 use salt::Salt;
+
+/// Ending of the truth beside a log.
+const TRUTH: &str = "people.csv";
 
 /// Arguments of `tagalong alter`.
 #[derive(Args, Debug)]
@@ -48,7 +52,7 @@ pub struct AlterArgs {
     /// Seed of the replaced pixels.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Replace an earlier copy.
+    /// Replace an earlier copy and its truth.
     #[arg(long)]
     overwrite: bool,
     /// Way in which the log is read.
@@ -82,6 +86,11 @@ pub fn alter(args: &AlterArgs) -> Outcome {
     args.check()?;
     check_log_path(&args.log)?;
     let copy = copy_of(&args.log, args.output.as_deref(), "altered", args.overwrite)?;
+    let truth = args.log.with_extension(TRUTH);
+    let altered_truth = copy.with_extension(TRUTH);
+    if truth.is_file() {
+        check_place(&altered_truth, &truth, "truth", args.overwrite)?;
+    }
     let signals = Signals::listen()?;
     let outer = args.input.applied(Default::default());
     let mut source = FrameSource::open(&args.log, &outer.input, &outer.limits, Inputs::ANY)?;
@@ -108,9 +117,10 @@ pub fn alter(args: &AlterArgs) -> Outcome {
     }
     let left_out = left_out(source.facts());
     recording.finish().map_err(refused)?;
-    let mut told = format!("{}: {} frames\n", copy.display(), kept.len());
-    if let Some(truth) = alter_truth(args, &copy, &kept, width)? {
-        let _ = writeln!(told, "its truth: {}", truth.display());
+    let mut told = format!("{}: {}\n", copy.display(), counted(kept.len(), "frame"));
+    if truth.is_file() {
+        alter_truth(args, [&truth, &altered_truth], &kept, width)?;
+        let _ = writeln!(told, "its truth: {}", altered_truth.display());
     }
     for (topic, kind) in left_out {
         let _ = writeln!(told, "left out: {topic} ({kind})");
@@ -162,19 +172,15 @@ fn altered(args: &AlterArgs, mut item: LogFrame) -> recording::Moment {
     }
 }
 
-/// Writes the truth beside the copy if there is one beside the log; returns its path.
+/// Writes the truth of the copy from that of the log.
 fn alter_truth(
     args: &AlterArgs,
-    copy: &Path,
+    [truth, altered]: [&Path; 2],
     kept: &BTreeMap<u64, u32>,
     width: usize,
-) -> Result<Option<PathBuf>, Failure> {
-    let truth = args.log.with_extension("people.csv");
-    if !truth.is_file() {
-        return Ok(None);
-    }
+) -> Result<(), Failure> {
     let shown = truth.display().to_string();
-    let text = read_text(&truth, FileLimit::Table)
+    let text = read_text(truth, FileLimit::Table)
         .map_err(|why| Failure::failed(format!("{shown}: {why}")))?;
     let rows = people::parse(&text, &shown).map_err(Failure::failed)?;
     let rows: Vec<Row> = rows
@@ -187,7 +193,5 @@ fn alter_truth(
         .collect();
     let mut out = Vec::new();
     people::write(&mut out, &rows).map_err(Failure::failed)?;
-    let altered = copy.with_extension("people.csv");
-    write_file(&altered, out)?;
-    Ok(Some(altered))
+    write_file(altered, out)
 }

@@ -22,6 +22,7 @@ use tagalong_log::images::{Pixels, decode_compressed, decode_raw};
 use tagalong_log::msgs::{CompressedImage, Image, decode};
 use tagalong_log::write::{MessageLog, WriteError};
 use tagalong_log::{FrameSource, Inputs, Limits, LogFacts, LogFiles, LogWalker, Message};
+use tagalong_math::counted;
 use tagalong_render::jpeg;
 
 use super::copies::copy_of;
@@ -272,10 +273,11 @@ impl Counts {
     /// Returns the numbers, and the warning that a user needs before sharing the copy.
     fn summary(&self, copy: &Path) -> String {
         let Self { images, blurred, heads, .. } = self;
-        let mut text =
-            format!("{}: {heads} heads blurred, in {blurred} of {images} images\n", copy.display());
+        let heads = counted(*heads, "head");
+        let images = counted(*images, "image");
+        let mut text = format!("{}: {heads} blurred, in {blurred} of {images}\n", copy.display());
         for (topic, (count, reason)) in &self.left_out {
-            let _ = writeln!(text, "left out: {count} messages of {topic}: {reason}");
+            let _ = writeln!(text, "left out: {} of {topic}: {reason}", counted(*count, "message"));
         }
         text.push_str(
             "people whom the run did not find are not blurred: look through the copy before you share \
