@@ -34,6 +34,9 @@ pub(super) const RECORDING: &str = "take the times of recording in place of the 
 /// Remedy for messages that were recorded at another time.
 pub(super) const TOGETHER: &str = "record it together with the sensor that makes the frames";
 
+/// Reason for stamps that are rounded to seconds.
+pub(super) const WHOLE_SECONDS: &str = "its stamps are rounded to whole seconds";
+
 /// Returns the reason for which depth cannot be brought together with the colour images.
 pub(crate) fn depth_problem(
     scan: &Scan,

@@ -3,7 +3,9 @@
 use tagalong_core::Stamp;
 use tagalong_math::median;
 
-use super::problems::{Problem, RECORDING, TOGETHER, pairing_problem, wider_tolerance};
+use super::problems::{
+    Problem, RECORDING, TOGETHER, WHOLE_SECONDS, pairing_problem, wider_tolerance,
+};
 use crate::scan::{Scan, Topic};
 use crate::timing::{Skew, Timing, nearest};
 
@@ -38,9 +40,8 @@ pub(crate) fn unpaired(
     if let Some(problem) = pairing_problem(scan, frames, partners, tolerance_s) {
         return Some(problem);
     }
-    if are_whole_seconds(partners) && !are_whole_seconds(frames) {
-        let why = "its stamps are in whole seconds".to_owned();
-        return Some(Problem { why, remedy: RECORDING.to_owned() });
+    if partners.has_whole_seconds() && !frames.has_whole_seconds() {
+        return Problem::new(WHOLE_SECONDS, RECORDING);
     }
     for (topic, stamps) in [(first, &frames.stamps), (second, &partners.stamps)] {
         let back = stamps.windows(2).filter(|pair| pair[1] < pair[0]).count();
@@ -56,13 +57,6 @@ pub(crate) fn unpaired(
         return None;
     }
     Some(missing_or_apart(frames, partners, tolerance_s))
-}
-
-/// Returns true for stamps without fractions of a second that several messages share.
-fn are_whole_seconds(topic: &Topic) -> bool {
-    let stamps = &topic.stamps;
-    let is_shared = stamps.windows(2).any(|pair| pair[0] == pair[1]);
-    is_shared && stamps.iter().all(|stamp| stamp.nanos() % 1_000_000_000 == 0)
 }
 
 /// Returns the words for partners that begin late or end early, if most frames without one lie there.

@@ -36,7 +36,7 @@ fn told(source: &FrameSource) -> String {
 fn frames_without_depth_are_lost_with_the_measured_cause() {
     type Depth<'a> = (&'a dyn Fn(u32, f64) -> Option<f64>, &'a str, &'a str);
     let cases: [Depth<'_>; 6] = [
-        (&|_, t| Some(t.floor()), "its stamps are in whole seconds", "--stamps recording"),
+        (&|_, t| Some(t.floor()), "its stamps are rounded to whole seconds", "--stamps recording"),
         (&|_, t| (t < 0.95).then_some(t), "it ends 1.0 s before the last frame", "record it"),
         (&|_, t| (t > 0.95).then_some(t), "it begins 1.0 s after the first frame", "record it"),
         (
