@@ -407,3 +407,43 @@ fn messages_of_ros_1_in_an_mcap_file_are_read() {
     assert_eq!(found[0].frame.grey().unwrap().pixels(), [1, 2, 3, 4, 5, 6]);
     assert!(!source.data_lost(), "{:?}", source.notes());
 }
+
+/// Writes what a log has of the way from its depth images to its colour images.
+type Geometry = fn(&mut LogWriter);
+
+fn calibrated(log: &mut LogWriter) {
+    log.info("/camera/depth/camera_info", "depth", &camera(16, 12, 14.0));
+}
+
+fn connected(log: &mut LogWriter) {
+    log.fixed("colour", "depth", &Isometry3::identity());
+}
+
+fn connected_later(log: &mut LogWriter) {
+    calibrated(log);
+    log.moving("colour", "depth", at(9.5), &Isometry3::identity());
+}
+
+#[test]
+fn depth_that_is_taken_to_be_registered_is_told_with_the_measured_cause() {
+    let cases: [(&str, Geometry, &str, &str); 4] = [
+        ("depth", calibrated, "tf does not connect its frame `depth` with `colour`", "/tf_static"),
+        ("depth", connected, "no calibration (sensor_msgs/CameraInfo)", "`depth_info_topic`"),
+        ("depth", connected_later, "but at other times", "record /tf from before"),
+        ("", calibrated, "the frame_id of /camera/depth/image_raw is empty", "set the frame_id"),
+    ];
+    for (frame, geometry, cause, remedy) in cases {
+        let mut log = started();
+        geometry(&mut log);
+        for t in [0.1, 9.5] {
+            log.colour(at(t));
+            log.depth(at(t), frame, 2.0);
+        }
+        let (source, found) = first_depth(log, &InputSettings::default()).unwrap();
+        assert!(found.frame.depth().is_ok(), "{cause}");
+        let notes = source.notes();
+        let told = notes.iter().find(|note| note.contains("taken to be registered")).unwrap();
+        assert!(told.starts_with("/camera/depth/image_raw ") && told.contains(cause), "{told}");
+        assert!(told.contains(remedy) && !source.data_lost(), "{told}");
+    }
+}
