@@ -256,6 +256,13 @@ impl Assembler {
         let known = found.or_else(|| self.camera.as_ref().map(|last| last.robot_from_camera));
         if found.is_none() {
             tally.count("frames_without_camera_pose");
+            if known.is_some() {
+                tally.note(format!(
+                    "{} has no pose of the camera at some frames, which get the last known one: if the \
+                     camera does not move on the robot, publish it on /tf_static, else throughout",
+                    plan.mount.source()
+                ));
+            }
         }
         let Some(robot_from_camera) = known else {
             tally.lose("frames_before_camera_pose", || {

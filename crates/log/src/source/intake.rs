@@ -270,9 +270,20 @@ impl Intake {
         for transform in &tf.transforms {
             if !self.tf.insert(transform, is_static(topic)) {
                 tally.lose("transforms_invalid", || {
+                    let q = transform.transform.rotation;
+                    let at = transform.transform.translation;
                     format!(
-                        "{topic}: {} to {} is no rigid transform",
-                        transform.header.frame_id, transform.child_frame_id
+                        "{topic}: {} to {} is no rigid transform: translation [{}, {}, {}], quaternion \
+                         [{}, {}, {}, {}]",
+                        transform.header.frame_id,
+                        transform.child_frame_id,
+                        at.x,
+                        at.y,
+                        at.z,
+                        q.x,
+                        q.y,
+                        q.z,
+                        q.w
                     )
                 });
             }
