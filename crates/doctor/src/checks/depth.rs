@@ -3,7 +3,9 @@ use std::sync::Arc;
 use tagalong_core::DepthImage;
 use tagalong_geometry::Camera;
 use tagalong_math::median;
-use tagalong_vision::ground::{GroundSettings, factor_of_depth, ground_of_depth, written_unit_m};
+use tagalong_vision::ground::{
+    GroundSettings, PLAUSIBLE_FACTORS, factor_of_depth, ground_of_depth, written_unit_m,
+};
 use tagalong_vision::quality::DepthQuality;
 
 use super::super::evidence::Evidence;
@@ -151,9 +153,6 @@ fn better_geometry(median_m: f64) -> String {
          messages"
     )
 }
-
-/// Factors of the unit that may come from a mount that is not quite right.
-const PLAUSIBLE_FACTORS: std::ops::RangeInclusive<f64> = 0.6..=1.7;
 
 /// Returns true if something else than depth tells the height of the camera.
 fn is_height_known(evidence: &Evidence) -> bool {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tagalong_core::DepthImage;
 use tagalong_geometry::{Camera, ConicalMirror, Lens};
 use tagalong_vision::ground::{
-    Ground, GroundSettings, factor_of_depth, ground_of_depth, written_unit_m,
+    Ground, GroundSettings, PLAUSIBLE_FACTORS, factor_of_depth, ground_of_depth, written_unit_m,
 };
 
 use super::assembly::{Assembly, Messages};
@@ -526,8 +526,6 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
 
 /// Number of depth images by which the unit of depth is measured.
 const UNIT_FRAMES: usize = 3;
-/// Factors of the unit of depth that may be those of a mount that is not quite right.
-const PLAUSIBLE_FACTORS: std::ops::RangeInclusive<f64> = 0.6..=1.7;
 /// Largest difference between the images, relative.
 const SAME_FACTOR: f64 = 1.1;
 
