@@ -106,14 +106,16 @@ const LEAST_FLOOR: f64 = 0.1;
 /// Largest share of readings that lie clearly below the floor.
 const MOST_BELOW: f64 = 0.1;
 
+/// Heights of the cameras of robots, m.
+pub const ROBOT_HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.1..=2.5;
 /// Factors of the unit of depth that may come from a mount that is not quite right.
 pub const PLAUSIBLE_FACTORS: std::ops::RangeInclusive<f64> = 0.6..=1.7;
 /// Angle between the floor and that of the mount beyond which the mount is wrong, rad.
 const OTHER_TILT_RAD: f64 = 0.17;
 
 /// Returns the factor by which the readings of a camera of known height and tilt have to be multiplied
-/// for the floor to lie where it is; `None` if too little floor is seen, or if the floor has another tilt
-/// than the mount says, which moves it as another unit does. Along each ray that points
+/// for the floor to lie where it is; `None` if too little floor is seen, or if the mount is wrong, which
+/// moves the floor as another unit does: its height is no robot's, or the floor has another tilt. Along each ray that points
 /// down, a reading is at most that of the floor, and over the image the floor is met most often.
 pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     let pose = &camera.robot_from_camera;
@@ -129,7 +131,7 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
             }
         }
     }
-    if ratios.len() < LEAST_RAYS || height_m <= 0.0 {
+    if ratios.len() < LEAST_RAYS || !ROBOT_HEIGHTS_M.contains(&height_m) {
         return None;
     }
     ratios.sort_by(f64::total_cmp);
@@ -335,6 +337,17 @@ mod tests {
         let few = factor_of_depth(&with_holes(80), &camera).unwrap();
         assert!((few - 1.0).abs() < 0.03, "{few}");
         assert_eq!(factor_of_depth(&with_holes(3), &camera), None);
+    }
+
+    #[test]
+    fn a_mount_at_the_height_of_no_robot_tells_no_unit() {
+        let lens =
+            Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        let depth = room(&Camera::mounted(lens, 160, 120, 1.2, 0.3, 0.0));
+        for height_m in [120.0, 0.0, -1.2] {
+            let told = Camera::mounted(lens, 160, 120, height_m, 0.3, 0.0);
+            assert_eq!(factor_of_depth(&depth, &told), None, "{height_m}");
+        }
     }
 
     #[test]

@@ -4,7 +4,8 @@ use tagalong_core::DepthImage;
 use tagalong_geometry::Camera;
 use tagalong_math::median;
 use tagalong_vision::ground::{
-    GroundSettings, PLAUSIBLE_FACTORS, factor_of_depth, ground_of_depth, written_unit_m,
+    GroundSettings, PLAUSIBLE_FACTORS, ROBOT_HEIGHTS_M, factor_of_depth, ground_of_depth,
+    written_unit_m,
 };
 use tagalong_vision::quality::DepthQuality;
 
@@ -46,7 +47,7 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
             1.0 / factor
         ),
         (None, Unit::OffFloor(height_m) | Unit::NearFloor(height_m)) => {
-            format!(", the floor {height_m:.2} m below the camera, whose height is not known")
+            format!(", the floor {height_m:.2} m below the camera by these readings")
         }
         (None, _) => String::new(),
     };
@@ -154,10 +155,13 @@ fn better_geometry(median_m: f64) -> String {
     )
 }
 
-/// Returns true if something else than depth tells the height of the camera.
+/// Returns true if something else than depth tells the height of the camera, and it is a robot's.
 fn is_height_known(evidence: &Evidence) -> bool {
     let source = &evidence.inspection.facts.camera_source;
-    !evidence.is_pose_assumed() && !source.starts_with("the floor")
+    let camera = evidence.samples.camera.as_ref();
+    !evidence.is_pose_assumed()
+        && !source.starts_with("the floor")
+        && camera.is_some_and(|camera| ROBOT_HEIGHTS_M.contains(&camera.height_m()))
 }
 
 /// Returns the factor by which depth has to be multiplied for the floor to lie as far below the camera
@@ -247,9 +251,6 @@ fn floor_m(depths: &[Arc<DepthImage>], camera: &Camera, median_m: f64) -> Option
     }
     median(heights_m)
 }
-
-/// Heights of the cameras of robots, m.
-const ROBOT_HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.1..=2.5;
 
 /// Returns true if the unit of depth may be wrong: the readings tell it, or nobody is found and no floor
 /// lies where that of a robot does, with a camera whose height nothing else tells.
