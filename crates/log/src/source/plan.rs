@@ -10,7 +10,7 @@ use tagalong_vision::ground::{
 };
 
 use super::assembly::{Assembly, Messages};
-use super::mount::Mount;
+use super::mount::{Mount, robot_frame};
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::images::StereoGeometry;
 use crate::input::StampSource;
@@ -255,7 +255,7 @@ pub(super) fn plan(
     note_unread_images(&plan, tally);
     note_choices(&plan, tally);
     if plan.odom_frames.is_none() {
-        tally.note("no odometry: the robot is taken to be at rest");
+        tally.note(no_odometry(&plan));
     }
     Ok(plan)
 }
@@ -288,6 +288,21 @@ fn timed(
         tally.note("the times of recording are taken in place of all stamps");
     }
     Ok((Arc::new(scan.with_recording_times()), true))
+}
+
+/// Tells that there is no odometry, and which frame of tf the robot moves in all the same.
+fn no_odometry(plan: &Plan) -> String {
+    let at_rest = "no odometry: the robot is taken to be at rest".to_owned();
+    let tf = &plan.scan.tf;
+    let robot = robot_frame(&plan.scan, &plan.input);
+    let root = tf.root_of(robot);
+    if tf.knows(&plan.input.odom_frame) || tf.moving_frames(root, robot).is_empty() {
+        return at_rest;
+    }
+    format!(
+        "{at_rest}, although tf has its poses in `{root}`: `odom_frame = \"{root}\"` under [input] \
+         takes them"
+    )
 }
 
 /// Returns the unit of depth, where it is not that of the convention: that of the settings, else that

@@ -83,6 +83,22 @@ fn stamps_of_localisation_may_lie_ahead() {
     assert!(source.has_odometry() && !source.lacks_usable_odometry());
 }
 
+#[test]
+fn poses_in_another_frame_than_that_of_odometry_are_told() {
+    for (parent, is_told) in [("world", true), ("odom", false)] {
+        let saved = ride(started(), |log, t| {
+            log.moving_of(at(t), (parent, "base_link"), at(t), &driven(t));
+        });
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
+        assert_eq!(source.has_odometry(), !is_told, "{parent}");
+        let notes = source.notes();
+        let told = notes.iter().any(|note| note.contains("`odom_frame = \"world\"`"));
+        assert_eq!(told, is_told, "{notes:?}");
+        let input = InputSettings { odom_frame: parent.into(), ..InputSettings::default() };
+        assert!(saved.open(&input, Inputs::ANY).unwrap().has_odometry(), "{parent}");
+    }
+}
+
 /// Writes odometry in time, and corrections by localisation late.
 fn with_late_corrections(log: &mut LogWriter, t: f64) {
     log.moving_of(at(t), ("odom", "base_link"), at(t), &driven(t));
