@@ -527,11 +527,6 @@ impl Topic {
         self.stamps.len() > 1 && stamps_same && !recorded_same
     }
 
-    /// Returns true if its stamps are rounded to whole seconds.
-    pub(crate) fn has_whole_seconds(&self) -> bool {
-        self.times().is_some_and(|times| times.are_whole_seconds())
-    }
-
     /// Returns the reason for which no message can be used, although all can be decoded.
     pub(crate) fn impossible(&self) -> Option<&str> {
         self.fault.as_deref().filter(|_| self.faulty == self.count)
