@@ -472,6 +472,17 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
         let wanted = "calibration of the right camera with a positive baseline (P[3] = -fx B)";
         return Err(missing(&plan.scan, wanted.into(), baseline_hint(plan)));
     }
+    if plan.inputs.requires(Input::Right)
+        && let Some(baseline_m) = plan.baseline_m.filter(|it| *it > LARGEST_BASELINE_M)
+    {
+        let topic = plan.chosen.right_info.as_deref().unwrap_or_default();
+        let wanted = "calibration of the right camera with a baseline in metres".to_owned();
+        let hint = format!(
+            ": by {topic} it is {baseline_m} m (P[3] = -fx B); calibrate the pair with a board that is \
+             measured in metres"
+        );
+        return Err(missing(&plan.scan, wanted, hint));
+    }
     if plan.lens.is_none() && is_metric(plan.inputs) {
         let wanted = format!("calibration (sensor_msgs/CameraInfo) of {}", plan.primary());
         let hint = if plan.scan.infos.is_empty() {
@@ -486,6 +497,9 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
     }
     Ok(())
 }
+
+/// Baseline beyond which that of a pair on a robot has another unit, m.
+const LARGEST_BASELINE_M: f64 = 5.0;
 
 /// Returns the remedy for a right camera whose calibration has no positive baseline.
 fn baseline_hint(plan: &Plan) -> String {

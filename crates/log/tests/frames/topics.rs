@@ -451,3 +451,27 @@ fn depth_that_is_taken_to_be_registered_is_told_with_the_measured_cause() {
         assert!(told.contains(remedy) && !source.data_lost(), "{told}");
     }
 }
+
+#[test]
+fn a_baseline_in_millimetres_is_refused() {
+    for (baseline_m, is_refused) in [(0.1, false), (100.0, true)] {
+        let mut log = LogWriter::plain();
+        let left = camera(16, 12, 14.0);
+        log.info("/stereo/left/camera_info", "colour", &left);
+        let mut right = info_of("colour", &left);
+        right.p[3] = -14.0 * baseline_m;
+        log.message("/stereo/right/camera_info", at(0.0), &right);
+        log.fixed("base_link", "colour", &level_pose());
+        for side in ["left", "right"] {
+            let image = disparities("mono8", &[0; 16 * 12]);
+            log.message(&format!("/stereo/{side}/image_rect"), at(0.1), &image);
+        }
+        let inputs = Inputs::NONE.require(Input::Colour).require(Input::Right);
+        let found = log.save().open(&InputSettings::default(), inputs);
+        assert_eq!(found.is_err(), is_refused, "{baseline_m}");
+        if let Err(error) = found {
+            let told = "by /stereo/right/camera_info it is 100 m";
+            assert!(error.to_string().contains(told), "{error}");
+        }
+    }
+}
