@@ -44,17 +44,15 @@ pub fn config_hint(wanted: &Path) -> String {
 /// Returns the TOML files of a folder, by name.
 pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let Ok(entries) = fs::read_dir(here) else { return Vec::new() };
-    let mut files: Vec<PathBuf> = entries
-        .flatten()
-        .map(|entry| folder.join(entry.file_name()))
-        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
-        // In a Rust workspace, `Cargo.toml` is the only TOML file that is never a config.
-        .filter(|path| path.file_name().is_none_or(|n| n != "Cargo.toml"))
-        .collect();
-    // The order of a directory depends on the file system.
-    files.sort();
+    let Ok(files) = files_in(here) else { return Vec::new() };
     files
+        .iter()
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .filter_map(|path| path.file_name())
+        // In a Rust workspace, `Cargo.toml` is the only TOML file that is never a config.
+        .filter(|name| *name != "Cargo.toml")
+        .map(|name| folder.join(name))
+        .collect()
 }
 
 /// Refuses a path that cannot be a log, with a remedy.
@@ -89,19 +87,16 @@ pub fn check_log_path(path: &Path) -> Result<(), Failure> {
 /// # Errors
 /// A folder that cannot be read.
 pub fn mcap_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
-    let mut files: Vec<PathBuf> = fs::read_dir(folder)?
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
-        .collect();
-    files.sort();
+    let mut files = files_in(folder)?;
+    files.retain(|path| path.extension().is_some_and(|ending| ending == "mcap"));
     Ok(files)
 }
 
 /// Returns true for a folder with an image that `tagalong import images` reads.
 fn has_images(folder: &Path) -> bool {
     let is_image = |ending: &str| ["jpg", "jpeg", "png"].contains(&ending);
-    files_in(folder).iter().any(|file| ending_of(file).is_some_and(|ending| is_image(&ending)))
+    let files = files_in(folder).unwrap_or_default();
+    files.iter().any(|file| ending_of(file).is_some_and(|ending| is_image(&ending)))
 }
 
 fn log_hint(wanted: &Path) -> String {
@@ -125,20 +120,23 @@ pub fn file_hint(wanted: &Path) -> String {
 /// ending is accepted.
 fn nearest_file(wanted: &Path, accepts: impl Fn(&str) -> bool) -> Option<PathBuf> {
     let folder = wanted.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let files = files_in(folder);
+    let files = files_in(folder).unwrap_or_default();
     let accepted = files.iter().filter(|file| accepts(&ending_of(file).unwrap_or_default()));
     let names: Vec<&str> = accepted.filter_map(|file| file.file_name()?.to_str()).collect();
     let best = nearest(wanted.file_name()?.to_str()?, names)?;
     Some(wanted.with_file_name(best))
 }
 
-/// Returns what is in a folder, by name; nothing for a folder that cannot be read.
-fn files_in(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+/// Returns what is in a folder, by name.
+///
+/// # Errors
+/// A folder that cannot be read.
+fn files_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut files: Vec<PathBuf> =
+        fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
     // The order of a directory depends on the file system.
     files.sort();
-    files
+    Ok(files)
 }
 
 /// Returns the ending of a file in lower case.

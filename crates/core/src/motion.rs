@@ -1,4 +1,4 @@
-use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Vector2, Vector3};
+use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, UnitQuaternion, Vector2, Vector3};
 
 /// Speeds over ground of the two driven wheels, m/s.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -187,6 +187,12 @@ pub fn planar_pose(pose: &Isometry3<f64>) -> Isometry2<f64> {
     Isometry2::new(Vector2::new(pose.translation.x, pose.translation.y), forward.y.atan2(forward.x))
 }
 
+/// Lifts a pose on the floor to one in space, as the inverse of [`planar_pose`].
+pub fn spatial_pose(pose: &Isometry2<f64>) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), pose.rotation.angle());
+    Isometry3::from_parts(pose.translation.vector.push(0.0).into(), turn)
+}
+
 /// Computes sin(x) / x, with its Taylor series near zero.
 fn sinc(x: f64) -> f64 {
     // Below 1e-4 the next term, x^4 / 120, is less than the rounding error.
@@ -327,10 +333,12 @@ mod tests {
 
     #[test]
     fn the_pose_on_the_floor_has_the_heading_of_the_front() {
-        let tilted = nalgebra::UnitQuaternion::from_euler_angles(0.1, -0.2, 0.7);
+        let tilted = UnitQuaternion::from_euler_angles(0.1, -0.2, 0.7);
         let pose = Isometry3::from_parts(Vector3::new(1.0, 2.0, 3.0).into(), tilted);
         let flat = planar_pose(&pose);
         assert_eq!(flat.translation.vector, Vector2::new(1.0, 2.0));
         assert!((flat.rotation.angle() - 0.7).abs() < 1e-12, "{flat}");
+        let back = planar_pose(&spatial_pose(&flat));
+        assert!((back.to_homogeneous() - flat.to_homogeneous()).norm() < 1e-12, "{back}");
     }
 }

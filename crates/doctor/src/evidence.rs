@@ -121,7 +121,7 @@ pub struct Scans {
     pub count: usize,
     /// Reflections in all of them.
     pub readings: usize,
-    /// Highest number of a ray that was reflected, plus one.
+    /// Highest number of a ray, plus one.
     pub rays: u32,
     /// Angle between two rays, rad.
     pub increment_rad: f64,
@@ -137,7 +137,9 @@ impl Scans {
         let ranges = scan.points.iter().map(|point| (point.coords - eye).norm());
         self.count += 1;
         self.readings += scan.points.len();
-        self.rays = self.rays.max(scan.rays.last().map_or(0, |ray| ray + 1));
+        let reflected = scan.rays.last().copied();
+        let unread = scan.unread.last().map(|unread| unread.ray);
+        self.rays = self.rays.max(reflected.max(unread).map_or(0, |ray| ray + 1));
         self.increment_rad = scan.increment_rad.abs();
         self.farthest_m = ranges.fold(self.farthest_m, f64::max);
         self.height_m = eye.z;

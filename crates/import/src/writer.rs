@@ -3,15 +3,12 @@
 use std::path::Path;
 
 use image::{DynamicImage, GenericImageView as _};
-use nalgebra::Isometry3;
 use tagalong_app::outcome::Failure;
 use tagalong_app::signals::Signals;
 use tagalong_config::{FileLimit, read_bytes};
 use tagalong_core::Stamp;
 use tagalong_geometry::{Distortion, Pinhole};
-use tagalong_log::msgs::{
-    CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage, TransformStamped,
-};
+use tagalong_log::msgs::{CameraInfo, CompressedImage, Header, Image, Odometry, TFMessage};
 use tagalong_log::write::{MessageLog, WriteError};
 
 use super::sequence::{Eye, Moment, Placed, Sequence};
@@ -29,7 +26,7 @@ pub fn write(sequence: &Sequence, path: &Path, signals: &Signals) -> Result<(), 
     let mut log = MessageLog::create(path).map_err(Failure::usage)?;
     let start = sequence.moments.first().map_or(Stamp::default(), |moment| moment.stamp);
     if let Some(mount) = &sequence.mount {
-        let tf = transforms(start, [(ROBOT_FRAME, CAMERA_FRAME, mount)]);
+        let tf = TFMessage::of_link(start, ROBOT_FRAME, CAMERA_FRAME, mount);
         log.send("/tf_static", start, &tf).map_err(Failure::failed)?;
     }
     let mut places = sequence.placed.iter().peekable();
@@ -48,28 +45,11 @@ pub fn write(sequence: &Sequence, path: &Path, signals: &Signals) -> Result<(), 
 
 fn place(log: &mut MessageLog, placed: &Placed) -> Result<(), WriteError> {
     if let Some(camera) = &placed.robot_from_camera {
-        let tf = transforms(placed.stamp, [(ROBOT_FRAME, CAMERA_FRAME, camera)]);
+        let tf = TFMessage::of_link(placed.stamp, ROBOT_FRAME, CAMERA_FRAME, camera);
         log.send("/tf", placed.stamp, &tf)?;
     }
-    let mut odometry = Odometry {
-        header: Header::new(placed.stamp, ODOM_FRAME),
-        child_frame_id: ROBOT_FRAME.into(),
-        ..Odometry::default()
-    };
-    odometry.pose.pose = (&placed.odom_from_robot).into();
-    log.send("/odom", placed.stamp, &odometry)
-}
-
-fn transforms<'a>(
-    at: Stamp,
-    links: impl IntoIterator<Item = (&'a str, &'a str, &'a Isometry3<f64>)>,
-) -> TFMessage {
-    let transforms = links.into_iter().map(|(parent, child, pose)| TransformStamped {
-        header: Header::new(at, parent),
-        child_frame_id: child.to_owned(),
-        transform: pose.into(),
-    });
-    TFMessage { transforms: transforms.collect() }
+    let pose = &placed.odom_from_robot;
+    log.send("/odom", placed.stamp, &Odometry::of_pose(placed.stamp, ODOM_FRAME, ROBOT_FRAME, pose))
 }
 
 /// Writes one image with its calibration.

@@ -101,8 +101,10 @@ impl CameraInfo {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
-    /// K is all zero, which by REP 104 means uncalibrated.
-    #[error("K is all zero: the camera is uncalibrated; calibrate it or publish its camera_info")]
+    /// K has no focal lengths, which by REP 104 means uncalibrated.
+    #[error(
+        "K[0] and K[4] are 0: the camera is uncalibrated; calibrate it or publish its camera_info"
+    )]
     Uncalibrated,
     /// A number is outside of its range.
     #[error("{field} = {value}: {why}")]
@@ -158,13 +160,12 @@ pub fn intrinsics(info: &CameraInfo, rectified: bool) -> Result<Intrinsics, Cali
     check_rotation(&info.r)?;
     let k = &info.k;
     let p = &info.p;
-    let is_k_blank = k.iter().all(|v| *v == 0.0);
     // P holds for rectified images; where K is left out, or has ones on its diagonal alone, it is all
     // there is.
     let has_no_k = k[0] == 0.0 && k[4] == 0.0;
     let rectified = rectified || has_no_k && p[0] != 0.0;
     let use_p = rectified && p[0] != 0.0;
-    if !use_p && is_k_blank {
+    if !use_p && has_no_k {
         return Err(CalibrationError::Uncalibrated);
     }
     let full = if use_p {

@@ -13,7 +13,7 @@ const CONSTANT_S: f64 = 0.2;
 const SECOND_NS: u64 = 1_000_000_000;
 
 /// Ranges of the stamps and of the times of recording of a topic, or of one transform.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Times {
     /// Earliest and latest stamp.
     pub(crate) first: Stamp,
@@ -30,6 +30,8 @@ pub(crate) struct Times {
     /// Stamp of the last run, and the time of recording of its first message.
     run: (Stamp, Stamp),
     is_run_coarse: bool,
+    /// Time by which the stamp of the message with the least delay is later than its recording, s.
+    latest_lag_s: f64,
 }
 
 impl Times {
@@ -45,6 +47,7 @@ impl Times {
             is_whole: stamp.nanos().is_multiple_of(SECOND_NS),
             run: (stamp, recorded),
             is_run_coarse: false,
+            latest_lag_s: stamp.seconds_since(recorded),
         }
     }
 
@@ -66,6 +69,7 @@ impl Times {
         self.last = self.last.max(stamp);
         self.first_recorded = self.first_recorded.min(recorded);
         self.last_recorded = self.last_recorded.max(recorded);
+        self.latest_lag_s = self.latest_lag_s.max(stamp.seconds_since(recorded));
         self.is_whole &= stamp.nanos().is_multiple_of(SECOND_NS);
         if stamp != self.run.0 {
             self.runs += 1;
@@ -83,6 +87,11 @@ impl Times {
         let mut times = Self::new(self.first_recorded, self.first_recorded);
         times.add(self.last_recorded, self.last_recorded);
         times
+    }
+
+    /// Returns the time by which no stamp is later than its recording, s; `None` for a few messages only.
+    pub(crate) fn latest_lag_s(&self) -> Option<f64> {
+        (self.runs >= LEAST_MESSAGES as u64).then_some(self.latest_lag_s)
     }
 
     /// Returns true if one stamp stands for messages of many times, most of the time.
@@ -138,5 +147,8 @@ mod tests {
         assert!((lag(&[0.9, 1.0, 1.1, 1.2, 1.3]).unwrap() - 0.9).abs() < 1e-6);
         assert_eq!(lag(&[0.9, 1.0, 1.1, 2.2, 2.3]), None);
         assert_eq!(lag(&[0.9, 1.0]), None);
+        let latest = |stamps: &[f64]| Times::of(&at(stamps), &recorded).unwrap().latest_lag_s();
+        assert!((latest(&[-1.5, -1.4, -1.0, -1.2, -1.1]).unwrap() + 1.2).abs() < 1e-6);
+        assert_eq!(latest(&[-1.5, -1.4]), None);
     }
 }

@@ -115,6 +115,11 @@ impl TfBuffer {
         self.links.contains_key(plain(frame))
     }
 
+    /// Returns the topmost frame above one; the frame itself if it has no parent.
+    pub(crate) fn root_of<'a>(&'a self, frame: &'a str) -> &'a str {
+        self.ancestors(plain(frame)).last().copied().unwrap_or(frame)
+    }
+
     /// Returns true if the two frames are connected, at any time.
     pub fn connects(&self, a: &str, b: &str) -> bool {
         let up_a = self.ancestors(plain(a));
@@ -337,6 +342,7 @@ mod tests {
         assert!((found.to_homogeneous() - expected.to_homogeneous()).norm() < 1e-12);
         assert!(tf.lookup("colour", "elsewhere", at(0.0)).is_none());
         assert!(tf.connects("colour", "base") && !tf.connects("base", "elsewhere"));
+        assert_eq!([tf.root_of("/depth"), tf.root_of("base")], ["base", "base"]);
     }
 
     #[test]

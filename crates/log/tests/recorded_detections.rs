@@ -100,6 +100,34 @@ fn boxes_that_cannot_be_are_lost_with_the_cause() {
 }
 
 #[test]
+fn boxes_that_mean_something_else_are_told_by_their_values() {
+    for (bbox, score, is_lost, told) in [
+        ([8.0, 6.0, 4.0, 6.0], 0.9, false, ""),
+        ([6.0, 3.0, 10.0, 9.0], 0.9, true, "if their middle and size are two corners"),
+        ([6.0, 14.0, 6.0, 4.0], 0.9, true, "are inside with x and y exchanged"),
+        ([80.0, 60.0, 40.0, 60.0], 0.9, true, "as far as to x = 100 and y = 90"),
+        ([6.0, 8.0, 8.0, 4.0], 0.9, false, "the detector writes y before x"),
+        ([8.0, 6.0, 4.0, 6.0], 90.0, false, "scores from 90.00 to 90.00 are no probabilities"),
+    ] {
+        let mut log = started();
+        for index in 0..8 {
+            let mut message = array(stamp(index), &["person"]);
+            let [x, y, size_x, size_y] = bbox;
+            let center = Pose2D { position: Point2D { x, y }, theta: 0.0 };
+            message.detections[0].bbox = BoundingBox2D { center, size_x, size_y };
+            message.detections[0].results[0].hypothesis.score = score;
+            log.message(TOPIC, stamp(index), &message);
+        }
+        let (counts, source) = read(log, 8, &[]);
+        assert_eq!(counts, [Some(1); 8], "{told}");
+        let notes = source.notes();
+        let is_told = notes.iter().any(|note| note.starts_with(TOPIC) && note.contains(told));
+        assert_eq!(is_told, !told.is_empty(), "{bbox:?}: {notes:?}");
+        assert_eq!(source.data_lost(), is_lost, "{bbox:?}: {notes:?}");
+    }
+}
+
+#[test]
 fn no_message_is_no_look_and_an_empty_one_is_nobody() {
     for every in [1, 2, 3, 5, 7] {
         let mut log = started();

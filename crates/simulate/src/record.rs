@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
-use nalgebra::{Isometry2, Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry2, Isometry3};
 use serde::Serialize;
-use tagalong_core::{DepthImage, GreyImage, RangeReading, RgbImage, Stamp};
+use tagalong_core::{DepthImage, GreyImage, RangeReading, RgbImage, Stamp, spatial_pose};
 use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
 use tagalong_log::camera_info::{CONICAL_MIRROR, mirror_coefficients};
 use tagalong_log::msgs::{
@@ -340,25 +340,15 @@ fn scan(header: Header, laser: &LaserSettings, ranges: &[f32]) -> LaserScan {
     }
 }
 
-/// Returns a pose on the floor.
-fn spatial(planar: &Isometry2<f64>) -> Isometry3<f64> {
-    let at = Translation3::new(planar.translation.x, planar.translation.y, 0.0);
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
-    Isometry3::from_parts(at, turn)
-}
-
 fn true_robot(captured: Stamp, world_from_robot: &Isometry2<f64>) -> PoseStamped {
-    let pose = (&spatial(world_from_robot)).into();
+    let pose = (&spatial_pose(world_from_robot)).into();
     PoseStamped { header: Header::new(captured, WORLD_FRAME), pose }
 }
 
 fn odometry(reading: &OdometryReading) -> Odometry {
-    let mut odometry = Odometry {
-        header: Header::new(log_stamp(reading.stamp_ns), "odom"),
-        child_frame_id: "base_link".into(),
-        ..Odometry::default()
-    };
-    odometry.pose.pose = (&spatial(&reading.odom_from_robot)).into();
+    let pose = spatial_pose(&reading.odom_from_robot);
+    let stamp = log_stamp(reading.stamp_ns);
+    let mut odometry = Odometry::of_pose(stamp, "odom", "base_link", &pose);
     odometry.twist.twist.linear.x = reading.speed_mps;
     odometry.twist.twist.angular.z = reading.turn_rate;
     odometry

@@ -1,10 +1,10 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
     DepthImage, EgoMotion, Frame, Images, MAX_ODOMETRY_GAP_S, ObstacleData, ObstacleReading,
-    ObstacleReadings, RangeReading, Stamp, WheelSpeeds,
+    ObstacleReadings, RangeReading, Stamp, WheelSpeeds, spatial_pose,
 };
 use tagalong_geometry::{Camera, Lens};
 use tagalong_sim::{
@@ -174,7 +174,7 @@ impl Draw {
                 source: Arc::clone(name),
                 stamp: Stamp::from_nanos(reading.stamp_ns),
                 age_s: stamp_ns.saturating_sub(reading.stamp_ns) as f64 * 1e-9,
-                data: moved_along(&reading.data, &spatial(&(here.inverse() * then))),
+                data: moved_along(&reading.data, &spatial_pose(&(here.inverse() * then))),
             });
         }
         (!newest.is_empty()).then(|| ObstacleReadings(newest.into()))
@@ -269,12 +269,6 @@ fn moved_along(data: &SensorData, now_from_then: &Isometry3<f64>) -> ObstacleDat
         }),
         SensorData::Bumper(is_pressed) => ObstacleData::Bumper(*is_pressed),
     }
-}
-
-/// Returns a motion on the floor.
-fn spatial(planar: &Isometry2<f64>) -> Isometry3<f64> {
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
-    Isometry3::from_parts(planar.translation.vector.push(0.0).into(), turn)
 }
 
 /// The camera of the frames: that of the log, with the circular image of a

@@ -106,8 +106,16 @@ const LEAST_FLOOR: f64 = 0.1;
 /// Largest share of readings that lie clearly below the floor.
 const MOST_BELOW: f64 = 0.1;
 
+/// Heights of the cameras of robots, m.
+pub const ROBOT_HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.1..=2.5;
+/// Factors of the unit of depth that may come from a mount that is not quite right.
+pub const PLAUSIBLE_FACTORS: std::ops::RangeInclusive<f64> = 0.6..=1.7;
+/// Angle between the floor and that of the mount beyond which the mount is wrong, rad.
+const OTHER_TILT_RAD: f64 = 0.17;
+
 /// Returns the factor by which the readings of a camera of known height and tilt have to be multiplied
-/// for the floor to lie where it is; `None` if too little floor is seen. Along each ray that points
+/// for the floor to lie where it is; `None` if too little floor is seen, or if the mount is wrong, which
+/// moves the floor as another unit does: its height is no robot's, or the floor has another tilt. Along each ray that points
 /// down, a reading is at most that of the floor, and over the image the floor is met most often.
 pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     let pose = &camera.robot_from_camera;
@@ -123,7 +131,7 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
             }
         }
     }
-    if ratios.len() < LEAST_RAYS || height_m <= 0.0 {
+    if ratios.len() < LEAST_RAYS || !ROBOT_HEIGHTS_M.contains(&height_m) {
         return None;
     }
     ratios.sort_by(f64::total_cmp);
@@ -141,7 +149,20 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     let is_seen = within(farthest) as f64 >= LEAST_FLOOR * ratios.len() as f64;
     let below = ratios.len() - ratios.partition_point(|ratio| *ratio <= floor + 4.0 * ONE_FLOOR);
     let is_lowest = below as f64 <= MOST_BELOW * ratios.len() as f64;
-    (is_seen && is_lowest).then(|| (-floor).exp())
+    let factor = (is_seen && is_lowest).then(|| (-floor).exp())?;
+    let is_other_tilt =
+        !PLAUSIBLE_FACTORS.contains(&factor) && has_other_tilt(depth, camera, factor);
+    (!is_other_tilt).then_some(factor)
+}
+
+/// Returns true if the floor in readings that are multiplied by a factor has another tilt than the mount
+/// of the camera says.
+fn has_other_tilt(depth: &DepthImage, camera: &Camera, factor: f64) -> bool {
+    let scaled =
+        DepthImage::from_fn(depth.width(), depth.height(), |x, y| depth.row(y)[x] * factor as f32);
+    let told = camera.robot_from_camera.rotation.inverse() * Vector3::z();
+    ground_of_depth(&scaled, camera, &GroundSettings::default())
+        .is_some_and(|floor| floor.up_in_camera.angle(&told) > OTHER_TILT_RAD)
 }
 
 /// Leading digits of the units that cameras have.
@@ -316,6 +337,31 @@ mod tests {
         let few = factor_of_depth(&with_holes(80), &camera).unwrap();
         assert!((few - 1.0).abs() < 0.03, "{few}");
         assert_eq!(factor_of_depth(&with_holes(3), &camera), None);
+    }
+
+    #[test]
+    fn a_mount_at_the_height_of_no_robot_tells_no_unit() {
+        let lens =
+            Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        let depth = room(&Camera::mounted(lens, 160, 120, 1.2, 0.3, 0.0));
+        for height_m in [120.0, 0.0, -1.2] {
+            let told = Camera::mounted(lens, 160, 120, height_m, 0.3, 0.0);
+            assert_eq!(factor_of_depth(&depth, &told), None, "{height_m}");
+        }
+    }
+
+    #[test]
+    fn a_mount_with_another_tilt_tells_no_unit() {
+        let lens =
+            Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
+        let depth = room(&Camera::mounted(lens, 160, 120, 1.2, 0.3, 0.0));
+        let half_pi = std::f64::consts::FRAC_PI_2;
+        for (pitch_rad, roll_rad) in [(0.3, half_pi), (0.3, -half_pi), (0.0, half_pi), (1.2, 0.0)] {
+            let told = Camera::mounted(lens, 160, 120, 1.2, pitch_rad, roll_rad);
+            let found = factor_of_depth(&depth, &told);
+            let is_told = found.is_some_and(|factor| !PLAUSIBLE_FACTORS.contains(&factor));
+            assert!(!is_told, "{pitch_rad} {roll_rad}: {found:?}");
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::{PathText, Registry};
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Usage};
-use tagalong_pipeline::{BlindZone, Pipeline, SafetyDistances};
+use tagalong_pipeline::{BlindZone, Pipeline, SafetyDistances, Suits};
 
 /// Frames of the log that are tried.
 const FRAMES: u64 = 3;
@@ -31,13 +31,13 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
         let distances = distances.as_ref().map(told).unwrap_or_default();
         print(&format!("{}: valid; {}\n{distances}", config.display(), in_words(&needs, &uses)))?;
     }
-    let suited_m = pipeline.config().suits.camera_height_m;
+    let suits = pipeline.config().suits;
     let fit = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
     let blind_zone = fit.as_ref().and_then(|fit| fit.blind_zone);
     let data_lost = fit.as_ref().is_some_and(|fit| fit.data_lost);
     let seen_m = fit.as_ref().and_then(|fit| fit.camera_height_m);
     let height_m = seen_m.or_else(|| outer.input.mount().map(|mount| mount.height_m));
-    let unsuited = height_m.zip(suited_m).and_then(|(height_m, range)| unsuited(height_m, range));
+    let unsuited = height_m.and_then(|height_m| unsuited(height_m, &suits));
     let notes = fit.map(|fit| fit.notes);
     print(&match format {
         Format::Text => {
@@ -78,13 +78,10 @@ struct Fit {
     blind_zone: Option<BlindZone>,
 }
 
-/// Deviation of the camera's height from the stated range that does not matter, m.
-const HEIGHT_TOLERANCE_M: f64 = 0.1;
-
 /// Returns the warning of a camera that is lower or higher than those of `[suits]`.
-fn unsuited(height_m: f64, [low_m, high_m]: [f64; 2]) -> Option<String> {
-    let beyond_m = (low_m - height_m).max(height_m - high_m);
-    (beyond_m > HEIGHT_TOLERANCE_M).then(|| {
+fn unsuited(height_m: f64, suits: &Suits) -> Option<String> {
+    let [low_m, high_m] = suits.camera_height_m?;
+    (suits.height_off_m(height_m) > Suits::HEIGHT_TOLERANCE_M).then(|| {
         format!(
             "warning: the camera is {height_m:.2} m high, and the config is for {low_m} to {high_m} m: \
              take one for this height, see the first table of configs/README.md"

@@ -3,14 +3,19 @@ use std::sync::Arc;
 use tagalong_core::DepthImage;
 use tagalong_geometry::Camera;
 use tagalong_math::median;
-use tagalong_vision::ground::{GroundSettings, factor_of_depth, ground_of_depth, written_unit_m};
+use tagalong_vision::ground::{
+    GroundSettings, PLAUSIBLE_FACTORS, ROBOT_HEIGHTS_M, factor_of_depth, ground_of_depth,
+    written_unit_m,
+};
 use tagalong_vision::quality::DepthQuality;
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Plausible median of the depth readings of a robot's camera, m.
+/// Usual median of the depth readings of a robot's camera, m.
 const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.6..=15.0;
+/// Median of the depth readings of a camera in any room, or in front of anything, m.
+const POSSIBLE_M: std::ops::RangeInclusive<f64> = 0.1..=60.0;
 
 /// Checks unit, scale, holes and steps of depth.
 pub fn depth(evidence: &Evidence) -> Option<Finding> {
@@ -28,19 +33,24 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
     };
     let is_disparity = is_disparity(evidence);
     let measured_factor = if is_disparity { None } else { measured_factor(evidence) };
-    let far = is_far(&quality, measured_factor);
+    let unit = unit_by(evidence, &quality, measured_factor);
     let step = quality.step_m.unwrap_or(0.0);
     // The steps of stereo depth grow with the square of the distance.
     let coarse = step / quality.median_m.powi(2).max(0.1);
-    let severity = Severity::beyond(if far { 1.0 } else { 0.0 }, 0.5, 0.5)
+    let severity = unit
+        .severity()
         .max(Severity::beyond(quality.without, 0.6, 0.9))
         .max(Severity::beyond(coarse, 0.02, 0.1));
-    let by_floor = measured_factor.map_or_else(String::new, |factor| {
-        format!(
+    let by_floor = match (measured_factor, &unit) {
+        (Some(factor), _) => format!(
             ", the floor at {:.2} of the distance that the height of the camera says",
             1.0 / factor
-        )
-    });
+        ),
+        (None, Unit::OffFloor(height_m) | Unit::NearFloor(height_m)) => {
+            format!(", the floor {height_m:.2} m below the camera by these readings")
+        }
+        (None, _) => String::new(),
+    };
     let measured = format!(
         "median {:.2} m, {:.0} % without a reading, steps of {:.1} mm{by_floor}",
         quality.median_m,
@@ -51,25 +61,83 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
         .figure("median_m", quality.median_m)
         .figure("without", quality.without)
         .figure("step_m", step);
-    Some(if far {
-        finding
-            .why("people are looked for between half a metre and some metres: the unit is wrong")
-            .remedy(if is_disparity {
-                better_geometry(quality.median_m)
-            } else {
-                better_unit(evidence, quality.median_m, measured_factor)
-            })
-    } else {
-        finding
+    Some(match unit {
+        Unit::Plausible | Unit::NearFloor(_) => finding
             .why("people in holes, or between coarse steps, have no shape")
-            .remedy("dark or shiny surfaces, sunlight, the camera's own range: look at the pictures; a stereo config may do better")
+            .remedy("dark or shiny surfaces, sunlight, the camera's own range: look at the pictures; a stereo config may do better"),
+        Unit::Unusual | Unit::OffMedian if is_disparity => finding
+            .why("people are looked for between half a metre and some metres: the unit may be wrong")
+            .remedy(better_geometry(quality.median_m)),
+        Unit::Measured(factor) => finding
+            .why("by the floor and the height of the camera the unit is wrong")
+            .remedy(format!(
+                "[input] depth_unit_m = {}",
+                written_unit_m(taken_unit_m(evidence) * factor)
+            )),
+        Unit::OffFloor(height_m) => finding
+            .why("no robot's camera is at this distance from the floor: the unit is wrong")
+            .remedy(units_by_height(taken_unit_m(evidence), height_m)),
+        Unit::OffMedian => finding
+            .why("no room is as near or as far: the unit is wrong")
+            .remedy(unit_by_median(taken_unit_m(evidence), quality.median_m)),
+        Unit::Unusual => finding
+            .why("people are looked for between half a metre and some metres: the unit may be wrong")
+            .remedy(UNIT_BY_THING),
     })
 }
 
-/// Returns true if the readings, or the floor in them, tell that the unit is wrong.
-fn is_far(quality: &DepthQuality, measured_factor: Option<f64>) -> bool {
-    let is_off = measured_factor.is_some_and(|factor| !PLAUSIBLE_FACTORS.contains(&factor));
-    !PLAUSIBLE_M.contains(&quality.median_m) || is_off
+/// Evidence on the unit of depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Unit {
+    /// Nothing speaks against it.
+    Plausible,
+    /// The floor lies where the height of the camera, which is known, says with readings times this.
+    Measured(f64),
+    /// The floor lies as far below a camera of unknown height as below no robot's, m.
+    OffFloor(f64),
+    /// The floor lies as far below a camera of unknown height as below that of a robot, m, and what is
+    /// seen is nearer or farther than usual.
+    NearFloor(f64),
+    /// No floor is seen, and the readings are those of no room.
+    OffMedian,
+    /// No floor is seen, and the readings are nearer or farther than usual.
+    Unusual,
+}
+
+impl Unit {
+    fn by_factor(factor: f64) -> Self {
+        if PLAUSIBLE_FACTORS.contains(&factor) { Self::Plausible } else { Self::Measured(factor) }
+    }
+
+    fn severity(self) -> Severity {
+        match self {
+            Self::Plausible | Self::NearFloor(_) => Severity::Ok,
+            Self::Unusual => Severity::Warn,
+            Self::Measured(_) | Self::OffFloor(_) | Self::OffMedian => Severity::Bad,
+        }
+    }
+}
+
+/// Judges the unit by the floor, and where none is seen by the median of the readings.
+fn unit_by(evidence: &Evidence, quality: &DepthQuality, measured_factor: Option<f64>) -> Unit {
+    if let Some(factor) = measured_factor {
+        return Unit::by_factor(factor);
+    }
+    if PLAUSIBLE_M.contains(&quality.median_m) {
+        return Unit::Plausible;
+    }
+    let camera = evidence.samples.camera.as_deref().filter(|_| !is_disparity(evidence));
+    let height_m =
+        camera.and_then(|camera| floor_m(&evidence.samples.depths, camera, quality.median_m));
+    match (height_m, camera) {
+        (Some(height_m), Some(camera)) if is_height_known(evidence) => {
+            Unit::by_factor(camera.height_m() / height_m)
+        }
+        (Some(height_m), _) if ROBOT_HEIGHTS_M.contains(&height_m) => Unit::NearFloor(height_m),
+        (Some(height_m), _) => Unit::OffFloor(height_m),
+        (None, _) if POSSIBLE_M.contains(&quality.median_m) => Unit::Unusual,
+        (None, _) => Unit::OffMedian,
+    }
 }
 
 /// Returns true if depth comes from disparities.
@@ -87,14 +155,19 @@ fn better_geometry(median_m: f64) -> String {
     )
 }
 
-/// Factors of the unit that may come from a mount that is not quite right.
-const PLAUSIBLE_FACTORS: std::ops::RangeInclusive<f64> = 0.6..=1.7;
+/// Returns true if something else than depth tells the height of the camera, and it is a robot's.
+fn is_height_known(evidence: &Evidence) -> bool {
+    let source = &evidence.inspection.facts.camera_source;
+    let camera = evidence.samples.camera.as_ref();
+    !evidence.is_pose_assumed()
+        && !source.starts_with("the floor")
+        && camera.is_some_and(|camera| ROBOT_HEIGHTS_M.contains(&camera.height_m()))
+}
 
 /// Returns the factor by which depth has to be multiplied for the floor to lie as far below the camera
 /// as its mount says; `None` where the mount is not known, or too little floor is seen.
 fn measured_factor(evidence: &Evidence) -> Option<f64> {
-    let source = &evidence.inspection.facts.camera_source;
-    if evidence.is_pose_assumed() || source.starts_with("the floor") {
+    if !is_height_known(evidence) {
         return None;
     }
     let camera = evidence.samples.camera.as_ref()?;
@@ -104,31 +177,53 @@ fn measured_factor(evidence: &Evidence) -> Option<f64> {
     factors.get(factors.len() / 2).copied()
 }
 
-/// Returns the setting of the unit by which the floor lies where it is. Where the height of the camera
-/// is not known, it is the unit for a camera of usual height; where no floor is seen, that by which the
-/// median would be some metres.
-fn better_unit(evidence: &Evidence, median_m: f64, measured_factor: Option<f64>) -> String {
+/// Returns the unit that is taken, m.
+fn taken_unit_m(evidence: &Evidence) -> f64 {
     let usual = if is_float(evidence) { 1.0 } else { 0.001 };
-    let unit = evidence.input.depth_unit_m.unwrap_or(usual);
-    if let Some(factor) = measured_factor {
-        return format!("[input] depth_unit_m = {}", written_unit_m(unit * factor));
+    evidence.input.depth_unit_m.unwrap_or(usual)
+}
+
+/// Units that depth cameras have, m.
+const USUAL_UNITS_M: [f64; 8] = [1.0, 0.01, 0.001, 0.0005, 0.00025, 0.0002, 0.000125, 0.0001];
+
+/// Returns the remedy where the floor lies at this height with the unit that is taken, m, and the height
+/// of the camera is not known: each unit with the height that follows from it.
+fn units_by_height(taken_m: f64, height_m: f64) -> String {
+    let mut follows: Vec<String> = Vec::new();
+    for unit_m in USUAL_UNITS_M {
+        let camera_m = height_m * unit_m / taken_m;
+        if ROBOT_HEIGHTS_M.contains(&camera_m) {
+            follows.push(format!("{unit_m} for a camera {camera_m:.2} m above the floor"));
+        }
     }
-    let camera = evidence.samples.camera.as_deref();
-    let by_floor = camera
-        .and_then(|camera| factor_for_usual_height(&evidence.samples.depths, camera, median_m));
-    if let Some(factor) = by_floor {
-        return format!(
-            "[input] depth_unit_m = {}\nfor a camera {USUAL_HEIGHT_M} m above the floor; that of a \
-             camera of half the height is half of it",
-            written_unit_m(unit * factor)
-        );
+    if follows.is_empty() {
+        let metre = written_unit_m(taken_m / height_m);
+        follows.push(format!("{metre} for each metre of its height above the floor"));
     }
+    format!(
+        "give the height of the camera, with which the floor tells the unit:\n[input.camera]\n\
+         height_m = ...  # measure it\nor the unit, [input] depth_unit_m = {}",
+        follows.join(", ")
+    )
+}
+
+/// Returns the remedy where the readings are those of no room and no floor is seen: the power of ten by
+/// which they are some metres.
+fn unit_by_median(taken_m: f64, median_m: f64) -> String {
     let tens = (USUAL_MEDIAN_M / median_m).log10().round();
-    let better = unit * 10f64.powf(tens);
+    let better = taken_m * 10f64.powf(tens);
     // In the short form: 0.001, not 0.0010000000000000002.
     let better = format!("{better:.9}").parse().unwrap_or(better);
-    format!("[input] depth_unit_m = {better}")
+    format!(
+        "[input] depth_unit_m = {better}\nwith which half of the readings are within {:.1} m; no floor \
+         is seen that tells the unit more exactly",
+        median_m * 10f64.powf(tens)
+    )
 }
+
+/// Remedy where nothing tells the unit.
+const UNIT_BY_THING: &str = "is the scene as near or as far as that? else set [input] depth_unit_m, in metres per unit; no \
+     floor is seen that tells it";
 
 /// Returns true for depth in floating-point numbers, which are metres by convention.
 fn is_float(evidence: &Evidence) -> bool {
@@ -137,20 +232,13 @@ fn is_float(evidence: &Evidence) -> bool {
     image.is_some_and(|image| image.pixels.contains("32FC1"))
 }
 
-/// Height of a camera on a robot where nothing tells it, m.
-const USUAL_HEIGHT_M: f64 = 1.2;
 /// Median of the depth readings of a robot's camera, m.
 const USUAL_MEDIAN_M: f64 = 3.0;
 /// Number of depth images by which the floor is measured.
 const FLOOR_IMAGES: usize = 3;
 
-/// Returns the factor by which depth has to be multiplied for the floor to lie as far below the camera
-/// as usual; `None` if no floor is seen.
-fn factor_for_usual_height(
-    depths: &[Arc<DepthImage>],
-    camera: &Camera,
-    median_m: f64,
-) -> Option<f64> {
+/// Returns the distance of the floor below the camera, m; `None` if no floor is seen.
+fn floor_m(depths: &[Arc<DepthImage>], camera: &Camera, median_m: f64) -> Option<f64> {
     // The fit has tolerances in metres, and needs readings of usual size.
     let scale = USUAL_MEDIAN_M / median_m;
     let mut heights_m = Vec::new();
@@ -159,34 +247,29 @@ fn factor_for_usual_height(
             depth.row(y)[x] * scale as f32
         });
         let floor = ground_of_depth(&scaled, camera, &GroundSettings::default());
-        heights_m.extend(floor.map(|floor| floor.height_m));
+        heights_m.extend(floor.map(|floor| floor.height_m / scale));
     }
-    let height_m = median(heights_m)?;
-    Some(scale * USUAL_HEIGHT_M / height_m)
+    median(heights_m)
 }
-
-/// Heights of the cameras of robots, m.
-const USUAL_HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.2..=2.0;
 
 /// Returns true if the unit of depth may be wrong: the readings tell it, or nobody is found and no floor
 /// lies where that of a robot does, with a camera whose height nothing else tells.
 pub(super) fn is_unit_in_doubt(evidence: &Evidence) -> bool {
     let samples = &evidence.samples;
-    let quality = DepthQuality::of(samples.depths.iter().map(AsRef::as_ref));
     let factor = if is_disparity(evidence) { None } else { measured_factor(evidence) };
-    if quality.is_some_and(|quality| is_far(&quality, factor)) {
+    if let Some(quality) = DepthQuality::of(samples.depths.iter().map(AsRef::as_ref))
+        && unit_by(evidence, &quality, factor).severity() > Severity::Ok
+    {
         return true;
     }
-    let source = &evidence.inspection.facts.camera_source;
-    let is_known = !evidence.is_pose_assumed() && !source.starts_with("the floor");
     let is_told = evidence.input.depth_unit_m.is_some() || is_float(evidence);
-    let is_judged = is_known || is_told || is_disparity(evidence);
+    let is_judged = is_height_known(evidence) || is_told || is_disparity(evidence);
     if is_judged || samples.depths.is_empty() || evidence.coverage.frames_with_people > 0 {
         return false;
     }
     let is_seen = 2 * samples.floors.len() >= samples.count;
     let height_m = median(samples.floors.iter().map(|(floor, _)| floor.height_m));
-    !is_seen || height_m.is_none_or(|height_m| !USUAL_HEIGHTS_M.contains(&height_m))
+    !is_seen || height_m.is_none_or(|height_m| !ROBOT_HEIGHTS_M.contains(&height_m))
 }
 
 #[cfg(test)]
@@ -204,9 +287,28 @@ mod tests {
                 DepthImage::from_fn(seen.width(), seen.height(), |x, y| seen.row(y)[x] * scale);
             let quality = DepthQuality::of([&scaled]).unwrap();
             let images = [Arc::new(scaled)];
-            let factor = factor_for_usual_height(&images, camera, quality.median_m).unwrap();
-            let expected = USUAL_HEIGHT_M / camera.height_m() / f64::from(scale);
-            assert!((factor / expected - 1.0).abs() < 0.03, "{scale}: {factor}, not {expected}");
+            let height_m = floor_m(&images, camera, quality.median_m).unwrap();
+            let expected_m = camera.height_m() * f64::from(scale);
+            assert!((height_m / expected_m - 1.0).abs() < 0.03, "{scale}: {height_m}");
         }
+    }
+
+    #[test]
+    fn an_unknown_height_tells_which_unit_follows_from_which_height() {
+        let told = units_by_height(0.001, 12.0);
+        assert!(told.contains("[input.camera]\nheight_m"), "{told}");
+        for follows in ["0.0001 for a camera 1.20 m above", "0.0002 for a camera 2.40 m above"] {
+            assert!(told.contains(follows), "{told}");
+        }
+        assert!(!told.contains("0.001 for") && !told.contains("0.00025 for"), "{told}");
+        let other = units_by_height(0.001, 1e6);
+        assert!(other.contains("0.000000001 for each metre"), "{other}");
+    }
+
+    #[test]
+    fn a_unit_by_the_median_alone_is_a_power_of_ten() {
+        let told = unit_by_median(0.001, 350.0);
+        assert!(told.starts_with("[input] depth_unit_m = 0.00001\nwith which half"), "{told}");
+        assert!(told.contains("within 3.5 m; no floor is seen"), "{told}");
     }
 }

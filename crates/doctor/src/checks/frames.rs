@@ -21,7 +21,11 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
         return ok(format!("no tf; the pose of the {sensor} comes from {}", facts.camera_source));
     }
     if !facts.camera_source.starts_with("tf") {
-        return Some(cut(evidence, &name));
+        return Some(if camera.is_blind() {
+            cut_scanner(evidence, &name)
+        } else {
+            cut(evidence, &name)
+        });
     }
     let pitch = camera.pitch_down_rad().to_degrees();
     let roll = camera.roll_rad().to_degrees();
@@ -36,11 +40,25 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
     let finding = Finding::new("frames", Severity::Bad, measured)
         .figure("pitch_down_deg", pitch)
         .figure("roll_deg", roll)
-        .why("images belong to an optical frame (REP 103: z forward, x right); this one is a body frame, or a rotation is missing");
+        .why("images belong to an optical frame (REP 103: z forward, x right); this one is a body frame, a rotation is missing, or the camera is mounted on its side");
     Some(finding.remedy(format!(
         "publish the images in the *_optical_frame, or give the pose:\n{}",
         mount_lines(evidence)
     )))
+}
+
+/// Reports that the scanner's frame is not connected to the robot's.
+fn cut_scanner(evidence: &Evidence, scanner: &str) -> Finding {
+    let facts = &evidence.inspection.facts;
+    let robot = facts.robot_frame.as_str();
+    let (measured, remedy) = if scanner.is_empty() {
+        ("the frame_id of the scans is empty".to_owned(), "let the driver set the frame_id")
+    } else {
+        (format!("tf does not connect `{scanner}` with `{robot}`"), "publish the missing transform")
+    };
+    Finding::new("frames", Severity::Bad, format!("{measured}; {}", facts.camera_source))
+        .why("without the transform the place of the scanner on the robot is not known")
+        .remedy(remedy)
 }
 
 /// Reports that the camera's frame is not connected to the robot's.

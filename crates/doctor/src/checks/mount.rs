@@ -1,4 +1,5 @@
 use tagalong_math::median;
+use tagalong_vision::ground::ROBOT_HEIGHTS_M;
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
@@ -36,7 +37,10 @@ pub fn mount(evidence: &Evidence) -> Option<Finding> {
         .figure("roll_off_deg", roll)
         .why("heads are looked for at the height of heads above the floor");
     // A wrong unit of depth scales the height and leaves the angles as they are.
-    let scaled = pitch.abs() < 3.0 && roll.abs() < 3.0 && !(0.7..1.4).contains(&(seen / told));
+    let scaled = pitch.abs() < 3.0
+        && roll.abs() < 3.0
+        && ROBOT_HEIGHTS_M.contains(&told)
+        && !(0.7..1.4).contains(&(seen / told));
     Some(finding.remedy(if scaled {
         format!(
             "the tilt agrees and the height does not: depth may be in another unit, {:.3} of what is \

@@ -26,7 +26,7 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     };
     let source = evidence.inspection.facts.odometry_topic.as_deref();
     let (severity, measured) = match (source, gaps + jumps) {
-        (_, 1..) => (Severity::Warn, format!("silent at {gaps} frames, jumps at {jumps}; {way}")),
+        (_, 1..) => (Severity::Warn, unsteady(gaps, jumps, &way, stands)),
         // Readings in a wrong unit are beyond the walls, or between floor and ceiling at random.
         _ if all_moves && is_unit_in_doubt(evidence) => {
             let measured =
@@ -54,9 +54,43 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
         .figure("driven_m", metres)
         .figure("turned_deg", evidence.driven.turned_rad.to_degrees())
         .why("while the robot moves and does not say so, people seem to move instead");
-    Some(
-        finding.remedy(
-            "record the odometry throughout, and name it:\n[input] odometry_topic = \"/odom\"",
-        ),
-    )
+    let name = "name it:\n[input] odometry_topic = \"/odom\"";
+    Some(finding.remedy(if jumps > gaps {
+        format!(
+            "is it in metres, of one publisher, and without resets? else record another one, and {name}"
+        )
+    } else {
+        format!("record the odometry throughout, and {name}")
+    }))
+}
+
+/// Returns the words for odometry with gaps and jumps. Over these the way is not known, so that nothing
+/// is said of a robot that seems to stand.
+fn unsteady(gaps: u64, jumps: u64, way: &str, stands: bool) -> String {
+    let mut parts = Vec::new();
+    if gaps > 0 {
+        parts.push(format!("silent at {gaps} frames"));
+    }
+    if jumps > 0 {
+        parts.push(format!("jumps by more than a metre at {jumps} frames"));
+    }
+    let way = if stands { "the way between them is not known" } else { way };
+    format!("{}; {way}", parts.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_whose_odometry_jumps_is_not_said_to_stand() {
+        let jumps = unsteady(0, 19, "the robot stands still", true);
+        assert_eq!(
+            jumps,
+            "jumps by more than a metre at 19 frames; the way between them is not known"
+        );
+        let both = unsteady(3, 1, "1.8 m driven, 0 degrees turned", false);
+        assert!(both.starts_with("silent at 3 frames, jumps by"), "{both}");
+        assert!(both.ends_with("; 1.8 m driven, 0 degrees turned"), "{both}");
+    }
 }

@@ -19,7 +19,14 @@ impl Evidence {
 pub fn rate(evidence: &Evidence) -> Option<Finding> {
     let topic = evidence.primary()?;
     let Some(timing) = topic.timing else {
-        let measured = format!("{} has {} message", topic.topic, topic.count);
+        let measured = if topic.count > 1 {
+            let name = &topic.topic;
+            format!(
+                "no message of {name} is stamped later than the one before: the rate is not known"
+            )
+        } else {
+            format!("{} has one message", topic.topic)
+        };
         return Some(Finding::new("rate", Severity::Unknown, measured));
     };
     let hz = 1.0 / timing.median_period_s;

@@ -20,8 +20,9 @@ const SKIPPED: [(&str, &str, &str); 8] = [
     ),
     (
         "frames_without_camera_pose",
-        "images at times without a pose of the camera",
-        "publish tf to the camera throughout, or give [input.camera]",
+        "images at times without a pose of the camera, which get the last known one if there is any",
+        "publish tf to the camera throughout, on /tf_static if it does not move on the robot, or give \
+         [input.camera]",
     ),
     ("late_frames", "images too late to be put in order", "[input] reorder_frames = 8"),
     (
@@ -65,7 +66,7 @@ pub fn skipped(evidence: &Evidence) -> Option<Finding> {
     let notes = evidence.inspection.notes.iter().filter(|note| note.contains("is not read"));
     let remedies: Vec<&str> = remedies.into_iter().chain(notes.map(String::as_str)).collect();
     let finding = Finding::new("skipped", severity, measured.join(", "))
-        .why("people in messages that are left out are missed, and nothing else says so");
+        .why("people are missed in what is left out, and misplaced by what is out of date");
     Some(finding.remedy(remedies.join("\n")))
 }
 

@@ -1,9 +1,11 @@
+use tagalong_pipeline::Suits;
+
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
 /// Deviations from a stated range that are no matter, and those that are a serious one: of the
 /// height, m, and of the pitch, degrees.
-const HEIGHT_M: (f64, f64) = (0.1, 0.5);
+const HEIGHT_M: (f64, f64) = (Suits::HEIGHT_TOLERANCE_M, 0.5);
 const PITCH_DEG: (f64, f64) = (3.0, 15.0);
 
 /// Checks that the robot and the camera are among those that the config states (`[suits]`).
@@ -33,10 +35,10 @@ fn camera(evidence: &Evidence) -> Option<Finding> {
     if camera.is_blind() || evidence.is_pose_assumed() || !is_stated {
         return None;
     }
-    let [height_off, pitch_off] =
-        [height, pitch].map(|value| value.map_or(0.0, |(now, range)| beyond(now, range)));
-    let severity = Severity::beyond(height_off, HEIGHT_M.0, HEIGHT_M.1).max(Severity::beyond(
-        pitch_off,
+    let height_off_m = stated.height_off_m(camera.height_m());
+    let pitch_off_deg = stated.pitch_off_deg(camera.pitch_down_rad().to_degrees());
+    let severity = Severity::beyond(height_off_m, HEIGHT_M.0, HEIGHT_M.1).max(Severity::beyond(
+        pitch_off_deg,
         PITCH_DEG.0,
         PITCH_DEG.1,
     ));
@@ -54,21 +56,6 @@ fn camera(evidence: &Evidence) -> Option<Finding> {
     ))
 }
 
-/// Returns the distance of a value from a range.
-fn beyond(value: f64, [low, high]: [f64; 2]) -> f64 {
-    (low - value).max(value - high).max(0.0)
-}
-
 fn said(unit: &str, digits: usize, (now, [low, high]): (f64, [f64; 2])) -> String {
     format!("{now:.digits$} {unit}, the config is for {low} to {high}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn deviations_count_on_both_sides() {
-        assert_eq!([0.3, 1.0, 2.5].map(|v| beyond(v, [0.9, 2.0])), [0.6000000000000001, 0.0, 0.5]);
-    }
 }

@@ -1,7 +1,7 @@
 use std::ops::Range;
 
-use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
-use tagalong_core::{DepthImage, Stamp};
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use tagalong_core::{DepthImage, Stamp, spatial_pose};
 use tagalong_geometry::{Camera, Lens};
 use tagalong_log::LogFrame;
 
@@ -53,11 +53,7 @@ impl View {
         let rows = depth.height() / step;
         let readings = reduced(&depth, step, columns, rows);
         let odom_from_robot = item.odom_from_robot;
-        let shift = odom_from_robot.translation;
-        let turn =
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), odom_from_robot.rotation.angle());
-        let lifted = Isometry3::from_parts(Translation3::new(shift.x, shift.y, 0.0), turn);
-        let odom_from_camera = lifted * frame.camera.robot_from_camera;
+        let odom_from_camera = spatial_pose(&odom_from_robot) * frame.camera.robot_from_camera;
         Some(Self {
             index: frame.index,
             stamp: frame.stamp,

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Isometry3, Point2, Point3, UnitQuaternion, Vector3};
-use tagalong_core::{DepthImage, EgoMotion, LaserScan, Track};
+use nalgebra::{Isometry2, Isometry3, Point2, Point3};
+use tagalong_core::{DepthImage, EgoMotion, LaserScan, Track, spatial_pose};
 use tagalong_geometry::Camera;
 
 /// Pixels of a depth image that are compared, at most, in each direction.
@@ -169,7 +169,7 @@ fn contradicts_depth(
     if (then.depth.width(), then.depth.height()) != (now.width(), now.height()) {
         return None;
     }
-    let now_from_then = lifted(moved).inverse();
+    let now_from_then = spatial_pose(moved).inverse();
     let mut counts = Counts::new(DEPTH_NOISE);
     for y in (0..now.height()).step_by(step_y) {
         for x in (0..now.width()).step_by(step_x) {
@@ -284,7 +284,7 @@ fn contradicts_scan(
     now: &ScanReference,
     moved: &Isometry2<f64>,
 ) -> Option<bool> {
-    let now_from_then = lifted(moved).inverse();
+    let now_from_then = spatial_pose(moved).inverse();
     let scanner_from_robot = scan.robot_from_scanner.inverse();
     let mut counts = Counts::new(SCAN_NOISE);
     for (ray, range) in then.ranges.iter().enumerate() {
@@ -338,11 +338,4 @@ impl Counts {
         (self.telling >= ENOUGH)
             .then(|| f64::from(self.unchanged) >= UNCHANGED * f64::from(self.telling))
     }
-}
-
-/// Returns a motion on the floor as one in space.
-fn lifted(motion: &Isometry2<f64>) -> Isometry3<f64> {
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), motion.rotation.angle());
-    let at = Vector3::new(motion.translation.x, motion.translation.y, 0.0);
-    Isometry3::from_parts(at.into(), turn)
 }

@@ -56,6 +56,10 @@ impl VideoDecoder {
     /// bits with halved colours. No picture follows until the next key picture.
     pub(crate) fn decode(&mut self, packet: &[u8], header: Header) -> Result<Picture, ImageError> {
         let packet = &*with_start_codes(packet);
+        if let Some(why) = cut_off(packet) {
+            self.is_whole = false;
+            return Err(damaged(why));
+        }
         // The decoder is a young one, and a log may hold any bytes: a panic is a damaged packet.
         match catch_unwind(AssertUnwindSafe(|| self.take(packet))) {
             Ok(Ok(Some(frame))) if self.is_out_of_order(&frame, header.stamp()) => {
@@ -76,13 +80,21 @@ impl VideoDecoder {
     }
 
     fn take(&mut self, packet: &[u8]) -> Result<Option<Frame>, ImageError> {
+        let begins = !self.is_whole;
         let mut outcome = Ok(());
         for unit in parse_annex_b(packet) {
             outcome = outcome.and_then(|()| self.take_unit(&unit));
         }
         // The rest of a damaged picture must not become part of the next one.
         let picture = self.decoder.flush();
-        outcome.map(|()| picture)
+        outcome?;
+        if let Some(frame) = &picture
+            && begins
+            && is_cut_short(packet, frame)
+        {
+            return Err(damaged("its end is missing"));
+        }
+        Ok(picture)
     }
 
     fn take_unit(&mut self, unit: &NalUnit<'_>) -> Result<(), ImageError> {
@@ -191,6 +203,42 @@ fn checked(unit: &NalUnit<'_>, limits: &Limits) -> Result<Sps, ImageError> {
     Ok(sps)
 }
 
+/// Returns what is missing at the start of a packet; `None` for one that begins with a unit, and whose
+/// picture begins with its first block. The decoder would make a picture of the rest.
+fn cut_off(packet: &[u8]) -> Option<&'static str> {
+    let zeros = packet.iter().take_while(|byte| **byte == 0).count();
+    let is_start = zeros >= 2 && packet.get(zeros) == Some(&1);
+    if !is_start && !packet.is_empty() {
+        return Some("its start is missing: it begins within a unit");
+    }
+    let units = parse_annex_b(packet);
+    let picture = units.iter().find(|unit| is_picture(unit))?;
+    let first_block = Bits { bytes: &picture.rbsp, at: 0 }.exponential();
+    (first_block != Some(0)).then_some("the first part of its picture is missing")
+}
+
+/// Bytes that are put behind a packet; neither zeros, as the decoder reads there, nor a start code.
+const BEHIND: [u8; 64] = [0x5a; 64];
+
+/// Returns true if a packet with parameters and a key picture lacks its end: the picture is another one
+/// with other bytes behind it.
+fn is_cut_short(packet: &[u8], seen: &Frame) -> bool {
+    let longer = [packet, &BEHIND].concat();
+    let units = parse_annex_b(&longer);
+    for needed in [NalUnitType::Sps, NalUnitType::Pps, NalUnitType::SliceIdr] {
+        if !units.iter().any(|unit| unit.nal_unit_type == needed) {
+            return false;
+        }
+    }
+    let mut decoder = Decoder::new();
+    for unit in &units {
+        // As in the picture that was seen, an error shows in its pixels.
+        let _ = decoder.decode_nal(unit);
+    }
+    let other = decoder.flush();
+    other.is_none_or(|other| (&other.y, &other.u, &other.v) != (&seen.y, &seen.u, &seen.v))
+}
+
 fn is_picture(unit: &NalUnit<'_>) -> bool {
     matches!(unit.nal_unit_type, NalUnitType::Slice | NalUnitType::SliceIdr)
 }
@@ -208,7 +256,7 @@ fn picture_number(rbsp: &[u8], bits: u32) -> Option<u32> {
     let mut reader = Bits { bytes: rbsp, at: 0 };
     // The first block, the type of the slice and its picture parameters stand before it.
     for _ in 0..3 {
-        reader.skip_exponential()?;
+        reader.exponential()?;
     }
     reader.number(bits)
 }
@@ -235,14 +283,17 @@ impl Bits<'_> {
         Some(value)
     }
 
-    /// Skips a number in the code of Golomb: as many bits behind the first one as zeros before it.
-    fn skip_exponential(&mut self) -> Option<()> {
+    /// Reads a number in the code of Golomb: as many bits behind the first one as zeros before it.
+    fn exponential(&mut self) -> Option<u64> {
         let mut zeros = 0;
         while self.bit()? == 0 {
             zeros += 1;
         }
-        self.at += zeros;
-        Some(())
+        let mut value: u64 = 1;
+        for _ in 0..zeros {
+            value = value.checked_mul(2)? + u64::from(self.bit()?);
+        }
+        Some(value - 1)
     }
 }
 
@@ -333,6 +384,41 @@ mod tests {
         gap.remove(3);
         let found = numbers(gap);
         assert_eq!(found[..6], [Some(0), Some(1), Some(2), None, None, Some(6)]);
+    }
+
+    #[test]
+    fn the_rest_of_a_packet_is_damaged_and_makes_no_picture() {
+        let key = packets()[6];
+        let rest = &key[key.len() / 2..];
+        // A key picture that begins with its second block.
+        let second_part = [0, 0, 0, 1, 0x65, 0x40, 0x80];
+        let cases = [
+            (rest, "its start is missing"),
+            (&second_part, "the first part of its picture is missing"),
+        ];
+        for (part, why) in cases {
+            let mut decoder = VideoDecoder::new(&Limits::default());
+            assert!(matches!(decoder.decode(packets()[0], at(1)), Ok(Picture::Whole(_))));
+            let error = decoder.decode(part, at(2)).unwrap_err().to_string();
+            assert!(error.contains(why), "{error}");
+            assert_eq!(decoder.decode(packets()[7], at(3)), Ok(Picture::Waits));
+            assert!(matches!(decoder.decode(key, at(4)), Ok(Picture::Whole(_))));
+        }
+    }
+
+    #[test]
+    fn a_first_key_picture_without_its_end_is_damaged() {
+        for stream in [split(WALK), split(SMALL), split(BETWEEN)] {
+            let key = stream[0];
+            for parts in [4, 6, 7] {
+                let mut decoder = VideoDecoder::new(&Limits::default());
+                let error = decoder.decode(&key[..key.len() * parts / 8], at(1)).unwrap_err();
+                assert!(matches!(error, ImageError::Codec(_)), "{parts}: {error}");
+                assert_eq!(decoder.decode(stream[1], at(2)), Ok(Picture::Waits), "{parts}");
+            }
+            let mut decoder = VideoDecoder::new(&Limits::default());
+            assert!(matches!(decoder.decode(key, at(1)), Ok(Picture::Whole(_))));
+        }
     }
 
     /// Returns stamp and checksum of the pixels of each picture of a stream, whose packets have these

@@ -1,5 +1,6 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
+use tagalong_core::Stamp;
 
 use super::{Header, message};
 
@@ -127,6 +128,18 @@ pub struct TFMessage {
 
 message!(TFMessage, "tf2_msgs/msg/TFMessage", "TFMessage.msg");
 
+impl TFMessage {
+    /// Creates a message with one transform.
+    pub fn of_link(at: Stamp, parent: &str, child: &str, pose: &Isometry3<f64>) -> Self {
+        let link = TransformStamped {
+            header: Header::new(at, parent),
+            child_frame_id: child.to_owned(),
+            transform: pose.into(),
+        };
+        Self { transforms: vec![link] }
+    }
+}
+
 /// `geometry_msgs/PoseStamped`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseStamped {
@@ -190,3 +203,15 @@ pub struct Odometry {
 }
 
 message!(Odometry, "nav_msgs/msg/Odometry", "Odometry.msg");
+
+impl Odometry {
+    /// Creates a message with a pose and no velocities.
+    pub fn of_pose(at: Stamp, odom: &str, robot: &str, odom_from_robot: &Isometry3<f64>) -> Self {
+        Self {
+            header: Header::new(at, odom),
+            child_frame_id: robot.to_owned(),
+            pose: PoseWithCovariance { pose: odom_from_robot.into(), ..Default::default() },
+            twist: TwistWithCovariance::default(),
+        }
+    }
+}

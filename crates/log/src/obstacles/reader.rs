@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use tagalong_core::{DepthImage, ObstacleData, ObstacleReading, RangeReading, Stamp};
+use tagalong_core::{DepthImage, ObstacleData, ObstacleReading, RangeReading, Stamp, spatial_pose};
 use tagalong_geometry::{Camera, Lens};
 
 use super::bumper::{Bumper, Contact};
@@ -18,7 +18,7 @@ use crate::odometry::AHEAD_S;
 use crate::pairing::Payload;
 use crate::scan::Type;
 use crate::sensors::Moment;
-use crate::sensors::laser::{lose_scan, on_floor, scan_fault, seen_from};
+use crate::sensors::laser::{lose_scan, scan_fault, seen_from};
 use crate::tally::Tally;
 
 /// Reader of one source.
@@ -144,7 +144,7 @@ impl ObstacleReader {
             Messages::Range(ranges) => {
                 let Timed { stamp, value, .. } = ranges.newest_until(latest)?;
                 let mount = mount_at(source, moment, &value.header.frame_id, *stamp, tally)?;
-                let pose = on_floor(&moment.robot_from(*stamp)) * mount;
+                let pose = spatial_pose(&moment.robot_from(*stamp)) * mount;
                 (*stamp, ObstacleData::Range(range_reading(value, pose)))
             }
             Messages::Scan(scans) => {
@@ -156,7 +156,7 @@ impl ObstacleReader {
             Messages::Depth(depth) => {
                 let (stamp, frame_id, image) = depth.newest(source, latest, format, tally)?;
                 let mount = mount_at(source, moment, &frame_id, stamp, tally)?;
-                let pose = on_floor(&moment.robot_from(stamp)) * mount;
+                let pose = spatial_pose(&moment.robot_from(stamp)) * mount;
                 let lens = Lens::Pinhole(depth.lens.lens);
                 let camera = Camera {
                     lens,

@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 use tagalong_core::{ExternalDetection, ExternalDetections, Input, Sensors, Stamp};
 use tagalong_geometry::{HALF_HEAD_M, Rect};
 
+use super::box_layout::BoxLayout;
 use super::{Moment, SensorReader, SensorType, is_type};
 use crate::InputSettings;
 use crate::camera_frames::CameraFrames;
@@ -60,6 +61,7 @@ struct Recorded {
     waiting: Waiting,
     /// Message of the frame that is being made.
     paired: Option<Payload>,
+    boxes: BoxLayout,
     /// Number of messages that were read, and of those that belong to a frame.
     read: u64,
     used: u64,
@@ -74,6 +76,7 @@ impl Recorded {
             cameras: CameraFrames::default(),
             waiting: Waiting::default(),
             paired: None,
+            boxes: BoxLayout::default(),
             read: 0,
             used: 0,
         }
@@ -138,6 +141,7 @@ impl SensorReader for Recorded {
 
     fn close(&mut self, topic: &str, tally: &mut Tally) {
         tally.add("detections_without_frame", self.waiting.leave());
+        self.boxes.close(topic, tally);
         if self.read > 0 && self.used == 0 {
             let read = self.read;
             tally.lose("detections_lost", || {
@@ -235,7 +239,7 @@ impl Recorded {
         if self.in_space {
             Some(in_space(&people, message, moment, tally))
         } else {
-            Some(in_image(&people, moment, tally))
+            Some(self.in_image(&people, moment, tally))
         }
     }
 
@@ -270,6 +274,36 @@ impl Recorded {
             }
         }
         people
+    }
+
+    /// Returns the people in an image. Boxes that are none are counted as lost.
+    fn in_image(
+        &self,
+        people: &[(&Value, f64)],
+        moment: &Moment<'_>,
+        tally: &mut Tally,
+    ) -> Vec<ExternalDetection> {
+        let topic = moment.topic;
+        let mut found = Vec::new();
+        for (detection, score) in people {
+            let Some(region) = region_of(detection) else {
+                lose_box(topic, tally);
+                continue;
+            };
+            if is_fraction(&region) {
+                tally.lose("detections_as_fractions", || {
+                    format!(
+                        "{topic}: a box of {:.3} x {:.3} is a fraction of the image: let the detector \
+                         write boxes in pixels",
+                        region.width, region.height
+                    )
+                });
+                continue;
+            }
+            self.boxes.take(&region, *score, moment.camera);
+            found.push(ExternalDetection { region: Some(region), head: None, score: *score });
+        }
+        found
     }
 
     /// Returns true for the class of people. A detection without a class is of a detector of people.
@@ -320,34 +354,6 @@ fn class_of(hypothesis: &Value) -> String {
         }
     }
     String::new()
-}
-
-/// Returns the people in an image. Boxes that are none are counted as lost.
-fn in_image(
-    people: &[(&Value, f64)],
-    moment: &Moment<'_>,
-    tally: &mut Tally,
-) -> Vec<ExternalDetection> {
-    let topic = moment.topic;
-    let mut found = Vec::new();
-    for (detection, score) in people {
-        let Some(region) = region_of(detection) else {
-            lose_box(topic, tally);
-            continue;
-        };
-        if is_fraction(&region) {
-            tally.lose("detections_as_fractions", || {
-                format!(
-                    "{topic}: a box of {:.3} x {:.3} is a fraction of the image: let the detector \
-                     write boxes in pixels",
-                    region.width, region.height
-                )
-            });
-            continue;
-        }
-        found.push(ExternalDetection { region: Some(region), head: None, score: *score });
-    }
-    found
 }
 
 /// Returns the box of a detection; `None` for one with numbers that are not finite, or without a size.

@@ -2,8 +2,10 @@
 
 use std::ops::RangeInclusive;
 
-use nalgebra::{Isometry2, Isometry3, Point3, UnitQuaternion, Vector3};
-use tagalong_core::{FurtherScans, Input, LaserScan as Scan, RayReading, Sensors, UnreadRay};
+use nalgebra::{Isometry2, Isometry3, Point3};
+use tagalong_core::{
+    FurtherScans, Input, LaserScan as Scan, RayReading, Sensors, UnreadRay, spatial_pose,
+};
 
 use super::recent::Recent;
 pub(crate) use super::scan_faults::scan_fault;
@@ -110,21 +112,13 @@ pub(crate) fn seen_from(
         .unzip();
     Scan {
         stamp: Some(scan.header.stamp()),
-        robot_from_scanner: on_floor(robot_from_then) * robot_from_laser,
+        robot_from_scanner: spatial_pose(robot_from_then) * robot_from_laser,
         first_rad: f64::from(scan.angle_min),
         increment_rad: f64::from(scan.angle_increment),
         points: points.into(),
         rays: rays.into(),
         unread: unread(scan).collect(),
     }
-}
-
-/// Returns a motion on the floor as one in space.
-pub(crate) fn on_floor(motion: &Isometry2<f64>) -> Isometry3<f64> {
-    let x = motion.translation.x;
-    let y = motion.translation.y;
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), motion.rotation.angle());
-    Isometry3::from_parts(Vector3::new(x, y, 0.0).into(), turn)
 }
 
 /// Returns the valid ranges of the scanner, m.

@@ -13,6 +13,7 @@
 //! A topic is found by type, or named as `topics.NAME` under `[input]`. Images are no entries: they
 //! make the frames, and their calibrations the cameras.
 
+mod box_layout;
 mod detections;
 pub(crate) mod laser;
 pub(crate) mod points;

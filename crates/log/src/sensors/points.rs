@@ -1,9 +1,8 @@
 //! Points of 3-D lidars: the nearest cloud to an image in time, or frames of their own.
 
 use nalgebra::{Isometry2, Isometry3, Point3};
-use tagalong_core::{Input, PointCloud as Cloud, Sensors};
+use tagalong_core::{Input, PointCloud as Cloud, Sensors, spatial_pose};
 
-use super::laser::on_floor;
 use super::recent::Recent;
 use super::{Moment, SensorReader, SensorType};
 use crate::Limits;
@@ -74,7 +73,7 @@ pub(crate) fn cloud_in_robot(
     robot_from_then: &Isometry2<f64>,
     tally: &mut Tally,
 ) -> Option<Cloud> {
-    let robot_from_lidar = on_floor(robot_from_then) * robot_from_lidar;
+    let robot_from_lidar = spatial_pose(robot_from_then) * robot_from_lidar;
     let decoded = decode::<PointCloud2<'_>>(&cloud.data).map_err(|error| error.to_string());
     let points = decoded.and_then(|cloud| {
         points_of_cloud(&cloud, &Limits::default()).map_err(|error| error.to_string())

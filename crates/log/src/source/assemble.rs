@@ -11,6 +11,7 @@ use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinho
 use tagalong_vision::Unwrapping;
 
 use super::LogFrame;
+use super::align::{DepthAligner, DepthMoment};
 use super::intake::Intake;
 use super::mount::robot_frame;
 use super::plan::Plan;
@@ -24,7 +25,6 @@ use crate::msgs::{CompressedImage, DisparityImage, Image, LaserScan, PointCloud2
 use crate::obstacles::DepthFormat;
 use crate::odometry::PoseAt;
 use crate::pairing::Payload;
-use crate::register::Registration;
 use crate::scan::Type;
 use crate::sensors::Moment;
 use crate::sensors::laser::{lose_scan, scan_fault, seen_from};
@@ -36,7 +36,7 @@ use crate::topics::Problem;
 pub(super) struct Assembler {
     index: u64,
     camera: Option<Arc<Camera>>,
-    registration: Option<Registration>,
+    aligner: DepthAligner,
     unwrapping: Unwrapping,
     previous: Option<(Stamp, PoseAt)>,
     /// First calibration that did not fit its images.
@@ -48,7 +48,7 @@ impl Assembler {
         Self {
             index: 0,
             camera: None,
-            registration: None,
+            aligner: DepthAligner::default(),
             unwrapping: Unwrapping::default(),
             previous: None,
             misfit: None,
@@ -109,7 +109,11 @@ impl Assembler {
         let (mut images, size) = self.primary(plan, image, tally)?;
         let camera = self.camera_at(plan, image, size, intake, tally)?;
         if let Some(depth) = depth {
-            images.depth = self.depth(plan, image, &depth, &camera, intake, tally);
+            let seen = pixels(plan, plan.chosen.depth.as_ref()?, &depth, tally);
+            if let Some(Pixels::Depth(seen)) = seen {
+                let moment = DepthMoment { image, depth: &depth, camera: &camera, tf: &intake.tf };
+                images.depth = self.aligner.align(plan, &moment, seen, tally);
+            }
         }
         if let Some(right) = right {
             images.right = right_image(plan, &right, size, tally).map(Arc::new);
@@ -252,6 +256,13 @@ impl Assembler {
         let known = found.or_else(|| self.camera.as_ref().map(|last| last.robot_from_camera));
         if found.is_none() {
             tally.count("frames_without_camera_pose");
+            if known.is_some() {
+                tally.note(format!(
+                    "{} has no pose of the camera at some frames, which get the last known one: if the \
+                     camera does not move on the robot, publish it on /tf_static, else throughout",
+                    plan.mount.source()
+                ));
+            }
         }
         let Some(robot_from_camera) = known else {
             tally.lose("frames_before_camera_pose", || {
@@ -275,81 +286,6 @@ impl Assembler {
             self.camera = Some(Arc::new(camera));
         }
         self.camera.clone()
-    }
-
-    /// Returns a depth image in the view of the colour camera.
-    fn depth(
-        &mut self,
-        plan: &Plan,
-        image: &Payload,
-        depth: &Payload,
-        camera: &Camera,
-        intake: &Intake,
-        tally: &mut Tally,
-    ) -> Option<Arc<DepthImage>> {
-        let Some(Pixels::Depth(seen)) = pixels(plan, plan.chosen.depth.as_ref()?, depth, tally)
-        else {
-            return None;
-        };
-        let seen = shifted(seen, plan.input.depth_offset_px);
-        let same_size = (seen.width(), seen.height()) == (camera.width, camera.height);
-        // Registered by the driver: same size, frame and lens.
-        if same_size && image.frame_id == depth.frame_id && plan.same_lens() {
-            return Some(Arc::new(seen));
-        }
-        let pose = if image.frame_id == depth.frame_id {
-            Some(Isometry3::identity())
-        } else {
-            intake.tf.lookup(&image.frame_id, &depth.frame_id, depth.stamp)
-        };
-        match (pose, plan.depth_camera(&seen)) {
-            (Some(pose), Some(from)) => self.register(&from, camera, pose, &seen, tally),
-            _ if same_size => {
-                tally.note(
-                    "depth and colour have different frames and no transform or calibration \
-                     between them: depth is taken to be registered to colour",
-                );
-                Some(Arc::new(seen))
-            }
-            _ => {
-                tally.lose("depth_not_registrable", || {
-                    let topic = plan.chosen.depth.as_deref().unwrap_or_default();
-                    let problem = plan.chosen.depth_problem.as_ref();
-                    let why = problem.map_or_else(
-                        || {
-                            format!(
-                                "its images are {}x{}, those of colour {}x{}, and no transform is \
-                                 known at that time",
-                                seen.width(),
-                                seen.height(),
-                                camera.width,
-                                camera.height
-                            )
-                        },
-                        |problem| problem.why.clone(),
-                    );
-                    format!("{topic} cannot be used: {why}")
-                });
-                None
-            }
-        }
-    }
-
-    fn register(
-        &mut self,
-        from: &Camera,
-        camera: &Camera,
-        colour_from_depth: Isometry3<f64>,
-        seen: &DepthImage,
-        tally: &mut Tally,
-    ) -> Option<Arc<DepthImage>> {
-        tally.count("depth_registered");
-        tally.note("depth is registered to the colour camera through tf and both calibrations");
-        // Made anew only after a change of the transform, because its rays are costly.
-        if !self.registration.as_ref().is_some_and(|known| known.is_for(&colour_from_depth)) {
-            self.registration = Some(Registration::new(from, camera, colour_from_depth));
-        }
-        self.registration.as_ref()?.apply(seen).map(Arc::new)
     }
 
     /// Returns the sensors of a frame with those beside the images.
@@ -538,17 +474,6 @@ fn note_odometry_ahead(plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut T
             )
         });
     }
-}
-
-/// Shifts the image by columns and rows; the pixels that come in are unknown.
-fn shifted(depth: DepthImage, offset: [i32; 2]) -> DepthImage {
-    let [right, down] = offset.map(i64::from);
-    if (right, down) == (0, 0) {
-        return depth;
-    }
-    DepthImage::from_fn(depth.width(), depth.height(), |x, y| {
-        depth.get(x as i64 - right, y as i64 - down).unwrap_or(f32::NAN)
-    })
 }
 
 fn images_of(pixels: Pixels) -> Images {

@@ -91,18 +91,13 @@ impl Intake {
     fn take_stamped(&mut self, message: &Message<'_>, tally: &mut Tally) {
         self.take_obstacles(message, tally);
         let topic = Some(&message.channel.topic);
-        let outcome = if *message.channel.topic == self.primary {
-            self.payload(message, tally).map(|image| {
-                let Some(image) = image else { return };
-                self.heard = Some((image.stamp, message.log_time));
-                self.take_frame(image, tally);
-            })
-        } else if topic == self.chosen.depth.as_ref() {
-            payload(message).map(|image| self.depth.push(image))
-        } else if topic == self.chosen.right.as_ref() {
+        let is_of_frames = *message.channel.topic == self.primary
+            || topic == self.chosen.depth.as_ref()
+            || topic == self.chosen.right.as_ref();
+        let outcome = if is_of_frames {
             self.payload(message, tally).map(|image| {
                 if let Some(image) = image {
-                    self.right.push(image);
+                    self.take_image(message, image, tally);
                 }
             })
         } else if let Some(reader) = self.reader(&message.channel.topic) {
@@ -125,6 +120,19 @@ impl Intake {
         };
         if let Err(error) = outcome {
             tally.lose("messages_undecodable", || format!("{}: {error}", message.channel.topic));
+        }
+    }
+
+    /// Takes in what makes a frame, or belongs to one.
+    fn take_image(&mut self, message: &Message<'_>, image: Payload, tally: &mut Tally) {
+        let topic = &message.channel.topic;
+        if *topic == self.primary {
+            self.heard = Some((image.stamp, message.log_time));
+            self.take_frame(image, tally);
+        } else if self.chosen.depth.as_ref() == Some(topic) {
+            self.depth.push(image);
+        } else {
+            self.right.push(image);
         }
     }
 
@@ -262,9 +270,20 @@ impl Intake {
         for transform in &tf.transforms {
             if !self.tf.insert(transform, is_static(topic)) {
                 tally.lose("transforms_invalid", || {
+                    let q = transform.transform.rotation;
+                    let at = transform.transform.translation;
                     format!(
-                        "{topic}: {} to {} is no rigid transform",
-                        transform.header.frame_id, transform.child_frame_id
+                        "{topic}: {} to {} is no rigid transform: translation [{}, {}, {}], quaternion \
+                         [{}, {}, {}, {}]",
+                        transform.header.frame_id,
+                        transform.child_frame_id,
+                        at.x,
+                        at.y,
+                        at.z,
+                        q.x,
+                        q.y,
+                        q.z,
+                        q.w
                     )
                 });
             }

@@ -1,5 +1,6 @@
 //! Second pass over a log: frames.
 
+mod align;
 mod assemble;
 mod assembly;
 mod changes;

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use tagalong_core::DepthImage;
 use tagalong_geometry::{Camera, ConicalMirror, Lens};
 use tagalong_vision::ground::{
-    Ground, GroundSettings, factor_of_depth, ground_of_depth, written_unit_m,
+    Ground, GroundSettings, PLAUSIBLE_FACTORS, factor_of_depth, ground_of_depth, written_unit_m,
 };
 
 use super::assembly::{Assembly, Messages};
-use super::mount::Mount;
+use super::mount::{Mount, robot_frame};
 use crate::camera_info::{CalibrationError, Intrinsics, Mirrored, check_size, intrinsics};
 use crate::images::StereoGeometry;
 use crate::input::StampSource;
@@ -255,7 +255,7 @@ pub(super) fn plan(
     note_unread_images(&plan, tally);
     note_choices(&plan, tally);
     if plan.odom_frames.is_none() {
-        tally.note("no odometry: the robot is taken to be at rest");
+        tally.note(no_odometry(&plan));
     }
     Ok(plan)
 }
@@ -288,6 +288,21 @@ fn timed(
         tally.note("the times of recording are taken in place of all stamps");
     }
     Ok((Arc::new(scan.with_recording_times()), true))
+}
+
+/// Tells that there is no odometry, and which frame of tf the robot moves in all the same.
+fn no_odometry(plan: &Plan) -> String {
+    let at_rest = "no odometry: the robot is taken to be at rest".to_owned();
+    let tf = &plan.scan.tf;
+    let robot = robot_frame(&plan.scan, &plan.input);
+    let root = tf.root_of(robot);
+    if tf.knows(&plan.input.odom_frame) || tf.moving_frames(root, robot).is_empty() {
+        return at_rest;
+    }
+    format!(
+        "{at_rest}, although tf has its poses in `{root}`: `odom_frame = \"{root}\"` under [input] \
+         takes them"
+    )
 }
 
 /// Returns the unit of depth, where it is not that of the convention: that of the settings, else that
@@ -457,6 +472,17 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
         let wanted = "calibration of the right camera with a positive baseline (P[3] = -fx B)";
         return Err(missing(&plan.scan, wanted.into(), baseline_hint(plan)));
     }
+    if plan.inputs.requires(Input::Right)
+        && let Some(baseline_m) = plan.baseline_m.filter(|it| *it > LARGEST_BASELINE_M)
+    {
+        let topic = plan.chosen.right_info.as_deref().unwrap_or_default();
+        let wanted = "calibration of the right camera with a baseline in metres".to_owned();
+        let hint = format!(
+            ": by {topic} it is {baseline_m} m (P[3] = -fx B); calibrate the pair with a board that is \
+             measured in metres"
+        );
+        return Err(missing(&plan.scan, wanted, hint));
+    }
     if plan.lens.is_none() && is_metric(plan.inputs) {
         let wanted = format!("calibration (sensor_msgs/CameraInfo) of {}", plan.primary());
         let hint = if plan.scan.infos.is_empty() {
@@ -471,6 +497,9 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
     }
     Ok(())
 }
+
+/// Baseline beyond which that of a pair on a robot has another unit, m.
+const LARGEST_BASELINE_M: f64 = 5.0;
 
 /// Returns the remedy for a right camera whose calibration has no positive baseline.
 fn baseline_hint(plan: &Plan) -> String {
@@ -526,8 +555,6 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
 
 /// Number of depth images by which the unit of depth is measured.
 const UNIT_FRAMES: usize = 3;
-/// Factors of the unit of depth that may be those of a mount that is not quite right.
-const PLAUSIBLE_FACTORS: std::ops::RangeInclusive<f64> = 0.6..=1.7;
 /// Largest difference between the images, relative.
 const SAME_FACTOR: f64 = 1.1;
 

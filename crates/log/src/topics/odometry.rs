@@ -2,9 +2,9 @@
 //! transforms.
 
 use super::kinds::{is_odometry, odometry_rank};
-use super::problems::{Problem, RECORDING, clock_problem};
+use super::problems::{Problem, RECORDING, WHOLE_SECONDS, clock_problem};
 use super::{best_of, named};
-use crate::clock::constant_lag_s;
+use crate::clock::{Times, constant_lag_s};
 use crate::scan::{Scan, Topic};
 use crate::source::robot_frame;
 use crate::{InputSettings, LogError};
@@ -59,6 +59,8 @@ pub(super) fn choose_odometry(
     Ok(found)
 }
 
+/// Frame in which odometry moves, by convention (REP 105).
+const ODOMETRY_FRAME: &str = "odom";
 /// Lead of the stamps of odometry over those of the frames beyond which its clock is another one, s.
 const LEAD_S: f64 = 0.5;
 /// Time by which stamps are later than their recording beyond which their clock is not that of the
@@ -95,9 +97,6 @@ pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Op
     lag_problem(frames, poses)
 }
 
-/// Reason for stamps that are rounded to seconds.
-const WHOLE_SECONDS: &str = "its stamps are rounded to whole seconds";
-
 /// Returns the problem of odometry whose stamps are all too early or too late by one time, which the
 /// times of recording tell.
 fn lag_problem(frames: &Topic, poses: &Topic) -> Option<Problem> {
@@ -111,18 +110,29 @@ fn lag_problem(frames: &Topic, poses: &Topic) -> Option<Problem> {
         return None;
     }
     let side = if off_s > 0.0 { "later" } else { "earlier" };
-    Problem::new(
-        format!(
-            "its stamps are {:.2} s {side} than those of the frames, by the times of recording: \
-             another clock",
-            off_s.abs()
-        ),
-        RECORDING,
-    )
+    lag_of(format!("{:.2} s {side}", off_s.abs()))
 }
 
-/// Returns the reason for which transforms cannot be the odometry. Their lag tells nothing, because
+/// Returns the problem of stamps that are another time than those of the frames, in words.
+fn lag_of(off: String) -> Option<Problem> {
+    let why = format!(
+        "its stamps are {off} than those of the frames, by the times of recording: another clock"
+    );
+    Problem::new(why, RECORDING)
+}
+
+/// Returns the problem of a transform whose stamps are all too early. Later ones tell nothing, because
 /// localisation gives its transforms later stamps on purpose.
+fn late_transform_problem(frames: &Topic, link: &Times) -> Option<Problem> {
+    let of_frames_s = constant_lag_s(&frames.stamps, &frames.recorded)?;
+    let off_s = link.latest_lag_s()? - of_frames_s;
+    if off_s > -DELAY_S {
+        return None;
+    }
+    lag_of(format!("all {:.2} s or more earlier", -off_s))
+}
+
+/// Returns the reason for which transforms cannot be the odometry.
 fn transform_odometry_problem(
     scan: &Scan,
     primary: &str,
@@ -132,10 +142,20 @@ fn transform_odometry_problem(
     if let Some(problem) = transform_problem(scan, primary, odom, robot) {
         return Some(problem);
     }
+    if scan.is_live() {
+        return None;
+    }
+    let frames = scan.topics.get(primary)?;
     for (frame, _) in scan.tf.moving_frames(odom, robot) {
-        let times = scan.link_times.get(frame).filter(|_| !scan.is_live());
-        if times.is_some_and(|times| times.are_whole_seconds()) {
+        let Some(times) = scan.link_times.get(frame) else { continue };
+        if times.are_whole_seconds() {
             return Problem::new(WHOLE_SECONDS, RECORDING);
+        }
+        // Above the odometry frame there is localisation, which corrects it now and then.
+        if frame != ODOMETRY_FRAME
+            && let Some(problem) = late_transform_problem(frames, times)
+        {
+            return Some(problem);
         }
     }
     None

@@ -34,6 +34,9 @@ pub(super) const RECORDING: &str = "take the times of recording in place of the 
 /// Remedy for messages that were recorded at another time.
 pub(super) const TOGETHER: &str = "record it together with the sensor that makes the frames";
 
+/// Reason for stamps that are rounded to seconds.
+pub(super) const WHOLE_SECONDS: &str = "its stamps are rounded to whole seconds";
+
 /// Returns the reason for which depth cannot be brought together with the colour images.
 pub(crate) fn depth_problem(
     scan: &Scan,
@@ -204,19 +207,29 @@ fn registration_problem(
         "its images are {width}x{height}, those of {colour} {}x{}",
         of_colour.0, of_colour.1
     );
+    let Problem { why, remedy } = geometry_problem(scan, input, colour, depth)?;
+    Problem::new(format!("{sizes}, and {why}"), remedy)
+}
+
+/// Returns the missing part of the geometry by which depth is moved into the view of the colour camera;
+/// `None` if it is whole.
+pub(crate) fn geometry_problem(
+    scan: &Scan,
+    input: &InputSettings,
+    colour: &str,
+    depth: &str,
+) -> Option<Problem> {
     let remedy = "record depth that the driver registers to colour (aligned depth), or ";
     let lens = match depth_lens(scan, input, depth) {
         Ok(lens) => lens,
         Err(why) => {
-            return Problem::new(
-                format!("{sizes}, and {why}"),
-                format!("{remedy}name its calibration as `depth_info_topic` under [input]"),
-            );
+            let named = format!("{remedy}name its calibration as `depth_info_topic` under [input]");
+            return Problem::new(why, named);
         }
     };
     if let Some(size) = misfit(scan, depth, &lens.1) {
         return Problem::new(
-            format!("{sizes}, and its calibration {} is {size}", lens.0),
+            format!("its calibration {} is {size}", lens.0),
             format!(
                 "{remedy}the camera_info of this resolution, named as `depth_info_topic` under [input]"
             ),
@@ -224,9 +237,15 @@ fn registration_problem(
     }
     let from = scan.frame_of(depth)?;
     let to = scan.frame_of(colour)?;
+    for (topic, frame) in [(depth, from), (colour, to)] {
+        if from != to && frame.is_empty() {
+            let why = format!("the frame_id of {topic} is empty");
+            return Problem::new(why, format!("{remedy}let its driver set the frame_id"));
+        }
+    }
     if from != to && !scan.tf.connects(from, to) {
         return Problem::new(
-            format!("{sizes}, and tf does not connect its frame `{from}` with `{to}`"),
+            format!("tf does not connect its frame `{from}` with `{to}`"),
             format!("{remedy}record /tf_static with the mounts of both cameras"),
         );
     }

@@ -3,7 +3,9 @@
 use tagalong_core::Stamp;
 use tagalong_math::median;
 
-use super::problems::{Problem, RECORDING, TOGETHER, pairing_problem, wider_tolerance};
+use super::problems::{
+    Problem, RECORDING, TOGETHER, WHOLE_SECONDS, pairing_problem, wider_tolerance,
+};
 use crate::scan::{Scan, Topic};
 use crate::timing::{Skew, Timing, nearest};
 
@@ -38,9 +40,8 @@ pub(crate) fn unpaired(
     if let Some(problem) = pairing_problem(scan, frames, partners, tolerance_s) {
         return Some(problem);
     }
-    if are_whole_seconds(partners) && !are_whole_seconds(frames) {
-        let why = "its stamps are in whole seconds".to_owned();
-        return Some(Problem { why, remedy: RECORDING.to_owned() });
+    if has_whole_seconds(partners) && !has_whole_seconds(frames) {
+        return Problem::new(WHOLE_SECONDS, RECORDING);
     }
     for (topic, stamps) in [(first, &frames.stamps), (second, &partners.stamps)] {
         let back = stamps.windows(2).filter(|pair| pair[1] < pair[0]).count();
@@ -55,14 +56,40 @@ pub(crate) fn unpaired(
     if is_slower(frames, partners, tolerance_s) {
         return None;
     }
-    Some(missing_or_apart(frames, partners, tolerance_s))
+    recorded_apart(frames, partners, tolerance_s)
+        .or_else(|| Some(missing_or_apart(frames, partners, tolerance_s)))
 }
 
-/// Returns true for stamps without fractions of a second that several messages share.
-fn are_whole_seconds(topic: &Topic) -> bool {
-    let stamps = &topic.stamps;
-    let is_shared = stamps.windows(2).any(|pair| pair[0] == pair[1]);
-    is_shared && stamps.iter().all(|stamp| stamp.nanos() % 1_000_000_000 == 0)
+/// Returns true for stamps that are rounded to whole seconds.
+fn has_whole_seconds(topic: &Topic) -> bool {
+    topic.times().is_some_and(|times| times.are_whole_seconds())
+}
+
+/// Returns the problem of partners with the stamps of most frames that stand elsewhere in the log, too
+/// far for the frames to wait.
+fn recorded_apart(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Option<Problem> {
+    let mut known: Vec<(Stamp, Stamp)> =
+        partners.stamps.iter().copied().zip(partners.recorded.iter().copied()).collect();
+    known.sort();
+    let mut delays_s = Vec::new();
+    for (at, recorded) in frames.stamps.iter().zip(&frames.recorded) {
+        let earliest = at.plus_seconds(-tolerance_s);
+        let first = known.partition_point(|(stamp, _)| *stamp < earliest);
+        if let Some((stamp, then)) = known.get(first)
+            && stamp.seconds_since(*at) <= tolerance_s
+        {
+            delays_s.push(then.seconds_since(*recorded));
+        }
+    }
+    let are_paired = delays_s.len() as f64 >= MOST_PAIRED * frames.stamps.len() as f64;
+    let delay_s = median(delays_s).filter(|delay_s| are_paired && delay_s.abs() > tolerance_s)?;
+    let side = if delay_s > 0.0 { "after" } else { "before" };
+    let why = format!(
+        "those with the stamps of the frames stand {:.1} s {side} them in the log, and no frame waits so \
+         long",
+        delay_s.abs()
+    );
+    Problem::new(why, TOGETHER)
 }
 
 /// Returns the words for partners that begin late or end early, if most frames without one lie there.

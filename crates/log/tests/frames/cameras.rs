@@ -184,3 +184,17 @@ fn calibrations_without_focal_lengths_say_nothing() {
         }
     }
 }
+
+#[test]
+fn a_mount_that_is_on_tf_once_is_held_and_told() {
+    let mut log = LogWriter::plain();
+    log.info(INFO, "colour", &camera(16, 12, 14.0));
+    log.moving("base_link", "colour", at(0.0), &level_pose());
+    (0..20).for_each(|i| log.colour(at(f64::from(i) * 0.1)));
+    let (mut source, _saved) = open(log, Inputs::ANY);
+    assert_eq!(frames(&mut source).len(), 20);
+    let held = count(&source, "frames_without_camera_pose");
+    assert!((10..20).contains(&held), "{held}");
+    let told = source.notes().iter().find(|note| note.contains("no pose of the camera")).unwrap();
+    assert!(told.contains("the last known one") && told.contains("/tf_static"), "{told}");
+}

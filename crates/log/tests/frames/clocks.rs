@@ -63,6 +63,7 @@ fn transforms_of_another_clock_are_no_odometry() {
         (|_| Stamp::default(), "1700000000.0 s earlier, by another clock"),
         (|t| at(t + 3600.0), "3600.0 s later, by another clock"),
         (|t| at(t.floor()), "rounded to whole seconds"),
+        (|t| at(t - 1.5), "all 1.50 s or more earlier"),
     ] {
         let saved = ride(started(), |log, t| {
             log.moving_of(at(t), ("odom", "base_link"), stamp_of(t), &driven(t));
@@ -80,6 +81,45 @@ fn stamps_of_localisation_may_lie_ahead() {
     let input = InputSettings { odom_frame: "map".into(), ..InputSettings::default() };
     let source = saved.open(&input, Inputs::ANY).unwrap();
     assert!(source.has_odometry() && !source.lacks_usable_odometry());
+}
+
+#[test]
+fn poses_in_another_frame_than_that_of_odometry_are_told() {
+    for (parent, is_told) in [("world", true), ("odom", false)] {
+        let saved = ride(started(), |log, t| {
+            log.moving_of(at(t), (parent, "base_link"), at(t), &driven(t));
+        });
+        let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
+        assert_eq!(source.has_odometry(), !is_told, "{parent}");
+        let notes = source.notes();
+        let told = notes.iter().any(|note| note.contains("`odom_frame = \"world\"`"));
+        assert_eq!(told, is_told, "{notes:?}");
+        let input = InputSettings { odom_frame: parent.into(), ..InputSettings::default() };
+        assert!(saved.open(&input, Inputs::ANY).unwrap().has_odometry(), "{parent}");
+    }
+}
+
+/// Writes odometry in time, and corrections by localisation late.
+fn with_late_corrections(log: &mut LogWriter, t: f64) {
+    log.moving_of(at(t), ("odom", "base_link"), at(t), &driven(t));
+    log.moving_of(at(t), ("map", "odom"), at(t - 1.5), &Isometry3::identity());
+}
+
+/// Writes odometry that is late after half a second.
+fn late_at_times(log: &mut LogWriter, t: f64) {
+    let late_s = if t < 0.5 { 0.0 } else { 1.5 };
+    log.moving_of(at(t), ("odom", "base_link"), at(t - late_s), &driven(t - late_s));
+}
+
+#[test]
+fn transforms_are_no_other_clock_unless_all_of_them_are_late() {
+    let writers: [(&str, fn(&mut LogWriter, f64)); 2] =
+        [("map", with_late_corrections), ("odom", late_at_times)];
+    for (odom_frame, write) in writers {
+        let input = InputSettings { odom_frame: odom_frame.into(), ..InputSettings::default() };
+        let source = ride(started(), write).open(&input, Inputs::ANY).unwrap();
+        assert!(!source.lacks_usable_odometry(), "{odom_frame}: {:?}", source.notes());
+    }
 }
 
 #[test]

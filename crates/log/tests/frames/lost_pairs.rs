@@ -27,7 +27,7 @@ fn told(source: &FrameSource) -> String {
     source
         .notes()
         .iter()
-        .find(|note| note.contains("have no image of"))
+        .find(|note| note.contains("were made without an image of"))
         .cloned()
         .unwrap_or_default()
 }
@@ -36,7 +36,7 @@ fn told(source: &FrameSource) -> String {
 fn frames_without_depth_are_lost_with_the_measured_cause() {
     type Depth<'a> = (&'a dyn Fn(u32, f64) -> Option<f64>, &'a str, &'a str);
     let cases: [Depth<'_>; 6] = [
-        (&|_, t| Some(t.floor()), "its stamps are in whole seconds", "--stamps recording"),
+        (&|_, t| Some(t.floor()), "its stamps are rounded to whole seconds", "--stamps recording"),
         (&|_, t| (t < 0.95).then_some(t), "it ends 1.0 s before the last frame", "record it"),
         (&|_, t| (t > 0.95).then_some(t), "it begins 1.0 s after the first frame", "record it"),
         (
@@ -58,6 +58,25 @@ fn frames_without_depth_are_lost_with_the_measured_cause() {
         assert_eq!(made, FRAMES as usize);
         assert!(!source.data_lost(), "{cause}: {:?}", source.notes());
     }
+}
+
+#[test]
+fn depth_that_stands_behind_its_frames_in_the_log_is_told() {
+    let mut log = started();
+    (0..FRAMES).for_each(|index| log.colour(at(0.1 * f64::from(index))));
+    for index in 0..FRAMES {
+        let stamp = at(0.1 * f64::from(index));
+        let data = [0; 16 * 12 * 2];
+        let image = Image::packed(Header::new(stamp, "colour"), "16UC1", 16, 12, &data);
+        log.message("/camera/depth/image_raw", stamp.plus_seconds(5.0), &image);
+    }
+    let (made, source) = read(&log.save(), DEPTH);
+    assert!(made < FRAMES as usize && source.data_lost(), "{made}: {:?}", source.notes());
+    let told = told(&source);
+    assert!(
+        told.contains("stand 5.0 s after them in the log, and no frame waits so long; record it"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -181,16 +181,20 @@ fn a_calibration_in_place_of_a_nearer_one_is_told_with_the_reason() {
 
 #[test]
 fn an_uncalibrated_camera_serves_a_pipeline_without_metres() {
-    let mut info = info_of("colour", &camera(16, 12, 14.0));
-    (info.k, info.p) = ([0.0; 9], [0.0; 12]);
-    let mut log = LogWriter::plain();
-    log.message("/cam/camera_info", at(0.0), &info);
-    log.fixed("base_link", "colour", &level_pose());
-    log.message("/cam/image_raw", at(0.1), &disparities("rgb8", &[0; 16 * 12 * 3]));
-    let (mut source, _saved) = open(log, Inputs::NONE.require(Input::Colour));
-    assert_eq!(frames(&mut source).len(), 1);
-    let told = "the calibration of the images is not used: ";
-    assert!(source.notes().iter().any(|note| note.starts_with(told)), "{:?}", source.notes());
+    // Some drivers leave ones on the diagonal, or the middle of the image.
+    for (last, middle) in [(0.0, 0.0), (1.0, 0.0), (1.0, 7.5)] {
+        let mut info = info_of("colour", &camera(16, 12, 14.0));
+        (info.k, info.p) = ([0.0; 9], [0.0; 12]);
+        (info.k[8], info.k[2]) = (last, middle);
+        let mut log = LogWriter::plain();
+        log.message("/cam/camera_info", at(0.0), &info);
+        log.fixed("base_link", "colour", &level_pose());
+        log.message("/cam/image_raw", at(0.1), &disparities("rgb8", &[0; 16 * 12 * 3]));
+        let (mut source, _saved) = open(log, Inputs::NONE.require(Input::Colour));
+        assert_eq!(frames(&mut source).len(), 1);
+        let told = "the calibration of the images is not used: ";
+        assert!(source.notes().iter().any(|note| note.starts_with(told)), "{:?}", source.notes());
+    }
 }
 
 /// Twelve pictures of video, of which each sixth is a key picture.
@@ -406,4 +410,68 @@ fn messages_of_ros_1_in_an_mcap_file_are_read() {
     assert_eq!(stamps(&found), [0.1]);
     assert_eq!(found[0].frame.grey().unwrap().pixels(), [1, 2, 3, 4, 5, 6]);
     assert!(!source.data_lost(), "{:?}", source.notes());
+}
+
+/// Writes what a log has of the way from its depth images to its colour images.
+type Geometry = fn(&mut LogWriter);
+
+fn calibrated(log: &mut LogWriter) {
+    log.info("/camera/depth/camera_info", "depth", &camera(16, 12, 14.0));
+}
+
+fn connected(log: &mut LogWriter) {
+    log.fixed("colour", "depth", &Isometry3::identity());
+}
+
+fn connected_later(log: &mut LogWriter) {
+    calibrated(log);
+    log.moving("colour", "depth", at(9.5), &Isometry3::identity());
+}
+
+#[test]
+fn depth_that_is_taken_to_be_registered_is_told_with_the_measured_cause() {
+    let cases: [(&str, Geometry, &str, &str); 4] = [
+        ("depth", calibrated, "tf does not connect its frame `depth` with `colour`", "/tf_static"),
+        ("depth", connected, "no calibration (sensor_msgs/CameraInfo)", "`depth_info_topic`"),
+        ("depth", connected_later, "but at other times", "record /tf from before"),
+        ("", calibrated, "the frame_id of /camera/depth/image_raw is empty", "set the frame_id"),
+    ];
+    for (frame, geometry, cause, remedy) in cases {
+        let mut log = started();
+        geometry(&mut log);
+        for t in [0.1, 9.5] {
+            log.colour(at(t));
+            log.depth(at(t), frame, 2.0);
+        }
+        let (source, found) = first_depth(log, &InputSettings::default()).unwrap();
+        assert!(found.frame.depth().is_ok(), "{cause}");
+        let notes = source.notes();
+        let told = notes.iter().find(|note| note.contains("taken to be registered")).unwrap();
+        assert!(told.starts_with("/camera/depth/image_raw ") && told.contains(cause), "{told}");
+        assert!(told.contains(remedy) && !source.data_lost(), "{told}");
+    }
+}
+
+#[test]
+fn a_baseline_in_millimetres_is_refused() {
+    for (baseline_m, is_refused) in [(0.1, false), (100.0, true)] {
+        let mut log = LogWriter::plain();
+        let left = camera(16, 12, 14.0);
+        log.info("/stereo/left/camera_info", "colour", &left);
+        let mut right = info_of("colour", &left);
+        right.p[3] = -14.0 * baseline_m;
+        log.message("/stereo/right/camera_info", at(0.0), &right);
+        log.fixed("base_link", "colour", &level_pose());
+        for side in ["left", "right"] {
+            let image = disparities("mono8", &[0; 16 * 12]);
+            log.message(&format!("/stereo/{side}/image_rect"), at(0.1), &image);
+        }
+        let inputs = Inputs::NONE.require(Input::Colour).require(Input::Right);
+        let found = log.save().open(&InputSettings::default(), inputs);
+        assert_eq!(found.is_err(), is_refused, "{baseline_m}");
+        if let Err(error) = found {
+            let told = "by /stereo/right/camera_info it is 100 m";
+            assert!(error.to_string().contains(told), "{error}");
+        }
+    }
 }

@@ -18,6 +18,27 @@ pub struct Suits {
     pub odometry: bool,
 }
 
+impl Suits {
+    /// Deviation of the camera's height from the stated range that does not matter, m.
+    pub const HEIGHT_TOLERANCE_M: f64 = 0.1;
+
+    /// Returns the distance of a camera's height from the stated range, m; zero within it, or where none
+    /// is stated.
+    pub fn height_off_m(&self, height_m: f64) -> f64 {
+        beyond(height_m, self.camera_height_m)
+    }
+
+    /// Returns the distance of a camera's pitch from the stated range, degrees, likewise.
+    pub fn pitch_off_deg(&self, pitch_down_deg: f64) -> f64 {
+        beyond(pitch_down_deg, self.pitch_down_deg)
+    }
+}
+
+fn beyond(value: f64, range: Option<[f64; 2]>) -> f64 {
+    let Some([low, high]) = range else { return 0.0 };
+    (low - value).max(value - high).max(0.0)
+}
+
 /// Reads `[suits]`.
 pub(super) fn read(table: Option<Value<'_>>) -> Result<Suits, ConfigError> {
     let place = table.as_ref().map(Value::span);
@@ -31,4 +52,17 @@ pub(super) fn read(table: Option<Value<'_>>) -> Result<Suits, ConfigError> {
         }
     }
     Ok(suits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deviations_count_on_both_sides() {
+        let suits = Suits { camera_height_m: Some([0.9, 2.0]), ..Suits::default() };
+        let off = [0.3, 1.0, 2.5].map(|height_m| suits.height_off_m(height_m));
+        assert_eq!(off, [0.6000000000000001, 0.0, 0.5]);
+        assert_eq!(suits.pitch_off_deg(90.0), 0.0);
+    }
 }

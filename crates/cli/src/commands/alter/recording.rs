@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry2, Isometry3, UnitQuaternion, Vector3};
-use tagalong_core::{Images, Stamp};
+use nalgebra::Isometry2;
+use tagalong_core::{Images, Stamp, spatial_pose};
 use tagalong_geometry::{Camera, Lens};
 use tagalong_log::LogFacts;
-use tagalong_log::msgs::{CameraInfo, Header, Image, Odometry, TFMessage, TransformStamped};
+use tagalong_log::msgs::{CameraInfo, Header, Image, Odometry, TFMessage};
 use tagalong_log::write::{MessageLog, WriteError};
 
 const ROBOT_FRAME: &str = "base_link";
@@ -73,27 +73,14 @@ impl Recording {
 
     /// Writes the pose of the camera, and that of the robot, before the images that they are for.
     fn poses(&mut self, moment: &Moment) -> Result<(), WriteError> {
-        let mount = TransformStamped {
-            header: Header::new(moment.stamp, ROBOT_FRAME),
-            child_frame_id: CAMERA_FRAME.into(),
-            transform: (&moment.camera.robot_from_camera).into(),
-        };
-        self.log.send("/tf", moment.stamp, &TFMessage { transforms: vec![mount] })?;
+        let mount = &moment.camera.robot_from_camera;
+        let tf = TFMessage::of_link(moment.stamp, ROBOT_FRAME, CAMERA_FRAME, mount);
+        self.log.send("/tf", moment.stamp, &tf)?;
         if !self.moves {
             return Ok(());
         }
-        let at = moment.odom_from_robot.translation.vector;
-        let turn = UnitQuaternion::from_axis_angle(
-            &Vector3::z_axis(),
-            moment.odom_from_robot.rotation.angle(),
-        );
-        let pose = Isometry3::from_parts(Vector3::new(at.x, at.y, 0.0).into(), turn);
-        let mut odometry = Odometry {
-            header: Header::new(moment.stamp, "odom"),
-            child_frame_id: ROBOT_FRAME.into(),
-            ..Odometry::default()
-        };
-        odometry.pose.pose = (&pose).into();
+        let pose = spatial_pose(&moment.odom_from_robot);
+        let odometry = Odometry::of_pose(moment.stamp, "odom", ROBOT_FRAME, &pose);
         self.log.send("/odom", moment.stamp, &odometry)
     }
 

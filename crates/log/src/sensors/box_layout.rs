@@ -1,0 +1,203 @@
+//! Meaning of recorded boxes: the numbers of some detectors are something else than middle and size in
+//! pixels of the image, and a probability, which their values tell.
+
+use std::sync::{Mutex, PoisonError};
+
+use tagalong_geometry::{Camera, Rect};
+
+use crate::tally::Tally;
+
+/// Number of boxes below which nothing is told.
+const LEAST_BOXES: u64 = 5;
+/// Share of the boxes that fit into the image where the layout is another one.
+const FEW: f64 = 0.5;
+/// Share of the boxes that fit into the image where the layout is right.
+const MOST: f64 = 0.9;
+/// Part of a side of the image by which boxes may stick out of it.
+const MARGIN: f64 = 0.1;
+/// Ratio of width to height from which on a box is wide. Standing people are higher than wide.
+const WIDE: f64 = 1.5;
+
+/// Boxes of people in images, as far as they were read.
+#[derive(Default)]
+pub(super) struct BoxLayout(Mutex<Seen>);
+
+#[derive(Default)]
+struct Seen {
+    boxes: u64,
+    /// Number of boxes that fit as they are, with x and y exchanged, and as two corners.
+    fit: u64,
+    fit_exchanged: u64,
+    fit_corners: u64,
+    wide: u64,
+    /// Number of boxes whose middle is outside of the image.
+    outside: u64,
+    /// Columns and rows of the image, and the farthest right and lower ends of the boxes, pixels.
+    image: [f64; 2],
+    reach: [f64; 2],
+    /// Least and greatest score.
+    scores: Option<[f64; 2]>,
+}
+
+impl BoxLayout {
+    /// Takes in a box with its score.
+    pub(super) fn take(&self, region: &Rect, score: f64, camera: &Camera) {
+        // The images of a mirror are unwrapped, and boxes may be those of the raw ones.
+        if camera.is_blind() || camera.panorama().is_some() {
+            return;
+        }
+        let mut seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        seen.take(region, [camera.width as f64, camera.height as f64]);
+        let [least, most] = seen.scores.unwrap_or([score; 2]);
+        seen.scores = Some([least.min(score), most.max(score)]);
+    }
+
+    /// Tells at the end of a log if the boxes have another layout.
+    pub(super) fn close(&self, topic: &str, tally: &mut Tally) {
+        let seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(why) = seen.misplaced() {
+            tally.lose("detections_of_other_layout", || format!("{topic}: {why}"));
+        } else if let Some(why) = seen.lying() {
+            tally.note(format!("{topic}: {why}"));
+        }
+        if let Some([least, most]) = seen.scores
+            && (least < 0.0 || most > 1.0)
+        {
+            tally.note(format!(
+                "{topic}: scores from {least:.2} to {most:.2} are no probabilities: let the detector \
+                 write 0 to 1; margins are taken with `score = \"log-odds\"` of recorded-detections"
+            ));
+        }
+    }
+}
+
+impl Seen {
+    fn take(&mut self, region: &Rect, image: [f64; 2]) {
+        let Rect { x, y, width, height } = *region;
+        let [across, down] = [x + 0.5 * width, y + 0.5 * height];
+        self.boxes += 1;
+        self.image = image;
+        self.reach = [self.reach[0].max(x + width), self.reach[1].max(y + height)];
+        let is_inside = (0.0..image[0]).contains(&across) && (0.0..image[1]).contains(&down);
+        self.outside += u64::from(!is_inside);
+        self.wide += u64::from(width > WIDE * height);
+        self.fit += u64::from(fits(region, image));
+        self.fit_exchanged += u64::from(fits(&Rect::new(y, x, height, width), image));
+        // Middle and size are the first and the second corner.
+        let corners = Rect::new(across, down, width - across, height - down);
+        let has_size = corners.width > 0.0 && corners.height > 0.0;
+        self.fit_corners += u64::from(has_size && fits(&corners, image));
+    }
+
+    fn are_most(&self, count: u64) -> bool {
+        count as f64 >= MOST * self.boxes as f64
+    }
+
+    /// Returns the reason for which most boxes stick out of the image, with what cures it.
+    fn misplaced(&self) -> Option<String> {
+        if self.boxes < LEAST_BOXES || self.fit as f64 >= FEW * self.boxes as f64 {
+            return None;
+        }
+        let [columns, rows] = self.image;
+        let all = self.boxes;
+        let out = format!(
+            "{} of the {all} boxes of people stick out of the {columns}x{rows} images",
+            all - self.fit
+        );
+        if self.are_most(self.fit_corners) {
+            return Some(format!(
+                "{out}, and {} are inside if their middle and size are two corners: let the detector \
+                 write the middle and the size",
+                self.fit_corners
+            ));
+        }
+        if self.are_most(self.fit_exchanged) {
+            return Some(format!(
+                "{out}, and {} are inside with x and y exchanged: let the detector write x before y",
+                self.fit_exchanged
+            ));
+        }
+        // Boxes of near people stick out, with their middle inside.
+        self.are_most(self.outside).then(|| {
+            format!(
+                "{out}, as far as to x = {:.0} and y = {:.0}: let the detector write pixels of these \
+                 images, and not of its own input",
+                self.reach[0], self.reach[1]
+            )
+        })
+    }
+
+    /// Returns the words for boxes that are wide, and would fit with x and y exchanged as well.
+    fn lying(&self) -> Option<String> {
+        let is_likely = self.boxes >= LEAST_BOXES
+            && self.are_most(self.wide)
+            && self.are_most(self.fit_exchanged);
+        is_likely.then(|| {
+            format!(
+                "{} of the {} boxes of people are wider than high by more than a half: if people \
+                 stand, the detector writes y before x",
+                self.wide, self.boxes
+            )
+        })
+    }
+}
+
+/// Returns true for a box in the image, or a little beyond it.
+fn fits(region: &Rect, [columns, rows]: [f64; 2]) -> bool {
+    let [aside, above] = [MARGIN * columns, MARGIN * rows];
+    region.x >= -aside
+        && region.y >= -above
+        && region.x + region.width <= columns + aside
+        && region.y + region.height <= rows + above
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns what is told of boxes with these middles and sizes in images of 640x480 pixels.
+    fn told(boxes: &[[f64; 4]]) -> (Option<String>, Option<String>) {
+        let mut seen = Seen::default();
+        for [x, y, width, height] in boxes {
+            let region = Rect::new(x - 0.5 * width, y - 0.5 * height, *width, *height);
+            seen.take(&region, [640.0, 480.0]);
+        }
+        (seen.misplaced(), seen.lying())
+    }
+
+    /// Returns people who walk through the image: middle and size of each box.
+    fn people() -> Vec<[f64; 4]> {
+        (0..10).map(|step| [100.0 + 45.0 * f64::from(step), 250.0, 90.0, 300.0]).collect()
+    }
+
+    #[test]
+    fn middles_and_sizes_in_pixels_are_right() {
+        assert_eq!(told(&people()), (None, None));
+        // Near people, of whom the image shows a part.
+        let near: Vec<[f64; 4]> =
+            people().iter().map(|[x, ..]| [*x, 300.0, 250.0, 700.0]).collect();
+        assert_eq!(told(&near), (None, None));
+    }
+
+    #[test]
+    fn other_layouts_are_told_by_the_values() {
+        let exchanged: Vec<[f64; 4]> =
+            people().iter().map(|[x, y, w, h]| [*y, *x, *h, *w]).collect();
+        let (_, lying) = told(&exchanged[..8]);
+        assert!(lying.unwrap().contains("8 of the 8 boxes of people are wider than high"));
+        let right: Vec<[f64; 4]> =
+            (0..10).map(|step| [250.0, 500.0 + 12.0 * f64::from(step), 300.0, 90.0]).collect();
+        assert_eq!(told(&right[..4]), (None, None), "too few to tell");
+        let (misplaced, _) = told(&right);
+        assert!(misplaced.unwrap().contains("with x and y exchanged"), "{right:?}");
+        let corners: Vec<[f64; 4]> = people()
+            .iter()
+            .map(|[x, y, w, h]| [x - 0.5 * w, y - 0.5 * h, x + 0.5 * w, y + 0.5 * h])
+            .collect();
+        let (misplaced, _) = told(&corners);
+        assert!(misplaced.unwrap().contains("are two corners"), "{corners:?}");
+        let larger: Vec<[f64; 4]> = people().iter().map(|all| all.map(|side| 3.0 * side)).collect();
+        let (misplaced, _) = told(&larger);
+        assert!(misplaced.unwrap().contains("pixels of these images"), "{larger:?}");
+    }
+}
