@@ -68,6 +68,12 @@ impl Ground {
         self.up_in_camera.x.atan2(-self.up_in_camera.y)
     }
 
+    /// Returns true if the floor has the tilt that the mount of the camera says.
+    pub fn has_tilt_of(&self, camera: &Camera) -> bool {
+        let told = camera.robot_from_camera.rotation.inverse() * Vector3::z();
+        self.up_in_camera.angle(&told) <= OTHER_TILT_RAD
+    }
+
     /// Returns the height of a point of the camera frame above the floor, m.
     pub fn height_of(&self, point_in_camera: &Point3<f64>) -> f64 {
         self.up_in_camera.dot(&point_in_camera.coords) + self.height_m
@@ -115,8 +121,9 @@ const OTHER_TILT_RAD: f64 = 0.17;
 
 /// Returns the factor by which the readings of a camera of known height and tilt have to be multiplied
 /// for the floor to lie where it is; `None` if too little floor is seen, or if the mount is wrong, which
-/// moves the floor as another unit does: its height is no robot's, or the floor has another tilt. Along each ray that points
-/// down, a reading is at most that of the floor, and over the image the floor is met most often.
+/// moves the floor as another unit does: its height is no robot's, or the floor has another tilt. Along
+/// each ray that points down, a reading is at most that of the floor, and over the image the floor is met
+/// most often.
 pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     let pose = &camera.robot_from_camera;
     let height_m = pose.translation.vector.z;
@@ -160,9 +167,8 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
 fn has_other_tilt(depth: &DepthImage, camera: &Camera, factor: f64) -> bool {
     let scaled =
         DepthImage::from_fn(depth.width(), depth.height(), |x, y| depth.row(y)[x] * factor as f32);
-    let told = camera.robot_from_camera.rotation.inverse() * Vector3::z();
     ground_of_depth(&scaled, camera, &GroundSettings::default())
-        .is_some_and(|floor| floor.up_in_camera.angle(&told) > OTHER_TILT_RAD)
+        .is_some_and(|floor| !floor.has_tilt_of(camera))
 }
 
 /// Leading digits of the units that cameras have.

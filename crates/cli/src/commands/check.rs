@@ -189,7 +189,7 @@ fn names(inputs: Inputs, settings: &InputSettings, wanted: Usage) -> Vec<&'stati
 /// the config has none.
 fn usage_of(input: Input, declared: Usage, settings: &InputSettings) -> Option<Usage> {
     if input == Input::OBSTACLES {
-        // Without a message of each the robot stands still.
+        // Silent ones stop the robot, but for bumpers, which speak when they are touched.
         return (!settings.sources.is_empty()).then_some(Usage::Required);
     }
     // A log without a topic that is named is refused.

@@ -163,8 +163,7 @@ fn unsteered(log: &Path, why: &MissingSource) -> Failure {
     let shown = log.display();
     let command = quoted(&shown.to_string());
     Failure::failed(format!(
-        "`{shown}`: {why}; to track the log alone, `tagalong run {command}` takes a config by itself, \
-         and no robot follows its commands"
+        "`{shown}`: {why}; `tagalong run {command}` tracks its people without commands to a robot"
     ))
 }
 

@@ -1,6 +1,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use clap::ValueEnum;
 use tagalong_app::timings::{Timings, WHOLE_FRAME};
 use tagalong_math::counted;
 
@@ -69,13 +70,19 @@ pub fn doctor(report: &RunReport, args: &RunArgs) -> String {
     // A config that the program chose is known by its name alone.
     let config = match args.config() {
         Some(path) => quoted(&path.display().to_string()),
-        None => report.config.name.trim_end_matches(".toml").to_owned(),
+        None => {
+            let name = &report.config.name;
+            name.strip_suffix(".toml").unwrap_or(name).to_owned()
+        }
     };
-    let camera = match &args.input.camera {
-        Some(camera) => format!(" --camera {}", quoted(camera)),
-        None => String::new(),
-    };
-    format!("tagalong doctor {config} {log}{camera}")
+    let mut command = format!("tagalong doctor {config} {log}");
+    if let Some(camera) = &args.input.camera {
+        let _ = write!(command, " --camera {}", quoted(camera));
+    }
+    if let Some(stamps) = args.input.stamps.and_then(|stamps| stamps.to_possible_value()) {
+        let _ = write!(command, " --stamps {}", stamps.get_name());
+    }
+    command
 }
 
 /// Returns a path as one word of a POSIX shell.

@@ -67,7 +67,7 @@ const OTHERS: [(&str, i32, &[&str]); 54] = [
     ("train svm-pitch", 2, &["svm-patch"]),
     ("import tmu folder.csv", 2, &["tum"]),
     ("run steered.toml good.mcap", 1, &["odometry = \"none\"` in [robot]"]),
-    ("run steered.toml good.mcap", 1, &["`tagalong run good.mcap` takes a config by itself"]),
+    ("run steered.toml good.mcap", 1, &["`tagalong run good.mcap` tracks its people without"]),
     ("check steered.toml good.mcap", 1, &["odometry = \"none\"` in [robot]"]),
     ("check sparse-model.toml", 2, &["at most 67108864 are read"]),
     ("check pipe-model.toml", 2, &["is a pipe or a device"]),

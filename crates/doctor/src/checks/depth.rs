@@ -4,7 +4,7 @@ use tagalong_core::DepthImage;
 use tagalong_geometry::Camera;
 use tagalong_math::median;
 use tagalong_vision::ground::{
-    GroundSettings, PLAUSIBLE_FACTORS, ROBOT_HEIGHTS_M, factor_of_depth, ground_of_depth,
+    Ground, GroundSettings, PLAUSIBLE_FACTORS, ROBOT_HEIGHTS_M, factor_of_depth, ground_of_depth,
     written_unit_m,
 };
 use tagalong_vision::quality::DepthQuality;
@@ -46,7 +46,8 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
             ", the floor at {:.2} of the distance that the height of the camera says",
             1.0 / factor
         ),
-        (None, Unit::OffFloor(height_m) | Unit::NearFloor(height_m)) => {
+        (None, Unit::OffFloor(floor) | Unit::NearFloor(floor)) => {
+            let height_m = floor.height_m;
             format!(", the floor {height_m:.2} m below the camera by these readings")
         }
         (None, _) => String::new(),
@@ -74,9 +75,9 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
                 "[input] depth_unit_m = {}",
                 written_unit_m(taken_unit_m(evidence) * factor)
             )),
-        Unit::OffFloor(height_m) => finding
+        Unit::OffFloor(floor) => finding
             .why("no robot's camera is at this distance from the floor: the unit is wrong")
-            .remedy(units_by_height(taken_unit_m(evidence), height_m)),
+            .remedy(units_by_height(taken_unit_m(evidence), &floor)),
         Unit::OffMedian => finding
             .why("no room is as near or as far: the unit is wrong")
             .remedy(unit_by_median(taken_unit_m(evidence), quality.median_m)),
@@ -93,11 +94,11 @@ enum Unit {
     Plausible,
     /// The floor lies where the height of the camera, which is known, says with readings times this.
     Measured(f64),
-    /// The floor lies as far below a camera of unknown height as below no robot's, m.
-    OffFloor(f64),
-    /// The floor lies as far below a camera of unknown height as below that of a robot, m, and what is
+    /// The floor lies as far below a camera of unknown height as below no robot's.
+    OffFloor(Ground),
+    /// The floor lies as far below a camera of unknown height as below that of a robot, and what is
     /// seen is nearer or farther than usual.
-    NearFloor(f64),
+    NearFloor(Ground),
     /// No floor is seen, and the readings are those of no room.
     OffMedian,
     /// No floor is seen, and the readings are nearer or farther than usual.
@@ -127,14 +128,14 @@ fn unit_by(evidence: &Evidence, quality: &DepthQuality, measured_factor: Option<
         return Unit::Plausible;
     }
     let camera = evidence.samples.camera.as_deref().filter(|_| !is_disparity(evidence));
-    let height_m =
-        camera.and_then(|camera| floor_m(&evidence.samples.depths, camera, quality.median_m));
-    match (height_m, camera) {
-        (Some(height_m), Some(camera)) if is_height_known(evidence) => {
-            Unit::by_factor(camera.height_m() / height_m)
+    let floor =
+        camera.and_then(|camera| floor_of(&evidence.samples.depths, camera, quality.median_m));
+    match (floor, camera) {
+        (Some(floor), Some(camera)) if is_height_known(evidence) && floor.has_tilt_of(camera) => {
+            Unit::by_factor(camera.height_m() / floor.height_m)
         }
-        (Some(height_m), _) if ROBOT_HEIGHTS_M.contains(&height_m) => Unit::NearFloor(height_m),
-        (Some(height_m), _) => Unit::OffFloor(height_m),
+        (Some(floor), _) if ROBOT_HEIGHTS_M.contains(&floor.height_m) => Unit::NearFloor(floor),
+        (Some(floor), _) => Unit::OffFloor(floor),
         (None, _) if POSSIBLE_M.contains(&quality.median_m) => Unit::Unusual,
         (None, _) => Unit::OffMedian,
     }
@@ -186,9 +187,10 @@ fn taken_unit_m(evidence: &Evidence) -> f64 {
 /// Units that depth cameras have, m.
 const USUAL_UNITS_M: [f64; 8] = [1.0, 0.01, 0.001, 0.0005, 0.00025, 0.0002, 0.000125, 0.0001];
 
-/// Returns the remedy where the floor lies at this height with the unit that is taken, m, and the height
-/// of the camera is not known: each unit with the height that follows from it.
-fn units_by_height(taken_m: f64, height_m: f64) -> String {
+/// Returns the remedy where the floor lies so with the unit that is taken, m, and the height of the
+/// camera is not known: each unit with the height that follows from it.
+fn units_by_height(taken_m: f64, floor: &Ground) -> String {
+    let height_m = floor.height_m;
     let mut follows: Vec<String> = Vec::new();
     for unit_m in USUAL_UNITS_M {
         let camera_m = height_m * unit_m / taken_m;
@@ -202,7 +204,10 @@ fn units_by_height(taken_m: f64, height_m: f64) -> String {
     }
     format!(
         "give the height of the camera, with which the floor tells the unit:\n[input.camera]\n\
-         height_m = ...  # measure it\nor the unit, [input] depth_unit_m = {}",
+         height_m = ...  # measure it\npitch_down_deg = {:.1}\nroll_deg = {:.1}\n\
+         or the unit, [input] depth_unit_m = {}",
+        floor.pitch_down_rad().to_degrees(),
+        floor.roll_rad().to_degrees(),
         follows.join(", ")
     )
 }
@@ -211,9 +216,7 @@ fn units_by_height(taken_m: f64, height_m: f64) -> String {
 /// which they are some metres.
 fn unit_by_median(taken_m: f64, median_m: f64) -> String {
     let tens = (USUAL_MEDIAN_M / median_m).log10().round();
-    let better = taken_m * 10f64.powf(tens);
-    // In the short form: 0.001, not 0.0010000000000000002.
-    let better = format!("{better:.9}").parse().unwrap_or(better);
+    let better = written_unit_m(taken_m * 10f64.powf(tens));
     format!(
         "[input] depth_unit_m = {better}\nwith which half of the readings are within {:.1} m; no floor \
          is seen that tells the unit more exactly",
@@ -237,19 +240,20 @@ const USUAL_MEDIAN_M: f64 = 3.0;
 /// Number of depth images by which the floor is measured.
 const FLOOR_IMAGES: usize = 3;
 
-/// Returns the distance of the floor below the camera, m; `None` if no floor is seen.
-fn floor_m(depths: &[Arc<DepthImage>], camera: &Camera, median_m: f64) -> Option<f64> {
+/// Returns the floor below the camera; `None` if none is seen.
+fn floor_of(depths: &[Arc<DepthImage>], camera: &Camera, median_m: f64) -> Option<Ground> {
     // The fit has tolerances in metres, and needs readings of usual size.
     let scale = USUAL_MEDIAN_M / median_m;
-    let mut heights_m = Vec::new();
+    let mut floors = Vec::new();
     for depth in depths.iter().take(FLOOR_IMAGES) {
         let scaled = DepthImage::from_fn(depth.width(), depth.height(), |x, y| {
             depth.row(y)[x] * scale as f32
         });
         let floor = ground_of_depth(&scaled, camera, &GroundSettings::default());
-        heights_m.extend(floor.map(|floor| floor.height_m / scale));
+        floors.extend(floor.map(|floor| Ground { height_m: floor.height_m / scale, ..floor }));
     }
-    median(heights_m)
+    floors.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
+    floors.get(floors.len() / 2).copied()
 }
 
 /// Returns true if the unit of depth may be wrong: the readings tell it, or nobody is found and no floor
@@ -274,6 +278,8 @@ pub(super) fn is_unit_in_doubt(evidence: &Evidence) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::scenery::testing::Room;
 
@@ -287,21 +293,28 @@ mod tests {
                 DepthImage::from_fn(seen.width(), seen.height(), |x, y| seen.row(y)[x] * scale);
             let quality = DepthQuality::of([&scaled]).unwrap();
             let images = [Arc::new(scaled)];
-            let height_m = floor_m(&images, camera, quality.median_m).unwrap();
+            let height_m = floor_of(&images, camera, quality.median_m).unwrap().height_m;
             let expected_m = camera.height_m() * f64::from(scale);
             assert!((height_m / expected_m - 1.0).abs() < 0.03, "{scale}: {height_m}");
         }
     }
 
+    /// Returns the floor below a camera that looks down by 30 degrees.
+    fn floor(height_m: f64) -> Ground {
+        let up_in_camera = Vector3::new(0.0, -0.75_f64.sqrt(), -0.5);
+        Ground { up_in_camera, height_m, inliers: 0.5 }
+    }
+
     #[test]
     fn an_unknown_height_tells_which_unit_follows_from_which_height() {
-        let told = units_by_height(0.001, 12.0);
+        let told = units_by_height(0.001, &floor(12.0));
         assert!(told.contains("[input.camera]\nheight_m"), "{told}");
+        assert!(told.contains("pitch_down_deg = 30.0\nroll_deg = 0.0"), "{told}");
         for follows in ["0.0001 for a camera 1.20 m above", "0.0002 for a camera 2.40 m above"] {
             assert!(told.contains(follows), "{told}");
         }
         assert!(!told.contains("0.001 for") && !told.contains("0.00025 for"), "{told}");
-        let other = units_by_height(0.001, 1e6);
+        let other = units_by_height(0.001, &floor(1e6));
         assert!(other.contains("0.000000001 for each metre"), "{other}");
     }
 

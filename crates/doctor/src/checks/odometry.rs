@@ -1,3 +1,5 @@
+use tagalong_math::counted;
+
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 use super::depth::is_unit_in_doubt;
@@ -69,10 +71,10 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
 fn unsteady(gaps: u64, jumps: u64, way: &str, stands: bool) -> String {
     let mut parts = Vec::new();
     if gaps > 0 {
-        parts.push(format!("silent at {gaps} frames"));
+        parts.push(format!("silent at {}", counted(gaps, "frame")));
     }
     if jumps > 0 {
-        parts.push(format!("jumps by more than a metre at {jumps} frames"));
+        parts.push(format!("jumps by more than a metre at {}", counted(jumps, "frame")));
     }
     let way = if stands { "the way between them is not known" } else { way };
     format!("{}; {way}", parts.join(", "))

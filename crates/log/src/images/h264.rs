@@ -56,10 +56,6 @@ impl VideoDecoder {
     /// bits with halved colours. No picture follows until the next key picture.
     pub(crate) fn decode(&mut self, packet: &[u8], header: Header) -> Result<Picture, ImageError> {
         let packet = &*with_start_codes(packet);
-        if let Some(why) = cut_off(packet) {
-            self.is_whole = false;
-            return Err(damaged(why));
-        }
         // The decoder is a young one, and a log may hold any bytes: a panic is a damaged packet.
         match catch_unwind(AssertUnwindSafe(|| self.take(packet))) {
             Ok(Ok(Some(frame))) if self.is_out_of_order(&frame, header.stamp()) => {
@@ -80,6 +76,9 @@ impl VideoDecoder {
     }
 
     fn take(&mut self, packet: &[u8]) -> Result<Option<Frame>, ImageError> {
+        if let Some(why) = cut_off(packet) {
+            return Err(damaged(why));
+        }
         let begins = !self.is_whole;
         let mut outcome = Ok(());
         for unit in parse_annex_b(packet) {

@@ -108,8 +108,8 @@ impl Assembler {
         }
         let (mut images, size) = self.primary(plan, image, tally)?;
         let camera = self.camera_at(plan, image, size, intake, tally)?;
-        if let Some(depth) = depth {
-            let seen = pixels(plan, plan.chosen.depth.as_ref()?, &depth, tally);
+        if let (Some(depth), Some(topic)) = (depth, &plan.chosen.depth) {
+            let seen = pixels(plan, topic, &depth, tally);
             if let Some(Pixels::Depth(seen)) = seen {
                 let moment = DepthMoment { image, depth: &depth, camera: &camera, tf: &intake.tf };
                 images.depth = self.aligner.align(plan, &moment, seen, tally);

@@ -105,7 +105,7 @@ impl Assembly {
                 continue;
             };
             let note = format!(
-                "{without} of {frames} frames were made without an image of {topic} within {:.0} ms: {}; {}",
+                "{without} of {frames} frames got no image of {topic} within {:.0} ms: {}; {}",
                 1e3 * tolerance_s,
                 problem.why,
                 problem.remedy

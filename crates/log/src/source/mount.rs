@@ -56,8 +56,8 @@ impl Mount {
 
     /// Returns the mount of a laser scanner that is not in tf.
     pub(super) fn scanner_at_origin() -> Self {
-        let source = "an assumption (tf does not connect it): the scanner sits at the robot's origin, level, and \
-                      looks ahead";
+        let source = "an assumption (tf does not connect it): the scanner sits at the robot's origin, \
+                      level, and looks ahead";
         Self::Fixed { pose: Isometry3::identity(), source: source.into() }
     }
 

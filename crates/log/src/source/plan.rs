@@ -20,7 +20,7 @@ use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
 use crate::topics::{
     Chosen, InputAccount, Problem, TopicUse, choose, decide, intrinsics_of, kind_of, missing,
-    told_unit, transform_problem, unreadable,
+    told_unit, transform_odometry_problem, transform_problem, unreadable,
 };
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
@@ -296,7 +296,9 @@ fn no_odometry(plan: &Plan) -> String {
     let tf = &plan.scan.tf;
     let robot = robot_frame(&plan.scan, &plan.input);
     let root = tf.root_of(robot);
-    if tf.knows(&plan.input.odom_frame) || tf.moving_frames(root, robot).is_empty() {
+    let moves = !tf.moving_frames(root, robot).is_empty();
+    let problem = transform_odometry_problem(&plan.scan, plan.primary(), root, robot);
+    if tf.knows(&plan.input.odom_frame) || !moves || problem.is_some() {
         return at_rest;
     }
     format!(

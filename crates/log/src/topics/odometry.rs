@@ -133,7 +133,7 @@ fn late_transform_problem(frames: &Topic, link: &Times) -> Option<Problem> {
 }
 
 /// Returns the reason for which transforms cannot be the odometry.
-fn transform_odometry_problem(
+pub(crate) fn transform_odometry_problem(
     scan: &Scan,
     primary: &str,
     odom: &str,
@@ -152,9 +152,9 @@ fn transform_odometry_problem(
             return Problem::new(WHOLE_SECONDS, RECORDING);
         }
         // Above the odometry frame there is localisation, which corrects it now and then.
-        if frame != ODOMETRY_FRAME
-            && let Some(problem) = late_transform_problem(frames, times)
-        {
+        let is_odometry_frame =
+            frame.rsplit('/').next().is_some_and(|name| name.starts_with(ODOMETRY_FRAME));
+        if !is_odometry_frame && let Some(problem) = late_transform_problem(frames, times) {
             return Some(problem);
         }
     }

@@ -21,6 +21,8 @@ const EVEN: f64 = 0.75;
 const LONGEST_GAP: f64 = 3.0;
 /// Share of the images of a slower topic that belong to a frame.
 const MOST_PAIRED: f64 = 0.9;
+/// Time in the log between a frame and its partner from which on it is too long to wait for, s.
+const LONG_S: f64 = 1.0;
 
 /// Returns true for more frames without a partner than cameras leave out.
 pub(crate) fn is_unusual(without: u64, frames: u64) -> bool {
@@ -82,7 +84,7 @@ fn recorded_apart(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Option<
         }
     }
     let are_paired = delays_s.len() as f64 >= MOST_PAIRED * frames.stamps.len() as f64;
-    let delay_s = median(delays_s).filter(|delay_s| are_paired && delay_s.abs() > tolerance_s)?;
+    let delay_s = median(delays_s).filter(|delay_s| are_paired && delay_s.abs() > LONG_S)?;
     let side = if delay_s > 0.0 { "after" } else { "before" };
     let why = format!(
         "those with the stamps of the frames stand {:.1} s {side} them in the log, and no frame waits so \

@@ -24,12 +24,7 @@ fn read(saved: &SavedLog, inputs: Inputs) -> (usize, FrameSource) {
 }
 
 fn told(source: &FrameSource) -> String {
-    source
-        .notes()
-        .iter()
-        .find(|note| note.contains("were made without an image of"))
-        .cloned()
-        .unwrap_or_default()
+    source.notes().iter().find(|note| note.contains("got no image of")).cloned().unwrap_or_default()
 }
 
 #[test]
