@@ -25,6 +25,13 @@ pub struct Tracks {
 #[derive(Deserialize)]
 struct RunFacts {
     log: LogName,
+    #[serde(default = "complete")]
+    ended: String,
+}
+
+/// End of a run that was not stopped, in its report.
+fn complete() -> String {
+    "complete".into()
 }
 
 #[derive(Deserialize)]
@@ -90,6 +97,13 @@ impl Tracks {
         let (text, name) = file("report.json")?;
         let facts: RunFacts = serde_json::from_str(&text)
             .map_err(|error| Failure::failed(format!("{name}: {error}")))?;
+        if facts.ended != complete() {
+            tracks.notes.push(format!(
+                "{}: the run is not whole ({}); the frames after its end count as frames without tracks",
+                folder.display(),
+                facts.ended
+            ));
+        }
         Ok(Self { log_name: Some(facts.log.name), in_robot_frame: true, ..tracks })
     }
 }

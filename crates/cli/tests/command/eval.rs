@@ -115,6 +115,21 @@ fn truth_that_is_named_after_another_log_is_noted() {
 }
 
 #[test]
+fn tracks_of_a_run_that_was_stopped_are_noted() {
+    let folder = home();
+    let report = folder.path().join("out/report.json");
+    let whole = fs::read_to_string(&report).unwrap();
+    let stopped = whole.replace("\"ended\": \"complete\"", "\"ended\": \"stopped by signal 2\"");
+    for (written, is_noted) in [(&whole, false), (&stopped, true)] {
+        fs::write(&report, written).unwrap();
+        let output = in_home(folder.path(), &["--truth", "walk.people.csv", "--tracks", "out"]);
+        let said = text(&output.stdout);
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        assert_eq!(said.contains("the run is not whole (stopped by signal 2)"), is_noted, "{said}");
+    }
+}
+
+#[test]
 fn people_annotated_in_laser_scans_are_truth_on_the_floor() {
     let folder = home();
     let header = "scan,id,x_laser_m,y_laser_m,x_robot_m,y_robot_m,ignore,source\n";

@@ -22,7 +22,9 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
     let still_share = coverage.still_boxes as f64 / coverage.boxes as f64;
     let idle_share = coverage.idle();
     let mut severity = Severity::beyond(idle_share, IDLE.0, IDLE.1);
-    if coverage.boxes < FEW_BOXES {
+    // Of tracks that live too briefly to be judged, nothing is certain.
+    let are_judged = coverage.moving + coverage.still > 0;
+    if coverage.boxes < FEW_BOXES || !are_judged {
         severity = severity.min(Severity::Warn);
     }
     let mut measured = match coverage.still {

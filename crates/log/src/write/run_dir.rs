@@ -17,8 +17,8 @@ pub struct RunDir {
     _lock: Option<File>,
 }
 
-/// Names of the files of a run; only these are ever removed.
-const OWN_FILES: [&str; 7] = [
+/// Names of the files of a run, and of its page; only these are ever removed.
+const OWN_FILES: [&str; 8] = [
     "tracks.mcap",
     "tracks.csv",
     "tracks-metres.csv",
@@ -26,6 +26,7 @@ const OWN_FILES: [&str; 7] = [
     "report.json",
     "timings.json",
     "origin.json",
+    "view.html",
 ];
 
 /// Folder of overlay pictures.

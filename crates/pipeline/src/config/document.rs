@@ -207,9 +207,13 @@ fn base_at(
         ));
     }
     if !is_config(&path) {
+        let shown = path.display();
+        let remedy = match path.extension() {
+            None => format!("; write `{EXTENDS} = \"{name}.{ENDING}\"`"),
+            Some(_) => String::new(),
+        };
         return Err(format!(
-            "cannot extend {}: a config is a file whose name ends in .{ENDING}",
-            path.display()
+            "cannot extend {shown}: a config is a file whose name ends in .{ENDING}{remedy}"
         ));
     }
     let text = read_base(&path).or_else(|error| builtin_base(name, error));

@@ -28,6 +28,8 @@ use salt::Salt;
 
 /// Ending of the truth beside a log.
 const TRUTH: &str = "people.csv";
+/// Ending of the truth of a log whose boxes are those of whole bodies, which is not altered.
+const BOXES: &str = "boxes.csv";
 
 /// Arguments of `tagalong alter`.
 #[derive(Args, Debug)]
@@ -121,6 +123,10 @@ pub fn alter(args: &AlterArgs) -> Outcome {
     if truth.is_file() {
         alter_truth(args, [&truth, &altered_truth], &kept, width)?;
         let _ = writeln!(told, "its truth: {}", altered_truth.display());
+    }
+    let whole_bodies = args.log.with_extension(BOXES);
+    if whole_bodies.is_file() {
+        let _ = writeln!(told, "left out: its truth of whole bodies, {}", whole_bodies.display());
     }
     for (topic, kind) in left_out {
         let _ = writeln!(told, "left out: {topic} ({kind})");
