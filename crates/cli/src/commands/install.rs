@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use sha2::{Digest, Sha256};
+use tagalong_app::config_file::ConfigFile;
 use tagalong_app::installed::{NetworkFiles, WITH_DEPTH};
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, write_file};
 use tagalong_config::{FileLimit, read_bytes};
@@ -87,6 +88,11 @@ impl Install<'_> {
         if name.ends_with(WITH_DEPTH) {
             return Err(Failure::usage(format!(
                 "`{name}` ends as the config that joins a network with depth: give another --name"
+            )));
+        }
+        if ConfigFile::built_in_names().any(|builtin| builtin == name) {
+            return Err(Failure::usage(format!(
+                "`{name}` is the name of a built-in config, which `run` takes: give another --name"
             )));
         }
         if name.is_empty() || !is_plain {

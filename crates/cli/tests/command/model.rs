@@ -99,6 +99,8 @@ fn an_installed_network_has_a_name() {
     assert!(why.contains("another network is installed as `blob-finder`"), "{why}");
     let odd = run(&["model", "--install", &other, "--name", "a/b"]);
     assert_eq!(code(&odd), 2, "{}", text(&odd.stderr));
+    let builtin = run(&["model", "--install", &other, "--name", "mono"]);
+    assert!(text(&builtin.stderr).contains("the name of a built-in config"));
     let twin = run(&["model", "--install", &other, "--name", "blob-finder-depth"]);
     assert_eq!(code(&twin), 2, "{}", text(&twin.stderr));
     let joined = fs::read_to_string(place("data/networks/blob-finder-depth.toml")).unwrap();
