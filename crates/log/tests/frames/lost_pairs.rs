@@ -11,7 +11,9 @@ fn ride(depth: impl Fn(u32, f64) -> Option<f64>) -> SavedLog {
     for index in 0..FRAMES {
         let t = 0.1 * f64::from(index);
         if let Some(stamp) = depth(index, t) {
-            log.depth(at(stamp), "colour", 2.0);
+            let data = 2000_u16.to_le_bytes().repeat(16 * 12);
+            let image = Image::packed(Header::new(at(stamp), "colour"), "16UC1", 16, 12, &data);
+            log.message("/camera/depth/image_raw", at(t), &image);
         }
         log.colour(at(t));
     }
