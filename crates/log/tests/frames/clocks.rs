@@ -113,8 +113,8 @@ fn late_at_times(log: &mut LogWriter, t: f64) {
 
 #[test]
 fn transforms_are_no_other_clock_unless_all_of_them_are_late() {
-    let writers: [(&str, fn(&mut LogWriter, f64)); 2] =
-        [("map", with_late_corrections), ("odom", late_at_times)];
+    type Write = fn(&mut LogWriter, f64);
+    let writers: [(&str, Write); 2] = [("map", with_late_corrections), ("odom", late_at_times)];
     for (odom_frame, write) in writers {
         let input = InputSettings { odom_frame: odom_frame.into(), ..InputSettings::default() };
         let source = ride(started(), write).open(&input, Inputs::ANY).unwrap();
