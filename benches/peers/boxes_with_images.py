@@ -20,9 +20,8 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import supervision
 from mot_trackers import PEERS
-from whole_programs import SCORE, images, network, people, scores, upper_body_row
+from whole_programs import SCORE, detections, images, network, people, scores, upper_body_row
 
 OURS = {
     "`recorded`": "",
@@ -63,12 +62,7 @@ def write_peer(peer, frames, path):
     tracker = peer(**{name: SCORE for name in ["track_activation_threshold"] if name in known})
     with open(path, "w") as rows:
         for frame, (image, boxes, sure) in enumerate(frames, 1):
-            found = supervision.Detections(
-                xyxy=boxes.astype(np.float32).reshape(-1, 4),
-                confidence=sure.astype(np.float32),
-                class_id=np.zeros(len(sure), int),
-            )
-            found = tracker.update(found, image if sees else None)
+            found = tracker.update(detections(boxes, sure), image if sees else None)
             for box, score, track in zip(found.xyxy, found.confidence, found.tracker_id):
                 if track >= 0:  # otherwise it is not confirmed yet
                     rows.write(upper_body_row(frame, track, box, score))

@@ -90,10 +90,20 @@ def upper_body_row(frame, track, box, score):
     return f"{frame},{track},{left:.2f},{top:.2f},{side:.2f},{side:.2f},{score:.4f},-1,-1,-1\n"
 
 
-def script(path, log, out):
-    """The usual script: reads the log, finds people, tracks them by ByteTrack."""
+def detections(boxes, scores):
+    """Boxes with their scores, as `trackers` takes them."""
     import numpy as np
     import supervision
+
+    return supervision.Detections(
+        xyxy=boxes.astype(np.float32).reshape(-1, 4),
+        confidence=scores.astype(np.float32),
+        class_id=np.zeros(len(scores), int),
+    )
+
+
+def script(path, log, out):
+    """The usual script: reads the log, finds people, tracks them by ByteTrack."""
     import trackers
 
     session = network(path)
@@ -102,12 +112,7 @@ def script(path, log, out):
     with open(out, "w", buffering=1) as rows:
         for frame, image in enumerate(images(log), 1):
             boxes, scores = people(session, image)
-            found = supervision.Detections(
-                xyxy=boxes.astype(np.float32).reshape(-1, 4),
-                confidence=scores.astype(np.float32),
-                class_id=np.zeros(len(scores), int),
-            )
-            found = tracker.update(found)
+            found = tracker.update(detections(boxes, scores))
             for box, score, track in zip(found.xyxy, found.confidence, found.tracker_id):
                 if track >= 0:  # otherwise it is not confirmed yet
                     rows.write(upper_body_row(frame, track, box, score))

@@ -147,8 +147,9 @@ mod tests {
         assert!((lag(&[0.9, 1.0, 1.1, 1.2, 1.3]).unwrap() - 0.9).abs() < 1e-6);
         assert_eq!(lag(&[0.9, 1.0, 1.1, 2.2, 2.3]), None);
         assert_eq!(lag(&[0.9, 1.0]), None);
-        let latest = |stamps: &[f64]| Times::of(&at(stamps), &recorded).unwrap().latest_lag_s();
-        assert!((latest(&[-1.5, -1.4, -1.0, -1.2, -1.1]).unwrap() + 1.2).abs() < 1e-6);
-        assert_eq!(latest(&[-1.5, -1.4]), None);
+        let many = Times::of(&at(&[-1.5, -1.4, -1.0, -1.2, -1.1]), &recorded).unwrap();
+        assert!((many.latest_lag_s().unwrap() + 1.2).abs() < 1e-6);
+        let few = Times::of(&at(&[-1.5, -1.4]), &recorded).unwrap();
+        assert_eq!(few.latest_lag_s(), None);
     }
 }

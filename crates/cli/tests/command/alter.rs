@@ -78,17 +78,18 @@ fn a_mirrored_log_mirrored_again_is_the_log() {
 #[test]
 fn the_truth_beside_a_copy_is_replaced_only_when_asked() {
     let folder = home();
-    let path = |name: &str| folder.path().join(name);
-    fs::write(path("other.people.csv"), "keep me").unwrap();
+    let copy = folder.path().join("other.mcap");
+    let truth = copy.with_extension("people.csv");
+    fs::write(&truth, "keep me").unwrap();
     let arguments = ["walk.mcap", "--mirror", "-o", "other.mcap"];
     let refused = alter(folder.path(), &arguments);
     assert_eq!(code(&refused), 2, "{}", text(&refused.stderr));
     assert!(text(&refused.stderr).contains("other.people.csv exists"), "{}", text(&refused.stderr));
-    assert_eq!(fs::read_to_string(path("other.people.csv")).unwrap(), "keep me");
-    assert!(!path("other.mcap").exists(), "a refused copy leaves nothing behind");
+    assert_eq!(fs::read_to_string(&truth).unwrap(), "keep me");
+    assert!(!copy.exists(), "a refused copy leaves nothing behind");
     let done = alter(folder.path(), &[&arguments[..], &["--overwrite"]].concat());
     assert_eq!(code(&done), 0, "{}", text(&done.stderr));
-    assert!(fs::read_to_string(path("other.people.csv")).unwrap().starts_with("frame,"));
+    assert!(fs::read_to_string(&truth).unwrap().starts_with("frame,"));
     // The truth of this name is the log's own.
     let own = alter(folder.path(), &["walk.mcap", "--mirror", "-o", "walk.bag", "--overwrite"]);
     assert_eq!(code(&own), 2, "{}", text(&own.stderr));

@@ -76,13 +76,18 @@ impl VideoDecoder {
     }
 
     fn take(&mut self, packet: &[u8]) -> Result<Option<Frame>, ImageError> {
-        if let Some(why) = cut_off(packet) {
-            return Err(damaged(why));
+        // The decoder would make a picture of the rest.
+        if !is_at_unit(packet) {
+            return Err(damaged("its start is missing: it begins within a unit"));
+        }
+        let units = parse_annex_b(packet);
+        if lacks_first_block(&units) {
+            return Err(damaged("the first part of its picture is missing"));
         }
         let begins = !self.is_whole;
         let mut outcome = Ok(());
-        for unit in parse_annex_b(packet) {
-            outcome = outcome.and_then(|()| self.take_unit(&unit));
+        for unit in &units {
+            outcome = outcome.and_then(|()| self.take_unit(unit));
         }
         // The rest of a damaged picture must not become part of the next one.
         let picture = self.decoder.flush();
@@ -202,18 +207,16 @@ fn checked(unit: &NalUnit<'_>, limits: &Limits) -> Result<Sps, ImageError> {
     Ok(sps)
 }
 
-/// Returns what is missing at the start of a packet; `None` for one that begins with a unit, and whose
-/// picture begins with its first block. The decoder would make a picture of the rest.
-fn cut_off(packet: &[u8]) -> Option<&'static str> {
+/// Returns true for a packet that begins with the start code of a unit, and for an empty one.
+fn is_at_unit(packet: &[u8]) -> bool {
     let zeros = packet.iter().take_while(|byte| **byte == 0).count();
-    let is_start = zeros >= 2 && packet.get(zeros) == Some(&1);
-    if !is_start && !packet.is_empty() {
-        return Some("its start is missing: it begins within a unit");
-    }
-    let units = parse_annex_b(packet);
-    let picture = units.iter().find(|unit| is_picture(unit))?;
-    let first_block = Bits { bytes: &picture.rbsp, at: 0 }.exponential();
-    (first_block != Some(0)).then_some("the first part of its picture is missing")
+    packet.is_empty() || zeros >= 2 && packet.get(zeros) == Some(&1)
+}
+
+/// Returns true if the units have a picture that does not begin with its first block.
+fn lacks_first_block(units: &[NalUnit<'_>]) -> bool {
+    let Some(picture) = units.iter().find(|unit| is_picture(unit)) else { return false };
+    Bits { bytes: &picture.rbsp, at: 0 }.exponential() != Some(0)
 }
 
 /// Bytes that are put behind a packet; neither zeros, as the decoder reads there, nor a start code.

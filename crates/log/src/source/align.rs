@@ -100,8 +100,9 @@ impl DepthAligner {
         seen: &DepthImage,
         tally: &mut Tally,
     ) -> Option<Arc<DepthImage>> {
-        tally.count("depth_registered");
-        tally.note("depth is registered to the colour camera through tf and both calibrations");
+        tally.remark("depth_registered", || {
+            "depth is registered to the colour camera through tf and both calibrations".to_owned()
+        });
         // Made anew only after a change of the transform, because its rays are costly.
         if !self.registration.as_ref().is_some_and(|known| known.is_for(&colour_from_depth)) {
             self.registration = Some(Registration::new(from, camera, colour_from_depth));

@@ -36,6 +36,8 @@ use crate::topics::Problem;
 pub(super) struct Assembler {
     index: u64,
     camera: Option<Arc<Camera>>,
+    /// True once it is told that a pose of the camera is held.
+    is_hold_told: bool,
     aligner: DepthAligner,
     unwrapping: Unwrapping,
     previous: Option<(Stamp, PoseAt)>,
@@ -48,6 +50,7 @@ impl Assembler {
         Self {
             index: 0,
             camera: None,
+            is_hold_told: false,
             aligner: DepthAligner::default(),
             unwrapping: Unwrapping::default(),
             previous: None,
@@ -256,7 +259,8 @@ impl Assembler {
         let known = found.or_else(|| self.camera.as_ref().map(|last| last.robot_from_camera));
         if found.is_none() {
             tally.count("frames_without_camera_pose");
-            if known.is_some() {
+            if known.is_some() && !self.is_hold_told {
+                self.is_hold_told = true;
                 tally.note(format!(
                     "{} has no pose of the camera at some frames, which get the last known one: if the \
                      camera does not move on the robot, publish it on /tf_static, else throughout",
