@@ -45,10 +45,7 @@ pub const CHOICES: [Choice; 11] = [
         reason: "it needs no heads, and no settings for the height of the camera",
     },
     Choice { config: "stereo-verified", reason: "verifiers judge what it finds" },
-    Choice {
-        config: "stereo-street",
-        reason: "stereo-verified looks for smaller disparities than such a pair has",
-    },
+    Choice { config: "stereo-street", reason: "it is the one for pairs with a wide baseline" },
     Choice {
         config: PANORAMIC,
         reason: "it is the one for several people before a conical mirror",
@@ -294,6 +291,16 @@ fn try_config(
     // Without odometry the robot is taken to be at rest, and all things seem to move.
     if settings.suits.odometry && !source.has_odometry() {
         return Err(Failure::failed("no odometry").into());
+    }
+    // A pair with a wide base sees nobody near, one with a narrow base nobody far away.
+    if let Some(baseline_m) = source.facts().baseline_m
+        && settings.suits.baseline_off_m(baseline_m) > 0.0
+    {
+        let [low, high] = settings.suits.baseline_m.unwrap_or_default();
+        return Err(Failure::failed(format!(
+            "for pairs with a baseline of {low} to {high} m, and this one has {baseline_m:.2} m"
+        ))
+        .into());
     }
     let stepped = pipeline.step(&item.frame).map(drop);
     stepped.map_err(|error| Misfit { why: Failure::failed(error), required })

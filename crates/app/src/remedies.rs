@@ -117,11 +117,16 @@ impl Remedies {
             return format!("the test \"{test}\" dropped the candidate");
         };
         let mut found = remedy.settings_in(resolved);
+        let further = found.len().saturating_sub(MOST_SETTINGS);
         found.truncate(MOST_SETTINGS);
         let settings = if found.is_empty() {
             "no setting decides it".to_owned()
         } else {
-            format!("decided by {}", Setting::in_words(&found))
+            let further = match further {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            format!("decided by {}{further}", Setting::in_words(&found))
         };
         format!("the test \"{test}\" dropped the candidate ({}); {settings}", remedy.look)
     }
@@ -429,7 +434,7 @@ mod tests {
         assert_eq!(
             remedies.sentence("too blue", &resolved),
             "the test \"too blue\" dropped the candidate (the sky); decided by [[detectors]] plugin = \
-             \"own\", config = { a = 1, b = 2 }"
+             \"own\", config = { a = 1, b = 2 } and 1 more"
         );
         let without = remedies.sentence("too blue", &Table::new());
         assert!(without.ends_with("; no setting decides it"), "{without}");

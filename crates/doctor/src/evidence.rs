@@ -20,6 +20,11 @@ const SAMPLES: u64 = 24;
 /// Number of depth images that are kept for a summary.
 const KEPT_DEPTHS: usize = 8;
 
+/// Way, m, and angle, rad, beyond which the camera moves on the robot: a floor that is measured at each
+/// frame, or a loose joint, gives less.
+const CAMERA_MOVED_M: f64 = 0.05;
+const CAMERA_TURNED_RAD: f64 = 0.05;
+
 /// Facts about a config and a log.
 pub struct Evidence {
     /// Name of the config.
@@ -30,6 +35,8 @@ pub struct Evidence {
     pub refusal: Option<LogError>,
     /// Source that the controller lacks.
     pub missing: Option<MissingSource>,
+    /// True if the user names the config: without a name `tagalong run` takes no heed of the controller.
+    pub is_named: bool,
     /// `[input]` of the config.
     pub input: InputSettings,
     /// `[suits]` of the config.
@@ -95,15 +102,22 @@ pub struct Reading {
     pub made: u64,
     /// Images (or scans) until then that should have made a frame.
     pub wanted: u64,
+    /// All images (or scans) of the log.
+    pub in_log: u64,
 }
 
-/// Way of the robot over the examined frames.
-#[derive(Clone, Copy, Debug, Default)]
+/// Way of the robot over the examined frames, and of the camera on it.
+#[derive(Clone, Debug, Default)]
 pub struct Driven {
     /// Length of the way, m.
     pub metres: f64,
     /// Sum of all turns, rad.
     pub turned_rad: f64,
+    /// Farthest that the camera got from its first place on the robot, m.
+    pub camera_moved_m: f64,
+    /// Largest angle that the camera turned away from its first direction on the robot, rad.
+    pub camera_turned_rad: f64,
+    first_camera: Option<Arc<Camera>>,
 }
 
 impl Driven {
@@ -111,6 +125,15 @@ impl Driven {
     pub fn take(&mut self, frame: &Frame) {
         self.metres += frame.motion.forward.hypot(frame.motion.left);
         self.turned_rad += frame.motion.turn.abs();
+        let first = self.first_camera.get_or_insert_with(|| Arc::clone(&frame.camera));
+        let moved = first.robot_from_camera.inv_mul(&frame.camera.robot_from_camera);
+        self.camera_moved_m = self.camera_moved_m.max(moved.translation.vector.norm());
+        self.camera_turned_rad = self.camera_turned_rad.max(moved.rotation.angle());
+    }
+
+    /// Returns true if the camera moves on the robot.
+    pub fn moves_camera(&self) -> bool {
+        self.camera_moved_m > CAMERA_MOVED_M || self.camera_turned_rad > CAMERA_TURNED_RAD
     }
 }
 
@@ -212,5 +235,41 @@ impl Samples {
         }
         let floor = ground_of_depth(&depth, &frame.camera, &GroundSettings::default());
         self.floors.extend(floor.map(|floor| (floor, Arc::clone(&frame.camera))));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+    use tagalong_core::{EgoMotion, Images, Stamp};
+    use tagalong_geometry::Pinhole;
+
+    use super::*;
+
+    /// Returns true if a camera with this pose in its first frame counts as moving.
+    fn moves(forward_m: f64, turn_rad: f64) -> bool {
+        let lens =
+            Pinhole { fx: 100.0, fy: 100.0, cx: 2.0, cy: 2.0, distortion: Default::default() };
+        let first = Camera::mounted(lens, 4, 4, 1.2, 0.0, 0.0);
+        let moved = Isometry3::from_parts(
+            Translation3::new(forward_m, 0.0, 0.0),
+            UnitQuaternion::from_euler_angles(0.0, 0.0, turn_rad),
+        );
+        let later = Camera { robot_from_camera: moved * first.robot_from_camera, ..first.clone() };
+        let mut driven = Driven::default();
+        for camera in [first.clone(), later, first] {
+            let motion = EgoMotion::at_rest(0.1);
+            let camera = Arc::new(camera);
+            driven.take(&Frame::new(1, Stamp::default(), camera, motion, Images::default()));
+        }
+        driven.moves_camera()
+    }
+
+    #[test]
+    fn a_camera_moves_that_leaves_its_first_pose_and_comes_back() {
+        assert!(!moves(0.0, 0.0));
+        assert!(!moves(0.01, 0.01), "a loose joint");
+        assert!(moves(0.3, 0.0));
+        assert!(moves(0.0, 0.2));
     }
 }

@@ -59,6 +59,7 @@ pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
         input: &args.input,
         frames: args.frames,
         with_pictures: args.output.is_some(),
+        is_named: config.is_some(),
     };
     let diagnosis = match config {
         Some(config) => diagnose(config, args, scope, registry)?,

@@ -43,6 +43,8 @@ pub struct Scope<'a> {
     pub frames: u64,
     /// True if pictures are wanted.
     pub with_pictures: bool,
+    /// True if the user names the config.
+    pub is_named: bool,
 }
 
 impl Visit {
@@ -73,6 +75,7 @@ impl Visit {
             inspection: found.inspection,
             refusal: found.refusal,
             missing: None,
+            is_named: scope.is_named,
             input: outer.input.clone(),
             suits: settings.suits,
             has_odometry: found.frames.as_ref().is_none_or(FrameSource::has_odometry),
@@ -118,6 +121,7 @@ fn look(
 ) {
     // Cut short by the user, the images behind the last frame are no loss.
     out.reading.wanted = expected_frames(&out.inspection);
+    out.reading.in_log = out.reading.wanted;
     for number in 0..scope.frames {
         let Some(item) = frames.next_frame() else { break };
         out.reading.made += 1;

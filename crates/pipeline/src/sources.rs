@@ -22,15 +22,15 @@ pub enum MissingSource {
     /// Nothing shows obstacles.
     #[error(
         "the controller has no sensor of obstacles: there is neither depth nor a laser scan that the \
-         pipeline uses; add one, remove [controller], or, for a robot that is to drive without eyes, \
-         set `obstacles = \"none\"` in [collision_monitor]"
+         pipeline uses; add one, remove [controller] where it is written, or, for a robot that is to \
+         drive without eyes, set `obstacles = \"none\"` in [collision_monitor]"
     )]
     Obstacles,
     /// Nothing shows the robot's motion.
     #[error(
         "the controller has no odometry: add a topic of it or a transform from the odometry frame to \
-         the robot, remove [controller], or, for a robot that is to drive without, set \
-         `odometry = \"none\"` in [robot]"
+         the robot, remove [controller] where it is written, or, for a robot that is to drive without, \
+         set `odometry = \"none\"` in [robot]"
     )]
     Odometry,
 }

@@ -537,3 +537,38 @@ fn a_camera_outside_of_the_stated_range_is_told() {
     assert!(low["measured"].as_str().unwrap().starts_with("not for this camera: 1.20 m high"));
     assert_eq!(stated("[0.9, 2.4]")["severity"], "ok");
 }
+
+#[test]
+fn of_a_part_of_the_log_the_whole_is_told() {
+    let (_, said) = doctor(&config(), good(), &["--frames", "24", "--settings", "never"]);
+    let read = finding(&said, "frames-read")["measured"].as_str().unwrap();
+    assert_eq!(read, "24 frames of the first 24 images of the 32 in the log, see `--frames`");
+}
+
+/// The baseline of a pair decides between the two configs for pairs, and a log without odometry is tracked
+/// all the same where the program chooses.
+#[test]
+fn a_wide_pair_gets_the_config_for_wide_pairs() {
+    let home = tempfile::tempdir().unwrap();
+    for (baseline_m, fits, other) in
+        [(0.12, "stereo-verified", "stereo-street"), (0.5, "stereo-street", "stereo-verified")]
+    {
+        let scene = format!(
+            "seed = 5\nduration_s = 0.3\n[room]\nsize_m = [9.0, 6.0]\n[camera]\nkind = 'stereo'\n\
+             baseline_m = {baseline_m}\nwidth = 160\nheight = 120\n[robot]\nstart = [0.8, 3.0]\n\
+             [[people]]\npath = [[4.0, 4.4], [4.0, 1.5]]\nspeed_mps = 0.6\n"
+        );
+        let log = simulated(home.path(), &scene, &["/odom"]);
+        let arguments = ["--format", "json", "--settings", "never"];
+        let output = tagalong().arg("doctor").arg(&log).args(arguments).output();
+        let said: Value = serde_json::from_slice(&output.unwrap().stdout).expect("a diagnosis");
+        let rows = said["pipelines"].as_array().unwrap();
+        let names: Vec<&str> = rows.iter().map(|row| row["config"].as_str().unwrap()).collect();
+        assert!(names.contains(&fits) && !names.contains(&other), "{baseline_m} m: {names:?}");
+        let needs = finding(&said, "needs");
+        assert_eq!(needs["severity"], "warn", "{needs:#}");
+        assert!(needs["measured"].as_str().unwrap().contains("no odometry"), "{needs:#}");
+        let (code, said) = doctor(&root().join(format!("configs/{fits}.toml")), &log, &[]);
+        assert_eq!((code, &finding(&said, "needs")["severity"]), (3, &"bad".into()), "{said:#}");
+    }
+}

@@ -52,7 +52,8 @@ fn cut_scanner(evidence: &Evidence, scanner: &str) -> Finding {
     let facts = &evidence.inspection.facts;
     let robot = facts.robot_frame.as_str();
     let (measured, remedy) = if scanner.is_empty() {
-        ("the frame_id of the scans is empty".to_owned(), "let the driver set the frame_id")
+        let readings = if facts.laser_topic.is_some() { "scans" } else { "points" };
+        (format!("the frame_id of the {readings} is empty"), "let the driver set the frame_id")
     } else {
         (format!("tf does not connect `{scanner}` with `{robot}`"), "publish the missing transform")
     };

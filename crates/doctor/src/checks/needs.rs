@@ -7,8 +7,16 @@ use super::super::finding::{Finding, Severity};
 pub fn needs(evidence: &Evidence) -> Option<Finding> {
     let usable = evidence.inspection.usable.join(", ");
     if let Some(missing) = &evidence.missing {
-        let finding = Finding::new("needs", Severity::Bad, missing.to_string());
-        return Some(finding.why("`tagalong run` and a robot refuse this pipeline"));
+        let (severity, why) = if evidence.is_named {
+            let why = "`tagalong run CONFIG LOG` and a robot refuse this pipeline; `tagalong run LOG` tracks \
+                       people without commands to a robot";
+            (Severity::Bad, why)
+        } else {
+            let why = "`tagalong run LOG` tracks people all the same; a robot refuses to drive by this \
+                       pipeline";
+            (Severity::Warn, why)
+        };
+        return Some(Finding::new("needs", severity, missing.to_string()).why(why));
     }
     let Some(LogError::Missing { wanted, hint, .. }) = &evidence.refusal else {
         let measured = format!("the config needs {}; the log has {usable}", words(evidence.inputs));

@@ -42,6 +42,18 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
         }
         (Some(topic), _) => (Severity::Ok, format!("{topic}: {way}")),
         (None, _) if !stands => (Severity::Ok, format!("from tf: {way}")),
+        (None, _) if evidence.driven.moves_camera() => {
+            let driven = &evidence.driven;
+            let turned = driven.camera_turned_rad.to_degrees();
+            let moved = driven.camera_moved_m;
+            (
+                Severity::Ok,
+                format!(
+                    "none; by tf the robot stands still and moves its camera, by up to {moved:.2} m and \
+                     {turned:.0} degrees"
+                ),
+            )
+        }
         (None, _) => match evidence.changed {
             Some(_) => (Severity::Ok, "none, and the camera stands still".to_owned()),
             // A scanner alone cannot tell, so nothing is said about how right that is.

@@ -35,7 +35,13 @@ pub fn reading(evidence: &Evidence) -> Option<Finding> {
     let is_of_scans = evidence.samples.camera.as_ref().is_some_and(|camera| camera.is_blind());
     let sources = counted(wanted, if is_of_scans { "scan" } else { "image" });
     let frames = counted(made, "frame");
-    let measured = format!("{frames} of {sources}{}", reasons(evidence, lost));
+    let in_log = evidence.reading.in_log;
+    let measured = if wanted < in_log {
+        let rest = format!("of the {in_log} in the log, see `--frames`");
+        format!("{frames} of the first {sources} {rest}{}", reasons(evidence, lost))
+    } else {
+        format!("{frames} of {sources}{}", reasons(evidence, lost))
+    };
     let finding = Finding::new("frames-read", severity, measured)
         .figure("frames", made as f64)
         .figure("wanted", wanted as f64)

@@ -10,7 +10,7 @@ const PITCH_DEG: (f64, f64) = (3.0, 15.0);
 
 /// Checks that the robot and the camera are among those that the config states (`[suits]`).
 pub fn suits(evidence: &Evidence) -> Option<Finding> {
-    odometry(evidence).or_else(|| camera(evidence))
+    odometry(evidence).or_else(|| baseline(evidence)).or_else(|| camera(evidence))
 }
 
 /// Checks that a config that needs odometry gets it.
@@ -24,6 +24,20 @@ fn odometry(evidence: &Evidence) -> Option<Finding> {
     Some(finding.remedy(
         "record odometry or tf from odom; or take a config without: `tagalong run LOG` chooses one",
     ))
+}
+
+/// Checks that a stereo pair has a baseline for which the config is.
+fn baseline(evidence: &Evidence) -> Option<Finding> {
+    let baseline_m = evidence.inspection.facts.baseline_m?;
+    let range = evidence.suits.baseline_m?;
+    if evidence.suits.baseline_off_m(baseline_m) <= 0.0 {
+        return None;
+    }
+    let measured = format!("not for this pair: {}", said("m of baseline", 2, (baseline_m, range)));
+    let finding = Finding::new("suits", Severity::Bad, measured)
+        .figure("baseline_m", baseline_m)
+        .why("a wide pair has no depth nearby, a narrow one none far away");
+    Some(finding.remedy("`tagalong run LOG` chooses the config for such a pair"))
 }
 
 fn camera(evidence: &Evidence) -> Option<Finding> {

@@ -14,6 +14,9 @@ pub struct Suits {
     pub camera_height_m: Option<[f64; 2]>,
     /// Least and greatest angle of the optical axis below the horizon, degrees.
     pub pitch_down_deg: Option<[f64; 2]>,
+    /// Least and greatest distance of the right camera from the left one, m. `tagalong run LOG` chooses the
+    /// config for such pairs alone.
+    pub baseline_m: Option<[f64; 2]>,
     /// True if motion over ground is evidence, so that the robot's own has to be known.
     pub odometry: bool,
 }
@@ -32,6 +35,11 @@ impl Suits {
     pub fn pitch_off_deg(&self, pitch_down_deg: f64) -> f64 {
         beyond(pitch_down_deg, self.pitch_down_deg)
     }
+
+    /// Returns the distance of a stereo pair's baseline from the stated range, m, likewise.
+    pub fn baseline_off_m(&self, baseline_m: f64) -> f64 {
+        beyond(baseline_m, self.baseline_m)
+    }
 }
 
 fn beyond(value: f64, range: Option<[f64; 2]>) -> f64 {
@@ -43,9 +51,12 @@ fn beyond(value: f64, range: Option<[f64; 2]>) -> f64 {
 pub(super) fn read(table: Option<Value<'_>>) -> Result<Suits, ConfigError> {
     let place = table.as_ref().map(Value::span);
     let suits: Suits = parse_settings(table)?;
-    for (key, range) in
-        [("camera_height_m", suits.camera_height_m), ("pitch_down_deg", suits.pitch_down_deg)]
-    {
+    let ranges = [
+        ("camera_height_m", suits.camera_height_m),
+        ("pitch_down_deg", suits.pitch_down_deg),
+        ("baseline_m", suits.baseline_m),
+    ];
+    for (key, range) in ranges {
         if range.is_some_and(|[low, high]| low.is_nan() || high.is_nan() || low > high) {
             let message = format!("`{key}` is the lowest and the highest value, in this order");
             return Err(ConfigError { message, span: place });
@@ -64,5 +75,8 @@ mod tests {
         let off = [0.3, 1.0, 2.5].map(|height_m| suits.height_off_m(height_m));
         assert_eq!(off, [0.6000000000000001, 0.0, 0.5]);
         assert_eq!(suits.pitch_off_deg(90.0), 0.0);
+        assert_eq!(suits.baseline_off_m(0.53), 0.0);
+        let narrow = Suits { baseline_m: Some([0.0, 0.3]), ..suits };
+        assert_eq!([0.12, 0.8].map(|baseline_m| narrow.baseline_off_m(baseline_m)), [0.0, 0.5]);
     }
 }
