@@ -6,7 +6,8 @@
 //! repeats the rows of tables of another page that begin so, below their head.
 //! `<!-- begin: accuracy PAGE NAME NAME -->` prints pipelines as shipped beside left out.
 //! `<!-- begin: source FILE -->` repeats a file of code, such as an example, without the comment at its
-//! head, and `<!-- begin: source FILE NAME -->` one function of it.
+//! head, and `<!-- begin: source FILE NAME -->` one function of it. Figures in sentences are those of
+//! [`sentences`].
 //! `cargo xtask docs` fills these parts, and `cargo xtask tidy` complains about those that have
 //! become stale. Slow parts, the tables of `tagalong-papers`, `follow` and `bench`, are filled only on
 //! request, and their sources are noted (see [`figures`]).
@@ -21,6 +22,7 @@ use crate::accuracy;
 use crate::faults;
 use crate::figures::{self, Part};
 use crate::program::{Name, Program};
+use crate::sentences;
 use crate::workspace::{Workspace, output};
 
 const BEGIN: &str = "<!-- begin: ";
@@ -62,6 +64,7 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
         let print = |command: &str| printed(workspace, &mut programs, command);
         let filled = filled(&document.text, wanted, print)
             .with_context(|| format!("in {}", document.path.display()))?;
+        let filled = sentences::filled(workspace, &document.path, &filled)?;
         if filled != document.text {
             workspace.write(&document.path, &filled)?;
             eprintln!("docs: {} is filled anew", document.path.display());
@@ -142,6 +145,7 @@ pub fn stale(workspace: &Workspace) -> Result<Vec<String>> {
         let print = |command: &str| printed(workspace, &mut programs, command);
         let filled = filled(&document.text, wanted, print)
             .with_context(|| format!("in {}", document.path.display()))?;
+        let filled = sentences::filled(workspace, &document.path, &filled)?;
         if filled != document.text {
             let name = document.path.display();
             complaints.push(format!(
@@ -161,7 +165,11 @@ fn documents(workspace: &Workspace) -> Result<Vec<Document>> {
     let markdown = files.filter(|path| path.extension().is_some_and(|e| e == "md"));
     let read = markdown.map(|path| Ok(Document { text: workspace.read(&path)?, path }));
     let all: Vec<Document> = read.collect::<Result<_>>()?;
-    Ok(all.into_iter().filter(|document| document.text.contains(BEGIN)).collect())
+    Ok(all.into_iter().filter(|document| has_parts(&document.text)).collect())
+}
+
+fn has_parts(text: &str) -> bool {
+    text.contains(BEGIN) || sentences::are_in(text)
 }
 
 /// The text with the wanted parts filled.

@@ -13,6 +13,7 @@ mod package;
 mod program;
 mod record;
 mod rehearse;
+mod sentences;
 mod tidy;
 mod try_out;
 mod walk_through;
