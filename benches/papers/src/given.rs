@@ -89,7 +89,7 @@ fn row(name: &str, all: &[&Tracked]) -> Row {
 fn whole_bodies(lab: &Lab<'_>) -> Result<Contender, ReproduceError> {
     let shipped = lab.contender(RECORDED)?;
     let resolved = shipped.pipeline(lab.registry, 1)?.resolved();
-    Ok(Contender { config: for_given_boxes(&resolved)?, ..shipped })
+    Ok(Contender { config: for_given_boxes(&resolved, lab.registry)?, ..shipped })
 }
 
 /// Returns the available sequences of MOT15, in the order of their names.

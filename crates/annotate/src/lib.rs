@@ -4,6 +4,23 @@
 //! `server` answers one page, on this computer alone: the page shows a frame and asks for changes,
 //! `document` makes them and takes them back, and `session` measures places by depth and writes the
 //! whole file after each. The page decides nothing, so that all of it can be tested without one.
+//!
+//! ```
+//! use clap::Parser as _;
+//! use tagalong_config::Registry;
+//! use tagalong_annotate::{annotate, AnnotateArgs};
+//!
+//! #[derive(clap::Parser)]
+//! struct Cli {
+//!     #[command(flatten)]
+//!     args: AnnotateArgs,
+//! }
+//!
+//! let cli = Cli::parse_from(["annotate", "none.mcap", "--empty"]);
+//! let failure = annotate(&cli.args, &Registry::default()).unwrap_err();
+//! assert_eq!(failure.code, 1);
+//! assert!(failure.message.contains("none.mcap"), "{}", failure.message);
+//! ```
 
 mod document;
 mod film;

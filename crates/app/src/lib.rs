@@ -3,6 +3,20 @@
 //!
 //! An application takes its arguments and returns an [`outcome::Outcome`]; the command line turns
 //! that into an exit code and a message.
+//!
+//! ```
+//! use tagalong_app::config_file::ConfigFile;
+//! use tagalong_app::outcome::{Ended, Failure, Outcome};
+//!
+//! /// An application: it finds the config of a name.
+//! fn known(name: &str) -> Outcome {
+//!     ConfigFile::named(name).ok_or_else(|| Failure::usage(format!("no config `{name}`")))?;
+//!     Ok(Ended::Well)
+//! }
+//!
+//! assert_eq!(known("depth-ekf").map(Ended::code), Ok(0));
+//! assert_eq!(known("depth-efk").map_err(|failure| failure.code), Err(2));
+//! ```
 
 pub mod choice;
 pub mod config_file;

@@ -4,6 +4,22 @@
 //! file named by that hash, so that running again costs nothing, several processes or machines can
 //! share a folder, and a changed config is never paired with an old result. A report only reads
 //! results.
+//!
+//! ```
+//! use clap::Parser as _;
+//! use tagalong_config::Registry;
+//! use tagalong_benchmark::{bench, BenchArgs};
+//!
+//! #[derive(clap::Parser)]
+//! struct Cli {
+//!     #[command(flatten)]
+//!     args: BenchArgs,
+//! }
+//!
+//! let cli = Cli::parse_from(["bench", "plan", "--configs", "none.toml", "--logs", "none.mcap"]);
+//! let failure = bench(&cli.args, &Registry::default()).unwrap_err();
+//! assert!(failure.message.contains("none.toml"), "{}", failure.message);
+//! ```
 
 mod args;
 pub mod experiments;

@@ -4,6 +4,16 @@
 //! plugin that is not listed here is unknown to the `tagalong` command, and `cargo xtask tidy`
 //! fails on a plugin folder that is not listed. `cargo xtask new-plugin` inserts its line in sorted
 //! order.
+//!
+//! ```
+//! use tagalong_config::{Kind, Registry};
+//!
+//! let mut registry = Registry::default();
+//! tagalong_catalog::register(&mut registry);
+//! assert_eq!(registry.find("ekf")?.kind, Kind::Filter);
+//! assert!(registry.find("ekff").is_err(), "the error names `ekf`");
+//! # Ok::<(), tagalong_config::ConfigError>(())
+//! ```
 
 use tagalong_config::Registry;
 

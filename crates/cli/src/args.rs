@@ -297,7 +297,7 @@ Examples:
 
 const BENCH_HELP: &str = "\
 Without a step: plans, runs and reports. Results are kept under a hash of everything they depend
-on; running again computes only what is missing.
+on; running again computes only what is missing. docs/reference/figures.md defines each figure.
 
 Examples:
   tagalong bench --logs-dir logs -o bench --jobs 2
@@ -312,7 +312,8 @@ Prints the figures of the field (HOTA, MOTA, IDF1, LAMR, OSPA, position errors),
 truth was read with, and notes on what was read in another way than it may be meant; --format json
 prints one flat object. Of MOTChallenge text is refused, with its line, what TrackEval refuses: a
 class that is none in truth, tracks of other classes than people, ids below 0, frames beyond
-seqLength. Boxes without an area match nobody, and are counted.
+seqLength. Boxes without an area match nobody, and are counted. docs/reference/figures.md defines each
+figure: what it is, its range, and which way is better.
 
 --repairs prints what HOTA, MOTA and IDF1 would be if one kind of error were gone and all else stayed:
 the largest gain tells what to work on. Reports and people whose boxes overlap by a tenth count as

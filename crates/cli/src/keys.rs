@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use schemars::schema_for;
 use serde_json::{Map, Value, json};
 use tagalong_app::config_file::OuterSettings;
-use tagalong_config::{PluginInfo, Registry};
-use tagalong_pipeline::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, PipelineSettings, Suits};
+use tagalong_config::{Kind, PluginInfo, Registry};
+use tagalong_pipeline::{PipelineSettings, Suits};
 
 /// Returns the schemas of everything around the plugins.
 fn around() -> [Value; 2] {
@@ -143,9 +143,10 @@ pub fn schema(registry: &Registry) -> Value {
     let object = |value: &mut Value| value.as_object_mut().map(std::mem::take).unwrap_or_default();
     let mut properties = object(&mut around["properties"]);
     let mut definitions = object(&mut around["$defs"]);
-    for (section, kind, many, default) in SECTIONS {
+    for (section, kind, many, has_default) in SECTIONS {
         let names: Vec<&PluginInfo> =
-            plugins(registry).into_iter().filter(|p| p.kind.to_string() == kind).collect();
+            plugins(registry).into_iter().filter(|plugin| plugin.kind == kind).collect();
+        let default = registry.default_of(kind).filter(|_| has_default).map(|plugin| plugin.name);
         let of_kind = plugin_section(&names, section, default, &mut definitions);
         let whole = if many { json!({ "type": "array", "items": of_kind }) } else { of_kind };
         properties.insert(section.to_owned(), whole);
@@ -161,14 +162,15 @@ pub fn schema(registry: &Registry) -> Value {
     })
 }
 
-/// Sections that name plugins: their kind, whether there may be several, and the default plugin.
-const SECTIONS: [(&str, &str, bool, Option<&str>); 6] = [
-    ("detectors", "detector", true, None),
-    ("verifiers", "verifier", true, None),
-    ("associator", "associator", false, Some(DEFAULT_ASSOCIATOR)),
-    ("filter", "filter", false, None),
-    ("manager", "track manager", false, Some(DEFAULT_MANAGER)),
-    ("controller", "controller", false, None),
+/// Sections that name plugins: their kind, whether there may be several, and whether one that is left
+/// out stands for the default plugin of its kind.
+const SECTIONS: [(&str, Kind, bool, bool); 6] = [
+    ("detectors", Kind::Detector, true, false),
+    ("verifiers", Kind::Verifier, true, false),
+    ("associator", Kind::Associator, false, true),
+    ("filter", Kind::Filter, false, false),
+    ("manager", Kind::Manager, false, true),
+    ("controller", Kind::Controller, false, false),
 ];
 
 /// Returns the schema of a section, in which the plugin determines the keys of `config`.

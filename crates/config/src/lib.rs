@@ -24,7 +24,7 @@ mod xml;
 pub use bounded::{FileLimit, read_bytes, read_text};
 pub use exported::{ExportedNetwork, NamedTensor};
 pub use names::nearest;
-pub use offers::{Remedy, TrainingData, TrainingOffer, TrialValues};
+pub use offers::{RecordedOffer, Remedy, TrainingData, TrainingOffer, TrialValues};
 pub use or_auto::OrAuto;
 pub use path_text::PathText;
 pub use registry::{Context, Kind, PluginInfo, Registry};

@@ -1,5 +1,5 @@
-//! Offers of a plugin to the applications: advice on its tests, settings that are worth a trial, and
-//! the training of its model.
+//! Offers of a plugin to the applications: advice on its tests, settings that are worth a trial, those
+//! for recorded detections, and the training of its model.
 
 /// Advice on a test of the funnel that drops candidates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +19,16 @@ pub struct TrialValues {
     pub setting: &'static str,
     /// The values.
     pub values: &'static [f64],
+}
+
+/// Settings under which a detector takes the detections that come with the frames
+/// ([`tagalong_core::Frame::recorded`]), as TOML.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RecordedOffer {
+    /// For boxes of whole people, as tracking benchmarks give them.
+    pub whole_people: &'static str,
+    /// For positions of people in metres that are known, also outside of the image.
+    pub known_positions: &'static str,
 }
 
 /// Examples from which a model is trained.

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use crate::bounded::{FileLimit, read_text};
 use crate::{
-    ConfigError, ExportedNetwork, Remedy, Settings, Trainer, TrainingData, TrainingOffer,
-    TrialValues, Value, commented_defaults, nearest, parse_settings,
+    ConfigError, ExportedNetwork, RecordedOffer, Remedy, Settings, Trainer, TrainingData,
+    TrainingOffer, TrialValues, Value, commented_defaults, nearest, parse_settings,
 };
 use tagalong_core::{
     Associator, Controller, Detector, DiffDrive, Error, Filter, Result, TrackManager, Verifier,
@@ -146,6 +146,9 @@ pub struct Registry {
     remedies: BTreeMap<&'static str, &'static [Remedy]>,
     trial_values: BTreeMap<&'static str, &'static [TrialValues]>,
     alternatives: BTreeSet<&'static str>,
+    defaults: BTreeMap<Kind, &'static str>,
+    recorded: BTreeMap<&'static str, RecordedOffer>,
+    networks: BTreeSet<&'static str>,
 }
 
 impl Registry {
@@ -300,6 +303,38 @@ impl Registry {
     /// Returns the plugins that are worth a trial in place of others of their kinds.
     pub fn alternatives(&self) -> impl Iterator<Item = &PluginInfo> {
         self.alternatives.iter().filter_map(|name| self.plugins.get(name))
+    }
+
+    /// Registers the plugin of a kind that a config has without naming it, in place of an earlier one.
+    pub fn default_plugin(&mut self, kind: Kind, name: &'static str) {
+        self.defaults.insert(kind, name);
+    }
+
+    /// Returns the plugin of a kind that a config has without naming it, if there is one.
+    pub fn default_of(&self, kind: Kind) -> Option<&PluginInfo> {
+        let plugin = self.plugins.get(self.defaults.get(&kind)?)?;
+        (plugin.kind == kind).then_some(plugin)
+    }
+
+    /// Registers a detector as one that takes the detections that come with the frames.
+    pub fn recorded(&mut self, name: &'static str, offer: RecordedOffer) {
+        self.recorded.insert(name, offer);
+    }
+
+    /// Returns the detectors that take the detections that come with the frames, by name.
+    pub fn all_recorded(&self) -> impl Iterator<Item = (&'static str, RecordedOffer)> {
+        self.recorded.iter().map(|(name, offer)| (*name, *offer))
+    }
+
+    /// Registers a detector as one that runs the network of the file `model`, with the settings `fit`,
+    /// `colours`, `mean` and `deviation` for the preparation of its images.
+    pub fn network_of_a_file(&mut self, name: &'static str) {
+        self.networks.insert(name);
+    }
+
+    /// Returns true for a detector that runs the network of a file.
+    pub fn runs_network_of_a_file(&self, name: &str) -> bool {
+        self.networks.contains(name)
     }
 
     /// Registers the export of a plugin's network as an ONNX file, under the name of the plugin; `C`

@@ -28,8 +28,13 @@ impl Images {
     /// Returns the images as data of sensors, with the camera that took them; the right camera of a
     /// stereo pair is its copy beside it.
     pub fn taken_by(self, camera: &Arc<Camera>) -> Sensors {
+        self.add_to(Sensors::default(), camera)
+    }
+
+    /// Returns the sensors with the images added as [`Images::taken_by`] returns them.
+    pub fn add_to(self, sensors: Sensors, camera: &Arc<Camera>) -> Sensors {
         let Self { colour, grey, depth, right } = self;
-        let sensors = with_image(Sensors::default(), colour, camera);
+        let sensors = with_image(sensors, colour, camera);
         let sensors = with_image(with_image(sensors, grey, camera), depth, camera);
         match right {
             Some(image) => sensors.with(CameraImage { camera: beside(camera, &image), image }),

@@ -87,9 +87,10 @@ pub struct TrackChanges {
 ///
 /// impl TrackManager for Credulous {
 ///     fn initiate(&mut self, _: TrackId, new: &Unassociated<'_>) -> Initiation {
-///         match new.discovered {
-///             true => Initiation::Start(TrackHealth { confirmed: true, log_odds: 1.0 }),
-///             false => Initiation::Drop("no track fits"),
+///         if new.discovered {
+///             Initiation::Start(TrackHealth { confirmed: true, log_odds: 1.0 })
+///         } else {
+///             Initiation::Drop("no track fits")
 ///         }
 ///     }
 ///

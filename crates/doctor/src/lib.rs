@@ -6,6 +6,23 @@
 //! `alternatives` tries other settings on the same frames, and `preparations` other colours, scales
 //! and places of the images of a neural network. Without a config, `comparison`
 //! visits the log with each built-in pipeline that fits it.
+//!
+//! ```
+//! use clap::Parser as _;
+//! use tagalong_config::Registry;
+//! use tagalong_doctor::{doctor, DoctorArgs};
+//!
+//! #[derive(clap::Parser)]
+//! struct Cli {
+//!     #[command(flatten)]
+//!     args: DoctorArgs,
+//! }
+//!
+//! let cli = Cli::parse_from(["doctor", "none.mcap", "--frames", "100"]);
+//! let failure = doctor(&cli.args, &Registry::default()).unwrap_err();
+//! assert_eq!(failure.code, 1);
+//! assert!(failure.message.contains("none.mcap"), "{}", failure.message);
+//! ```
 
 mod alternatives;
 mod args;

@@ -12,8 +12,6 @@ use super::evidence::{Preparations, Prepared};
 use super::trial::Spread;
 use super::visit::{Scope, Visit};
 
-/// The plugin whose preparations are tried.
-const PLUGIN: &str = "onnx";
 /// Most frames, spread over the log.
 const FRAMES: usize = 8;
 /// More people than this in a frame are noise: values far outside of the usual range saturate
@@ -32,6 +30,7 @@ type Settings = Vec<(&'static str, Value)>;
 /// A detector section with the frames to try it on.
 struct Bench<'a> {
     registry: &'a Registry,
+    plugin: &'a str,
     context: Context,
     config: Table,
     frames: &'a [Frame],
@@ -40,25 +39,28 @@ struct Bench<'a> {
 /// Tries the preparations of each network of a config.
 pub fn tried(visit: &Visit, when: Trying, scope: Scope, registry: &Registry) -> Vec<Preparations> {
     let sections = visit.pipeline.config().values().get("detectors").and_then(Value::as_array);
-    let configs: Vec<&Table> = sections.into_iter().flatten().filter_map(network_config).collect();
+    let sections = sections.into_iter().flatten();
+    let configs: Vec<(&str, &Table)> =
+        sections.filter_map(|section| network_config(section, registry)).collect();
     if configs.is_empty() || when == Trying::Never {
         return Vec::new();
     }
     let frames = sample(visit, scope);
-    let tried = configs.into_iter().filter_map(|config| {
+    let tried = configs.into_iter().filter_map(|(plugin, config)| {
         let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
         let context = Context { seed: 0, base_dir: visit.config.folder().to_owned(), wheels };
-        let bench = Bench { registry, context, config: config.clone(), frames: &frames };
+        let bench = Bench { registry, plugin, context, config: config.clone(), frames: &frames };
         bench.preparations(when == Trying::Always)
     });
     tried.collect()
 }
 
-/// Returns the settings of a section with a network.
-fn network_config(section: &Value) -> Option<&Table> {
+/// Returns the plugin and the settings of a section with a network.
+fn network_config<'a>(section: &'a Value, registry: &Registry) -> Option<(&'a str, &'a Table)> {
+    let plugin = section.get("plugin")?.as_str()?;
     let config = section.get("config")?.as_table()?;
-    let is_network = section.get("plugin")?.as_str()? == PLUGIN;
-    (is_network && !config.get("model")?.as_str()?.is_empty()).then_some(config)
+    let is_network = registry.runs_network_of_a_file(plugin);
+    (is_network && !config.get("model")?.as_str()?.is_empty()).then_some((plugin, config))
 }
 
 /// Returns frames that are spread over the examined part of the log.
@@ -130,12 +132,12 @@ impl Bench<'_> {
         let text = config.to_string();
         let table = DeTable::parse(&text).ok()?;
         let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
-        let built = self.registry.build_detector(PLUGIN, Some(value), &self.context);
+        let built = self.registry.build_detector(self.plugin, Some(value), &self.context);
         let mut detector = built.ok()?;
         let found = self.frames.iter().map(|frame| likeliest(&mut *detector, frame));
         let found: Vec<f64> = found.collect::<Option<_>>()?;
         Some(Prepared {
-            change: line(settings),
+            change: line(self.plugin, settings),
             found: found.iter().filter(|probability| **probability > 0.0).count(),
             score: found.iter().sum::<f64>() / found.len() as f64,
         })
@@ -180,13 +182,13 @@ fn combinations() -> Vec<Settings> {
 }
 
 /// Returns the line of a config with these settings.
-fn line(settings: &Settings) -> String {
+fn line(plugin: &str, settings: &Settings) -> String {
     if settings.is_empty() {
         return String::new();
     }
     let settings: Vec<String> =
         settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
-    format!("[[detectors]] plugin = \"{PLUGIN}\", config = {{ {} }}", settings.join(", "))
+    format!("[[detectors]] plugin = \"{plugin}\", config = {{ {} }}", settings.join(", "))
 }
 
 #[cfg(test)]
@@ -223,7 +225,7 @@ mod tests {
         let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
         let context = Context { seed: 0, base_dir: models(), wheels };
         let config: Table = config.parse().unwrap();
-        let bench = Bench { registry: &registry, context, config, frames };
+        let bench = Bench { registry: &registry, plugin: "onnx", context, config, frames };
         bench.preparations(always)
     }
 

@@ -2,6 +2,16 @@
 //!
 //! Each kind is a module that reads its layout into a `Sequence`; one writer makes a log of it.
 //! No other part of Tagalong knows these layouts.
+//!
+//! ```
+//! let export = r#"<annotations><track id="0" label="person">
+//!     <box frame="0" keyframe="1" outside="0" occluded="0" xtl="10" ytl="20" xbr="60" ybr="70"/>
+//! </track></annotations>"#;
+//! let people = tagalong_import::people_of_cvat(export)?;
+//! assert_eq!((people.len(), people[0].frame), (1, 1), "frames of truth are counted from 1");
+//! assert!(tagalong_import::people_of_cvat("<html/>").is_err());
+//! # Ok::<(), String>(())
+//! ```
 
 mod args;
 mod cvat;

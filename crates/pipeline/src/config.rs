@@ -4,7 +4,9 @@
 use std::ops::Range;
 use std::path::Path;
 
-use tagalong_config::{ConfigError, Context, Registry, Settings, Value, nearest, parse_settings};
+use tagalong_config::{
+    ConfigError, Context, Kind, Registry, Settings, Value, nearest, parse_settings,
+};
 use tagalong_core::{Associator, Filter, TrackManager, Verifier};
 use tagalong_stereo::StereoDepth;
 use tagalong_tracking::Guarded;
@@ -35,7 +37,7 @@ mod tune;
 use checks::check;
 pub use document::{Document, flattened};
 use inputs::{Declared, declared_inputs};
-use resolve::resolve;
+use resolve::{default_plugin, resolve};
 pub use resolved::ResolvedConfig;
 pub use source::{BuildError, ConfigSource};
 pub use suits::Suits;
@@ -59,10 +61,6 @@ const OWN: [&str; 14] = [
 ];
 const PLUGINS: [&str; 6] =
     ["detectors", "verifiers", "associator", "filter", "manager", "controller"];
-/// The associator of a config that names none.
-pub const DEFAULT_ASSOCIATOR: &str = "associate-hungarian";
-/// The track manager of a config that names none.
-pub const DEFAULT_MANAGER: &str = "manage-m-of-n";
 
 /// Tables of a config that belong to the reader of logs and the writer of runs.
 const FOREIGN: [&str; 3] = ["input", "limits", "output"];
@@ -264,13 +262,18 @@ impl<'a, T: Settings> Section<'a, T> {
 
 impl<'a> Section<'a, PluginSettings> {
     /// Splits a section that may be left out, or name no plugin.
-    fn or_default(name: &str, value: Option<Value<'a>>, plugin: &str) -> Result<Self, ConfigError> {
+    fn or_default(
+        kind: Kind,
+        name: &str,
+        value: Option<Value<'a>>,
+        registry: &Registry,
+    ) -> Result<Self, ConfigError> {
         let mut section = Self::new(
             name,
             value.unwrap_or_else(|| Spanned::new(0..0, DeValue::Table(DeTable::new()))),
         )?;
         if section.settings.plugin.is_empty() {
-            section.settings.plugin = plugin.to_owned();
+            section.settings.plugin = default_plugin(registry, kind, name)?.to_owned();
         }
         Ok(section)
     }
@@ -353,7 +356,8 @@ impl Builder<'_> {
     }
 
     fn associator(&self, value: Option<Value<'_>>) -> Result<Guarded<dyn Associator>, ConfigError> {
-        let mut section = Section::or_default("associator", value, DEFAULT_ASSOCIATOR)?;
+        let mut section =
+            Section::or_default(Kind::Associator, "associator", value, self.registry)?;
         let config = section.config.take();
         let context = self.context(4, 0);
         let name = &section.settings.plugin;
@@ -362,7 +366,7 @@ impl Builder<'_> {
     }
 
     fn manager(&self, value: Option<Value<'_>>) -> Result<Guarded<dyn TrackManager>, ConfigError> {
-        let mut section = Section::or_default("manager", value, DEFAULT_MANAGER)?;
+        let mut section = Section::or_default(Kind::Manager, "manager", value, self.registry)?;
         let config = section.config.take();
         let context = self.context(5, 0);
         let name = &section.settings.plugin;

@@ -102,8 +102,7 @@ pub use builder::PipelineBuilder;
 #[cfg(feature = "plugins")]
 pub use builder::{builtin_registry, register_plugins};
 pub use config::{
-    BuildError, ConfigSource, DEFAULT_ASSOCIATOR, DEFAULT_MANAGER, Document, ResolvedConfig, Suits,
-    Tunable, flattened, with_values,
+    BuildError, ConfigSource, Document, ResolvedConfig, Suits, Tunable, flattened, with_values,
 };
 pub use pipeline::Pipeline;
 pub use report::FrameReport;

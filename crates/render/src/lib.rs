@@ -5,6 +5,17 @@
 //! above, above a legend. [`Detail::Debug`] adds dropped candidates, dashed, with the test that
 //! dropped them, tentative tracks and the state of the filter. All pictures of a run have the same
 //! size.
+//!
+//! ```
+//! use tagalong_render::canvas::{Canvas, Ink};
+//! use tagalong_render::jpeg;
+//!
+//! let mut canvas = Canvas::new(64, 48, [24, 24, 28]);
+//! canvas.line([4.0, 40.0].into(), [60.0, 8.0].into(), Ink::solid([250, 200, 0]));
+//! let picture = canvas.into_image();
+//! assert_eq!(picture.get(4, 40), Some([250, 200, 0]));
+//! assert!(jpeg(&picture, 32, 80).starts_with(&[0xff, 0xd8]));
+//! ```
 
 mod animation;
 pub mod canvas;

@@ -1,4 +1,16 @@
 //! `tagalong simulate`: renders a scene to a log or to pictures.
+//!
+//! ```
+//! use std::path::Path;
+//! use tagalong_sim::Scene;
+//! use tagalong_simulate::scenes;
+//!
+//! // Scenes are built in by name; `simulate` renders them to logs, and `sample` writes a short one.
+//! let text = scenes::built_in(Path::new("crossing")).ok_or("no such scene")?;
+//! let scene = Scene::parse(text)?;
+//! assert!(scene.people.len() >= 2 && scenes::names().count() > 10);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod gallery;
 mod realism;

@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    DepthImage, EgoMotion, Frame, GreyImage, Images, LaserScan, MAX_ODOMETRY_GAP_S,
-    MAX_ODOMETRY_STEP_M, RgbImage, RightImage, Stamp,
+    DepthImage, EgoMotion, Frame, GreyImage, Images, Input, LaserScan, MAX_ODOMETRY_GAP_S,
+    MAX_ODOMETRY_STEP_M, RgbImage, RightImage, Sensor, Sensors, Stamp,
 };
 use tagalong_geometry::Camera;
 use tagalong_pipeline::Sources;
@@ -32,7 +32,8 @@ pub struct Moment<'m> {
     camera: Arc<Camera>,
     index: Option<u64>,
     images: Images,
-    laser: Option<LaserScan>,
+    /// The data that are no images.
+    sensors: Sensors,
     pose: Option<Isometry2<f64>>,
     odometry_age_s: f64,
 }
@@ -60,7 +61,7 @@ impl FrameMaker {
             camera: Arc::clone(&self.camera),
             index: None,
             images: Images::default(),
-            laser: None,
+            sensors: Sensors::default(),
             pose: None,
             odometry_age_s: 0.0,
             maker: self,
@@ -129,8 +130,31 @@ impl Moment<'_> {
     }
 
     /// Adds the laser scan, in the robot frame.
-    pub fn laser(mut self, scan: LaserScan) -> Self {
-        self.laser = Some(scan);
+    pub fn laser(self, scan: LaserScan) -> Self {
+        self.sensor(scan)
+    }
+
+    /// Adds the reading of any other sensor, in place of one of the same type: of a sensor of the
+    /// program's own, which implements [`Sensor`], or of one that has no function here. Plugins that
+    /// declare [`Sensor::INPUT`] find it by `Frame::sensor`.
+    ///
+    /// ```
+    /// use tagalong::prelude::*;
+    ///
+    /// /// Distances of the echoes of a radar, m.
+    /// struct Radar(Vec<f64>);
+    ///
+    /// impl Sensor for Radar {
+    ///     const INPUT: Input = Input::Named("radar");
+    /// }
+    ///
+    /// let mut frames = FrameMaker::without_camera();
+    /// let frame = frames.at(Stamp::default()).sensor(Radar(vec![2.5])).frame()?;
+    /// assert_eq!(frame.sensor::<Radar>()?.0, [2.5]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn sensor<S: Sensor>(mut self, reading: S) -> Self {
+        self.sensors = self.sensors.with(reading);
         self
     }
 
@@ -152,7 +176,7 @@ impl Moment<'_> {
         Sources {
             depth: self.images.depth.is_some(),
             right: self.images.right.is_some(),
-            laser: self.laser.is_some(),
+            laser: self.sensors.get::<LaserScan>().is_some(),
             odometry: self.pose.is_some(),
         }
     }
@@ -160,8 +184,8 @@ impl Moment<'_> {
     /// Makes the frame.
     ///
     /// # Errors
-    /// [`Error::Frame`]: images of another size than the camera's, images without a camera, and a pose,
-    /// an age or a baseline with impossible numbers.
+    /// [`Error::Frame`]: images of another size than the camera's, images without a camera, images among
+    /// the other sensors, and a pose, an age or a baseline with impossible numbers.
     pub fn frame(self) -> Result<Frame> {
         if let Some(why) = self.mistake() {
             return Err(Error::Frame { stamp: self.stamp, why });
@@ -171,8 +195,8 @@ impl Moment<'_> {
         let (motion, has_jumped) = self.maker.motion(self.stamp, self.pose);
         self.maker.count += 1;
         let index = self.index.unwrap_or(self.maker.count);
-        Ok(Frame::new(index, self.stamp, self.camera, motion, self.images)
-            .with_laser(self.laser)
+        let sensors = self.images.add_to(self.sensors, &self.camera);
+        Ok(Frame::of_sensors(index, self.stamp, self.camera, motion, sensors)
             .with_odometry_age(age_s)
             .with_odometry_jump(has_jumped))
     }
@@ -180,6 +204,12 @@ impl Moment<'_> {
     /// Returns the reason for which the data make no frame, if there is one.
     fn mistake(&self) -> Option<String> {
         self.misfit().or_else(|| {
+            // Images have functions of their own, which look at their size.
+            let images = [Input::Colour, Input::Depth, Input::Right];
+            if let Some(image) = images.into_iter().find(|image| self.sensors.holds(*image)) {
+                let name = image.name();
+                return Some(format!("`sensor` takes no {name} images; add them by `{name}`"));
+            }
             if self.images.right.as_ref().is_some_and(|right| !is_distance(right.baseline_m)) {
                 return Some(
                     "the baseline is the distance of the two cameras, m; give one above 0"
@@ -235,6 +265,7 @@ fn is_finite(pose: &Isometry2<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector2;
+    use tagalong_core::CameraImage;
     use tagalong_geometry::Pinhole;
 
     use super::*;
@@ -277,12 +308,35 @@ mod tests {
         assert!((travelled.motion.forward - 2.0).abs() < 1e-12);
     }
 
+    /// Distances of echoes, m.
+    struct Sonar(f64);
+
+    impl Sensor for Sonar {
+        const INPUT: Input = Input::Named("sonar");
+    }
+
+    #[test]
+    fn sensors_of_any_type_are_beside_the_images_and_the_newest_of_a_type_counts() {
+        let mut maker = maker();
+        let moment = maker.at(at(1.0)).sensor(Sonar(2.0)).sensor(Sonar(3.0));
+        let moment = moment.depth(DepthImage::filled(8, 6, 1.0)).sensor(LaserScan::of_points([]));
+        let sources = moment.sources();
+        assert!(sources.depth && sources.laser, "{sources:?}");
+        let frame = moment.frame().unwrap();
+        assert_eq!(frame.sensor::<Sonar>().unwrap().0, 3.0);
+        assert!(frame.depth().is_ok() && frame.scan().is_ok());
+        let next = maker.at(at(1.1)).frame().unwrap();
+        assert!(next.sensor::<Sonar>().is_err(), "a reading is of one moment");
+    }
+
     #[test]
     fn what_makes_no_frame_is_refused_with_the_remedy() {
         let mut maker = maker();
         let small = || DepthImage::filled(4, 4, 1.0);
         let right = GreyImage::filled(8, 6, 0);
         let mut blind = FrameMaker::without_camera();
+        let camera = Arc::clone(&maker.camera);
+        let unsized_depth = CameraImage { image: Arc::new(small()), camera };
         let cases = [
             (
                 maker.at(at(1.0)).depth(small()).frame(),
@@ -291,6 +345,7 @@ mod tests {
             (maker.at(at(1.0)).right(right, 0.0).frame(), "the baseline is the distance"),
             (maker.at(at(1.0)).pose(pose(f64::NAN)).frame(), "the pose has numbers"),
             (maker.at(at(1.0)).pose(pose(0.0)).odometry_age_s(f64::NAN).frame(), "give 0 or more"),
+            (maker.at(at(1.0)).sensor(unsized_depth).frame(), "add them by `depth`"),
             (blind.at(at(1.0)).depth(small()).frame(), "there is a depth image and no camera"),
         ];
         for (made, words) in cases {

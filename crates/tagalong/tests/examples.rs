@@ -54,6 +54,8 @@ fn the_examples_find_the_people() {
     assert!(person.last().is_some_and(|line| line.contains(" 1 at 3.0")), "{person:?}");
     let nearest = run("own_detector");
     assert!(nearest.last().is_some_and(|line| line.contains(" 1 at 2.")), "{nearest:?}");
+    let by_radar = run("own_sensor");
+    assert!(by_radar.iter().any(|line| line.starts_with("2.9 s: 1 at 2.3")), "{by_radar:?}");
 }
 
 #[test]

@@ -4,6 +4,24 @@
 //! A verifier is trained on the proposals of the detector, since these are its later inputs. The
 //! first model is then applied to new rooms, and candidates that it judges wrongly or with a small
 //! margin are added before the next fit.
+//!
+//! ```
+//! use clap::Parser as _;
+//! use tagalong_config::Registry;
+//! use tagalong_training::{train, TrainArgs};
+//!
+//! #[derive(clap::Parser)]
+//! struct Cli {
+//!     #[command(flatten)]
+//!     args: TrainArgs,
+//! }
+//!
+//! let cli = Cli::parse_from(["train", "svm-patch", "--quick"]);
+//! // A program registers its trainers; this one has none.
+//! let failure = train(&cli.args, &Registry::default()).unwrap_err();
+//! assert_eq!(failure.code, 2);
+//! assert!(failure.message.contains("--features train"), "{}", failure.message);
+//! ```
 
 mod args;
 mod card;

@@ -23,11 +23,6 @@ use tagalong_pipeline::FrameReport;
 
 use crate::{Contender, TrialError};
 
-/// Plugin that reads the boxes, and ...
-const RECORDED: &str = "recorded-detections";
-/// ... the setting by which it tracks whole bodies, as the MOTChallenge annotates them.
-const WHOLE_BODIES: &str = "full-box";
-
 /// A sequence: its annotated people, and the given boxes.
 pub struct GivenSequence {
     /// Name, length and rate.
@@ -167,25 +162,29 @@ impl GivenTracks {
 }
 
 /// Returns a config for given boxes: the detector takes them from the frames instead of a file or a
-/// topic, and as whole bodies. `resolved` is the config with every setting.
+/// topic, and as whole bodies, as the MOTChallenge annotates them. `resolved` is the config with every
+/// setting.
 ///
 /// # Errors
-/// A config without a detector of recorded boxes.
-pub fn for_given_boxes(resolved: &str) -> Result<String, TrialError> {
+/// A config without a detector that takes recorded detections.
+pub fn for_given_boxes(resolved: &str, registry: &Registry) -> Result<String, TrialError> {
     let mut root: toml::Table = resolved.parse().map_err(given)?;
     let detectors = root.get_mut("detectors").and_then(toml::Value::as_array_mut);
-    let recorded = detectors
-        .into_iter()
-        .flatten()
-        .filter(|slot| slot.get("plugin").and_then(toml::Value::as_str) == Some(RECORDED));
     let mut changed = false;
-    for config in recorded.filter_map(|slot| slot.get_mut("config")?.as_table_mut()) {
-        config.insert("path".into(), "".into());
-        config.insert("body".into(), WHOLE_BODIES.into());
-        changed = true;
+    for slot in detectors.into_iter().flatten() {
+        let plugin = slot.get("plugin").and_then(toml::Value::as_str);
+        let offer = registry.all_recorded().find(|(name, _)| Some(*name) == plugin);
+        let config = slot.get_mut("config").and_then(toml::Value::as_table_mut);
+        if let (Some((_, offer)), Some(config)) = (offer, config) {
+            config.extend(offer.whole_people.parse::<toml::Table>().map_err(given)?);
+            changed = true;
+        }
     }
     if !changed {
-        return Err(given(format!("the config has no detector `{RECORDED}`, which reads boxes")));
+        let names: Vec<String> =
+            registry.all_recorded().map(|(name, _)| format!("`{name}`")).collect();
+        let names = names.join(" or ");
+        return Err(given(format!("the config has no detector {names}, which reads boxes")));
     }
     toml::to_string(&root).map_err(given)
 }
@@ -254,6 +253,7 @@ fn given(error: impl ToString) -> TrialError {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_config::RecordedOffer;
     use tagalong_eval::Role;
 
     use super::*;
@@ -309,15 +309,20 @@ mod tests {
     fn the_detector_of_a_config_takes_whole_bodies_from_the_frames() {
         let config = "[[detectors]]\nplugin = 'recorded-detections'\n\
                       config = { path = 'x/det.txt', body = 'upper', min_score = 0.4 }\n";
-        let root: toml::Table = for_given_boxes(config).unwrap().parse().unwrap();
+        let mut registry = Registry::default();
+        let whole_people = "path = ''\nbody = 'full-box'";
+        let offer = RecordedOffer { whole_people, known_positions: "" };
+        registry.recorded("recorded-detections", offer);
+        let root: toml::Table = for_given_boxes(config, &registry).unwrap().parse().unwrap();
         let detector = &root["detectors"][0]["config"];
         assert_eq!(
             (detector["path"].as_str(), detector["body"].as_str()),
             (Some(""), Some("full-box"))
         );
         assert_eq!(detector["min_score"].as_float(), Some(0.4));
-        let none = for_given_boxes("[[detectors]]\nplugin = 'other'\n").unwrap_err();
-        assert!(none.to_string().contains("recorded-detections"), "{none}");
+        let none = for_given_boxes("[[detectors]]\nplugin = 'other'\n", &registry).unwrap_err();
+        let words = "no detector `recorded-detections`, which reads boxes";
+        assert!(none.to_string().contains(words), "{none}");
     }
 
     #[test]

@@ -24,6 +24,19 @@
 //!
 //! The result of a list of scenes depends on the scenes and configs alone, not on the number of
 //! threads.
+//!
+//! ```
+//! use tagalong_sim::Scene;
+//! use tagalong_trials::Draw;
+//!
+//! let scene = "duration_s = 1.0\n[camera]\nwidth = 32\nheight = 24\n\
+//!              [robot]\npath = [[6.0, 4.0]]\n[[people]]\npath = [[4.0, 3.0], [4.0, 1.0]]\n";
+//! let mut draw = Draw::new(&Scene::parse(scene)?, 1);
+//! let first = draw.next_frame().ok_or("no frame")?;
+//! assert_eq!((first.frame.index, first.truth.len()), (1, 1));
+//! assert!(first.frame.depth().is_ok());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod contender;
 mod crossing;

@@ -4,6 +4,22 @@
 //! A `recording` is read from the folder of a run; `assemble` puts runs on one list of times;
 //! `film` passes the log once for images, laser scans and trails; `truth` says which annotated
 //! people a run has missed; `page` has the markup, the style, the script and the data of the page.
+//!
+//! ```
+//! use clap::Parser as _;
+//! use tagalong_config::Registry;
+//! use tagalong_view::{view, ViewArgs};
+//!
+//! #[derive(clap::Parser)]
+//! struct Cli {
+//!     #[command(flatten)]
+//!     args: ViewArgs,
+//! }
+//!
+//! let cli = Cli::parse_from(["view", "runs/none"]);
+//! let failure = view(&cli.args, &Registry::default()).unwrap_err();
+//! assert!(failure.message.contains("runs/none"), "{}", failure.message);
+//! ```
 
 mod assemble;
 mod clip;

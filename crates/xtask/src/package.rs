@@ -13,9 +13,9 @@ use crate::workspace::{Workspace, copy_file, remove_folder, succeed};
 const NOT_PACKAGED: &[&str] =
     &["tagalong-tests", "tagalong-benches", "tagalong-fuzz", "tagalong-xtask"];
 /// Examples of the library that the stranger builds.
-const EXAMPLES: &[&str] = &["log_to_tracks", "own_arrays", "own_detector"];
+const EXAMPLES: &[&str] = &["follow", "log_to_tracks", "own_arrays", "own_detector", "own_sensor"];
 /// Those of them that need no file.
-const RUNNABLE: &[&str] = &["own_arrays", "own_detector"];
+const RUNNABLE: &[&str] = &["own_arrays", "own_detector", "own_sensor"];
 /// Folder of the library among the packages.
 const LIBRARY: &str = "tagalong";
 

@@ -1,4 +1,4 @@
-//! The walk-throughs of the documents, done as they say.
+//! The walk-throughs of `plugins`, done as they say.
 
 use anyhow::{Context as _, Result};
 
@@ -45,7 +45,7 @@ pub const GUIDES: [Guide; 4] = [
         ],
     },
     Guide {
-        page: "docs/walk-through-filter.md",
+        page: "plugins/walk-through-filter.md",
         kind: Kind::Filter,
         name: "steady",
         edits: &[
@@ -60,7 +60,7 @@ pub const GUIDES: [Guide; 4] = [
         ],
     },
     Guide {
-        page: "docs/walk-through-detector.md",
+        page: "plugins/walk-through-detector.md",
         kind: Kind::Detector,
         name: "shoulders",
         edits: &[
@@ -82,7 +82,7 @@ pub const GUIDES: [Guide; 4] = [
         ],
     },
     Guide {
-        page: "docs/walk-through-associator.md",
+        page: "plugins/walk-through-associator.md",
         kind: Kind::Associator,
         name: "seniority",
         edits: &[

@@ -6,6 +6,18 @@
 //! without.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).
+//!
+//! ```
+//! use tagalong_conformance::{context, patch};
+//! use tagalong_core::Verifier;
+//! use tagalong_body_net::{BodyNet, Config};
+//!
+//! let mut verifier = BodyNet::new(Config::default(), &context())?;
+//! let frame = patch::frame(patch::picture(true, 1)); // a head above shoulders
+//! // There is no depth image, and so no evidence.
+//! assert_eq!(verifier.log_odds(&frame, &patch::candidate())?, 0.0);
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 mod config;
 mod model;

@@ -8,6 +8,19 @@
 //! Features that a frame lacks, colour in a grey log or depth in a photograph, have no vote.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).
+//!
+//! ```
+//! use tagalong_conformance::{context, patch};
+//! use tagalong_core::Verifier;
+//! use tagalong_color_texture::{ColorTexture, Config};
+//!
+//! let mut verifier = ColorTexture::new(Config::default(), &context())?;
+//! let frame = patch::frame(patch::picture(true, 1)); // a head above shoulders
+//! let bars = patch::frame(patch::picture(false, 1));
+//! let candidate = patch::candidate();
+//! assert!(verifier.log_odds(&frame, &candidate)? > verifier.log_odds(&bars, &candidate)?);
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 mod config;
 mod features;

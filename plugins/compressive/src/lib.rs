@@ -14,6 +14,32 @@
 //! Such a tracker follows any object that it has learned, so most of the care goes into not
 //! learning: not from hidden people, not when unsure, and its score is too low to keep a track
 //! alive alone.
+//!
+//! ```
+//! use tagalong_compressive::{Compressive, Config};
+//! use tagalong_conformance::figure::{Figure, World};
+//! use tagalong_conformance::samples::track_at;
+//! use tagalong_core::{Detector, EgoMotion, Frame, Funnel, Query, Stamp};
+//! use tagalong_geometry::{Camera, Pinhole};
+//!
+//! # fn frame(people: &[Figure]) -> Frame {
+//! #     let lens = Pinhole::centred(262.0, 320, 240);
+//! #     let camera = Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0);
+//! #     let images = World::with(people).draw(&camera);
+//! #     Frame::new(1, Stamp::default(), camera.into(), EgoMotion::at_rest(0.1), images)
+//! # }
+//! let mut detector = Compressive::new(Config::default(), 1)?;
+//! let shown = frame(&[Figure::at(2.5, 0.0)]);
+//! let mut track = track_at(1, 2.5, 0.0);
+//! track.estimate.region = shown.camera.upper_body(&track.estimate.person.position);
+//! detector.learn(&shown, &[track.clone()])?;
+//! let found = detector.detect(&shown, &Query::Track(&track), &mut Funnel::default())?;
+//! assert_eq!(found.len(), 1);
+//! // People that it has not learned are not found.
+//! let all = Query::Discover { occupied: &[] };
+//! assert!(detector.detect(&shown, &all, &mut Funnel::default())?.is_empty());
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 mod appearance;
 mod candidates;

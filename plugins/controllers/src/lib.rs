@@ -1,6 +1,23 @@
 //! The controllers, each in a module of its name, and their shared parts: the commands that the
 //! wheels have not executed yet, the time step of a frame, and the caution towards a target that was
 //! not seen lately.
+//!
+//! ```
+//! use nalgebra::Vector2;
+//! use tagalong_conformance::{patch, target};
+//! use tagalong_controllers::clear_follow::{ClearFollow, Config};
+//! use tagalong_core::{Controller, DiffDrive, Scene};
+//!
+//! let mut controller = ClearFollow::new(Config::default())?;
+//! let frame = patch::frame(patch::picture(true, 1));
+//! let person = target(3.0, 1.0, Vector2::zeros()); // ahead, and to the left
+//! let tracks = std::slice::from_ref(&person);
+//! let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
+//! let scene = Scene { frame: &frame, target: Some(&person), tracks, wheels, max_speed_mps: 1.0 };
+//! let twist = controller.command(&scene);
+//! assert!(twist.linear_mps > 0.0 && twist.angular_rps > 0.0);
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 pub mod arc_follow;
 pub mod clear_follow;

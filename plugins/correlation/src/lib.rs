@@ -11,6 +11,29 @@
 //!
 //! A picture gives the direction and not the distance: that stays the expected one. The plugin
 //! answers only where there is no depth.
+//!
+//! ```
+//! use tagalong_conformance::figure::{Figure, World};
+//! use tagalong_conformance::samples::track_at;
+//! use tagalong_core::{Detector, EgoMotion, Frame, Funnel, Query, Stamp};
+//! use tagalong_correlation::{Config, Correlation};
+//! use tagalong_geometry::{Camera, Pinhole};
+//!
+//! # fn frame(people: &[Figure]) -> Frame {
+//! #     let lens = Pinhole::centred(262.0, 320, 240);
+//! #     let camera = Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0);
+//! #     let images = World::with(people).draw(&camera);
+//! #     Frame::new(1, Stamp::default(), camera.into(), EgoMotion::at_rest(0.1), images)
+//! # }
+//! let mut detector = Correlation::new(Config::default())?;
+//! let shown = frame(&[Figure::at(2.5, 0.0)]);
+//! let track = track_at(1, 2.5, 0.0);
+//! detector.learn(&shown, &[track.clone()])?;
+//! // Where there is depth, other detectors see the person.
+//! let found = detector.detect(&shown, &Query::Track(&track), &mut Funnel::default())?;
+//! assert!(found.is_empty());
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 mod config;
 mod detect;

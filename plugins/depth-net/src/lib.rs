@@ -15,6 +15,27 @@
 //! `tagalong model --export depth-net FILE.onnx` writes the network as an ONNX file.
 //!
 //! With the feature `train` the plugin also offers a trainer ([`train`]).
+//!
+//! ```
+//! use tagalong_conformance::context;
+//! use tagalong_conformance::figure::{Figure, World};
+//! use tagalong_core::{Detector, EgoMotion, Frame, Funnel, Query, Stamp};
+//! use tagalong_depth_net::{Config, DepthNet};
+//! use tagalong_geometry::{Camera, Pinhole};
+//!
+//! # fn frame(people: &[Figure]) -> Frame {
+//! #     let lens = Pinhole::centred(262.0, 320, 240);
+//! #     let camera = Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0);
+//! #     let images = World::with(people).draw(&camera);
+//! #     Frame::new(1, Stamp::default(), camera.into(), EgoMotion::at_rest(0.1), images)
+//! # }
+//! let mut detector = DepthNet::new(Config::default(), &context())?;
+//! let all = Query::Discover { occupied: &[] };
+//! let found = detector.detect(&frame(&[Figure::at(2.5, 0.4)]), &all, &mut Funnel::default())?;
+//! assert_eq!(found.len(), 1);
+//! assert!((found[0].position.x - 2.5).abs() < 0.2, "{}", found[0].position);
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 mod beams;
 mod config;

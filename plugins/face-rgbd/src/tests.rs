@@ -384,13 +384,17 @@ mod training {
             let dy = y as f64 - 48.0;
             let eye = (dx.abs() - 8.0).hypot(dy + 6.0) < 4.0;
             let mouth = dx.abs() < 8.0 && (dy - 10.0).abs() < 2.5;
-            let grey = match is_face {
-                true if eye || mouth => 40.0,
-                true if dx.hypot(dy) < 19.0 => 200.0,
-                true => 110.0,
-                false if ((x + y * (seed as usize % 3)) / 6).is_multiple_of(2) => 60.0,
-                false => 180.0,
+            let skin = dx.hypot(dy) < 19.0;
+            let stripe = ((x + y * (seed as usize % 3)) / 6).is_multiple_of(2);
+            let face = if eye || mouth {
+                40.0
+            } else if skin {
+                200.0
+            } else {
+                110.0
             };
+            let stripes = if stripe { 60.0 } else { 180.0 };
+            let grey = if is_face { face } else { stripes };
             (grey + 25.0 * random.uniform()) as u8
         })
     }

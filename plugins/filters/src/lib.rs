@@ -1,5 +1,23 @@
 //! The filters without a random number, each in a module of its name: they estimate the position of
 //! each person from all evidence.
+//!
+//! ```
+//! use tagalong_conformance::samples::detection_at;
+//! use tagalong_core::{EgoMotion, PersonFilter};
+//! use tagalong_filters::ekf::{Config, Ekf};
+//! use tagalong_geometry::Camera;
+//!
+//! let filter = Ekf::new(Config::default())?;
+//! let camera = Camera::blind(nalgebra::one());
+//! let mut person = filter.start(&detection_at(3.0, 0.0));
+//! for step in 1..=10 {
+//!     filter.predict(&mut person, &EgoMotion::at_rest(0.1));
+//!     filter.correct(&mut person, &detection_at(3.0, 0.1 * f64::from(step)), &camera);
+//! }
+//! let velocity = filter.estimate(&person, &camera).person.velocity;
+//! assert!(velocity.y > 0.5, "the person walks to the left: {velocity}");
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 pub mod ekf;
 pub mod floor_kalman;

@@ -13,6 +13,22 @@
 //!
 //! The methods of the paper, its likelihood maps included, are settings; other schemes of sampling are
 //! [`SamplingSteps`].
+//!
+//! ```
+//! use tagalong_conformance::samples::detection_at;
+//! use tagalong_core::{EgoMotion, Filter, TrackId};
+//! use tagalong_geometry::{Camera, Pinhole};
+//! use tagalong_joint_particle::{Config, JointParticle};
+//!
+//! let camera = Camera::mounted(Pinhole::centred(262.0, 320, 240), 320, 240, 1.2, 0.0, 0.0);
+//! let mut filter = JointParticle::new(Config::default(), 1)?;
+//! filter.start(TrackId(1), &detection_at(3.0, 0.0), &camera);
+//! // The robot drives half a metre towards the person.
+//! filter.predict(&EgoMotion { forward: 0.5, ..EgoMotion::at_rest(0.5) }, &camera);
+//! let position = filter.estimates(&camera)[&TrackId(1)].person.position;
+//! assert!((position.x - 2.5).abs() < 0.3, "{position}");
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 mod config;
 mod filter;

@@ -10,6 +10,23 @@
 //! second, third or fourth ray only.
 //!
 //! With the feature `train` the crate also fits models (`train`).
+//!
+//! ```
+//! use tagalong_conformance::context;
+//! use tagalong_conformance::figure::{Figure, World};
+//! use tagalong_core::{Detector, EgoMotion, Frame, Funnel, Query, Sensors, Stamp};
+//! use tagalong_geometry::Camera;
+//! use tagalong_laser_legs::{Config, LaserLegs};
+//!
+//! let mut detector = LaserLegs::new(Config::default(), &context())?;
+//! let sensors = Sensors::default().with(World::with(&[Figure::at(2.0, 0.3)]).scan());
+//! let blind = Camera::blind(nalgebra::one()).into();
+//! let frame = Frame::of_sensors(1, Stamp::default(), blind, EgoMotion::at_rest(0.1), sensors);
+//! let all = Query::Discover { occupied: &[] };
+//! let found = detector.detect(&frame, &all, &mut Funnel::default())?;
+//! assert!(found.iter().any(|person| (person.position.x - 2.0).abs() < 0.3));
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 mod config;
 mod detect;

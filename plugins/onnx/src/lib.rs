@@ -3,6 +3,21 @@
 //! The network runs through [`tagalong_network::PersonNetwork`], which knows the conventions of
 //! nine families of detectors. Its boxes of whole people become upper-body squares with a place:
 //! by depth where that shows the face, otherwise by the size of the box.
+//!
+//! ```
+//! use tagalong_conformance::{context, patch};
+//! use tagalong_core::{Detector, Funnel, Query};
+//! use tagalong_onnx::{Config, Onnx};
+//!
+//! // The file of the network is `model`. Without one the detector finds no person, and says so.
+//! let mut detector = Onnx::new(Config::default(), &context())?;
+//! let mut funnel = Funnel::default();
+//! let frame = patch::frame(patch::picture(true, 1));
+//! let found = detector.detect(&frame, &Query::Discover { occupied: &[] }, &mut funnel)?;
+//! assert!(found.is_empty());
+//! assert_eq!(funnel.count("no model"), 1);
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 mod config;
 mod detect;
@@ -38,5 +53,6 @@ const REMEDIES: &[Remedy] = &[
 /// Registers the plugin.
 pub fn register(registry: &mut Registry) {
     registry.remedies(NAME, REMEDIES);
+    registry.network_of_a_file(NAME);
     registry.detector(NAME, "people by a neural network from an ONNX file", Onnx::new);
 }

@@ -11,6 +11,19 @@
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`). Without it no solver is
 //! compiled in.
+//!
+//! ```
+//! use tagalong_conformance::{context, patch};
+//! use tagalong_core::Verifier;
+//! use tagalong_svm_patch::{SvmPatch, Config};
+//!
+//! let mut verifier = SvmPatch::new(Config::default(), &context())?;
+//! let frame = patch::frame(patch::picture(true, 1)); // a head above shoulders
+//! let bars = patch::frame(patch::picture(false, 1));
+//! let candidate = patch::candidate();
+//! assert!(verifier.log_odds(&frame, &candidate)? > verifier.log_odds(&bars, &candidate)?);
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 mod config;
 mod gradients;

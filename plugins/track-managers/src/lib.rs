@@ -1,5 +1,18 @@
 //! The track managers, each in a module of its name: they decide when a track starts, counts as a
 //! person, and ends.
+//!
+//! ```
+//! use tagalong_conformance::samples::detection_at;
+//! use tagalong_core::{Initiation, TrackId, TrackManager, Unassociated};
+//! use tagalong_track_managers::m_of_n::{Config, MOfN};
+//!
+//! let mut manager = MOfN::new(Config::default())?;
+//! let detection = detection_at(3.0, 0.0);
+//! let new = Unassociated { detection: &detection, detector_log_odds: 2.0, discovered: true };
+//! let Initiation::Start(health) = manager.initiate(TrackId(1), &new) else { unreachable!() };
+//! assert!(!health.confirmed, "one detection is not enough");
+//! # Ok::<(), tagalong_core::Error>(())
+//! ```
 
 pub mod m_of_n;
 pub mod sprt;

@@ -237,7 +237,7 @@ impl Bench<'_> {
 impl Contestant {
     fn new(file: &ConfigFile, args: &BoxesArgs, registry: &Registry) -> Result<Self, Failure> {
         let (pipeline, settings) = file.pipeline(registry, None)?;
-        let resolved = for_given_boxes(&pipeline.resolved()).map_err(Failure::usage)?;
+        let resolved = for_given_boxes(&pipeline.resolved(), registry).map_err(Failure::usage)?;
         let tunables = if args.leave_one_out { settings.tune } else { Vec::new() };
         let tried = candidates(&tunables, args.budget.into(), args.seed);
         let mut settings = Vec::new();

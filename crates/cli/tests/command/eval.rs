@@ -33,6 +33,21 @@ fn in_home(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 #[test]
+fn each_printed_figure_is_defined_in_the_reference() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/figures.md");
+    let page = fs::read_to_string(page).unwrap();
+    let folder = home();
+    let files = ["--truth", "walk.people.csv", "--tracks", "out", "--format", "json"];
+    let printed = json(&in_home(folder.path(), &files));
+    for name in printed.as_object().unwrap().keys() {
+        // A cell may have the ends of names that begin alike.
+        let end = name.strip_prefix("position_error").unwrap_or(name);
+        let is_defined = [name, end].iter().any(|name| page.contains(&format!("`{name}`")));
+        assert!(is_defined || ["rules", "notes"].contains(&name.as_str()), "{name}");
+    }
+}
+
+#[test]
 fn a_run_is_scored_in_the_image_and_on_the_floor() {
     let folder = home();
     let files = ["--truth", "walk.people.csv", "--tracks", "out", "--format", "json"];

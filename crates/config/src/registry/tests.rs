@@ -81,6 +81,29 @@ fn what_plugins_offer_is_listed_with_their_names() {
 }
 
 #[test]
+fn a_default_is_of_its_kind_and_the_later_one_counts() {
+    let mut registry = registry();
+    assert!(registry.default_of(Kind::Verifier).is_none());
+    registry.default_plugin(Kind::Verifier, "not registered");
+    assert!(registry.default_of(Kind::Verifier).is_none());
+    registry.default_plugin(Kind::Verifier, "fixed");
+    registry.default_plugin(Kind::Associator, "fixed");
+    assert_eq!(registry.default_of(Kind::Verifier).map(|plugin| plugin.name), Some("fixed"));
+    assert!(registry.default_of(Kind::Associator).is_none(), "a verifier is no associator");
+}
+
+#[test]
+fn detectors_of_recorded_detections_and_of_networks_are_known() {
+    let mut registry = registry();
+    let offer = RecordedOffer { whole_people: "body = 'full'", known_positions: "" };
+    registry.recorded("fixed", offer);
+    assert_eq!(registry.all_recorded().collect::<Vec<_>>(), [("fixed", offer)]);
+    registry.network_of_a_file("counting");
+    assert!(registry.runs_network_of_a_file("counting"));
+    assert!(!registry.runs_network_of_a_file("fixed"));
+}
+
+#[test]
 fn who_cannot_be_trained_is_answered_with_who_can() {
     let fixed = "the verifier `fixed` cannot be trained; available: counting";
     assert_eq!(refusal("fixed"), fixed);

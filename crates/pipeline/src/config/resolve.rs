@@ -1,9 +1,8 @@
-use tagalong_config::{ConfigError, Registry};
+use tagalong_config::{ConfigError, Kind, Registry};
 use toml::{Table, Value};
 
 use tagalong_tracking::DetectorSettings;
 
-use super::{DEFAULT_ASSOCIATOR, DEFAULT_MANAGER};
 use crate::settings::PipelineSettings;
 
 /// Returns the config with every default filled in, also those of the plugins. `[tune]` and
@@ -16,8 +15,11 @@ pub(super) fn resolve(
     root.remove(super::tune::TABLE);
     root.remove(super::suits::TABLE);
     root.extend(table_of(settings)?);
-    for (section, plugin) in [("associator", DEFAULT_ASSOCIATOR), ("manager", DEFAULT_MANAGER)] {
-        let named = Table::from_iter([("plugin".to_owned(), Value::from(plugin))]);
+    for (section, kind) in [("associator", Kind::Associator), ("manager", Kind::Manager)] {
+        let named = match registry.default_of(kind) {
+            Some(plugin) => Table::from_iter([("plugin".to_owned(), Value::from(plugin.name))]),
+            None => Table::new(),
+        };
         fill(root.entry(section).or_insert_with(|| Value::Table(Table::new())), named);
     }
     for (name, value) in &mut root {
@@ -40,6 +42,23 @@ pub(super) fn resolve(
         }
     }
     Ok(root)
+}
+
+/// Returns the name of the plugin that a section has without naming one.
+///
+/// # Errors
+/// A program that registers no default of this kind.
+pub(super) fn default_plugin(
+    registry: &Registry,
+    kind: Kind,
+    section: &str,
+) -> Result<&'static str, ConfigError> {
+    registry.default_of(kind).map(|plugin| plugin.name).ok_or_else(|| {
+        ConfigError::new(format!(
+            "no {kind}: this program registers no default; add a section [{section}] with \
+             `plugin = \"...\"`"
+        ))
+    })
 }
 
 fn fill_config(section: &mut Value, registry: &Registry) -> Result<(), ConfigError> {

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::commented_defaults;
+use tagalong_config::{Kind, commented_defaults};
 
 use crate::tests::doubles::{PLAIN, World, frame, person};
 use crate::{MissingSource, Pipeline, PipelineSettings, Sources};
@@ -13,6 +13,22 @@ fn build(text: &str) -> Result<Pipeline, String> {
 
 const FILTER: &str = "filter.plugin = 'steady'\n";
 const SCRIPT: &str = "[[detectors]]\nplugin = 'script'\n";
+
+#[test]
+fn a_section_may_name_no_plugin_only_where_a_default_of_its_kind_is_registered() {
+    let config = format!("{FILTER}{SCRIPT}");
+    let pipeline = build(&config).unwrap();
+    let values = pipeline.config().values();
+    assert_eq!(values["associator"]["plugin"].as_str(), Some("associate-hungarian"));
+    assert_eq!(values["manager"]["plugin"].as_str(), Some("manage-m-of-n"));
+
+    let mut registry = World::default().registry();
+    registry.default_plugin(Kind::Associator, "not registered");
+    let error = Pipeline::builder(&registry).from_toml(&config).map(drop).unwrap_err().to_string();
+    assert!(error.contains("add a section [associator] with `plugin"), "{error}");
+    let named = format!("associator.plugin = 'associate-hungarian'\n{config}");
+    assert!(Pipeline::builder(&registry).from_toml(&named).is_ok());
+}
 
 #[test]
 fn mistakes_are_shown_with_their_place_and_the_remedy() {

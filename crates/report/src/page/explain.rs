@@ -26,7 +26,7 @@ impl Page<'_> {
             h3 { "Where it comes from" }
             p {
                 "HOTA, CLEAR (MOTA) and identity (IDF1) figures follow TrackEval, the log-average miss rate follows the Caltech protocol, "
-                "with matches at a similarity of 0.5. report.json and report.csv beside this page hold the same results for programs."
+                "with matches at a similarity of 0.5. docs/reference/figures.md of the repository defines each figure. report.json and report.csv beside this page hold the same results for programs."
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Rides that are told where people are, to measure the price of perception.
 
 use nalgebra::Point2;
+use tagalong_config::Registry;
 use tagalong_core::{ExternalDetection, TrackId};
 use tagalong_pipeline::{Choice, Enrollment, FrameReport, Pipeline};
 use tagalong_sim::Simulation;
@@ -12,25 +13,27 @@ use crate::{Contender, SimulatedFrame, TrialError};
 const SURE: f64 = 6.0;
 /// A track within this distance of the target's head is on the target, m.
 const SAME_M: f64 = 0.4;
-/// Detectors of a pipeline that is told the truth.
-const DETECTORS: &str = r#"
-[[detectors]]
-plugin = "recorded-detections"
-roles = ["discover"]
-config = { score = "log-odds", min_score = 0.0, sigma_position_m = 0.05, outside_image = true }
-"#;
 
 impl Contender {
     /// Returns the same pipeline with one detector, that of the positions that it is told; see
     /// [`crate::Ride::told`].
     ///
     /// # Errors
-    /// [`TrialError::Config`] for a config that is no TOML.
-    pub fn told(&self) -> Result<Self, TrialError> {
+    /// [`TrialError::Config`] for a config that is no TOML, and where no registered detector takes
+    /// positions.
+    pub fn told(&self, registry: &Registry) -> Result<Self, TrialError> {
         let wrong = |error: toml::de::Error| TrialError::Config(format!("{}: {error}", self.name));
         let mut config: Table = self.config.parse().map_err(wrong)?;
-        let detectors: Table = DETECTORS.parse().map_err(wrong)?;
-        config.extend(detectors);
+        let Some((plugin, offer)) = registry.all_recorded().next() else {
+            let why = "no registered detector takes the positions that a pipeline is told";
+            return Err(TrialError::Config(why.to_owned()));
+        };
+        let mut detector = Table::new();
+        detector.insert("plugin".to_owned(), plugin.into());
+        detector.insert("roles".to_owned(), vec!["discover"].into());
+        let settings: Table = offer.known_positions.parse().map_err(wrong)?;
+        detector.insert("config".to_owned(), settings.into());
+        config.insert("detectors".to_owned(), vec![detector].into());
         // Cameras that a detector suits are no matter of the positions that are told.
         config.remove("suits");
         let config = config.to_string();

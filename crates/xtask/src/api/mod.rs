@@ -1,5 +1,5 @@
-//! Lists of the public items of the crates that the library re-exports, so that no change of them
-//! goes unseen. They are made of the sources: nothing is built, and no nightly compiler is needed.
+//! Lists of the public items of the library and of the crates that others build on, so that no
+//! change of them goes unseen. They are made of the sources: nothing is built, and no nightly compiler is needed.
 
 mod crate_items;
 mod text;
@@ -13,8 +13,24 @@ use anyhow::{Context as _, Result, bail};
 use self::crate_items::CrateItems;
 use crate::workspace::Workspace;
 
-/// Folders of the crates below `crates`: the library, and those that it re-exports.
-const CRATES: &[&str] = &["tagalong", "config", "core", "geometry", "log", "pipeline", "tracking"];
+/// Folders of the crates below `crates`: the library, those that it re-exports, and those that
+/// plugins and programs outside of this repository use.
+const CRATES: &[&str] = &[
+    "tagalong",
+    "config",
+    "core",
+    "eval",
+    "following",
+    "geometry",
+    "log",
+    "math",
+    "network",
+    "pipeline",
+    "sim",
+    "stereo",
+    "tracking",
+    "vision",
+];
 
 /// Lines of each kind that a complaint shows.
 const SHOWN: usize = 20;

@@ -6,15 +6,9 @@ use crate::workspace::Workspace;
 /// Crates that know plugins: the list of all, the fuzzer of their models, and this one.
 const KNOWING: &[&str] = &["crates/catalog/", "crates/fuzz/", "crates/xtask/"];
 
-/// Files that may name a plugin, or a config of the same name.
+/// Files with names of configs that are those of plugins, too.
 const MAY_NAME: &[(&str, &str)] = &[
-    ("crates/pipeline/src/config.rs", "associate-hungarian"), // the default associator
-    ("crates/pipeline/src/config.rs", "manage-m-of-n"),       // the default track manager
-    ("crates/trials/src/given.rs", "recorded-detections"),    // replaces the detectors of a config
-    ("crates/trials/src/ride/told.rs", "recorded-detections"), // likewise
-    ("crates/doctor/src/preparations.rs", "onnx"),            // tries preparations of its images
-    ("crates/app/src/installed.rs", "onnx"),                  // the ending of its files
-    // Names of configs.
+    ("crates/app/src/installed.rs", "onnx"), // and the ending of files
     ("crates/app/src/choice.rs", "laser-legs"),
     ("crates/pipeline/src/config/builtin.rs", "joint-particle"),
     ("crates/pipeline/src/config/builtin.rs", "laser-legs"),
@@ -90,7 +84,7 @@ mod tests {
         ] {
             assert!(!is_shared_code(file), "{file}");
         }
-        assert!(may_name("crates/pipeline/src/config.rs", "manage-m-of-n"));
-        assert!(!may_name("crates/pipeline/src/config.rs", "ekf"));
+        assert!(may_name("crates/app/src/choice.rs", "laser-legs"));
+        assert!(!may_name("crates/app/src/choice.rs", "ekf"));
     }
 }

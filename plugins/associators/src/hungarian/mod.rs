@@ -10,13 +10,17 @@ mod config;
 
 pub use associate::Hungarian;
 pub use config::Config;
-use tagalong_config::Registry;
+use tagalong_config::{Kind, Registry};
 
-/// Registers the associator `associate-hungarian`.
+/// Name of this plugin in configs.
+const NAME: &str = "associate-hungarian";
+
+/// Registers the associator `associate-hungarian`, which is that of a config that names none.
 pub fn register(registry: &mut Registry) {
     registry.associator(
-        "associate-hungarian",
+        NAME,
         "one detection a track, by the assignment with the least sum of costs",
         |config: Config, _| Hungarian::new(config),
     );
+    registry.default_plugin(Kind::Associator, NAME);
 }

@@ -57,12 +57,14 @@ impl Targets {
         for limit_m in [UNCLEAR_M, PERSON_M] {
             for k in &found {
                 let height = (people[*k].head.z - HEAD_M) as f32;
-                around(&people[*k], &mut cells, |off, m| match m < limit_m {
-                    true if limit_m == PERSON_M => {
+                around(&people[*k], &mut cells, |off, m| {
+                    if m >= limit_m {
+                        None
+                    } else if limit_m == PERSON_M {
                         Some(Target::Person([off.x as f32, off.y as f32, height]))
+                    } else {
+                        Some(Target::Any)
                     }
-                    true => Some(Target::Any),
-                    false => None,
                 });
             }
         }

@@ -14,13 +14,17 @@ mod track;
 
 pub use config::Config;
 pub use manage::MOfN;
-use tagalong_config::Registry;
+use tagalong_config::{Kind, Registry};
 
-/// Registers the track manager `manage-m-of-n`.
+/// Name of this plugin in configs.
+const NAME: &str = "manage-m-of-n";
+
+/// Registers the track manager `manage-m-of-n`, which is that of a config that names none.
 pub fn register(registry: &mut Registry) {
     registry.manager(
-        "manage-m-of-n",
+        NAME,
         "confirms a track by M detections in N frames, ends it by its misses",
         |config: Config, _| MOfN::new(config),
     );
+    registry.default_plugin(Kind::Manager, NAME);
 }

@@ -222,7 +222,7 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
     let mut jobs = Vec::new();
     let mut contenders = Vec::new();
     for contender in self::contenders(args, registry)? {
-        let told = if args.told { Some(contender.told().map_err(failure)?) } else { None };
+        let told = if args.told { Some(contender.told(registry).map_err(failure)?) } else { None };
         contenders.push((contender, false));
         contenders.extend(told.map(|told| (told, true)));
     }

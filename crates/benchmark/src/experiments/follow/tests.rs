@@ -25,7 +25,7 @@ fn ridden(block: &str, is_told: bool) -> Ridden {
         [filter]\nplugin = \"ekf\"\n[controller]\nplugin = \"clear-follow\"\n";
     let seeing = Contender::new("follow", config);
     let ride = if is_told {
-        Ride::told(&scene(block), &seeing.told().unwrap(), &registry, &mut ())
+        Ride::told(&scene(block), &seeing.told(&registry).unwrap(), &registry, &mut ())
     } else {
         Ride::new(&scene(block), &seeing, &registry, &mut ())
     };
