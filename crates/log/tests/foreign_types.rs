@@ -43,7 +43,7 @@ fn each_type_that_is_not_read_is_told_with_what_to_record() {
         ("sensor_msgs/msg/PointCloud2", "json", Some("points"), "are in `json`"),
         ("foxglove.CompressedImage", "protobuf", None, "convert the log"),
         ("foxglove.RawImage", "protobuf", None, "convert the log"),
-        ("foxglove_msgs/msg/CompressedImage", "cdr", None, "CompressedImage of sensor_msgs is"),
+        ("foxglove_msgs/msg/CompressedImage", "cdr", None, "as sensor_msgs/CompressedImage"),
         ("jsk_recognition_msgs/BoundingBoxArray", "ros1", None, "Detection2DArray"),
         ("foxglove.Detection2DArray", "protobuf", None, "convert the log"),
     ] {
@@ -54,8 +54,21 @@ fn each_type_that_is_not_read_is_told_with_what_to_record() {
         let told = entry(&source, "/other");
         assert_eq!((told.used_as.as_ref(), told.could_be), (None, could_be), "{told}");
         assert!(told.to_string().contains(words), "{told}");
-        let is_remedied = told.remedy.is_some() || told.to_string().contains("are read");
-        assert!(is_remedied || told.to_string().ends_with(" is"), "{kind}: {told}");
+        let is_remedied =
+            told.remedy.is_some() || told.to_string().contains("Detection3DArray are");
+        assert!(is_remedied, "{kind}: {told}");
+    }
+}
+
+#[test]
+fn depth_of_a_type_that_is_not_read_could_be_depth() {
+    for kind in ["my_msgs/msg/Image", "foxglove_msgs/msg/RawImage", "my_msgs/msg/DisparityImage"] {
+        let mut log = log_of_colour();
+        log.foreign("/camera/depth/image", kind, "cdr", at(0.0), &[0, 1, 0, 0]);
+        let source = log.save().open(&InputSettings::default(), Inputs::ANY).unwrap();
+        let told = entry(&source, "/camera/depth/image");
+        assert_eq!(told.could_be, Some("depth"), "{told}");
+        assert!(told.remedy.as_ref().unwrap().contains("republish it as s"), "{told}");
     }
 }
 

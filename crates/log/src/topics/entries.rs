@@ -103,14 +103,15 @@ impl Judge<'_> {
             return (odometry.is_none() && odom_frames.is_none()).then_some("odometry");
         }
         let parts = TopicName::of(name);
+        let is_scan = topic.kind == Type::PointCloud || topic.schema.ends_with("LaserScan");
         let is_depth = topic.content == Content::Depth || topic.is_jpeg_depth || topic.is_deep_grey;
         let is_depth = is_depth || topic.is_other_stream || parts.stream == Stream::Depth;
         if is_depth {
             let is_free = self.inputs.uses(Input::Depth) && !has_depth;
-            return (is_image(topic) && is_free).then_some("depth");
+            let is_depth = is_image(topic) || unreadable(topic).is_some() && !is_scan;
+            return (is_depth && is_free).then_some("depth");
         }
         let is_free = self.inputs.uses(Input::Colour) && colour.is_none();
-        let is_scan = topic.kind == Type::PointCloud || topic.schema.ends_with("LaserScan");
         (unreadable(topic).is_some() && is_free && !is_scan).then_some("colour")
     }
 

@@ -108,8 +108,15 @@ pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
         (Some(_), _) if topic.is_other_stream => Some(OTHER_STREAM_REMEDY.to_owned()),
         (Some(pixels), _) if topic.content == Content::Unknown => Some(refusal_of(pixels)),
         (None, Type::Other) if SENSOR_MESSAGES.contains(&name) => {
+            let read_as = match name {
+                "RawImage" => "sensor_msgs/Image".to_owned(),
+                "DisparityImage" => "stereo_msgs/DisparityImage".to_owned(),
+                name => format!("sensor_msgs/{name}"),
+            };
             Some(match unread_encoding(&topic.encoding) {
-                None => format!("its type is not read; {name} of sensor_msgs is"),
+                None => {
+                    format!("its type is not read: record or republish it as {read_as}")
+                }
                 Some((why, remedy)) => format!("{why}: {remedy}"),
             })
         }

@@ -37,7 +37,7 @@ use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
 pub(crate) use units::told_unit;
-pub(crate) use unpaired::{is_unusual, unpaired};
+pub(crate) use unpaired::{is_unusual, slower_words, unpaired};
 
 use crate::obstacles::ObstacleTopic;
 use crate::scan::{Scan, Topic};
