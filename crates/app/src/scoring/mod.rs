@@ -15,7 +15,7 @@ pub use extents::extents_note;
 pub use shots::{Shot, Shots};
 use tagalong_config::{FileLimit, read_text as read_bounded};
 use tagalong_eval::formats::{OddLines, kitti};
-use tagalong_eval::{Comparison, Frame, Region, Report, Sequence, Similarity, Truth};
+use tagalong_eval::{Comparison, EvalError, Frame, Region, Report, Sequence, Similarity, Truth};
 pub use tracks::Tracks;
 pub use truth::{RulesChoice, TruthFile, TruthOptions};
 
@@ -76,6 +76,16 @@ pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequenc
         frame.reports.retain(has_report);
     }
     is_comparable.then_some(kept)
+}
+
+/// Returns the sentence of an error of a truth or of tracks, with the option that cures it.
+pub fn with_remedy(error: &EvalError) -> String {
+    match error {
+        EvalError::DuplicateId { side: "truth", .. } => {
+            format!("{error}; `--drop-doubled-ids` keeps the first of them")
+        }
+        _ => error.to_string(),
+    }
 }
 
 /// Returns the comparison that the truth's protocol asks for.

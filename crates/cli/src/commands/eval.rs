@@ -8,7 +8,7 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::scoring::{
     Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
-    extents_note,
+    extents_note, with_remedy,
 };
 use tagalong_app::serialize::{to_json, to_json_line};
 use tagalong_app::suggest::check_log_path;
@@ -41,6 +41,9 @@ pub struct EvalArgs {
     /// The truth's boxes are whole bodies; compare the upper bodies of them.
     #[arg(long)]
     pub upper_body: bool,
+    /// Of several people of the truth with one ID in a frame keep the first, and count the others.
+    #[arg(long)]
+    pub drop_doubled_ids: bool,
     /// Also print HOTA, MOTA and IDF1 if one kind of error were repaired: IDs, false reports, misses,
     /// and where the boxes are.
     #[arg(long)]
@@ -155,7 +158,11 @@ fn no_place_reported(args: &EvalArgs) -> Failure {
 }
 
 fn refused(args: &EvalArgs, error: &EvalError) -> Failure {
-    Failure::failed(format!("{}: {error}", args.tracks.display()))
+    let file = match error {
+        EvalError::DuplicateId { side: "truth", .. } => &args.truth,
+        _ => &args.tracks,
+    };
+    Failure::failed(format!("{}: {}", file.display(), with_remedy(error)))
 }
 
 /// Note on tracks for which LAMR and AP are meaningless.
@@ -188,7 +195,11 @@ struct Judged {
 }
 
 fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
-    let options = TruthOptions { rules: args.rules, upper_body: args.upper_body };
+    let options = TruthOptions {
+        rules: args.rules,
+        upper_body: args.upper_body,
+        drops_doubled_ids: args.drop_doubled_ids,
+    };
     let mut truth = TruthFile::read(&args.truth, options)?;
     let tracks = Tracks::read(&args.tracks, truth.info.as_ref().map(|info| info.length))?;
     let shots = shots(args, &truth, &tracks)?;
@@ -201,6 +212,7 @@ fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
     }
     let mut notes = std::mem::take(&mut truth.notes);
     notes.extend(other_log(&args.truth, &truth, &tracks));
+    notes.extend(truth.early_end(&args.truth.display().to_string(), &shots));
     notes.extend(longer(args, truth.last(&shots).max(shots.last()), &tracks));
     notes.extend(tracks.notes);
     let lost = truth.without_image(&shots);
