@@ -4,9 +4,10 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use crate::{BridgeError, threads};
 use tagalong::core::{Stamp, WheelSpeeds};
 use tagalong::pipeline::{Enable, EnableSwitch, Orders, Permission};
+
+use crate::{BridgeError, threads};
 
 /// Duration of zero commands after the last frame, or the last time with permission to move, s; then
 /// none are sent, so that other nodes may drive (the `stop_pub_timeout` of Nav2).
