@@ -105,6 +105,8 @@ pub(crate) struct Topic {
     /// True for points that can be read, also if they are not those of a camera.
     pub(crate) has_points: bool,
     pub(crate) frame_id: Option<String>,
+    /// Frame that odometry gives the pose of.
+    pub(crate) child_frame_id: Option<String>,
     /// Type of images, points or scans that messages of an unknown type contain.
     pub(crate) part: Option<&'static str>,
     pub(crate) stamps: Vec<Stamp>,
@@ -351,6 +353,7 @@ impl Gathering {
             video_fault: None,
             has_points: false,
             frame_id: None,
+            child_frame_id: None,
             part: None,
             stamps: Vec::new(),
             recorded: Vec::new(),
@@ -654,6 +657,7 @@ impl Topic {
 
     fn take_odometry(&mut self, data: &[u8]) -> Option<()> {
         let odometry: Odometry = decode(data).ok()?;
+        self.child_frame_id.get_or_insert(odometry.child_frame_id);
         self.take_header(odometry.header);
         Some(())
     }

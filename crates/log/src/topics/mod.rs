@@ -29,7 +29,7 @@ use kinds::{
 pub(crate) use kinds::{kind_of, unreadable};
 pub(crate) use name::{Stream, TopicName};
 use odometry::{choose_odometry, odometry_problem};
-pub(crate) use odometry::{transform_odometry_problem, transform_problem};
+pub(crate) use odometry::{exchanged_frames, transform_odometry_problem, transform_problem};
 pub(crate) use problems::{Problem, geometry_problem};
 use problems::{detections_problem, scan_times_problem, scanner_problem};
 pub(crate) use rigs::camera_frames;
