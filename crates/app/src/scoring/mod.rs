@@ -1,6 +1,7 @@
 //! Reads files of truth and tracks into a sequence that can be scored.
 
 mod extents;
+mod other_log;
 mod shots;
 mod tracks;
 mod truth;
@@ -12,6 +13,7 @@ use std::path::Path;
 use crate::outcome::Failure;
 use crate::suggest::file_hint;
 pub use extents::extents_note;
+pub use other_log::other_log_notes;
 pub use shots::{Shot, Shots};
 use tagalong_config::{FileLimit, read_text as read_bounded};
 use tagalong_eval::formats::{OddLines, kitti};

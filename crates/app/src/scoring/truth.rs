@@ -153,8 +153,7 @@ impl TruthFile {
             Some(info) => (info.length, "seqLength is"),
             None => (shots.last(), "the last of the log is"),
         };
-        let mut numbers = self.frames.keys().filter_map(|key| self.number(*key, shots));
-        let last = numbers.next_back()?;
+        let last = self.last_annotated(shots)?;
         let missing = length.saturating_sub(last);
         let is_far = missing > EARLY_FRAMES && f64::from(missing) > EARLY_PART * f64::from(length);
         is_far.then(|| {
@@ -308,6 +307,22 @@ impl TruthFile {
         let stated = self.info.as_ref().map_or(0, |info| info.length);
         let annotated = self.frames.keys().filter_map(|key| self.number(*key, shots)).max();
         stated.max(annotated.unwrap_or(0))
+    }
+
+    /// Returns the number of the last frame with an entry; `None` without any.
+    pub fn last_annotated(&self, shots: &Shots) -> Option<u32> {
+        self.frames.keys().filter_map(|key| self.number(*key, shots)).next_back()
+    }
+
+    /// Returns the number of moments with an entry.
+    pub fn annotated(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Yields the boxes of all people, as they are annotated.
+    pub fn regions(&self) -> impl Iterator<Item = &Region> {
+        let people = self.frames.values().flat_map(|frame| &frame.people);
+        people.filter_map(|(truth, _)| truth.region.as_ref())
     }
 
     /// Returns the number of annotated moments without an image of the log.
