@@ -298,7 +298,7 @@ impl Bridge {
         };
         let publisher =
             network.publisher_of(&options.diagnostics, "diagnostic_msgs/msg/DiagnosticArray")?;
-        let diagnostics = Diagnostics::start(publisher, Arc::clone(&clock));
+        let diagnostics = Diagnostics::start(publisher, Arc::clone(&clock))?;
         Ok(Self {
             max_speed_mps: setup.robot.max_speed_mps,
             network,

@@ -2,7 +2,7 @@
 
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::{self, JoinHandle};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ros2_client::Publisher;
@@ -12,6 +12,7 @@ use tagalong::pipeline::Permission;
 use crate::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::skill::STUCK;
 use crate::stamps::StampClock;
+use crate::{BridgeError, threads};
 
 /// Time between two messages.
 const EACH: Duration = Duration::from_secs(1);
@@ -54,11 +55,18 @@ pub(crate) struct Diagnostics {
 }
 
 impl Diagnostics {
-    pub(crate) fn start(publisher: Publisher<DiagnosticArray>, clock: Arc<StampClock>) -> Self {
+    /// Starts the thread.
+    ///
+    /// # Errors
+    /// [`BridgeError::Thread`].
+    pub(crate) fn start(
+        publisher: Publisher<DiagnosticArray>,
+        clock: Arc<StampClock>,
+    ) -> Result<Self, BridgeError> {
         let status: Arc<Mutex<Option<Status>>> = Arc::default();
         let theirs = Arc::clone(&status);
         let (end, ended) = channel();
-        let thread = thread::spawn(move || {
+        let thread = threads::start("the diagnostics", move || {
             while ended.recv_timeout(EACH) == Err(RecvTimeoutError::Timeout) {
                 let status = *theirs.lock().unwrap_or_else(PoisonError::into_inner);
                 let header = Header::new(clock.now(), "");
@@ -67,8 +75,8 @@ impl Diagnostics {
                 // Subscribers are not waited for.
                 let _lost = publisher.publish(DiagnosticArray { header, status });
             }
-        });
-        Self { status, end: Some(end), thread: Some(thread) }
+        })?;
+        Ok(Self { status, end: Some(end), thread: Some(thread) })
     }
 
     /// Sets the state after a turn of the loop.

@@ -37,6 +37,7 @@ mod raw;
 mod services;
 mod skill;
 mod stamps;
+mod threads;
 pub mod wheels;
 
 pub use bridge::{Summary, run, run_with};
@@ -57,6 +58,12 @@ pub enum BridgeError {
     /// The page of what happens now cannot be served.
     #[error("cannot serve on {0}: {1}; name another port with --serve=PORT")]
     Serve(std::net::SocketAddr, std::io::Error),
+    /// No further thread can be started.
+    #[error(
+        "no thread for {0} can be started: {1}; raise the limit of threads (the pids limit of a container, \
+         `TasksMax` of a systemd unit, `ulimit -u`)"
+    )]
+    Thread(&'static str, std::io::Error),
     /// An input of the pipeline did not arrive, or cannot be used.
     #[error(transparent)]
     Input(Box<tagalong::log::LogError>),

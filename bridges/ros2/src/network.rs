@@ -1,7 +1,7 @@
 //! The DDS node: discovery, subscriptions and publishers.
 
 use std::sync::Arc;
-use std::thread::{self, JoinHandle};
+use std::thread::JoinHandle;
 
 use futures::StreamExt;
 use futures::executor::block_on;
@@ -18,7 +18,6 @@ use tagalong::log::msgs::{
     CameraInfo, Detection2DArray, Detection3DArray, LaserScan, Message, Odometry, TFMessage, encode,
 };
 
-use crate::BridgeError;
 use crate::inbox::Inbox;
 use crate::messages::{
     Bool, Empty, FrameMessage, IMAGES, OTHERS, OwnedCompressedImage, OwnedFfmpegPacket, OwnedImage,
@@ -27,6 +26,7 @@ use crate::messages::{
 use crate::publishers::Origin;
 use crate::raw::RawAdapter;
 use crate::stamps::StampClock;
+use crate::{BridgeError, threads};
 
 /// Number of answers of a service that are kept for callers that missed them.
 const ANSWERS: usize = 10;
@@ -104,7 +104,7 @@ impl Network {
         let mut node = context.new_node(name, options).map_err(failed)?;
         let spinner = node.spinner().map_err(failed)?;
         // The thread ends when the node is dropped.
-        let spinner = thread::spawn(move || drop(block_on(spinner.spin())));
+        let spinner = threads::start("the node", move || drop(block_on(spinner.spin())))?;
         Ok(Self { node, context, spinner: Some(spinner) })
     }
 
@@ -177,7 +177,7 @@ impl Network {
         let (abort, registration) = AbortHandle::new_pair();
         let inbox = Arc::clone(inbox);
         let name = topic.to_owned();
-        let thread = thread::spawn(move || {
+        let thread = threads::start("a topic", move || {
             // The reader lives as long as its subscriber.
             let _subscriber = subscriber;
             let put = reader.as_async_stream().for_each(|message| {
@@ -189,7 +189,7 @@ impl Network {
             });
             // The stream ends by being aborted.
             let _aborted = block_on(Abortable::new(put, registration));
-        });
+        })?;
         Ok(Ear::new(topic, abort, thread))
     }
 
@@ -330,7 +330,7 @@ impl Network {
         let subscription: Subscription<M> =
             node.create_subscription(&handle, Some(qos)).map_err(failed)?;
         let (abort, registration) = AbortHandle::new_pair();
-        let thread = thread::spawn(move || {
+        let thread = threads::start("a topic", move || {
             // A message that does not decode is of another type than its topic states.
             let put = subscription.async_stream().for_each(|message| {
                 take(message.ok());
@@ -338,7 +338,7 @@ impl Network {
             });
             // The stream ends by being aborted.
             let _aborted = block_on(Abortable::new(put, registration));
-        });
+        })?;
         Ok(Ear::new(topic, abort, thread))
     }
 

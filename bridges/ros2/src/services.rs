@@ -1,7 +1,5 @@
 //! The verbs of the skill as ROS 2 services of standard types.
 
-use std::thread;
-
 use futures::StreamExt;
 use futures::executor::block_on;
 use futures::future::{AbortHandle, Abortable, ready};
@@ -12,9 +10,9 @@ use serde::{Deserialize, Serialize};
 use tagalong::core::TrackId;
 use tagalong::pipeline::{Choice, Enrollment};
 
-use crate::BridgeError;
 use crate::network::{Ear, Network};
 use crate::skill::{Desk, Refusal, Verb};
+use crate::{BridgeError, threads};
 
 /// Middleware of the ROS 2 nodes that call the services: each carries the number of a request in its
 /// own way.
@@ -65,7 +63,7 @@ impl From<Result<(), Refusal>> for TriggerResponse {
 /// `people/enroll_approach`, `people/clear` and `people/status` (`std_srvs/Trigger`).
 ///
 /// # Errors
-/// [`BridgeError::Network`].
+/// [`BridgeError::Network`] and [`BridgeError::Thread`].
 pub(crate) fn offer(
     network: &mut Network,
     middleware: Middleware,
@@ -84,27 +82,31 @@ pub(crate) fn offer(
         let desk = desk.clone();
         all.push(serve(name, server, move |_: TriggerRequest| {
             TriggerResponse::from(desk.ask(verb))
-        }));
+        })?);
     }
     let name = "people/status";
     let server = network.server(name, "std_srvs/srv/Trigger", mapping)?;
     let theirs = desk.clone();
-    all.push(serve(name, server, move |_: TriggerRequest| status(&theirs)));
+    all.push(serve(name, server, move |_: TriggerRequest| status(&theirs))?);
     let name = "people/enroll";
     let server = network.server(name, "rcl_interfaces/srv/SetParameters", mapping)?;
     let desk = desk.clone();
-    all.push(serve(name, server, move |request| enroll(&desk, &request)));
+    all.push(serve(name, server, move |request| enroll(&desk, &request))?);
     Ok(all)
 }
 
 /// Answers the requests of a service in a thread of its own.
-fn serve<Q, A>(name: &str, server: Server<Q, A>, answer: impl Fn(Q) -> A + Send + 'static) -> Ear
+fn serve<Q, A>(
+    name: &str,
+    server: Server<Q, A>,
+    answer: impl Fn(Q) -> A + Send + 'static,
+) -> Result<Ear, BridgeError>
 where
     Q: Message + Clone + Send + 'static,
     A: Message + Send + 'static,
 {
     let (abort, registration) = AbortHandle::new_pair();
-    let thread = thread::spawn(move || {
+    let thread = threads::start("a service", move || {
         let served = server.receive_request_stream().for_each(|request| {
             // A request that does not decode has no number to answer to.
             if let Ok((id, request)) = request {
@@ -114,8 +116,8 @@ where
         });
         // The stream ends by being aborted.
         let _aborted = block_on(Abortable::new(served, registration));
-    });
-    Ear::new(name, abort, thread)
+    })?;
+    Ok(Ear::new(name, abort, thread))
 }
 
 /// Returns the status as JSON; success means that a person is followed.

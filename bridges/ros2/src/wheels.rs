@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 use tagalong::core::{Stamp, WheelSpeeds};
 use tagalong::pipeline::{Enable, EnableSwitch, Orders, Permission};
 
+use crate::{BridgeError, threads};
+
 /// Duration of zero commands after the last frame, or the last time with permission to move, s; then
 /// none are sent, so that other nodes may drive (the `stop_pub_timeout` of Nav2).
 const ZEROS_S: f64 = 2.0;
@@ -94,12 +96,15 @@ impl State {
 impl Wheels {
     /// Starts the thread, with a switch that it obeys. `now` returns the time by the clock of the frames' stamps, `tell` sends
     /// wheel speeds and must not wait.
+    ///
+    /// # Errors
+    /// [`BridgeError::Thread`].
     pub fn start(
         period: Duration,
         switch: EnableSwitch,
         now: impl Fn() -> Stamp + Send + 'static,
         tell: impl FnMut(WheelSpeeds) + Send + 'static,
-    ) -> Self {
+    ) -> Result<Self, BridgeError> {
         let state = State {
             orders: None,
             switch,
@@ -112,8 +117,8 @@ impl Wheels {
         let changed = Condvar::new();
         let shared = Arc::new(Shared { state, changed, started: Instant::now() });
         let theirs = Arc::clone(&shared);
-        let thread = thread::spawn(move || theirs.drive(period, now, tell));
-        Self { shared, thread: Some(thread) }
+        let thread = threads::start("the wheels", move || theirs.drive(period, now, tell))?;
+        Ok(Self { shared, thread: Some(thread) })
     }
 
     /// Returns access to the switch.
@@ -203,7 +208,7 @@ mod tests {
         let tape = Arc::clone(tape);
         let tell = move |wheels| tape.lock().unwrap().push((Instant::now(), wheels));
         let switch = EnableSwitch::new(Duration::from_millis(100));
-        Wheels::start(Duration::from_millis(5), switch, Stamp::default, tell)
+        Wheels::start(Duration::from_millis(5), switch, Stamp::default, tell).unwrap()
     }
 
     fn enable(wheels: &Wheels) {

@@ -85,6 +85,9 @@ pub struct PlanArgs {
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
+    /// Of several people of a truth with one ID in a frame keep the first, and count the others.
+    #[arg(long)]
+    pub drop_doubled_ids: bool,
 }
 
 /// Execution of the tasks.
@@ -162,7 +165,7 @@ impl BenchArgs {
     pub fn of(configs: Vec<PathBuf>, logs: Vec<PathBuf>, output: PathBuf) -> Self {
         Self {
             step: None,
-            plan: PlanArgs { configs, logs, logs_dir: None, seeds: 1 },
+            plan: PlanArgs { configs, logs, logs_dir: None, seeds: 1, drop_doubled_ids: false },
             run: RunArgs { jobs: 1, task: None, shard: None, retry_failed: false, timing: false },
             report: ReportArgs {
                 gate: GateArgs { baseline: None, fail_if: Vec::new() },

@@ -42,6 +42,9 @@ pub struct Task {
     pub truth: PathBuf,
     /// True if the boxes of the truth are whole bodies.
     pub whole_bodies: bool,
+    /// True if the first of doubled IDs in a frame of the truth is kept.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub drops_doubled_ids: bool,
     /// Seed of the run.
     pub seed: u64,
     /// Hashed inputs, by name.
@@ -97,6 +100,8 @@ pub struct Annotated {
     pub truth_sha256: String,
     /// True if the boxes of the truth are whole bodies.
     pub whole_bodies: bool,
+    /// True if the first of doubled IDs in a frame of the truth is kept.
+    pub drops_doubled_ids: bool,
     /// Frames in which people are neither missed nor found.
     pub unjudged: Vec<u32>,
 }
@@ -190,7 +195,8 @@ fn task(
     ]);
     inputs.extend(files(config)?);
     // The hash names the result, so it covers the program and the seed as well.
-    let everything = format!("{version}\n{seed}\n{}\n{inputs:?}", log.whole_bodies);
+    let doubled = if log.drops_doubled_ids { "\nfirst of doubled ids" } else { "" };
+    let everything = format!("{version}\n{seed}\n{}\n{inputs:?}{doubled}", log.whole_bodies);
     Ok(Task {
         k: 0,
         hash: sha256(everything.as_bytes())[..32].to_owned(),
@@ -200,6 +206,7 @@ fn task(
         log: log.log.clone(),
         truth: log.truth.clone(),
         whole_bodies: log.whole_bodies,
+        drops_doubled_ids: log.drops_doubled_ids,
         seed,
         inputs,
         version: version.to_owned(),
@@ -294,6 +301,7 @@ fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
             None => say(&format!("note: left out: {} has no truth", log.display())),
         }
     }
+    found.iter_mut().for_each(|log| log.drops_doubled_ids = args.drop_doubled_ids);
     if found.is_empty() {
         return Err(Failure::usage("no log with truth; name some with --logs or --logs-dir"));
     }
@@ -332,6 +340,7 @@ fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
         truth_sha256: sha256_of_file(&truth)?,
         truth,
         whole_bodies,
+        drops_doubled_ids: false,
         unjudged: Vec::new(),
     }))
 }

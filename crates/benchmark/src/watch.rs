@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use tagalong_app::scoring::{
-    Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region,
+    Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region, with_remedy,
 };
 use tagalong_app::timings::{StageTimes, Timings, WHOLE_FRAME};
 use tagalong_core::{Funnel, Track};
@@ -144,7 +144,8 @@ fn score(
     let mut measured = |similarity: Similarity| -> Result<Option<(Tally, Vec<Event>)>, String> {
         let Some(sequence) = comparable(sequence, similarity) else { return Ok(None) };
         let comparison = comparison(truth, similarity);
-        let prepared = Prepared::new(&sequence, &comparison).map_err(|error| error.to_string())?;
+        let prepared =
+            Prepared::new(&sequence, &comparison).map_err(|error| with_remedy(&error))?;
         let (_, matches) = Clear::measure(&prepared);
         if similarity == Similarity::Iou {
             missed_people = missed(&sequence, &prepared, &matches, dropped);

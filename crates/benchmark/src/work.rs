@@ -250,7 +250,11 @@ impl Desk<'_> {
     /// Returns the results of a group, in its order; `None` after a stop signal.
     fn results(&self, group: &Group) -> Result<Option<Vec<Kept>>, String> {
         let first = &group[0].task;
-        let options = TruthOptions { upper_body: first.whole_bodies, ..TruthOptions::default() };
+        let options = TruthOptions {
+            upper_body: first.whole_bodies,
+            drops_doubled_ids: first.drops_doubled_ids,
+            ..TruthOptions::default()
+        };
         let truth = TruthFile::read(&first.truth, options).map_err(|failure| failure.message)?;
         truth.notes.iter().for_each(|note| say(&format!("note: {note}")));
         let mut source = open(&group[0], group[0].config.inputs)?;

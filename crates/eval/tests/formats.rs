@@ -6,7 +6,8 @@ use std::fs;
 
 use proptest::prelude::*;
 use tagalong_eval::formats::{
-    FormatError, MOST_FRAMES, OddLines, Timeline, floor, kitti, metres, mot, people, trackeval,
+    FormatError, MOST_FRAMES, OddLines, Timeline, floor, keep_first_of_id, kitti, metres, mot,
+    people, trackeval,
 };
 use tagalong_eval::{
     Comparison, Frame, Region, Report, Role, Sequence, SetDistance, Similarity, Tally, Truth,
@@ -528,4 +529,13 @@ fn the_tree_has_the_paths_that_trackeval_looks_for() {
     broken.remove("gt/mot_challenge/Tagalong-train/hall/gt/gt.txt");
     let missing = trackeval::read(&broken, "Tagalong", "ours", mot::Rules::Mot17);
     assert!(why(missing).contains("hall/gt/gt.txt: is missing"));
+}
+
+#[test]
+fn of_people_with_one_id_in_a_frame_the_first_stays() {
+    let mut people = vec![(1, 7, 'a'), (2, 7, 'b'), (1, 7, 'c'), (1, 8, 'd'), (1, 7, 'e')];
+    assert_eq!(keep_first_of_id(&mut people, |(frame, id, _)| (*frame, *id)), 2);
+    let kept: String = people.iter().map(|(.., name)| name).collect();
+    assert_eq!(kept, "abd");
+    assert_eq!(keep_first_of_id(&mut people, |(frame, id, _)| (*frame, *id)), 0);
 }

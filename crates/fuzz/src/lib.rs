@@ -4,6 +4,7 @@
 //! A panic is a finding, and so is a file that takes longer than a second of the processor. The bytes of a finding are
 //! written to a file; `tagalong-fuzz TARGET --file FILE` repeats it.
 
+mod definitions;
 mod live;
 mod mutate;
 mod targets;

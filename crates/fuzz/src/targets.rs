@@ -10,7 +10,7 @@ use tagalong_log::{FrameSource, InputSettings, Inputs, Limits, LogWalker};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::Scene;
 
-use crate::live;
+use crate::{definitions, live};
 
 /// A parser.
 pub struct Target {
@@ -34,6 +34,7 @@ const JOURNAL: &[u8] = include_bytes!("../seeds/tiny-journal.db3-journal");
 const LOGGED_AHEAD: &[u8] = include_bytes!("../seeds/tiny-wal.db3");
 const WRITE_AHEAD_LOG: &[u8] = include_bytes!("../seeds/tiny-wal.db3-wal");
 const CASCADE: &str = include_str!("../seeds/tiny-cascade.xml");
+const FOLLOW_BENCH: &str = include_str!("../seeds/follow-bench.yaml");
 const COLOR_TEXTURE: &str = include_str!("../../../configs/models/color-texture.toml");
 const BODY_NET: &str = include_str!("../../../configs/models/body-net.toml");
 const DEPTH_NET: &str = include_str!("../../../configs/models/depth-net.toml");
@@ -135,6 +136,12 @@ pub fn targets() -> Vec<Target> {
             parse: live::frame_of_detections,
         },
         Target {
+            name: "definitions",
+            about: "definitions of messages in a log, each with a message",
+            seeds: definitions::seeds(),
+            parse: definitions::frames_of_definition,
+        },
+        Target {
             name: "config",
             about: "the TOML of a pipeline",
             seeds: vec![
@@ -218,6 +225,9 @@ pub fn targets() -> Vec<Target> {
             seeds: CVAT.map(|file| file.as_bytes().to_vec()).to_vec(),
             parse: |bytes, _| as_text(bytes, |text| drop(tagalong_import::people_of_cvat(text))),
         },
+        text("follow-bench", FOLLOW_BENCH, |bytes, _| {
+            as_text(bytes, |text| drop(tagalong_import::scene_of_follow_bench(text, "x")));
+        }),
     ]
 }
 
@@ -364,6 +374,12 @@ mod tests {
             assert_eq!((read, walker.data_lost()), (count, true), "{ending}");
             std::fs::remove_file(folder.path().join(format!("log.db3{ending}"))).unwrap();
         }
+    }
+
+    #[test]
+    fn the_scene_of_follow_bench_is_read() {
+        let scene = tagalong_import::scene_of_follow_bench(FOLLOW_BENCH, "x").unwrap();
+        assert_eq!((scene.people.len(), scene.blocks.len()), (2, 1));
     }
 
     #[test]

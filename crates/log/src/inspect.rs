@@ -64,7 +64,7 @@ pub struct Inspection {
     pub transforms: BTreeMap<String, String>,
     /// Use of each image, scan, detection and odometry topic, with reasons.
     pub inputs: InputAccount,
-    /// Inputs that a pipeline could use: `colour`, `depth`, `right`, `odometry`, `laser`, and
+    /// Inputs that a pipeline could use: `colour`, `depth`, `right`, `odometry`, `laser`, `detections`, and
     /// the names of further sensors.
     pub usable: Vec<&'static str>,
     /// Reason for which no frames can be made, if so.
@@ -171,6 +171,9 @@ impl Inspection {
             if topic.is_some() && !fails {
                 self.usable.push(name);
             }
+        }
+        if self.inputs.used_as("detections").is_some_and(|it| it.problem.is_none()) {
+            self.usable.push("detections");
         }
         self.usable.extend(facts.sensor_topics.keys());
         let [colour, depth] = [&facts.colour_topic, &facts.depth_topic]

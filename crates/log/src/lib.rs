@@ -21,6 +21,7 @@ mod camera_settings;
 mod clock;
 mod database;
 mod error;
+mod hashing;
 pub mod images;
 mod input;
 mod inspect;

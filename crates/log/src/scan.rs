@@ -11,6 +11,7 @@ use tagalong_math::counted;
 
 use crate::camera_info::is_blank;
 use crate::clock::Times;
+use crate::hashing::Hashing;
 use crate::images::{
     CloudAxes, CloudCamera, Codec, Content, H264, ImageError, NO_PARAMETERS, Packet,
     camera_of_cloud, content_of_compressed, content_of_encoding, has_lengths, may_be_disparity,
@@ -24,7 +25,7 @@ use crate::msgs::{
 use crate::packed::LogFile;
 use crate::sensors::SensorType;
 use crate::tf::{TfBuffer, plain};
-use crate::topics::{Stream, TopicName};
+use crate::topics::{Stream, TopicName, part_of};
 use crate::walk::{Channel, Counters, Message};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
@@ -104,6 +105,10 @@ pub(crate) struct Topic {
     /// True for points that can be read, also if they are not those of a camera.
     pub(crate) has_points: bool,
     pub(crate) frame_id: Option<String>,
+    /// Frame that odometry gives the pose of.
+    pub(crate) child_frame_id: Option<String>,
+    /// Type of images, points or scans that messages of an unknown type contain.
+    pub(crate) part: Option<&'static str>,
     pub(crate) stamps: Vec<Stamp>,
     /// Times at which the messages with these stamps were recorded.
     pub(crate) recorded: Vec<Stamp>,
@@ -141,32 +146,6 @@ pub(crate) struct LogPart {
     pub(crate) channels: Vec<Arc<Channel>>,
 }
 
-/// Reader that passes bytes on and hashes them.
-struct Hashing<R> {
-    reader: R,
-    hash: Sha256,
-    bytes: u64,
-}
-
-impl<R: Read> Read for Hashing<R> {
-    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
-        let count = self.reader.read(out)?;
-        self.hash.update(&out[..count]);
-        self.bytes += count as u64;
-        Ok(count)
-    }
-}
-
-impl<R: Read> Hashing<R> {
-    /// Reads the rest, and returns size and hash of everything.
-    fn finish(mut self) -> (u64, Sha256) {
-        let mut rest = vec![0; 1 << 16];
-        // The hash covers the whole file, also the part behind the last record.
-        while matches!(self.read(&mut rest), Ok(count) if count > 0) {}
-        (self.bytes, self.hash)
-    }
-}
-
 impl Scan {
     /// Reads the whole log once; a file a second time if there were messages of channels that became
     /// known only later.
@@ -201,7 +180,7 @@ impl Scan {
             let file = LogFile::open(&part.path, limits)?;
             let contents = file.path().to_owned();
             let fault = file.fault().map(str::to_owned);
-            let file = Hashing { reader: file, hash, bytes: 0 };
+            let file = Hashing::new(file, hash);
             let mut walker = LogWalker::at(&contents, file, limits)
                 .map_err(|source| LogError::NotMcap { path: part.path.clone(), source })?
                 .knowing(part.channels.iter().cloned());
@@ -374,6 +353,8 @@ impl Gathering {
             video_fault: None,
             has_points: false,
             frame_id: None,
+            child_frame_id: None,
+            part: None,
             stamps: Vec::new(),
             recorded: Vec::new(),
         })
@@ -397,7 +378,13 @@ impl Gathering {
             Type::CameraInfo => self.take_info(&channel.topic, message.data),
             Type::Number => self.take_number(&channel.topic, message.data),
             Type::Tf => self.take_tf(&channel.topic, message.data, message.log_time),
-            Type::Other => Some(()),
+            Type::Other => {
+                // Of an unknown type the definition tells what it contains.
+                if topic.count == 1 {
+                    topic.part = part_of(&channel.definition);
+                }
+                Some(())
+            }
         };
         let topic = self.topic(&channel.topic, "", "");
         if topic.recorded.len() < topic.stamps.len() {
@@ -670,6 +657,7 @@ impl Topic {
 
     fn take_odometry(&mut self, data: &[u8]) -> Option<()> {
         let odometry: Odometry = decode(data).ok()?;
+        self.child_frame_id.get_or_insert(odometry.child_frame_id);
         self.take_header(odometry.header);
         Some(())
     }

@@ -77,6 +77,21 @@ fn people_are_taken_and_other_classes_are_named() {
 }
 
 #[test]
+fn detections_that_the_settings_name_are_listed_as_usable() {
+    let mut log = started();
+    log.message(TOPIC, stamp(0), &array(stamp(0), &["person"]));
+    log.colour(stamp(0));
+    let saved = log.save();
+    let usable = |detections_topic: Option<&str>| {
+        let detections_topic = detections_topic.map(str::to_owned);
+        let input = InputSettings { detections_topic, ..InputSettings::default() };
+        tagalong_log::inspect(&saved.path, &input, &Default::default()).unwrap().usable
+    };
+    assert_eq!(usable(Some(TOPIC)), ["colour", "detections"]);
+    assert_eq!(usable(None), ["colour"]);
+}
+
+#[test]
 fn boxes_that_cannot_be_are_lost_with_the_cause() {
     let nan = f64::NAN;
     for (x, y, width, height, counter) in [

@@ -6,7 +6,7 @@ use tagalong_geometry::Rect;
 
 use crate::family::{NANODET_BINS, NANODET_M_BINS, NANODET_STRIDES, STRIDES, count_cells};
 use crate::values::{bins_of, is_score, is_transposed, unit_of_list, unit_of_rows};
-use crate::{BoxUnit, Family, InputSize, Tensor};
+use crate::{BoxOrder, BoxUnit, Family, InputSize, Tensor};
 
 /// Joints of a person.
 const JOINTS: usize = 17;
@@ -35,6 +35,8 @@ pub(crate) struct Wanted<'a> {
     pub classes: &'a [usize],
     /// Boxes with a lower score are left out.
     pub min_score: f32,
+    /// Order of the corners of a list.
+    pub order: BoxOrder,
 }
 
 impl Wanted<'_> {
@@ -231,7 +233,9 @@ pub(crate) fn columns_of(output: &Tensor) -> Columns {
 fn yolo_v10(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
     let Columns { first, score, label } = columns_of(output);
     let people = output.rows().filter(|row| wanted.has_label(row[label]));
-    people.filter_map(|row| wanted.take(row[score], || between(&row[first..]))).collect()
+    people
+        .filter_map(|row| wanted.take(row[score], || between(&wanted.order.sorted(&row[first..]))))
+        .collect()
 }
 
 fn nanodet(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredBox> {
@@ -421,7 +425,7 @@ mod tests {
 
     const INPUT: InputSize = InputSize { width: 64, height: 64, channels_last: false };
     const WIDE: InputSize = InputSize { width: 64, height: 32, channels_last: false };
-    const PEOPLE: Wanted<'_> = Wanted { classes: &[0], min_score: 0.5 };
+    const PEOPLE: Wanted<'_> = Wanted { classes: &[0], min_score: 0.5, order: BoxOrder::Xyxy };
 
     fn tensor(shape: &[usize], values: &[f32]) -> Tensor {
         Tensor::new(shape.to_vec(), values.to_vec()).unwrap()
@@ -471,6 +475,18 @@ mod tests {
     }
 
     #[test]
+    fn corners_may_have_y_before_x() {
+        let list = tensor(&[1, 1, 6], &[2.0, 1.0, 10.0, 5.0, 0.9, 0.0]);
+        let exchanged = Wanted { order: BoxOrder::Yxyx, ..PEOPLE };
+        assert_eq!(rects(&yolo_v10(&list, exchanged)), [[1.0, 2.0, 4.0, 8.0]]);
+        // With the number of the image, and in fractions of an input that is not square.
+        let list = tensor(&[1, 1, 7], &[0.0, 0.5, 0.25, 1.0, 0.75, 0.0, 0.9]);
+        let outputs = [("output", &list)];
+        let found = decode(Family::YoloV10, &outputs, WIDE, Some(BoxUnit::Fractions), exchanged);
+        assert_eq!(rects(&found), [[16.0, 16.0, 32.0, 16.0]]);
+    }
+
+    #[test]
     fn boxes_in_fractions_of_the_input_become_pixels() {
         let row = [0.25, 0.5, 0.5, 1.0, 0.9, 0.0];
         let list = tensor(&[1, 2, 6], &[row, [0.0; 6]].concat());
@@ -500,10 +516,10 @@ mod tests {
     fn rf_detr_has_fractions_and_logits() {
         let boxes = tensor(&[1, 1, 4], &[0.5, 0.5, 0.25, 0.5]);
         let logits = tensor(&[1, 1, 3], &[-9.0, 3.0_f32.ln(), 9.0]);
-        let found = rf_detr(&boxes, &logits, INPUT, Wanted { classes: &[1], min_score: 0.5 });
+        let found = rf_detr(&boxes, &logits, INPUT, Wanted { classes: &[1], ..PEOPLE });
         assert_eq!(rects(&found), [[24.0, 16.0, 16.0, 32.0]]);
         assert!((found[0].score - 0.75).abs() < 1e-6);
-        let found = rf_detr(&boxes, &logits, WIDE, Wanted { classes: &[1], min_score: 0.5 });
+        let found = rf_detr(&boxes, &logits, WIDE, Wanted { classes: &[1], ..PEOPLE });
         assert_eq!(rects(&found), [[24.0, 8.0, 16.0, 16.0]], "fractions of each side");
     }
 

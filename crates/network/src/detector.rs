@@ -9,11 +9,12 @@ use tagalong_core::RgbImage;
 use crate::decode::{Wanted, decode, suppress};
 use crate::family::{OutputShape, recognise, shapes_of};
 use crate::network::rten;
+use crate::order::Shapes;
 use crate::values::{unit_of_columns, unit_of_rows};
 use crate::worker::Worker;
 use crate::{
-    BoxUnit, ClassNames, Element, Family, InputSize, Limits, Network, Port, Preparation, Runtime,
-    ScoredBox, Tensor,
+    BoxOrder, BoxUnit, ClassNames, Element, Family, InputSize, Limits, Network, Port, Preparation,
+    Runtime, ScoredBox, Tensor,
 };
 
 /// Columns and rows of an input that the file leaves open.
@@ -46,6 +47,9 @@ pub struct Choices {
     pub classes: Vec<usize>,
     /// Unit of the boxes; by default that of the outputs.
     pub unit: Option<BoxUnit>,
+    /// Order of the corners of a list; by default x before y, unless the boxes that are found tell
+    /// another one.
+    pub order: Option<BoxOrder>,
 }
 
 /// Description of a network file.
@@ -239,6 +243,9 @@ pub struct PersonNetwork {
     input: InputSize,
     classes: Vec<usize>,
     unit: Option<BoxUnit>,
+    order: BoxOrder,
+    /// Shapes of the boxes until now, where they tell the order of corners; `None` where it is known.
+    shapes: Option<Shapes>,
     limits: Limits,
 }
 
@@ -289,7 +296,14 @@ impl PersonNetwork {
             return Err(format!("boxes of the family {family} have one unit: remove `box_unit`"));
         }
         let unit = choices.unit.or_else(|| about.unit(family));
-        Ok(Self { worker, about, family, input, classes, unit, limits: *limits })
+        if choices.order.is_some() && !family.has_order() {
+            return Err(format!("boxes of the family {family} have one order: remove `box_order`"));
+        }
+        let is_open = family.has_order() && choices.order.is_none();
+        let shapes = is_open.then(Shapes::default);
+        let order = choices.order.unwrap_or_default();
+        let limits = *limits;
+        Ok(Self { worker, about, family, input, classes, unit, order, shapes, limits })
     }
 
     /// Returns the description of the file.
@@ -307,7 +321,8 @@ impl PersonNetwork {
     /// family leaves that open. `None`: the call was not done within the deadline.
     ///
     /// # Errors
-    /// A failure of the runtime, in a sentence.
+    /// A failure of the runtime, and boxes whose shapes are those of another order of corners, in a
+    /// sentence.
     pub fn find(
         &mut self,
         image: &RgbImage,
@@ -327,7 +342,7 @@ impl PersonNetwork {
         if self.family.classes(&shapes, self.input).is_none() {
             return Err("its outputs change their shape from call to call".into());
         }
-        let wanted = Wanted { classes: &self.classes, min_score };
+        let wanted = Wanted { classes: &self.classes, min_score, order: self.order };
         let found = decode(self.family, &outputs, self.input, self.unit, wanted);
         // Lists without doubles are sorted all the same.
         let iou = if self.family.needs_suppression(&shapes) { iou } else { 1.0 };
@@ -335,6 +350,9 @@ impl PersonNetwork {
         for person in &mut people {
             person.rect = place.rect_to_image(&person.rect);
             person.joints = person.joints.take().map(|joints| place.joints_to_image(&joints));
+        }
+        if let Some(shapes) = &mut self.shapes {
+            shapes.take(&people, self.family.usual_score())?;
         }
         Ok(Some(people))
     }

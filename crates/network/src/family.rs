@@ -254,6 +254,11 @@ impl Family {
         matches!(self, Self::Yolox | Self::YoloV8 | Self::YoloV10 | Self::RtDetr | Self::RtmDet)
     }
 
+    /// Returns true if exports of the family differ in the order of the corners of their boxes.
+    pub(crate) const fn has_order(self) -> bool {
+        matches!(self, Self::YoloV10)
+    }
+
     /// Returns true if several boxes of one person are left to the caller. Lists of final boxes
     /// are without doubles, but for those with a box for each cell of a grid.
     pub fn needs_suppression(self, outputs: &[OutputShape]) -> bool {

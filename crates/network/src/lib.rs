@@ -39,6 +39,7 @@ mod installed;
 mod limits;
 mod names;
 mod network;
+mod order;
 mod preparation;
 mod rewriting;
 mod runtime;
@@ -56,6 +57,7 @@ pub use installed::{DATA_FOLDER, Variables, model_file, networks_folder, network
 pub use limits::{LimitSettings, Limits};
 pub use names::ClassNames;
 pub use network::{Network, Runtime, check_file, rten};
+pub use order::BoxOrder;
 pub use preparation::{Colours, Fit, InputSize, Placement, Preparation};
 pub use runtime::RtenNetwork;
 pub use tensor::{Element, Port, Tensor};

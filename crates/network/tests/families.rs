@@ -10,7 +10,9 @@ use std::time::Duration;
 use serde::Deserialize;
 use tagalong_core::RgbImage;
 use tagalong_geometry::Rect;
-use tagalong_network::{BoxUnit, Choices, Family, Limits, PersonNetwork, inspect};
+use tagalong_network::{
+    BoxOrder, BoxUnit, Choices, Family, Fit, Limits, PersonNetwork, Preparation, inspect,
+};
 
 /// Output of onnxruntime.
 #[derive(Deserialize)]
@@ -239,6 +241,36 @@ fn the_unit_of_boxes_is_for_families_that_have_several() {
     let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
     let found = network.find(&scene(1), &Family::YoloV8.preparation(), 0.5, 0.5).unwrap().unwrap();
     assert!(found[0].rect.x > 1000.0, "{found:?}");
+}
+
+#[test]
+fn lists_of_wide_people_name_the_order_of_corners() {
+    let file = path("yolov10.onnx");
+    // Four times as wide as the input: that makes a person of 16 x 32 pixels a wide one.
+    let square = scene(1);
+    let wide = RgbImage::from_fn(256, 64, |x, y| square.row(y)[x / 4]);
+    let preparation = Preparation { fit: Fit::Stretch, ..Family::YoloV10.preparation() };
+    let calls = |order: Option<BoxOrder>| {
+        let choices = Choices { order, ..Choices::default() };
+        let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
+        let mut found = Vec::new();
+        for _ in 0..31 {
+            match network.find(&wide, &preparation, 0.1, 0.5) {
+                Ok(people) => found = people.unwrap(),
+                Err(why) => return Err(why),
+            }
+        }
+        Ok(found[0].rect)
+    };
+    let why = calls(None).unwrap_err();
+    assert!(why.contains("box_order = \"yxyx\""), "{why}");
+    let as_set = calls(Some(BoxOrder::Xyxy)).unwrap();
+    assert!(as_set.width > 1.5 * as_set.height, "{as_set:?}");
+    let exchanged = calls(Some(BoxOrder::Yxyx)).unwrap();
+    assert!((exchanged.width - 4.0 * as_set.height).abs() < 1e-3, "{exchanged:?}");
+    let other = Choices { order: Some(BoxOrder::Yxyx), ..Choices::default() };
+    let why = PersonNetwork::load(&path("nanodet.onnx"), &other, &Limits::default());
+    assert!(why.err().unwrap().contains("remove `box_order`"));
 }
 
 #[test]

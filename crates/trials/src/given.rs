@@ -16,7 +16,7 @@ use tagalong_core::{EgoMotion, ExternalDetection, Frame, Images, Stamp};
 use tagalong_eval::formats::mot::{
     self, Rules, SequenceInfo, parse_info, parse_truth, write_report,
 };
-use tagalong_eval::formats::{FormatError, Timeline};
+use tagalong_eval::formats::{FormatError, Timeline, keep_first_of_id};
 use tagalong_eval::{Comparison, Report, Sequence, SetDistance, Similarity, Tally, Truth};
 use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
 use tagalong_pipeline::FrameReport;
@@ -80,6 +80,12 @@ impl GivenSequence {
             return Err(given(format!("{shown} holds no folder with a seqinfo.ini")));
         }
         folders.iter().map(|folder| Self::read(folder, &boxes_of(folder, boxes))).collect()
+    }
+
+    /// Keeps the first of the people of the truth with the same ID in a frame; returns the number of those
+    /// left out.
+    pub fn drop_doubled_ids(&mut self) -> usize {
+        keep_first_of_id(&mut self.truths, |(frame, truth)| (u64::from(*frame), truth.id))
     }
 
     /// Tracks the boxes with a contender. Its detector gets them with the frames, as whole bodies,
@@ -283,6 +289,18 @@ mod tests {
         let stamps: Vec<u64> = all[0].frames.iter().map(|frame| frame.stamp.nanos()).collect();
         assert_eq!(stamps, [100_000_000, 200_000_000, 300_000_000]);
         assert_eq!(all[0].truths[0].1.role, Role::Counts);
+    }
+
+    #[test]
+    fn doubled_ids_stop_the_scores_unless_the_first_is_kept() {
+        let folder = folder();
+        let row = "1,1,10,10,20,60,1,-1,-1,-1\n";
+        fs::write(folder.path().join("Walk-1/gt/gt.txt"), row.repeat(2)).unwrap();
+        let mut sequence = GivenSequence::read_all(folder.path(), None).unwrap().remove(0);
+        let error = sequence.tally(&GivenTracks::default()).unwrap_err();
+        assert!(error.to_string().contains("occurs twice"), "{error}");
+        assert_eq!(sequence.drop_doubled_ids(), 1);
+        assert_eq!(sequence.tally(&GivenTracks::default()).unwrap().scores().truths, 1);
     }
 
     #[test]

@@ -288,7 +288,7 @@ fn add_log(
     notes.extend(film.pictures.summary());
     data.scans = film.scans();
     data.view_rad = film.view_rad;
-    if let Some(truth) = read_truth(args, &log, &film, stamps, notes)? {
+    if let Some(truth) = read_truth(args, (&log, &first.report.log.name), &film, stamps, notes)? {
         for run in &mut data.runs {
             // Contradictions are those of the truth: the page is of use without it.
             if let Err(why) = truth.judge(&data.t, data.image_px, run) {
@@ -303,7 +303,7 @@ fn add_log(
 
 fn read_truth(
     args: &ViewArgs,
-    log: &Path,
+    (log, log_name): (&Path, &str),
     film: &Film,
     stamps: &[u64],
     notes: &mut Vec<String>,
@@ -315,7 +315,10 @@ fn read_truth(
     let Some((path, is_whole)) = named.or_else(|| TruthFile::beside(log).ok().flatten()) else {
         return Ok(None);
     };
-    let truth = PageTruth::read(&path, is_whole, &film.shots, stamps)?;
+    // Truth that was found beside the log has its name.
+    let named_log = args.truth.as_ref().map(|_| log_name);
+    let truth = PageTruth::read(&path, is_whole, named_log, &film.shots, stamps)?;
+    notes.extend(truth.signs.iter().cloned());
     if !truth.has_people() {
         notes.push(format!("{} has nobody in the frames shown", path.display()));
         return Ok(None);

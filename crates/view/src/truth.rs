@@ -5,7 +5,9 @@ use std::path::Path;
 
 use nalgebra::{Isometry2, Point2};
 use tagalong_app::outcome::Failure;
-use tagalong_app::scoring::{Shots, TruthFile, TruthOptions, comparable, comparison};
+use tagalong_app::scoring::{
+    Shots, TruthFile, TruthOptions, comparable, comparison, other_log_notes,
+};
 use tagalong_eval::{
     Clear, Event, EventKind, Frame, Prepared, Region, Report, Role, Sequence, Similarity, Truth,
     events,
@@ -17,6 +19,8 @@ use crate::page::data::{EventData, FrameData, RunData, TruthBox};
 /// Truth by frame of the page.
 pub struct PageTruth {
     file: TruthFile,
+    /// Signs that it is the truth of another log.
+    pub signs: Vec<String>,
     /// People that are annotated in each frame.
     pub frames: Vec<Vec<TruthBox>>,
     /// As they are scored.
@@ -31,10 +35,12 @@ impl PageTruth {
     pub fn read(
         path: &Path,
         upper_body: bool,
+        log_name: Option<&str>,
         shots: &Shots,
         stamps: &[u64],
     ) -> Result<Self, Failure> {
         let file = TruthFile::read(path, TruthOptions { upper_body, ..TruthOptions::default() })?;
+        let signs = other_log_notes(path, &file, log_name, shots);
         let mut by_number = file.frames(shots);
         let by_stamp: BTreeMap<u64, (u32, Isometry2<f64>)> =
             shots.iter().map(|shot| (shot.stamp_ns, (shot.number, shot.odom_from_robot))).collect();
@@ -47,7 +53,7 @@ impl PageTruth {
             frames.push(there.0.iter().map(|truth| shown(truth, &pose)).collect());
             people.push(there);
         }
-        Ok(Self { file, frames, people })
+        Ok(Self { file, frames, people, signs })
     }
 
     /// Returns true if any frame has anyone.
@@ -192,7 +198,7 @@ mod tests {
             });
         }
         let stamps = [100_000_000, 200_000_000, 300_000_000];
-        let truth = PageTruth::read(&path, false, &shots, &stamps).unwrap();
+        let truth = PageTruth::read(&path, false, None, &shots, &stamps).unwrap();
         assert!(truth.has_people());
         assert_eq!(truth.frames[0][0].box_px, Some([10.0, 10.0, 40.0, 40.0]));
         let on = Some([10.0, 10.0, 40.0, 40.0]);

@@ -2,7 +2,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{OrAuto, check_settings};
 use tagalong_core::{Error, Result};
-use tagalong_network::{BoxUnit, Choices, Colours, Family, Fit, LimitSettings, Preparation};
+use tagalong_network::{
+    BoxOrder, BoxUnit, Choices, Colours, Family, Fit, LimitSettings, Preparation,
+};
 use tagalong_vision::BoxSettings;
 
 /// Number that leaves a setting to the family of the network.
@@ -38,6 +40,9 @@ pub struct Config {
     /// Unit of the boxes: `auto` (by the outputs), `pixels` of the input or `fractions` of its sides;
     /// for `yolox`, `yolov8`, `yolov10`, `rt-detr` and `rtmdet`.
     pub box_unit: OrAuto<BoxUnit>,
+    /// Order of the corners of a list of boxes: `auto` (`xyxy`, and refused if nearly all boxes of
+    /// people are wide), `xyxy` or `yxyx`; for `yolov10`.
+    pub box_order: OrAuto<BoxOrder>,
     /// Probability from which a box is a new person; -1: that of the family. Below a half, scores
     /// are log-odds above it, so that it also is what `start_score = 0.0` of a track manager means.
     #[schemars(range(min = -1.0, max = 1.0))]
@@ -80,6 +85,7 @@ impl Default for Config {
             size: Vec::new(),
             classes: Vec::new(),
             box_unit: OrAuto::Auto,
+            box_order: OrAuto::Auto,
             discover_score: BY_FAMILY,
             track_score: BY_FAMILY,
             suppress_iou: 0.6,
@@ -117,6 +123,7 @@ impl Config {
             size,
             classes: self.classes.clone(),
             unit: self.box_unit.chosen(),
+            order: self.box_order.chosen(),
         }
     }
 

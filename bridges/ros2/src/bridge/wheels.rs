@@ -72,7 +72,7 @@ pub(super) fn drive(
         let header = Header::new(clock.now(), base_frame.as_str());
         publish(TwistStamped { header, twist: twist(wheels, half_m) });
     };
-    Ok(Wheels::start(Duration::from_secs_f64(1.0 / options.rate), switch, now, tell))
+    Wheels::start(Duration::from_secs_f64(1.0 / options.rate), switch, now, tell)
 }
 
 /// Returns a function that publishes commands as the type that the options name.

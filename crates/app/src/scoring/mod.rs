@@ -1,6 +1,7 @@
 //! Reads files of truth and tracks into a sequence that can be scored.
 
 mod extents;
+mod other_log;
 mod shots;
 mod tracks;
 mod truth;
@@ -12,10 +13,11 @@ use std::path::Path;
 use crate::outcome::Failure;
 use crate::suggest::file_hint;
 pub use extents::extents_note;
+pub use other_log::other_log_notes;
 pub use shots::{Shot, Shots};
 use tagalong_config::{FileLimit, read_text as read_bounded};
 use tagalong_eval::formats::{OddLines, kitti};
-use tagalong_eval::{Comparison, Frame, Region, Report, Sequence, Similarity, Truth};
+use tagalong_eval::{Comparison, EvalError, Frame, Region, Report, Sequence, Similarity, Truth};
 pub use tracks::Tracks;
 pub use truth::{RulesChoice, TruthFile, TruthOptions};
 
@@ -76,6 +78,16 @@ pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequenc
         frame.reports.retain(has_report);
     }
     is_comparable.then_some(kept)
+}
+
+/// Returns the sentence of an error of a truth or of tracks, with the option that cures it.
+pub fn with_remedy(error: &EvalError) -> String {
+    match error {
+        EvalError::DuplicateId { side: "truth", .. } => {
+            format!("{error}; `--drop-doubled-ids` keeps the first of them")
+        }
+        _ => error.to_string(),
+    }
 }
 
 /// Returns the comparison that the truth's protocol asks for.

@@ -5,7 +5,7 @@ use crate::outcome::Failure;
 use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3};
 use tagalong_eval::formats::mot::{self, SequenceInfo};
-use tagalong_eval::formats::{Timeline, floor, kitti, people};
+use tagalong_eval::formats::{Timeline, floor, keep_first_of_id, kitti, people};
 use tagalong_eval::{Region, Role, Truth};
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
@@ -14,6 +14,11 @@ use super::{Shots, odd_labels, read_text, region, without_area};
 
 /// Largest difference between the stamps of an image and its truth in a log, ns.
 const SAME_MOMENT_NS: u64 = 5_000_000;
+
+/// Number of frames, and part of all frames, after the last person of a truth beyond which it may be
+/// unfinished.
+const EARLY_FRAMES: u32 = 10;
+const EARLY_PART: f64 = 0.2;
 
 /// Assumed height of a person in a whole-body box, m.
 const STANDING_HEIGHT_M: f64 = 1.7;
@@ -42,6 +47,9 @@ pub struct TruthOptions {
     pub rules: RulesChoice,
     /// True if boxes are of whole people: their upper bodies are compared.
     pub upper_body: bool,
+    /// True if the first of several people with one ID in a frame is kept, and the others are left out
+    /// and counted.
+    pub drops_doubled_ids: bool,
 }
 
 /// Position of a person, as far as the file has one.
@@ -119,7 +127,41 @@ impl TruthFile {
             Kind::Mot => Self::of_mot(path, options.rules)?,
         };
         truth.whole_bodies = options.upper_body;
+        if options.drops_doubled_ids {
+            truth.drop_doubled_ids(&path.display().to_string());
+        }
         Ok(truth)
+    }
+
+    /// Keeps the first of the people with the same ID in a frame, and notes the number of the others.
+    fn drop_doubled_ids(&mut self, name: &str) {
+        let mut dropped = 0;
+        for frame in self.frames.values_mut() {
+            dropped += keep_first_of_id(&mut frame.people, |(truth, _)| (0, truth.id));
+        }
+        if dropped > 0 {
+            self.notes.push(format!(
+                "{name}: {dropped} people are left out, whose ID the frame has already"
+            ));
+        }
+    }
+
+    /// Returns a note if the people of the truth end far before its frames do, as far as a file or the
+    /// log states their number.
+    pub fn early_end(&self, name: &str, shots: &Shots) -> Option<String> {
+        let (length, stated) = match &self.info {
+            Some(info) => (info.length, "seqLength is"),
+            None => (shots.last(), "the last of the log is"),
+        };
+        let last = self.last_annotated(shots)?;
+        let missing = length.saturating_sub(last);
+        let is_far = missing > EARLY_FRAMES && f64::from(missing) > EARLY_PART * f64::from(length);
+        is_far.then(|| {
+            format!(
+                "{name}: its last frame with people is {last}, and {stated} {length}: if the {missing} \
+                 frames after it are not annotated, all tracks in them count as false positives"
+            )
+        })
     }
 
     fn empty(kind: Kind) -> Self {
@@ -267,6 +309,22 @@ impl TruthFile {
         stated.max(annotated.unwrap_or(0))
     }
 
+    /// Returns the number of the last frame with an entry; `None` without any.
+    pub fn last_annotated(&self, shots: &Shots) -> Option<u32> {
+        self.frames.keys().filter_map(|key| self.number(*key, shots)).next_back()
+    }
+
+    /// Returns the number of moments with an entry.
+    pub fn annotated(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Yields the boxes of all people, as they are annotated.
+    pub fn regions(&self) -> impl Iterator<Item = &Region> {
+        let people = self.frames.values().flat_map(|frame| &frame.people);
+        people.filter_map(|(truth, _)| truth.region.as_ref())
+    }
+
     /// Returns the number of annotated moments without an image of the log.
     pub fn without_image(&self, shots: &Shots) -> usize {
         self.frames.keys().filter(|key| self.number(**key, shots).is_none()).count()
@@ -406,6 +464,41 @@ mod tests {
         let guessed = file.compared(whole(1.7), None);
         let on_floor = file.compared(whole(1.7), Some(&camera()));
         assert!((guessed.width / on_floor.width - 1.0).abs() < 0.06, "{guessed:?} {on_floor:?}");
+    }
+
+    #[test]
+    fn truth_that_ends_far_before_its_frames_is_told() {
+        let info = |length| SequenceInfo { length, ..SequenceInfo::default() };
+        for (last, length, is_told) in
+            [(20, 600, true), (590, 600, false), (1, 9, false), (85, 100, false)]
+        {
+            let mut file = TruthFile::empty(Kind::Mot);
+            (1..=last)
+                .for_each(|number| file.add(number, Truth::default(), TruthPosition::Unknown));
+            file.info = Some(info(length));
+            let note = file.early_end("gt.txt", &Shots::default());
+            assert_eq!(note.is_some(), is_told, "{last} of {length}: {note:?}");
+        }
+        let nobody = TruthFile { info: Some(info(600)), ..TruthFile::empty(Kind::Mot) };
+        assert_eq!(nobody.early_end("gt.txt", &Shots::default()), None);
+    }
+
+    #[test]
+    fn the_first_of_doubled_ids_is_kept_and_the_others_are_counted() {
+        let mut file = TruthFile::empty(Kind::Mot);
+        let person = |id, x| Truth {
+            id,
+            region: Some(Region { x, y: 0.0, width: 3.0, height: 4.0 }),
+            ..Truth::default()
+        };
+        for (number, id, x) in [(1, 5, 1.0), (1, 5, 2.0), (1, 6, 3.0), (2, 5, 4.0)] {
+            file.add(number, person(id, x), TruthPosition::Unknown);
+        }
+        file.drop_doubled_ids("gt.txt");
+        let frames = file.frames(&Shots::default());
+        assert_eq!(frames[&1].0, [person(5, 1.0), person(6, 3.0)]);
+        assert_eq!(frames[&2].0.len(), 1);
+        assert_eq!(file.notes, ["gt.txt: 1 people are left out, whose ID the frame has already"]);
     }
 
     #[test]

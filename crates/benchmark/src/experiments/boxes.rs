@@ -4,20 +4,23 @@
 //! association is tried on thousands of frames in less than a second.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::tuning::{Choice, Figures, Objective, candidates, leave_one_out, mean, shown_value};
 use clap::Args;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
+use tagalong_app::scoring::with_remedy;
 use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_eval::Tally;
 use tagalong_pipeline::{Tunable, with_values};
 use tagalong_report::{Cell, Row, Table};
-use tagalong_trials::{Contender, GivenSequence, GivenTracks, for_given_boxes, in_order};
+use tagalong_trials::{
+    Contender, GivenSequence, GivenTracks, TrialError, for_given_boxes, in_order,
+};
 
 /// The config that is run where none is named.
 const RECORDED: &str = "configs/recorded.toml";
@@ -51,13 +54,17 @@ Examples:
 #[derive(Args, Debug)]
 pub struct BoxesArgs {
     /// Folder of the sequences.
-    pub sequences: PathBuf,
+    #[arg(required_unless_present = "configs")]
+    pub sequences: Option<PathBuf>,
     /// Folder of the boxes [default: det/det.txt beside the truth].
     #[arg(long, value_name = "DIR")]
     pub boxes: Option<PathBuf>,
     /// The pipelines [default: configs/recorded.toml].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
+    /// Of several people of a truth with one ID in a frame keep the first, and count the others.
+    #[arg(long)]
+    pub drop_doubled_ids: bool,
     /// Chooses settings by the other sequences.
     #[arg(long)]
     pub leave_one_out: bool,
@@ -104,9 +111,13 @@ struct Tracked {
 /// # Errors
 /// Configs that cannot be used are exit code 2; files that cannot be read are 1.
 pub fn boxes(args: &BoxesArgs, registry: &Registry) -> Outcome {
-    let contestants = contestants(args, registry)?;
-    let sequences =
-        GivenSequence::read_all(&args.sequences, args.boxes.as_deref()).map_err(Failure::failed)?;
+    let (folder, configs) = folder_and_configs(args)?;
+    let contestants = contestants(configs, args, registry)?;
+    let mut sequences =
+        GivenSequence::read_all(folder, args.boxes.as_deref()).map_err(Failure::failed)?;
+    if args.drop_doubled_ids {
+        drop_doubled_ids(&mut sequences);
+    }
     let bench = Bench { args, registry, sequences: &sequences, places: places(&sequences) };
     let mut rows = Vec::new();
     let mut notes = Vec::new();
@@ -161,7 +172,7 @@ impl Bench<'_> {
             },
             |_| {},
         )
-        .map_err(Failure::failed)
+        .map_err(|error| failed(&error))
     }
 
     /// Runs all settings on all sequences; returns which are chosen, and the number of those tried.
@@ -185,7 +196,7 @@ impl Bench<'_> {
             },
             |done| say_progress(done, contestant.settings.len()),
         )
-        .map_err(Failure::failed)?;
+        .map_err(|error| failed(&error))?;
         Ok((leave_one_out(&figures, self.args.objective), figures.len()))
     }
 
@@ -267,9 +278,52 @@ impl Contestant {
     }
 }
 
-fn contestants(args: &BoxesArgs, registry: &Registry) -> Result<Vec<Contestant>, Failure> {
+/// Returns the failure of trackers or of their scores, with the option that cures it.
+fn failed(error: &TrialError) -> Failure {
+    Failure::failed(match error {
+        TrialError::Eval(error) => with_remedy(error),
+        other => other.to_string(),
+    })
+}
+
+/// Returns the folder of the sequences, and the configs. A folder behind `--configs`, which takes all
+/// paths that follow it, is the one of the sequences.
+///
+/// # Errors
+/// No folder of sequences: the order to type.
+fn folder_and_configs(args: &BoxesArgs) -> Result<(&Path, &[PathBuf]), Failure> {
+    if let Some(folder) = &args.sequences {
+        return Ok((folder, &args.configs));
+    }
+    match args.configs.split_last() {
+        Some((folder, configs)) if folder.is_dir() => Ok((folder, configs)),
+        _ => Err(Failure::usage(
+            "the folder of the sequences is missing: name it before --configs, as in `tagalong boxes \
+             DIR --configs A.toml B.toml`",
+        )),
+    }
+}
+
+/// Keeps the first of doubled IDs of each truth, and tells how many others there are.
+fn drop_doubled_ids(sequences: &mut [GivenSequence]) {
+    for sequence in sequences {
+        let dropped = sequence.drop_doubled_ids();
+        if dropped > 0 {
+            let name = &sequence.info.name;
+            say(&format!(
+                "note: {name}: {dropped} people are left out, whose ID the frame has already"
+            ));
+        }
+    }
+}
+
+fn contestants(
+    configs: &[PathBuf],
+    args: &BoxesArgs,
+    registry: &Registry,
+) -> Result<Vec<Contestant>, Failure> {
     let default = [PathBuf::from(RECORDED)];
-    let named = if args.configs.is_empty() { &default[..] } else { &args.configs };
+    let named = if configs.is_empty() { &default[..] } else { configs };
     named.iter().map(|path| Contestant::new(&ConfigFile::read(path)?, args, registry)).collect()
 }
 
@@ -335,11 +389,42 @@ fn show(tables: &[Table], format: TableFormat) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser as _;
+
     use super::*;
 
     #[test]
     fn sequences_of_one_place_are_left_out_together() {
         assert_eq!(numbered(&["ETH-A", "TUD-B", "ETH-C"]), [0, 1, 0]);
         assert_eq!(numbered(&["MOT17-02", "MOT17-04"]), [0, 1], "or each alone");
+    }
+
+    #[derive(clap::Parser)]
+    struct Program {
+        #[command(flatten)]
+        boxes: BoxesArgs,
+    }
+
+    /// Returns folder and configs of a command line, or what is said of it.
+    fn parsed(line: &[&str]) -> Result<(PathBuf, Vec<PathBuf>), String> {
+        let line = std::iter::once(&"boxes").chain(line);
+        let args = Program::try_parse_from(line).map_err(|error| error.to_string())?.boxes;
+        match folder_and_configs(&args) {
+            Ok((folder, configs)) => Ok((folder.to_owned(), configs.to_vec())),
+            Err(failure) => Err(failure.message),
+        }
+    }
+
+    #[test]
+    fn the_folder_may_stand_behind_the_configs() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path().to_str().unwrap();
+        let both = [PathBuf::from("a.toml"), PathBuf::from("b.toml")];
+        let expected = Ok((PathBuf::from(folder), both.to_vec()));
+        assert_eq!(parsed(&[folder, "--configs", "a.toml", "b.toml"]), expected);
+        assert_eq!(parsed(&["--configs", "a.toml", "b.toml", folder]), expected);
+        let why = parsed(&["--configs", "a.toml", "b.toml"]).unwrap_err();
+        assert!(why.contains("`tagalong boxes DIR --configs A.toml B.toml`"), "{why}");
+        assert!(parsed(&[]).unwrap_err().contains("SEQUENCES"));
     }
 }

@@ -8,7 +8,7 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::scoring::{
     Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
-    extents_note,
+    extents_note, other_log_notes, with_remedy,
 };
 use tagalong_app::serialize::{to_json, to_json_line};
 use tagalong_app::suggest::check_log_path;
@@ -41,6 +41,9 @@ pub struct EvalArgs {
     /// The truth's boxes are whole bodies; compare the upper bodies of them.
     #[arg(long)]
     pub upper_body: bool,
+    /// Of several people of the truth with one ID in a frame keep the first, and count the others.
+    #[arg(long)]
+    pub drop_doubled_ids: bool,
     /// Also print HOTA, MOTA and IDF1 if one kind of error were repaired: IDs, false reports, misses,
     /// and where the boxes are.
     #[arg(long)]
@@ -155,7 +158,11 @@ fn no_place_reported(args: &EvalArgs) -> Failure {
 }
 
 fn refused(args: &EvalArgs, error: &EvalError) -> Failure {
-    Failure::failed(format!("{}: {error}", args.tracks.display()))
+    let file = match error {
+        EvalError::DuplicateId { side: "truth", .. } => &args.truth,
+        _ => &args.tracks,
+    };
+    Failure::failed(format!("{}: {}", file.display(), with_remedy(error)))
 }
 
 /// Note on tracks for which LAMR and AP are meaningless.
@@ -188,7 +195,11 @@ struct Judged {
 }
 
 fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
-    let options = TruthOptions { rules: args.rules, upper_body: args.upper_body };
+    let options = TruthOptions {
+        rules: args.rules,
+        upper_body: args.upper_body,
+        drops_doubled_ids: args.drop_doubled_ids,
+    };
     let mut truth = TruthFile::read(&args.truth, options)?;
     let tracks = Tracks::read(&args.tracks, truth.info.as_ref().map(|info| info.length))?;
     let shots = shots(args, &truth, &tracks)?;
@@ -200,36 +211,14 @@ fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
         ));
     }
     let mut notes = std::mem::take(&mut truth.notes);
-    notes.extend(other_log(&args.truth, &truth, &tracks));
+    notes.extend(other_log_notes(&args.truth, &truth, tracks.log_name.as_deref(), &shots));
+    notes.extend(truth.early_end(&args.truth.display().to_string(), &shots));
     notes.extend(longer(args, truth.last(&shots).max(shots.last()), &tracks));
     notes.extend(tracks.notes);
-    let lost = truth.without_image(&shots);
-    if lost > 0 {
-        let shown = args.truth.display();
-        notes.push(format!("{shown}: {lost} moments have no image and are left out"));
-    }
     let rate = rate(args, &truth)?;
     let name = args.truth.display().to_string();
     let sequence = assemble(&name, &truth, &shots, tracks.reports, rate);
     Ok(Judged { sequence, truth, notes })
-}
-
-/// Endings of truth that is named after its log.
-const OF_A_LOG: [&str; 5] = [".people.csv", ".boxes.csv", ".jsonl", ".mcap", ".bag"];
-
-/// Returns a note if the truth is named after another log than the run is of.
-fn other_log(path: &Path, truth: &TruthFile, tracks: &Tracks) -> Option<String> {
-    let of_run = tracks.log_name.as_deref()?;
-    let name = path.file_name()?.to_string_lossy().into_owned();
-    let of_truth = OF_A_LOG.iter().find_map(|ending| name.strip_suffix(ending))?;
-    let stem = Path::new(of_run).file_stem()?.to_string_lossy().into_owned();
-    let is_other = of_truth != stem && !(truth.is_in_log() && name == of_run);
-    is_other.then(|| {
-        format!(
-            "{name} is named after {of_truth}, and the run is of {of_run}: if the truth is that of \
-             another log, these figures mean nothing"
-        )
-    })
 }
 
 /// Returns a note if tracks go on after the last known frame. Where no file states the length of a

@@ -306,6 +306,23 @@ fn files_that_a_config_names_belong_to_the_hash() {
 }
 
 #[test]
+fn doubled_ids_of_a_truth_are_dropped_if_asked_for() {
+    let home = Home::new();
+    let truth = crate::common::people(10);
+    let last = truth.lines().last().unwrap();
+    fs::write(home.path("logs/short.people.csv"), format!("{truth}{last}\n")).unwrap();
+    let only = ["--logs", "logs/short.mcap", "--configs", "configs/near.toml"];
+    home.bench(&[&only[..], &["-o", "out"]].concat());
+    let failed = home.report("out")["tasks"][0]["outcome"].clone();
+    let why = failed["why"].as_str().unwrap_or_default();
+    assert!(why.contains("occurs twice") && why.contains("`--drop-doubled-ids`"), "{failed}");
+    let told = ok(home.bench(&[&only[..], &["-o", "dropped", "--drop-doubled-ids"]].concat()));
+    assert!(told.contains("1 people are left out"), "{told}");
+    assert_eq!(home.report("dropped")["tasks"][0]["outcome"]["ended"], "done");
+    assert_ne!(home.plan("out")[0]["hash"], home.plan("dropped")[0]["hash"], "another result");
+}
+
+#[test]
 fn what_changed_since_the_plan_is_not_run() {
     let home = Home::new();
     ok(home.bench(&["plan", "--logs", "logs/short.mcap", "-o", "out"]));

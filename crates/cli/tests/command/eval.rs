@@ -379,3 +379,41 @@ fn mot17_figures_equal_those_of_trackeval() {
         }
     }
 }
+
+#[test]
+fn truth_that_ends_far_before_the_sequence_is_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "seqinfo.ini", "name=long\nframeRate=10\nseqLength=600\n");
+    let row = |frame: usize| format!("{frame},1,0,0,40,90,1,-1,-1,-1\n");
+    let tracks: String = (1..=600).map(row).collect();
+    write(folder.path(), "tracks.txt", &tracks);
+    for (last, is_noted) in [(20, true), (590, false)] {
+        let truth: String = (1..=last).map(row).collect();
+        write(folder.path(), "gt.txt", &truth);
+        let files = ["--truth", "gt.txt", "--tracks", "tracks.txt"];
+        let output = in_home(folder.path(), &files);
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        let said = text(&output.stdout);
+        let note = "its last frame with people is 20, and seqLength is 600";
+        assert_eq!(said.contains(note), is_noted, "{said}");
+    }
+}
+
+#[test]
+fn doubled_ids_of_the_truth_are_dropped_if_asked_for() {
+    let truth = "1,1,0,0,40,90,1,-1,-1,-1\n1,1,200,0,40,90,1,-1,-1,-1\n";
+    let track = "1,1,0,0,40,90,1,-1,-1,-1\n";
+    let refused = scored(truth, track, &[]);
+    assert_eq!(code(&refused), 1);
+    let said = text(&refused.stderr);
+    assert!(said.contains("gt.txt: ") && said.contains("truth id 1 occurs twice"), "{said}");
+    assert!(said.contains("`--drop-doubled-ids` keeps the first"), "{said}");
+    let said = json(&scored(truth, track, &["--drop-doubled-ids", "--format", "json"]));
+    assert_eq!((said["truths"].as_u64(), said["TP"].as_u64()), (Some(1), Some(1)), "{said}");
+    assert!(said["notes"].to_string().contains("1 people are left out"), "{said}");
+    // Of tracks nothing is dropped: a tracker that reports an ID twice is wrong.
+    let doubled = scored(track, truth, &["--drop-doubled-ids"]);
+    assert_eq!(code(&doubled), 1);
+    let said = text(&doubled.stderr);
+    assert!(said.contains("tracks.txt: ") && !said.contains("`--drop"), "{said}");
+}

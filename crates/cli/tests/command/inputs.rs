@@ -5,6 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use tagalong_core::Stamp;
+use tagalong_log::msgs::{CameraInfo, CompressedImage, Header, Image, decode};
 use tagalong_log::write::MessageLog;
 use tagalong_log::{Channel, Limits, LogWalker, Message};
 
@@ -250,4 +252,244 @@ fn each_camera_has_a_run_of_its_own() {
     }
     let (code, said) = ran(&["run", "two.mcap", "--each-camera", "--camera", "/rear"]);
     assert!(code == 2 && said.contains("cannot be used with"), "{said}");
+}
+
+/// Reason for which depth of a log cannot be used.
+struct Cause {
+    name: &'static str,
+    /// Writes a message of a topic of depth in another way; the number counts those of its topic.
+    write: fn(&mut MessageLog, &Message<'_>, u64),
+    /// Words of the sentence about the better pipeline: the cause, and the remedy. Without any, nothing
+    /// stands in its way.
+    words: &'static [&'static str],
+}
+
+const DEPTH_IMAGES: &str = "/camera/depth/image_raw";
+/// Columns and rows of images that no integer ratio brings to the size of the calibration.
+const OTHER_SIZE: (u32, u32) = (96, 72);
+
+const CAUSES: [Cause; 14] = [
+    Cause {
+        name: "unknown encoding",
+        write: |log, message, _| changed(log, message, |image| image.encoding = "16SC1".into()),
+        words: &["encoding `16SC1` is not known", "depth as 16UC1 or 32FC1"],
+    },
+    Cause {
+        name: "no calibration",
+        write: |log, message, _| {
+            if is_image(message) {
+                smaller(log, message, "depth_optical");
+            }
+        },
+        words: &["no calibration (sensor_msgs/CameraInfo) belongs to it", "`depth_info_topic`"],
+    },
+    Cause {
+        name: "calibration of zeros",
+        write: |log, message, _| {
+            calibrated(log, message, |info| (info.k, info.p) = Default::default());
+        },
+        words: &["K[0] and K[4] are 0", "calibrate it or publish its camera_info"],
+    },
+    Cause {
+        name: "calibration of another size",
+        write: |log, message, _| {
+            calibrated(log, message, |info| (info.width, info.height) = (128, 100));
+        },
+        words: &["is calibrated for 128x100, but the images are 96x72", "of this resolution"],
+    },
+    Cause {
+        name: "stamps of another clock",
+        write: |log, message, _| changed(log, message, |image| later(&mut image.header, 3600.0)),
+        words: &["by another clock", "`--stamps recording`"],
+    },
+    Cause {
+        name: "stamps that are not set",
+        write: |log, message, _| {
+            changed(log, message, |image| {
+                image.header = Header::new(Stamp::default(), "camera_optical")
+            });
+        },
+        words: &["its stamps never change", "`--stamps recording`"],
+    },
+    Cause {
+        name: "stamps between those of colour",
+        write: |log, message, _| changed(log, message, |image| later(&mut image.header, 0.04)),
+        words: &["they come 0.040 s after it", "set `pair_tolerance_s = 0.06`"],
+    },
+    Cause {
+        name: "no transform",
+        write: |log, message, _| {
+            if is_image(message) {
+                smaller(log, message, "depth_optical");
+            } else {
+                let mut info: CameraInfo = decode(message.data).unwrap();
+                (info.width, info.height) = OTHER_SIZE;
+                info.header.frame_id = "depth_optical".into();
+                log.send_like(message, &info).unwrap();
+            }
+        },
+        words: &["tf does not connect its frame `depth_optical` with", "record /tf_static"],
+    },
+    Cause {
+        name: "JPEG",
+        write: |log, message, _| {
+            if is_image(message) {
+                as_jpeg(log, message);
+            }
+        },
+        words: &["JPEG keeps 8 of the 16 bits of depth", "or its compressedDepth"],
+    },
+    Cause {
+        name: "rate",
+        write: |log, message, number| {
+            if number % 5 == 0 {
+                log.copy(message).unwrap();
+            }
+        },
+        words: &[],
+    },
+    Cause {
+        name: "type of another package",
+        write: |log, message, _| of_type(log, message, "my_msgs/msg/Image"),
+        words: &["its type is not read", "republish it as sensor_msgs/Image"],
+    },
+    Cause {
+        name: "colour and depth in one message",
+        write: |log, message, _| of_type(log, message, "realsense2_camera_msgs/msg/RGBD"),
+        words: &["colour and depth in one message", "record the topics of the images themselves"],
+    },
+    Cause {
+        name: "packets of a lidar",
+        write: |log, message, _| of_type(log, message, "velodyne_msgs/msg/VelodyneScan"),
+        words: &[],
+    },
+    Cause {
+        name: "video of another codec",
+        write: |log, message, _| of_type(log, message, "theora_image_transport/msg/Packet"),
+        words: &[],
+    },
+];
+
+fn is_image(message: &Message<'_>) -> bool {
+    message.channel.topic == DEPTH_IMAGES
+}
+
+/// Writes an image of depth with a change, and a calibration as it is.
+fn changed(log: &mut MessageLog, message: &Message<'_>, change: fn(&mut Image<'_>)) {
+    if !is_image(message) {
+        return log.copy(message).unwrap();
+    }
+    let mut image: Image<'_> = decode(message.data).unwrap();
+    change(&mut image);
+    log.send_like(message, &image).unwrap();
+}
+
+fn later(header: &mut Header, seconds: f64) {
+    *header = Header::new(header.stamp().plus_seconds(seconds), &header.frame_id);
+}
+
+/// Writes an image of depth that has fewer pixels and another frame.
+fn smaller(log: &mut MessageLog, message: &Message<'_>, frame: &str) {
+    let image: Image<'_> = decode(message.data).unwrap();
+    let (width, height) = OTHER_SIZE;
+    let data = 2800_u16.to_le_bytes().repeat((width * height) as usize);
+    let header = Header::new(image.header.stamp(), frame);
+    log.send_like(message, &Image::packed(header, "16UC1", width, height, &data)).unwrap();
+}
+
+/// Writes a calibration with a change, and smaller images of depth.
+fn calibrated(log: &mut MessageLog, message: &Message<'_>, change: fn(&mut CameraInfo)) {
+    if is_image(message) {
+        return smaller(log, message, "camera_optical");
+    }
+    let mut info: CameraInfo = decode(message.data).unwrap();
+    change(&mut info);
+    log.send_like(message, &info).unwrap();
+}
+
+/// Writes an image of depth as JPEG.
+fn as_jpeg(log: &mut MessageLog, message: &Message<'_>) {
+    let image: Image<'_> = decode(message.data).unwrap();
+    let grey = image::GrayImage::from_pixel(image.width, image.height, image::Luma([90]));
+    let mut data = Vec::new();
+    grey.write_to(&mut std::io::Cursor::new(&mut data), image::ImageFormat::Jpeg).unwrap();
+    let format = "16UC1; jpeg compressed mono8".into();
+    let compressed = CompressedImage { header: image.header, format, data: &data };
+    log.send_like(message, &compressed).unwrap();
+}
+
+/// Writes an image of depth as a message of a type that is not read.
+fn of_type(log: &mut MessageLog, message: &Message<'_>, schema_name: &str) {
+    if is_image(message) {
+        let like = (**message.channel).clone();
+        let other = Channel { schema_name: schema_name.into(), definition: "".into(), ..like };
+        log.copy(&Message { channel: &Arc::new(other), ..*message }).unwrap();
+    }
+}
+
+/// Writes a log of colour and depth, of which depth cannot be used for a reason.
+fn write_unusable(home: &Path, cause: &Cause) {
+    let drawn = home.join("drawn.mcap");
+    Drawn::of(20).write(&drawn);
+    let mut log = MessageLog::create(&home.join("log.mcap")).unwrap();
+    let mut walker = LogWalker::open(&drawn, &Limits::default()).unwrap();
+    let mut images = 0;
+    while let Some(message) = walker.next() {
+        if message.channel.topic.starts_with("/camera/depth") {
+            images += u64::from(is_image(&message));
+            (cause.write)(&mut log, &message, images);
+        } else {
+            log.copy(&message).unwrap();
+        }
+    }
+    log.finish().unwrap();
+}
+
+#[test]
+fn each_reason_against_depth_is_told_and_never_that_colour_is_alone() {
+    for cause in CAUSES {
+        let home = tempfile::tempdir().unwrap();
+        write_unusable(home.path(), &cause);
+        for args in [
+            &["run", "log.mcap", "-o", "out"][..],
+            &["inspect", "log.mcap"],
+            &["doctor", "log.mcap"],
+        ] {
+            let output = tagalong().args(args).current_dir(&home).output().unwrap();
+            let said = text(&output.stderr) + &text(&output.stdout);
+            let name = format!("{}, {}", cause.name, args[0]);
+            for alone in ["colour alone", "images alone", "colour or grey"] {
+                assert!(!said.contains(alone), "{name}: {said}");
+            }
+            assert!(said.contains(DEPTH_IMAGES), "{name}: {said}");
+            if args[0] == "inspect" {
+                continue;
+            }
+            let better = said.lines().find(|line| line.contains("would do better"));
+            let Some(better) = better.filter(|_| !cause.words.is_empty()) else {
+                assert!(better.is_none() && cause.words.is_empty(), "{name}: {said}");
+                continue;
+            };
+            assert!(better.contains(DEPTH_IMAGES), "{name}: {better}");
+            for words in cause.words {
+                assert!(better.contains(words), "{name}: `{words}` is not in {better}");
+            }
+        }
+    }
+}
+
+#[test]
+fn frames_at_the_rate_of_slow_depth_are_told() {
+    let home = tempfile::tempdir().unwrap();
+    let rate = CAUSES.iter().find(|cause| cause.name == "rate").unwrap();
+    write_unusable(home.path(), rate);
+    let output =
+        tagalong().args(["run", "log.mcap", "-o", "out"]).current_dir(&home).output().unwrap();
+    let said = text(&output.stderr) + &text(&output.stdout);
+    assert_eq!(code(&output), 0, "{said}");
+    assert!(said.contains("16 of 20 images make no frame"), "{said}");
+    assert!(
+        said.contains("it has 2.0 images a second, and /camera/color/image_raw 10.0"),
+        "{said}"
+    );
 }

@@ -94,3 +94,21 @@ fn what_is_no_run_is_answered_with_the_command_that_makes_one() {
         assert!(message.contains(said) && message.contains("tagalong run"), "{message}");
     }
 }
+
+#[test]
+fn the_truth_of_another_log_is_told() {
+    let home = home();
+    let truth = |frames| crate::common::people(frames);
+    for (name, frames, sign) in [
+        ("walk.people.csv", 20, ""),
+        ("other.people.csv", 20, "is named after other, and the run is of walk.mcap"),
+        ("truth.csv", 40, "has people up to frame 40, and the last of the log is 20"),
+    ] {
+        fs::write(home.path().join(name), truth(frames)).unwrap();
+        let output = view(home.path(), &["one", "--overwrite", "--truth", name]);
+        let said = text(&output.stdout);
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        let is_told = said.contains("if the truth is that of another log");
+        assert_eq!((is_told, said.contains(sign)), (!sign.is_empty(), true), "{name}: {said}");
+    }
+}

@@ -17,7 +17,7 @@ pub mod mot;
 pub mod people;
 pub mod trackeval;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::types::{Frame, Report, Sequence, Truth};
 
@@ -55,6 +55,14 @@ impl OddLines {
         }
         odd.first().map(|&first| Self { count: odd.len(), first, of })
     }
+}
+
+/// Keeps the first of the people with the same ID in one frame; returns the number of those left out.
+pub fn keep_first_of_id<T>(people: &mut Vec<T>, frame_and_id: impl Fn(&T) -> (u64, i64)) -> usize {
+    let mut seen = BTreeSet::new();
+    let before = people.len();
+    people.retain(|person| seen.insert(frame_and_id(person)));
+    before - people.len()
 }
 
 fn place(line: usize) -> String {

@@ -15,6 +15,12 @@ const FEW: f64 = 0.5;
 const MOST: f64 = 0.9;
 /// Part of a side of the image by which boxes may stick out of it.
 const MARGIN: f64 = 0.1;
+/// Least deviation of the columns of middles, as a part of the width of the image, by which motion tells
+/// corners.
+const LEAST_MOTION: f64 = 0.02;
+/// Part of that deviation below which the width follows the column: that of a second corner does so, and a
+/// width does not.
+const FOLLOWS: f64 = 0.5;
 /// Ratio of width to height from which on a box is wide. Standing people are higher than wide.
 const WIDE: f64 = 1.5;
 
@@ -32,6 +38,10 @@ struct Seen {
     wide: u64,
     /// Column of the rightmost middle, pixels.
     rightmost: f64,
+    /// Sums and sums of squares, by which deviations are known: of the columns of middles, and of the widths
+    /// less those columns, pixels.
+    columns: [f64; 2],
+    rests: [f64; 2],
     /// Number of boxes whose middle is outside of the image.
     outside: u64,
     /// Columns and rows of the image, and the farthest right and lower ends of the boxes, pixels.
@@ -83,6 +93,9 @@ impl Seen {
         let is_inside = (0.0..image[0]).contains(&across) && (0.0..image[1]).contains(&down);
         self.outside += u64::from(!is_inside);
         self.rightmost = self.rightmost.max(across);
+        let rest = width - across;
+        self.columns = [self.columns[0] + across, self.columns[1] + across * across];
+        self.rests = [self.rests[0] + rest, self.rests[1] + rest * rest];
         self.wide += u64::from(width > WIDE * height);
         self.fit += u64::from(fits(region, image));
         self.fit_exchanged += u64::from(fits(&Rect::new(y, x, height, width), image));
@@ -96,6 +109,19 @@ impl Seen {
         count as f64 >= MOST * self.boxes as f64
     }
 
+    /// Returns the standard deviation of numbers with these sums.
+    fn deviation(&self, [sum, squares]: [f64; 2]) -> f64 {
+        let mean = sum / self.boxes as f64;
+        (squares / self.boxes as f64 - mean * mean).max(0.0).sqrt()
+    }
+
+    /// Returns true if the widths change with the columns of the middles, as those of a second corner
+    /// change with the first one.
+    fn widths_follow(&self) -> bool {
+        let moved = self.deviation(self.columns);
+        moved > LEAST_MOTION * self.image[0] && self.deviation(self.rests) < FOLLOWS * moved
+    }
+
     /// Returns the reason for which most boxes stick out of the image, with what cures it.
     fn misplaced(&self) -> Option<String> {
         if self.boxes < LEAST_BOXES || self.fit as f64 >= FEW * self.boxes as f64 {
@@ -107,8 +133,10 @@ impl Seen {
             "{} of the {all} boxes of people stick out of the {columns}x{rows} images",
             all - self.fit
         );
-        // Boxes of near people at the left border are inside as corners, too.
-        if self.are_most(self.fit_corners) && self.rightmost > 0.5 * columns {
+        // Boxes of near people at the left border are inside as corners, too, but no wider the farther to
+        // the right they are.
+        let is_corner = self.rightmost > 0.5 * columns || self.widths_follow();
+        if self.are_most(self.fit_corners) && is_corner {
             return Some(format!(
                 "{out}, and {} are inside if their middle and size are two corners: let the detector \
                  write the middle and the size",
@@ -182,6 +210,14 @@ mod tests {
         let near: Vec<[f64; 4]> =
             people().iter().map(|[x, ..]| [*x, 300.0, 250.0, 700.0]).collect();
         assert_eq!(told(&near), (None, None));
+        // One who walks away at the left: farther away the box is narrower, and nearer to the middle.
+        let leaves: Vec<[f64; 4]> = (0..10)
+            .map(|step| {
+                let part = 1.0 / (1.0 + 0.1 * f64::from(step));
+                [320.0 - 200.0 * part, 240.0, 290.0 * part, 700.0 * part]
+            })
+            .collect();
+        assert_eq!(told(&leaves), (None, None));
         for stands in [[320.0, 343.0, 147.0, 500.0], [150.0, 300.0, 250.0, 520.0]] {
             assert_eq!(told(&[stands; 10]), (None, None), "{stands:?}");
         }
@@ -204,6 +240,15 @@ mod tests {
             .collect();
         let (misplaced, _) = told(&corners);
         assert!(misplaced.unwrap().contains("are two corners"), "{corners:?}");
+        // People who stay at the left.
+        let at_left: Vec<[f64; 4]> = (0..10)
+            .map(|step| {
+                let left = 20.0 + 12.0 * f64::from(step);
+                [left, 100.0, left + 90.0 + f64::from(step % 3), 400.0]
+            })
+            .collect();
+        let (misplaced, _) = told(&at_left);
+        assert!(misplaced.unwrap().contains("are two corners"), "{at_left:?}");
         let larger: Vec<[f64; 4]> = people().iter().map(|all| all.map(|side| 3.0 * side)).collect();
         let (misplaced, _) = told(&larger);
         assert!(misplaced.unwrap().contains("pixels of these images"), "{larger:?}");

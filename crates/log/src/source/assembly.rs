@@ -13,7 +13,7 @@ use super::{LogFacts, LogFrame};
 use crate::camera_info::CalibrationError;
 use crate::scan::Type;
 use crate::tally::Tally;
-use crate::topics::{is_unusual, unpaired};
+use crate::topics::{is_unusual, slower_words, unpaired};
 use crate::walk::{Channel, Message};
 
 /// Sequence of messages.
@@ -102,6 +102,15 @@ impl Assembly {
             let Some(topic) = topic.filter(|_| is_unusual(without, frames)) else { continue };
             let tolerance_s = plan.input.pair_tolerance_s;
             let Some(problem) = unpaired(&plan.scan, plan.primary(), topic, tolerance_s) else {
+                if plan.inputs.requires(input)
+                    && let Some(words) = slower_words(&plan.scan, plan.primary(), topic)
+                {
+                    let name = input.name();
+                    self.tally.note(format!(
+                        "{without} of {frames} images make no frame, because no image of {topic} belongs to \
+                         them: {words}; record it at their rate, or take a pipeline without {name}"
+                    ));
+                }
                 continue;
             };
             let note = format!(

@@ -19,8 +19,8 @@ use crate::obstacles::{PlannedSource, planned_sources};
 use crate::scan::{Scan, Topic, Type};
 use crate::tally::Tally;
 use crate::topics::{
-    Chosen, InputAccount, Problem, TopicUse, choose, decide, intrinsics_of, kind_of, missing,
-    told_unit, transform_odometry_problem, transform_problem, unreadable,
+    Chosen, InputAccount, Problem, TopicUse, choose, decide, exchanged_frames, intrinsics_of,
+    kind_of, missing, told_unit, transform_odometry_problem, transform_problem, unreadable,
 };
 use crate::{Input, InputSettings, Inputs, Limits, LogError, MountSettings};
 
@@ -358,6 +358,11 @@ fn note_choices(plan: &Plan, tally: &mut Tally) {
             "the images of the camera {used} are used, those of {camera} are not: \
              `camera = \"{camera}\"` under [input] takes them"
         ));
+    }
+    let odometry = plan.chosen.odometry.as_deref();
+    if let Some(why) = odometry.and_then(|it| exchanged_frames(&plan.scan, &plan.input, it)) {
+        tally.count("odometry_with_exchanged_frames");
+        tally.note(why);
     }
     for (odometry, problem) in &plan.chosen.unused_odometry {
         tally.count("odometry_not_used");

@@ -1,6 +1,7 @@
 //! Reasons for which topics are used or not.
 
 use super::account::{InputAccount, TopicUse};
+use super::foreign::{Foreign, foreign};
 use super::kinds::{
     depth_as_picture, is_image, is_odometry, is_of, kind_of, unread_detections, unreadable,
 };
@@ -50,7 +51,9 @@ impl Judge<'_> {
         let sensor = sensor.filter(|_| !(topic.is_lidar() && lacks_depth));
         let is_known = is_image(topic) || is_odometry(topic) || sensor.is_some();
         let unread = unread_detections(topic);
-        if !is_known && unreadable(topic).is_none() && unread.is_none() {
+        let is_listed = is_known || unreadable(topic).is_some() || unread.is_some();
+        let foreign = foreign(topic).filter(|_| !is_listed);
+        if !is_listed && foreign.is_none() {
             return None;
         }
         let used_as = self.use_of(name);
@@ -59,9 +62,11 @@ impl Judge<'_> {
             None => Some(match sensor {
                 Some(sensor) => self.unused_sensor(name, topic, sensor),
                 None if is_odometry(topic) => self.unused_odometry(name, topic),
-                None => match unread {
-                    Some(why) => empty(topic).unwrap_or((why, None)),
-                    None => self.unused_image(name, topic),
+                None => match (unread, &foreign) {
+                    (Some(why), _) => empty(topic).unwrap_or_else(|| with_remedy(why)),
+                    (None, Some(found)) => empty(topic)
+                        .unwrap_or_else(|| (found.why.clone(), Some(found.remedy.clone()))),
+                    (None, None) => self.unused_image(name, topic),
                 },
             }),
         };
@@ -75,7 +80,10 @@ impl Judge<'_> {
             camera: self.rig_of(name).map(|rig| rig.label.clone()),
             used_as,
             calibration: self.calibration(name),
-            could_be: problem.as_ref().and_then(|_| self.could_be(name, topic)),
+            could_be: match &foreign {
+                Some(foreign) => self.foreign_could_be(foreign, topic),
+                None => problem.as_ref().and_then(|_| self.could_be(name, topic)),
+            },
             problem,
             remedy,
         })
@@ -95,15 +103,33 @@ impl Judge<'_> {
             return (odometry.is_none() && odom_frames.is_none()).then_some("odometry");
         }
         let parts = TopicName::of(name);
+        let is_scan = topic.kind == Type::PointCloud || topic.schema.ends_with("LaserScan");
         let is_depth = topic.content == Content::Depth || topic.is_jpeg_depth || topic.is_deep_grey;
         let is_depth = is_depth || topic.is_other_stream || parts.stream == Stream::Depth;
         if is_depth {
             let is_free = self.inputs.uses(Input::Depth) && !has_depth;
-            return (is_image(topic) && is_free).then_some("depth");
+            let is_depth = is_image(topic) || unreadable(topic).is_some() && !is_scan;
+            return (is_depth && is_free).then_some("depth");
         }
         let is_free = self.inputs.uses(Input::Colour) && colour.is_none();
-        let is_scan = topic.kind == Type::PointCloud || topic.schema.ends_with("LaserScan");
         (unreadable(topic).is_some() && is_free && !is_scan).then_some("colour")
+    }
+
+    /// Returns the first of the inputs of messages of another type that nothing else serves as.
+    fn foreign_could_be(&self, foreign: &Foreign, topic: &Topic) -> Option<&'static str> {
+        let Chosen { colour, depth, depth_problem, .. } = self.chosen;
+        for input in foreign.could_be {
+            let (wanted, is_served) = match *input {
+                "colour" => (Input::Colour, colour.is_some()),
+                "depth" => (Input::Depth, depth.is_some() && depth_problem.is_none()),
+                "laser" => (Input::Laser, self.chosen.sensor(Input::Laser).is_some()),
+                _ => (Input::POINTS, self.chosen.sensor(Input::POINTS).is_some()),
+            };
+            if topic.count > 0 && self.inputs.uses(wanted) && !is_served {
+                return Some(input);
+            }
+        }
+        None
     }
 
     fn kind(&self, topic: &Topic) -> String {
@@ -177,10 +203,7 @@ impl Judge<'_> {
             return (why.to_owned(), Some(remedy.to_owned()));
         }
         if let Some(why) = unreadable(topic) {
-            return match why.split_once(": ") {
-                Some((why, remedy)) => (why.to_owned(), Some(remedy.to_owned())),
-                None => (why, None),
-            };
+            return with_remedy(why);
         }
         let rig = self.rig_of(name);
         let other_rig = rig.filter(|rig| Some(&rig.label) != self.chosen.camera.as_ref());
@@ -268,6 +291,14 @@ fn is_scaled(info: &crate::msgs::CameraInfo, size: (u32, u32)) -> bool {
     // Binning and regions explain other sizes.
     let is_plain = info.binning_x <= 1 && info.binning_y <= 1 && info.roi.width == 0;
     is_plain && (info.width, info.height) != size
+}
+
+/// Returns a reason apart from its remedy.
+fn with_remedy(why: String) -> Reason {
+    match why.split_once(": ") {
+        Some((why, remedy)) => (why.to_owned(), Some(remedy.to_owned())),
+        None => (why, None),
+    }
 }
 
 /// Returns the reason of a topic without one message that can be read.

@@ -107,15 +107,33 @@ pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
         }
         (Some(_), _) if topic.is_other_stream => Some(OTHER_STREAM_REMEDY.to_owned()),
         (Some(pixels), _) if topic.content == Content::Unknown => Some(refusal_of(pixels)),
-        (None, Type::Other) if SENSOR_MESSAGES.contains(&name) => Some(match &*topic.encoding {
-            "cdr" | "ros1" => format!("its type is not read; {name} of sensor_msgs is"),
-            other => format!(
-                "its messages are in `{other}`, and those of ROS 2 (`cdr`) and ROS 1 (`ros1`) are \
-                 read: record with `ros2 bag record`, or convert the log"
-            ),
-        }),
+        (None, Type::Other) if SENSOR_MESSAGES.contains(&name) => {
+            let read_as = match name {
+                "RawImage" => "sensor_msgs/Image".to_owned(),
+                "DisparityImage" => "stereo_msgs/DisparityImage".to_owned(),
+                name => format!("sensor_msgs/{name}"),
+            };
+            Some(match unread_encoding(&topic.encoding) {
+                None => {
+                    format!("its type is not read: record or republish it as {read_as}")
+                }
+                Some((why, remedy)) => format!("{why}: {remedy}"),
+            })
+        }
         _ => None,
     }
+}
+
+/// Returns the reason for which messages in an encoding cannot be read, whatever their type, and the
+/// remedy.
+pub(super) fn unread_encoding(encoding: &str) -> Option<(String, &'static str)> {
+    if matches!(encoding, "cdr" | "ros1") {
+        return None;
+    }
+    let why = format!(
+        "its messages are in `{encoding}`, and those of ROS 2 (`cdr`) and ROS 1 (`ros1`) are read"
+    );
+    Some((why, "record with `ros2 bag record`, or convert the log"))
 }
 
 /// Returns the reason and the remedy for pictures or video under a name of depth; `None` for all other
@@ -138,26 +156,41 @@ fn is_video(topic: &Topic) -> bool {
 }
 
 /// Names of messages with detections of objects or people, whatever their package.
-const DETECTION_MESSAGES: [&str; 10] = [
+const DETECTION_MESSAGES: [&str; 22] = [
+    "BoundingBoxArray",
     "BoundingBoxes",
     "Detection2DArray",
     "Detection3DArray",
     "DetectionArray",
     "SpatialDetectionArray",
+    "DetectedObjectArray",
     "DetectedObjects",
     "DetectedPersons",
+    "LegArray",
+    "ObjectsInBoxes",
     "ObjectsStamped",
+    "OpenPoseHumanList",
     "People",
+    "PersonArray",
     "PositionMeasurementArray",
+    "PredictedObjects",
+    "TrackDetection2DArray",
+    "TrackedObjects",
+    "TrackedPersons",
+    "YoloDetections",
+    "YoloResult",
 ];
 
 /// Returns the reason for which detections of a topic cannot be read; `None` for those that can, and
 /// for all other topics.
 pub(super) fn unread_detections(topic: &Topic) -> Option<String> {
-    let name = topic.schema.rsplit('/').next().unwrap_or_default();
-    let is_message = matches!(topic.encoding.as_str(), "cdr" | "ros1");
-    let is_unread = topic.kind == Type::Other && is_message && DETECTION_MESSAGES.contains(&name);
-    is_unread.then(|| format!("its type is not read; {} are", detection_types()))
+    if topic.kind != Type::Other || !DETECTION_MESSAGES.contains(&message_name(topic)) {
+        return None;
+    }
+    Some(match unread_encoding(&topic.encoding) {
+        None => format!("its type is not read; {} are", detection_types()),
+        Some((why, remedy)) => format!("{why}: {remedy}"),
+    })
 }
 
 /// Returns the types of detections that are read.

@@ -7,6 +7,7 @@
 mod account;
 mod calibration;
 mod entries;
+mod foreign;
 mod kinds;
 mod name;
 mod odometry;
@@ -19,6 +20,8 @@ use std::collections::BTreeMap;
 
 pub use account::{InputAccount, TopicUse};
 pub(crate) use calibration::{FoundCalibration, Relation, calibration_of, intrinsics_of};
+use foreign::foreign;
+pub(crate) use foreign::part_of;
 use kinds::{
     could_be_depth, depth_as_picture, detection_types, disparity_rank, is_info, is_of,
     is_usable_depth, is_usable_picture, remedy_as_depth,
@@ -26,7 +29,7 @@ use kinds::{
 pub(crate) use kinds::{kind_of, unreadable};
 pub(crate) use name::{Stream, TopicName};
 use odometry::{choose_odometry, odometry_problem};
-pub(crate) use odometry::{transform_odometry_problem, transform_problem};
+pub(crate) use odometry::{exchanged_frames, transform_odometry_problem, transform_problem};
 pub(crate) use problems::{Problem, geometry_problem};
 use problems::{detections_problem, scan_times_problem, scanner_problem};
 pub(crate) use rigs::camera_frames;
@@ -34,7 +37,7 @@ use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
 pub(crate) use units::told_unit;
-pub(crate) use unpaired::{is_unusual, unpaired};
+pub(crate) use unpaired::{is_unusual, slower_words, unpaired};
 
 use crate::obstacles::ObstacleTopic;
 use crate::scan::{Scan, Topic};
@@ -400,7 +403,8 @@ impl Requirement<'_> {
         let Self { wanted, key, types, fits, taken, .. } = self;
         let is_image = key.ends_with("_topic") && types.contains("Image");
         let unreadable = scan.topics.iter().find_map(|(name, topic)| {
-            let why = unreadable(topic).filter(|_| is_image && !topic.is_other_stream)?;
+            let why = unreadable(topic).filter(|_| is_image && !topic.is_other_stream);
+            let why = why.or_else(|| self.foreign_reason(topic))?;
             Some(format!("; {name} ({}) cannot be read: {why}", kind_of(topic)))
         });
         let mut free = scan.topics.iter().filter(|(name, _)| *taken != Some(name.as_str()));
@@ -424,6 +428,14 @@ impl Requirement<'_> {
         let other = (key == "right_topic").then(|| RIGHT_REMEDY.to_owned());
         let hint = unreadable.or(meant).or(depth).or(other).unwrap_or_default();
         missing(scan, format!("{wanted} ({types})"), hint)
+    }
+
+    /// Returns the reason and the remedy for messages of the wanted sensor whose type is not read.
+    fn foreign_reason(&self, topic: &Topic) -> Option<String> {
+        let found = foreign(topic)?;
+        let input = self.key.trim_end_matches("_topic").trim_start_matches("topics.");
+        let is_wanted = found.could_be.contains(&input);
+        is_wanted.then(|| format!("{}: {}", found.why, found.remedy))
     }
 }
 
@@ -466,6 +478,7 @@ fn named(
         let other = fitting.next().map(|(name, topic)| format!("{name} ({})", kind_of(topic)));
         let as_depth = remedy_as_depth(topic).filter(|_| key == "depth_topic");
         let remedy = unreadable(topic)
+            .or_else(|| foreign(topic).map(|found| format!("{}: {}", found.why, found.remedy)))
             .or_else(|| as_depth.map(|remedy| format!("if it is meant, {remedy}")))
             .or_else(|| other.map(|other| format!("{other} would fit")))
             .or_else(|| {

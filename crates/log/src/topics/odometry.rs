@@ -7,6 +7,7 @@ use super::{best_of, named};
 use crate::clock::{Times, constant_lag_s};
 use crate::scan::{Scan, Topic};
 use crate::source::robot_frame;
+use crate::tf::plain;
 use crate::{InputSettings, LogError};
 
 /// Odometry of a log.
@@ -95,6 +96,39 @@ pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Op
         );
     }
     lag_problem(frames, poses)
+}
+
+/// Returns the words for odometry whose messages name the robot as the parent and the odometry frame as
+/// the child. Whether the poses are exchanged as well no message tells.
+pub(crate) fn exchanged_frames(
+    scan: &Scan,
+    input: &InputSettings,
+    odometry: &str,
+) -> Option<String> {
+    let topic = scan.topics.get(odometry)?;
+    let parent = topic.frame_id.as_deref()?;
+    let child = topic.child_frame_id.as_deref()?;
+    let robot = robot_frame(scan, input);
+    let is_robot = plain(parent) == plain(robot) || is_named(parent, &ROBOT_FRAMES);
+    let is_fixed = plain(child) == plain(&input.odom_frame) || is_named(child, &FIXED_FRAMES);
+    (is_robot && is_fixed).then(|| {
+        format!(
+            "{odometry} has the frame_id `{parent}`, which is the robot's, and the child_frame_id `{child}`: \
+             parent and child are exchanged; its poses are taken for those of `{parent}` in `{child}`; let \
+             the driver write `{child}` as frame_id and `{parent}` as child_frame_id, and if the poses \
+             themselves are exchanged, name other odometry as `odometry_topic` under [input]"
+        )
+    })
+}
+
+/// Beginnings of the names of frames on the robot, and of frames in which it moves (REP 105).
+const ROBOT_FRAMES: [&str; 1] = ["base"];
+const FIXED_FRAMES: [&str; 3] = [ODOMETRY_FRAME, "map", "world"];
+
+/// Returns true if the last part of a frame's name begins with one of these words.
+fn is_named(frame: &str, words: &[&str]) -> bool {
+    let name = frame.rsplit('/').next().unwrap_or_default();
+    words.iter().any(|word| name.starts_with(word))
 }
 
 /// Returns the problem of odometry whose stamps are all too early or too late by one time, which the

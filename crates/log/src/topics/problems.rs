@@ -223,8 +223,12 @@ pub(crate) fn geometry_problem(
     let lens = match depth_lens(scan, input, depth) {
         Ok(lens) => lens,
         Err(why) => {
-            let named = format!("{remedy}name its calibration as `depth_info_topic` under [input]");
-            return Problem::new(why, named);
+            let other = if scan.infos.is_empty() {
+                "record its camera_info"
+            } else {
+                "name its calibration as `depth_info_topic` under [input]"
+            };
+            return Problem::new(why, format!("{remedy}{other}"));
         }
     };
     if let Some(size) = misfit(scan, depth, &lens.1) {

@@ -119,6 +119,17 @@ fn is_short(frames: &[Stamp], partners: &Topic, tolerance_s: f64) -> Option<Stri
     })
 }
 
+/// Returns the words for partners that are slower than the frames by themselves, with both rates.
+pub(crate) fn slower_words(scan: &Scan, first: &str, second: &str) -> Option<String> {
+    let fast = Timing::of(&scan.topics.get(first)?.stamps)?;
+    let slow = Timing::of(&scan.topics.get(second)?.stamps)?;
+    Some(format!(
+        "it has {:.1} images a second, and {first} {:.1}",
+        1.0 / slow.median_period_s,
+        1.0 / fast.median_period_s
+    ))
+}
+
 /// Returns true if the partners come at a lower rate, evenly, and each of them belongs to a frame.
 fn is_slower(frames: &Topic, partners: &Topic, tolerance_s: f64) -> bool {
     let (Some(fast), Some(slow)) = (Timing::of(&frames.stamps), Timing::of(&partners.stamps))

@@ -104,5 +104,7 @@ fn a_missing_partner_now_and_then_and_a_slower_camera_lose_nothing() {
         assert_eq!(made + without, FRAMES as usize, "{case}");
         assert!(!source.data_lost(), "{case}: {:?}", source.notes());
         assert_eq!(told(&source), "", "{case}");
+        let is_told = source.notes().iter().any(|note| note.contains("images make no frame"));
+        assert_eq!(is_told, case > 2, "{case}: {:?}", source.notes());
     }
 }

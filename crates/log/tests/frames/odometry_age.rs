@@ -1,6 +1,6 @@
 //! Age of the odometry of a frame: what is silent, invalid or stamped wrongly does not make it young.
 
-use tagalong_log::msgs::{Point, Pose, Quaternion};
+use tagalong_log::msgs::{Odometry, Point, Pose, Quaternion};
 
 use super::*;
 
@@ -136,4 +136,39 @@ fn a_static_transform_is_no_odometry() {
     log.colour(at(0.1));
     let (mut source, _saved) = open(log, Inputs::ANY);
     assert_eq!(frames(&mut source)[0].frame.odometry_age_s, f64::INFINITY);
+}
+
+#[test]
+fn a_parent_and_a_child_that_are_exchanged_are_told() {
+    for (parent, child, is_told) in [
+        ("odom", "base_link", false),
+        ("base_link", "odom", true),
+        ("base_footprint", "map", true),
+        ("/robot1/base_link", "/robot1/odom", true),
+        ("map", "odom", false),
+        ("base_link", "imu_link", false),
+        ("camera_link", "odom", false),
+        ("odom", "", false),
+    ] {
+        let mut log = started();
+        for index in 0..4 {
+            let t = 0.1 * f64::from(index);
+            let mut odometry =
+                Odometry { header: Header::new(at(t), parent), ..Odometry::default() };
+            odometry.child_frame_id = child.into();
+            odometry.pose.pose = driven(t);
+            log.message("/odom", at(t), &odometry);
+            log.colour(at(t));
+        }
+        let (source, _saved) = open(log, Inputs::ANY);
+        let words = format!("/odom has the frame_id `{parent}`");
+        let note = source.notes().iter().find(|note| note.starts_with(&words));
+        assert_eq!(note.is_some(), is_told, "{parent} {child}: {:?}", source.notes());
+        let count = source.counters().get("odometry_with_exchanged_frames").copied();
+        assert_eq!(count.unwrap_or(0), u64::from(is_told), "{parent} {child}");
+        if let Some(note) = note {
+            let remedy = format!("let the driver write `{child}` as frame_id and `{parent}`");
+            assert!(note.contains(&remedy), "{note}");
+        }
+    }
 }

@@ -1,0 +1,198 @@
+//! Signs that a truth is that of another log than the frames beside it.
+
+use std::path::Path;
+
+use super::{Shots, TruthFile};
+
+/// Endings of truth that is named after its log.
+const OF_A_LOG: [&str; 6] =
+    [".people.csv", ".boxes.csv", ".truth.jsonl", ".jsonl", ".mcap", ".bag"];
+/// Number of frames that a truth may go on behind the last one that the log gave: images at the end may
+/// have lost their depth.
+const BEYOND: u32 = 5;
+/// Part of the boxes that lie outside of the image, by their middles, from which on it is another image.
+const OUTSIDE: f64 = 0.2;
+
+/// Returns notes with the signs that a truth is that of another log: its name, its number of frames, its
+/// stamps, and the size of the image in which its boxes lie. `log_name` is the file name of the log, if it
+/// is known; of `shots` there are none where no log was read.
+pub fn other_log_notes(
+    path: &Path,
+    truth: &TruthFile,
+    log_name: Option<&str>,
+    shots: &Shots,
+) -> Vec<String> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut signs: Vec<String> =
+        log_name.and_then(|log| by_name(&name, truth, log)).into_iter().collect();
+    signs.extend(by_frames(&name, truth, shots));
+    signs.extend(by_image(&name, truth, shots));
+    if let Some(last) = signs.last_mut() {
+        last.push_str(": if the truth is that of another log, the comparison means nothing");
+    }
+    // A few of them are images that were lost.
+    let lost = truth.without_image(shots);
+    if shots.first().is_some() && lost > 0 && !is_of_other_times(truth, lost) {
+        signs.push(format!("{name}: {lost} moments have no image and are left out"));
+    }
+    signs
+}
+
+/// Returns true if most moments of a truth have no image.
+fn is_of_other_times(truth: &TruthFile, without: usize) -> bool {
+    truth.needs_stamps() && 2 * without > truth.annotated()
+}
+
+/// Returns the sign of a truth that is named after another log.
+fn by_name(name: &str, truth: &TruthFile, log: &str) -> Option<String> {
+    let of_truth = OF_A_LOG.iter().find_map(|ending| name.strip_suffix(ending))?;
+    let stem = Path::new(log).file_stem()?.to_string_lossy().into_owned();
+    let is_other = of_truth != stem && !(truth.is_in_log() && name == log);
+    is_other.then(|| format!("{name} is named after {of_truth}, and the run is of {log}"))
+}
+
+/// Returns the sign of people in frames, or at stamps, that the log does not have.
+fn by_frames(name: &str, truth: &TruthFile, shots: &Shots) -> Option<String> {
+    shots.first()?;
+    if truth.needs_stamps() {
+        let without = truth.without_image(shots);
+        let all = truth.annotated();
+        return is_of_other_times(truth, without)
+            .then(|| format!("{name}: {without} of {all} moments have no image and are left out"));
+    }
+    let last = truth.last_annotated(shots)?;
+    let known = shots.last();
+    (last > known.saturating_add(BEYOND)).then(|| {
+        format!("{name} has people up to frame {last}, and the last of the log is {known}")
+    })
+}
+
+/// Returns the sign of boxes in an image of another size.
+fn by_image(name: &str, truth: &TruthFile, shots: &Shots) -> Option<String> {
+    let camera = &shots.first()?.camera;
+    let size = [camera.width as f64, camera.height as f64];
+    // Boxes may be those of the raw image of a mirror, and the camera that of the unwrapped one.
+    if camera.is_blind() || camera.panorama().is_some() {
+        return None;
+    }
+    if let Some(info) = &truth.info
+        && info.width > 0
+        && [f64::from(info.width), f64::from(info.height)] != size
+    {
+        return Some(format!(
+            "seqinfo.ini beside {name} is of {}x{} images, and those of the log are {}x{}",
+            info.width, info.height, camera.width, camera.height
+        ));
+    }
+    let mut count = 0;
+    let mut outside = 0;
+    let mut reach = [0.0_f64; 2];
+    for region in truth.regions() {
+        let middle = [region.x + 0.5 * region.width, region.y + 0.5 * region.height];
+        let is_inside = (0..2).all(|axis| (0.0..size[axis]).contains(&middle[axis]));
+        count += 1;
+        outside += u32::from(!is_inside);
+        reach = [reach[0].max(region.x + region.width), reach[1].max(region.y + region.height)];
+    }
+    let are_many = f64::from(outside) > OUTSIDE * f64::from(count);
+    are_many.then(|| {
+        format!(
+            "{name}: {outside} of {count} boxes lie outside of the {}x{} images of the log, as far as to x = \
+             {:.0} and y = {:.0}",
+            camera.width, camera.height, reach[0], reach[1]
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::Isometry2;
+    use tagalong_geometry::{Camera, Distortion, Pinhole};
+
+    use super::super::{Shot, TruthOptions};
+    use super::*;
+
+    /// Returns twenty frames of images of 640x480 pixels, ten a second.
+    fn shots() -> Shots {
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
+        let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.0, 0.0, 0.0));
+        let mut shots = Shots::default();
+        for number in 1..=20 {
+            shots.push(Shot {
+                number,
+                stamp_ns: u64::from(number) * 100_000_000,
+                camera: Arc::clone(&camera),
+                odom_from_robot: Isometry2::identity(),
+            });
+        }
+        shots
+    }
+
+    /// Returns the notes on a truth of one person, whose box is that of frame 1 and of `last`.
+    fn notes(file: &str, last: u32, x: f64, log: Option<&str>, info: &str) -> Vec<String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(file);
+        if !info.is_empty() {
+            std::fs::write(folder.path().join("seqinfo.ini"), info).unwrap();
+        }
+        let row = |frame: u32| format!("{frame},1,{x},10,40,90,1,-1,-1,-1\n");
+        std::fs::write(&path, row(1) + &row(last)).unwrap();
+        let truth = TruthFile::read(&path, TruthOptions::default()).unwrap();
+        other_log_notes(&path, &truth, log, &shots())
+    }
+
+    #[test]
+    fn a_truth_of_the_log_gives_no_sign() {
+        for log in [None, Some("walk.mcap"), Some("walk.bag")] {
+            assert!(notes("walk.boxes.csv", 20, 600.0, log, "").is_empty(), "{log:?}");
+        }
+        // Images at the end may have lost their depth.
+        assert!(notes("gt.txt", 24, 10.0, Some("walk.mcap"), "").is_empty());
+        let info = "name=a\nframeRate=10\nseqLength=20\nimWidth=640\nimHeight=480\n";
+        assert!(notes("gt.txt", 20, 10.0, Some("walk.mcap"), info).is_empty());
+    }
+
+    #[test]
+    fn each_sign_of_another_log_is_told() {
+        let other = "name=a\nframeRate=10\nseqLength=20\nimWidth=1280\nimHeight=720\n";
+        for (file, last, x, info, sign) in [
+            ("other.boxes.csv", 20, 10.0, "", "named after other, and the run is of walk.mcap"),
+            ("gt.txt", 40, 10.0, "", "up to frame 40, and the last of the log is 20"),
+            ("gt.txt", 20, 900.0, "", "2 of 2 boxes lie outside of the 640x480 images"),
+            ("gt.txt", 20, 10.0, other, "is of 1280x720 images, and those of the log are 640x480"),
+        ] {
+            let notes = notes(file, last, x, Some("walk.mcap"), info);
+            let [note] = &notes[..] else { panic!("{sign}: {notes:?}") };
+            assert!(
+                note.contains(sign) && note.ends_with("the comparison means nothing"),
+                "{note}"
+            );
+        }
+    }
+
+    #[test]
+    fn stamps_that_no_image_has_are_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("walk.truth.jsonl");
+        let frame = |stamp_ns: u64| {
+            let frame = tagalong_log::TruthFrame { stamp_ns, ..Default::default() };
+            serde_json::to_string(&frame).unwrap() + "\n"
+        };
+        let told = |stamps: &[u64]| {
+            let text: String = stamps.iter().map(|stamp| frame(*stamp)).collect();
+            std::fs::write(&path, text).unwrap();
+            let truth = TruthFile::read(&path, TruthOptions::default()).unwrap();
+            let notes = other_log_notes(&path, &truth, Some("walk.mcap"), &shots());
+            assert_eq!(notes.len(), 1, "{notes:?}");
+            notes[0].clone()
+        };
+        let other = told(&[100_000_000, 900_000_000_000, 901_000_000_000]);
+        assert!(other.contains("2 of 3 moments have no image"), "{other}");
+        assert!(other.ends_with("the comparison means nothing"), "{other}");
+        let lost = told(&[100_000_000, 200_000_000, 901_000_000_000]);
+        assert!(lost.ends_with("1 moments have no image and are left out"), "{lost}");
+    }
+}
