@@ -122,7 +122,7 @@ fn list(format: TableFormat) -> Outcome {
     for system in SYSTEMS {
         print(&format!("{}  {}\n", system.name, system.about))?;
         for Experiment { name, about, .. } in system.experiments {
-            print(&format!("  {name:<12} {about}\n"))?;
+            print(&format!("  {name:<16} {about}\n"))?;
         }
     }
     Ok(Ended::Well)

@@ -58,6 +58,14 @@ pub(crate) fn unpaired_p(a: &[f64], b: &[f64]) -> Option<f64> {
     Some(2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t.abs()))
 }
 
+/// Returns the p-values of draws against those of a rival: of [`unpaired_p`] over all values, and of
+/// the differences of [`paired`] draws. Empty where there is none.
+pub(crate) fn p_values(rival: &[Vec<f64>], draws: &[Vec<f64>]) -> [Cell; 2] {
+    let unpaired = unpaired_p(&rival.concat(), &draws.concat());
+    let paired = paired(rival, draws).map(|gain| gain.p_value);
+    [unpaired, paired].map(|p| Cell::number(p.unwrap_or(f64::NAN), 3))
+}
+
 /// Returns a score of the tallies of all draws together, with its interval over draws.
 pub(crate) fn pooled(draws: &[&Tally], digits: usize, score: fn(&Scores) -> Option<f64>) -> Cell {
     let figure = |drawn: &[usize]| {
@@ -80,6 +88,25 @@ mod tests {
         assert!((p - 0.035_687).abs() < 1e-5, "{p}");
         assert_eq!(unpaired_p(&[1.0], &[1.0]), None);
         assert_eq!(unpaired_p(&[1.0, 1.0], &[1.0, 1.0]), None);
+    }
+
+    fn eight_rooms(shift: f64) -> Vec<Vec<f64>> {
+        (0..8).map(|room| vec![f64::from(room) + shift, f64::from(room) + shift + 1.0]).collect()
+    }
+
+    /// The own model is better in each of eight rooms, by as much as the values of a room differ.
+    #[test]
+    fn p_values_are_of_all_values_and_of_pairs_of_draws() {
+        let general = eight_rooms(0.0);
+        let own = eight_rooms(-0.5);
+        let [unpaired, paired] = p_values(&general, &own).map(|cell| cell.value.unwrap());
+        let all = unpaired_p(&general.concat(), &own.concat()).unwrap();
+        assert!(
+            (unpaired - all).abs() < 1e-12 && unpaired > 0.1,
+            "rooms differ by more: {unpaired}"
+        );
+        assert!((paired - 2.0 / 256.0).abs() < 1e-9, "all signs agree: {paired}");
+        assert_eq!(p_values(&[], &[]).map(|cell| cell.value), [None, None]);
     }
 
     #[test]

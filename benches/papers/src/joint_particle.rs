@@ -2,6 +2,8 @@
 
 mod fair;
 
+pub(crate) use fair::OTHER_READING;
+
 use nalgebra::Point3;
 use tagalong_core::Track;
 use tagalong_geometry::Camera;

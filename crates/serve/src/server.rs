@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use self::connections::{Connections, StartThread};
+use self::connections::{Connections, Limits, StartThread};
 use crate::http::{Request, Response};
 
 /// Pause between two looks for a connection, for bytes or for a reason to stop.
@@ -85,6 +85,7 @@ struct Guard {
     token: Option<String>,
     changes: Changes,
     body_bytes: usize,
+    limits: Limits,
 }
 
 impl Server {
@@ -98,7 +99,8 @@ impl Server {
         listener.set_nonblocking(true)?;
         let token = access.key.then(random_token).transpose()?;
         let Access { changes, body_bytes, .. } = access;
-        let guard = Guard { bound: listener.local_addr()?, token, changes, body_bytes };
+        let limits = Limits::default();
+        let guard = Guard { bound: listener.local_addr()?, token, changes, body_bytes, limits };
         Ok(Self { listener, guard: Arc::new(guard) })
     }
 

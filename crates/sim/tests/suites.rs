@@ -57,6 +57,31 @@ fn every_scene_can_be_drawn_for_every_split_and_camera() {
     }
 }
 
+fn parse(name: &str, text: &str, variant: &Variant) -> Scene {
+    let scene = Scene::parse_with(text, variant);
+    scene.map_err(|e| e.render(name, text)).unwrap_or_else(|told| panic!("{told}"))
+}
+
+#[test]
+fn every_ride_can_have_a_path_of_its_own() {
+    for (name, text) in suites().into_iter().filter(|(name, _)| name.starts_with("follow-")) {
+        let mut paths = Vec::new();
+        let mut changed = false;
+        for number in 0..5 {
+            let plain = Variant::of_split(Split::Test, number);
+            let varied =
+                plain.clone().with("variation.path_jitter_m", 0.3).with("variation.mirror", true);
+            let scene = parse(&name, &text, &varied);
+            let path = scene.people[0].path.clone();
+            changed |= path != parse(&name, &text, &plain).people[0].path;
+            assert!(!paths.contains(&path), "{name}: two seeds have the same path");
+            paths.push(path);
+            assert!(!first_shot(scene).truth.is_empty(), "{name}: the person is there");
+        }
+        assert!(changed, "{name}");
+    }
+}
+
 #[test]
 fn rooms_that_vary_are_shared_by_no_two_splits() {
     for (name, text) in suites().iter().filter(|(_, text)| text.contains("[vary]")) {

@@ -45,27 +45,36 @@ pub fn markdown(table: &str, names: &str) -> Result<String> {
     Ok(out)
 }
 
-/// Returns what to expect of one pipeline in a single room, and how far off the people are that it
-/// finds, with the settings and models of the other rooms. `rooms` has a row for each room.
+/// Returns what to expect of one pipeline in a single room, how many people it finds and how far off
+/// these are, with the settings and models of the other rooms. `rooms` has a row for each room; rooms
+/// of single frames, over which nothing is tracked, do not count.
 ///
 /// # Errors
 /// A table without the pipeline, without rooms or without one of the figures.
 pub fn sentence(name: &str, means: &str, rooms: &str) -> Result<String> {
     let hota = column(rooms, "HOTA w/o")?;
-    let single: Vec<f64> =
-        hota.iter().filter(|(row, _)| *row != "mean").map(|(_, value)| *value).collect();
+    let single: Vec<f64> = hota
+        .iter()
+        .filter(|(row, _)| !row.starts_with("mean") && !row.ends_with("single frames"))
+        .map(|(_, value)| *value)
+        .collect();
     let least = single.iter().copied().reduce(f64::min).context("there is no room")?;
     let most = single.iter().copied().reduce(f64::max).context("there is no room")?;
-    let off = column(means, "off m w/o")?;
-    let (_, off_m) = off
-        .iter()
-        .find(|(row, _)| *row == name)
-        .with_context(|| format!("there is no row `{name}`"))?;
+    let recall = figure_of(name, means, "recall w/o")?;
+    let off_m = figure_of(name, means, "off m w/o")?;
     Ok(format!(
-        "In single rooms, left out, the HOTA of `{name}` is {least:.3} to {most:.3}. The people that \
-         it finds are {:.0} mm off on average.",
+        "In single rooms, left out, the HOTA of `{name}` is {least:.3} to {most:.3}. It finds {:.1} % \
+         of the annotated people; these are {:.0} mm off on average.",
+        1e2 * recall,
         1e3 * off_m
     ))
+}
+
+/// Returns one figure of a row.
+fn figure_of(name: &str, table: &str, title: &str) -> Result<f64> {
+    let all = column(table, title)?;
+    let row = all.iter().find(|(row, _)| *row == name);
+    row.map(|(_, figure)| *figure).with_context(|| format!("there is no row `{name}`"))
 }
 
 /// Returns the figures of a column by the first cells of their rows, without those that are missing.
@@ -108,14 +117,14 @@ mod tests {
     }
 
     #[test]
-    fn a_sentence_has_the_range_over_rooms_and_the_mean_distance() {
-        let means = "|  | HOTA w/o | off m w/o |\n|---|---|---|\n| a | 0.5 | 0.0371 |\n";
+    fn a_sentence_has_the_range_over_rooms_and_the_distance_beside_the_recall() {
+        let means = "|  | recall w/o | off m w/o |\n|---|---|---|\n| a | 0.845 | 0.0371 |\n";
         let rooms = "|  | HOTA w/o |\n|---|---|\n| A | 0.7 |\n| B | - |\n| C | 0.4 |\n\
-                     | mean | 0.9 |\n";
+                     | D, single frames | 0.1 |\n| mean | 0.9 |\n| mean, rooms alike | 0.8 |\n";
         assert_eq!(
             sentence("a", means, rooms).unwrap(),
-            "In single rooms, left out, the HOTA of `a` is 0.400 to 0.700. The people that it finds \
-             are 37 mm off on average."
+            "In single rooms, left out, the HOTA of `a` is 0.400 to 0.700. It finds 84.5 % of the \
+             annotated people; these are 37 mm off on average."
         );
         assert!(sentence("b", means, rooms).unwrap_err().to_string().contains("no row `b`"));
     }

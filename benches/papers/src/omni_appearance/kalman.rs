@@ -4,7 +4,7 @@ use tagalong_sim::{Scene, Truth};
 use tagalong_trials::{Contender, Moment, Run, Trial, TrialError};
 
 use super::{FRESH, in_turn};
-use crate::draws::{difference, means, over_draws, paired, unpaired_p};
+use crate::draws::{difference, means, over_draws, p_values};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Number of rooms, with two people each.
@@ -173,10 +173,9 @@ fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
             rows.push(Row::ours(*name, with_empty(error)));
             continue;
         }
-        let unpaired = unpaired_p(&draws(0).concat(), &draws(at).concat());
-        let paired = paired(&draws(0), &draws(at)).map(|gain| gain.p_value);
         let gain = difference(&draws(0), &draws(at), 3);
-        rows.push(Row::ours(*name, vec![error, gain, p_cell(unpaired), p_cell(paired)]));
+        let [unpaired, paired] = p_values(&draws(0), &draws(at));
+        rows.push(Row::ours(*name, vec![error, gain, unpaired, paired]));
     }
     let images = draws(0).concat().len();
     Table {
@@ -206,10 +205,6 @@ fn with_empty(error: Cell) -> Vec<Cell> {
     let mut cells = vec![error];
     cells.resize_with(COLUMNS.len(), Cell::default);
     cells
-}
-
-fn p_cell(value: Option<f64>) -> Cell {
-    Cell::number(value.unwrap_or(f64::NAN), 3)
 }
 
 /// Builds the table from the printed method to the corrected one, step by step.

@@ -32,10 +32,12 @@ const VERIFIERS: [(&str, &str, &str); 2] = [
     ("svm-patch", "training = { gammas = [2.0], penalties = [3.0] }", ""),
     ("color-texture", "training = { trees = [200] }", "weight = 2.0\nbias = -4.0"),
 ];
+/// Seed of training and of verifiers.
+const SEED: u64 = 1;
 /// Config of the detector, used without its verifiers.
-const DETECTS: &str = "stereo-verified";
+pub(super) const DETECTS: &str = "stereo-verified";
 /// Lowered thresholds, so that training gets many candidates (as by `tagalong train`).
-const LOWERED: [(&str, f64); 9] = [
+pub(super) const LOWERED: [(&str, f64); 9] = [
     ("detectors.0.config.boundary_margin_m", 0.2),
     ("detectors.0.config.min_head_height_m", 1.0),
     ("detectors.0.config.min_head_width_m", 0.06),
@@ -76,7 +78,7 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
     let detects = without_verifiers(&lab.contender(DETECTS)?)?;
     let mut trainers = Vec::new();
     for (plugin, training, _) in VERIFIERS {
-        let each = (0..=KINDS.len()).map(|_| trainer(lab, plugin, training));
+        let each = (0..=KINDS.len()).map(|_| trainer(lab, plugin, training, SEED));
         trainers.push(each.collect::<Result<Vec<_>, _>>()?);
     }
     // Training has two draws for each draw of the test.
@@ -183,20 +185,21 @@ fn table(
 }
 
 /// A labelled candidate of the detector.
-struct LabelledCandidate<'a> {
-    detection: &'a Detection,
-    is_person: bool,
+pub(super) struct LabelledCandidate<'a> {
+    pub(super) detection: &'a Detection,
+    pub(super) is_person: bool,
     /// Furniture at the position of a candidate that is not a person.
-    thing: Option<&'static str>,
-    is_believed: bool,
-    group: u64,
+    pub(super) thing: Option<&'static str>,
+    pub(super) is_believed: bool,
+    pub(super) group: u64,
 }
 
 /// Callback for each candidate.
-type See<'a> = &'a mut dyn FnMut(&Frame, &LabelledCandidate<'_>) -> Result<(), ReproduceError>;
+pub(super) type See<'a> =
+    &'a mut dyn FnMut(&Frame, &LabelledCandidate<'_>) -> Result<(), ReproduceError>;
 
 /// Runs the detector on `seeds` draws of each room of a split.
-fn visit(
+pub(super) fn visit(
     lab: &Lab,
     split: Split,
     seeds: u64,
@@ -251,18 +254,25 @@ fn is_person(detection: &Detection, people: &[Truth]) -> Option<bool> {
     }
 }
 
-fn without_verifiers(contender: &Contender) -> Result<Contender, ReproduceError> {
+/// Returns the contender without verifiers and odometry.
+pub(super) fn without_verifiers(contender: &Contender) -> Result<Contender, ReproduceError> {
     let mut config = variants::table(contender)?;
     config.retain(|key, _| key != "verifiers" && key != "odometry");
     Ok(Contender { config: config.to_string(), ..contender.clone() })
 }
 
-fn trainer(lab: &Lab, plugin: &str, settings: &str) -> Result<Box<dyn Trainer>, ReproduceError> {
-    build(settings, |value, context| lab.registry.build_trainer(plugin, Some(value), context))
+/// Returns a trainer with settings of the plugin, TOML.
+pub(super) fn trainer(
+    lab: &Lab,
+    plugin: &str,
+    settings: &str,
+    seed: u64,
+) -> Result<Box<dyn Trainer>, ReproduceError> {
+    build(settings, seed, |value, context| lab.registry.build_trainer(plugin, Some(value), context))
 }
 
 /// Fits the models, and builds the verifiers with them.
-fn judges_of(
+pub(super) fn judges_of(
     lab: &Lab,
     plugin: &str,
     settings: &str,
@@ -276,7 +286,7 @@ fn judges_of(
         let path = folder.path().join(format!("{at}.toml"));
         fs::write(&path, fitted.model).map_err(other)?;
         let settings = format!("{settings}\nmodel = '{}'", path.display());
-        judges.push(build(&settings, |value, context| {
+        judges.push(build(&settings, SEED, |value, context| {
             lab.registry.build_verifier(plugin, Some(value), context)
         })?);
         lab.progress.step();
@@ -286,15 +296,17 @@ fn judges_of(
 
 fn build<T>(
     settings: &str,
+    seed: u64,
     make: impl FnOnce(Value<'_>, &Context) -> Result<T, ConfigError>,
 ) -> Result<T, ReproduceError> {
     let table = DeTable::parse(settings).map_err(other)?;
     let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
     let wheels = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
-    make(value, &Context { seed: 1, base_dir: ".".into(), wheels }).map_err(|e| other(e.message))
+    make(value, &Context { seed, base_dir: ".".into(), wheels }).map_err(|e| other(e.message))
 }
 
-fn other(error: impl ToString) -> ReproduceError {
+/// Returns an error of another crate as one of an experiment.
+pub(super) fn other(error: impl ToString) -> ReproduceError {
     ReproduceError::Other(error.to_string())
 }
 

@@ -1,5 +1,7 @@
 //! Stereo systems of Satake and Miura: P1 without and P4 with a verifier.
 
+mod apart;
+mod few_samples;
 mod fit;
 mod ladder;
 mod left_out;
@@ -70,6 +72,11 @@ pub const STEREO_SVM_EKF: System = System {
             run: left_out::left_out,
         },
         Experiment {
+            name: "few-samples",
+            about: "Section II-C: the verifier trained on 438 + 146 samples, and on all",
+            run: few_samples::few_samples,
+        },
+        Experiment {
             name: "walk",
             about: "Fig. 11: error along two edges of a square, 125 mm on average",
             run: walk::of_p4,
@@ -83,6 +90,11 @@ pub const STEREO_SVM_EKF: System = System {
             name: "occlusion",
             about: "Fig. 7: who is fully hidden is known again, by gap and duration",
             run: occlusion::occlusion,
+        },
+        Experiment {
+            name: "two-people-apart",
+            about: "Section III-C: how near two people may be to be told apart, by range",
+            run: apart::apart,
         },
         Experiment {
             name: "directions",

@@ -6,7 +6,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::tuning::{Choice, Figures, Objective, candidates, leave_one_out, mean, shown_value};
+use crate::tuning::{
+    Choice, Figures, Objective, Poll, candidates, leave_one_out, mean, shipped, shown_value,
+};
 use clap::Args;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
@@ -71,8 +73,9 @@ pub struct BoxesArgs {
     /// The objective: the mean of this figure over the places is maximised.
     #[arg(long, value_enum, default_value_t = Objective::HotaAndIdf1)]
     pub objective: Objective,
-    /// Most settings that are tried for a pipeline, its own among them: all combinations where they
-    /// are so few, otherwise a sample.
+    /// Most settings that are tried for a pipeline: all combinations where they are so few, otherwise
+    /// a sample. Those of the config are scored beside them and chosen only if they are among them;
+    /// with 1 they are all there is.
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub budget: u16,
@@ -95,8 +98,12 @@ pub struct BoxesArgs {
 struct Contestant {
     name: String,
     tunables: Vec<Tunable>,
-    /// Values and their contenders, the shipped ones first.
+    /// Values and their contenders: first those among which the sequences choose.
     settings: Vec<(Vec<toml::Value>, Contender)>,
+    /// Number of settings among which the sequences choose.
+    candidates: usize,
+    /// Place of the settings of the config, which are a candidate only by chance.
+    shipped: usize,
 }
 
 /// Result on one sequence.
@@ -129,7 +136,7 @@ pub fn boxes(args: &BoxesArgs, registry: &Registry) -> Outcome {
             details.push((name, tracked));
             Ok(())
         };
-        let shipped = vec![0; sequences.len()];
+        let shipped = vec![contestant.shipped; sequences.len()];
         add(contestant.name.clone(), bench.track(contestant, &shipped)?)?;
         if args.leave_one_out {
             let (choice, figures) = bench.choose(contestant)?;
@@ -182,8 +189,9 @@ impl Bench<'_> {
             let message = "one sequence is left out, so two are needed for --leave-one-out";
             return Err(Failure::usage(message));
         }
+        let candidates = &contestant.settings[..contestant.candidates];
         let figures = in_order(
-            &contestant.settings,
+            candidates,
             threads(self.args.jobs),
             |(_, contender)| {
                 let mut by_place: Vec<Vec<Figures>> = vec![Vec::new(); places];
@@ -194,10 +202,11 @@ impl Bench<'_> {
                 }
                 Ok(by_place.iter().map(mean).collect())
             },
-            |done| say_progress(done, contestant.settings.len()),
+            |done| say_progress(done, candidates.len()),
         )
         .map_err(|error| failed(&error))?;
-        Ok((leave_one_out(&figures, self.args.objective), figures.len()))
+        let poll = Poll::of_equals(places);
+        Ok((leave_one_out(&figures, self.args.objective, &poll), figures.len()))
     }
 
     /// Returns the chosen settings as text.
@@ -250,21 +259,31 @@ impl Contestant {
         let (pipeline, settings) = file.pipeline(registry, None)?;
         let resolved = for_given_boxes(&pipeline.resolved(), registry).map_err(Failure::usage)?;
         let tunables = if args.leave_one_out { settings.tune } else { Vec::new() };
-        let tried = candidates(&tunables, args.budget.into(), args.seed);
-        let mut settings = Vec::new();
-        for values in tried {
-            let keys = tunables.iter().map(|tunable| tunable.key.as_str());
-            let named: Vec<(&str, &toml::Value)> = keys.zip(&values).collect();
-            let text = with_values(&resolved, &named).map_err(|e| Failure::usage(e.message))?;
-            let folder = file.folder().to_owned();
-            settings.push((values, Contender { folder, ..Contender::new(file.stem(), text) }));
-        }
         if args.leave_one_out {
             file.check_tuning(registry)?;
         }
-        // Each value is allowed, so that a refusal is of a combination that contradicts itself.
-        settings.retain(|(_, contender)| contender.pipeline(registry, 1).is_ok());
-        Ok(Self { name: file.stem(), tunables, settings })
+        let now = shipped(&tunables);
+        let mut settings: Vec<(Vec<toml::Value>, Contender)> = Vec::new();
+        for values in candidates(&tunables, args.budget.into(), args.seed) {
+            let contender = contender(file, &resolved, &tunables, &values)?;
+            // Each value is allowed, so that a refusal is of a combination that contradicts itself.
+            if values == now || contender.pipeline(registry, 1).is_ok() {
+                settings.push((values, contender));
+            }
+        }
+        let candidates = settings.len();
+        if candidates == 0 {
+            let why =
+                format!("{}: no setting of [tune] is left, all contradict themselves", file.stem());
+            return Err(Failure::usage(why));
+        }
+        let shipped = settings.iter().position(|(values, _)| *values == now);
+        if shipped.is_none() {
+            let as_is = contender(file, &resolved, &tunables, &now)?;
+            settings.push((now, as_is));
+        }
+        let shipped = shipped.unwrap_or(settings.len() - 1);
+        Ok(Self { name: file.stem(), tunables, settings, candidates, shipped })
     }
 
     fn words(&self, setting: usize) -> String {
@@ -274,7 +293,7 @@ impl Contestant {
             .zip(&self.settings[setting].0)
             .map(|(tunable, value)| format!("`{}` = {}", tunable.key, shown_value(value)))
             .collect();
-        if setting == 0 { "as shipped".to_owned() } else { words.join(", ") }
+        if setting == self.shipped { "as shipped".to_owned() } else { words.join(", ") }
     }
 }
 
@@ -315,6 +334,19 @@ fn drop_doubled_ids(sequences: &mut [GivenSequence]) {
             ));
         }
     }
+}
+
+/// Returns the contender with these values of the tunable settings.
+fn contender(
+    file: &ConfigFile,
+    resolved: &str,
+    tunables: &[Tunable],
+    values: &[toml::Value],
+) -> Result<Contender, Failure> {
+    let keys = tunables.iter().map(|tunable| tunable.key.as_str());
+    let named: Vec<(&str, &toml::Value)> = keys.zip(values).collect();
+    let text = with_values(resolved, &named).map_err(|e| Failure::usage(e.message))?;
+    Ok(Contender { folder: file.folder().to_owned(), ..Contender::new(file.stem(), text) })
 }
 
 fn contestants(

@@ -30,11 +30,13 @@ pub struct RoomsArgs {
     /// Folder of the logs [default: the `folder` that the rooms name].
     #[arg(long, value_name = "DIR")]
     pub logs_dir: Option<PathBuf>,
-    /// The objective: the mean of this figure over the rooms is maximised.
+    /// The objective: the mean of this figure over the rooms, weighed by their annotated people, is
+    /// maximised.
     #[arg(long, value_enum, default_value_t = Objective::Hota)]
     pub objective: Objective,
-    /// Most settings that are tried for a pipeline, its own among them: all combinations where they
-    /// are so few, otherwise a sample.
+    /// Most settings that are tried for a pipeline: all combinations where they are so few, otherwise
+    /// a sample. Those of the config are scored beside them and chosen only if they are among them;
+    /// with 1 they are all there is.
     #[arg(long, value_name = "N", default_value_t = 32,
           value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub budget: u16,

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::tuning::{candidates, shown_value};
+use crate::tuning::{candidates, shipped, shown_value};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::outcome::Failure;
 use tagalong_config::Registry;
@@ -17,14 +17,20 @@ pub struct Location {
     pub logs: Vec<Annotated>,
     /// Models that have not seen it, by the plugin that reads them.
     pub models: BTreeMap<String, PathBuf>,
+    /// True if nothing is tracked over its frames: it has no say in a choice.
+    pub single_frames: bool,
 }
 
 /// Pipeline with all settings that are tried.
 pub struct Contestant {
     /// Config as it is shipped.
     pub config: PlannedConfig,
-    /// Tried settings, the shipped ones first.
+    /// Settings that run: first those among which the rooms choose.
     pub settings: Vec<Setting>,
+    /// Number of settings among which the rooms choose.
+    pub candidates: usize,
+    /// Place of the settings of the config, which are a candidate only by chance.
+    pub shipped: usize,
     /// Number of combinations that contradict themselves.
     pub refused: usize,
 }
@@ -60,7 +66,8 @@ impl Contestant {
         config.file.check_tuning(registry)?;
         let (pipeline, _) = config.file.pipeline(registry, None)?;
         let budget = usize::from(args.budget);
-        let mut settings = Vec::new();
+        let now = shipped(&config.tune);
+        let mut settings: Vec<Setting> = Vec::new();
         let mut refused = 0;
         for values in candidates(&config.tune, budget, args.seed) {
             match Setting::new(&config, pipeline.config(), values, locations, registry)? {
@@ -68,7 +75,21 @@ impl Contestant {
                 None => refused += 1,
             }
         }
-        Ok(Self { config, settings, refused })
+        let candidates = settings.len();
+        if candidates == 0 {
+            let name = config.file.stem();
+            let why = format!(
+                "{name}: no setting of [tune] is left, all {refused} contradict themselves"
+            );
+            return Err(Failure::usage(why));
+        }
+        let shipped = settings.iter().position(|setting| setting.values == now);
+        if shipped.is_none() {
+            let as_is = Setting::new(&config, pipeline.config(), now, locations, registry)?;
+            settings.extend(as_is);
+        }
+        let shipped = shipped.unwrap_or(settings.len() - 1);
+        Ok(Self { config, settings, candidates, shipped, refused })
     }
 
     /// Returns its name in tables.

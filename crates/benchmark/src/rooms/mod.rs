@@ -79,7 +79,13 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
             Err(at(tagalong_config::ConfigError { message, span: Some(model.place) }))
         });
         let models = models.collect::<Result<_, Failure>>()?;
-        locations.push(Location { name: room.name, about: room.about, logs, models });
+        locations.push(Location {
+            name: room.name,
+            about: room.about,
+            logs,
+            models,
+            single_frames: room.single_frames,
+        });
     }
     Ok(locations)
 }

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::tuning::{Choice, Figures, Objective, leave_one_out, mean, shown_value};
+use crate::tuning::{
+    Choice, Figures, Objective, Poll, Weights, leave_one_out, mean, shown_value, weighted_mean,
+};
 use serde::Serialize;
 use tagalong_app::outcome::Failure;
 use tagalong_app::serialize::to_json;
@@ -31,6 +33,7 @@ pub struct Report {
 struct About {
     name: String,
     about: String,
+    single_frames: bool,
     logs: Vec<String>,
 }
 
@@ -38,7 +41,7 @@ struct About {
 #[derive(Serialize)]
 pub struct Fitted {
     pub name: String,
-    /// Number of tried settings, those of the config among them.
+    /// Number of settings among which the rooms chose.
     settings: usize,
     /// Number of settings that contradict themselves, which were not tried.
     refused: usize,
@@ -65,6 +68,9 @@ struct Skipped {
 #[derive(Serialize)]
 pub struct InRoom {
     pub room: String,
+    /// True if nothing is tracked over its frames: it has no say in the choice, nor in the means of
+    /// HOTA, IDF1 and MOTA.
+    pub single_frames: bool,
     /// Settings that the other rooms chose.
     chosen_without: Values,
     /// Their score here.
@@ -102,6 +108,7 @@ impl Report {
         let rooms = locations.iter().map(|location| About {
             name: location.name.clone(),
             about: location.about.clone(),
+            single_frames: location.single_frames,
             logs: location.logs.iter().map(described).collect(),
         });
         let fitted = contestants
@@ -151,7 +158,7 @@ impl Report {
     fn summary(&self) -> Table {
         let rows = self.pipelines.iter().map(|fitted| {
             let rooms = Cell::number(fitted.rooms.len() as f64, 0);
-            let cells = if fitted.rooms.is_empty() { Vec::new() } else { cells(&fitted.mean()) };
+            let cells = if fitted.rooms.is_empty() { Vec::new() } else { fitted.mean_cells() };
             Row::ours(&fitted.name, [vec![rooms], cells].concat())
         });
         let objective = match self.objective {
@@ -162,17 +169,22 @@ impl Report {
         };
         let rooms: Vec<String> = self.rooms.iter().map(About::words).collect();
         let mut notes = vec![
+            "The means here weigh each room by its annotated people, each counted once per frame; \
+             rooms alike: the mean in which all rooms have the same weight. Rooms of single frames \
+             have no say in HOTA, IDF1 and MOTA, nor in what is chosen."
+                .to_owned(),
             format!("Rooms: {}.", rooms.join("; ")),
             "w/o: in each room, with the settings that the other rooms chose, and with models \
              that have not seen it where the rooms name such; all: with those \
              that all rooms chose, this one among them, and the shipped models; gap: HOTA of all less that of w/o; as is: \
              with the settings of the config; false: false people in a frame; free, partly: recall of people within 5 m of the \
              camera of whom at least 90 % and 60 to 90 % shows; off: mean distance of a track from \
-             its person. A room's figure is the mean over its logs, and the means here are over rooms."
+             its person. A room's figure is the mean over its logs."
                 .to_owned(),
             format!(
-                "Chosen by the mean of {objective} over rooms, among at most {} settings a \
-                 pipeline (seed {}).",
+                "Chosen by the mean of {objective} over rooms, weighed by people, among at most {} \
+                 settings a pipeline (seed {}); those of the config take part only if the sample \
+                 has them.",
                 self.budget, self.seed
             ),
             "So few rooms bear no interval.".to_owned(),
@@ -181,7 +193,9 @@ impl Report {
             fitted.too_few.as_ref().map(|why| format!("{}: {why}.", fitted.name))
         });
         notes.extend(too_few);
-        let columns = ["rooms"].into_iter().map(String::from).chain(columns()).collect();
+        let first = ["rooms"].into_iter().map(String::from);
+        let last = ["rooms alike: HOTA w/o"].into_iter().map(String::from);
+        let columns = first.chain(columns()).chain(last).collect();
         let title = "Chosen without the room that is scored, and with all: means over the rooms";
         Table { title: title.into(), columns, rows: rows.collect(), notes }
     }
@@ -200,8 +214,13 @@ impl About {
     fn words(&self) -> String {
         let logs = self.logs.join(", ");
         let about = if self.about.is_empty() { String::new() } else { format!("{}: ", self.about) };
-        format!("{} ({about}{logs})", self.name)
+        format!("{} ({about}{logs})", labelled(&self.name, self.single_frames))
     }
+}
+
+/// Returns the name of a room in tables.
+fn labelled(room: &str, single_frames: bool) -> String {
+    if single_frames { format!("{room}, single frames") } else { room.to_owned() }
 }
 
 /// Access to the results of one pipeline.
@@ -232,45 +251,51 @@ impl Scorer<'_> {
             }
         }
         // With one room there is no other one to choose the settings by.
-        let too_few = (rooms.len() < 2)
-            .then(|| format!("can read logs of {} room, and two are needed", rooms.len()));
+        let choosing = rooms.iter().filter(|(location, _)| !location.single_frames).count();
+        let too_few = (choosing < 2).then(|| {
+            let beside = if choosing < rooms.len() { " beside those of single frames" } else { "" };
+            format!("can read logs of {choosing} room{beside}, and two are needed")
+        });
         if too_few.is_some() {
             rooms.clear();
         }
         let unseen = self.table(true, &rooms)?;
         let seen = self.table(false, &rooms)?;
         // A model that has seen a room would make any setting look good there.
-        let Choice { without, with_all } = leave_one_out(&unseen, objective);
+        let has_say = rooms.iter().map(|(location, _)| !location.single_frames).collect();
+        let poll = Poll { weights: Weights::People, has_say };
+        let Choice { without, with_all } = leave_one_out(&unseen, objective, &poll);
         let mut in_rooms = Vec::new();
         for (at, (location, logs)) in rooms.iter().enumerate() {
             in_rooms.push(InRoom {
                 room: location.name.clone(),
+                single_frames: location.single_frames,
                 chosen_without: self.values(without[at]),
                 without: unseen[without[at]][at],
                 with_all: seen[with_all][at],
-                shipped: seen[0][at],
+                shipped: self.room(self.contestant.shipped, false, logs)?,
                 logs: self.by_log(without[at], logs)?,
             });
         }
         Ok(Fitted {
             name: self.contestant.name(),
-            settings: self.contestant.settings.len(),
+            settings: self.contestant.candidates,
             refused: self.contestant.refused,
             skipped,
-            shipped: self.values(0),
+            shipped: self.values(self.contestant.shipped),
             chosen_with_all: self.values(with_all),
             rooms: in_rooms,
             too_few,
         })
     }
 
-    /// Returns the figures with each setting in each room.
+    /// Returns the figures with each candidate in each room.
     fn table(
         &self,
         unseen: bool,
         rooms: &[(&Location, Vec<usize>)],
     ) -> Result<Vec<Vec<Figures>>, Failure> {
-        (0..self.contestant.settings.len())
+        (0..self.contestant.candidates)
             .map(|at| rooms.iter().map(|(_, logs)| self.room(at, unseen, logs)).collect())
             .collect()
     }
@@ -289,7 +314,7 @@ impl Scorer<'_> {
             .collect();
         let logs = logs.iter().map(|log| {
             let without = self.log(chosen, true, *log)?;
-            let shipped = self.log(0, false, *log)?;
+            let shipped = self.log(self.contestant.shipped, false, *log)?;
             Ok(InLog { log: names[*log].to_owned(), without, shipped })
         });
         logs.collect()
@@ -309,26 +334,47 @@ impl Scorer<'_> {
     }
 }
 
+/// Returns the mean of figures over rooms; HOTA, IDF1 and MOTA of those that are not single frames.
+fn over_rooms(rooms: &[InRoom], read: fn(&InRoom) -> &Figures, weights: Weights) -> Figures {
+    let tracked = rooms.iter().filter(|room| !room.single_frames);
+    let Figures { hota, idf1, mota, .. } = weighted_mean(tracked.map(read), weights);
+    Figures { hota, idf1, mota, ..weighted_mean(rooms.iter().map(read), weights) }
+}
+
 impl Fitted {
     /// Returns the means over the rooms.
-    fn mean(&self) -> InRoom {
+    fn mean(&self, name: &str, weights: Weights) -> InRoom {
         InRoom {
-            room: "mean".to_owned(),
+            room: name.to_owned(),
+            single_frames: false,
             chosen_without: Values::new(),
-            without: mean(self.rooms.iter().map(|room| &room.without)),
-            with_all: mean(self.rooms.iter().map(|room| &room.with_all)),
-            shipped: mean(self.rooms.iter().map(|room| &room.shipped)),
+            without: over_rooms(&self.rooms, |room| &room.without, weights),
+            with_all: over_rooms(&self.rooms, |room| &room.with_all, weights),
+            shipped: over_rooms(&self.rooms, |room| &room.shipped, weights),
             logs: Vec::new(),
         }
     }
 
+    /// Returns the two means: the one that weighs rooms by their people first.
+    fn means(&self) -> [InRoom; 2] {
+        [self.mean("mean", Weights::People), self.mean("mean, rooms alike", Weights::Equal)]
+    }
+
+    /// Returns the cells of the mean, and HOTA of the one of rooms alike.
+    fn mean_cells(&self) -> Vec<Cell> {
+        let [mean, alike] = self.means();
+        [cells(&mean), vec![Cell::number(alike.without.hota, 3)]].concat()
+    }
+
     fn table(&self) -> Table {
-        let mean = (!self.rooms.is_empty()).then(|| self.mean());
-        let rows = self.rooms.iter().chain(&mean);
+        let means = if self.rooms.is_empty() { Vec::new() } else { Vec::from(self.means()) };
+        let rows = self.rooms.iter().chain(&means);
         Table {
             title: self.name.clone(),
             columns: columns().collect(),
-            rows: rows.map(|room| Row::ours(&room.room, cells(room))).collect(),
+            rows: rows
+                .map(|room| Row::ours(labelled(&room.room, room.single_frames), cells(room)))
+                .collect(),
             notes: self.notes(),
         }
     }
@@ -404,4 +450,76 @@ fn cells(room: &InRoom) -> Vec<Cell> {
         [without.recall_free, without.recall_partly_hidden, without.position_error_m].into_iter();
     let figures = figures.map(Some).chain(shown);
     figures.map(|figure| figure.map_or_else(Cell::default, |f| Cell::number(f, 3))).collect()
+}
+
+#[cfg(test)]
+pub(super) mod testing {
+    use super::*;
+
+    /// Returns the results in a room in which all figures of a pipeline are the same.
+    pub fn room(name: &str, single_frames: bool, people: u64, figure: f64) -> InRoom {
+        let figures = Figures {
+            hota: figure,
+            idf1: figure,
+            mota: figure,
+            false_a_frame: figure,
+            recall: figure,
+            people,
+            ..Figures::default()
+        };
+        InRoom {
+            room: name.into(),
+            single_frames,
+            chosen_without: Values::new(),
+            without: figures,
+            with_all: figures,
+            shipped: figures,
+            logs: Vec::new(),
+        }
+    }
+
+    /// Returns the results of a pipeline in these rooms.
+    pub fn fitted(name: &str, rooms: Vec<InRoom>) -> Fitted {
+        Fitted {
+            name: name.into(),
+            settings: 1,
+            refused: 0,
+            skipped: Vec::new(),
+            shipped: Values::new(),
+            chosen_with_all: Values::new(),
+            rooms,
+            too_few: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::{fitted, room};
+    use super::*;
+
+    fn three_rooms() -> Fitted {
+        let rooms =
+            vec![room("A", false, 75, 0.8), room("B", false, 25, 0.4), room("D", true, 100, 0.2)];
+        fitted("pipeline", rooms)
+    }
+
+    #[test]
+    fn means_weigh_rooms_by_people_and_track_nothing_over_single_frames() {
+        let [by_people, alike] = three_rooms().means();
+        for (mean, expected) in [(by_people, [0.7, 0.7, 0.45]), (alike, [0.6, 0.6, 1.4 / 3.0])] {
+            let found = [mean.without.hota, mean.without.mota, mean.without.recall];
+            let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-12, "{found:?} instead of {expected:?}");
+        }
+    }
+
+    #[test]
+    fn the_table_has_the_row_of_single_frames_and_both_means() {
+        let table = three_rooms().table();
+        let names: Vec<&str> = table.rows.iter().map(|row| row.name.as_str()).collect();
+        assert_eq!(names, ["A", "B", "D, single frames", "mean", "mean, rooms alike"]);
+        let last = three_rooms().mean_cells().pop().and_then(|cell| cell.value).unwrap();
+        assert!((last - 0.6).abs() < 1e-12, "{last}");
+    }
 }

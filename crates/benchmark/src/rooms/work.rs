@@ -161,7 +161,8 @@ impl<'a> Desk<'a> {
                 }
                 for (setting, values) in about.settings.iter().enumerate() {
                     runs.push(Run { contestant, setting, log, unseen: false });
-                    if values.has_seen(room) {
+                    // Without a say in a choice, a setting is scored as it is shipped alone.
+                    if setting < about.candidates && values.has_seen(room) {
                         runs.push(Run { contestant, setting, log, unseen: true });
                     }
                 }

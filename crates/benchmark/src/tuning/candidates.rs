@@ -9,26 +9,32 @@ pub type Candidate = Vec<toml::Value>;
 /// Largest number of new deals for a candidate that is not there yet.
 const ROUNDS: usize = 64;
 
-/// Returns the settings to be tried, at most `budget`, as they are in the config first. All
-/// combinations where they are few enough; otherwise a sample of them in which each value
-/// of a setting comes equally often (in the manner of a Latin hypercube: McKay, Beckman and
-/// Conover, Technometrics 1979), the same for the same seed.
-pub fn candidates(tunables: &[Tunable], budget: usize, seed: u64) -> Vec<Candidate> {
-    let shipped: Candidate = tunables.iter().map(|tunable| tunable.now.clone()).collect();
-    let others = budget.saturating_sub(1);
-    let chosen = match grid(tunables, &shipped, others) {
-        Some(all) => all,
-        None => sample(tunables, &shipped, others, seed),
-    };
-    std::iter::once(shipped).chain(chosen).collect()
+/// Returns the settings of the config.
+pub fn shipped(tunables: &[Tunable]) -> Candidate {
+    tunables.iter().map(|tunable| tunable.now.clone()).collect()
 }
 
-/// All combinations but the one of the config, unless they are more than `most`.
-fn grid(tunables: &[Tunable], shipped: &Candidate, most: usize) -> Option<Vec<Candidate>> {
+/// Returns the settings to be tried, at most `budget`. All combinations where they are few enough;
+/// otherwise a sample of them in which each value of a setting comes equally often (in the manner of
+/// a Latin hypercube: McKay, Beckman and Conover, Technometrics 1979), the same for the same seed.
+///
+/// The settings of the config are among them only if they come so: figures of all rooms may have
+/// chosen them. With a budget of 1 there is no choice, and they are all there is.
+pub fn candidates(tunables: &[Tunable], budget: usize, seed: u64) -> Vec<Candidate> {
+    if budget <= 1 {
+        return vec![shipped(tunables)];
+    }
+    match grid(tunables, budget) {
+        Some(all) => all,
+        None => sample(tunables, budget, seed),
+    }
+}
+
+/// All combinations, unless they are more than `most`.
+fn grid(tunables: &[Tunable], most: usize) -> Option<Vec<Candidate>> {
     let mut all: Vec<Candidate> = vec![Vec::new()];
     for Tunable { values, .. } in tunables {
-        // One more than `most`, in case that of the config is among them.
-        if all.len() * values.len() > most + 1 {
+        if all.len() * values.len() > most {
             return None;
         }
         let mut longer = Vec::new();
@@ -39,14 +45,13 @@ fn grid(tunables: &[Tunable], shipped: &Candidate, most: usize) -> Option<Vec<Ca
         }
         all = longer;
     }
-    all.retain(|candidate| candidate != shipped);
-    (all.len() <= most).then_some(all)
+    Some(all)
 }
 
 /// Returns settings dealt in blocks, so that a larger budget adds to those of a smaller one.
-fn sample(tunables: &[Tunable], shipped: &Candidate, count: usize, seed: u64) -> Vec<Candidate> {
+fn sample(tunables: &[Tunable], count: usize, seed: u64) -> Vec<Candidate> {
     let mut random = ChaCha::new(seed, 0);
-    let mut seen = BTreeSet::from([shown(shipped)]);
+    let mut seen = BTreeSet::new();
     let mut chosen = Vec::new();
     let block = tunables.iter().map(|tunable| tunable.values.len()).max().unwrap_or(0);
     for _ in 0..ROUNDS * count {
@@ -104,23 +109,38 @@ mod tests {
     #[test]
     fn few_combinations_are_all_tried() {
         let tunables = [tunable("a", 2, &[1, 2]), tunable("b", 9, &[5, 6, 7])];
-        let all = candidates(&tunables, 7, 1);
+        let all = candidates(&tunables, 6, 1);
         let numbers: Vec<Vec<i64>> =
             all.iter().map(|c| c.iter().filter_map(Value::as_integer).collect()).collect();
-        let expected = [[2, 9], [1, 5], [1, 6], [1, 7], [2, 5], [2, 6], [2, 7]];
+        let expected = [[1, 5], [1, 6], [1, 7], [2, 5], [2, 6], [2, 7]];
         assert_eq!(numbers, expected);
-        assert_eq!(candidates(&tunables[..1], 2, 1).len(), 2, "its own value is one of the two");
         assert_eq!(candidates(&[], 9, 1), [Vec::<Value>::new()]);
+    }
+
+    /// All rooms chose the settings of a config, so that with them the truth of a room would have a
+    /// say in what is chosen without it.
+    #[test]
+    fn the_settings_of_the_config_decide_nothing() {
+        let with_now = |now: i64| ["a", "b", "c"].map(|key| tunable(key, now, &[1, 2, 3, 4]));
+        assert_eq!(candidates(&with_now(2), 64, 1), candidates(&with_now(9), 64, 1));
+        assert_eq!(candidates(&with_now(2), 20, 1), candidates(&with_now(9), 20, 1));
+        let sampled = candidates(&with_now(9), 20, 1);
+        assert!(!sampled.contains(&shipped(&with_now(9))));
+    }
+
+    #[test]
+    fn without_a_choice_there_are_the_settings_of_the_config() {
+        assert_eq!(candidates(&three(), 1, 1), [vec![Value::Integer(2); 3]]);
     }
 
     #[test]
     fn of_many_a_balanced_sample_is_tried() {
-        let all = candidates(&three(), 21, 1);
-        assert_eq!(all.len(), 21);
-        assert_eq!(all.iter().map(shown).collect::<BTreeSet<_>>().len(), 21, "none twice");
+        let all = candidates(&three(), 20, 1);
+        assert_eq!(all.len(), 20);
+        assert_eq!(all.iter().map(shown).collect::<BTreeSet<_>>().len(), 20, "none twice");
         for setting in 0..3 {
             for value in 1..=4 {
-                let count = all[1..].iter().filter(|c| c[setting] == Value::Integer(value)).count();
+                let count = all.iter().filter(|c| c[setting] == Value::Integer(value)).count();
                 assert!((3..=7).contains(&count), "{setting} is {value} in {count} of 20");
             }
         }
@@ -130,7 +150,6 @@ mod tests {
     fn a_seed_says_which() {
         assert_eq!(candidates(&three(), 21, 1), candidates(&three(), 21, 1));
         assert_ne!(candidates(&three(), 21, 1), candidates(&three(), 21, 2));
-        assert_eq!(candidates(&three(), 21, 1)[0], candidates(&three(), 21, 2)[0]);
     }
 
     #[test]

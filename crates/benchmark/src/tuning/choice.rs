@@ -25,6 +25,26 @@ pub struct Figures {
     pub recall_partly_hidden: Option<f64>,
     /// Mean distance of a track from its person, m, where places are annotated.
     pub position_error_m: Option<f64>,
+    /// Number of annotated people, each counted once per frame; of a mean, the sum.
+    pub people: u64,
+}
+
+/// Weights of rooms in a mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weights {
+    /// All rooms alike.
+    Equal,
+    /// By the number of annotated people, each counted once per frame.
+    People,
+}
+
+/// Rules of a choice: which rooms have a say in it, and how much.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Poll {
+    /// Weights of the rooms.
+    pub weights: Weights,
+    /// For each room whether it has a say.
+    pub has_say: Vec<bool>,
 }
 
 /// Figure to maximise.
@@ -69,7 +89,24 @@ impl Figures {
             recall_free: scores.recall_free,
             recall_partly_hidden: scores.recall_partly_hidden,
             position_error_m: scores.position_error_mean_m,
+            people: scores.truths,
         })
+    }
+}
+
+impl Weights {
+    fn of(self, figures: &Figures) -> f64 {
+        match self {
+            Self::Equal => 1.0,
+            Self::People => figures.people as f64,
+        }
+    }
+}
+
+impl Poll {
+    /// Returns the rules by which all of so many rooms have the same say.
+    pub fn of_equals(rooms: usize) -> Self {
+        Self { weights: Weights::Equal, has_say: vec![true; rooms] }
     }
 }
 
@@ -87,39 +124,67 @@ impl Objective {
 /// Returns the mean of figures, each of the same weight; zeros of none. Where some lack a figure,
 /// its mean is that of the others.
 pub fn mean<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Figures {
+    weighted_mean(figures, Weights::Equal)
+}
+
+/// Returns the mean of figures as [`mean`], with weights.
+pub fn weighted_mean<'a>(
+    figures: impl IntoIterator<Item = &'a Figures>,
+    weights: Weights,
+) -> Figures {
     let all: Vec<&Figures> = figures.into_iter().collect();
-    let part = |figure: fn(&Figures) -> Option<f64>| {
-        let values: Vec<f64> = all.iter().filter_map(|figures| figure(figures)).collect();
-        tagalong_math::mean(&values)
-    };
     Figures {
-        hota: part(|f| Some(f.hota)).unwrap_or(0.0),
-        idf1: part(|f| Some(f.idf1)).unwrap_or(0.0),
-        mota: part(|f| Some(f.mota)).unwrap_or(0.0),
-        false_a_frame: part(|f| Some(f.false_a_frame)).unwrap_or(0.0),
-        recall: part(|f| Some(f.recall)).unwrap_or(0.0),
-        recall_free: part(|f| f.recall_free),
-        recall_partly_hidden: part(|f| f.recall_partly_hidden),
-        position_error_m: part(|f| f.position_error_m),
+        hota: mean_of(&all, weights, |f| Some(f.hota)).unwrap_or(0.0),
+        idf1: mean_of(&all, weights, |f| Some(f.idf1)).unwrap_or(0.0),
+        mota: mean_of(&all, weights, |f| Some(f.mota)).unwrap_or(0.0),
+        false_a_frame: mean_of(&all, weights, |f| Some(f.false_a_frame)).unwrap_or(0.0),
+        recall: mean_of(&all, weights, |f| Some(f.recall)).unwrap_or(0.0),
+        recall_free: mean_of(&all, weights, |f| f.recall_free),
+        recall_partly_hidden: mean_of(&all, weights, |f| f.recall_partly_hidden),
+        position_error_m: mean_of(&all, weights, |f| f.position_error_m),
+        people: all.iter().map(|figures| figures.people).sum(),
     }
+}
+
+/// Returns the weighted mean of one figure; `None` if all lack it.
+fn mean_of(all: &[&Figures], weights: Weights, figure: fn(&Figures) -> Option<f64>) -> Option<f64> {
+    let mut sum = 0.0;
+    let mut weight = 0.0;
+    for figures in all {
+        if let Some(value) = figure(figures) {
+            sum += weights.of(figures) * value;
+            weight += weights.of(figures);
+        }
+    }
+    (weight > 0.0).then(|| sum / weight)
 }
 
 /// Returns the choice without each room, and the one with all. `figures` has those of each
-/// candidate in each room, of which there are two at least. Of equally good candidates the first is
-/// taken, so that a setting stays as it is where nothing is better.
-pub fn leave_one_out(figures: &[Vec<Figures>], objective: Objective) -> Choice {
+/// candidate in each room, of which at least two have a say. Of equally good candidates the first is
+/// taken.
+pub fn leave_one_out(figures: &[Vec<Figures>], objective: Objective, poll: &Poll) -> Choice {
     let rooms = figures.first().map_or(0, Vec::len);
     Choice {
-        without: (0..rooms).map(|room| best(figures, objective, |other| other != room)).collect(),
-        with_all: best(figures, objective, |_| true),
+        without: (0..rooms).map(|room| best(figures, objective, poll, Some(room))).collect(),
+        with_all: best(figures, objective, poll, None),
     }
 }
 
-fn best(figures: &[Vec<Figures>], objective: Objective, counts: impl Fn(usize) -> bool) -> usize {
+fn best(
+    figures: &[Vec<Figures>],
+    objective: Objective,
+    poll: &Poll,
+    left_out: Option<usize>,
+) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
     for (at, rooms) in figures.iter().enumerate() {
-        let counting = rooms.iter().enumerate().filter(|(room, _)| counts(*room));
-        let worth = objective.of(&mean(counting.map(|(_, figures)| figures)));
+        let counting = rooms
+            .iter()
+            .zip(&poll.has_say)
+            .enumerate()
+            .filter(|(room, (_, has_say))| **has_say && left_out != Some(*room))
+            .map(|(_, (figures, _))| figures);
+        let worth = objective.of(&weighted_mean(counting, poll.weights));
         if worth > best.1 {
             best = (at, worth);
         }
@@ -147,6 +212,10 @@ mod tests {
         [hota, idf1, mota, false_a_frame, recall]
     }
 
+    fn alike() -> Poll {
+        Poll::of_equals(3)
+    }
+
     fn table(rows: &[[f64; 3]]) -> Vec<Vec<Figures>> {
         rows.iter().map(|row| row.iter().copied().map(of).collect()).collect()
     }
@@ -154,12 +223,49 @@ mod tests {
     #[test]
     fn a_room_has_no_say_in_what_is_chosen_without_it() {
         let figures = [[0.5, 0.5, 0.5], [0.9, 0.4, 0.4], [0.2, 0.6, 0.6]];
-        let choice = leave_one_out(&table(&figures), Objective::Hota);
+        let choice = leave_one_out(&table(&figures), Objective::Hota, &alike());
         assert_eq!(choice, Choice { without: vec![2, 1, 1], with_all: 1 });
         for value in [0.0, 0.3, 1.0] {
             let other = figures.map(|[_, b, c]| [value * b, b, c]);
-            assert_eq!(leave_one_out(&table(&other), Objective::Hota).without[0], 2);
+            assert_eq!(leave_one_out(&table(&other), Objective::Hota, &alike()).without[0], 2);
         }
+    }
+
+    /// The second candidate gains little in two rooms and loses much in the third.
+    #[test]
+    fn a_room_without_a_say_chooses_nothing() {
+        let figures = table(&[[0.5, 0.5, 0.9], [0.6, 0.6, 0.1]]);
+        let chosen = |has_say: [bool; 3]| {
+            let poll = Poll { has_say: has_say.to_vec(), ..alike() };
+            leave_one_out(&figures, Objective::Hota, &poll)
+        };
+        assert_eq!(chosen([true; 3]), Choice { without: vec![0, 0, 1], with_all: 0 });
+        assert_eq!(chosen([true, true, false]), Choice { without: vec![1, 1, 1], with_all: 1 });
+    }
+
+    /// The second candidate gains in the room with nine people of ten.
+    #[test]
+    fn rooms_weigh_by_their_people() {
+        let mut figures = table(&[[0.5, 0.9, 0.5], [0.6, 0.1, 0.5]]);
+        for rooms in &mut figures {
+            [rooms[0].people, rooms[1].people, rooms[2].people] = [90, 5, 5];
+        }
+        let by_people = Poll { weights: Weights::People, ..alike() };
+        assert_eq!(leave_one_out(&figures, Objective::Hota, &by_people).with_all, 1);
+        assert_eq!(leave_one_out(&figures, Objective::Hota, &alike()).with_all, 0);
+        let mean = weighted_mean(&figures[0], Weights::People);
+        assert!((mean.hota - 0.52).abs() < 1e-12, "{mean:?}");
+        assert_eq!(mean.people, 100);
+    }
+
+    #[test]
+    fn a_figure_that_some_lack_weighs_nothing() {
+        let few = Figures { recall_free: Some(0.2), people: 1, ..of(0.2) };
+        let many = Figures { recall_free: Some(0.6), people: 3, ..of(0.6) };
+        let without = Figures { people: 96, ..of(0.4) };
+        let mean = weighted_mean([&few, &many, &without], Weights::People);
+        assert!((mean.recall_free.unwrap() - 0.5).abs() < 1e-12, "{mean:?}");
+        assert!((mean.hota - 0.404).abs() < 1e-12, "{mean:?}");
     }
 
     #[test]
@@ -175,15 +281,15 @@ mod tests {
     #[test]
     fn the_objective_says_what_is_better() {
         let figures = table(&[[0.5, 0.5, 0.5], [0.9, 0.9, 0.9]]);
-        assert_eq!(leave_one_out(&figures, Objective::Hota).with_all, 1);
-        assert_eq!(leave_one_out(&figures, Objective::Idf1).with_all, 0);
-        assert_eq!(leave_one_out(&figures, Objective::Mota).with_all, 0);
+        assert_eq!(leave_one_out(&figures, Objective::Hota, &alike()).with_all, 1);
+        assert_eq!(leave_one_out(&figures, Objective::Idf1, &alike()).with_all, 0);
+        assert_eq!(leave_one_out(&figures, Objective::Mota, &alike()).with_all, 0);
     }
 
     #[test]
-    fn nothing_changes_without_a_gain() {
+    fn of_equals_the_first_is_chosen() {
         let figures = table(&[[0.5, 0.6, 0.7], [0.7, 0.6, 0.5], [0.5, 0.6, 0.7]]);
-        assert_eq!(leave_one_out(&figures, Objective::Hota).with_all, 0);
+        assert_eq!(leave_one_out(&figures, Objective::Hota, &alike()).with_all, 0);
     }
 
     #[test]
@@ -202,10 +308,11 @@ mod tests {
             mota: Some(0.3),
             fp_per_frame: Some(0.4),
             recall: Some(0.5),
+            truths: 7,
             ..Scores::default()
         };
-        let figures = Figures::of(&scores).map(|figures| all(&figures));
-        assert_eq!(figures, Some([0.1, 0.2, 0.3, 0.4, 0.5]));
+        let figures = Figures::of(&scores).unwrap();
+        assert_eq!((all(&figures), figures.people), ([0.1, 0.2, 0.3, 0.4, 0.5], 7));
         assert_eq!(Figures::of(&Scores { hota: None, ..scores }), None);
     }
 }

@@ -1,13 +1,14 @@
 //! Leave one room out: settings are chosen by all rooms but one, and scored in that one.
 //!
-//! All rooms choose among the same [`candidates`], which no figure has a say in. So each
-//! candidate runs once on each log, whatever room is left out, and [`leave_one_out`] is
-//! arithmetic: the truth of a room cannot reach the choice made without it.
+//! All rooms choose among the same [`candidates`], which no figure has a say in: the settings of the
+//! config, which all rooms may have chosen, are one of them only by chance. So each candidate runs
+//! once on each log, whatever room is left out, and [`leave_one_out`] is arithmetic: the truth of a
+//! room cannot reach the choice made without it.
 
 mod candidates;
 mod choice;
 mod rooms;
 
-pub use candidates::{candidates, shown_value};
-pub use choice::{Choice, Figures, Objective, leave_one_out, mean};
+pub use candidates::{candidates, shipped, shown_value};
+pub use choice::{Choice, Figures, Objective, Poll, Weights, leave_one_out, mean, weighted_mean};
 pub use rooms::Rooms;

@@ -27,6 +27,8 @@ pub struct Room {
     pub logs: Vec<RoomFile>,
     /// Models that have not seen this room, by the plugin that reads them.
     pub models: BTreeMap<String, RoomFile>,
+    /// True if its logs are single frames, over which nothing is tracked.
+    pub single_frames: bool,
     /// Frames of its logs whose annotation does not say where the upper body of a person is.
     unjudged: BTreeMap<String, Vec<u32>>,
 }
@@ -64,6 +66,8 @@ struct Entry {
     logs: Spanned<Vec<Spanned<PathBuf>>>,
     #[serde(default)]
     models: BTreeMap<String, Spanned<PathBuf>>,
+    #[serde(default)]
+    single_frames: bool,
     #[serde(default)]
     unjudged: BTreeMap<Spanned<String>, Vec<u32>>,
 }
@@ -119,7 +123,14 @@ impl Room {
             }
         }
         let unjudged = entry.unjudged.into_iter().map(|(log, all)| (log.into_inner(), all));
-        Ok(Self { name, about: entry.about, logs, models, unjudged: unjudged.collect() })
+        Ok(Self {
+            name,
+            about: entry.about,
+            logs,
+            models,
+            single_frames: entry.single_frames,
+            unjudged: unjudged.collect(),
+        })
     }
 }
 
@@ -192,6 +203,13 @@ mod tests {
         let rooms = parse(&text).unwrap().rooms;
         assert_eq!(rooms[1].unjudged(&rooms[1].logs[0]), [8, 9]);
         assert!(rooms[0].unjudged(&rooms[0].logs[0]).is_empty());
+    }
+
+    #[test]
+    fn a_room_of_single_frames_says_so() {
+        let text = TWO.replace("[\"b.mcap\"]\n", "[\"b.mcap\"]\nsingle_frames = true\n");
+        let rooms = parse(&text).unwrap().rooms;
+        assert_eq!([rooms[0].single_frames, rooms[1].single_frames], [false, true]);
     }
 
     #[test]

@@ -28,8 +28,7 @@ impl Pace {
         if !self.real {
             return;
         }
-        let now = Instant::now();
-        let due = self.last.map_or(now, |(last, at)| at + between(last, stamp));
+        let due = self.due(stamp, Instant::now());
         while signals.received().is_none() {
             let left = due.saturating_duration_since(Instant::now());
             if left.is_zero() {
@@ -37,7 +36,13 @@ impl Pace {
             }
             thread::sleep(left.min(NAP));
         }
-        self.last = Some((stamp, due.max(now)));
+    }
+
+    /// Returns when a frame that is there now is due.
+    fn due(&mut self, stamp: Stamp, now: Instant) -> Instant {
+        let due = self.last.map_or(now, |(last, at)| at + between(last, stamp)).max(now);
+        self.last = Some((stamp, due));
+        due
     }
 }
 
@@ -57,25 +62,44 @@ mod tests {
 
     #[test]
     fn frames_come_as_they_were_recorded_and_jumps_cost_no_time() {
+        let mut pace = Pace::new(true);
+        let start = Instant::now();
+        let stamps = [100.0, 100.1, 100.2, 3.0, 3.05];
+        // The first frame is late for none: each is there as soon as the one before was worked on.
+        let mut now = start;
+        for (at, expected_s) in stamps.into_iter().zip([0.0, 0.1, 0.2, 0.2, 0.25]) {
+            now = pace.due(stamp(at), now);
+            let due_s = (now - start).as_secs_f64();
+            assert!((due_s - expected_s).abs() < 1e-6, "{at}: {due_s}");
+        }
+        assert_eq!(between(stamp(1.0), stamp(1000.0)), LONGEST);
+    }
+
+    #[test]
+    fn a_pipeline_that_is_late_does_not_catch_up() {
+        let mut pace = Pace::new(true);
+        let start = Instant::now();
+        let after = |seconds: f64| start + Duration::from_secs_f64(seconds);
+        assert_eq!(pace.due(stamp(1.0), start), start);
+        assert_eq!(pace.due(stamp(1.1), after(0.7)), after(0.7), "late");
+        assert_eq!(pace.due(stamp(1.2), after(0.7)), after(0.7) + between(stamp(1.1), stamp(1.2)));
+    }
+
+    #[test]
+    fn a_frame_is_waited_for() {
         let signals = Signals::listen().unwrap();
         let mut pace = Pace::new(true);
         let start = Instant::now();
-        for at in [100.0, 100.1, 100.2, 3.0, 3.05] {
-            pace.wait_for(stamp(at), &signals);
-        }
-        let took = start.elapsed().as_secs_f64();
-        assert!((0.25..1.0).contains(&took), "{took}");
-        assert_eq!(between(stamp(1.0), stamp(1000.0)), LONGEST);
+        pace.wait_for(stamp(1.0), &signals);
+        pace.wait_for(stamp(1.08), &signals);
+        assert!(start.elapsed() >= Duration::from_millis(80), "longer than a nap");
     }
 
     #[test]
     fn without_a_pace_nothing_waits() {
         let signals = Signals::listen().unwrap();
         let mut pace = Pace::new(false);
-        let start = Instant::now();
-        for at in [1.0, 100.0] {
-            pace.wait_for(stamp(at), &signals);
-        }
-        assert!(start.elapsed().as_secs_f64() < 0.5);
+        pace.wait_for(stamp(1.0), &signals);
+        assert!(pace.last.is_none(), "no frame is due after another");
     }
 }

@@ -57,7 +57,7 @@ fn another_first_seed_rides_elsewhere_and_the_tables_name_it() {
     // With one ride, only the share of kept rides has an interval.
     let cells = near["tables"][0]["rows"][0]["cells"].as_array().unwrap();
     let with: Vec<usize> = (0..cells.len()).filter(|&k| !cells[k]["interval"].is_null()).collect();
-    assert_eq!(with, [1], "{cells:?}");
+    assert_eq!(with, [6], "{cells:?}");
 }
 
 #[test]

@@ -205,7 +205,56 @@ fn settings_that_contradict_each_other_are_left_out_and_counted() {
     // The section of the detector ends before that of the life cycle.
     assert!(text.contains("[manager.config]"));
     let fitted = home.fitted(&[]);
-    assert_eq!((fitted["settings"].as_u64(), fitted["refused"].as_u64()), (Some(4), Some(1)));
+    assert_eq!((fitted["settings"].as_u64(), fitted["refused"].as_u64()), (Some(3), Some(1)));
+    let tune = "manager.config.confirm_hits = [4]\nmanager.config.confirm_within = [3]";
+    home.config("near", "[manager.config]\nconfirm_within = 4\n", tune);
+    let told = text(&home.rooms(&[]).stderr);
+    assert!(
+        told.contains("near: no setting of [tune] is left, all 1 contradict themselves"),
+        "{told}"
+    );
+}
+
+/// The shipped setting finds the walker and the only candidate does not: it would be chosen by all.
+#[test]
+fn the_settings_of_the_config_are_scored_and_not_chosen() {
+    let home = Home::new();
+    home.config("near", "config = { max_depth_m = 4.0 }", &VALUES.replace("[2.0, 4.0]", "[2.0]"));
+    let fitted = home.fitted(&["--objective", "MOTA"]);
+    assert_eq!(chosen(&fitted), [2.0, 2.0, 2.0]);
+    assert_eq!(fitted["settings"], 1);
+    assert_eq!(mota(&fitted, 0, "without"), 0.0, "nobody is seen");
+    assert!(mota(&fitted, 0, "shipped") > 0.5, "{fitted}");
+    let alone = home.fitted(&["--objective", "MOTA", "--budget", "1"]);
+    assert_eq!(chosen(&alone), [4.0, 4.0, 4.0], "without a choice");
+}
+
+#[test]
+fn a_room_of_single_frames_has_no_say() {
+    let home = Home::new();
+    Drawn::of(60).write(&home.path("logs/c.mcap"));
+    // The walker is annotated in the first two frames alone, so that finding it is mostly wrong.
+    home.write(
+        "logs/c.people.csv",
+        &people(60).lines().take(3).map(|l| format!("{l}\n")).collect::<String>(),
+    );
+    let rooms = fs::read_to_string(home.path("rooms.toml")).unwrap();
+    let third = "[rooms.C]\nlogs = [\"c.mcap\"]\n";
+    let tables = |home: &Home| text(&home.rooms(&["--format", "markdown"]).stdout);
+    home.write("rooms.toml", &format!("{rooms}{third}"));
+    assert_eq!(chosen(&home.fitted(&["--objective", "MOTA"])), [2.0, 2.0, 2.0]);
+    assert!(!tables(&home).contains("single frames |"));
+    home.write("rooms.toml", &format!("{rooms}{third}single_frames = true\n"));
+    let fitted = home.fitted(&["--objective", "MOTA"]);
+    assert_eq!(chosen(&fitted), [4.0, 4.0, 4.0]);
+    assert!(fitted["rooms"][2]["single_frames"].as_bool().unwrap(), "{fitted}");
+    assert!(fitted["rooms"][2]["without"]["people"].as_u64().unwrap() > 0, "{fitted}");
+    assert!(tables(&home).contains("| C, single frames | "));
+    // With one other room that can choose, there is none where it is left out.
+    let first = rooms.split("[rooms.B]").next().unwrap();
+    home.write("rooms.toml", &format!("{first}{third}single_frames = true\n"));
+    let told = text(&home.rooms(&[]).stdout);
+    assert!(told.contains("1 room beside those of single frames, and two are needed"), "{told}");
 }
 
 #[test]

@@ -23,14 +23,26 @@ pub(super) const THREADS: usize = 32;
 /// Connections that are accepted in one turn.
 const ACCEPTED_IN_A_TURN: usize = 128;
 
-/// Longest wait for the next bytes of a request, or for a client to read the next ones.
-pub(super) const SILENCE: Duration = Duration::from_secs(5);
+/// Times that a client has.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Longest wait for the next bytes of a request, or for a client to read the next ones.
+    pub(super) silence: Duration,
+    /// Time for a whole request, and then for a free thread.
+    pub(super) request: Duration,
+    /// Time for a client to read a whole answer.
+    pub(super) reading: Duration,
+}
 
-/// Time for a whole request, and then for a free thread.
-const PATIENCE: Duration = Duration::from_secs(10);
-
-/// Time for a client to read a whole answer.
-const READING: Duration = Duration::from_secs(60);
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            silence: Duration::from_secs(5),
+            request: Duration::from_secs(10),
+            reading: Duration::from_secs(60),
+        }
+    }
+}
 
 /// Longest pause between two looks at a silent connection.
 const LOOK: Duration = Duration::from_millis(50);
@@ -233,11 +245,15 @@ impl Connection {
         self.looked = now;
         match &mut self.work {
             Work::Reading(_) => self.read(now, guard),
-            Work::Whole(_) if now.saturating_duration_since(self.since) > PATIENCE => {
-                self.refuse(now, Response::refusal(503, "all threads are busy; try again"))
+            Work::Whole(_) if now.saturating_duration_since(self.since) > guard.limits.request => {
+                self.refuse(
+                    now,
+                    guard.limits,
+                    Response::refusal(503, "all threads are busy; try again"),
+                )
             }
             Work::Whole(_) => Step::Waits,
-            Work::Writing { .. } => self.write(now),
+            Work::Writing { .. } => self.write(now, guard.limits),
         }
     }
 
@@ -248,14 +264,18 @@ impl Connection {
             let Work::Reading(incoming) = &mut self.work else { break };
             match self.stream.read(&mut part) {
                 Ok(0) => {
-                    return self.refuse(now, Response::refusal(400, "the request is cut off"));
+                    return self.refuse(
+                        now,
+                        guard.limits,
+                        Response::refusal(400, "the request is cut off"),
+                    );
                 }
                 Ok(count) => {
                     (step, self.moved) = (Step::Moves, now);
                     match incoming.take(&part[..count], guard.body_bytes) {
                         Ok(None) => {}
                         Ok(Some(request)) => self.admit(now, guard, request),
-                        Err(refusal) => return self.refuse(now, refusal),
+                        Err(refusal) => return self.refuse(now, guard.limits, refusal),
                     }
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
@@ -263,10 +283,14 @@ impl Connection {
                 Err(_) => return Step::Ends,
             }
         }
-        let is_late = now.saturating_duration_since(self.since) > PATIENCE
-            || now.saturating_duration_since(self.moved) > SILENCE;
+        let is_late = now.saturating_duration_since(self.since) > guard.limits.request
+            || now.saturating_duration_since(self.moved) > guard.limits.silence;
         if is_late && matches!(self.work, Work::Reading(_)) {
-            return self.refuse(now, Response::refusal(408, "the request came too slowly"));
+            return self.refuse(
+                now,
+                guard.limits,
+                Response::refusal(408, "the request came too slowly"),
+            );
         }
         step
     }
@@ -284,13 +308,13 @@ impl Connection {
         };
     }
 
-    fn refuse(&mut self, now: Instant, refusal: Response) -> Step {
+    fn refuse(&mut self, now: Instant, limits: Limits, refusal: Response) -> Step {
         (self.since, self.moved) = (now, now);
         self.work = Work::Writing { bytes: refusal.into_bytes(false), sent: 0 };
-        self.write(now)
+        self.write(now, limits)
     }
 
-    fn write(&mut self, now: Instant) -> Step {
+    fn write(&mut self, now: Instant, limits: Limits) -> Step {
         let Work::Writing { bytes, sent } = &mut self.work else { return Step::Waits };
         let mut step = Step::Waits;
         while *sent < bytes.len() {
@@ -303,8 +327,8 @@ impl Connection {
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
-                    let is_late = now.saturating_duration_since(self.moved) > SILENCE
-                        || now.saturating_duration_since(self.since) > READING;
+                    let is_late = now.saturating_duration_since(self.moved) > limits.silence
+                        || now.saturating_duration_since(self.since) > limits.reading;
                     return if is_late { Step::Ends } else { step };
                 }
                 Err(_) => return Step::Ends,

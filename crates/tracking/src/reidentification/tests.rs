@@ -9,6 +9,8 @@ use super::*;
 const DT_S: f64 = 0.1;
 const RED: [u8; 3] = [200, 20, 20];
 const BLUE: [u8; 3] = [20, 20, 200];
+/// A tenth of the way from blue to the next hue: near to it, and as far from red.
+const VIOLET: [u8; 3] = [29, 20, 200];
 
 fn camera() -> Camera {
     let lens = Pinhole { fx: 200.0, fy: 200.0, cx: 160.0, cy: 60.0, distortion: Distortion::None };
@@ -119,15 +121,27 @@ fn tracks_that_changed_over_change_their_numbers_back() {
     assert_eq!(scene.show(10, &frame(BLUE, RED), &apart), [2, 1], "and each stays");
 }
 
-/// After the contact both tracks look like person 2: an exchange would be right for one of them
-/// only.
+/// After the contact both tracks look like person 2, track 1 less so: an exchange would be right for
+/// one of them, and wrong for the other by more.
 #[test]
 fn a_track_does_not_change_over_against_the_looks_of_the_other() {
+    assert_eq!(after_a_contact(VIOLET, BLUE), [1, 2]);
+}
+
+/// After the contact both tracks look like person 2, track 2 less so: it loses less than track 1 gains.
+#[test]
+fn a_track_changes_over_against_lesser_doubts_of_the_other() {
+    assert_eq!(after_a_contact(BLUE, VIOLET), [2, 1]);
+}
+
+/// Returns the numbers of a track in red and one in blue after a contact from which they come in
+/// these colours.
+fn after_a_contact(left: [u8; 3], right: [u8; 3]) -> Vec<u32> {
     let mut scene = Scene::new();
     let apart = [track(1, 0.8, 1.6), track(2, -0.8, 1.6)];
     assert_eq!(scene.show(30, &frame(RED, BLUE), &apart), [1, 2]);
     scene.show(5, &frame(RED, BLUE), &[track(1, 0.1, 1.6), track(2, -0.1, 1.6)]);
-    assert_eq!(scene.show(10, &frame(BLUE, BLUE), &apart), [1, 2]);
+    scene.show(10, &frame(left, right), &apart)
 }
 
 #[test]

@@ -28,8 +28,9 @@ const TRAIL_S: f64 = 2.0;
 /// Events that a page which begins, or was away, still gets.
 const EVENTS: usize = 200;
 
-/// Longest wait of a page for the next frame.
-const WAIT: Duration = Duration::from_secs(1);
+/// Longest wait of a page for the next frame. In a test it is beyond all else, so that an answer is
+/// one to an event.
+pub(super) const WAIT: Duration = Duration::from_secs(if cfg!(test) { 120 } else { 1 });
 
 /// Time since the last question within which the page counts as watched.
 const WATCHED: Duration = Duration::from_secs(2);
@@ -155,6 +156,12 @@ impl Newest {
         state.ended.get_or_insert_with(|| why.to_owned());
         drop(state);
         self.changed.notify_all();
+    }
+
+    /// Returns true if a page has asked.
+    #[cfg(test)]
+    pub(super) fn was_asked(&self) -> bool {
+        self.lock().asked.is_some()
     }
 
     /// Returns true if a page asked lately and has not been told of the end.

@@ -9,26 +9,29 @@ use super::{Followed, crowd_table};
 /// Steps of the reliability curve.
 const BINS: usize = 10;
 
+/// Columns of the scores. Those that tell controllers apart come first; nearly all rides are kept, also
+/// by a controller that finds nobody again.
+const COLUMNS: [&str; 14] = [
+    "rides",
+    "in view %",
+    "refound %",
+    "after s",
+    "distance %",
+    "farther m",
+    "kept %",
+    "wrong %",
+    "longest wrong s",
+    "contacts",
+    "to people m",
+    "to things m",
+    "jerk m/s3",
+    "ms/frame",
+];
+
 /// Returns the scores of the rides, scene by scene and over all scenes, and the reliability of the
 /// lock's probabilities where there was a lock.
 pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
     let judge = RideJudge::default();
-    let columns = [
-        "rides",
-        "kept %",
-        "wrong %",
-        "longest wrong s",
-        "refound %",
-        "after s",
-        "in view %",
-        "distance %",
-        "farther m",
-        "contacts",
-        "to people m",
-        "to things m",
-        "jerk m/s3",
-        "ms/frame",
-    ];
     let pipelines = unique(results.iter().map(|result| result.pipeline.as_str()));
     let mut rows: Vec<Row> = Vec::new();
     let mut crowd_rows: Vec<Row> = Vec::new();
@@ -43,7 +46,7 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
     }
     let following = Table {
         title: "Following the first person of each scene".into(),
-        columns: columns.map(str::to_owned).to_vec(),
+        columns: COLUMNS.map(str::to_owned).to_vec(),
         rows,
         notes: notes(&judge, seeds),
     };
@@ -72,18 +75,14 @@ fn groups(results: &[Followed]) -> Vec<(String, Vec<&Followed>)> {
     groups
 }
 
+/// Returns the notes, in the order of the columns.
 fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
     vec![
         format!("each scene with {seeds}"),
         "intervals: 95 %, over rides; Wilson for rides that were kept, and for what happens several \
          times in a ride with the spread between rides; Student for times"
             .into(),
-        format!(
-            "kept: the person was found, no other person was followed for more than {} s at a time, \
-             and at the end the person was followed or out of view for {} s",
-            judge.most_wrong_s, judge.refind_s
-        ),
-        "wrong: share of the time in which the robot followed another person or a thing".into(),
+        "in view: share of the time in which the camera saw the person".into(),
         format!(
             "refound: losses of the person that ended within {} s of the return into view (up to {} m \
              away)",
@@ -95,6 +94,12 @@ fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
              {} m/s, and the mean excess of the distance",
             judge.off_m, judge.slow_mps
         ),
+        format!(
+            "kept: the person was found, no other person was followed for more than {} s at a time, \
+             and at the end the person was followed or out of view for {} s",
+            judge.most_wrong_s, judge.refind_s
+        ),
+        "wrong: share of the time in which the robot followed another person or a thing".into(),
         "contacts: rides in which the robot touched a person or a thing, and the least clearance".into(),
         "ms/frame: 95th percentile of the processor time of the pipeline's thread".into(),
     ]
@@ -137,14 +142,14 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     let kept = rides.iter().filter(|ride| ride.kept).count() as u64;
     vec![
         Cell::number(count as f64, 0),
+        part(|r| r.in_view_s, |r| r.time_s, 3),
+        Cell::clustered(&refound, 1),
+        Cell::estimate(after.map(|time| time.within(0.0, f64::INFINITY)), 1),
+        part(|r| r.distance_kept_s, |r| r.slow_s, 3),
+        Cell::mean(&farther, 2),
         Cell::share(kept, count, 1),
         part(|r| r.wrong_s, |r| r.right_s + r.wrong_s, 4),
         Cell::number(rides.iter().map(|ride| ride.longest_wrong_s).fold(0.0, f64::max), 1),
-        Cell::clustered(&refound, 1),
-        Cell::estimate(after.map(|time| time.within(0.0, f64::INFINITY)), 1),
-        part(|r| r.in_view_s, |r| r.time_s, 3),
-        part(|r| r.distance_kept_s, |r| r.slow_s, 3),
-        Cell::mean(&farther, 2),
         Cell::number(touches.count() as f64, 0),
         least(|ride| ride.clearance_people_m),
         least(|ride| ride.clearance_things_m),
@@ -281,6 +286,34 @@ mod tests {
         let table = &tables(&[ride], Split::Test.seeds(0, 1).unwrap())[0];
         let at = table.columns.iter().position(|column| column == "after s").unwrap();
         assert_eq!(table.rows[0].cells[at].value, Some(1.5));
+    }
+
+    /// A ride of 100 s in which each figure is another one.
+    #[test]
+    fn figures_that_tell_controllers_apart_come_first() {
+        let ridden = Ridden {
+            kept: true,
+            time_s: 100.0,
+            in_view_s: 90.0,
+            slow_s: 50.0,
+            distance_kept_s: 40.0,
+            farther_m: Some(0.7),
+            right_s: 60.0,
+            wrong_s: 20.0,
+            longest_wrong_s: 1.5,
+            ..Ridden::default()
+        };
+        let ride = Followed { ridden, ..Followed::default() };
+        let table = &tables(&[ride], Split::Test.seeds(0, 1).unwrap())[0];
+        let first = ["rides", "in view %", "refound %", "after s", "distance %", "farther m"];
+        assert_eq!(table.columns[..6], first);
+        assert_eq!(table.columns[6], "kept %");
+        let values: Vec<Option<f64>> = table.rows[0].cells.iter().map(|cell| cell.value).collect();
+        assert_eq!(values.len(), table.columns.len());
+        let expected = [1.0, 90.0, 80.0, 0.7, 100.0, 25.0, 1.5];
+        let shown = [0, 1, 4, 5, 6, 7, 8].map(|at: usize| values[at].unwrap());
+        let off = shown.iter().zip(expected).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-9, "{shown:?}");
     }
 
     /// One sighting of the person with this probability by the log-odds, calibrated or not.

@@ -235,6 +235,25 @@ mod tests {
         assert_eq!(SwingFit::of_agreeing(&noise, NEAR, 8), None, "none agree");
     }
 
+    /// The first 24 points agree and the rest goes anywhere.
+    fn pairs_of_which_24_agree(all: usize) -> Vec<Pair> {
+        let real = known([0.006, 0.012, 0.01], 1.02);
+        let mut random = SplitMix64::new(7);
+        let mut pairs: Vec<Pair> = rays().take(24).map(|at| [at, real.apply(at)]).collect();
+        for at in rays().chain(rays()).skip(24).take(all - 24) {
+            let anywhere = Vector2::new(random.between(-0.6, 0.6), random.between(-0.5, 0.5));
+            pairs.push([at, anywhere]);
+        }
+        pairs
+    }
+
+    #[test]
+    fn fewer_than_two_fifths_of_the_points_are_no_motion() {
+        let enough = SwingFit::of_agreeing(&pairs_of_which_24_agree(58), NEAR, 12);
+        assert_eq!(enough.unwrap().points, 24, "two fifths of 58 are 23.2");
+        assert_eq!(SwingFit::of_agreeing(&pairs_of_which_24_agree(70), NEAR, 12), None);
+    }
+
     #[test]
     fn the_uncertainty_is_that_of_the_points() {
         let off = |i: usize| Vector2::new((i % 3) as f64 - 1.0, (i / 3 % 3) as f64 - 1.0) * 1e-3;
