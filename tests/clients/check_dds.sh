@@ -34,7 +34,7 @@ tagalong() {
 }
 if [ -z "${TAGALONG_ROS2:-}" ]; then
     export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$root/target}"
-    cargo build --quiet --manifest-path "$root/bridges/ros2/Cargo.toml"
+    cargo build --quiet --manifest-path "$root/Cargo.toml" -p tagalong-ros2
     TAGALONG_ROS2=$CARGO_TARGET_DIR/debug/tagalong-ros2
 fi
 
