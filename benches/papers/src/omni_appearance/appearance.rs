@@ -399,8 +399,8 @@ fn of_persons(rooms: &[Room], strangers: &Head) -> Result<Table, ReproduceError>
         published("their own", [[0.096, 0.074], [0.117, 0.111]]),
         published("the other person's", [[0.133, 0.126], [0.231, 0.276]]),
     ];
-    for at in 0..models.len() {
-        rows.push(Row::ours(WHOSE[at], against_general(&models, at)));
+    for (at, name) in WHOSE.iter().enumerate() {
+        rows.push(Row::ours(*name, against_general(&models, at)));
     }
     let best = means(&models[0]).len();
     Ok(Table {
@@ -471,12 +471,14 @@ mod tests {
         assert_eq!(ranks(&[5.0, 1.0, 5.0, 0.0]), [2.5, 1.0, 2.5, 0.0]);
     }
 
+    /// Errors in eight rooms, about as large as this.
+    fn eight_rooms(error_m: f64) -> Vec<Vec<f64>> {
+        (0..8).map(|room| vec![error_m, error_m + 0.01 + 0.001 * f64::from(room)]).collect()
+    }
+
     #[test]
     fn models_are_tested_against_the_general_one() {
-        let draws = |error_m: f64| -> Vec<Vec<f64>> {
-            (0..8).map(|room| vec![error_m, error_m + 0.01 + 0.001 * f64::from(room)]).collect()
-        };
-        let models = [0.1, 0.3, 0.2, 0.2, 0.2].map(draws);
+        let models = [0.1, 0.3, 0.2, 0.2, 0.2].map(eight_rooms);
         let own = against_general(&models, 0);
         assert!((own[3].value.unwrap() + 0.1).abs() < 1e-9, "{own:?}");
         assert!(own[4].value.unwrap() < 0.01 && own[5].value.unwrap() < 0.01, "{own:?}");

@@ -70,9 +70,9 @@ fn standing(gap_m: f64, range_m: f64) -> Vec<(&'static str, String)> {
     let mut set = vec![
         (STEREO.0, STEREO.1.to_owned()),
         ("room.clutter", "0".to_owned()),
-        ("robot.start", format!("[{x}, {y}]")),
-        ("people.0.path", format!("[[{}, {y}]]", x + near_m)),
-        ("people.1.path", format!("[[{}, {}]]", x + range_m, y + beside_m)),
+        ("robot.start", format!("[{x:.3}, {y:.3}]")),
+        ("people.0.path", format!("[[{:.3}, {y:.3}]]", x + near_m)),
+        ("people.1.path", format!("[[{:.3}, {:.3}]]", x + range_m, y + beside_m)),
     ];
     set.extend(TURNS.map(|(key, value)| (key, value.to_owned())));
     set
