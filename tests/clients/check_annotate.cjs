@@ -4,7 +4,7 @@ const assert = require("node:assert");
 const { spawn } = require("node:child_process");
 const { existsSync, mkdirSync, readFileSync } = require("node:fs");
 const path = require("node:path");
-const { launch, openPage, violations, tooWidePx, conclude } = require("./pages.cjs");
+const { WAYS, launch, openPage, violations, layoutFaults, conclude } = require("./pages.cjs");
 
 const [program, log, file] = process.argv.slice(2);
 const pictures = process.env.TAGALONG_PICTURES;
@@ -174,9 +174,7 @@ const judge = async (browser, url, ways) => {
     await findBusyFrame(page);
     await page.click("#people button");
     await page.evaluate(() => document.querySelectorAll("details").forEach((d) => (d.open = true)));
-    found.push(...(await violations(page)).map(({ text }) => text));
-    const tooWide = await tooWidePx(page);
-    if (tooWide > 0) found.push(`the page is ${tooWide} px too wide`);
+    found.push(...(await violations(page)), ...(await layoutFaults(page)));
     if (pictures) {
       mkdirSync(pictures, { recursive: true });
       await page.waitForTimeout(300);
@@ -206,11 +204,7 @@ const main = async () => {
   const before = readFileSync(file, "utf8");
   const second = await start();
   await checkContinued(page, second.url, before);
-  problems.push(...(await judge(browser, second.url, [
-    { way: "light", colorScheme: "light", viewport: { width: 1360, height: 900 } },
-    { way: "dark", colorScheme: "dark", viewport: { width: 1360, height: 900 } },
-    { way: "phone", colorScheme: "light", viewport: { width: 390, height: 800 } },
-  ])));
+  problems.push(...(await judge(browser, second.url, WAYS)));
   await page.click("#finish");
   assert.deepEqual(await second.child.ended, { code: 0, signal: null }, "Finish ends the program");
   await browser.close();

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Opens the page of `tagalong annotate` with programs that others wrote: html-validate for the markup,
-# axe in headless Chromium for accessibility (light, dark and phone width), a watch on the browser for
+# axe in headless Chromium for accessibility (at 1280, 1920 and 390 px, light and dark), a watch on the browser for
 # any request to the network, and a scripted visitor that corrects proposed tracks, adds a person,
 # numbers, interpolates, takes back, kills the program, goes on, finishes, and reads the file after
 # each step.

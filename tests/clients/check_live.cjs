@@ -4,7 +4,7 @@ const assert = require("node:assert");
 const { spawn } = require("node:child_process");
 const { existsSync, mkdirSync, writeFileSync } = require("node:fs");
 const path = require("node:path");
-const { launch, openPage, violations, tooWidePx, conclude } = require("./pages.cjs");
+const { WAYS, launch, openPage, violations, layoutFaults, conclude } = require("./pages.cjs");
 
 const [program, config, log, home] = process.argv.slice(2);
 const pictures = process.env.TAGALONG_PICTURES;
@@ -76,8 +76,7 @@ const visit = async (browser, url, { way, colorScheme, viewport }) => {
   } catch (error) {
     problems.push(error.message);
   }
-  problems.push(...(await violations(page)).map(({ text }) => text));
-  if ((await tooWidePx(page)) > 0) problems.push("the page is too wide");
+  problems.push(...(await violations(page)), ...(await layoutFaults(page)));
   if (pictures) {
     mkdirSync(pictures, { recursive: true });
     await page.screenshot({ path: path.join(pictures, `live-${way}.png`) });
@@ -100,13 +99,8 @@ const checkEnd = async (page, child, problems) => {
 
 const main = async () => {
   const browser = await launch();
-  const ways = [
-    { way: "light", colorScheme: "light", viewport: { width: 1360, height: 850 } },
-    { way: "dark", colorScheme: "dark", viewport: { width: 1360, height: 850 } },
-    { way: "phone", colorScheme: "light", viewport: { width: 390, height: 800 } },
-  ];
   const problems = [];
-  for (const way of ways) {
+  for (const way of WAYS) {
     const { child, url } = await start();
     const { page, problems: found } = await visit(browser, url, way);
     problems.push(...found);

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Opens the page of `tagalong run --serve` while the run goes on: html-validate for the markup, axe in
-# headless Chromium for accessibility (light, dark and phone width), a watch on the browser for any
+# headless Chromium for accessibility (at 1280, 1920 and 390 px, light and dark), a watch on the browser for any
 # request elsewhere, and a scripted visitor that sees frames arrive, pauses, scrubs, clicks, goes on,
 # reads the state of lock and command, and sees the end by Ctrl-C, after which the files of the run are
 # whole.

@@ -1,55 +1,54 @@
 "use strict";
-// Called by check_report.sh: axe, requests, script errors and overflow of a page.
+// Called by check_report.sh and check_view.sh for pages that are read: axe, requests, script errors, layout
+// and length of a page.
 const { mkdirSync } = require("node:fs");
 const { pathToFileURL } = require("node:url");
 const path = require("node:path");
-const { launch, openPage, violations, tooWidePx, conclude } = require("./pages.cjs");
+const { WAYS, launch, openPage, violations, layoutFaults, conclude } = require("./pages.cjs");
 
 const url = pathToFileURL(process.argv[2]).href;
 const pictures = process.env.TAGALONG_PICTURES;
-const SERIOUS = ["serious", "critical"];
+const name = process.env.TAGALONG_PAGE || "report";
+// Height of the folded page on a desk, px.
+const MOST_PX = 6000;
 
-const look = async (browser, { colorScheme, javaScript, media }) => {
-  const name = [colorScheme, javaScript ? "script" : "no-script", media].join("-");
+const look = async (browser, { way, colorScheme, viewport, javaScript = true, media = "screen" }) => {
   const problems = [];
-  const options = { colorScheme, javaScriptEnabled: javaScript, viewport: { width: 1280, height: 800 } };
+  const options = { colorScheme, javaScriptEnabled: javaScript, viewport };
   const page = await openPage(browser, options, (asked) => asked === url, problems);
   await page.goto(url);
   await page.emulateMedia({ media, colorScheme });
-  if (pictures && javaScript) await photograph(page, name);
-  if (javaScript) problems.push(...(await judge(page, name)));
+  if (javaScript && way.startsWith("desk") && media === "screen") {
+    const height = await page.evaluate(() => document.documentElement.scrollHeight);
+    if (height >= MOST_PX) problems.push(`the page is ${height} px high, and should be below ${MOST_PX}`);
+  }
+  if (pictures && javaScript) await photograph(page, way);
+  if (javaScript) problems.push(...(await judge(page, media)));
   await page.context().close();
-  return problems.map((problem) => `${name}: ${problem}`);
+  return problems.map((problem) => `${way}: ${problem}`);
 };
 
 // Everything is unfolded first, because axe does not see what is folded away.
-const judge = async (page, name) => {
+const judge = async (page, media) => {
+  const folded = media === "screen" ? await layoutFaults(page) : [];
   await page.evaluate(() => document.querySelectorAll("details").forEach((d) => (d.open = true)));
-  const tooWide = await tooWidePx(page);
-  const found = await violations(page);
-  found.forEach(({ text }) => console.log(`${name}: ${text}`));
-  const serious = found.filter(({ impact }) => SERIOUS.includes(impact)).map(({ text }) => text);
-  return tooWide > 0 && !name.endsWith("print")
-    ? [...serious, `the page is ${tooWide} px too wide`]
-    : serious;
+  const unfolded = media === "screen" ? await layoutFaults(page) : [];
+  return [...new Set([...folded, ...unfolded]), ...(await violations(page))];
 };
 
-const photograph = async (page, name) => {
+const photograph = async (page, way) => {
   mkdirSync(pictures, { recursive: true });
-  for (const section of await page.$$("main > section")) {
-    const id = await section.getAttribute("id");
-    await section.screenshot({ path: path.join(pictures, `${name}-${id}.png`) });
-  }
-  await page.screenshot({ path: path.join(pictures, `${name}.png`) });
+  await page.screenshot({ path: path.join(pictures, `${name}-${way}.png`) });
+  await page.screenshot({ path: path.join(pictures, `${name}-${way}-whole.png`), fullPage: true });
 };
 
 const main = async () => {
   const browser = await launch();
+  const desk = WAYS[0].viewport;
   const ways = [
-    { colorScheme: "light", javaScript: true, media: "screen" },
-    { colorScheme: "dark", javaScript: true, media: "screen" },
-    { colorScheme: "dark", javaScript: true, media: "print" },
-    { colorScheme: "light", javaScript: false, media: "screen" },
+    ...WAYS,
+    { way: "print", colorScheme: "dark", viewport: desk, media: "print" },
+    { way: "no-script", colorScheme: "light", viewport: desk, javaScript: false },
   ];
   const problems = [];
   for (const way of ways) problems.push(...(await look(browser, way)));
@@ -57,4 +56,4 @@ const main = async () => {
   return problems;
 };
 
-conclude("axe and browser", main);
+conclude(`${name}: axe and browser`, main);

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Opens a benchmark's page with programs that others wrote: html-validate for the
-# markup, axe in headless Chromium for accessibility (light and dark, folded and
-# unfolded), and a watch on the browser for any request to the network.
+# markup, axe in headless Chromium for accessibility (at 1280, 1920 and 390 px, light
+# and dark), and a watch on the browser for any request to the network.
 #
 #   tests/clients/check_report.sh runs/bench/report.html
 #

@@ -5,7 +5,7 @@ const assert = require("node:assert");
 const { mkdirSync } = require("node:fs");
 const { pathToFileURL } = require("node:url");
 const path = require("node:path");
-const { launch, openPage, violations, tooWidePx, conclude } = require("./pages.cjs");
+const { WAYS, launch, openPage, violations, layoutFaults, conclude } = require("./pages.cjs");
 
 const url = pathToFileURL(process.argv[2]).href;
 const pictures = process.env.TAGALONG_PICTURES;
@@ -138,12 +138,6 @@ const checkLayers = async (page, data) => {
   assert.ok((await count()) > 0, "the key D shows dropped candidates");
 };
 
-const judge = async (page, way) => {
-  const tooWide = await tooWidePx(page);
-  const found = (await violations(page)).map(({ text }) => text);
-  return tooWide > 0 ? [...found, `${way}: the page is ${tooWide} px too wide`] : found;
-};
-
 const visit = async (browser, { way, colorScheme, viewport }) => {
   const problems = [];
   const page = await openPage(browser, { colorScheme, viewport }, (asked) => asked === url, problems);
@@ -160,7 +154,7 @@ const visit = async (browser, { way, colorScheme, viewport }) => {
   } catch (error) {
     problems.push(error.message);
   }
-  problems.push(...(await judge(page, way)));
+  problems.push(...(await violations(page)), ...(await layoutFaults(page)));
   if (pictures) await photograph(page, way, data);
   await page.context().close();
   return problems.map((problem) => `${way}: ${problem}`);
@@ -176,13 +170,8 @@ const photograph = async (page, way, data) => {
 
 const main = async () => {
   const browser = await launch();
-  const ways = [
-    { way: "light", colorScheme: "light", viewport: { width: 1360, height: 850 } },
-    { way: "dark", colorScheme: "dark", viewport: { width: 1360, height: 850 } },
-    { way: "phone", colorScheme: "light", viewport: { width: 390, height: 800 } },
-  ];
   const problems = [];
-  for (const way of ways) problems.push(...(await visit(browser, way)));
+  for (const way of WAYS) problems.push(...(await visit(browser, way)));
   await browser.close();
   return problems;
 };

@@ -6,6 +6,15 @@ const { chromium } = require("playwright-core");
 const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 const TIMEOUT_MS = 60_000;
 
+// Ways in which each page is visited: a small and a large screen and a phone, light and dark.
+const SCREENS = [
+  { screen: "desk", viewport: { width: 1280, height: 800 } },
+  { screen: "wide", viewport: { width: 1920, height: 1080 } },
+  { screen: "phone", viewport: { width: 390, height: 844 } },
+];
+const WAYS = SCREENS.flatMap(({ screen, viewport }) =>
+  ["light", "dark"].map((colorScheme) => ({ way: `${screen}-${colorScheme}`, colorScheme, viewport })));
+
 const launch = () => chromium.launch({
   executablePath: process.env.TAGALONG_CHROMIUM,
   args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking",
@@ -27,19 +36,35 @@ const openPage = async (browser, options, isAllowed, problems) => {
   return page;
 };
 
-// The faults that axe finds, worst ones and others.
+// The faults that axe finds, whatever their impact.
 const violations = async (page) => {
   await page.evaluate(axe);
   const found = (await page.evaluate(() => globalThis.axe.run())).violations;
   return found.map(({ id, impact, help, nodes }) => {
     const [node] = nodes;
     const why = node.any[0] ? node.any[0].message : "";
-    return { impact, text: `axe: ${impact} ${id} (${nodes.length}), ${help}: ${node.html.slice(0, 140)} ${why}` };
+    return `axe: ${impact} ${id} (${nodes.length}), ${help}: ${node.html.slice(0, 140)} ${why}`;
   });
 };
 
-const tooWidePx = (page) =>
-  page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+// Faults of the layout: a page that is too wide, and cells of tables that are cut or squeezed.
+const layoutFaults = (page) => page.evaluate(() => {
+  const { scrollWidth, clientWidth } = document.documentElement;
+  const faults = scrollWidth > clientWidth ? [`the page is ${scrollWidth - clientWidth} px too wide`] : [];
+  const small = [...document.querySelectorAll("body *")].filter((element) =>
+    element.checkVisibility() && [...element.childNodes].some((node) => node.nodeType === 3 && node.data.trim())
+      && !element.closest("svg") && parseFloat(getComputedStyle(element).fontSize) < 11);
+  if (small.length) faults.push(`letters below 11 px (${small.length}): ${small[0].outerHTML.slice(0, 120)}`);
+  for (const table of document.querySelectorAll("table")) {
+    const box = table.parentElement;
+    if (!box || !box.checkVisibility()) continue;
+    const isCut = table.scrollWidth > box.clientWidth + 1;
+    if (isCut && !["auto", "scroll"].includes(getComputedStyle(box).overflowX)) {
+      faults.push(`a table is cut: ${table.outerHTML.slice(0, 120)}`);
+    }
+  }
+  return faults;
+});
 
 // Runs a visitor that returns problems, prints them and ends the program.
 const conclude = (title, visit) => {
@@ -53,4 +78,4 @@ const conclude = (title, visit) => {
   });
 };
 
-module.exports = { launch, openPage, violations, tooWidePx, conclude };
+module.exports = { WAYS, launch, openPage, violations, layoutFaults, conclude };

@@ -35,7 +35,7 @@ validate() {
     echo "html-validate: ok"
 }
 
-# Runs a script with the clients, for at most five minutes.
+# Runs a script with the clients, for at most ten minutes.
 visit() {
-    NODE_PATH="$node/node_modules" TAGALONG_CHROMIUM="$chromium" timeout 300 node "$@"
+    NODE_PATH="$node/node_modules" TAGALONG_CHROMIUM="$chromium" timeout 600 node "$@"
 }

@@ -59,7 +59,7 @@ pub const CHOICES: [Choice; 11] = [
     Choice { config: WITHOUT_NETWORK, reason: "it needs no depth; places in metres are rough" },
     Choice {
         config: "laser-legs",
-        reason: "it believes in what moves where nothing was; people who stand may be missed",
+        reason: "it detects objects that move into free space; people who stand still may be missed",
     },
     Choice {
         config: "laser-follow",

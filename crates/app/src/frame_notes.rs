@@ -109,7 +109,7 @@ pub struct DroppedNote {
     pub test: String,
     /// Number of candidates, windows or pixels that it dropped.
     pub count: u64,
-    /// Regions of the first of them, as far as they have one, pixels.
+    /// Boxes of the first of them that have a region in the image, pixels.
     pub boxes_px: Vec<[f64; 4]>,
 }
 

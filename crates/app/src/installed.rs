@@ -95,6 +95,22 @@ pub fn installed_networks() -> Vec<String> {
     networks_folder().map(|folder| installed_in(&folder)).unwrap_or_default()
 }
 
+/// Returns the names of the installed networks without a config, which are those for
+/// re-identification, in the order of the alphabet.
+pub fn installed_embeddings() -> Vec<String> {
+    networks_folder().map(|folder| onnx_files(&folder, false)).unwrap_or_default()
+}
+
+/// Returns the names of all configs of installed networks.
+pub fn installed_configs() -> Vec<String> {
+    let mut names = Vec::new();
+    for name in installed_networks() {
+        names.push(format!("{name}{WITH_DEPTH}"));
+        names.push(name);
+    }
+    names
+}
+
 /// Returns the name of the network that is taken for a log with colour alone.
 pub fn default_network() -> Option<String> {
     let folder = networks_folder()?;
@@ -102,12 +118,17 @@ pub fn default_network() -> Option<String> {
 }
 
 fn installed_in(folder: &Path) -> Vec<String> {
+    onnx_files(folder, true)
+}
+
+/// Returns the names of the networks of a folder that have a config, or of those that have none.
+fn onnx_files(folder: &Path, with_config: bool) -> Vec<String> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let mut names = Vec::new();
     for entry in entries.flatten() {
         let path = entry.path();
         let is_network = path.extension().is_some_and(|ending| ending == "onnx");
-        if is_network && path.with_extension("toml").is_file() {
+        if is_network && path.with_extension("toml").is_file() == with_config {
             names.extend(path.file_stem().and_then(|stem| stem.to_str()).map(str::to_owned));
         }
     }
@@ -155,6 +176,7 @@ mod tests {
         fs::write(folder.join(DEFAULT), "removed").unwrap();
         assert_eq!(config(NETWORK), Some(folder.join("movenet.toml")));
         assert_eq!(installed_in(folder), ["movenet", "yolox"]);
+        assert_eq!(onnx_files(folder, false), ["alone"]);
     }
 
     #[test]

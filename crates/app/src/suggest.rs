@@ -8,6 +8,7 @@ use tagalong_config::nearest;
 use tagalong_log::LogFiles;
 
 use crate::config_file::ConfigFile;
+use crate::installed::installed_configs;
 use crate::outcome::Failure;
 
 /// Endings of logs.
@@ -26,11 +27,17 @@ pub fn config_hint(wanted: &Path) -> String {
     let names: Vec<&str> = files.iter().filter_map(|f| f.file_stem()?.to_str()).collect();
     let stem = wanted.file_stem().and_then(|s| s.to_str()).unwrap_or_default();
     let built_in: Vec<&str> = ConfigFile::built_in_names().collect();
+    let installed = installed_configs();
+    if let Some(best) = nearest_installed(stem, &installed, names.iter().chain(&built_in).copied())
+    {
+        return format!("; did you mean `{best}`, which is an installed network?");
+    }
     let best = nearest(stem, names.iter().chain(&built_in).copied());
     let Some(best) = best else {
         // Of a folder that was named all files may be meant; TOML files lie about in many others.
         let named = if folders[0].as_os_str().is_empty() { &[][..] } else { &names };
         let mut known: Vec<&str> = named.iter().chain(&built_in).copied().collect();
+        known.extend(installed.iter().map(String::as_str));
         known.sort_unstable();
         known.dedup();
         return format!("; there are: {}", known.join(", "));
@@ -39,6 +46,18 @@ pub fn config_hint(wanted: &Path) -> String {
         Some(file) => format!("; did you mean `{}`?", file.display()),
         None => format!("; did you mean `{best}`, which is built in?"),
     }
+}
+
+/// Returns the config of an installed network whose name is nearest to a mistyped one; `None` if that
+/// of another config is as near.
+fn nearest_installed<'a>(
+    wanted: &str,
+    installed: &'a [String],
+    others: impl Iterator<Item = &'a str>,
+) -> Option<&'a str> {
+    // Of names that are equally near the first one is taken.
+    let best = nearest(wanted, others.chain(installed.iter().map(String::as_str)))?;
+    installed.iter().map(String::as_str).find(|name| *name == best)
 }
 
 /// Returns the TOML files of a folder, by name.
@@ -159,6 +178,16 @@ mod tests {
         assert!(hint.contains(", depth-ekf, ") && hint.contains(", other, "), "{hint}");
         let hint = config_hint(&home.path().join("follow-lov.toml"));
         assert!(hint.contains("did you mean `follow-low`"), "{hint}");
+    }
+
+    #[test]
+    fn a_mistyped_name_of_an_installed_network_is_answered_with_it() {
+        let installed = ["yolox-nano-depth", "yolox-nano", "depth-nekf"].map(str::to_owned);
+        let best = |wanted| nearest_installed(wanted, &installed, ["depth-ekf"].into_iter());
+        assert_eq!(best("yolox-nan"), Some("yolox-nano"));
+        assert_eq!(best("yolo-nano-depth"), Some("yolox-nano-depth"));
+        assert_eq!(best("depth-ekff"), None, "a config is nearer");
+        assert_eq!(best("zzz"), None);
     }
 
     #[test]

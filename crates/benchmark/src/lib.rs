@@ -61,8 +61,9 @@ pub fn bench(args: &BenchArgs, registry: &Registry) -> Outcome {
             Ok(Ended::Well)
         }
         Some(Step::Run { run, folder }) => {
-            let tally = work::work(run, &store(folder), registry)?;
-            verdict(tally)
+            let store = store(folder);
+            let tally = work::work(run, &store, registry)?;
+            verdict(tally, &store)
         }
         Some(Step::Report { report, folder }) => {
             let gate = Gate::read(&report.gate)?;
@@ -90,15 +91,14 @@ fn everything(args: &BenchArgs, registry: &Registry) -> Outcome {
     // The gate is read first: a wrong rule should not cost a whole benchmark.
     let gate = Gate::read(&args.report.gate)?;
     make_plan(&args.plan, &args.folder, registry)?;
-    let tally = work::work(&args.run, &store(&args.folder), registry)?;
-    if let Some(signal) = tally.signal {
-        return Ok(Ended::BySignal(signal));
-    }
+    let store = store(&args.folder);
+    let tally = work::work(&args.run, &store, registry)?;
     // A single task or shard has no complete set of results to report.
-    if args.run.task.is_none() && args.run.shard.is_none() {
+    let is_whole = args.run.task.is_none() && args.run.shard.is_none();
+    if tally.signal.is_none() && is_whole {
         make_report(&args.folder, args.report.format, gate.as_ref())?;
     }
-    verdict(tally)
+    verdict(tally, &store)
 }
 
 /// Writes the plan, and returns it as text.
@@ -124,12 +124,13 @@ fn make_report(folder: &FolderArgs, format: Format, gate: Option<&Gate>) -> Resu
     }
 }
 
-fn verdict(tally: Tally) -> Outcome {
-    let Tally { asked, ran, failed, lost, signal } = tally;
-    say(&format!("{} run, {} had their results", counted(ran, "task"), asked - ran));
+fn verdict(tally: Tally, store: &Store) -> Outcome {
+    let Tally { asked, ran, done, failed, lost, signal } = tally;
     if let Some(signal) = signal {
+        say(&stopped(done, &counted(asked, "task"), store));
         return Ok(Ended::BySignal(signal));
     }
+    say(&format!("{} run, {} had their results", counted(ran, "task"), asked - ran));
     match (failed, lost) {
         (0, false) => Ok(Ended::Well),
         (0, true) => Ok(Ended::WithLoss),
@@ -138,6 +139,16 @@ fn verdict(tally: Tally) -> Outcome {
             counted(asked, "task")
         ))),
     }
+}
+
+/// Returns the message after a signal: the results that are kept, and the way to go on.
+fn stopped(done: usize, asked: &str, store: &Store) -> String {
+    let folder = store.path("");
+    format!(
+        "stopped: {done} of {asked} have their results in {}, and there is no new report; the same \
+         command goes on with the others",
+        folder.display()
+    )
 }
 
 #[cfg(test)]
@@ -154,6 +165,13 @@ mod tests {
 
     fn parse(line: &str) -> Result<BenchArgs, clap::Error> {
         Cli::try_parse_from(line.split(' ')).map(|cli| cli.bench)
+    }
+
+    #[test]
+    fn an_interrupted_benchmark_says_where_its_results_are_and_how_it_goes_on() {
+        let told = stopped(3, "12 tasks", &Store::new(std::path::Path::new("out")));
+        assert!(told.contains("3 of 12 tasks have their results in out"), "{told}");
+        assert!(told.contains("the same command goes on"), "{told}");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use tagalong_app::outcome::{Failure, say};
 use tagalong_app::scoring::TruthFile;
 use tagalong_app::suggest::{self, check_log_path, toml_files};
 use tagalong_config::{Registry, path_text};
-use tagalong_log::{FrameSource, Inputs, LogError};
+use tagalong_log::{COPY_OF, FrameSource, Inputs, Limits, LogError, read_attachment};
 use tagalong_pipeline::Tunable;
 
 use super::args::PlanArgs;
@@ -49,6 +49,9 @@ pub struct Task {
     pub seed: u64,
     /// Hashed inputs, by name.
     pub inputs: BTreeMap<String, String>,
+    /// SHA-256 of the recording that the log is a copy of, if `tagalong alter` made it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copy_of: Option<String>,
     /// Version of the program that planned it.
     pub version: String,
     /// Reason for which it cannot run, if there is one.
@@ -94,6 +97,8 @@ pub struct Annotated {
     pub name: String,
     /// Hash of the log.
     pub sha256: String,
+    /// Hash of the recording that it is a copy of, if `tagalong alter` made it.
+    pub copy_of: Option<String>,
     /// Path of its truth.
     pub truth: PathBuf,
     /// Hash of the truth.
@@ -209,6 +214,7 @@ fn task(
         drops_doubled_ids: log.drops_doubled_ids,
         seed,
         inputs,
+        copy_of: log.copy_of.clone(),
         version: version.to_owned(),
         skip: None,
     })
@@ -337,12 +343,20 @@ fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
         log: log.to_owned(),
         name: log.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         sha256: sha256_of_file(log)?,
+        copy_of: copy_of(log),
         truth_sha256: sha256_of_file(&truth)?,
         truth,
         whole_bodies,
         drops_doubled_ids: false,
         unjudged: Vec::new(),
     }))
+}
+
+/// Returns the hash of the recording that a log is a copy of.
+fn copy_of(log: &Path) -> Option<String> {
+    // A log of another kind has no attachment, and errors in reading it are found elsewhere.
+    let bytes = read_attachment(log, COPY_OF, &Limits::default()).ok().flatten()?;
+    String::from_utf8(bytes).ok()
 }
 
 /// Refuses a name that is used twice: names identify rows of tables.

@@ -1,5 +1,6 @@
 //! Report of a benchmark from its results.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use tagalong_app::outcome::Failure;
@@ -28,7 +29,7 @@ pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
     if missing.is_empty() {
         let moments = moments::gather(&all);
         let tasks = all.into_iter().map(|stored| stored.result).collect();
-        return Ok(Benchmark { version, tasks, moments });
+        return Ok(Benchmark { version, tasks, copies: copies(&plan), moments });
     }
     let count = missing.len();
     let first = &missing[0];
@@ -38,6 +39,19 @@ pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
         plan.len(),
         store.path("").display()
     )))
+}
+
+/// Returns the names of logs that go back to one recording.
+fn copies(plan: &[Task]) -> Vec<Vec<String>> {
+    let mut recordings: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for task in plan {
+        let own = task.inputs.get("log").map(String::as_str);
+        if let Some(recording) = task.copy_of.as_deref().or(own) {
+            recordings.entry(recording).or_default().insert(&task.log_name);
+        }
+    }
+    let several = recordings.into_values().filter(|logs| logs.len() > 1);
+    several.map(|logs| logs.into_iter().map(str::to_owned).collect()).collect()
 }
 
 fn result(store: &Store, task: &Task) -> Option<Stored> {
@@ -100,6 +114,9 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
                 task.pipeline, task.log
             );
         }
+    }
+    for logs in &benchmark.copies {
+        let _ = writeln!(out, "note: {}", tagalong_report::copies_note(logs));
     }
     let _ = writeln!(out, "report in {}", store.path("report.html").display());
     out

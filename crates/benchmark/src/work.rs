@@ -28,8 +28,10 @@ use super::watch::{Watch, repaired};
 pub struct Tally {
     /// Tasks that were requested and can run.
     pub asked: usize,
-    /// Of these, tasks that were run now.
+    /// Of these, tasks that had no result before.
     pub ran: usize,
+    /// Tasks that have a result now.
+    pub done: usize,
     /// Tasks that failed, by their results.
     pub failed: usize,
     /// True if part of some log was lost.
@@ -71,6 +73,7 @@ pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally,
     let mut tally =
         Tally { asked: asked.len(), ran, signal: signals.received(), ..Tally::default() };
     for stored in asked.iter().filter_map(|task| store.result(task)) {
+        tally.done += 1;
         tally.failed += usize::from(matches!(stored.result.outcome, Outcome::Failed { .. }));
         tally.lost |= stored.result.data_lost;
     }

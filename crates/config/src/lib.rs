@@ -23,7 +23,7 @@ mod xml;
 
 pub use bounded::{FileLimit, read_bytes, read_text};
 pub use exported::{ExportedNetwork, NamedTensor};
-pub use names::nearest;
+pub use names::{model_hint, nearest};
 pub use offers::{RecordedOffer, Remedy, TrainingData, TrainingOffer, TrialValues};
 pub use or_auto::OrAuto;
 pub use path_text::PathText;

@@ -1,3 +1,6 @@
+use std::fs;
+use std::path::Path;
+
 /// Returns the name among `available` that is nearest to the mistyped `wanted`, if fewer than half
 /// of its letters differ.
 ///
@@ -14,6 +17,31 @@ pub fn nearest<'a>(wanted: &str, available: impl IntoIterator<Item = &'a str>) -
         .filter(|(distance, name)| 2 * distance < name.chars().count().max(wanted.chars().count()))
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, name)| name)
+}
+
+/// Returns "; did you mean `NAME`?" for a file that is missing, with the nearest name among the files of
+/// its folder that have its extension and among `others`; nothing if none is near.
+///
+/// ```
+/// use tagalong_config::model_hint;
+/// let hint = model_hint("models/yolox-nan".as_ref(), &["yolox-nano".to_owned()]);
+/// assert_eq!(hint, "; did you mean `yolox-nano`?");
+/// ```
+pub fn model_hint(missing: &Path, others: &[String]) -> String {
+    let Some(wanted) = missing.file_name().and_then(|name| name.to_str()) else {
+        return String::new();
+    };
+    let folder = missing.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten().flatten() {
+        if entry.path().extension() == missing.extension() {
+            names.extend(entry.file_name().to_str().map(str::to_owned));
+        }
+    }
+    // The order of a directory depends on the file system.
+    names.sort();
+    let best = nearest(wanted, others.iter().chain(&names).map(String::as_str));
+    best.map_or(String::new(), |best| format!("; did you mean `{best}`?"))
 }
 
 /// Computes the Levenshtein distance, one row at a time.
@@ -47,5 +75,17 @@ mod tests {
         assert_eq!(nearest("abxx", ["abcd"]), None);
         assert_eq!(nearest("abxxe", ["abcde"]), Some("abcde"));
         assert_eq!(nearest("EKF", ["ekf"]), Some("ekf"), "however it is written");
+    }
+    #[test]
+    fn a_missing_model_leads_to_the_nearest_file_of_its_kind() {
+        let home = tempfile::tempdir().unwrap();
+        for name in ["people.toml", "people-two.toml", "peopel.onnx"] {
+            fs::write(home.path().join(name), "").unwrap();
+        }
+        let hint = |name: &str| model_hint(&home.path().join(name), &["peoples".to_owned()]);
+        assert_eq!(hint("peple.toml"), "; did you mean `people.toml`?");
+        assert_eq!(hint("people.onnx"), "; did you mean `peopel.onnx`?");
+        assert_eq!(hint("people"), "; did you mean `peoples`?", "the name of no file");
+        assert_eq!(hint("zebra.toml"), "");
     }
 }

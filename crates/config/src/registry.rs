@@ -1,11 +1,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use crate::bounded::{FileLimit, read_text};
 use crate::{
     ConfigError, ExportedNetwork, RecordedOffer, Remedy, Settings, Trainer, TrainingData,
-    TrainingOffer, TrialValues, Value, commented_defaults, nearest, parse_settings,
+    TrainingOffer, TrialValues, Value, commented_defaults, model_hint, nearest, parse_settings,
 };
 use tagalong_core::{
     Associator, Controller, Detector, DiffDrive, Error, Filter, Result, TrackManager, Verifier,
@@ -77,7 +78,11 @@ impl Context {
         }
         let path = self.base_dir.join(file);
         let broken = |why: String| Error::Model { path: path.display().to_string(), why };
-        let text = read_text(&path, FileLimit::Model).map_err(|error| broken(error.to_string()))?;
+        let text = read_text(&path, FileLimit::Model).map_err(|error| {
+            let is_missing = error.kind() == ErrorKind::NotFound;
+            let hint = if is_missing { model_hint(&path, &[]) } else { String::new() };
+            broken(format!("{error}{hint}"))
+        })?;
         parse(&text).map_err(broken)
     }
 }

@@ -39,9 +39,9 @@ enum SearchOutcome {
 fn look(
     detector: &mut dyn Detector,
     frame: &Frame,
-    search: &Query<'_>,
+    query: &Query<'_>,
 ) -> Result<SearchOutcome, String> {
-    match detector.detect(frame, search, &mut Funnel::default()) {
+    match detector.detect(frame, query, &mut Funnel::default()) {
         Ok(people) => Ok(SearchOutcome::People(people)),
         Err(Error::MissingImage { .. }) => Ok(SearchOutcome::Lacks),
         Err(error) => Err(format!("it fails on a simulated frame: {error}")),
@@ -51,9 +51,9 @@ fn look(
 fn people(
     detector: &mut dyn Detector,
     frame: &Frame,
-    search: &Query<'_>,
+    query: &Query<'_>,
 ) -> Result<Vec<Detection>, String> {
-    Ok(match look(detector, frame, search)? {
+    Ok(match look(detector, frame, query)? {
         SearchOutcome::People(people) => people,
         SearchOutcome::Lacks => Vec::new(),
     })
@@ -63,8 +63,8 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
     let mut detector = subject.detector(From::Nothing)?;
     let lost = track(1, Point3::new(2.0, 0.0, 1.6), 0.2, &level());
     for (name, frame) in odd_frames() {
-        for search in [EVERYWHERE, Query::Track(&lost)] {
-            let outcome = detector.detect(&frame, &search, &mut Funnel::default());
+        for query in [EVERYWHERE, Query::Track(&lost)] {
+            let outcome = detector.detect(&frame, &query, &mut Funnel::default());
             demand(outcome.is_ok(), || match &outcome {
                 Err(error) => format!("the {name} frame is an error: {error}"),
                 Ok(_) => String::new(),
@@ -81,8 +81,8 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
 fn missing_image_is_named(subject: &Subject<'_>) -> Verdict {
     let mut detector = subject.detector(From::Nothing)?;
     let lost = track(1, Point3::new(2.0, 0.0, 1.6), 0.2, &level());
-    for search in [EVERYWHERE, Query::Track(&lost)] {
-        match detector.detect(&bare_frame(), &search, &mut Funnel::default()) {
+    for query in [EVERYWHERE, Query::Track(&lost)] {
+        match detector.detect(&bare_frame(), &query, &mut Funnel::default()) {
             Err(Error::MissingImage { .. }) => {}
             Ok(found) if found.is_empty() => {}
             Err(error) => return Err(format!("the error does not name the image: {error}")),
@@ -142,8 +142,8 @@ fn required_suffice(subject: &Subject<'_>) -> Verdict {
         if !inputs.of(Usage::Required).all(|input| frame.holds(input)) {
             return Ok(());
         }
-        for search in [EVERYWHERE, Query::Track(&lost)] {
-            if let Err(error) = detector.detect(&frame, &search, &mut Funnel::default()) {
+        for query in [EVERYWHERE, Query::Track(&lost)] {
+            if let Err(error) = detector.detect(&frame, &query, &mut Funnel::default()) {
                 return Err(format!("with the inputs that it requires: {error}"));
             }
         }
@@ -170,8 +170,8 @@ fn roles_are_declared(subject: &Subject<'_>) -> Verdict {
             ("discovers", capabilities.discovers, everywhere),
             ("tracks", capabilities.tracks, near),
         ];
-        for (role, is_declared, search) in roles {
-            let found = people(detector, &frame, &search)?;
+        for (role, is_declared, query) in roles {
+            let found = people(detector, &frame, &query)?;
             demand(is_declared || found.is_empty(), || {
                 format!("it finds people and declares `{role}: false`")
             })?;
@@ -202,11 +202,11 @@ fn question_alone(subject: &Subject<'_>) -> Verdict {
     record(&mut *seasoned, &frames)?;
     let followed = track(1, Figure::at(3.0, -0.6).head, 0.15, &level());
     for frame in frames.iter().rev() {
-        for search in [EVERYWHERE, Query::Track(&followed)] {
+        for query in [EVERYWHERE, Query::Track(&followed)] {
             let mut fresh = subject.detector(From::Nothing)?;
             let answer = |detector: &mut dyn Detector| {
                 let mut funnel = Funnel::default();
-                (detector.detect(frame, &search, &mut funnel).map_err(|e| e.to_string()), funnel)
+                (detector.detect(frame, &query, &mut funnel).map_err(|e| e.to_string()), funnel)
             };
             let then = answer(&mut *fresh);
             let now = answer(&mut *seasoned);
@@ -264,8 +264,8 @@ fn near_stays_near(subject: &Subject<'_>) -> Verdict {
         let couple = [Figure::at(2.6, 0.8), Figure::at(2.6, -0.8)];
         let frame = drawn(1, &camera, &couple);
         for wanted in [couple[0].head, couple[1].head, Point3::new(1.8, 0.0, 1.6)] {
-            let search = track(1, wanted, sigma_m, &camera);
-            for found in people(detector, &frame, &Query::Track(&search))? {
+            let lost = track(1, wanted, sigma_m, &camera);
+            for found in people(detector, &frame, &Query::Track(&lost))? {
                 let away = (found.position.xy() - wanted.xy()).norm();
                 demand(away <= window_m, || {
                     format!(

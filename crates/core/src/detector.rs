@@ -75,7 +75,7 @@ pub trait Detector: Send {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>>;
 
@@ -242,10 +242,10 @@ mod tests {
     #[test]
     fn a_place_is_taken_by_whoever_was_found_near_it_on_the_floor() {
         let occupied = [seen(3.0, 0.0, 1.6)];
-        let search = Query::Discover { occupied: &occupied };
-        assert!(search.is_occupied(&Point3::new(3.2, 0.1, 0.0), 0.3), "whatever the height");
-        assert!(!search.is_occupied(&Point3::new(3.31, 0.0, 1.6), 0.3));
-        assert!(!search.is_occupied(&Point3::new(0.3, 0.0, 1.6), 0.3));
+        let query = Query::Discover { occupied: &occupied };
+        assert!(query.is_occupied(&Point3::new(3.2, 0.1, 0.0), 0.3), "whatever the height");
+        assert!(!query.is_occupied(&Point3::new(3.31, 0.0, 1.6), 0.3));
+        assert!(!query.is_occupied(&Point3::new(0.3, 0.0, 1.6), 0.3));
         assert!(!Query::Discover { occupied: &[] }.is_occupied(&Point3::origin(), 9.0));
     }
 

@@ -12,6 +12,10 @@ use crate::{Limits, LogError};
 /// Length of the bytes that an MCAP file begins with.
 const MAGIC_BYTES: usize = 8;
 
+/// Attachment of a log that `tagalong alter` made of another one: the SHA-256 of the recording that all
+/// copies go back to.
+pub const COPY_OF: &str = "copy-of.sha256";
+
 /// Returns the attachment of a name that stands before the first message of a file; `None` if
 /// there is none, or if the file is damaged before it.
 ///

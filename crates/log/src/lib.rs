@@ -47,7 +47,7 @@ mod walk;
 mod walker;
 pub mod write;
 
-pub use attachment::read_attachment;
+pub use attachment::{COPY_OF, read_attachment};
 pub use camera_settings::{CameraSettings, MountSettings};
 pub use error::{LogError, NotMcap};
 pub use input::{DisparitySettings, InputSettings, StampSource};

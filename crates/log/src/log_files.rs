@@ -99,8 +99,8 @@ fn stripped(name: &str) -> &str {
     PACKED.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(name)
 }
 
-/// Returns the files of the first kind of [`KINDS`] of which there are any. Of a file that is there
-/// compressed and unpacked, as players leave it, the unpacked one is read.
+/// Returns the files of a folder that have one of the [`KINDS`]: those of the first kind that is present.
+/// Players leave a compressed file beside its unpacked copy; then the copy alone is returned.
 fn parts_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let files = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path());
     let files: Vec<PathBuf> = files.collect();

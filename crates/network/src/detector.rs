@@ -3,11 +3,12 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use tagalong_config::{FileLimit, read_bytes};
+use tagalong_config::{FileLimit, model_hint, read_bytes};
 use tagalong_core::RgbImage;
 
 use crate::decode::{Wanted, decode, suppress};
 use crate::family::{OutputShape, recognise, shapes_of};
+use crate::installed::installed_names;
 use crate::network::rten;
 use crate::order::Shapes;
 use crate::values::{unit_of_columns, unit_of_rows};
@@ -140,6 +141,10 @@ impl About {
 fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, String> {
     read_bytes(path, FileLimit::Bytes(limits.file_bytes)).map_err(|why| match why.kind() {
         ErrorKind::FileTooLarge => format!("{why}: raise `max_file_mb`"),
+        ErrorKind::NotFound => {
+            let hint = model_hint(path, &installed_names());
+            format!("cannot be read: {why}{hint}")
+        }
         _ => format!("cannot be read: {why}"),
     })
 }

@@ -42,6 +42,20 @@ pub fn model_file(folder: &Path, model: &str) -> PathBuf {
     installed.filter(|installed| installed.is_file()).unwrap_or(file)
 }
 
+/// Returns the names of the installed networks, in the order of the alphabet.
+pub(crate) fn installed_names() -> Vec<String> {
+    let Some(folder) = networks_folder() else { return Vec::new() };
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.extension().is_some_and(|ending| ending == "onnx") {
+            names.extend(path.file_stem().and_then(|stem| stem.to_str()).map(str::to_owned));
+        }
+    }
+    names.sort();
+    names
+}
+
 /// Returns true for a text without folders and extension.
 fn is_name(model: &str) -> bool {
     let path = Path::new(model);

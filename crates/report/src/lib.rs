@@ -34,7 +34,7 @@ pub use compare::{Difference, SAME_EVENT_S, compare};
 pub use files::{csv, figures, json};
 pub use model::{
     Benchmark, Dropped, EventRow, MissedPerson, Moment, Outcome, StageTiming, TaskResult,
-    TaskTiming, Timings, Trajectory,
+    TaskTiming, Timings, Trajectory, copies_note,
 };
 pub use page::{BASE_STYLE, document, html};
 pub use summary::{Estimate, PairSummary, PipelineSummary, Summary};

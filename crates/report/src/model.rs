@@ -13,9 +13,23 @@ pub struct Benchmark {
     pub version: String,
     /// Results, one per task, in any order.
     pub tasks: Vec<TaskResult>,
+    /// Names of logs that go back to one recording, as copies that `tagalong alter` makes; means and
+    /// intervals count each of them as a log of its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub copies: Vec<Vec<String>>,
     /// Moments in which people were missed, with their images; for the page alone.
     #[serde(skip)]
     pub moments: Vec<Moment>,
+}
+
+/// Says that logs go back to one recording, so that intervals over logs are too narrow.
+pub fn copies_note(logs: &[String]) -> String {
+    format!(
+        "{} go back to one recording, as copies of `tagalong alter` do, but count as {} independent logs: \
+         the intervals are too narrow and the p-values too small",
+        logs.join(" and "),
+        logs.len()
+    )
 }
 
 /// Moment in which a person was missed, with all that the pipelines made of it.

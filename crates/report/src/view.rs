@@ -12,6 +12,8 @@ pub struct OrderedBenchmark<'a> {
     /// Pipelines by name, or best first once they are [ranked](Self::ranked).
     pub pipelines: Vec<&'a str>,
     pub logs: Vec<&'a str>,
+    /// Logs that go back to one recording.
+    pub copies: &'a [Vec<String>],
 }
 
 impl<'a> OrderedBenchmark<'a> {
@@ -26,6 +28,7 @@ impl<'a> OrderedBenchmark<'a> {
             tasks,
             pipelines: pipelines.into_iter().collect(),
             logs: logs.into_iter().collect(),
+            copies: &benchmark.copies,
         }
     }
 

@@ -108,8 +108,8 @@ fn leave_agreeing(there: &[u8], back: &[u8], tolerance: u8, disparities: &mut [f
     dropped
 }
 
-// One loop for each of a row's results: of all three in one loop, the compiler makes
-// vector instructions of none or of one, and which one changes with every line.
+// One loop per result of a row, because the compiler vectorises at most one of three results that share a
+// loop, and small changes of the code decide which one.
 
 /// Writes the lowest costs.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]

@@ -10,7 +10,7 @@ use tagalong_core::{Derived, Detection, Frame, Funnel, Query, Result};
 #[derive(Default)]
 struct Memo {
     found: Mutex<BTreeMap<String, (Vec<Detection>, Funnel)>>,
-    margins: Mutex<BTreeMap<String, f64>>,
+    log_odds: Mutex<BTreeMap<String, f64>>,
 }
 
 impl Derived for Memo {
@@ -33,12 +33,12 @@ pub struct Identities {
 pub(crate) fn found(
     identity: &str,
     frame: &Frame,
-    search: &Query<'_>,
+    query: &Query<'_>,
     funnel: &mut Funnel,
     find: impl FnOnce(&mut Funnel) -> Result<Vec<Detection>>,
 ) -> Result<Vec<Detection>> {
     let memo = frame.derived::<Memo>()?;
-    let question = match search {
+    let question = match query {
         Query::Discover { occupied } => key(identity, occupied),
         Query::Track(track) => key(identity, track),
     };
@@ -55,7 +55,7 @@ pub(crate) fn found(
 }
 
 /// Returns the result of `judge` for a candidate, or the stored result of the same query.
-pub(crate) fn margin(
+pub(crate) fn log_odds(
     identity: &str,
     frame: &Frame,
     candidate: &Detection,
@@ -63,12 +63,12 @@ pub(crate) fn margin(
 ) -> Result<f64> {
     let memo = frame.derived::<Memo>()?;
     let question = key(identity, &candidate);
-    if let Some(margin) = lock(&memo.margins).get(&question) {
-        return Ok(*margin);
+    if let Some(log_odds) = lock(&memo.log_odds).get(&question) {
+        return Ok(*log_odds);
     }
-    let margin = judge()?;
-    lock(&memo.margins).insert(question, margin);
-    Ok(margin)
+    let log_odds = judge()?;
+    lock(&memo.log_odds).insert(question, log_odds);
+    Ok(log_odds)
 }
 
 /// Builds a key from the `Debug` form, in which different numbers have different text.

@@ -96,18 +96,18 @@ impl SearchStage {
         &mut self,
         frame: &Frame,
         index: usize,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<PendingDetection>, StepError> {
         let slot = &mut self.detectors[index];
         let identity = self.shared.as_ref().and_then(|shared| shared.detectors[index].as_deref());
         let found = slot.plugin.call(frame.index, |detector| match identity {
-            Some(identity) => memo::found(identity, frame, search, funnel, |funnel| {
-                detector.detect(frame, search, funnel)
+            Some(identity) => memo::found(identity, frame, query, funnel, |funnel| {
+                detector.detect(frame, query, funnel)
             }),
-            None => detector.detect(frame, search, funnel),
+            None => detector.detect(frame, query, funnel),
         })?;
-        let discovered = matches!(search, Query::Discover { .. });
+        let discovered = matches!(query, Query::Discover { .. });
         let mut passed = Vec::new();
         for detection in found {
             if !detection.is_sane() {
@@ -139,7 +139,7 @@ impl SearchStage {
         for (at, verifier) in self.verifiers.iter_mut().enumerate() {
             let candidate = &pending.detection;
             sum += verifier.call(frame.index, |verifier| match &self.shared {
-                Some(shared) => memo::margin(&shared.verifiers[at], frame, candidate, || {
+                Some(shared) => memo::log_odds(&shared.verifiers[at], frame, candidate, || {
                     verifier.log_odds(frame, candidate)
                 }),
                 None => verifier.log_odds(frame, candidate),

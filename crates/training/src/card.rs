@@ -69,7 +69,7 @@ impl Card {
     pub fn to_text(&self) -> Result<String, Failure> {
         let text = to_toml("the card", self)?;
         Ok(format!(
-            "# Shares come with 95 % intervals (Wilson), too narrow for sightings, which are not independent.\n{text}"
+            "# Shares come with 95 % intervals (Wilson), too narrow for detections, which are not independent.\n{text}"
         ))
     }
 
@@ -82,9 +82,9 @@ impl Card {
             for (what, share) in [
                 ("false proposals rejected", effect.false_proposals_rejected),
                 ("people's proposals rejected", effect.people_proposals_rejected),
-                ("false sightings removed", effect.false_sightings_removed),
-                ("people's sightings lost", effect.people_sightings_lost),
-                ("sightings of parts removed", effect.part_sightings_removed),
+                ("false detections removed", effect.false_sightings_removed),
+                ("detections of people lost", effect.people_sightings_lost),
+                ("detections of parts removed", effect.part_sightings_removed),
                 ("false tracks removed", effect.false_tracks_removed),
                 ("false track frames removed", effect.false_track_frames_removed),
                 ("tracked people lost (frames)", effect.tracked_people_lost),

@@ -122,7 +122,7 @@ impl Comparison {
     pub fn step(&mut self, seen: &AnnotatedFrame, tally: &mut Tally) -> Result<(), Failure> {
         let proposed = self.proposer.step(&seen.frame).map_err(Failure::failed)?;
         for Candidate { detection, .. } in &proposed.candidates {
-            tally.proposal(label(detection, &seen.people), self.margin(seen, detection)? < 0.0);
+            tally.proposal(label(detection, &seen.people), self.log_odds(seen, detection)? < 0.0);
         }
         let plain = self.plain.step(&seen.frame).map_err(Failure::failed)?;
         let verified = self.verified.step(&seen.frame).map_err(Failure::failed)?;
@@ -130,14 +130,14 @@ impl Comparison {
             if matches!(candidate.fate, Fate::Dropped(_)) {
                 continue;
             }
-            let score = candidate.detection.score + self.margin(seen, &candidate.detection)?;
+            let score = candidate.detection.score + self.log_odds(seen, &candidate.detection)?;
             tally.sighting(label(&candidate.detection, &seen.people), score < self.start_score);
         }
         tally.frame(&[&plain, &verified], &seen.people);
         Ok(())
     }
 
-    fn margin(&mut self, seen: &AnnotatedFrame, candidate: &Detection) -> Result<f64, Failure> {
+    fn log_odds(&mut self, seen: &AnnotatedFrame, candidate: &Detection) -> Result<f64, Failure> {
         self.verifier.log_odds(&seen.frame, candidate).map_err(Failure::failed)
     }
 }

@@ -144,8 +144,8 @@ impl<'a> Session<'a> {
         let mut show = |frame: &Frame, candidate: &Detection, example: Example| {
             counts.seen += 1;
             if let Some(verifier) = &mut doubter {
-                let margin = verifier.log_odds(frame, candidate).map_err(Failure::failed)?;
-                let right = if example.is_person { margin } else { -margin };
+                let log_odds = verifier.log_odds(frame, candidate).map_err(Failure::failed)?;
+                let right = if example.is_person { log_odds } else { -log_odds };
                 counts.mistakes += u64::from(right < 0.0);
                 // Only mistakes and unsure cases are added: the model is right about the rest.
                 if right >= UNSURE {

@@ -13,7 +13,7 @@ use tagalong_app::progress::Progress;
 use tagalong_app::scoring::{Shot, Shots};
 use tagalong_geometry::Camera;
 use tagalong_log::write::BoxedPart;
-use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
+use tagalong_log::{FrameSource, Input, InputSettings, Inputs, LogFrame};
 use tagalong_render::background;
 
 use crate::pictures::Pictures;
@@ -81,7 +81,13 @@ fn outer_settings(run: &Recording) -> OuterSettings {
     let own = ["input", "limits", "output"];
     let tables = run.config.iter().filter(|(key, _)| own.contains(&key.as_str()));
     let tables = tables.map(|(key, value)| (key.clone(), value.clone())).collect();
-    toml::Value::Table(tables).try_into().unwrap_or_default()
+    let mut outer: OuterSettings = toml::Value::Table(tables).try_into().unwrap_or_default();
+    // The topics of `[input]` are those of the real robot; a ride did not read its log by them, and the
+    // simulator writes its own.
+    if run.report.ride.is_some() {
+        outer.input = InputSettings::default();
+    }
+    outer
 }
 
 /// Returns the part of people that the boxes of a run enclose.
@@ -168,11 +174,26 @@ mod tests {
     use tagalong_geometry::{Distortion, Pinhole};
 
     use super::*;
+    use crate::recording::RideFacts;
 
     fn camera() -> Camera {
         let lens =
             Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         Camera::mounted(lens, 640, 480, 1.6, 0.0, 0.0)
+    }
+
+    #[test]
+    fn the_log_of_a_ride_is_read_without_the_topics_of_the_robot() {
+        let config = toml::from_str("[input]\nlaser_topic = \"/scan\"\n[output]\nboxes = \"full\"");
+        let mut run = Recording { config: config.unwrap(), ..Recording::default() };
+        assert_ne!(outer_settings(&run).input, InputSettings::default());
+        run.report.ride = Some(RideFacts::default());
+        assert_eq!(outer_settings(&run).input, InputSettings::default());
+        assert_eq!(
+            outer_settings(&run).output.boxes,
+            BoxedPart::Full,
+            "the boxes are those of the run"
+        );
     }
 
     #[test]

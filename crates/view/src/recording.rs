@@ -98,6 +98,8 @@ pub struct RideFacts {
     pub seed: u64,
     /// True if the person was followed, or rightly given up, and no other person for long.
     pub kept: bool,
+    /// Commonest reason of the commands of a robot that never moved.
+    pub never_moved: Option<String>,
     /// Length of the ride, s.
     pub time_s: f64,
     /// Time in which the person was in view, s.
@@ -136,8 +138,10 @@ impl RideFacts {
     pub fn summary(&self) -> String {
         let metres = |room: Option<f64>| room.map_or("-".into(), |room| format!("{room:.2} m"));
         let share = self.distance_share().map_or("-".into(), |s| format!("{:.0} %", 100.0 * s));
+        let stands = self.never_moved.as_ref();
+        let stands = stands.map_or(String::new(), |why| format!("; the robot never moved ({why})"));
         format!(
-            "{}{}; least room to people {}, to things {}; distance kept for {share} of the time; \
+            "{}{stands}{}; least room to people {}, to things {}; distance kept for {share} of the time; \
              followed another person for {:.1} s",
             if self.kept { "the person was kept" } else { "the person was not kept" },
             if self.touches() { "; the robot touched something" } else { "" },

@@ -97,13 +97,14 @@ pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// Orders rides: those with a contact first, then by the least room, then by the share of the time
-/// in which the distance was kept.
+/// Orders rides: those with a contact first, then those in which the robot never moved, then by the
+/// least room, then by the share of the time in which the distance was kept.
 fn worse_first(a: &RideFacts, b: &RideFacts) -> std::cmp::Ordering {
     let room = |ride: &RideFacts| ride.room_m().unwrap_or(f64::INFINITY);
     let share = |ride: &RideFacts| ride.distance_share().unwrap_or(1.0);
     b.touches()
         .cmp(&a.touches())
+        .then(b.never_moved.is_some().cmp(&a.never_moved.is_some()))
         .then(room(a).total_cmp(&room(b)))
         .then(share(a).total_cmp(&share(b)))
 }
@@ -162,17 +163,27 @@ fn list(folder: &Path, from: Option<&Path>, rides: &[Ride]) -> String {
         }
         main id="main" tabindex="-1" {
             p {
-                "The worst ride is first: contacts, then the least room to a person or a thing while the "
-                "robot moved, then the share of the time in which it kept its distance. A link opens the "
+                "The worst ride is first: contacts, then rides in which the robot never moved, then the least "
+                "room to a person or a thing while the robot moved, then the share of the time in which it kept its distance. A link opens the "
                 "ride where it came nearest."
             }
             (table(rides, from))
         }
         footer { p { "Made by Tagalong " (env!("CARGO_PKG_VERSION")) "." } }
+        script { (PreEscaped(ROLES)) }
     };
     document(&format!("Rides in {name} - Tagalong"), &head, "Skip to the rides", &body)
         .into_string()
 }
+
+/// Script that gives the table its roles, which a row of cells one below the other, as a phone shows it,
+/// would not have.
+const ROLES: &str = r#""use strict";
+const roles = { TABLE: "table", THEAD: "rowgroup", TBODY: "rowgroup", TR: "row", TD: "cell" };
+for (const part of document.querySelectorAll("table, table *")) {
+  const role = part.tagName === "TH" ? (part.scope === "row" ? "rowheader" : "columnheader") : roles[part.tagName];
+  if (role) part.setAttribute("role", role);
+}"#;
 
 /// Names of the columns after the first, which a phone shows beside each value.
 const COLUMNS: [&str; 7] = [
@@ -187,28 +198,37 @@ const COLUMNS: [&str; 7] = [
 
 fn table(rides: &[Ride], from: Option<&Path>) -> Markup {
     html! {
-        div class="scroll" role="region" aria-label="Rides, the worst first" tabindex="0" {
-            table class="cards" role="table" {
-                thead role="rowgroup" {
-                    tr role="row" {
-                        th scope="col" role="columnheader" { "Ride" }
-                        @for name in COLUMNS { th scope="col" role="columnheader" { (name) } }
+        section class="scroll" aria-label="Rides, the worst first" tabindex="0" {
+            table class="cards" {
+                thead {
+                    tr {
+                        th scope="col" { "Ride" }
+                        @for name in COLUMNS { th scope="col" { (name) } }
                     }
                 }
-                tbody role="rowgroup" {
+                tbody {
                     @for ride in rides {
-                        tr role="row" {
-                            th scope="row" role="rowheader" {
+                        tr {
+                            th scope="row" {
                                 a href=(ride.link(from)) { (ride.suite) ", " (ride.pipeline) ", seed " (ride.facts.seed) }
                             }
                             @for (name, (text, is_bad)) in COLUMNS.iter().zip(cells(&ride.facts)) {
-                                td role="cell" data-name=(name) class=[is_bad.then_some("bad")] { (text) }
+                                td data-name=(name) class=[is_bad.then_some("bad")] { (text) }
                             }
                         }
                     }
                 }
             }
         }
+    }
+}
+
+/// Returns whether the person was kept, and the reason of a robot that never moved.
+fn kept(ride: &RideFacts) -> String {
+    let answer = if ride.kept { "yes" } else { "no" };
+    match &ride.never_moved {
+        Some(why) => format!("{answer}; the robot never moved ({why})"),
+        None => answer.into(),
     }
 }
 
@@ -225,7 +245,7 @@ fn cells(ride: &RideFacts) -> [(String, bool); 7] {
         metres(ride.clearance_people_m),
         metres(ride.clearance_things_m),
         (share.map_or("-".into(), |share| format!("{:.0} %", 100.0 * share)), false),
-        (if ride.kept { "yes" } else { "no" }.into(), !ride.kept),
+        (kept(ride), !ride.kept),
         (format!("{:.1} s", ride.wrong_s), false),
         (format!("{:.0} %", 100.0 * in_view), false),
     ]
@@ -257,6 +277,19 @@ mod tests {
         rides.sort_by(|a, b| worse_first(&a.facts, &b.facts));
         let names: Vec<&str> = rides.iter().map(|ride| ride.suite.as_str()).collect();
         assert_eq!(names, ["touch", "b", "a", "far"]);
+    }
+
+    #[test]
+    fn a_robot_that_never_moved_is_no_good_ride() {
+        let mut stands = ride("stands", 0.9, 1.0);
+        stands.facts.never_moved = Some("silent".into());
+        let mut rides = [ride("near", 0.1, 0.1), stands, ride("touch", -0.1, 1.0)];
+        rides.sort_by(|a, b| worse_first(&a.facts, &b.facts));
+        let names: Vec<&str> = rides.iter().map(|ride| ride.suite.as_str()).collect();
+        assert_eq!(names, ["touch", "stands", "near"]);
+        let page = list(Path::new("rides"), None, &rides);
+        assert!(page.contains("no; the robot never moved (silent)"), "{page}");
+        assert!(rides[1].facts.summary().contains("the robot never moved (silent)"));
     }
 
     #[test]

@@ -411,10 +411,10 @@ impl Detector for Compressive {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
-        match search {
+        match query {
             Query::Discover { .. } => Ok(Vec::new()),
             Query::Track(track) => {
                 let view = FrameImages::of(frame)?;

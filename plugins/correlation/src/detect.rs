@@ -181,10 +181,10 @@ impl Detector for Correlation {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
-        let Query::Track(track) = search else { return Ok(Vec::new()) };
+        let Query::Track(track) = query else { return Ok(Vec::new()) };
         match self.near(&FrameImages::of(frame)?, track) {
             Ok(found) => Ok(vec![found]),
             Err(test) => {

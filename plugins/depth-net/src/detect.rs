@@ -117,13 +117,13 @@ impl Detector for DepthNet {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let (views, passes) = self.model.look(frame, self.config.source)?;
         let Config { discover_score, track_score, separation_m, .. } = self.config;
         // A track lowers the threshold only once it is believed: a peak must not feed itself.
-        let least = match search {
+        let least = match query {
             Query::Track(track) if track.confirmed => track_score,
             _ => discover_score,
         };
@@ -140,7 +140,7 @@ impl Detector for DepthNet {
             }
             None => Eyes::Camera(&frame.camera, None),
         };
-        Ok(match search {
+        Ok(match query {
             Query::Track(track) => self
                 .near(track, &found)
                 .and_then(|peak| self.detection(&eyes, peak))
@@ -148,8 +148,7 @@ impl Detector for DepthNet {
                 .collect(),
             Query::Discover { .. } => {
                 // People who are tracked already would be discovered twice.
-                let free =
-                    found.iter().filter(|peak| !search.is_occupied(&peak.head, separation_m));
+                let free = found.iter().filter(|peak| !query.is_occupied(&peak.head, separation_m));
                 free.filter_map(|peak| self.detection(&eyes, peak)).collect()
             }
         })

@@ -333,7 +333,7 @@ impl Detector for DepthTemplate {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let depth = frame.depth()?;
@@ -348,8 +348,8 @@ impl Detector for DepthTemplate {
         let view = self.view(frame, rows);
         let matcher = Matcher::new(&self.config, background);
         let scene = PreparedFrame { rows, view, matcher, replaced };
-        match search {
-            Query::Discover { .. } => self.discover(frame, &scene, search, funnel),
+        match query {
+            Query::Discover { .. } => self.discover(frame, &scene, query, funnel),
             Query::Track(track) => self.follow(frame, &scene, track, funnel),
         }
     }

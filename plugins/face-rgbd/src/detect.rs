@@ -117,10 +117,10 @@ impl Detector for FaceRgbd {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
-        let near = match search {
+        let near = match query {
             Query::Track(track) => Some(track.estimate.region),
             Query::Discover { .. } => None,
         };
@@ -213,10 +213,10 @@ mod tests {
     fn detect(
         detector: &mut FaceRgbd,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
     ) -> (Vec<Detection>, Funnel) {
         let mut funnel = Funnel::default();
-        (detector.detect(frame, search, &mut funnel).unwrap(), funnel)
+        (detector.detect(frame, query, &mut funnel).unwrap(), funnel)
     }
 
     const EVERYWHERE: Query<'_> = Query::Discover { occupied: &[] };

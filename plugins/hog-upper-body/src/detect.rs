@@ -189,13 +189,13 @@ impl Detector for HogUpperBody {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let grey = frame.grey()?;
         let camera = &*frame.camera;
         let depth = frame.depth().ok().filter(|_| self.config.depth_proposals);
-        let near = match search {
+        let near = match query {
             Query::Track(track) => Some(track.estimate.region),
             Query::Discover { .. } => None,
         };
@@ -358,9 +358,9 @@ mod tests {
             ..Images::default()
         };
         let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
-        let search = near.map_or(Query::Discover { occupied: &[] }, Query::Track);
+        let query = near.map_or(Query::Discover { occupied: &[] }, Query::Track);
         let mut funnel = Funnel::default();
-        let found = detector(config).detect(&frame, &search, &mut funnel).unwrap();
+        let found = detector(config).detect(&frame, &query, &mut funnel).unwrap();
         let count = |test: &str| funnel.count(test);
         ([count("window: size and depth"), count("window: gradients")], found.len())
     }

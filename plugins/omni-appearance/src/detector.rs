@@ -132,7 +132,7 @@ impl Detector for OmniAppearance {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let blobs = self.eyes.look(frame, funnel)?;
@@ -146,7 +146,7 @@ impl Detector for OmniAppearance {
             let person = self.placed(blob, &frame.camera, &view);
             if !(low..=high).contains(&person.position.z) {
                 funnel.drop_detection("head height", &person);
-            } else if !fits(search, &person) {
+            } else if !fits(query, &person) {
                 funnel.drop_detection("not near the track", &person);
             } else {
                 found.push(person);
@@ -160,9 +160,9 @@ impl Detector for OmniAppearance {
     }
 }
 
-/// Returns true if a detection lies where the search looks.
-fn fits(search: &Query<'_>, person: &Detection) -> bool {
-    match search {
+/// Returns true if a detection lies within the region of a query.
+fn fits(query: &Query<'_>, person: &Detection) -> bool {
+    match query {
         Query::Discover { .. } => true,
         Query::Track(track) => {
             let off = (person.position - track.estimate.person.position).xy();

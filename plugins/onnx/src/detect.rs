@@ -130,13 +130,13 @@ impl Detector for Onnx {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let people = self.people(frame, funnel)?;
         let Some(Loaded { thresholds, .. }) = &self.loaded else { return Ok(Vec::new()) };
         // A track lowers the threshold only once it is believed: a weak box must not feed itself.
-        let least = match search {
+        let least = match query {
             Query::Track(track) if track.confirmed => thresholds.track,
             _ => thresholds.discover,
         };
@@ -155,7 +155,7 @@ impl Detector for Onnx {
                 None => funnel.drop_at("outside", person.rect),
             }
         }
-        Ok(match search {
+        Ok(match query {
             Query::Track(track) => self.config.boxes.near(track, found),
             Query::Discover { .. } => found,
         })

@@ -79,7 +79,7 @@ impl Detector for RecordedDetections {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let mut found = Vec::new();
@@ -93,7 +93,7 @@ impl Detector for RecordedDetections {
                 None => funnel.drop_at("outside", recorded.region.unwrap_or_default()),
             }
         }
-        Ok(match search {
+        Ok(match query {
             Query::Track(track) => self.config.boxes.near(track, found),
             Query::Discover { .. } => found,
         })

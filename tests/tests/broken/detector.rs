@@ -69,9 +69,9 @@ impl Heads {
             .with_image(ImageBox::upper_body(region))
     }
 
-    fn places(&self, frame: &Frame, search: &Query<'_>) -> Result<Vec<Point3<f64>>> {
+    fn places(&self, frame: &Frame, query: &Query<'_>) -> Result<Vec<Point3<f64>>> {
         let mut found = heads(frame)?;
-        match (search, self.fault) {
+        match (query, self.fault) {
             (Query::Discover { .. }, "blind") | (Query::Track(_), "short-sighted") => {
                 found.clear();
             }
@@ -100,14 +100,14 @@ impl Detector for Heads {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         _: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         assert!(self.fault != "panics" || frame.camera.width > 1, "cannot see");
         if self.fault == "vague" && frame.depth().is_err() {
             return Err(Error::Other("something is missing".into()));
         }
-        let places = self.places(frame, search)?;
+        let places = self.places(frame, query)?;
         Ok(places.into_iter().map(|place| self.detection(frame, place)).collect())
     }
 

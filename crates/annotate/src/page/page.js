@@ -2,7 +2,8 @@
 // The page shows frames and asks for changes; the server makes them, saves them, and answers with the
 // boxes of the people that changed.
 
-const COLOURS = ["#62b0ff", "#ff9c57", "#43cf9b", "#d598f0", "#ff8fa3", "#c3d452", "#4fcfe0", "#f2e6a0"];
+// The colours of IDs are those of all pages.
+const STYLE = getComputedStyle(document.documentElement);
 const SVG = "http://www.w3.org/2000/svg";
 const CLICK_PX = 4;
 const VISIBLE = [1, 0.75, 0.5, 0.25, 0];
@@ -20,7 +21,7 @@ let queue = Promise.resolve();
 let finished = false;
 
 const frame = () => about.frames[at];
-const colour = (id) => COLOURS[(id - 1) % COLOURS.length];
+const colour = (id) => STYLE.getPropertyValue(`--t${((id % 10) + 10) % 10}`);
 const rowOf = (id) => people.get(id)?.get(frame());
 const here = () => [...people.keys()].filter((id) => rowOf(id)).sort((a, b) => a - b);
 
@@ -126,7 +127,7 @@ const drawBox = (stage, id, box, unit) => {
   const tagWidth = (8.2 * name.length + 10) * unit;
   const left = Math.min(Math.max(0, x), Math.max(0, about.size[0] - tagWidth));
   stage.append(svg("rect", { x: left, y: top, width: tagWidth, height: line, class: "tag" }));
-  const text = svg("text", { class: "tag-text", fill: id === null ? "#fff" : colour(id), transform: `translate(${left + 5 * unit} ${top + 15 * unit}) scale(${unit})` });
+  const text = svg("text", { class: "tag-text", transform: `translate(${left + 5 * unit} ${top + 15 * unit}) scale(${unit})` });
   text.textContent = name;
   stage.append(text);
   if (id === null || id !== chosen) return;

@@ -34,11 +34,12 @@ pub fn rooms(args: &RoomsArgs, registry: &Registry) -> Outcome {
     let store = Store::new(&args.folder.output);
     let desk = Desk::new(&store, registry, &contestants, &locations)?;
     let done = desk.work(usize::from(args.jobs))?;
-    let ran = counted(done.ran, "run");
-    say(&format!("{ran} done, {} had their results", done.asked - done.ran));
     if let Some(signal) = done.signal {
+        say(&super::stopped(done.done, &counted(done.asked, "run"), &store));
         return Ok(Ended::BySignal(signal));
     }
+    let ran = counted(done.ran, "run");
+    say(&format!("{ran} done, {} had their results", done.asked - done.ran));
     let report = Report::new(args, &locations, &contestants, &desk)?;
     let json = report.json()?;
     store.put("rooms.json", json.as_bytes())?;

@@ -56,7 +56,10 @@ struct StoredRoom {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RunSummary {
     pub asked: usize,
+    /// Runs that had no result before.
     pub ran: usize,
+    /// Runs that have a result now.
+    pub done: usize,
     pub lost: bool,
     pub signal: Option<u8>,
 }
@@ -147,9 +150,13 @@ impl<'a> Desk<'a> {
         shift.run_all(self.passes(due, jobs), jobs);
         bar.finish_and_clear();
         shift.verdict()?;
-        let mut results = asked.iter().filter_map(|run| self.result(*run));
-        let lost = results.any(|result| result.data_lost);
-        Ok(RunSummary { asked: asked.len(), ran, lost, signal: signals.received() })
+        let mut done = 0;
+        let mut lost = false;
+        for result in asked.iter().filter_map(|run| self.result(*run)) {
+            done += 1;
+            lost |= result.data_lost;
+        }
+        Ok(RunSummary { asked: asked.len(), ran, done, lost, signal: signals.received() })
     }
 
     fn runs(&self) -> Vec<Run> {

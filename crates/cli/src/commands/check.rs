@@ -8,7 +8,7 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::{PathText, Registry};
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Usage};
-use tagalong_pipeline::{BlindZone, Pipeline, SafetyDistances, Suits};
+use tagalong_pipeline::{BlindZone, Pipeline, SafetyDistances, Sources, Suits};
 
 /// Frames of the log that are tried.
 const FRAMES: u64 = 3;
@@ -23,7 +23,10 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     file.check_tuning(registry)?;
     let outer = file.outer_for(&pipeline)?;
     let inputs = pipeline.inputs();
-    let needs = names(inputs, &outer.input, Usage::Required);
+    let mut needs = names(inputs, &outer.input, Usage::Required);
+    if needs_odometry(&pipeline) {
+        needs.push("odometry");
+    }
     let uses = names(inputs, &outer.input, Usage::Optional);
     let distances = pipeline.safety_distances();
     if format == Format::Text {
@@ -38,7 +41,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     let seen_m = fit.as_ref().and_then(|fit| fit.camera_height_m);
     let height_m = seen_m.or_else(|| outer.input.mount().map(|mount| mount.height_m));
     let unsuited = height_m.and_then(|height_m| unsuited(height_m, &suits));
-    let notes = fit.map(|fit| fit.notes);
+    let (topics, notes) = fit.map(|fit| (fit.topics, fit.notes)).unzip();
     print(&match format {
         Format::Text => {
             let mut out = String::new();
@@ -48,8 +51,9 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
             if let Some(zone) = &blind_zone {
                 out += &told_zone(zone);
             }
-            if let (Some(log), Some(notes)) = (log, notes) {
+            if let (Some(log), Some(topics), Some(notes)) = (log, topics, notes) {
                 let _ = writeln!(out, "{}: fits", log.display());
+                topics.iter().for_each(|topic| out += &format!("  {topic}\n"));
                 notes.iter().for_each(|note| out += &format!("  {note}\n"));
             }
             out
@@ -57,7 +61,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
         Format::Json => {
             let answer = serde_json::json!({
                 "config": config.display().to_string(), "needs": needs, "uses": uses,
-                "log": log.map(PathText), "notes": notes, "unsuited": unsuited,
+                "log": log.map(PathText), "topics": topics, "notes": notes, "unsuited": unsuited,
                 "distances": distances, "blind_zone": blind_zone,
             });
             format!("{answer:#}\n")
@@ -66,8 +70,17 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     Ok(Ended::with_loss(data_lost))
 }
 
+/// Returns true for a config that a robot without odometry cannot run: its controller needs it, or
+/// `[suits]` says so.
+fn needs_odometry(pipeline: &Pipeline) -> bool {
+    let all_but_odometry = Sources { depth: true, right: true, laser: true, odometry: false };
+    pipeline.check_sources(all_but_odometry).is_err() || pipeline.config().suits.odometry
+}
+
 /// Facts about a log that fits.
 struct Fit {
+    /// Topics that are read, each with its input.
+    topics: Vec<String>,
     /// Notes of the reader.
     notes: Vec<String>,
     /// Part of the log was lost.
@@ -163,8 +176,10 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit
     if tried == 0 {
         return Err(Failure::failed(format!("{}: no frame that can be used", log.display())));
     }
+    let used = source.account().topics.iter().filter(|topic| topic.used_as.is_some());
+    let topics = used.map(ToString::to_string).collect();
     let notes = source.notes().to_vec();
-    Ok(Fit { notes, data_lost: source.data_lost(), camera_height_m, blind_zone })
+    Ok(Fit { topics, notes, data_lost: source.data_lost(), camera_height_m, blind_zone })
 }
 
 /// Returns true if the log tells nothing about the pose of the camera.

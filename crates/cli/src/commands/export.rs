@@ -17,6 +17,8 @@ pub(super) struct Export<'a> {
     pub(super) weights: Option<&'a Path>,
     /// File for a sample of inputs and outputs.
     pub(super) sample: Option<&'a Path>,
+    /// True if files that exist are replaced.
+    pub(super) overwrite: bool,
 }
 
 impl Export<'_> {
@@ -26,6 +28,15 @@ impl Export<'_> {
     /// A plugin without a network, a model that it refuses (exit code 2), a file that cannot be
     /// written.
     pub(super) fn run(&self, registry: &Registry) -> Outcome {
+        let card = card_of(self.file);
+        for file in [Some(self.file), Some(&card), self.sample].into_iter().flatten() {
+            // The file is an argument of its own here, and -o names a config.
+            if file.exists() && !self.overwrite {
+                let shown = file.display();
+                let why = format!("{shown} exists; name another file, or add --overwrite");
+                return Err(Failure::usage(why));
+            }
+        }
         let text = self.settings()?.to_string();
         let table = DeTable::parse(&text).map_err(Failure::usage)?;
         let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
@@ -33,7 +44,6 @@ impl Export<'_> {
         let context = Context { seed: 0, base_dir: PathBuf::from("."), wheels };
         let network = registry.export(self.plugin, Some(value), &context);
         let network = network.map_err(|error| Failure::usage(error.message))?;
-        let card = card_of(self.file);
         write_file(self.file, &network.onnx)?;
         write_file(&card, &network.card)?;
         let mut written = vec![self.file.display().to_string(), card.display().to_string()];

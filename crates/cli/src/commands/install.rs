@@ -1,13 +1,16 @@
 use std::fmt::Write as _;
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use sha2::{Digest, Sha256};
 use tagalong_app::config_file::ConfigFile;
-use tagalong_app::installed::{NetworkFiles, WITH_DEPTH};
+use tagalong_app::installed::{
+    NetworkFiles, WITH_DEPTH, default_network, installed_embeddings, installed_networks,
+};
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, write_file};
-use tagalong_config::{FileLimit, read_bytes};
+use tagalong_config::{FileLimit, nearest, read_bytes};
 use tagalong_network::{About, DATA_FOLDER, Limits, networks_folder};
 
 use super::model::{Known, NetworkConfig, as_text};
@@ -132,6 +135,51 @@ impl Install<'_> {
     }
 }
 
+/// Removes an installed network with its configs and its card.
+///
+/// # Errors
+/// A name that no installed network has (exit code 2), files that cannot be removed.
+pub(super) fn remove(name: &str) -> Outcome {
+    let folder = folder()?;
+    let mut installed = installed_networks();
+    installed.extend(installed_embeddings());
+    if !installed.iter().any(|known| known == name) {
+        let hint = match nearest(name, installed.iter().map(String::as_str)) {
+            Some(best) => format!("; did you mean `{best}`?"),
+            None if installed.is_empty() => "; none is installed".into(),
+            None => format!("; installed: {}", installed.join(", ")),
+        };
+        return Err(Failure::usage(format!("no network is installed as `{name}`{hint}")));
+    }
+    let was_default = default_network().as_deref() == Some(name);
+    let NetworkFiles { onnx, config, depth_config, card, default } =
+        NetworkFiles::of(&folder, name);
+    // The network last: until then an interrupted removal can be repeated.
+    for file in [&card, &depth_config, &config, &onnx] {
+        delete(file)?;
+    }
+    let mut out = format!("removed: {}\n", onnx.display());
+    if was_default {
+        delete(&default)?;
+        let _ = match default_network() {
+            Some(next) => writeln!(out, "`{next}` is now taken for a log with colour alone"),
+            None => writeln!(out, "no network is left for a log with colour alone"),
+        };
+    }
+    print(&out)?;
+    Ok(Ended::Well)
+}
+
+/// Deletes a file, if it is there.
+fn delete(file: &Path) -> Result<(), Failure> {
+    match fs::remove_file(file) {
+        Err(why) if why.kind() != io::ErrorKind::NotFound => {
+            Err(Failure::failed(format!("cannot remove {}: {why}", file.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Returns the folder of installed networks.
 fn folder() -> Result<PathBuf, Failure> {
     networks_folder().ok_or_else(|| {
@@ -143,7 +191,7 @@ fn folder() -> Result<PathBuf, Failure> {
 fn check_free(file: &Path, name: &str, sha256: &str) -> Result<(), Failure> {
     match read_network(file) {
         Ok(present) if hash_of(&present) != sha256 => Err(Failure::failed(format!(
-            "another network is installed as `{name}` ({}): give another --name, or delete it",
+            "another network is installed as `{name}` ({}): give another --name, or `tagalong model --remove {name}` first",
             file.display()
         ))),
         _ => Ok(()),

@@ -5,7 +5,7 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::{Value, json};
 use tagalong_app::format::Format;
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, write_file};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare, write_file};
 use tagalong_app::serialize::to_json;
 use tagalong_config::Registry;
 use tagalong_core::RgbImage;
@@ -16,7 +16,7 @@ use tagalong_network::{
 };
 
 use super::export::Export;
-use super::install::{Install, hash_of, read_network};
+use super::install::{Install, hash_of, read_network, remove};
 use super::networks::{self, KnownNetwork};
 
 /// Config for a network of the user.
@@ -50,7 +50,7 @@ const CALLS: usize = 3;
 #[derive(Debug, Args)]
 pub struct ModelArgs {
     /// The ONNX file.
-    #[arg(required_unless_present = "list")]
+    #[arg(required_unless_present_any = ["list", "remove"])]
     file: Option<PathBuf>,
     /// List networks that are known to work, with their licences and figures, and those that are
     /// installed.
@@ -63,9 +63,16 @@ pub struct ModelArgs {
     /// Name of the installed network [default: that of a known network, or of the file].
     #[arg(long, value_name = "NAME", requires = "install")]
     name: Option<String>,
+    /// Remove the installed network of this name, with its configs and its card.
+    #[arg(long, value_name = "NAME",
+          conflicts_with_all = ["file", "list", "install", "export", "output", "size", "format"])]
+    remove: Option<String>,
     /// Write the config that runs the network into this file, and name the network relative to it.
     #[arg(short, long, value_name = "CONFIG", conflicts_with_all = ["export", "format"])]
     output: Option<PathBuf>,
+    /// Replace a config, or an exported network with its card, that exists.
+    #[arg(long)]
+    overwrite: bool,
     /// Write the network of this plugin into the file, and its card beside it, instead of reading
     /// the file.
     #[arg(long, value_name = "PLUGIN", conflicts_with_all = ["size", "format"])]
@@ -114,6 +121,9 @@ pub(super) struct KnownDetector<'a> {
 /// A file that is refused (its cause and remedy), or whose outputs no decoder reads; an export of
 /// a plugin without a network; files that cannot be written.
 pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
+    if let Some(name) = &args.remove {
+        return remove(name);
+    }
     let Some(file) = &args.file else {
         print(&match args.format {
             Format::Text => networks::as_text(),
@@ -124,7 +134,8 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
     if let Some(plugin) = &args.export {
         let weights = args.weights.as_deref();
         let sample = args.sample.as_deref();
-        return Export { plugin, file, weights, sample }.run(registry);
+        let overwrite = args.overwrite;
+        return Export { plugin, file, weights, sample, overwrite }.run(registry);
     }
     let size = args.size.as_deref().and_then(|size| <[usize; 2]>::try_from(size).ok());
     let shown = file.display();
@@ -138,6 +149,7 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
     }
     if let Some(config) = &args.output {
         let known = known.map_err(refused)?;
+        spare(config, args.overwrite)?;
         make_room_for(config)?;
         let name = relative_to(config, file)?;
         write_file(config, as_text(&name, &about, Some(&known), NetworkConfig::Colour))?;

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use tagalong_app::installed::{default_network, installed_networks};
+use tagalong_app::installed::{default_network, installed_embeddings, installed_networks};
 
 /// Table of the networks. Its figures are those of the command that it names.
 const TABLE: &str = include_str!("networks.toml");
@@ -86,14 +86,19 @@ pub(super) fn as_text() -> String {
     );
     let default = default_network();
     let installed = installed_networks();
-    let _ = match installed[..] {
-        [] => writeln!(out, "None is installed: `tagalong model --install FILE.onnx`."),
-        _ => writeln!(out, "Installed:"),
+    let embeddings = installed_embeddings();
+    let _ = if installed.is_empty() && embeddings.is_empty() {
+        writeln!(out, "None is installed: `tagalong model --install FILE.onnx`.")
+    } else {
+        writeln!(out, "Installed (`tagalong model --remove NAME` removes one):")
     };
     for name in installed {
         let is_default = default.as_ref() == Some(&name);
         let mark = if is_default { " (taken for a log with colour alone)" } else { "" };
         let _ = writeln!(out, "  {name}{mark}");
+    }
+    for name in embeddings {
+        let _ = writeln!(out, "  {name} (re-identification: [appearance] model = \"{name}\")");
     }
     out
 }
@@ -104,6 +109,7 @@ pub(super) fn as_json() -> Value {
         "known": KNOWN.network,
         "command": KNOWN.command,
         "installed": installed_networks(),
+        "embeddings": installed_embeddings(),
         "default": default_network(),
     })
 }

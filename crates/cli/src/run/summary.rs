@@ -50,7 +50,8 @@ fn persons(out: &mut String, report: &RunReport, args: &RunArgs) {
              dropped each candidate",
             doctor(report, args)
         ),
-        count => writeln!(out, "{}:", counted(count, "person")),
+        // A person whose track ends is reported under a new ID: these are no persons.
+        count => writeln!(out, "{}:", counted(count, "ID")),
     };
     for (id, person) in report.persons.iter().take(PERSON_LINES) {
         let _ = writeln!(

@@ -408,3 +408,24 @@ fn trackeval_gets_its_tree() {
         assert!(tree.contains_key(name), "{name} of {:?}", tree.keys());
     }
 }
+
+#[test]
+fn copies_of_one_log_are_no_independent_logs() {
+    let home = Home::new();
+    let alter = |log: &str, copy: &str| {
+        let mut command = own_plugin();
+        command.current_dir(home.folder.path()).args(["alter", log, "--mirror", "-o", copy]);
+        ok(command.output().unwrap());
+    };
+    alter("logs/short.mcap", "logs/mirrored.mcap");
+    // A copy of a copy goes back to the same recording.
+    alter("logs/mirrored.mcap", "logs/twice.mcap");
+    let done = home.bench(&["--logs-dir", "logs", "-o", "out"]);
+    assert_eq!(code(&done), 0, "{}", text(&done.stderr));
+    let told = text(&done.stdout);
+    assert!(told.contains("note: mirrored and short and twice go back to one recording"), "{told}");
+    let copies = serde_json::json!([["mirrored", "short", "twice"]]);
+    assert_eq!(home.report("out")["copies"], copies);
+    let page = fs::read_to_string(home.path("out/report.html")).unwrap();
+    assert!(page.contains("mirrored and short and twice go back to one recording"));
+}

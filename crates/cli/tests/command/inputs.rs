@@ -160,11 +160,17 @@ fn check_says_what_is_needed_and_what_is_used() {
     assert!(named.contains("valid; needs colour and depth\n"), "a named topic: {named}");
     let steered = config("follow-depth");
     let plain = said(&steered);
-    assert!(plain.contains("valid; needs depth; uses colour and laser where"), "{plain}");
+    assert!(
+        plain.contains("valid; needs depth and odometry; uses colour and laser where"),
+        "{plain}"
+    );
     let bumper = "[[collision_monitor.sources]]\nname = \"hazards\"\ntype = \"bumper\"\n\
                   topic = \"/hazards\"\n";
     let bumper = said(&format!("{steered}\n{bumper}"));
-    assert!(bumper.contains("valid; needs depth and obstacle-sources; uses colour"), "{bumper}");
+    assert!(
+        bumper.contains("valid; needs depth and obstacle-sources and odometry; uses colour"),
+        "{bumper}"
+    );
     let refused = said(&format!("without = [\"depth\"]\n{}", config("rgbd-ekf")));
     assert!(refused.contains("`depth-template` requires depth images"), "{refused}");
 }

@@ -112,6 +112,64 @@ fn an_installed_network_has_a_name() {
     assert_eq!(code(&run(&["model", "--install", &unknown])), 1);
     let list = text(&run(&["model", "--list"]).stdout);
     assert!(list.contains("blob-finder (taken for a log with colour alone)"), "{list}");
+    // Mistyped names lead to it.
+    fs::write(place("own.toml"), own.replace("blob-finder", "blob-findr")).unwrap();
+    for config in ["own.toml", "blob-findr"] {
+        let why = text(&run(&["check", config]).stderr);
+        assert!(why.contains("did you mean `blob-finder`"), "{config}: {why}");
+    }
+}
+
+#[test]
+fn installed_networks_are_listed_and_removed_by_their_names() {
+    let home = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = tagalong();
+        command.args(arguments).env("TAGALONG_HOME", home.path()).output().unwrap()
+    };
+    let install = |file: &str, name: &str| {
+        let file = network(file).display().to_string();
+        let told = run(&["model", "--install", &file, "--name", name]);
+        assert_eq!(code(&told), 0, "{}", text(&told.stderr));
+    };
+    install("yolox.onnx", "first");
+    install("yolov8.onnx", "second");
+    install("omz.onnx", "faces");
+    let list = text(&run(&["model", "--list"]).stdout);
+    assert!(
+        list.contains("second (taken for") && list.contains("faces (re-identification"),
+        "{list}"
+    );
+    let typo = run(&["model", "--remove", "secnd"]);
+    assert_eq!(code(&typo), 2);
+    assert!(text(&typo.stderr).contains("did you mean `second`?"), "{}", text(&typo.stderr));
+    let told = text(&run(&["model", "--remove", "second"]).stdout);
+    assert!(told.contains("`first` is now taken for a log with colour alone"), "{told}");
+    for name in ["faces", "first"] {
+        assert_eq!(code(&run(&["model", "--remove", name])), 0);
+    }
+    let left = fs::read_dir(home.path().join("networks")).unwrap().count();
+    assert_eq!(left, 0, "no file stays behind");
+}
+
+#[test]
+fn files_that_exist_are_replaced_on_request_alone() {
+    let home = tempfile::tempdir().unwrap();
+    fs::copy(network("nanodet.onnx"), home.path().join("net.onnx")).unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = tagalong();
+        command.args(arguments).current_dir(home.path()).output().unwrap()
+    };
+    let writing = ["model", "net.onnx", "-o", "people.toml"];
+    fs::write(home.path().join("people.toml"), "mine").unwrap();
+    let refused = run(&writing);
+    assert_eq!(code(&refused), 2);
+    assert!(text(&refused.stderr).contains("people.toml exists"), "{}", text(&refused.stderr));
+    assert_eq!(fs::read_to_string(home.path().join("people.toml")).unwrap(), "mine");
+    assert_eq!(code(&run(&[&writing[..], &["--overwrite"]].concat())), 0);
+    let export = run(&["model", "--export", "depth-net", "net.onnx"]);
+    assert_eq!(code(&export), 2);
+    assert!(text(&export.stderr).contains("net.onnx exists"), "{}", text(&export.stderr));
 }
 
 /// A published network on a street: once installed, it is taken without a config or a threshold.
@@ -246,7 +304,7 @@ fn the_shipped_network_is_the_one_that_the_export_writes() {
     {
         let same =
             fs::read(home.path().join(written)).unwrap() == fs::read(models.join(shipped)).unwrap();
-        let renew = "tagalong model --export depth-net configs/models/depth-net.onnx";
+        let renew = "tagalong model --export depth-net --overwrite configs/models/depth-net.onnx";
         assert!(same, "{shipped} is another one: run `{renew}`");
     }
     let card = fs::read_to_string(home.path().join("net.onnx.card.toml")).unwrap();
@@ -268,7 +326,7 @@ fn an_export_takes_the_weights_of_a_model_file() {
     let file = home.path().join("net.onnx");
     let export = |weights: &str| {
         let told = tagalong()
-            .args(["model", "--export", "depth-net", "--weights", weights])
+            .args(["model", "--export", "depth-net", "--overwrite", "--weights", weights])
             .arg(&file)
             .output()
             .unwrap();

@@ -63,7 +63,7 @@ fn a_run_writes_whole_files_and_says_what_it_found() {
     let home = Home::new(&Drawn::of(20), "");
     let output = home.run("out", &[]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("1 person"), "{}", text(&output.stdout));
+    assert!(text(&output.stdout).contains("\n1 ID:\n"), "{}", text(&output.stdout));
     let mut names: Vec<_> = fs::read_dir(home.path("out"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())

@@ -6,7 +6,7 @@ use super::super::finding::{Finding, Severity};
 /// Columns of the image that the limits on offsets refer to.
 const USUAL_COLUMNS: f64 = 640.0;
 
-/// Greatest error of an offset that is believed, as a part of it.
+/// Greatest error of an offset that is reported, as a fraction of the offset.
 const SURE: f64 = 0.125;
 
 /// Checks the registration of depth to colour.

@@ -1,10 +1,11 @@
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
-use mcap::{Compression, WriteOptions, Writer};
+use mcap::{Attachment, Compression, WriteOptions, Writer};
 use serde::Serialize;
 use tagalong_core::Stamp;
 
@@ -42,6 +43,21 @@ impl MessageLog {
             .create(BufWriter::new(file))
             .map_err(WriteError::mcap(&partial))?;
         Ok(Self { writer, channels: BTreeMap::new(), partial, path: path.to_owned() })
+    }
+
+    /// Attaches a text, which [`crate::read_attachment`] finds if it stands before the first message.
+    ///
+    /// # Errors
+    /// [`WriteError::Mcap`].
+    pub fn attach(&mut self, name: &str, media_type: &str, text: &str) -> Result<(), WriteError> {
+        let attachment = Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: name.to_owned(),
+            media_type: media_type.to_owned(),
+            data: Cow::Borrowed(text.as_bytes()),
+        };
+        self.writer.attach(&attachment).map_err(WriteError::mcap(&self.partial))
     }
 
     /// Writes a message; `captured` is its publish time and its log time.

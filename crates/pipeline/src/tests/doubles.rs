@@ -149,11 +149,11 @@ impl Detector for Script {
     fn detect(
         &mut self,
         frame: &Frame,
-        search: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
         let script = self.config.script;
-        let track = match search {
+        let track = match query {
             Query::Track(track) => Some(*track),
             Query::Discover { .. } => None,
         };

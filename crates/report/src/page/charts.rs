@@ -66,8 +66,8 @@ impl Page<'_> {
             self.view.logs.iter().filter_map(|log| self.plans_of(log)).collect();
         (!logs.is_empty()).then(|| html! {
             p {
-                "Where people were (wide and pale) and where the tracks put them (thin, with the number of the track at its end), "
-                "in the odometry frame. A change of line along one person is a change of number."
+                "Where people were (wide and pale) and where the tracks put them (thin, with the ID at the end), "
+                "in the odometry frame. A change of line along one person is an ID switch."
                 (self.of_the_best())
             }
             @for log in &logs { (log) }

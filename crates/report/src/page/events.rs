@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use maud::{Markup, html};
 use tagalong_math::counted;
 
-use super::{Page, cell, column, number, optional_cell, table};
+use super::{MOST_UNFOLDED, Page, cell, column, number, optional_cell, table};
 use crate::chart::key;
 use crate::model::{EventRow, TaskResult};
 use crate::view::OrderedBenchmark;
@@ -65,10 +65,34 @@ impl Page<'_> {
             html! {
                 (self.event_counts(&tasks))
                 div class="filters" hidden { span class="unseen" { "Show kinds of events" } }
-                @for (number, task) in numbered { (self.events_of(number, task)) }
+                @if numbered.clone().count() <= MOST_UNFOLDED {
+                    @for (number, task) in numbered { (self.events_of(number, task)) }
+                } @else {
+                    @for pipeline in &self.view.pipelines {
+                        @let of_pipeline = numbered.clone().filter(|(_, task)| task.pipeline == *pipeline);
+                        (self.events_of_pipeline(pipeline, of_pipeline.collect()))
+                    }
+                }
                 @if more > 0 { p { "The events of " (counted(more, "task")) " of the last pipelines are in report.json." } }
             }
         })
+    }
+
+    /// Renders the events of the tasks of a pipeline, folded together.
+    fn events_of_pipeline(&self, pipeline: &str, tasks: Vec<(usize, &&TaskResult)>) -> Markup {
+        if tasks.is_empty() {
+            return html! {};
+        }
+        let count: usize = tasks.iter().map(|(_, task)| task.events.len()).sum();
+        html! {
+            details class="group" {
+                summary {
+                    (key(self.series(pipeline), pipeline))
+                    span class="aside" { (counted(count, "event")) " in " (counted(tasks.len(), "task")) }
+                }
+                @for (number, task) in tasks { (self.events_of(number, task)) }
+            }
+        }
     }
 
     /// Renders the number of events of each kind and pipeline.
@@ -142,7 +166,7 @@ pub(super) fn kind(kind: &str) -> Markup {
     let (sign, name) = match kind {
         "miss" => ("○", "miss"),
         "found" => ("●", "found"),
-        "switch" => ("⇄", "id switch"),
+        "switch" => ("⇄", "ID switch"),
         "wrong-person" => ("✕", "wrong person"),
         "false-track" => ("△", "false track"),
         other => ("·", other),

@@ -9,12 +9,14 @@ use crate::figures::{ComparisonSpace, Figure};
 impl Page<'_> {
     pub(super) fn explain(&self) -> Markup {
         html! {
-            dl { (figures()) }
+            details class="print" { summary { "Each figure in a sentence" } dl { (figures()) } }
             h3 { "What the intervals mean" }
             p {
                 "A figure is formed per log, over the seeds first, and then averaged over logs: each log counts once, however long it is. "
                 "Its 95 % interval is Student's, over logs, not frames, because frames of one recording resemble each other. "
-                "A single log has none, and neither have logs that all show the same: they do not tell how much others differ. "
+                "A mean of one log has none, and neither has one of logs that all show the same value: they do not tell how much others "
+                "differ. Of figures between two fixed ends, as HOTA from 0 to 1, an interval that leaves out less than a twentieth of the "
+                "values at each end is not shown in the tables, because it says next to nothing; report.json has it. "
                 "No interval knows places of a kind that no log shows. Differences between two pipelines are formed in pairs, log by log. "
                 "Rates of people found have Wilson intervals, widened by what the logs differ in."
             }

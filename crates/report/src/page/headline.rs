@@ -5,6 +5,7 @@ use super::pairs::p_text;
 use super::{Page, cell, column, no_cell, number, table};
 use crate::chart::{interval, key, series_class};
 use crate::figures::{ComparisonSpace, Figure, MAIN};
+use crate::model::copies_note;
 use crate::summary::{Estimate, PairSummary, PipelineSummary, per_log};
 
 impl Page<'_> {
@@ -17,6 +18,7 @@ impl Page<'_> {
         html! {
             @if let Some(verdict) = self.verdict() { p class="verdict" { (verdict) } }
             @if shown.is_empty() { p { "No task has been compared with a truth, so there are no figures." } }
+            @for logs in self.view.copies { p class="bad" { (copies_note(logs)) "." } }
             @for place in shown {
                 h3 { (place_name(place)) }
                 (self.headline_table(place))
@@ -127,7 +129,9 @@ impl Page<'_> {
                     @if estimate.best { "★ " } (number(estimate.mean, figure.decimals))
                     @if estimate.best { span class="unseen" { " best" } }
                 }
-                @if let Some(ends) = estimate.interval.filter(informs) { " " (ends_of(ends, figure.decimals)) }
+                @if let Some(ends) = estimate.interval.filter(|ends| informs(ends, figure.range)) {
+                    " " (ends_of(ends, figure.decimals))
+                }
                 @if estimate.logs < most { span class="fewer" { (counted(estimate.logs, "log")) " only" } }
                 @if let Some(picture) = picture { (picture) }
             },
@@ -166,8 +170,8 @@ impl Page<'_> {
 
 fn log_cell(value: Option<f64>, best: f64, columns: usize) -> Markup {
     let Some(value) = value else { return no_cell() };
-    // A single column has no best one.
-    let best = columns > 1 && value >= best;
+    // A single column has no best one, and a pipeline without a match is the best in nothing.
+    let best = columns > 1 && value >= best && value > 0.0;
     cell(
         value,
         &html! {
@@ -219,17 +223,22 @@ fn people_cell(summary: &PipelineSummary) -> Markup {
         found.estimate,
         &html! {
             span class="value" { (count) " of " (summary.people) }
-            @if let Some(ends) = found.ends().filter(informs) { " " (ends_of(ends, 2)) }
+            @if let Some(ends) = found.ends().filter(|ends| informs(ends, SHARE)) { " " (ends_of(ends, 2)) }
         },
     )
 }
 
-/// Least part of the range from 0 to 1 that an interval leaves out to be worth its place in a cell.
+/// Range of a share.
+const SHARE: [f64; 2] = [0.0, 1.0];
+/// Least part of the range of a figure that an interval leaves out at one end to be worth its place in
+/// a cell.
 const LEAST_INFORMATION: f64 = 0.05;
 
-/// Returns false for an interval that covers all that a share can be.
-fn informs(ends: &[f64; 2]) -> bool {
-    ends[0] > LEAST_INFORMATION || ends[1] < 1.0 - LEAST_INFORMATION
+/// Returns false for an interval that covers nearly all values that a figure of this range can have.
+/// One of a range without an end, as of a count, always leaves out some.
+fn informs(ends: &[f64; 2], [least, most]: [f64; 2]) -> bool {
+    let least_part = LEAST_INFORMATION * (most - least);
+    !least_part.is_finite() || ends[0] > least + least_part || ends[1] < most - least_part
 }
 
 pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {
@@ -275,5 +284,26 @@ pub(super) const fn place_where(place: ComparisonSpace) -> &'static str {
     match place {
         ComparisonSpace::Image => "in the image",
         ComparisonSpace::Floor => "on the floor",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_pipeline_with_a_match_is_the_best_on_a_log() {
+        let has_star =
+            |value, columns| log_cell(Some(value), 0.0, columns).into_string().contains('★');
+        assert!(!has_star(0.0, 3), "all pipelines found nobody");
+        assert!(has_star(0.001, 3));
+        assert!(!has_star(0.5, 1), "no rival");
+    }
+
+    #[test]
+    fn an_interval_of_nearly_all_values_is_left_out_of_a_cell_and_that_of_a_count_is_not() {
+        assert!(!informs(&[0.02, 0.99], SHARE));
+        assert!(informs(&[0.02, 0.9], SHARE) && informs(&[0.2, 1.0], SHARE));
+        assert!(informs(&[0.0, 3.2], [0.0, f64::INFINITY]), "ID switches");
     }
 }

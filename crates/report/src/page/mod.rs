@@ -30,6 +30,9 @@ const TITLE: &str = "Tagalong benchmark";
 /// Most pipelines that are told apart in one chart or image; of more the best ones are shown.
 const MOST_DRAWN: usize = 8;
 
+/// Most entries of a list that are not folded together.
+const MOST_UNFOLDED: usize = 6;
+
 /// Data that the sections are made from.
 struct Page<'a> {
     view: OrderedBenchmark<'a>,

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use tagalong_math::counted;
 
 use super::events::is_base64;
-use super::{MOST_DRAWN, Page, cell, column, no_cell, number, table};
+use super::{MOST_DRAWN, MOST_UNFOLDED, Page, cell, column, no_cell, number, table};
 use crate::chart::{key, px, series_class};
 use crate::model::{MissedPerson, Moment, TaskResult};
 use crate::view::OrderedBenchmark;
@@ -58,9 +58,25 @@ impl Page<'_> {
                         ", thin and dashed the candidates that were dropped."
                     }
                 }
-                @for moment in &self.moments { (self.moment(moment)) }
+                (self.moments())
             }
         })
+    }
+
+    /// Renders the moments; of many, those of each log are folded together.
+    fn moments(&self) -> Markup {
+        if self.moments.len() <= MOST_UNFOLDED {
+            return html! { @for moment in &self.moments { (self.moment(moment)) } };
+        }
+        html! {
+            // They are sorted by log.
+            @for of_log in self.moments.chunk_by(|a, b| a.log == b.log) {
+                details class="group" {
+                    summary { (of_log[0].log) span class="aside" { (counted(of_log.len(), "moment")) } }
+                    @for moment in of_log { (self.moment(moment)) }
+                }
+            }
+        }
     }
 
     /// Renders the number of missed people in frames, by test and pipeline.

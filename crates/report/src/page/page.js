@@ -87,7 +87,7 @@
           if (row.dataset.kind === kind) row.hidden = !box.checked;
         }
       });
-      label.append(box, " " + kind.replace("-", " "));
+      label.append(box, " " + (kind === "switch" ? "ID switch" : kind.replace("-", " ")));
       filters.append(label);
     }
     filters.hidden = false;

@@ -25,7 +25,7 @@ impl Page<'_> {
             "HOTA as it is, and the gain if the truth repaired one kind of error alone; the largest gain in bold."
         };
         Some(html! {
-            p { "The largest gain of a row tells what to work on: who is who, false tracks, missed people, or where the boxes are." }
+            p { "The largest gain of a row shows the kind of error to work on: identities, false tracks, misses, or positions of the boxes." }
             details class="print" open[tasks.len() <= MOST_OPEN] {
                 summary { "One row per pipeline, log and seed" }
                 (table("Gain by repairs", &caption, &head, &body))

@@ -46,7 +46,12 @@ pub fn benchmark(pipelines: &[&str], logs: &[&str]) -> Benchmark {
             tasks.push(task(pipeline, log, 0.55 + 0.08 * p as f64, 97 * p as u64, l as u64));
         }
     }
-    Benchmark { version: "0.0.0-sample".into(), moments: moments(&tasks), tasks }
+    Benchmark {
+        version: "0.0.0-sample".into(),
+        moments: moments(&tasks),
+        tasks,
+        ..Benchmark::default()
+    }
 }
 
 fn task(pipeline: &str, log: &str, level: f64, seed: u64, place: u64) -> TaskResult {

@@ -1,6 +1,8 @@
+use std::collections::BTreeMap;
+
 use nalgebra::{Point2, Vector2};
 use serde::Serialize;
-use tagalong_core::Track;
+use tagalong_core::{Reason, Track};
 use tagalong_pipeline::{FrameReport, Likeness};
 use tagalong_sim::{Clearance, Truth};
 
@@ -67,8 +69,12 @@ pub struct Episode {
 pub struct Ridden {
     /// Seed of the scene.
     pub seed: u64,
-    /// The person was followed, or rightly given up, and no other person for long.
+    /// The person was followed, or rightly given up, and no other person for long; the robot drove
+    /// if the person went away.
     pub kept: bool,
+    /// Commonest reason of the commands of a ride in which the robot never moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub never_moved: Option<&'static str>,
     /// Length of the ride, s.
     pub time_s: f64,
     /// The person was in view, s.
@@ -144,9 +150,14 @@ impl RideJudge {
         let episodes = episodes(&looks);
         let first_s = looks.first().map_or(0.0, |look| look.at_s);
         let longest_wrong_s = longest(&looks, |look| look.whom == Whom::Wrong);
+        let never_moved = never_moved(&ride.ticks);
+        // Tracking alone is not following: a robot that is switched off loses no person that it sees.
+        let stays_behind = never_moved.is_some() && self.goes_away(&looks, ride.stand_off_m);
+        let keeps_track = longest_wrong_s <= self.most_wrong_s && self.ends_well(&looks, &episodes);
         Ridden {
             seed: ride.seed,
-            kept: longest_wrong_s <= self.most_wrong_s && self.ends_well(&looks, &episodes),
+            kept: keeps_track && !stays_behind,
+            never_moved,
             time_s: sum(&|_| true),
             in_view_s: sum(&|look| look.in_view),
             right_s: sum(&|look| look.whom == Whom::Right),
@@ -181,6 +192,13 @@ impl RideJudge {
         let last = episodes.last().filter(|episode| episode.found_s.is_none());
         // A loss at the very end, without time to find the person again, is no failure.
         found && last.and_then(|episode| self.refound(episode, end_s)).unwrap_or(true)
+    }
+
+    /// Returns true if the person was ever farther away than the distance to keep; without such a
+    /// distance, out of view for being far away.
+    fn goes_away(&self, looks: &[JudgedFrame], stand_off_m: Option<f64>) -> bool {
+        let near_m = stand_off_m.map_or(self.max_range_m, |stand_off_m| stand_off_m + self.off_m);
+        looks.iter().any(|look| look.range_m.is_some_and(|range_m| range_m > near_m))
     }
 
     fn looks(&self, ride: &Ride) -> Vec<JudgedFrame> {
@@ -309,6 +327,18 @@ fn longest(looks: &[JudgedFrame], counts: impl Fn(&JudgedFrame) -> bool) -> f64 
     most
 }
 
+/// Returns the commonest reason of the commands if the robot neither drove nor turned.
+fn never_moved(ticks: &[Tick]) -> Option<&'static str> {
+    if ticks.iter().any(|tick| tick.body_mps() > MOVES_MPS) {
+        return None;
+    }
+    let mut counts: BTreeMap<&'static str, usize> = BTreeMap::new();
+    for tick in ticks {
+        *counts.entry(tick.reason.map_or("no command", Reason::name)).or_default() += 1;
+    }
+    counts.into_iter().max_by_key(|(_, count)| *count).map(|(reason, _)| reason)
+}
+
 /// Returns the time at which a robot that moved had the least room, s since the start.
 fn nearest_s<'a>(moving: impl Iterator<Item = &'a Tick>) -> Option<f64> {
     let rooms = moving.map(|tick| {
@@ -345,7 +375,10 @@ fn jerk(ticks: &[Tick]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_core::TrackId;
+
     use super::*;
+    use crate::testing::trial;
 
     fn looks(whom: &[(Whom, bool)]) -> Vec<JudgedFrame> {
         let look = |(at, (whom, in_view)): (usize, &(Whom, bool))| JudgedFrame {
@@ -380,6 +413,47 @@ mod tests {
         assert_eq!(judge.refound(&second, 9.0), None);
         let late = Episode { in_view_s: Some(4.0), ..second };
         assert_eq!((judge.refound(&late, 6.0), judge.refound(&late, 8.0)), (None, Some(false)));
+    }
+
+    #[test]
+    fn a_robot_that_never_moves_names_the_reason_and_keeps_no_person_that_goes_away() {
+        let tick = |speed_mps, turn_rate, reason| Tick {
+            at_s: 0.0,
+            speed_mps,
+            turn_rate,
+            clearance: Clearance { people_m: 1.0, things_m: 1.0 },
+            approach: None,
+            reason,
+            crowd: None,
+        };
+        let silent = Some(Reason::Silent);
+        let ticks = [tick(0.0, 0.0, None), tick(0.0, 0.0, silent), tick(0.01, 0.0, silent)];
+        assert_eq!(never_moved(&ticks), Some("silent"));
+        assert_eq!(never_moved(&[ticks[0], tick(0.2, 0.0, silent)]), None, "it drives");
+        assert_eq!(never_moved(&[ticks[0], tick(0.0, 0.9, silent)]), None, "it turns");
+        let kept = |range_m: f64, speed_mps: f64| {
+            let heads = [(range_m, 0.0, 1.0); 10];
+            let places = [Some((range_m, 0.0)); 10];
+            let mut trial = trial(&[&heads], &[(7, &places)]);
+            let mut reports = trial.runs.remove(0).reports;
+            for report in &mut reports {
+                report.target = Some(TrackId(7));
+            }
+            let ride = Ride {
+                seed: 1,
+                stand_off_m: Some(1.5),
+                moments: trial.moments,
+                reports,
+                took_ms: Vec::new(),
+                ticks: vec![tick(speed_mps, 0.0, silent)],
+                in_view: Vec::new(),
+                faults: Vec::new(),
+            };
+            RideJudge::default().judge(&ride).kept
+        };
+        assert!(kept(1.5, 0.0), "a person at the distance to keep is no reason to move");
+        assert!(!kept(3.0, 0.0), "the robot stayed behind");
+        assert!(kept(3.0, 0.3), "it drove");
     }
 
     #[test]

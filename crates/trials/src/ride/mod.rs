@@ -16,7 +16,7 @@ use enable::StuckEnable;
 pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_config::Registry;
 use tagalong_core::{Command, Frame, Reason, Stamp, WheelSpeeds};
-use tagalong_pipeline::{FrameReport, Pipeline, Sources};
+use tagalong_pipeline::{FrameReport, Pipeline, SourceKind, Sources};
 use tagalong_sim::{
     ApproachInView, ApproachState, Clearance, CrowdView, Event, ROBOT_RADIUS_M, Scene,
     ScheduledFault, Simulation,
@@ -102,8 +102,8 @@ impl Ride {
     /// [`Pipeline::command_at`] at each message of the odometry.
     ///
     /// # Errors
-    /// A config that is wrong, has no controller or one without sensors of obstacles, or a plugin
-    /// that fails.
+    /// A config that is wrong, has no controller or one without sensors of obstacles, or asks for a
+    /// source of obstacles that the scene does not simulate; a plugin that fails.
     pub fn new(
         scene: &Scene,
         contender: &Contender,
@@ -140,6 +140,7 @@ impl Ride {
             let message = format!("{} has no [controller]: nothing can follow", contender.name);
             return Err(TrialError::Config(message));
         }
+        Self::check_obstacle_sources(scene, &pipeline, &contender.name)?;
         // The simulated base executes the commands.
         pipeline.set_driving(true);
         let mut draw = Draw::live(scene, 1);
@@ -186,6 +187,53 @@ impl Ride {
             ride.reports.push(report);
         }
         Ok(ride)
+    }
+
+    /// Refuses a pipeline with a source of obstacles that the robot of the scene does not have: without a
+    /// reading of it the robot would never move.
+    ///
+    /// # Errors
+    /// [`TrialError::Config`] names the source and the remedy.
+    pub fn check_obstacle_sources(
+        scene: &Scene,
+        pipeline: &Pipeline,
+        name: &str,
+    ) -> Result<(), TrialError> {
+        for source in pipeline.obstacle_sources() {
+            let mut names: Vec<&str> = Vec::new();
+            let key = match source.kind {
+                SourceKind::Scan => {
+                    names.extend(scene.lasers.iter().map(|laser| &*laser.name));
+                    Some("lasers")
+                }
+                SourceKind::Range => {
+                    names.extend(scene.ranges.iter().map(|range| &*range.name));
+                    Some("ranges")
+                }
+                SourceKind::Bumper => {
+                    names.extend(scene.bumpers.iter().map(|bumper| &*bumper.name));
+                    Some("bumpers")
+                }
+                // The simulated robot has one depth camera, which needs no section.
+                SourceKind::Depth => None,
+            };
+            if names.contains(&&*source.name) {
+                continue;
+            }
+            let wanted = &source.name;
+            let remedy = match key {
+                Some(key) if names.is_empty() => {
+                    format!("add it with `--set '{key}=[{{name=\"{wanted}\"}}]'`")
+                }
+                Some(key) => format!("add `[[{key}]]` with `name = \"{wanted}\"` to the scene"),
+                None => "a simulated robot has no second depth camera".into(),
+            };
+            return Err(TrialError::Config(format!(
+                "{name}: the robot of the scene lacks the source `{wanted}` of [[collision_monitor.sources]], \
+                 without which it never moves; {remedy}, or leave the source out of the config"
+            )));
+        }
+        Ok(())
     }
 
     /// Returns the time of the last step of the simulation, s.

@@ -679,7 +679,7 @@
   const fillEvents = () => {
     listed = events.filter((event) => !hiddenKinds.has(event.kind)).map((event) => {
       const text = data.runs.length > 1 ? `${data.runs[event.run].name}: ${event.text}` : event.text;
-      const node = el("button", { type: "button" },
+      const node = el("button", { type: "button", "data-i": event.i },
         el("span", { class: "when" }, `${fixed(event.t, 2)} s`),
         el("span", { class: BAD.includes(event.kind) ? "kind bad" : "kind" }, `${SIGNS[event.kind] || "·"} ${event.kind}`), el("span", {}, text));
       node.addEventListener("click", () => goToEvent(event));

@@ -46,7 +46,8 @@ fn calls(line: &str) -> Vec<Call<'_>> {
 fn calls_of_part(part: &str) -> Vec<Call<'_>> {
     let all: Vec<&str> = part.split_whitespace().skip_while(|word| word.contains('=')).collect();
     // Redirections and pipes belong to the shell, not to the program.
-    let words = all.split(|word| matches!(*word, ">" | "|")).next().unwrap_or_default();
+    let words =
+        all.split(|word| matches!(*word, ">" | "2>" | "|" | "||")).next().unwrap_or_default();
     match words {
         ["tagalong", rest @ ..] => vec![Call::Program(Name::Tagalong, rest.to_vec())],
         ["tagalong-papers", rest @ ..] => vec![Call::Program(Name::Papers, rest.to_vec())],
@@ -145,7 +146,10 @@ mod tests {
     #[test]
     fn what_the_shell_does_is_left_out_and_settings_are_kept() {
         let set = Call::Program(Name::Tagalong, vec!["simulate", "--set", "a.b=1"]);
-        assert_eq!(calls("tagalong simulate --set a.b=1 > x"), [set]);
+        for rest in ["> x", "2> x", "| wc", "|| test $? -eq 2"] {
+            let line = format!("tagalong simulate --set a.b=1 {rest}");
+            assert_eq!(calls(&line), std::slice::from_ref(&set), "{rest}");
+        }
         assert_eq!(plain(&"'HOTA<-0.01'"), "HOTA<-0.01");
         assert_eq!(plain(&"\"$TASK\""), "1");
         assert_eq!(plain(&"\"$TASK/$TASKS\""), "1/1");

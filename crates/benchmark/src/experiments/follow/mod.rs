@@ -33,6 +33,8 @@ use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
 use crate::experiments::contender::contender;
 
+/// Files of results, beside the logs of the rides.
+const RESULTS: [&str; 3] = ["follow.json", "follow.md", "likeness.csv"];
 /// Folder and name prefix of the default scenes.
 const SCENES: (&str, &str) = ("configs/scenes", "follow-");
 
@@ -190,6 +192,10 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
         for job in &jobs {
             spare(&log_file(folder, job), args.overwrite)?;
         }
+        // Other rides may have left their results there, which are no part of these.
+        for name in RESULTS {
+            spare(&folder.join(name), args.overwrite)?;
+        }
         make_folder(folder)?;
     }
     let bar = RidesBar::new(jobs.iter().map(|job| job.scene.duration_s));
@@ -226,19 +232,26 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
         contenders.push((contender, false));
         contenders.extend(told.map(|told| (told, true)));
     }
+    // Before any file is written.
+    let mut pipelines = Vec::new();
+    for (contender, _) in &contenders {
+        pipelines.push(contender.pipeline(registry, 0).map_err(failure)?);
+    }
     for path in scenes(args)? {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for value in swept(args) {
             let swept = value.as_ref().map(|(_, value)| value.clone());
             let suite = std::iter::once(&name).chain(&swept);
             let suite = suite.map(String::as_str).collect::<Vec<_>>().join(" ");
-            for (contender, is_told) in &contenders {
+            for ((contender, is_told), pipeline) in contenders.iter().zip(&pipelines) {
                 for seed in seeds.numbers() {
                     let mut variant = variant(args, seed);
                     variant.set.extend(value.clone());
                     let mut scene = tagalong_simulate::read(&path, &variant)?;
                     scene.faults.inject.extend(args.inject.iter().cloned());
                     scene.check_faults().map_err(Failure::usage)?;
+                    Ride::check_obstacle_sources(&scene, pipeline, &contender.name)
+                        .map_err(failure)?;
                     let suite = suite.clone();
                     let swept = swept.clone();
                     let contender = contender.clone();
@@ -359,6 +372,13 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     let joined = |show: fn(&Table) -> String| -> String {
         tables.iter().map(show).collect::<Vec<_>>().join("\n")
     };
+    // Written before it is printed: a pipe that closes must not cost the results.
+    if let Some(folder) = &args.output {
+        let texts = [json.clone(), joined(Table::markdown), table::likeness_csv(results)];
+        for (name, text) in RESULTS.iter().zip(texts) {
+            write_file(&folder.join(name), text)?;
+        }
+    }
     match args.format {
         TableFormat::Json => print(&json)?,
         TableFormat::Markdown => print(&joined(Table::markdown))?,
@@ -379,13 +399,6 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
         }
         return Ok(());
     };
-    let markdown = joined(Table::markdown);
-    let likeness = table::likeness_csv(results);
-    for (name, text) in
-        [("follow.json", &json), ("follow.md", &markdown), ("likeness.csv", &likeness)]
-    {
-        write_file(&folder.join(name), text)?;
-    }
     let shown = folder.display();
     say(&format!("the logs and tables are in {shown}; `tagalong view {shown}` shows the rides"));
     Ok(())

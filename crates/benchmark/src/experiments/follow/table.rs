@@ -1,4 +1,5 @@
 use tagalong_eval::{draws_interval, percentile};
+use tagalong_math::counted;
 use tagalong_pipeline::Likeness;
 use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Seeds;
@@ -48,7 +49,7 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
         title: "Following the first person of each scene".into(),
         columns: COLUMNS.map(str::to_owned).to_vec(),
         rows,
-        notes: notes(&judge, seeds),
+        notes: notes(&judge, seeds).into_iter().chain(standing(results)).collect(),
     };
     std::iter::once(following)
         .chain(crowd_table::table(crowd_rows, seeds))
@@ -96,13 +97,32 @@ fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
         ),
         format!(
             "kept: the person was found, no other person was followed for more than {} s at a time, \
-             and at the end the person was followed or out of view for {} s",
+             at the end the person was followed or out of view for {} s, and the robot moved if the \
+             person was ever out of its reach",
             judge.most_wrong_s, judge.refind_s
         ),
         "wrong: share of the time in which the robot followed another person or a thing".into(),
         "contacts: rides in which the robot touched a person or a thing, and the least clearance".into(),
         "ms/frame: 95th percentile of the processor time of the pipeline's thread".into(),
     ]
+}
+
+/// Returns a note for each pipeline whose robot never moved in some rides, with the reason.
+fn standing(results: &[Followed]) -> Vec<String> {
+    let mut all = Vec::new();
+    for pipeline in unique(results.iter().map(|result| result.pipeline.as_str())) {
+        let rides: Vec<&Followed> = results.iter().filter(|r| r.pipeline == pipeline).collect();
+        let reasons: Vec<&str> = rides.iter().filter_map(|ride| ride.ridden.never_moved).collect();
+        if !reasons.is_empty() {
+            all.push(format!(
+                "{pipeline} never moved in {} of {}; reason of its commands: {}",
+                reasons.len(),
+                counted(rides.len(), "ride"),
+                unique(reasons.into_iter()).join(", ")
+            ));
+        }
+    }
+    all
 }
 
 fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
@@ -314,6 +334,20 @@ mod tests {
         let shown = [0, 1, 4, 5, 6, 7, 8].map(|at: usize| values[at].unwrap());
         let off = shown.iter().zip(expected).map(|(a, b)| (a - b).abs());
         assert!(off.fold(0.0, f64::max) < 1e-9, "{shown:?}");
+    }
+
+    #[test]
+    fn a_robot_that_never_moves_is_named_below_the_table() {
+        let stands = |never_moved| Followed {
+            pipeline: "blind".into(),
+            ridden: Ridden { never_moved, ..Ridden::default() },
+            ..Followed::default()
+        };
+        let seeds = Split::Test.seeds(0, 2).unwrap();
+        let told = |results: &[Followed]| tables(results, seeds)[0].notes.last().unwrap().clone();
+        let both = told(&[stands(Some("silent")), stands(None)]);
+        assert_eq!(both, "blind never moved in 1 of 2 rides; reason of its commands: silent");
+        assert!(!told(&[stands(None)]).contains("never moved"));
     }
 
     /// One sighting of the person with this probability by the log-odds, calibrated or not.

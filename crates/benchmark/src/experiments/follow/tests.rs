@@ -59,3 +59,20 @@ fn each_pipeline_is_told_beside_seeing() {
     assert_eq!(jobs_of(&[]), [seeing.clone(), seeing.clone()]);
     assert_eq!(jobs_of(&["--told"]), [seeing.clone(), seeing, told.clone(), told]);
 }
+
+#[test]
+fn a_source_of_obstacles_that_the_scene_lacks_is_named_before_the_ride() {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let config = "[[detectors]]\nplugin = \"depth-template\"\nroles = [\"track\", \"discover\"]\n\
+        [filter]\nplugin = \"ekf\"\n[controller]\nplugin = \"clear-follow\"\n\
+        [[collision_monitor.sources]]\nname = \"hazards\"\ntype = \"bumper\"\n";
+    let contender = Contender::new("robot", config);
+    let ride = |block: &str| Ride::new(&scene(block), &contender, &registry, &mut ());
+    let refused = ride("bumpers = [{ name = \"other\" }]").unwrap_err().to_string();
+    assert!(refused.contains("lacks the source `hazards`"), "{refused}");
+    assert!(refused.contains("add `[[bumpers]]` with `name = \"hazards\"`"), "{refused}");
+    let refused = ride("").unwrap_err().to_string();
+    assert!(refused.contains("--set 'bumpers=[{name=\"hazards\"}]'"), "{refused}");
+    assert!(ride("bumpers = [{ name = \"hazards\" }]").is_ok());
+}

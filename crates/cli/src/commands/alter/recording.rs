@@ -5,9 +5,9 @@ use std::path::Path;
 use nalgebra::Isometry2;
 use tagalong_core::{Images, Stamp, spatial_pose};
 use tagalong_geometry::{Camera, Lens};
-use tagalong_log::LogFacts;
 use tagalong_log::msgs::{CameraInfo, Header, Image, Odometry, TFMessage};
 use tagalong_log::write::{MessageLog, WriteError};
+use tagalong_log::{COPY_OF, Limits, LogFacts, read_attachment};
 
 const ROBOT_FRAME: &str = "base_link";
 const CAMERA_FRAME: &str = "camera_optical_frame";
@@ -40,7 +40,13 @@ impl Recording {
     /// A file that cannot be written.
     pub(super) fn create(path: &Path, facts: &LogFacts) -> Result<Self, WriteError> {
         let moves = facts.odometry_topic.is_some();
-        Ok(Self { log: MessageLog::create(path)?, moves })
+        let mut log = MessageLog::create(path)?;
+        let limits = Limits::default();
+        // A copy of a copy goes back to the same recording. A log that is no MCAP file has no attachment.
+        let earlier = read_attachment(&facts.path, COPY_OF, &limits).ok().flatten();
+        let earlier = earlier.and_then(|bytes| String::from_utf8(bytes).ok());
+        log.attach(COPY_OF, "text/plain", &earlier.unwrap_or_else(|| facts.sha256.clone()))?;
+        Ok(Self { log, moves })
     }
 
     /// Writes a frame.

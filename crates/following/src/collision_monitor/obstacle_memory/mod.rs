@@ -26,16 +26,17 @@ const FALLS_S: f64 = 0.3;
 /// believed to be there until it is seen that it is not, however short it was seen: that near no
 /// camera measures.
 const CLOSE_M: f64 = 0.7;
-/// Height below which a thing is part of what stands so far beside it, m: the seat of a chair, which is
-/// below the image before it was seen for a second. Nobody is so low.
+/// Height below which a point is counted to a static obstacle beside it, m. The seat of a chair leaves
+/// the image at its lower edge before it was seen for [`STANDS_S`]; the head of a person is higher.
 const LOW_M: f64 = 0.6;
+/// Greatest distance between such a point and the obstacle, m.
 const BESIDE_M: f64 = 0.2;
 /// Offset from the torso of a person to the head, m.
 const TORSO: Vector3<f64> = Vector3::new(0.0, 0.0, 0.35);
-/// Distance from a person within which a point may be an object that the person carries, pulls or
-/// pushes, m, ...
+/// Distance from a person within which a point may belong to an object that the person carries, pulls or
+/// pushes, m.
 pub(super) const CARRIED_M: f64 = 0.8;
-/// ... while the person is slower than this, m/s.
+/// Speed of the person below which such a point is tested, m/s.
 const STAYS_MPS: f64 = 0.25;
 /// Distance before a place from which on a nearer surface hides it, m.
 const BEFORE_M: f64 = 0.2;

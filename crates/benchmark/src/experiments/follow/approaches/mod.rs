@@ -27,6 +27,8 @@ use tagalong_trials::{
 use super::log::RideLog;
 use super::{FollowArgs, contenders, failure, run_files, swept, variant};
 
+/// Files of results, beside the logs of the approaches.
+const RESULTS: [&str; 2] = ["approaches.json", "approaches.md"];
 /// The scene of all approaches unless scenes are named.
 const SCENE: &str = "configs/scenes/approach.toml";
 /// Earliest time of an injected fault, s.
@@ -100,6 +102,9 @@ pub(super) fn approaches(args: &FollowArgs, registry: &Registry) -> Outcome {
     if let Some(folder) = &args.output {
         for job in &jobs {
             spare(&log_file(folder, job), args.overwrite)?;
+        }
+        for name in RESULTS {
+            spare(&folder.join(name), args.overwrite)?;
         }
         make_folder(folder)?;
     }
@@ -273,6 +278,12 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Outlived]) -> Result<(), F
     let tables = table::tables(results, seeds);
     let findings = Findings { seeds, tables: &tables, approaches: results };
     let json = to_json("the results of the approaches", &findings)?;
+    if let Some(folder) = &args.output {
+        let texts = [json.clone(), joined(&tables, Table::markdown)];
+        for (name, text) in RESULTS.iter().zip(texts) {
+            write_file(&folder.join(name), text)?;
+        }
+    }
     match args.format {
         TableFormat::Json => print(&json)?,
         TableFormat::Markdown => print(&joined(&tables, Table::markdown))?,
@@ -287,11 +298,6 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Outlived]) -> Result<(), F
         }
     }
     let Some(folder) = &args.output else { return Ok(()) };
-    for (name, text) in
-        [("approaches.json", &json), ("approaches.md", &joined(&tables, Table::markdown))]
-    {
-        write_file(&folder.join(name), text)?;
-    }
     let contacts = results.iter().filter(|one| one.approached.contact.is_some()).count();
     say(&format!("the logs of {contacts} contacts, and the tables, are in {}", folder.display()));
     Ok(())
