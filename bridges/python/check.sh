@@ -1,7 +1,6 @@
 #!/bin/sh
-# Builds the wheel, installs it into a virtual environment of its own, and runs its tests. As the tests
-# of the workspace, in the development profile, whose crates are shared; an optimised build takes
-# minutes and tells nothing more.
+# Builds the wheel, installs it into a virtual environment of its own, and runs its tests. Not optimised:
+# its crates have other features than those of the workspace's tests, and are built for this alone.
 set -eu
 cd "$(dirname "$0")"
 
@@ -15,6 +14,7 @@ if [ ! -x "$venv/bin/maturin" ]; then
     python3 -m venv "$venv"
     "$venv/bin/pip" install --quiet 'maturin>=1.9,<2' numpy pytest
 fi
+export CARGO_PROFILE_DEV_OPT_LEVEL=0
 wheels=$(mktemp -d)
 trap 'rm -rf "$wheels"' EXIT
 "$venv/bin/maturin" build --quiet --profile dev --strip --auditwheel skip \

@@ -97,7 +97,7 @@ fn interruptible(py: Python<'_>, args: RunArgs) -> PyResult<Outcome> {
 /// Compares tracks with truth; returns the figures of `tagalong eval` as JSON.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python function")]
-#[pyo3(signature = (truth, tracks, *, similarity, log, rate, upper_body, repairs))]
+#[pyo3(signature = (truth, tracks, *, similarity, log, rate, upper_body, repairs, drop_doubled_ids))]
 pub fn scores(
     py: Python<'_>,
     truth: PathBuf,
@@ -107,6 +107,7 @@ pub fn scores(
     rate: Option<f64>,
     upper_body: bool,
     repairs: bool,
+    drop_doubled_ids: bool,
 ) -> PyResult<String> {
     let similarity = match similarity {
         "iou" => SimilarityChoice::Iou,
@@ -124,6 +125,7 @@ pub fn scores(
         rules: Default::default(),
         upper_body,
         repairs,
+        drop_doubled_ids,
         rate,
         format: Format::default(),
     };

@@ -106,14 +106,23 @@ def run(
 
 
 def eval(
-    truth, tracks, *, similarity="iou", log=None, rate=None, upper_body=False, repairs=False
+    truth,
+    tracks,
+    *,
+    similarity="iou",
+    log=None,
+    rate=None,
+    upper_body=False,
+    repairs=False,
+    drop_doubled_ids=False,
 ):
     """Compare tracks with truth, as `tagalong eval`, and return the figures as a dict.
 
     truth: MOTChallenge text, people.csv, KITTI labels, or a log with truth. tracks: the folder of a
     run, tracks-metres.csv, MOTChallenge text or KITTI labels. similarity: "iou" of boxes, or
     "metres" on the floor. log: the log of the truth, for its stamps. repairs: also return, as
-    "repairs", HOTA, MOTA and IDF1 if one kind of error were repaired.
+    "repairs", HOTA, MOTA and IDF1 if one kind of error were repaired. drop_doubled_ids: keep the
+    first person with an ID in each frame of the truth, where it is an error otherwise.
     """
     return _json.loads(
         _tagalong.scores(
@@ -124,6 +133,7 @@ def eval(
             rate=rate,
             upper_body=upper_body,
             repairs=repairs,
+            drop_doubled_ids=drop_doubled_ids,
         )
     )
 

@@ -41,5 +41,6 @@ def eval(
     rate: Optional[float] = None,
     upper_body: bool = False,
     repairs: bool = False,
+    drop_doubled_ids: bool = False,
 ) -> dict[str, Any]: ...
 def read_tracks(path: _Path) -> dict[str, NDArray[Any]]: ...

@@ -202,4 +202,5 @@ def scores(
     rate: Optional[float],
     upper_body: bool,
     repairs: bool,
+    drop_doubled_ids: bool,
 ) -> str: ...
