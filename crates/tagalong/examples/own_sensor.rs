@@ -1,3 +1,6 @@
+//! People by a radar: a sensor that Tagalong does not know, and a detector that reads it.
+#![allow(clippy::print_stdout, reason = "an example prints what it finds")]
+
 use tagalong::nalgebra::Matrix3;
 use tagalong::prelude::*;
 
