@@ -34,5 +34,8 @@ fi
 
 for page in "$@"; do
     validate "$page"
-    TAGALONG_PAGE=$(basename "$(dirname "$page")")-$(basename "$page" .html) visit "$here/check_view.cjs" "$home/page.html"
+    name=$(basename "$page" .html)
+    # The page in the folder of a run or a ride is named by the folder.
+    [ "$name" != view ] || name=$(basename "$(dirname "$page")")
+    TAGALONG_PAGE=$name visit "$here/check_view.cjs" "$home/page.html"
 done

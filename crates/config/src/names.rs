@@ -1,5 +1,5 @@
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Returns the name among `available` that is nearest to the mistyped `wanted`, if fewer than half
 /// of its letters differ.
@@ -28,20 +28,26 @@ pub fn nearest<'a>(wanted: &str, available: impl IntoIterator<Item = &'a str>) -
 /// assert_eq!(hint, "; did you mean `yolox-nano`?");
 /// ```
 pub fn model_hint(missing: &Path, others: &[String]) -> String {
-    let Some(wanted) = missing.file_name().and_then(|name| name.to_str()) else {
+    let Some(wanted) = missing.file_stem().and_then(|stem| stem.to_str()) else {
         return String::new();
     };
     let folder = missing.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let mut names = Vec::new();
+    let mut files: Vec<PathBuf> = Vec::new();
     for entry in fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten().flatten() {
         if entry.path().extension() == missing.extension() {
-            names.extend(entry.file_name().to_str().map(str::to_owned));
+            files.push(entry.path());
         }
     }
     // The order of a directory depends on the file system.
-    names.sort();
-    let best = nearest(wanted, others.iter().chain(&names).map(String::as_str));
-    best.map_or(String::new(), |best| format!("; did you mean `{best}`?"))
+    files.sort();
+    // Without the extension, which is common to all of them and would make any two alike.
+    let stems = files.iter().filter_map(|file| file.file_stem()?.to_str());
+    let Some(best) = nearest(wanted, others.iter().map(String::as_str).chain(stems)) else {
+        return String::new();
+    };
+    let file = files.iter().find(|file| file.file_stem().is_some_and(|stem| stem == best));
+    let name = file.and_then(|file| file.file_name()?.to_str()).unwrap_or(best);
+    format!("; did you mean `{name}`?")
 }
 
 /// Computes the Levenshtein distance, one row at a time.
@@ -82,10 +88,10 @@ mod tests {
         for name in ["people.toml", "people-two.toml", "peopel.onnx"] {
             fs::write(home.path().join(name), "").unwrap();
         }
-        let hint = |name: &str| model_hint(&home.path().join(name), &["peoples".to_owned()]);
+        let hint = |name: &str| model_hint(&home.path().join(name), &["yolox-nano".to_owned()]);
         assert_eq!(hint("peple.toml"), "; did you mean `people.toml`?");
         assert_eq!(hint("people.onnx"), "; did you mean `peopel.onnx`?");
-        assert_eq!(hint("people"), "; did you mean `peoples`?", "the name of no file");
+        assert_eq!(hint("yolox-nan"), "; did you mean `yolox-nano`?", "the name of no file");
         assert_eq!(hint("zebra.toml"), "");
     }
 }

@@ -29,7 +29,7 @@ impl Export<'_> {
     /// written.
     pub(super) fn run(&self, registry: &Registry) -> Outcome {
         let card = card_of(self.file);
-        for file in [Some(self.file), Some(&card), self.sample].into_iter().flatten() {
+        for file in [Some(self.file), Some(card.as_path()), self.sample].into_iter().flatten() {
             // The file is an argument of its own here, and -o names a config.
             if file.exists() && !self.overwrite {
                 let shown = file.display();

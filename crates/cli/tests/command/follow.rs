@@ -165,6 +165,42 @@ fn a_ride_is_seen_with_its_images_obstacles_zones_and_reasons() {
 }
 
 #[test]
+fn the_results_of_earlier_rides_are_replaced_on_request_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let rides = ["-o", "rides", "--format", "json"];
+    json(&follow(folder.path(), "follow-depth.toml", &rides));
+    let results = folder.path().join("rides/follow.json");
+    let before = fs::read(&results).unwrap();
+    // Its log has another name, and its tables would take the place of those of the first.
+    let other = ["--first-seed", "1"];
+    let refused = follow(folder.path(), "follow-depth.toml", &[&rides[..], &other].concat());
+    assert_eq!(code(&refused), 2);
+    assert!(text(&refused.stderr).contains("follow.json exists"), "{}", text(&refused.stderr));
+    assert_eq!(fs::read(&results).unwrap(), before);
+    let again = [&rides[..], &other, &["--overwrite"]].concat();
+    json(&follow(folder.path(), "follow-depth.toml", &again));
+    assert_ne!(fs::read(&results).unwrap(), before);
+}
+
+/// The config names topics of the real robot, which the log of a ride does not have.
+#[test]
+fn a_ride_of_a_robot_with_topics_of_its_own_has_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let bumper = ["--set", "bumpers=[{name=\"hazards\"}]"];
+    let rides = ["-o", "rides", "--format", "json"];
+    let bare = follow(folder.path(), "robots/turtlebot4.toml", &rides);
+    assert_eq!(code(&bare), 2, "{}", text(&bare.stdout));
+    assert!(text(&bare.stderr).contains("lacks the source `hazards`"), "{}", text(&bare.stderr));
+    assert!(!folder.path().join("rides").exists(), "nothing is written before the refusal");
+    json(&follow(folder.path(), "robots/turtlebot4.toml", &[&rides[..], &bumper].concat()));
+    let name = "rides/walk-turtlebot4-2000000000";
+    let shown = view(folder.path(), &[name]);
+    assert_eq!(code(&shown), 0, "{}", text(&shown.stderr));
+    let page = page_data(&folder.path().join(name).join("view.html"));
+    assert!(page["images"].as_array().unwrap().iter().all(|image| image != ""), "no images");
+}
+
+#[test]
 fn a_folder_of_rides_has_a_page_for_each_and_a_list_with_the_worst_first() {
     let folder = tempfile::tempdir().unwrap();
     let more = ["--seeds", "2", "-o", "rides", "--format", "json"];

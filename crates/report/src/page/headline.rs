@@ -295,7 +295,7 @@ mod tests {
     fn only_a_pipeline_with_a_match_is_the_best_on_a_log() {
         let has_star =
             |value, columns| log_cell(Some(value), 0.0, columns).into_string().contains('★');
-        assert!(!has_star(0.0, 3), "all pipelines found nobody");
+        assert!(!has_star(0.0, 3), "no pipeline has a match");
         assert!(has_star(0.001, 3));
         assert!(!has_star(0.5, 1), "no rival");
     }

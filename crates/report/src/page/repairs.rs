@@ -6,7 +6,7 @@ use crate::chart::key;
 use crate::model::TaskResult;
 
 /// Most rows that are shown without being asked for.
-const MOST_OPEN: usize = 12;
+const MOST_OPEN: usize = 6;
 
 impl Page<'_> {
     /// Renders the HOTA of each task, and the gain by repairing one kind of error alone.
