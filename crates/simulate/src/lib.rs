@@ -1,7 +1,6 @@
 //! `tagalong simulate`: renders a scene to a log or to pictures.
 
 mod gallery;
-mod realism;
 mod record;
 pub mod sample;
 pub mod scenes;
@@ -19,19 +18,16 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
-use tagalong_config::{FileLimit, PathText, Registry, nearest, read_text};
+use tagalong_config::{FileLimit, PathText, nearest, read_text};
 use tagalong_log::write::WriteError;
 use tagalong_math::counted;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
-
-use crate::realism::realism;
 
 /// Arguments of `tagalong simulate`.
 #[derive(Args, Debug)]
 pub struct SimulateArgs {
     /// The scene, a TOML file.
-    #[arg(required_unless_present = "realism")]
-    pub scene: Option<PathBuf>,
+    pub scene: PathBuf,
     /// The log to write [default: runs/SCENE.mcap].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
@@ -50,13 +46,6 @@ pub struct SimulateArgs {
     /// Threads that render; the log is the same [default: as many as there are].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub threads: Option<u8>,
-    /// Simulate no scene, but check how realistic simulated worlds are, and print it.
-    #[arg(long, conflicts_with_all = ["scene", "output", "gallery", "seed", "split", "set", "threads"])]
-    pub realism: bool,
-    /// Random variants of each random scene of the checks.
-    #[arg(long, value_name = "N", default_value_t = 8, requires = "realism",
-          value_parser = clap::value_parser!(u64).range(1..=1000))]
-    pub seeds: u64,
     /// Replace the log if it is there.
     #[arg(long)]
     pub overwrite: bool,
@@ -70,8 +59,8 @@ pub struct SimulateArgs {
 /// # Errors
 /// A scene that cannot be read or is wrong, and an output path that cannot be written, are exit
 /// code 2; a disk that fails is 1.
-pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
-    let Some(path) = &args.scene else { return realism(registry, args.seeds, args.format) };
+pub fn simulate(args: &SimulateArgs) -> Outcome {
+    let path = &args.scene;
     let variant = Variant { seed: args.seed, split: args.split, set: args.set.clone() };
     let scene = read(path, &variant)?;
     let simulation = Simulation::new(&scene, threads(args.threads));

@@ -11,8 +11,8 @@ use tagalong_trials::{Contender, Trial, TrialError, each};
 use super::{Check, mean, scene, scenes};
 
 const GROUP: &str = "failures that must show";
-const EMPTY: &str = include_str!("../../configs/scenes/empty-clutter.toml");
-const EKF: &str = include_str!("../../configs/depth-ekf.toml");
+const EMPTY: &str = include_str!("../../../../configs/scenes/empty-clutter.toml");
+const EKF: &str = include_str!("../../../../configs/depth-ekf.toml");
 
 pub fn checks(registry: &Registry, seeds: u64) -> Result<Vec<Check>, TrialError> {
     let alarms = false_alarms(registry, seeds)?;
