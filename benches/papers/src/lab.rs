@@ -141,13 +141,15 @@ impl Lab<'_> {
             .seeds(self.first_seed, seeds)
             .map_err(|error| ReproduceError::Other(error.to_string()))?;
         self.simulated.add(SimulatedScene { scene: name.to_owned(), seeds });
-        let scene = |seed| {
-            let variant = Variant { seed: Some(seed), split: Some(split), set: set.clone() };
-            Scene::parse_with(&text, &variant).map_err(|error| {
-                ReproduceError::Scene(error.render(&path.display().to_string(), &text))
+        seeds
+            .numbers()
+            .map(|seed| {
+                let variant = Variant { seed: Some(seed), split: Some(split), set: set.clone() };
+                Scene::parse_with(&text, &variant).map_err(|error| {
+                    ReproduceError::Scene(error.render(&path.display().to_string(), &text))
+                })
             })
-        };
-        seeds.numbers().map(scene).collect()
+            .collect()
     }
 
     /// Returns the shipped configs of these names.
@@ -278,19 +280,20 @@ mod tests {
 
     #[test]
     fn another_first_seed_draws_others_and_each_draw_is_noted_once() {
+        fn seeds(lab: &Lab) -> Vec<u64> {
+            lab.scenes("crowd", &[], 2).unwrap().iter().map(|scene| scene.seed).collect()
+        }
+
+        fn of(first: u64) -> SimulatedScene {
+            SimulatedScene { scene: "crowd".into(), seeds: Split::Test.seeds(first, 2).unwrap() }
+        }
+
         let registry = Registry::default();
         let mut lab = lab(&registry, false, None);
-        let seeds = |lab: &Lab| -> Vec<u64> {
-            lab.scenes("crowd", &[], 2).unwrap().iter().map(|scene| scene.seed).collect()
-        };
         assert_eq!(seeds(&lab), [2_000_000_000, 2_000_000_001]);
         assert_eq!(seeds(&lab), [2_000_000_000, 2_000_000_001]);
         lab.first_seed = 40;
         assert_eq!(seeds(&lab), [2_000_000_040, 2_000_000_041]);
-        let of = |first| SimulatedScene {
-            scene: "crowd".into(),
-            seeds: Split::Test.seeds(first, 2).unwrap(),
-        };
         assert_eq!(lab.simulated.take(), [of(0), of(40)]);
         assert_eq!(lab.simulated.take(), []);
         lab.first_seed = 999_999_999;

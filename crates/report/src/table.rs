@@ -146,8 +146,11 @@ impl Table {
 
     /// Formats the table for a page of the documentation.
     pub fn markdown(&self) -> String {
+        fn line(cells: Vec<String>) -> String {
+            format!("| {} |\n", cells.join(" | "))
+        }
+
         let mut lines = self.lines().into_iter();
-        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
         let mut out = format!("**{}**\n\n", self.title);
         if let Some(header) = lines.next() {
             let rule = vec!["---".to_owned(); header.len()];

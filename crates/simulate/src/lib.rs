@@ -78,8 +78,8 @@ pub fn simulate(args: &SimulateArgs) -> Outcome {
 
 fn write(simulation: Simulation, scene: &Scene, log: &Path, format: Format) -> Outcome {
     let signals = Signals::listen()?;
-    let goes_on = || signals.received().is_none();
-    let images = record(simulation, scene, log, &goes_on).map_err(Failure::failed)?;
+    let images = record(simulation, scene, log, &|| signals.received().is_none())
+        .map_err(Failure::failed)?;
     if let Some(signal) = signals.received() {
         say(CUT_SHORT);
         return Ok(Ended::BySignal(signal));
@@ -240,17 +240,11 @@ mod tests {
 
     #[test]
     fn injected_faults_are_in_the_log() {
-        let depth = |frame: &LogFrame| -> Vec<u32> {
+        fn depth(frame: &LogFrame) -> Vec<u32> {
             frame.frame.depth().unwrap().pixels().iter().map(|z| z.to_bits()).collect()
-        };
-        let frozen = logged(FaultKind::FreezeDepth);
-        let first = depth(&within(&frozen)[0]);
-        assert_eq!(within(&frozen).len(), 20);
-        assert!(within(&frozen).iter().all(|frame| depth(frame) == first));
-        assert!(depth(&frozen[45]) != depth(&frozen[46]));
+        }
 
-        let blank = logged(FaultKind::BlankDepth);
-        let is_dark = |frame: &LogFrame, column: usize| {
+        fn is_dark(frame: &LogFrame, column: usize) -> bool {
             frame
                 .frame
                 .depth()
@@ -260,7 +254,15 @@ mod tests {
                 .skip(column)
                 .step_by(64)
                 .all(|z| z.is_nan())
-        };
+        }
+
+        let frozen = logged(FaultKind::FreezeDepth);
+        let first = depth(&within(&frozen)[0]);
+        assert_eq!(within(&frozen).len(), 20);
+        assert!(within(&frozen).iter().all(|frame| depth(frame) == first));
+        assert!(depth(&frozen[45]) != depth(&frozen[46]));
+
+        let blank = logged(FaultKind::BlankDepth);
         assert!(within(&blank).iter().all(|frame| (0..64).all(|column| is_dark(frame, column))));
         let dark = logged(FaultKind::DarkColumns);
         for frame in within(&dark) {
@@ -325,8 +327,9 @@ mod tests {
             assert!(off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-9);
             let a = logged.frame.depth().unwrap();
             let b = drawn.depth().unwrap();
-            let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
-            assert!(a.pixels().iter().zip(b.pixels()).all(same));
+            assert!(
+                a.pixels().iter().zip(b.pixels()).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
+            );
             let a = &logged.frame.laser().unwrap().points;
             let b = &drawn.laser().unwrap().points;
             assert_eq!(a.len(), b.len());

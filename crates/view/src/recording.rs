@@ -134,7 +134,10 @@ impl RideFacts {
 
     /// Returns the result in one line.
     pub fn summary(&self) -> String {
-        let metres = |room: Option<f64>| room.map_or("-".into(), |room| format!("{room:.2} m"));
+        fn metres(room: Option<f64>) -> String {
+            room.map_or("-".into(), |room| format!("{room:.2} m"))
+        }
+
         let share = self.distance_share().map_or("-".into(), |s| format!("{:.0} %", 100.0 * s));
         format!(
             "{}{}; least room to people {}, to things {}; distance kept for {share} of the time; \

@@ -153,8 +153,12 @@ struct Scaled {
 
 impl Scaled {
     fn cost(&self, network: &Network, weights: &DVector<f64>) -> f64 {
-        let error = |(x, t): (&Vec<f64>, &f64)| (network.forward(|i| x[i]) - t).powi(2);
-        let errors = self.inputs.iter().zip(&self.targets).map(error).sum::<f64>();
+        let errors = self
+            .inputs
+            .iter()
+            .zip(&self.targets)
+            .map(|(x, t)| (network.forward(|i| x[i]) - t).powi(2))
+            .sum::<f64>();
         errors + self.decay * weights.norm_squared()
     }
 }
@@ -224,7 +228,10 @@ mod tests {
         Fit { decay: 0.0, steps: 2000, descent: Descent::BackPropagation { rate: 0.3 }, ..FIT };
 
     fn samples(count: usize) -> (Vec<Vec<f64>>, Vec<f64>) {
-        let x = |i: usize| vec![(i as f64 * 0.37) % 3.0, (i as f64 * 0.61) % 2.0];
+        fn x(i: usize) -> Vec<f64> {
+            vec![(i as f64 * 0.37) % 3.0, (i as f64 * 0.61) % 2.0]
+        }
+
         let inputs: Vec<Vec<f64>> = (0..count).map(x).collect();
         let targets = inputs.iter().map(|x| 2.0 + x[0].sin() + 0.5 * x[0] * x[1]).collect();
         (inputs, targets)

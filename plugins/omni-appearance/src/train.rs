@@ -304,6 +304,10 @@ fn spread(pairs: impl Iterator<Item = (f64, f64)>) -> Line {
 }
 
 fn ridge(samples: &[Sample], weight: f64) -> Ridge {
+    fn array(values: &[f64]) -> [f64; 5] {
+        std::array::from_fn(|i| values[i])
+    }
+
     let terms: Vec<[f64; 5]> = samples.iter().map(|s| Ridge::terms(&s.features)).collect();
     let (mean, scale): (Vec<f64>, Vec<f64>) =
         (0..5).map(|i| mean_and_scale(terms.iter().map(|t| t[i]))).unzip();
@@ -317,7 +321,6 @@ fn ridge(samples: &[Sample], weight: f64) -> Ridge {
     penalties[0] = 0.0;
     let equations = NormalEquations::new(&x, &y);
     let solved = equations.solve(&penalties, equations.right_side());
-    let array = |values: &[f64]| std::array::from_fn(|i| values[i]);
     Ridge {
         weights: std::array::from_fn(|i| solved.as_ref().map_or(0.0, |w| w[i])),
         mean: array(&mean),
@@ -355,17 +358,19 @@ pub fn model(
         head.believe(samples, &held_out(samples, held, training, seed)?);
         Ok::<Head, Error>(head)
     };
-    let person = |(id, own): (&u64, &Vec<Sample>)| {
-        Ok(Person {
-            name: format!("person-{id}"),
-            signature: signature(own),
-            head: believed(own, HeldOut::Blocks, mix(seed ^ id))?,
-        })
-    };
     Ok(Model {
         geometry,
         general: believed(samples, HeldOut::People, seed)?,
-        people: people.iter().map(person).collect::<Result<_>>()?,
+        people: people
+            .iter()
+            .map(|(id, own)| {
+                Ok(Person {
+                    name: format!("person-{id}"),
+                    signature: signature(own),
+                    head: believed(own, HeldOut::Blocks, mix(seed ^ id))?,
+                })
+            })
+            .collect::<Result<_>>()?,
     })
 }
 
@@ -490,6 +495,10 @@ mod tests {
 
     #[test]
     fn the_ridge_finds_a_straight_line_and_shrinks_with_its_weight() {
+        fn norm(ridge: &Ridge) -> f64 {
+            ridge.weights[1..].iter().map(|w| w * w).sum::<f64>()
+        }
+
         let mut all = samples(60);
         for sample in &mut all {
             let f = sample.features;
@@ -500,7 +509,6 @@ mod tests {
             assert!((free.answer(&sample.features) - sample.distance_m).abs() < 1e-4);
         }
         let held = ridge(&all, 10.0);
-        let norm = |ridge: &Ridge| ridge.weights[1..].iter().map(|w| w * w).sum::<f64>();
         assert!(norm(&held) < 0.1 * norm(&free));
         assert!((held.weights[0] - free.weights[0]).abs() < 1e-6, "the mean is not held");
         // One weight of one term, by hand: x'y / (x'x + n w), with x of deviation 1.
@@ -529,16 +537,19 @@ mod tests {
     /// sample reveals the samples it was fitted to.
     #[test]
     fn answers_come_from_everybody_else() {
+        fn key(held: HeldOut, sample: &Sample) -> u64 {
+            match held {
+                HeldOut::Blocks => sample.frame / 4 % 5,
+                HeldOut::People => sample.person % 5,
+            }
+        }
+
         let mut all = samples(60);
         for (number, sample) in all.iter_mut().enumerate() {
             sample.floor_m = sample.distance_m - 0.1 * ((number * number) % 17) as f64;
         }
         let training = Training { block_frames: 4, ..quick() };
         let analytic = WAYS.iter().position(|way| *way == Distance::Analytic).unwrap();
-        let key = |held: HeldOut, sample: &Sample| match held {
-            HeldOut::Blocks => sample.frame / 4 % 5,
-            HeldOut::People => sample.person % 5,
-        };
         for held in [HeldOut::Blocks, HeldOut::People] {
             let answers = held_out(&all, held, &training, 1).unwrap();
             for (sample, said) in all.iter().zip(&answers) {
@@ -555,8 +566,11 @@ mod tests {
     }
 
     fn quick() -> Training {
+        fn few(fit: Fit) -> Fit {
+            Fit { restarts: 1, steps: 5, ..fit }
+        }
+
         let training = Training::default();
-        let few = |fit: Fit| Fit { restarts: 1, steps: 5, ..fit };
         Training {
             network: few(training.network),
             printed: few(training.printed),
@@ -621,9 +635,10 @@ mod tests {
 
     #[test]
     fn bearings_differ_by_the_shorter_way_round() {
-        let off = |a: f64, b: f64| {
+        fn off(a: f64, b: f64) -> f64 {
             Sample { bearing_rad: a, true_bearing_rad: b, ..sample(0) }.bearing_error_rad()
-        };
+        }
+
         assert!((off(3.1, -3.1) - (std::f64::consts::TAU - 6.2)).abs() < 1e-12);
         assert!((off(-0.2, 0.1) - 0.3).abs() < 1e-12);
     }

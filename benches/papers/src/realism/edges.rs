@@ -54,8 +54,10 @@ pub fn checks(rig: &Rig, seeds: u64) -> Result<Vec<Check>, TrialError> {
             .for_each(|simulated| offsets.extend(displacements(&simulated)));
     }
     let share = |wanted: i64| {
-        let held = |o: &&f64| (o.round() as i64).clamp(-BINS, BINS) == wanted;
-        100.0 * offsets.iter().filter(held).count() as f64 / offsets.len().max(1) as f64
+        100.0
+            * offsets.iter().filter(|o| (o.round() as i64).clamp(-BINS, BINS) == wanted).count()
+                as f64
+            / offsets.len().max(1) as f64
     };
     let mut checks: Vec<Check> = (-BINS..=BINS)
         .map(|bin| Check::told(group, format!("edges displaced by {}", name(bin)), share(bin), "%"))

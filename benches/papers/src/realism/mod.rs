@@ -168,7 +168,10 @@ fn scene(text: &str) -> Scene {
 /// Returns the same scene with as many seeds: other noise, and new values of everything that
 /// varies.
 fn scenes(text: &str, seeds: u64) -> Vec<Scene> {
-    let variant = |seed| Variant { seed: Some(seed), ..Variant::default() };
+    fn variant(seed: u64) -> Variant {
+        Variant { seed: Some(seed), ..Variant::default() }
+    }
+
     (0..seeds).map(|seed| scene_with(text, &variant(seed))).collect()
 }
 
