@@ -22,7 +22,7 @@ pub struct Training {
     /// The paper's network: three inputs, four hidden units (P5, section 4.4).
     pub network: Fit,
     /// The same network, by back-propagation.
-    pub printed: Fit,
+    pub gradient: Fit,
     /// Network of all features.
     pub rich: Fit,
     /// Weight of the squared weights of the ridge regression, per sample.
@@ -39,7 +39,7 @@ impl Default for Training {
         let descent = Descent::BackPropagation { rate: 0.3 };
         Self {
             network,
-            printed: Fit { decay: 0.0, steps: 2000, descent, ..network },
+            gradient: Fit { decay: 0.0, steps: 2000, descent, ..network },
             rich: Fit { hidden: 8, decay: 3e-2, ..network },
             ridge: 1e-4,
             block_frames: 15,
@@ -94,7 +94,7 @@ impl Sample {
     pub fn distance(&self, head: &Head, how: Distance) -> f64 {
         match how {
             Distance::Network => head.network.answer(&self.features.values()),
-            Distance::Printed => head.printed.answer(&self.features.values()),
+            Distance::Gradient => head.gradient.answer(&self.features.values()),
             Distance::Rich => head.rich.answer(&self.inputs()),
             Distance::Ridge => head.ridge.answer(&self.features),
             Distance::Analytic => self.floor_m + head.floor_offset_m,
@@ -202,8 +202,7 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
         return Err(Error::Other(format!("{} samples are too few to fit", samples.len())));
     }
     let targets: Vec<f64> = samples.iter().map(|s| s.distance_m).collect();
-    let printed: Vec<Vec<f64>> =
-        samples.iter().map(|s| s.features.values()[..3].to_vec()).collect();
+    let three: Vec<Vec<f64>> = samples.iter().map(|s| s.features.values()[..3].to_vec()).collect();
     let all: Vec<Vec<f64>> = samples.iter().map(|s| s.inputs().to_vec()).collect();
     let flat = Line { start: 0.0, slope: 0.0 };
     let mut head = Head {
@@ -212,11 +211,11 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
         analytic_sigma: flat,
         ridge_sigma: flat,
         network_sigma: flat,
-        printed_sigma: flat,
+        gradient_sigma: flat,
         rich_sigma: flat,
         ridge: ridge(samples, training.ridge),
-        network: training.network.network(&printed, &targets, seed),
-        printed: training.printed.network(&printed, &targets, seed),
+        network: training.network.network(&three, &targets, seed),
+        gradient: training.gradient.network(&three, &targets, seed),
         rich: training.rich.network(&all, &targets, seed),
     };
     let answers: Vec<Answers> = samples.iter().map(|sample| sample.answers(&head)).collect();
@@ -229,7 +228,7 @@ pub type Answers = [f64; WAYS.len()];
 
 /// All methods for the distance.
 pub const WAYS: [Distance; 5] =
-    [Distance::Network, Distance::Printed, Distance::Rich, Distance::Ridge, Distance::Analytic];
+    [Distance::Network, Distance::Gradient, Distance::Rich, Distance::Ridge, Distance::Analytic];
 
 /// Returns for each sample the distances by a head that was fitted without the sample's part.
 ///
@@ -272,7 +271,7 @@ impl Head {
     fn believe(&mut self, samples: &[Sample], answers: &[Answers]) {
         [
             self.network_sigma,
-            self.printed_sigma,
+            self.gradient_sigma,
             self.rich_sigma,
             self.ridge_sigma,
             self.analytic_sigma,
@@ -573,7 +572,7 @@ mod tests {
         let training = Training::default();
         Training {
             network: few(training.network),
-            printed: few(training.printed),
+            gradient: few(training.gradient),
             rich: few(training.rich),
             ..training
         }
@@ -602,7 +601,7 @@ mod tests {
             let said = held_out(samples, held, &quick(), seed).unwrap();
             let lines = [
                 head.network_sigma,
-                head.printed_sigma,
+                head.gradient_sigma,
                 head.rich_sigma,
                 head.ridge_sigma,
                 head.analytic_sigma,
@@ -629,7 +628,7 @@ mod tests {
         assert_eq!(folds.len(), WAYS.len());
         // The floor is 0.1 m short for all samples, so the held-out mean corrects it.
         assert_eq!(folds["analytic_error_m"].as_float(), Some(0.0));
-        assert!(folds.contains_key("printed_error_m"));
+        assert!(folds.contains_key("gradient_error_m"));
         assert_eq!(rounded(0.123_449), toml::Value::Float(0.1234));
     }
 

@@ -37,9 +37,9 @@ const EYES: [(Eye, &str); 2] =
     [(Eye::Printed, "omni-appearance-as-printed"), (Eye::Ours, "omni-appearance")];
 
 const WAYS: [Way; 7] = [
-    ("as printed: features and back-propagation", Eye::Printed, Distance::Printed),
+    ("as printed: features and back-propagation", Eye::Printed, Distance::Gradient),
     ("printed features, small weights preferred", Eye::Printed, Distance::Network),
-    ("shadows left out, back-propagation", Eye::Ours, Distance::Printed),
+    ("shadows left out, back-propagation", Eye::Ours, Distance::Gradient),
     ("network 3-4-1", Eye::Ours, Distance::Network),
     ("ridge", Eye::Ours, Distance::Ridge),
     ("analytic", Eye::Ours, Distance::Analytic),
@@ -509,7 +509,7 @@ mod tests {
         let trained = trained.printed();
         let used = settings(printed).unwrap();
         assert!(used.after_measuring.is_some(), "the seam");
-        assert_eq!(used.distance, Distance::Printed);
+        assert_eq!(used.distance, Distance::Gradient);
         assert_eq!(used.model, "models/omni-distance-as-printed.toml");
         let Config { model, distance, .. } = used.clone();
         assert_eq!(Config { model, distance, ..trained }, used);

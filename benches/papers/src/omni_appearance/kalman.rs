@@ -41,11 +41,11 @@ const STEPS: [(&str, &str, &str); 6] = [
     ("misprint: u is the last difference, with its noise", SEAMLESS, LAST_U),
     (
         "lack: 24 images of background, which follows the light",
-        "model = \"models/omni-distance-as-printed.toml\"\ndistance = \"printed\"\n\
+        "model = \"models/omni-distance-as-printed.toml\"\ndistance = \"gradient\"\n\
          shadow_min = 1.0\nvalley = 0.0\nmax_people = 1",
         LAST_U,
     ),
-    ("lack: shadows are left out", "distance = \"printed\"\nvalley = 0.0\nmax_people = 1", LAST_U),
+    ("lack: shadows are left out", "distance = \"gradient\"\nvalley = 0.0\nmax_people = 1", LAST_U),
     (
         "lack: the network prefers small weights",
         "distance = \"network\"\nvalley = 0.0\nmax_people = 1",
@@ -53,7 +53,7 @@ const STEPS: [(&str, &str, &str); 6] = [
     ),
     ("lack: four states, the detection's noise", "valley = 0.0\nmax_people = 1", OURS),
 ];
-const SEAMLESS: &str = "model = \"models/omni-distance-as-printed.toml\"\ndistance = \"printed\"\n\
+const SEAMLESS: &str = "model = \"models/omni-distance-as-printed.toml\"\ndistance = \"gradient\"\n\
     background_frames = 5\nadapt_s = 0.0\nabsorb_s = 0.0\nshadow_min = 1.0\nvalley = 0.0\n\
     max_people = 1";
 const OURS: &str = "plugin = \"floor-kalman\"";
