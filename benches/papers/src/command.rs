@@ -40,7 +40,7 @@ pub struct ReproduceArgs {
     /// The folder with the configs and scenes.
     #[arg(long, value_name = "DIR", default_value = "configs")]
     pub configs: PathBuf,
-    /// The folder with the configs of the printed forms.
+    /// The folder with the configs of printed forms and of single steps of a paper.
     #[arg(long, value_name = "DIR", default_value = "benches/papers/configs")]
     pub printed_configs: PathBuf,
     /// The folder with real logs and labelled images; experiments that need them are left out where

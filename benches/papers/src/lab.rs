@@ -77,7 +77,8 @@ pub struct Lab<'a> {
     pub registry: &'a Registry,
     /// Folder of the configs, which holds the folder `scenes`.
     pub configs: PathBuf,
-    /// Folder of the configs of the printed forms, with their models.
+    /// Folder of the configs of the laboratory, with their models: printed forms, and single steps of a
+    /// paper.
     pub printed_configs: PathBuf,
     /// Folder of real logs and labelled images, if there is one.
     pub data: Option<PathBuf>,
@@ -160,7 +161,7 @@ impl Lab<'_> {
         names.iter().map(|name| self.contender(name)).collect()
     }
 
-    /// Returns the config of this name, of a printed form or a shipped one.
+    /// Returns the config of this name, one of the laboratory or a shipped one.
     ///
     /// # Errors
     /// A config that cannot be read.
@@ -177,7 +178,8 @@ impl Lab<'_> {
 
     /// Returns the folder of the config of this name.
     pub fn folder_of(&self, name: &str) -> &Path {
-        if name.ends_with("-as-printed") { &self.printed_configs } else { &self.configs }
+        let is_own = self.printed_configs.join(format!("{name}.toml")).is_file();
+        if is_own { &self.printed_configs } else { &self.configs }
     }
 
     /// Runs all contenders on all scenes and keeps the results of `keep` for each trial, in the
@@ -311,6 +313,10 @@ mod tests {
         assert_eq!(table["filter"]["plugin"].as_str(), Some("ekf-as-printed"));
         assert!(table.contains_key("stereo"), "of the config that it extends");
         assert_eq!(lab.contender("stereo-ekf").unwrap().folder, lab.configs);
+        let step = lab.contender("joint-particle-kde50").unwrap();
+        assert_eq!(step.folder, lab.printed_configs);
+        let table: toml::Table = step.config.parse().unwrap();
+        assert_eq!(table["filter"]["config"]["hold_depth"].as_bool(), Some(true), "{table}");
     }
 
     #[test]
