@@ -178,7 +178,7 @@ mod tests {
     fn table() -> Table {
         let interval = Interval { estimate: 0.971, lower: 0.93, upper: 0.988 };
         Table {
-            title: "Crossings (P3, Table I)".into(),
+            title: "Crossings (Table I)".into(),
             columns: vec!["success %".into(), "ms".into()],
             rows: vec![
                 Row::published("625", vec![Cell::number(97.8, 1), Cell::number(247.0, 0)]),
@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn text_has_aligned_columns() {
         let expected = [
-            "Crossings (P3, Table I)",
+            "Crossings (Table I)",
             "                          success %   ms",
             "  published: 625               97.8  247",
             "  all             97.1 [93.0, 98.8]    -",

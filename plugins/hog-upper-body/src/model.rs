@@ -19,7 +19,7 @@ const FORMAT: &str = "hog-upper-body 3";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// Normalised blocks of cells and a linear machine, as in P2.
+    /// Normalised blocks of cells and a linear machine.
     Linear,
     /// Finer cells and boosted trees: fewer errors.
     #[default]

@@ -11,7 +11,7 @@ use crate::Blob;
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Distance {
-    /// The network of the paper: three features, four hidden units.
+    /// A network of three features and four hidden units.
     Network,
     /// The same network, trained by gradient descent: back-propagation at a rate of 0.3.
     Gradient,
