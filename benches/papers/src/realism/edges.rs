@@ -6,7 +6,8 @@ use tagalong_geometry::Rect;
 use tagalong_sim::Truth;
 use tagalong_trials::{SimulatedFrame, TrialError};
 
-use super::{Check, depth, deviation, mean, scene, simulated};
+use super::{Check, depth, deviation, scene, simulated};
+use crate::draws::mean;
 
 /// Camera, and the limits of its check.
 pub struct Rig {

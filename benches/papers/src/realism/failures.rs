@@ -8,7 +8,8 @@ use tagalong_pipeline::{Candidate, Fate};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Trial, TrialError, each};
 
-use super::{Check, mean, scene, scenes};
+use super::{Check, scene, scenes};
+use crate::draws::mean;
 
 const GROUP: &str = "failures that must show";
 const EMPTY: &str = include_str!("../../../../configs/scenes/empty-clutter.toml");

@@ -5,7 +5,8 @@
 use nalgebra::Point3;
 use tagalong_trials::TrialError;
 
-use super::{Check, mean, scene, simulated};
+use super::{Check, scene, simulated};
+use crate::draws::mean;
 
 const GROUP: &str = "gait";
 /// Requested speeds of the people, m/s.

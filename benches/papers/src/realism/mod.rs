@@ -202,10 +202,6 @@ fn depth(frame: &Frame) -> Option<&DepthImage> {
     frame.depth().ok()
 }
 
-fn mean(values: &[f64]) -> f64 {
-    tagalong_math::mean(values).unwrap_or(0.0)
-}
-
 fn deviation(values: &[f64]) -> f64 {
     tagalong_math::mean_and_deviation(values).map_or(0.0, |(_, deviation)| deviation)
 }
@@ -227,8 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn mean_and_deviation() {
-        assert_eq!((mean(&[1.0, 3.0]), deviation(&[1.0, 3.0])), (2.0, 1.0));
-        assert_eq!(mean(&[]), 0.0);
+    fn the_deviation_of_no_values_is_zero() {
+        assert_eq!((deviation(&[1.0, 3.0]), deviation(&[])), (1.0, 0.0));
     }
 }

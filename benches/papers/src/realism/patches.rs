@@ -16,7 +16,8 @@ use tagalong_geometry::Rect;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_trials::TrialError;
 
-use super::{Check, mean, scene, simulated};
+use super::{Check, scene, simulated};
+use crate::draws::mean;
 
 const GROUP: &str = "simulated against real depth patches";
 /// Folder of the recordings with annotated people, relative to the repository.
@@ -151,10 +152,10 @@ fn cell(depth: &DepthImage, square: &Rect, side: usize, row: usize, column: usiz
         .collect()
 }
 
+/// Returns the median of the finite values.
 fn median(values: &[f32]) -> Option<f32> {
-    let mut finite: Vec<f32> = values.iter().copied().filter(|z| z.is_finite()).collect();
-    finite.sort_by(f32::total_cmp);
-    finite.get(finite.len() / 2).copied()
+    let finite = values.iter().copied().filter(|z| z.is_finite());
+    tagalong_math::median(finite.map(f64::from)).map(|middle| middle as f32)
 }
 
 /// Returns the median step between neighbours, in thousandths of the squared range.
