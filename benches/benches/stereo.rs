@@ -83,17 +83,21 @@ impl Measurement for ProcessorTime {
 
 /// Smooth noise: each pixel the mean of hashes around it.
 fn pattern(x: usize, y: usize) -> u8 {
-    let hash = |x: usize, y: usize| {
+    fn hash(x: usize, y: usize) -> usize {
         let h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
         ((h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D) >> 24) as usize
-    };
+    }
+
     let sum: usize = (0..9).map(|i| hash(x + i % 3, y + i / 3)).sum();
     (sum / 9) as u8
 }
 
 /// A wall at 8 px, and in front of it a box at 30 px.
 fn pair() -> (GreyImage, GreyImage) {
-    let boxed = |x: usize, y: usize| (180..330).contains(&x) && y > 100;
+    fn boxed(x: usize, y: usize) -> bool {
+        (180..330).contains(&x) && y > 100
+    }
+
     let left = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
         if boxed(x, y) { pattern(x + 1000, y) } else { pattern(x, y) }
     });
@@ -176,7 +180,7 @@ impl Bench {
 /// Returns all configs with both matchers, in front of the first two people that all of them see:
 /// the simulator decides on clothes and posture.
 fn all() -> Vec<(String, Bench)> {
-    let of_seed = |seed| {
+    fn of_seed(seed: u64) -> Option<Vec<(String, Bench)>> {
         let seen = shot(seed);
         let mut all = Vec::new();
         for (config, text) in CONFIGS {
@@ -191,7 +195,8 @@ fn all() -> Vec<(String, Bench)> {
             }
         }
         Some(all)
-    };
+    }
+
     (0..50).find_map(of_seed).expect("two people whom all see")
 }
 

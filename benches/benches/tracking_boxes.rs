@@ -65,12 +65,13 @@ fn compressive(criterion: &mut Criterion) {
 
 /// Returns eight people that walk to and fro, as boxes of whole bodies.
 fn recorded(index: u64) -> Vec<ExternalDetection> {
-    let person = |k: u64| {
-        let x = 300.0 + 200.0 * ((index as f64) * 0.02 + k as f64).sin();
-        let region = Some(Rect::new(x, 120.0 + 8.0 * k as f64, 70.0, 190.0));
-        ExternalDetection { region, head: None, score: 0.95 }
-    };
-    (0..8).map(person).collect()
+    (0..8)
+        .map(|k| {
+            let x = 300.0 + 200.0 * ((index as f64) * 0.02 + k as f64).sin();
+            let region = Some(Rect::new(x, 120.0 + 8.0 * k as f64, 70.0, 190.0));
+            ExternalDetection { region, head: None, score: 0.95 }
+        })
+        .collect()
 }
 
 fn boxes(criterion: &mut Criterion) {

@@ -26,9 +26,14 @@ fn time(size: usize) -> (f64, f64) {
     let miss = vec![MISS; size];
     let solve = || assign(size, &miss, |row, col| Some(costs[row * size + col]));
     let us = median_us(solve);
-    let cost =
-        |(row, col): (usize, &Option<usize>)| col.map_or(MISS, |col| costs[row * size + col]);
-    (us, solve().iter().enumerate().map(cost).sum())
+    (
+        us,
+        solve()
+            .iter()
+            .enumerate()
+            .map(|(row, col)| col.map_or(MISS, |col| costs[row * size + col]))
+            .sum(),
+    )
 }
 
 /// Returns a number in 0 to 1 that looks random.

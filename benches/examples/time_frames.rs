@@ -73,8 +73,10 @@ fn longest(report: &FrameReport) -> &'static str {
 }
 
 fn print_row(log: &str, config: &str, frames: &[Timed]) {
-    let name =
-        |path| Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    fn name(path: &str) -> String {
+        Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
     let times: Vec<f64> = frames.iter().map(|frame| frame.ms).collect();
     let [p50, p95, p99] =
         [0.5, 0.95, 0.99].map(|part| percentile(&times, part).unwrap_or(f64::NAN));

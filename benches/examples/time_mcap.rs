@@ -83,8 +83,10 @@ fn write(path: &Path, compression: Option<Compression>) -> Result<(), Box<dyn Er
     let channel_id = writer.add_channel(schema, "depth", "cdr", &BTreeMap::new())?;
     let mut random = SplitMix64::new(1);
     for sequence in 0..IMAGES {
-        let pixel = |i: u32| (1000 + i / 300) as u16 + random.between(0.0, 4.0) as u16;
-        let data: Vec<u8> = (0..640 * 480).map(pixel).flat_map(u16::to_le_bytes).collect();
+        let data: Vec<u8> = (0..640 * 480)
+            .map(|i| (1000 + i / 300) as u16 + random.between(0.0, 4.0) as u16)
+            .flat_map(u16::to_le_bytes)
+            .collect();
         let time = 100_000_000 * u64::from(sequence);
         let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
         writer.write_to_known_channel(&header, &data)?;

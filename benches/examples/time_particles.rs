@@ -70,8 +70,7 @@ fn look_up() -> (f64, f64) {
 
 /// Returns places of two people within the reach of the filter's table.
 fn places(first: u64, count: u64) -> Vec<PositionPair> {
-    let place = |k: u64| [0.6 * uniform(2 * k), 1.8 * uniform(2 * k + 1)];
-    (first..first + count).map(place).collect()
+    (first..first + count).map(|k| [0.6 * uniform(2 * k), 1.8 * uniform(2 * k + 1)]).collect()
 }
 
 /// Returns a number between -1/2 and 1/2.

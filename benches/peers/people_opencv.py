@@ -142,7 +142,7 @@ def miss_rate(programs, log, tracks, extent):
 def settings_for(row, log):
     """Settings of a row on one log: in a room, with the model that has not seen it."""
     settings, model = OURS[row]
-    left_out = f"configs/models/{model}.without-{ROOMS.get(log.stem)}.toml"
+    left_out = f"benches/models/{model}.without-{ROOMS.get(log.stem)}.toml"
     return [*settings, f"model='{left_out}'"] if (ROOT / left_out).exists() else settings
 
 

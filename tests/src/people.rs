@@ -151,8 +151,11 @@ mod tests {
 
     #[test]
     fn covered_within_two_frames_counts() {
+        fn at(frame: u64) -> BTreeMap<u64, Vec<(u32, Rect)>> {
+            BTreeMap::from([(frame, vec![(7, Rect::new(1.0, 0.0, 10.0, 10.0))])])
+        }
+
         let truth = [1, 2, 3, 4].map(|f| person(f, 1, 0.0, false));
-        let at = |frame| BTreeMap::from([(frame, vec![(7, Rect::new(1.0, 0.0, 10.0, 10.0))])]);
         assert_eq!(score(&truth, &at(3)).covered_soon, 1);
         assert_eq!(score(&truth, &at(4)).covered_soon, 0);
         assert_eq!(score(&truth, &at(4)).ids[&1], BTreeSet::from([7]));

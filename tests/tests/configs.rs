@@ -14,9 +14,12 @@ fn folder() -> PathBuf {
 
 /// Returns the name and the text of each shipped config.
 fn configs() -> Vec<(String, String)> {
+    fn name(path: &Path) -> String {
+        path.file_name().unwrap().to_string_lossy().into_owned()
+    }
+
     let paths = fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().path());
     let configs = paths.filter(|path| path.extension().is_some_and(|it| it == "toml"));
-    let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
     configs.map(|path| (name(&path), fs::read_to_string(&path).unwrap())).collect()
 }
 

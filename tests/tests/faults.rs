@@ -179,11 +179,14 @@ fn t5_images_are_paired_within_the_tolerance_and_others_are_counted() {
 
 #[test]
 fn t5_depth_at_half_rate_halves_the_frames_and_nothing_else() {
+    fn confirmed(tracks: &[Track]) -> usize {
+        tracks.iter().filter(|t| t.confirmed && t.seen).count()
+    }
+
     let (camera, shots) = shots();
     let run = run(&record(&camera, &shots, Fault { half_depth: true, ..Fault::default() }));
     assert_eq!(run.tracks.len(), shots.len().div_ceil(2));
     assert_eq!((run.colour_alone, run.depth_alone), (shots.len() as u64 / 2, 0));
-    let confirmed = |tracks: &[Track]| tracks.iter().filter(|t| t.confirmed && t.seen).count();
     assert_eq!(confirmed(&run.tracks.last().unwrap().1), 1);
 }
 

@@ -149,6 +149,10 @@ fn seen(path: &Path) -> (Vec<(Stamp, RgbImage)>, Places) {
 
 #[test]
 fn a_circular_log_and_an_unwrapped_one_show_the_same_people() {
+    fn counts(all: &Places) -> Vec<usize> {
+        all.iter().map(Vec::len).collect::<Vec<_>>()
+    }
+
     // The log ends after 12 images at 3 Hz, so the person has to enter early.
     let enters_early = ROOM.replace("enters_s = 9.0", "enters_s = 2.5");
     let (simulation, shots) = shots(&Scene::parse(&enters_early).unwrap());
@@ -157,11 +161,13 @@ fn a_circular_log_and_an_unwrapped_one_show_the_same_people() {
     let folder = tempfile::tempdir().unwrap();
     let raw = folder.path().join("raw.mcap");
     let unwrapped = folder.path().join("flat.mcap");
-    let colour = |shot: &Shot| {
-        let image = shot.images.colour.as_deref().unwrap().clone();
-        (Stamp::from_nanos(1_000_000_000 + shot.captured_ns), image)
-    };
-    let circles: Vec<_> = shots.iter().map(colour).collect();
+    let circles: Vec<_> = shots
+        .iter()
+        .map(|shot| {
+            let image = shot.images.colour.as_deref().unwrap().clone();
+            (Stamp::from_nanos(1_000_000_000 + shot.captured_ns), image)
+        })
+        .collect();
     let side = [circles[0].1.width(), circles[0].1.height()];
     let centre = mirror.centre_px.into();
     let circular =
@@ -181,6 +187,5 @@ fn a_circular_log_and_an_unwrapped_one_show_the_same_people() {
     for (a, b) in from_circles.iter().flatten().zip(from_panoramas.iter().flatten()) {
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6), "{a:?} {b:?}");
     }
-    let counts = |all: &Places| all.iter().map(Vec::len).collect::<Vec<_>>();
     assert_eq!(counts(&from_circles), counts(&from_panoramas));
 }

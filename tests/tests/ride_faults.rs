@@ -15,11 +15,11 @@ const STANDS_MPS: f64 = 0.02;
 
 /// Returns a ride of `follow-depth` after a person walking ahead along a room, with a fault in its middle.
 fn ride(kind: FaultKind) -> Ride {
-    ride_of("follow-depth", kind)
+    ride_of("configs", "follow-depth", kind)
 }
 
-/// Returns such a ride of a config.
-fn ride_of(config: &str, kind: FaultKind) -> Ride {
+/// Returns such a ride of a config in a folder of the repository.
+fn ride_of(folder: &str, config: &str, kind: FaultKind) -> Ride {
     let walk = Variant::default()
         .with("duration_s", 11.0)
         .with("camera.rate_hz", 15.0)
@@ -33,7 +33,7 @@ fn ride_of(config: &str, kind: FaultKind) -> Ride {
     scene.check_faults().unwrap();
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder);
     let text = std::fs::read_to_string(configs.join(config).with_extension("toml")).unwrap();
     let contender = Contender { folder: configs, ..Contender::new(config, text) };
     Ride::new(&scene, &contender, &registry, &mut ()).unwrap()
@@ -99,7 +99,8 @@ fn t7_odometry_that_is_silent_broken_or_stands_still_stops_the_robot() {
 #[test]
 fn t7_odometry_whose_values_stand_still_is_a_fault() {
     let kind = FaultKind::OdometryFrozen;
-    assert_ride_stands(&ride_of("follow-depth-near", kind), kind, 4.6, &[Reason::Fault]);
+    let ride = ride_of("benches/papers/configs", "follow-depth-near", kind);
+    assert_ride_stands(&ride, kind, 4.6, &[Reason::Fault]);
 }
 
 #[test]

@@ -55,11 +55,13 @@ fn run(pipelines: &mut [Pipeline]) -> Vec<Vec<String>> {
     let mut draw = Draw::new(&scene, 1);
     let frames: Vec<Frame> =
         std::iter::from_fn(|| draw.next_frame()).map(|drawn| drawn.frame).collect();
-    let say = |frame| -> Vec<String> {
-        let reports = pipelines.iter_mut().map(|pipeline| pipeline.step(frame).unwrap());
-        reports.map(|report| format!("{:?}", untimed(report))).collect()
-    };
-    frames.iter().map(say).collect()
+    frames
+        .iter()
+        .map(|frame| -> Vec<String> {
+            let reports = pipelines.iter_mut().map(|pipeline| pipeline.step(frame).unwrap());
+            reports.map(|report| format!("{:?}", untimed(report))).collect()
+        })
+        .collect()
 }
 
 /// Returns a report without timings, which differ between any two runs.

@@ -25,11 +25,13 @@ fn registry() -> Registry {
 
 fn contenders(names: &[&str]) -> Vec<Contender> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
-    let read = |name: &&str| {
-        let config = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
-        Contender { folder: folder.clone(), ..Contender::new(*name, config) }
-    };
-    names.iter().map(read).collect()
+    names
+        .iter()
+        .map(|name| {
+            let config = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
+            Contender { folder: folder.clone(), ..Contender::new(*name, config) }
+        })
+        .collect()
 }
 
 fn scenes(seeds: u64, duration_s: f64) -> Vec<Scene> {

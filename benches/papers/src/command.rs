@@ -40,7 +40,7 @@ pub struct ReproduceArgs {
     /// The folder with the configs and scenes.
     #[arg(long, value_name = "DIR", default_value = "configs")]
     pub configs: PathBuf,
-    /// The folder with the configs of the printed forms.
+    /// The folder with the configs of printed forms and of single steps of a paper.
     #[arg(long, value_name = "DIR", default_value = "benches/papers/configs")]
     pub printed_configs: PathBuf,
     /// The folder with real logs and labelled images; experiments that need them are left out where
@@ -111,10 +111,11 @@ fn lab<'a>(args: &ReproduceArgs, registry: &'a Registry, progress: &'a Bar) -> L
 }
 
 fn list(format: TableFormat) -> Outcome {
+    fn names(system: &System) -> Vec<&str> {
+        system.experiments.iter().map(|experiment| experiment.name).collect()
+    }
+
     if format == TableFormat::Json {
-        let names = |system: &System| -> Vec<&str> {
-            system.experiments.iter().map(|experiment| experiment.name).collect()
-        };
         let all: Vec<_> = SYSTEMS.iter().map(|system| (system.name, names(system))).collect();
         print(&to_json("the list of systems", &all)?)?;
         return Ok(Ended::Well);
@@ -223,15 +224,16 @@ mod tests {
 
     #[test]
     fn seeds_that_the_split_does_not_have_and_unknown_systems_are_refused() {
+        fn refusal(line: &str) -> Failure {
+            let line = <Line as clap::Parser>::parse_from(line.split(' '));
+            reproduce(&line.args, &Registry::default()).unwrap_err()
+        }
+
         #[derive(clap::Parser)]
         struct Line {
             #[command(flatten)]
             args: ReproduceArgs,
         }
-        let refusal = |line: &str| {
-            let line = <Line as clap::Parser>::parse_from(line.split(' '));
-            reproduce(&line.args, &Registry::default()).unwrap_err()
-        };
         let failure = refusal("reproduce stereo-ekf --seeds 2 --first-seed 999999999");
         assert!(failure.code == 2 && failure.message.contains("the split"), "{failure:?}");
         let failure = refusal("reproduce stereo-smv-ekf");

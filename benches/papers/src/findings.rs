@@ -63,10 +63,13 @@ fn seeds_note(simulated: &[SimulatedScene]) -> String {
             None => groups.push((*seeds, vec![scene])),
         }
     }
-    let group = |(seeds, scenes): &(Seeds, Vec<&str>)| format!("{}: {seeds}", scenes.join(", "));
     format!(
         "Simulated for this table. {}.",
-        groups.iter().map(group).collect::<Vec<_>>().join("; ")
+        groups
+            .iter()
+            .map(|(seeds, scenes)| format!("{}: {seeds}", scenes.join(", ")))
+            .collect::<Vec<_>>()
+            .join("; ")
     )
 }
 
@@ -122,10 +125,10 @@ mod tests {
 
     #[test]
     fn scenes_with_the_same_seeds_are_named_together() {
-        let simulated = |scene: &str, first| SimulatedScene {
-            scene: scene.into(),
-            seeds: Split::Test.seeds(first, 5).unwrap(),
-        };
+        fn simulated(scene: &str, first: u64) -> SimulatedScene {
+            SimulatedScene { scene: scene.into(), seeds: Split::Test.seeds(first, 5).unwrap() }
+        }
+
         let note =
             seeds_note(&[simulated("crowd", 0), simulated("turntable", 7), simulated("walk", 0)]);
         let expected = "Simulated for this table. crowd, walk: 5 seeds of the split test from 0 on; \

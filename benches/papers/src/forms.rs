@@ -269,12 +269,15 @@ impl Forms {
     }
 
     fn judged(&self, trial: &Trial) -> Result<Vec<Form>, TrialError> {
-        let form = |run| {
-            let judged = self.judge.judge(trial, run)?;
-            let errors_m = judged.errors_in_robot_m;
-            Ok(Form { tally: judged.tally, errors_m, headline: Vec::new() })
-        };
-        trial.runs.iter().map(form).collect()
+        trial
+            .runs
+            .iter()
+            .map(|run| {
+                let judged = self.judge.judge(trial, run)?;
+                let errors_m = judged.errors_in_robot_m;
+                Ok(Form { tally: judged.tally, errors_m, headline: Vec::new() })
+            })
+            .collect()
     }
 
     fn table(&self, real: &[Vec<Form>], simulated: &[Vec<Form>]) -> Table {
@@ -373,15 +376,18 @@ mod tests {
 
     /// A draw with as many hits and false alarms for each form, and the errors of its headline.
     fn draw<const N: usize>(forms: [(u64, u64, &[f64]); N]) -> Vec<Form> {
-        let form = |(tp, fp, headline): (u64, u64, &[f64])| Form {
-            tally: Tally {
-                clear: Clear { tp, fp, ..Clear::default() },
-                truths: tp,
-                ..Tally::default()
-            },
-            errors_m: vec![0.1],
-            headline: headline.to_vec(),
-        };
+        fn form((tp, fp, headline): (u64, u64, &[f64])) -> Form {
+            Form {
+                tally: Tally {
+                    clear: Clear { tp, fp, ..Clear::default() },
+                    truths: tp,
+                    ..Tally::default()
+                },
+                errors_m: vec![0.1],
+                headline: headline.to_vec(),
+            }
+        }
+
         forms.map(form).into()
     }
 
@@ -394,11 +400,13 @@ mod tests {
 
     #[test]
     fn every_form_is_a_shipped_config_and_sees_pairs_where_the_paper_does() {
+        fn sees_pairs(contender: &Contender) -> bool {
+            parsed(contender).unwrap().contains_key("stereo")
+        }
+
         let registry = Registry::default();
         let lab = lab(&registry, true, None);
         for forms in ALL {
-            let sees_pairs =
-                |contender: &Contender| parsed(contender).unwrap().contains_key("stereo");
             let simulated = (forms.contenders)(&lab, &forms.configs).unwrap();
             let of_pairs = ["P1", "P3", "P4"].contains(&forms.paper);
             assert!(simulated.iter().all(|form| sees_pairs(form) == of_pairs), "{}", forms.paper);

@@ -32,6 +32,16 @@ struct Tracked {
 
 /// Builds the table.
 pub(crate) fn given(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
+    fn published(name: &str, mota: f64) -> Row {
+        let mut cells = vec![Cell::default(); COLUMNS.len()];
+        cells[0] = Cell::number(mota, 1);
+        Row::published(format!("SORT, {name}"), cells)
+    }
+
+    fn mota_of(name: &str) -> Option<f64> {
+        SORT.iter().find(|(of, _)| *of == name).map(|(_, mota)| *mota)
+    }
+
     let config = whole_bodies(lab)?;
     let sequences = sequences(lab)?;
     lab.progress.begin(sequences.len(), "sequences of MOT15");
@@ -41,12 +51,6 @@ pub(crate) fn given(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
         tracked
     };
     let tracked = sequences.iter().map(track).collect::<Result<Vec<Tracked>, _>>()?;
-    let published = |name: &str, mota: f64| {
-        let mut cells = vec![Cell::default(); COLUMNS.len()];
-        cells[0] = Cell::number(mota, 1);
-        Row::published(format!("SORT, {name}"), cells)
-    };
-    let mota_of = |name: &str| SORT.iter().find(|(of, _)| *of == name).map(|(_, mota)| *mota);
     let mut rows = Vec::new();
     for one in &tracked {
         rows.extend(mota_of(&one.name).map(|mota| published(&one.name, mota)));
@@ -74,9 +78,12 @@ pub(crate) fn given(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
 }
 
 fn row(name: &str, all: &[&Tracked]) -> Row {
+    fn percent(value: Option<f64>) -> Cell {
+        Cell::number(value.unwrap_or(f64::NAN), 3).percent()
+    }
+
     let tally = Tally::combine(all.iter().map(|one| &one.tally));
     let scores = tally.scores();
-    let percent = |value: Option<f64>| Cell::number(value.unwrap_or(f64::NAN), 3).percent();
     let frames: f64 = all.iter().map(|one| one.frames as f64).sum();
     let worked_ms: f64 = all.iter().map(|one| one.worked_ms).sum();
     let mut cells = [scores.mota, scores.idf1, scores.hota].map(percent).to_vec();

@@ -278,8 +278,11 @@ fn in_stereo(
     lab: &Lab,
     contenders: &[Contender],
 ) -> std::result::Result<(StereoSettings, Vec<Contender>), ReproduceError> {
+    fn wrong(what: &str) -> ReproduceError {
+        ReproduceError::Other(format!("{STEREO}: {what}"))
+    }
+
     let model = parsed(&lab.contender(STEREO)?)?;
-    let wrong = |what: &str| ReproduceError::Other(format!("{STEREO}: {what}"));
     let stereo = model.get("stereo").cloned().ok_or_else(|| wrong("no [stereo]"))?;
     let stereo = stereo.try_into().map_err(|error: toml::de::Error| wrong(&error.to_string()))?;
     let detector = model.get("detectors").and_then(|all| all.get(0)?.get("config")?.as_table());
@@ -289,8 +292,10 @@ fn in_stereo(
         .map(|(key, value): (_, &Value)| (format!("detectors.0.config.{key}"), value.to_string()))
         .collect();
     let values: Vec<(&str, &str)> = values.iter().map(|(k, v)| (&**k, &**v)).collect();
-    let seeing = |contender: &Contender| with_values(contender, &contender.name, &values);
-    let contenders: std::result::Result<Vec<_>, _> = contenders.iter().map(seeing).collect();
+    let contenders: std::result::Result<Vec<_>, _> = contenders
+        .iter()
+        .map(|contender| with_values(contender, &contender.name, &values))
+        .collect();
     Ok((stereo, contenders?))
 }
 
@@ -364,10 +369,19 @@ impl Trials {
     }
 
     fn row(&self, at: usize) -> Vec<Cell> {
-        let all = |_: &&Result| true;
-        let good = |result: &&Result| result.in_image;
+        fn all(_: &&Result) -> bool {
+            true
+        }
+
+        fn good(result: &&Result) -> bool {
+            result.in_image
+        }
+
+        fn share_of(all: usize, count: usize) -> Cell {
+            Cell::share(count as u64, all as u64, 1)
+        }
+
         let trials = self.of(at).filter(|r| r.is_trial).count();
-        let share_of = |all: usize, count: usize| Cell::share(count as u64, all as u64, 1);
         let share = |count: usize| share_of(trials, count);
         let across = self.of(at).filter(|r| r.in_image).count();
         let mean = |values: Vec<f64>, digits| Cell::number(mean(&values), digits);
@@ -394,11 +408,15 @@ impl Trials {
     fn chart(&self) -> String {
         let error =
             |at| mean(&self.of(at).flat_map(|r| r.metres.iter().copied()).collect::<Vec<_>>());
-        let point = |(at, contender): (usize, &Contender)| {
-            let name = contender.name.trim_start_matches("joint-particle-").to_owned();
-            (name, self.cost(at, 1), error(at))
-        };
-        let points = self.contenders.iter().enumerate().map(point).collect();
+        let points = self
+            .contenders
+            .iter()
+            .enumerate()
+            .map(|(at, contender)| {
+                let name = contender.name.trim_start_matches("joint-particle-").to_owned();
+                (name, self.cost(at, 1), error(at))
+            })
+            .collect();
         Scatter {
             title: "Two people cross: what the methods of P3 cost, and how good they are",
             across: "matching, ms per frame with an overlap",

@@ -77,7 +77,8 @@ pub struct Lab<'a> {
     pub registry: &'a Registry,
     /// Folder of the configs, which holds the folder `scenes`.
     pub configs: PathBuf,
-    /// Folder of the configs of the printed forms, with their models.
+    /// Folder of the configs of the laboratory, with their models: printed forms, and single steps of a
+    /// paper.
     pub printed_configs: PathBuf,
     /// Folder of real logs and labelled images, if there is one.
     pub data: Option<PathBuf>,
@@ -141,13 +142,15 @@ impl Lab<'_> {
             .seeds(self.first_seed, seeds)
             .map_err(|error| ReproduceError::Other(error.to_string()))?;
         self.simulated.add(SimulatedScene { scene: name.to_owned(), seeds });
-        let scene = |seed| {
-            let variant = Variant { seed: Some(seed), split: Some(split), set: set.clone() };
-            Scene::parse_with(&text, &variant).map_err(|error| {
-                ReproduceError::Scene(error.render(&path.display().to_string(), &text))
+        seeds
+            .numbers()
+            .map(|seed| {
+                let variant = Variant { seed: Some(seed), split: Some(split), set: set.clone() };
+                Scene::parse_with(&text, &variant).map_err(|error| {
+                    ReproduceError::Scene(error.render(&path.display().to_string(), &text))
+                })
             })
-        };
-        seeds.numbers().map(scene).collect()
+            .collect()
     }
 
     /// Returns the shipped configs of these names.
@@ -158,7 +161,7 @@ impl Lab<'_> {
         names.iter().map(|name| self.contender(name)).collect()
     }
 
-    /// Returns the config of this name, of a printed form or a shipped one.
+    /// Returns the config of this name, one of the laboratory or a shipped one.
     ///
     /// # Errors
     /// A config that cannot be read.
@@ -175,7 +178,8 @@ impl Lab<'_> {
 
     /// Returns the folder of the config of this name.
     pub fn folder_of(&self, name: &str) -> &Path {
-        if name.ends_with("-as-printed") { &self.printed_configs } else { &self.configs }
+        let is_own = self.printed_configs.join(format!("{name}.toml")).is_file();
+        if is_own { &self.printed_configs } else { &self.configs }
     }
 
     /// Runs all contenders on all scenes and keeps the results of `keep` for each trial, in the
@@ -278,19 +282,20 @@ mod tests {
 
     #[test]
     fn another_first_seed_draws_others_and_each_draw_is_noted_once() {
+        fn seeds(lab: &Lab) -> Vec<u64> {
+            lab.scenes("crowd", &[], 2).unwrap().iter().map(|scene| scene.seed).collect()
+        }
+
+        fn of(first: u64) -> SimulatedScene {
+            SimulatedScene { scene: "crowd".into(), seeds: Split::Test.seeds(first, 2).unwrap() }
+        }
+
         let registry = Registry::default();
         let mut lab = lab(&registry, false, None);
-        let seeds = |lab: &Lab| -> Vec<u64> {
-            lab.scenes("crowd", &[], 2).unwrap().iter().map(|scene| scene.seed).collect()
-        };
         assert_eq!(seeds(&lab), [2_000_000_000, 2_000_000_001]);
         assert_eq!(seeds(&lab), [2_000_000_000, 2_000_000_001]);
         lab.first_seed = 40;
         assert_eq!(seeds(&lab), [2_000_000_040, 2_000_000_041]);
-        let of = |first| SimulatedScene {
-            scene: "crowd".into(),
-            seeds: Split::Test.seeds(first, 2).unwrap(),
-        };
         assert_eq!(lab.simulated.take(), [of(0), of(40)]);
         assert_eq!(lab.simulated.take(), []);
         lab.first_seed = 999_999_999;
@@ -308,6 +313,10 @@ mod tests {
         assert_eq!(table["filter"]["plugin"].as_str(), Some("ekf-as-printed"));
         assert!(table.contains_key("stereo"), "of the config that it extends");
         assert_eq!(lab.contender("stereo-ekf").unwrap().folder, lab.configs);
+        let step = lab.contender("joint-particle-kde50").unwrap();
+        assert_eq!(step.folder, lab.printed_configs);
+        let table: toml::Table = step.config.parse().unwrap();
+        assert_eq!(table["filter"]["config"]["hold_depth"].as_bool(), Some(true), "{table}");
     }
 
     #[test]

@@ -93,11 +93,14 @@ struct Tracked {
 type Counted = (f64, FloorClear, Option<u32>);
 
 fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
+    fn given(of: [f64; 8]) -> [Option<f64>; 8] {
+        of.map(Some)
+    }
+
     let tracked = MOVING.track_all(lab)?;
     if tracked.is_empty() {
         return Ok(MOVING.without_data().into());
     }
-    let given = |of: [f64; 8]| of.map(Some);
     let mut table = MOVING.table(
         "People beside a robot that drives (laser-moving, strict, 0.75 m)",
         &[
@@ -128,14 +131,15 @@ fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
 }
 
 fn following(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
+    fn figures(of: [f64; 6]) -> [Option<f64>; 8] {
+        let [objects, valid, switches, misses, recall, motp] = of.map(Some);
+        [objects, valid, switches, misses, None, None, recall, motp]
+    }
+
     let tracked = FOLLOWING.track_all(lab)?;
     if tracked.is_empty() {
         return Ok(FOLLOWING.without_data().into());
     }
-    let figures = |of: [f64; 6]| {
-        let [objects, valid, switches, misses, recall, motp] = of.map(Some);
-        [objects, valid, switches, misses, None, None, recall, motp]
-    };
     let mut table = FOLLOWING.table(
         "One person before a robot that follows it (laser-following, 0.75 m)",
         &[
@@ -184,10 +188,14 @@ const FOLLOWING_PUBLISHED: [(&str, [f64; 4]); 3] = [
 const DIGITS: [usize; 8] = [0, 0, 0, 0, 0, 1, 1, 3];
 
 fn cells(figures: Figures) -> Vec<Cell> {
-    let cell = |(value, digits): (Option<f64>, usize)| {
-        value.map_or_else(Cell::default, |value| Cell::number(value, digits))
-    };
-    figures.into_iter().zip(DIGITS).map(cell).chain([Cell::default()]).collect()
+    figures
+        .into_iter()
+        .zip(DIGITS)
+        .map(|(value, digits)| {
+            value.map_or_else(Cell::default, |value| Cell::number(value, digits))
+        })
+        .chain([Cell::default()])
+        .collect()
 }
 
 fn published(name: &str, figures: Figures) -> Row {
@@ -298,7 +306,10 @@ impl Log {
     }
 
     fn cells(&self, clear: &FloorClear) -> Vec<Cell> {
-        let number = |value: u64| Cell::number(value as f64, 0);
+        fn number(value: u64) -> Cell {
+            Cell::number(value as f64, 0)
+        }
+
         let (false_positives, mota) = if self.is_complete {
             (
                 number(clear.false_positives),
@@ -371,18 +382,22 @@ fn estimates(
     coasting_s: f64,
 ) -> impl Iterator<Item = FloorPoint> {
     let laser_from_robot = laser.inverse();
-    let is_estimate = move |track: &&Track| {
-        track.confirmed && (track.seen || (coasting_s > 0.0 && track.unseen_s <= coasting_s))
-    };
-    report.tracks.iter().filter(is_estimate).map(move |track| {
-        let at = laser_from_robot * track.estimate.person.position;
-        FloorPoint { id: i64::from(track.id.0), at_m: [at.x, at.y] }
-    })
+    report
+        .tracks
+        .iter()
+        .filter(move |track| {
+            track.confirmed && (track.seen || (coasting_s > 0.0 && track.unseen_s <= coasting_s))
+        })
+        .map(move |track| {
+            let at = laser_from_robot * track.estimate.person.position;
+            FloorPoint { id: i64::from(track.id.0), at_m: [at.x, at.y] }
+        })
 }
 
 fn has_match(scan: &FloorScan) -> bool {
-    let apart = |a: &FloorPoint, b: &FloorPoint| {
+    fn apart(a: &FloorPoint, b: &FloorPoint) -> bool {
         (a.at_m[0] - b.at_m[0]).hypot(a.at_m[1] - b.at_m[1]) <= CUT_M
-    };
+    }
+
     scan.people.iter().any(|person| scan.estimates.iter().any(|one| apart(person, one)))
 }

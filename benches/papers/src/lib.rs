@@ -22,6 +22,7 @@ mod laser;
 mod omni_appearance;
 mod printed;
 mod real;
+pub mod realism;
 mod recorded;
 mod rgbd_compressive;
 mod scatter;

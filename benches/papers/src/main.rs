@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tagalong_config::Registry;
 use tagalong_papers::command::{HELP, ReproduceArgs, reproduce};
+use tagalong_papers::realism::{RealismArgs, realism};
 use tagalong_papers::webcams::{self, TriangulateArgs, triangulate};
 
 /// Repeats the experiments of five published systems. Every other command is that of `tagalong`,
@@ -23,6 +24,8 @@ enum Command {
     /// Prints the tables of a published system beside ours
     #[command(after_help = HELP)]
     Reproduce(ReproduceArgs),
+    /// Checks how realistic simulated worlds are, beside measurements of real sensors and rooms
+    Realism(RealismArgs),
     /// Measures the position of a coloured hat with fixed cameras in a log
     #[command(after_help = webcams::HELP)]
     Triangulate(TriangulateArgs),
@@ -34,11 +37,8 @@ enum Command {
 fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().collect();
     let outcome = match Cli::parse().command {
-        Command::Reproduce(args) => {
-            let mut registry = Registry::default();
-            tagalong_papers::register(&mut registry);
-            reproduce(&args, &registry)
-        }
+        Command::Reproduce(args) => reproduce(&args, &registry()),
+        Command::Realism(args) => realism(&args, &registry()),
         Command::Triangulate(args) => triangulate(&args),
         Command::Product(words) => {
             // The name of the program comes before its words, as in any command line.
@@ -47,6 +47,13 @@ fn main() -> ExitCode {
         }
     };
     ExitCode::from(tagalong_cli::exit_code(&outcome, tagalong_cli::wants_json(&arguments)))
+}
+
+/// Returns a registry with all plugins of the workspace and those of the printed equations.
+fn registry() -> Registry {
+    let mut registry = Registry::default();
+    tagalong_papers::register(&mut registry);
+    registry
 }
 
 #[cfg(test)]
@@ -68,5 +75,8 @@ mod tests {
         );
         let cli = Cli::try_parse_from(["tagalong-papers", "reproduce", "laser"]).unwrap();
         assert!(matches!(cli.command, Command::Reproduce(_)));
+        let cli = Cli::try_parse_from(["tagalong-papers", "realism", "--seeds", "24"]).unwrap();
+        assert!(matches!(cli.command, Command::Realism(args) if args.seeds == 24));
+        assert!(Cli::try_parse_from(["tagalong-papers", "realism", "--seeds", "0"]).is_err());
     }
 }

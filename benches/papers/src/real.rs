@@ -51,6 +51,10 @@ pub(crate) fn trial(
     log: &str,
     contenders: &[Contender],
 ) -> Result<Option<Trial>, ReproduceError> {
+    fn run(of: &Contender) -> Run {
+        Run { pipeline: of.name.clone(), reports: vec![], worked_ms: 0.0 }
+    }
+
     let Some(folder) = lab.data.as_ref().map(|data| data.join("logs")) else { return Ok(None) };
     let path = folder.join(log);
     let truth = folder.join(log).with_extension("people.csv");
@@ -69,7 +73,6 @@ pub(crate) fn trial(
     let mut source = source.map_err(|error| failed(&error))?;
     let pipelines = contenders.iter().map(|contender| contender.pipeline(lab.registry, 1));
     let mut pipelines = pipelines.collect::<Result<Vec<Pipeline>, _>>()?;
-    let run = |of: &Contender| Run { pipeline: of.name.clone(), reports: vec![], worked_ms: 0.0 };
     let mut runs: Vec<Run> = contenders.iter().map(run).collect();
     let mut moments = Vec::new();
     let mut camera = None;
@@ -98,10 +101,13 @@ fn moment(frame: &Frame, known: &[Annotated]) -> Moment {
 
 /// Converts an annotation; heads are annotated at their surface. `None` without a place.
 fn annotated(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Option<Truth> {
+    fn rect(r: &tagalong_eval::Region) -> Rect {
+        Rect::new(r.x, r.y, r.width, r.height)
+    }
+
     let surface = Point3::from(row.head_in_camera_m?);
     let ray = surface.coords.try_normalize(1e-6).unwrap_or_default();
     let head = robot_from_camera * (surface + ray * HEAD_RADIUS_M);
-    let rect = |r: &tagalong_eval::Region| Rect::new(r.x, r.y, r.width, r.height);
     Some(Truth {
         id: u16::try_from(row.id).unwrap_or(u16::MAX),
         head_in_robot: head,

@@ -58,10 +58,13 @@ struct Log {
 
 /// Returns the annotated logs in the order of their names.
 fn logs(lab: &Lab<'_>) -> Result<Vec<Log>, ReproduceError> {
+    fn name(path: PathBuf) -> Option<String> {
+        path.file_name()?.to_str()?.strip_suffix(TRUTH).map(String::from)
+    }
+
     let Some(data) = &lab.data else { return Ok(Vec::new()) };
     let Ok(entries) = fs::read_dir(data.join("logs")) else { return Ok(Vec::new()) };
     let files = entries.flatten().map(|entry| entry.path());
-    let name = |path: PathBuf| path.file_name()?.to_str()?.strip_suffix(TRUTH).map(String::from);
     let mut names: Vec<String> = files.filter_map(name).collect();
     names.sort();
     names.into_iter().map(|name| Log::read(data.join("logs"), name)).collect()

@@ -135,9 +135,11 @@ struct Work {
 
 impl Work {
     fn of(reports: &[FrameReport], ms: f64) -> Self {
+        fn is_searched(r: &&FrameReport) -> bool {
+            BOXES.iter().chain([&COMPARED]).any(|test| r.funnel.count(test) > 0)
+        }
+
         let count = |test: &str| reports.iter().map(|r| r.funnel.count(test)).sum::<u64>();
-        let is_searched =
-            |r: &&FrameReport| BOXES.iter().chain([&COMPARED]).any(|test| r.funnel.count(test) > 0);
         let by_depth: u64 = BY_DEPTH.map(count).iter().sum();
         let looked_at = count(BY_GRADIENTS);
         let compared = count(COMPARED);
@@ -299,14 +301,17 @@ fn growing(trial: Trial) -> Result<Vec<Vec<Tally>>, TrialError> {
 
 /// Returns some frames of a trial.
 fn part(trial: &Trial, frames: Range<usize>) -> Trial {
-    let of = |run: &Run| Run {
-        pipeline: run.pipeline.clone(),
-        reports: run.reports[frames.clone()].to_vec(),
-        worked_ms: run.worked_ms,
-    };
     Trial {
         moments: trial.moments[frames.clone()].to_vec(),
-        runs: trial.runs.iter().map(of).collect(),
+        runs: trial
+            .runs
+            .iter()
+            .map(|run| Run {
+                pipeline: run.pipeline.clone(),
+                reports: run.reports[frames.clone()].to_vec(),
+                worked_ms: run.worked_ms,
+            })
+            .collect(),
         furniture: trial.furniture.clone(),
         camera: trial.camera.clone(),
         seed: trial.seed,
@@ -347,9 +352,12 @@ fn boxes(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
         let how = if *each_pixel { "pixel by pixel" } else { "on the coarse grid" };
         rows.push(Row::ours(format!("within {radius} widths, {how}"), cells));
     }
-    let left = |metres: &f64| [format!("within {metres} m"), format!("within {metres} m, %")];
     let columns = std::iter::once("boxes a searched frame".to_owned())
-        .chain(TOLERANCES_M.iter().flat_map(left))
+        .chain(
+            TOLERANCES_M
+                .iter()
+                .flat_map(|metres| [format!("within {metres} m"), format!("within {metres} m, %")]),
+        )
         .collect();
     let notes = vec![
         "Boxes of a search around where a person is expected, and those of them that show something as far away as the person, give or take; a box shows what \
@@ -375,15 +383,18 @@ fn colour(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let contenders: Vec<Contender> =
         lab.contenders(&WITHOUT_DEPTH)?.into_iter().map(without_depth).collect();
     let real = recorded(lab, &contenders, &JUDGE)?;
-    let row = |(name, logs): (&&str, &Vec<Recorded>)| {
-        let mut cells = scores(logs.iter().map(|log| &log.tally)).to_vec();
-        cells.push(
-            Work::sum(logs.iter().map(|log| Work::of(&log.reports, log.worked_ms))).cells()[0]
-                .clone(),
-        );
-        Row::ours(*name, cells)
-    };
-    let rows = WITHOUT_DEPTH.iter().zip(&real).map(row).collect();
+    let rows = WITHOUT_DEPTH
+        .iter()
+        .zip(&real)
+        .map(|(name, logs)| {
+            let mut cells = scores(logs.iter().map(|log| &log.tally)).to_vec();
+            cells.push(
+                Work::sum(logs.iter().map(|log| Work::of(&log.reports, log.worked_ms))).cells()[0]
+                    .clone(),
+            );
+            Row::ours(*name, cells)
+        })
+        .collect();
     let columns = ["LAMR, real", "IDF1, real", "MOTA, real", WORK[0]].map(String::from).to_vec();
     let notes = vec![describe(&real), "Boxes, IoU 0.5; people within 6 m".into(), TIMES.into()];
     Ok(Table { title: "Without depth".into(), columns, rows, notes }.into())
@@ -400,13 +411,16 @@ fn without_depth(contender: Contender) -> Contender {
 }
 
 fn done(trial: Trial) -> Result<Vec<PipelineResult>, TrialError> {
-    let of = |run: &Run| {
-        Ok(PipelineResult {
-            tally: JUDGE.judge(&trial, run)?.tally,
-            work: Work::of(&run.reports, run.worked_ms),
+    trial
+        .runs
+        .iter()
+        .map(|run| {
+            Ok(PipelineResult {
+                tally: JUDGE.judge(&trial, run)?.tally,
+                work: Work::of(&run.reports, run.worked_ms),
+            })
         })
-    };
-    trial.runs.iter().map(of).collect()
+        .collect()
 }
 
 /// Returns log-average miss rate, IDF1 and MOTA.

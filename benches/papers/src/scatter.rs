@@ -22,8 +22,11 @@ const MARGIN: [f64; 4] = [70.0, 60.0, 130.0, 56.0];
 impl Scatter<'_> {
     /// Renders the chart; points that are not finite, or not positive across, are left out.
     pub fn svg(&self) -> String {
-        let usable = |p: &&(String, f64, f64)| p.1.is_finite() && p.1 > 0.0 && p.2.is_finite();
-        let points: Vec<_> = self.points.iter().filter(usable).collect();
+        let points: Vec<_> = self
+            .points
+            .iter()
+            .filter(|p| p.1.is_finite() && p.1 > 0.0 && p.2.is_finite())
+            .collect();
         let low = points.iter().map(|p| p.1.log10().floor()).fold(f64::INFINITY, f64::min);
         let high = points.iter().map(|p| p.1.log10().ceil()).fold(f64::NEG_INFINITY, f64::max);
         // Headroom above the highest point.
@@ -87,10 +90,11 @@ impl Frame {
 
 /// Returns a position for a label, at or below the wanted one, that no earlier label covers.
 fn free_place(labels: &mut Vec<(f64, f64)>, wanted: (f64, f64)) -> (f64, f64) {
-    let mut place = wanted;
-    let covers = |at: &(f64, f64), by: &(f64, f64)| {
+    fn covers(at: &(f64, f64), by: &(f64, f64)) -> bool {
         (at.0 - by.0).abs() < LABEL_PX.0 && (at.1 - by.1).abs() < LABEL_PX.1
-    };
+    }
+
+    let mut place = wanted;
     while labels.iter().any(|label| covers(&place, label)) {
         // Small steps keep a label near its point.
         place.1 += LABEL_PX.1 / 4.0;

@@ -10,9 +10,10 @@ use crate::ReproduceError;
 /// # Errors
 /// A config that is not TOML.
 pub(crate) fn parsed(contender: &Contender) -> Result<Table, ReproduceError> {
-    let unreadable =
-        |error: toml::de::Error| ReproduceError::Other(format!("{}: {error}", contender.name));
-    contender.config.parse().map_err(unreadable)
+    contender
+        .config
+        .parse()
+        .map_err(|error| ReproduceError::Other(format!("{}: {error}", contender.name)))
 }
 
 /// Returns the contender without a table of its config.

@@ -24,11 +24,14 @@ fn scenes(path: &str) -> Vec<Scene> {
          [[people]]\npath = [[6.0, 3.2]]\nheading_deg = 180.0\n"
     );
     let seeds = Split::Test.seeds(0, 3).unwrap();
-    let scene = |seed| {
-        let variant = Variant { seed: Some(seed), split: Some(Split::Test), ..Variant::default() };
-        Scene::parse_with(&text, &variant).unwrap()
-    };
-    seeds.numbers().map(scene).collect()
+    seeds
+        .numbers()
+        .map(|seed| {
+            let variant =
+                Variant { seed: Some(seed), split: Some(Split::Test), ..Variant::default() };
+            Scene::parse_with(&text, &variant).unwrap()
+        })
+        .collect()
 }
 
 /// Returns the mean forward velocity of the tracks near the only person, once they have settled.
@@ -48,13 +51,14 @@ fn velocity_bias_mps(trial: &Trial, run: usize) -> f64 {
 
 /// Returns the bias of the corrected and of the printed filter, m/s.
 fn biases_mps(path: &str) -> [f64; 2] {
+    fn keep(trial: Trial) -> Result<[f64; 2], TrialError> {
+        Ok([0, 1].map(|run| velocity_bias_mps(&trial, run)))
+    }
+
     let mut registry = Registry::default();
     tagalong_papers::register(&mut registry);
     let contenders =
         [contender("../../configs/depth-ekf.toml"), contender("configs/depth-ekf-as-printed.toml")];
-    let keep = |trial: Trial| -> Result<[f64; 2], TrialError> {
-        Ok([0, 1].map(|run| velocity_bias_mps(&trial, run)))
-    };
     let scenes = scenes(path);
     let all = each(&scenes, &contenders, &registry, 2, keep, |_| ()).unwrap();
     [0, 1].map(|run| (all.iter().map(|both| both[run]).sum::<f64>() / all.len() as f64).abs())

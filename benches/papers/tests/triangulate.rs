@@ -31,13 +31,14 @@ const ROOM: &str = "seed = 3\nduration_s = 26.0\n[room]\nsize_m = [10.0, 5.0]\n[
 /// The poses of the webcams, with an error of the guess: m and degrees.
 fn webcams(off_m: f64, off_deg: f64) -> String {
     let corners = [(0.1, 0.1, 45.0), (9.9, 0.1, 135.0), (9.9, 4.9, 225.0), (0.1, 4.9, 315.0)];
-    let one = |(x, y, heading): (f64, f64, f64)| {
-        let x = x + off_m;
-        let y = y - off_m;
-        let heading = heading + off_deg;
-        format!("[[webcams]]\nat = [{x}, {y}]\nheading_deg = {heading}\n")
-    };
-    corners.map(one).concat()
+    corners
+        .map(|(x, y, heading)| {
+            let x = x + off_m;
+            let y = y - off_m;
+            let heading = heading + off_deg;
+            format!("[[webcams]]\nat = [{x}, {y}]\nheading_deg = {heading}\n")
+        })
+        .concat()
 }
 
 fn run(folder: &Path, arguments: &[&str]) -> String {
@@ -47,11 +48,13 @@ fn run(folder: &Path, arguments: &[&str]) -> String {
 }
 
 fn heads(frames: &[TruthFrame]) -> Vec<(u64, [f64; 3])> {
-    let counted = |frame: &TruthFrame| {
-        let person = frame.people.first().filter(|person| !person.ignore)?;
-        Some((frame.stamp_ns, person.head_in_robot_m?))
-    };
-    frames.iter().filter_map(counted).collect()
+    frames
+        .iter()
+        .filter_map(|frame| {
+            let person = frame.people.first().filter(|person| !person.ignore)?;
+            Some((frame.stamp_ns, person.head_in_robot_m?))
+        })
+        .collect()
 }
 
 #[test]

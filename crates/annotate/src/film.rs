@@ -298,8 +298,11 @@ pub mod tests {
 
     #[test]
     fn the_depth_of_an_occluder_or_of_the_wall_is_no_place() {
+        fn at(x: f64, side: f64) -> Region {
+            Region { x, y: 75.0, width: side, height: side }
+        }
+
         let film = film(1);
-        let at = |x: f64, side: f64| Region { x, y: 75.0, width: side, height: side };
         assert!(film.places(1, &[at(130.0, 59.0)])[0].is_some());
         // The box of a person at 5 m, behind the one at 2.5 m, and one at 2.5 m before the wall.
         assert_eq!(film.places(1, &[at(145.0, 29.0), at(20.0, 59.0)]), [None, None]);

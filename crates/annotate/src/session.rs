@@ -372,8 +372,10 @@ pub fn read_people(path: &Path, film: &Film) -> Result<BTreeMap<i64, Person>, St
             keys.entry(id).or_default().insert(frame, key);
         }
     }
-    let person = |(id, keys)| (id, Person::of(keys, shown.get(&id).unwrap_or(&BTreeSet::new())));
-    Ok(keys.into_iter().map(person).collect())
+    Ok(keys
+        .into_iter()
+        .map(|(id, keys)| (id, Person::of(keys, shown.get(&id).unwrap_or(&BTreeSet::new()))))
+        .collect())
 }
 
 /// Returns the key of a row; none for a place behind the camera.

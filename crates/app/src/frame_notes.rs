@@ -266,7 +266,10 @@ mod tests {
 
     #[test]
     fn obstacles_are_noted_by_cell_in_the_odometry_frame() {
-        let point = |x: f64, moves| ObstaclePoint { at: Point2::new(x, 0.02), moves };
+        fn point(x: f64, moves: bool) -> ObstaclePoint {
+            ObstaclePoint { at: Point2::new(x, 0.02), moves }
+        }
+
         let obstacles = [point(1.01, false), point(1.06, false), point(2.0, true)];
         let turned = Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2);
         assert_eq!(cells_cm(&obstacles, false, &turned), [95, 105], "two readings of one cell");

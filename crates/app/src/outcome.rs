@@ -159,11 +159,12 @@ pub const CUT_SHORT: &str = "stopped; the log is whole, but ends early";
 
 /// Returns a text without characters that steer a terminal: names in a log come from anywhere.
 fn harmless(text: &str) -> Cow<'_, str> {
-    let steers = |c: char| {
+    fn steers(c: char) -> bool {
         // The second part turns the direction of writing round.
         (c.is_control() && !matches!(c, '\n' | '\t'))
             || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
+    }
+
     if !text.contains(steers) {
         return Cow::Borrowed(text);
     }

@@ -49,9 +49,9 @@ impl Progress {
         let done = thread::scope(|scope| {
             if !spinner.is_hidden() {
                 let spinner = &spinner;
-                let turn = move || turn_until(&ended, spinner);
                 // Without another thread it stands still, and the work goes on.
-                let _ = thread::Builder::new().spawn_scoped(scope, turn);
+                let _ =
+                    thread::Builder::new().spawn_scoped(scope, move || turn_until(&ended, spinner));
             }
             // Dropped at the end of the work, also by a panic.
             let _ends: Sender<()> = ends;
@@ -144,7 +144,10 @@ mod tests {
 
     #[test]
     fn a_long_work_is_told_beforehand_and_a_short_one_is_not() {
-        let after = |seconds| sentence(20, 384, Duration::from_secs(seconds), "tasks");
+        fn after(seconds: u64) -> Option<String> {
+            sentence(20, 384, Duration::from_secs(seconds), "tasks")
+        }
+
         assert_eq!(after(33).unwrap(), "20 of 384 tasks took 33 s: about 11 minutes more");
         assert_eq!(after(3), None);
         assert_eq!(sentence(1, 1, Duration::from_secs(900), "tasks"), None);

@@ -212,7 +212,10 @@ fn keys_of<'a>(
 
 /// Returns true if a value, or each part of it that is given, is the present one.
 pub fn is_present(value: &Value, now: &Value) -> bool {
-    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|v| v as f64));
+    fn number(value: &Value) -> Option<f64> {
+        value.as_float().or_else(|| value.as_integer().map(|v| v as f64))
+    }
+
     match (value, now) {
         (Value::Table(value), Value::Table(now)) => {
             value.iter().all(|(key, value)| now.get(key).is_some_and(|now| is_present(value, now)))

@@ -113,7 +113,10 @@ pub fn mcap_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
 
 /// Returns true for a folder with an image that `tagalong import images` reads.
 fn has_images(folder: &Path) -> bool {
-    let is_image = |ending: &str| ["jpg", "jpeg", "png"].contains(&ending);
+    fn is_image(ending: &str) -> bool {
+        ["jpg", "jpeg", "png"].contains(&ending)
+    }
+
     let files = files_in(folder).unwrap_or_default();
     files.iter().any(|file| ending_of(file).is_some_and(|ending| is_image(&ending)))
 }

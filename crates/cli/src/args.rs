@@ -329,7 +329,6 @@ const SIMULATE_HELP: &str = "\
 Same scene and seed, same bytes.
 
 Examples:
-  tagalong simulate --realism
   tagalong simulate configs/scenes/crossing.toml
   tagalong simulate configs/scenes/crossing.toml -o crossing.mcap --seed 7 --split test
   tagalong simulate configs/scenes/crowd.toml --set crowd=3 --set camera.kind=stereo

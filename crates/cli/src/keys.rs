@@ -139,8 +139,11 @@ fn alternatives(property: &Value) -> Box<dyn Iterator<Item = &Value> + '_> {
 /// Returns a JSON schema of a whole config: the sections, and in each the settings of the plugin
 /// that it names.
 pub fn schema(registry: &Registry) -> Value {
+    fn object(value: &mut Value) -> Map<String, Value> {
+        value.as_object_mut().map(std::mem::take).unwrap_or_default()
+    }
+
     let mut around = around_schema();
-    let object = |value: &mut Value| value.as_object_mut().map(std::mem::take).unwrap_or_default();
     let mut properties = object(&mut around["properties"]);
     let mut definitions = object(&mut around["$defs"]);
     for (section, kind, many, has_default) in SECTIONS {

@@ -114,7 +114,7 @@ fn dispatch(command: &Command, registry: &Registry) -> Outcome {
         Command::Eval(args) => commands::eval(args),
         Command::Alter(args) => commands::alter(args),
         Command::Blur(args) => commands::blur(args, registry),
-        Command::Simulate(args) => tagalong_simulate::simulate(args, registry),
+        Command::Simulate(args) => tagalong_simulate::simulate(args),
         Command::Boxes(args) => tagalong_benchmark::experiments::boxes::boxes(args, registry),
         Command::Trials(args) => tagalong_benchmark::experiments::trials::trials(args, registry),
         Command::Train(args) => tagalong_training::train(args, registry),

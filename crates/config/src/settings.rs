@@ -245,11 +245,14 @@ pub fn parse_settings<T: Settings>(value: Option<Value<'_>>) -> Result<T, Config
 /// is read alone, as if the others were left out, and the schema has the names.
 fn at_its_key<T: Settings>(error: toml::de::Error, value: &Value<'_>) -> ConfigError {
     let is_precise = error.span().is_some_and(|span| !is_place_of_table(value, &span));
-    let fails = |alone: Value<'_>| {
-        let read = T::deserialize(toml::de::ValueDeserializer::from(alone));
-        read.is_err_and(|why| why.message() == error.message())
+    let wrong = if is_precise {
+        None
+    } else {
+        wrong_key(value, &|alone| {
+            let read = T::deserialize(toml::de::ValueDeserializer::from(alone));
+            read.is_err_and(|why| why.message() == error.message())
+        })
     };
-    let wrong = if is_precise { None } else { wrong_key(value, &fails) };
     let Some(WrongKey { path, key, entry }) = wrong else { return error.into() };
     if error.message().starts_with("unknown field") {
         let message = format!("{}, expected one of {}", error.message(), names_in::<T>(&path));
@@ -290,8 +293,11 @@ fn wrong_key<'a>(value: &Value<'a>, fails: &dyn Fn(Value<'a>) -> bool) -> Option
             wrong.path.insert(0, key.get_ref().clone().into_owned());
             wrong
         });
-        let here = || WrongKey { path: Vec::new(), key: key.span(), entry: entry.span() };
-        Some(deeper.unwrap_or_else(here))
+        Some(deeper.unwrap_or_else(|| WrongKey {
+            path: Vec::new(),
+            key: key.span(),
+            entry: entry.span(),
+        }))
     })
 }
 
@@ -528,10 +534,16 @@ mod tests {
 
     #[test]
     fn flattened_settings_are_read_and_refused_like_all_others() {
-        let parse = |text| parse_settings::<Joined>(Some(DeValue::parse(text).unwrap()));
+        fn parse(text: &str) -> Result<Joined, ConfigError> {
+            parse_settings::<Joined>(Some(DeValue::parse(text).unwrap()))
+        }
+
+        fn shown(text: &str) -> String {
+            parse(text).unwrap_err().render("a.toml", text)
+        }
+
         let read = parse("{ own = 2, height_m = 1 }").unwrap();
         assert_eq!((read.own, read.shared.height_m), (2, 1.0));
-        let shown = |text| parse(text).unwrap_err().render("a.toml", text);
         let unknown = shown("{ own = 2, hight_m = 1.0 }");
         let nearest_first =
             "unknown field `hight_m`; did you mean `height_m`? expected one of `own`";
@@ -557,12 +569,13 @@ mod tests {
 
     #[test]
     fn flattened_settings_of_an_inner_table_are_named_with_their_line() {
-        let shown = |line: &str| {
+        fn shown(line: &str) -> String {
             let text = format!("plain = 1\n\n[joined]\nown = 2\n{line}\n");
             let root = DeTable::parse(&text).unwrap();
             let value = Spanned::new(0..0, DeValue::Table(root.into_inner()));
             parse_settings::<Outer>(Some(value)).unwrap_err().render("a.toml", &text)
-        };
+        }
+
         let unknown = shown("hight_m = 1.0");
         let nearest_first =
             "unknown field `hight_m`; did you mean `height_m`? expected one of `own`";

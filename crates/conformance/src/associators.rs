@@ -28,9 +28,9 @@ fn track(id: u32, x: f64, y: f64) -> Track {
 
 /// Returns tracks and detections at random positions, some detections with low scores.
 fn crowd(random: &mut SplitMix64, tracks: u32, detections: usize) -> (Vec<Track>, Vec<Detection>) {
-    let mut place =
-        || (2.0 + 4.0 * random.positive_uniform(), 3.0 * random.positive_uniform() - 1.5);
-    let places: Vec<(f64, f64)> = (0..tracks as usize + detections).map(|_| place()).collect();
+    let places: Vec<(f64, f64)> = (0..tracks as usize + detections)
+        .map(|_| (2.0 + 4.0 * random.positive_uniform(), 3.0 * random.positive_uniform() - 1.5))
+        .collect();
     let (of_tracks, of_detections) = places.split_at(tracks as usize);
     let tracks = (1..).zip(of_tracks).map(|(id, (x, y))| track(id, *x, *y)).collect();
     let found = of_detections.iter().map(|(x, y)| {
@@ -109,11 +109,12 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
 
 /// Returns the most probable detection of each track.
 fn best(answer: &Associations, tracks: usize) -> Vec<Option<usize>> {
-    let of_track = |at: usize| {
-        let pairs = answer.pairs.iter().filter(|pair| pair.track == at);
-        pairs.max_by(|a, b| a.weight.total_cmp(&b.weight)).map(|pair| pair.detection)
-    };
-    (0..tracks).map(of_track).collect()
+    (0..tracks)
+        .map(|at| {
+            let pairs = answer.pairs.iter().filter(|pair| pair.track == at);
+            pairs.max_by(|a, b| a.weight.total_cmp(&b.weight)).map(|pair| pair.detection)
+        })
+        .collect()
 }
 
 fn own_detections(subject: &Subject<'_>) -> Verdict {

@@ -25,7 +25,10 @@ fn command(controller: &mut dyn Controller, frame: &Frame, target: Option<&Track
 }
 
 fn bounded(twist: Twist, scene: &str) -> Verdict {
-    let fits = |speed: f64| speed.is_finite() && speed.abs() <= MAX_SPEED_MPS * (1.0 + 1e-9);
+    fn fits(speed: f64) -> bool {
+        speed.is_finite() && speed.abs() <= MAX_SPEED_MPS * (1.0 + 1e-9)
+    }
+
     let rim = twist.angular_rps * WHEELS.half_separation_m;
     demand(fits(twist.linear_mps) && fits(twist.lateral_mps) && fits(rim), || {
         format!("{twist:?} with a limit of {MAX_SPEED_MPS} m/s, {scene}")

@@ -37,13 +37,20 @@ struct Oracle(Vec<Point3<f64>>);
 
 impl Likelihood for Oracle {
     fn log_likelihood(&self, _: &Frame, scene: &[Person]) -> tagalong_core::Result<f64> {
-        let explained = |person: &Person| {
-            let nearest = self.0.iter().map(|truth| (person.position - truth).norm_squared());
-            // Beyond 1 m the likelihood is flat, as that of an image is.
-            let d2 = nearest.fold(1.0, f64::min);
-            (1.0 - d2) / (2.0 * 0.1 * 0.1)
-        };
-        Ok(if self.0.is_empty() { 0.0 } else { scene.iter().map(explained).sum() })
+        Ok(if self.0.is_empty() {
+            0.0
+        } else {
+            scene
+                .iter()
+                .map(|person| {
+                    let nearest =
+                        self.0.iter().map(|truth| (person.position - truth).norm_squared());
+                    // Beyond 1 m the likelihood is flat, as that of an image is.
+                    let d2 = nearest.fold(1.0, f64::min);
+                    (1.0 - d2) / (2.0 * 0.1 * 0.1)
+                })
+                .sum()
+        })
     }
 }
 
@@ -201,15 +208,16 @@ fn covariance_stays_positive(subject: &Subject<'_>) -> Verdict {
 }
 
 fn uncertainty_grows(subject: &Subject<'_>) -> Verdict {
+    fn variance(run: &Run) -> Result<f64, String> {
+        let p = run.estimate(1)?.covariance;
+        Ok(p[(0, 0)] + p[(1, 1)])
+    }
+
     let mut run = Run::new(subject, From::Nothing, EgoMotion::at_rest(DT_S))?;
     run.start(&COUPLE[..1]);
     for _ in 0..10 {
         run.step(&[(1, COUPLE[0])])?;
     }
-    let variance = |run: &Run| -> Result<f64, String> {
-        let p = run.estimate(1)?.covariance;
-        Ok(p[(0, 0)] + p[(1, 1)])
-    };
     let mut before = variance(&run)?;
     for half_seconds in 1..=4 {
         for _ in 0..5 {

@@ -66,7 +66,7 @@ pub(crate) fn drawn(index: u64, camera: &Arc<Camera>, people: &[Figure]) -> Fram
 
 /// Returns frames without useful content, with their names.
 pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
-    let flat = |camera: &Arc<Camera>, grey: u8, depth: f32| {
+    fn flat(camera: &Arc<Camera>, grey: u8, depth: f32) -> Frame {
         let w = camera.width;
         let h = camera.height;
         let images = Images {
@@ -78,11 +78,13 @@ pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
         // Five reflections at the scanner itself: a scan without useful content, too.
         let scan = LaserScan::of_points(vec![Point3::origin(); 5]);
         frame(1, camera, images).with_laser(Some(scan))
-    };
-    let sized = |width: usize, height: usize| {
+    }
+
+    fn sized(width: usize, height: usize) -> Arc<Camera> {
         let camera = camera(640, 1.2, 0.0, 0.0);
         Arc::new(Camera { width, height, ..camera })
-    };
+    }
+
     vec![
         ("black", flat(&level(), 0, 2.0)),
         ("white at zero depth", flat(&level(), 255, 0.0)),

@@ -73,8 +73,11 @@ fn margins(verifier: &mut dyn Verifier, frame: &Frame) -> Result<Vec<f64>, Strin
 }
 
 fn undeclared_do_not_matter(subject: &Subject<'_>) -> Verdict {
+    fn frame() -> Frame {
+        drawn(1, &level(), &[Figure::at(2.0, 0.1)])
+    }
+
     let verifier = &mut *subject.verifier(From::Nothing)?;
-    let frame = || drawn(1, &level(), &[Figure::at(2.0, 0.1)]);
     let declared = restricted(frame(), &verifier.inputs());
     let whole = margins(verifier, &frame())?;
     let declared = margins(verifier, &declared)?;

@@ -429,6 +429,14 @@ mod tests {
 
     #[test]
     fn only_declared_inputs_are_left() {
+        fn held(frame: &Frame) -> [bool; 5] {
+            let Images { colour, grey, depth, right } = frame.images();
+            let laser = frame.laser().is_some();
+            let recorded = frame.recorded().is_some();
+            assert_eq!(colour.is_some(), grey.is_some());
+            [colour.is_some(), depth.is_some(), right.is_some(), laser, recorded]
+        }
+
         let colour = RgbImage::filled(4, 4, [9; 3]);
         let grey = GreyImage::filled(4, 4, 9);
         let right = RightImage { image: grey.clone(), baseline_m: 0.1 };
@@ -441,13 +449,6 @@ mod tests {
         let frame =
             frame(images).with_laser(Some(LaserScan::of_points([]))).with_recorded(Some(vec![]));
         assert!(frame.restricted_to(&Inputs::ANY).is_none(), "nothing has to go");
-        let held = |frame: &Frame| {
-            let Images { colour, grey, depth, right } = frame.images();
-            let laser = frame.laser().is_some();
-            let recorded = frame.recorded().is_some();
-            assert_eq!(colour.is_some(), grey.is_some());
-            [colour.is_some(), depth.is_some(), right.is_some(), laser, recorded]
-        };
         for (place, input) in Input::ALL.into_iter().enumerate() {
             let alone = frame.restricted_to(&Inputs::NONE.require(input)).unwrap();
             let expected: [bool; 5] = std::array::from_fn(|i| i == place);

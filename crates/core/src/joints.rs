@@ -301,10 +301,11 @@ mod tests {
 
     #[test]
     fn shoulders_and_nose_tell_the_direction_of_the_body() {
-        let near = |found: Option<f64>, wanted: f64| {
+        fn near(found: Option<f64>, wanted: f64) {
             let off = (found.expect("a direction") - wanted).rem_euclid(360.0);
             assert!(off.min(360.0 - off) < 1.0, "{found:?} {wanted}");
-        };
+        }
+
         near(degrees(person(), 0.0), 180.0);
         near(degrees(person(), 30.0), -150.0);
         let away = moved(person(), JointName::LeftShoulder, 64.0, 100.0);

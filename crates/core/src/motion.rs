@@ -260,9 +260,12 @@ mod tests {
     /// half of that slip, and that of the heading is half of it over the half separation.
     #[test]
     fn what_a_wheel_slips_is_uncertain_ahead_and_in_heading() {
+        fn of(left: f64, right: f64) -> Matrix3<f64> {
+            EgoMotion::from_wheels(left, right, &WHEELS, 0.1).covariance
+        }
+
         let d = WHEELS.half_separation_m;
         let slipped = 0.02 * 0.5 * 0.1;
-        let of = |left, right| EgoMotion::from_wheels(left, right, &WHEELS, 0.1).covariance;
         let left = of(0.5, 0.0);
         let right = of(0.0, 0.5);
         for covariance in [left, right] {

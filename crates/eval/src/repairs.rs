@@ -358,9 +358,12 @@ mod tests {
     /// A missed person gets the track from before; where that is on another person, one of its own.
     #[test]
     fn a_filled_miss_goes_on_with_the_track_of_its_person() {
+        fn people() -> Vec<Truth> {
+            vec![person(1, 0.0), person(2, 100.0)]
+        }
+
         let right = [0.0, 0.0, 20.0, 40.0];
         let other = [100.0, 0.0, 20.0, 40.0];
-        let people = || vec![person(1, 0.0), person(2, 100.0)];
         let swapped = sequence(vec![
             (people(), vec![report(5, right), report(6, other)]),
             (people(), vec![report(5, other)]),

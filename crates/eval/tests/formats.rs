@@ -286,13 +286,18 @@ fn kitti_pedestrians_count_as_far_as_they_are_seen() {
 
 #[test]
 fn numbers_of_a_line_are_whole_where_they_have_to_be() {
-    let id = |id: &str| mot::parse(&format!("\u{feff}1,{id},0,0,9,9"), "t").map(|rows| rows[0].id);
+    fn id(id: &str) -> Result<i64, FormatError> {
+        mot::parse(&format!("\u{feff}1,{id},0,0,9,9"), "t").map(|rows| rows[0].id)
+    }
+
+    fn frame(frame: &str) -> Result<u32, FormatError> {
+        mot::parse(&format!("{frame},1,0,0,9,9"), "t").map(|rows| rows[0].frame)
+    }
+
     assert_eq!((id("12.0").unwrap(), id("-3").unwrap()), (12, -3));
     assert_eq!(id("8999999999999999").unwrap(), 8_999_999_999_999_999);
     assert!(why(id("9e15")).contains("expected a whole number"));
     assert!(why(id("0.5")).contains("expected a whole number"));
-    let frame =
-        |frame: &str| mot::parse(&format!("{frame},1,0,0,9,9"), "t").map(|rows| rows[0].frame);
     assert_eq!((frame("1").unwrap(), frame("1e6").unwrap()), (1, MOST_FRAMES));
     assert!(frame("0").is_err() && frame("-1").is_err() && frame("4294967296").is_err());
     let whole_file = FormatError { file: "a".into(), line: 0, why: "is empty".into() };
@@ -378,7 +383,10 @@ fn sequence_info_has_limits_and_may_leave_out_the_size() {
 
 #[test]
 fn kitti_objects_that_are_not_told_apart_are_left_out() {
-    let label = |id: i64, class: &str| format!("0 {id} {class} 0 0 0 1 1 9 9 1 1 1 1 1 1 0\n");
+    fn label(id: i64, class: &str) -> String {
+        format!("0 {id} {class} 0 0 0 1 1 9 9 1 1 1 1 1 1 0\n")
+    }
+
     let source = label(-1, "Pedestrian") + &label(-1, "DontCare") + &label(0, "Pedestrian");
     let labels = kitti::parse(&source, "0000.txt").unwrap();
     let odd = labels.iter().map(|label| (label.line, label.is_anonymous())).collect::<Vec<_>>();

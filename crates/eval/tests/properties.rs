@@ -349,8 +349,7 @@ proptest! {
             .collect();
         let got = SetDistance { cutoff, order }.between(truths.len(), reports.len(), &near);
         let (few, many) = if truths.len() < reports.len() { (&truths, &reports) } else { (&reports, &truths) };
-        let distance = |a: f64, b: f64| (a - b).abs().min(cutoff).powf(order);
-        let pairs = cheapest(few, many, &mut vec![false; many.len()], &distance);
+        let pairs = cheapest(few, many, &mut vec![false; many.len()], &|a, b| (a - b).abs().min(cutoff).powf(order));
         let spare = (many.len() - few.len()) as f64 * cutoff.powf(order);
         let ospa = ((pairs + spare) / many.len().max(1) as f64).powf(order.recip());
         let gospa = (pairs + 0.5 * spare).powf(order.recip());

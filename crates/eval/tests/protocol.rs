@@ -81,11 +81,12 @@ fn the_real_person_goes_before_the_ignored_one() {
 
 #[test]
 fn unmatched_reports_in_an_ignore_region_or_too_small_are_left_out() {
-    let mut scene = one_frame(vec![truth(1, 0.0)], vec![report(1, 0.0), report(2, 5.0)]);
-    let false_alarms = |scene: &Sequence, comparison: &Comparison| {
+    fn false_alarms(scene: &Sequence, comparison: &Comparison) -> (u64, u64) {
         let tally = Tally::measure(scene, comparison, &SetDistance::default()).unwrap();
         (tally.clear.tp, tally.clear.fp)
-    };
+    }
+
+    let mut scene = one_frame(vec![truth(1, 0.0)], vec![report(1, 0.0), report(2, 5.0)]);
     let usual = Comparison::default();
     assert_eq!(false_alarms(&scene, &usual), (1, 1));
     let small = Comparison { ignore_unmatched_below_px: Some(10.0), ..usual };
@@ -148,8 +149,11 @@ fn each_reference_reads_the_last_point_that_is_not_beyond_it() {
 
 #[test]
 fn constant_scores_are_told_from_an_order() {
+    fn scores(scene: &Sequence) -> Scores {
+        Scores::measure(scene, Similarity::Iou).unwrap()
+    }
+
     let mut scene = sequence(&[(&[(1, 0.0)], &[(1, 0.0), (2, 5.0)]), (&[(1, 0.0)], &[(1, 0.0)])]);
-    let scores = |scene: &Sequence| Scores::measure(scene, Similarity::Iou).unwrap();
     let constant = scores(&scene);
     assert_eq!((constant.distinct_scores, constant.has_constant_scores()), (1, true));
     scene.frames[1].reports[0].score = 0.4;
@@ -258,11 +262,12 @@ fn following_is_judged_by_the_clock() {
 
 #[test]
 fn position_errors_and_set_distances_in_metres() {
+    fn close(got: Option<f64>, expected: f64) {
+        assert!((got.unwrap() - expected).abs() < 1e-12, "{got:?} {expected}");
+    }
+
     let scene = one_frame(vec![truth(1, 0.0), truth(2, 5.0)], vec![report(1, 0.3), report(2, 5.4)]);
     let scores = Scores::measure(&scene, Similarity::Metres).unwrap();
-    let close = |got: Option<f64>, expected: f64| {
-        assert!((got.unwrap() - expected).abs() < 1e-12, "{got:?} {expected}");
-    };
     close(scores.position_error_mean_m, 0.35);
     close(scores.position_error_rms_m, (0.125_f64).sqrt());
     close(scores.position_error_p95_m, 0.395);
@@ -280,9 +285,10 @@ fn position_errors_and_set_distances_in_metres() {
 
 #[test]
 fn bad_input_is_named() {
-    let error = |scene: &Sequence, similarity: Similarity| {
+    fn error(scene: &Sequence, similarity: Similarity) -> EvalError {
         Prepared::new(scene, &similarity.into()).unwrap_err()
-    };
+    }
+
     let twice = one_frame(vec![truth(1, 0.0), truth(1, 3.0)], vec![]);
     let text = error(&twice, Similarity::Iou).to_string();
     assert!(text.contains("`one`, frame 1") && text.contains("truth id 1 occurs twice"), "{text}");
@@ -343,26 +349,56 @@ fn the_flat_object_carries_the_names_of_the_field() {
 
 #[test]
 fn what_is_counted_adds_up_field_by_field() {
-    let clear = |n: u64| Clear {
-        tp: n,
-        fn_: 2 * n,
-        fp: 3 * n,
-        id_switches: 5 * n,
-        fragmentations: 7 * n,
-        mostly_tracked: 11 * n,
-        partly_tracked: 13 * n,
-        mostly_lost: 17 * n,
-        similarity_sum: n as f64,
-        frames: 19 * n,
-    };
-    assert_eq!(Clear::combine([&clear(1), &clear(2)]), clear(3));
-    let identity = |n: u64| Identity { tp: n, fn_: 2 * n, fp: 3 * n };
-    assert_eq!(Identity::combine([&identity(1), &identity(2)]), identity(3));
-    let sets = |n: u64| {
+    fn clear(n: u64) -> Clear {
+        Clear {
+            tp: n,
+            fn_: 2 * n,
+            fp: 3 * n,
+            id_switches: 5 * n,
+            fragmentations: 7 * n,
+            mostly_tracked: 11 * n,
+            partly_tracked: 13 * n,
+            mostly_lost: 17 * n,
+            similarity_sum: n as f64,
+            frames: 19 * n,
+        }
+    }
+
+    fn identity(n: u64) -> Identity {
+        Identity { tp: n, fn_: 2 * n, fp: 3 * n }
+    }
+
+    fn sets(n: u64) -> SetTally {
         let of = |factor: f64| factor * n as f64;
         let parts = GospaParts { location: of(3.0), missed: of(4.0), false_: of(5.0) };
         SetTally { ospa_sum: of(1.0), gospa_sum: of(2.0), parts, frames: n }
-    };
+    }
+
+    fn times(numbers: &[f64], n: u64) -> Times {
+        Times {
+            confirm_s: numbers.to_vec(),
+            never_confirmed: n,
+            reacquire_s: numbers.iter().map(|t| -t).collect(),
+            never_reacquired: 2 * n,
+            wrong_person_s: 3.0 * n as f64,
+            duration_s: 4.0 * n as f64,
+        }
+    }
+
+    fn detections(scores: &[f64], n: u64) -> DetectionTally {
+        DetectionTally {
+            verdicts: scores.iter().map(|&score| Verdict { score, right: true }).collect(),
+            truths: n,
+            images: 3 * n,
+        }
+    }
+
+    fn tally(n: u64) -> Tally {
+        Tally { truths: n, reports: 2 * n, truth_ids: 3 * n, track_ids: 5 * n, ..Tally::default() }
+    }
+
+    assert_eq!(Clear::combine([&clear(1), &clear(2)]), clear(3));
+    assert_eq!(Identity::combine([&identity(1), &identity(2)]), identity(3));
     let both = SetTally::combine([&sets(1), &sets(2)]);
     assert_eq!(both, sets(3));
     assert_eq!((both.ospa(), both.gospa()), (Some(1.0), Some(2.0)));
@@ -382,29 +418,9 @@ fn what_is_counted_adds_up_field_by_field() {
         }
     }
     assert_eq!(Hota::combine([&hota[0], &hota[1]]), hota[2]);
-    let times = |numbers: &[f64], n: u64| Times {
-        confirm_s: numbers.to_vec(),
-        never_confirmed: n,
-        reacquire_s: numbers.iter().map(|t| -t).collect(),
-        never_reacquired: 2 * n,
-        wrong_person_s: 3.0 * n as f64,
-        duration_s: 4.0 * n as f64,
-    };
     assert_eq!(Times::combine([&times(&[1.0], 1), &times(&[2.0], 2)]), times(&[1.0, 2.0], 3));
-    let detections = |scores: &[f64], n: u64| DetectionTally {
-        verdicts: scores.iter().map(|&score| Verdict { score, right: true }).collect(),
-        truths: n,
-        images: 3 * n,
-    };
     let both = DetectionTally::combine([&detections(&[0.5], 1), &detections(&[0.6], 2)]);
     assert_eq!(both, detections(&[0.5, 0.6], 3));
-    let tally = |n: u64| Tally {
-        truths: n,
-        reports: 2 * n,
-        truth_ids: 3 * n,
-        track_ids: 5 * n,
-        ..Tally::default()
-    };
     assert_eq!(Tally::combine([&tally(1), &tally(2)]), tally(3));
 }
 
@@ -450,8 +466,10 @@ fn alike_on_the_floor_is_what_is_left_of_a_metre() {
 
 #[test]
 fn what_makes_no_sense_is_absent() {
-    let scores =
-        |truths, reports| Scores::measure(&one_frame(truths, reports), Similarity::Iou).unwrap();
+    fn scores(truths: Vec<Truth>, reports: Vec<Report>) -> Scores {
+        Scores::measure(&one_frame(truths, reports), Similarity::Iou).unwrap()
+    }
+
     let unseen = scores(vec![truth(1, 0.0)], vec![]);
     assert_eq!((unseen.mota, unseen.recall, unseen.lamr), (Some(0.0), Some(0.0), Some(1.0)));
     assert_eq!((unseen.precision, unseen.motp, unseen.fp_per_frame), (None, None, Some(0.0)));
@@ -492,25 +510,35 @@ fn who_is_followed_by_nothing_known_is_idle() {
 
 #[test]
 fn reports_at_the_limits_of_what_is_excused() {
-    let kept = |truth_x: f64, ignored: Option<Region>, report_x: f64| {
+    fn kept(truth_x: f64, ignored: Option<Region>, report_x: f64) -> u64 {
         let mut scene = one_frame(
             vec![Truth { role: Role::Ignored, ..truth(1, truth_x) }],
             vec![report(1, report_x)],
         );
         scene.frames[0].ignore_regions.extend(ignored);
         prepared(&scene).report_count()
-    };
+    }
+
+    // Half inside of a region that is not annotated, and a little more.
+    fn region(x: f64) -> Option<Region> {
+        Some(Region::new(x, 0.0, 100.0, 100.0))
+    }
+
     // Intersection over union: 0.5 and a little less.
     assert_eq!((kept(0.0, None, 1.0 / 3.0), kept(0.0, None, 0.34)), (0, 1));
-    // Half inside of a region that is not annotated, and a little more.
-    let region = |x: f64| Some(Region::new(x, 0.0, 100.0, 100.0));
     assert_eq!((kept(50.0, region(5.0), 0.0), kept(50.0, region(4.9), 0.0)), (1, 0));
 }
 
 #[test]
 fn recall_is_told_apart_by_what_shows_of_a_person() {
-    let view = |visible, distance_m| Some(View { visible, distance_m });
-    let seen = |id, x, view| Truth { view, ..truth(id, x) };
+    fn view(visible: f64, distance_m: f64) -> Option<View> {
+        Some(View { visible, distance_m })
+    }
+
+    fn seen(id: i64, x: f64, view: Option<View>) -> Truth {
+        Truth { view, ..truth(id, x) }
+    }
+
     let people = vec![
         seen(1, 0.0, view(1.0, 2.0)),
         seen(2, 5.0, view(0.9, 5.0)),

@@ -237,7 +237,10 @@ fn kaist(folder: &Path) -> Vec<Frame> {
 }
 
 fn kaist_truth(truth: &Value) -> Truth {
-    let number = |value: &Value| value.as_f64().unwrap();
+    fn number(value: &Value) -> f64 {
+        value.as_f64().unwrap()
+    }
+
     let b = &truth["bbox"];
     let region = Region::new(number(&b[0]), number(&b[1]), number(&b[2]), number(&b[3]));
     let leaves = region.x < 5.0
@@ -252,13 +255,14 @@ fn kaist_truth(truth: &Value) -> Truth {
 
 #[test]
 fn log_average_miss_rates_equal_the_published_ones() {
-    let Some(folder) = find("lamr") else { return };
-    let frames = kaist(&folder);
-    let rate = |frames: &[Frame]| {
+    fn rate(frames: &[Frame]) -> f64 {
         let sequence = Sequence { name: "KAIST".into(), frames: frames.to_vec() };
         let tally = DetectionTally::measure(&sequence, Similarity::Iou, 0.5);
         100.0 * tally.log_average_miss_rate().unwrap()
-    };
+    }
+
+    let Some(folder) = find("lamr") else { return };
+    let frames = kaist(&folder);
     let all = rate(&frames);
     let day = rate(&frames[..1455]);
     let night = rate(&frames[1455..]);

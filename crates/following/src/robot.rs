@@ -93,12 +93,18 @@ impl RobotSettings {
     /// # Errors
     /// [`Error::Settings`] names the key and the remedy.
     pub fn check(&self) -> Result<()> {
-        let refuse = |why: String| Err(Error::setting("footprint", why));
+        fn refuse(why: String) -> Result<()> {
+            Err(Error::setting("footprint", why))
+        }
+
+        fn is_near(value: &f64) -> bool {
+            (-MOST_M..=MOST_M).contains(value)
+        }
+
         if !(3..=64).contains(&self.footprint.len()) {
             let count = self.footprint.len();
             return refuse(format!("must have 3 to 64 corners [x, y], not {count}"));
         }
-        let is_near = |value: &f64| (-MOST_M..=MOST_M).contains(value);
         if let Some(far) = self.footprint.iter().find(|corner| !corner.iter().all(is_near)) {
             return refuse(format!("has a corner at {far:?}: they must be within {MOST_M} m"));
         }

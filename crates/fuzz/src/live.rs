@@ -27,19 +27,22 @@ fn header() -> Header {
 
 /// Returns messages of two detections.
 pub(crate) fn detections() -> Vec<Vec<u8>> {
-    let detection = |class: &str| Detection2D {
-        header: header(),
-        results: vec![ObjectHypothesisWithPose {
-            hypothesis: ObjectHypothesis { class_id: class.to_owned(), score: 0.9 },
-            pose: msgs::PoseWithCovariance::default(),
-        }],
-        bbox: BoundingBox2D {
-            center: Pose2D { position: Point2D { x: 8.0, y: 6.0 }, theta: 0.0 },
-            size_x: 4.0,
-            size_y: 6.0,
-        },
-        id: String::new(),
-    };
+    fn detection(class: &str) -> Detection2D {
+        Detection2D {
+            header: header(),
+            results: vec![ObjectHypothesisWithPose {
+                hypothesis: ObjectHypothesis { class_id: class.to_owned(), score: 0.9 },
+                pose: msgs::PoseWithCovariance::default(),
+            }],
+            bbox: BoundingBox2D {
+                center: Pose2D { position: Point2D { x: 8.0, y: 6.0 }, theta: 0.0 },
+                size_x: 4.0,
+                size_y: 6.0,
+            },
+            id: String::new(),
+        }
+    }
+
     let flat = Detection2DArray {
         header: header(),
         detections: ["person", "chair"].map(detection).to_vec(),

@@ -246,10 +246,14 @@ fn first_trees(text: &str) -> String {
 /// Returns a model with short numbers in its arrays: a file of half the length, in which
 /// a mutation is more likely to hit something else than a digit.
 fn short_numbers(text: &str) -> String {
-    let is_row = |line: &str| line.starts_with("  ") && line.ends_with(',');
-    let shortened = |line: &str| {
+    fn is_row(line: &str) -> bool {
+        line.starts_with("  ") && line.ends_with(',')
+    }
+
+    fn shortened(line: &str) -> String {
         if is_row(line) { "1.0,".repeat(line.matches(',').count()) } else { line.to_owned() }
-    };
+    }
+
     text.lines().map(|line| shortened(line) + "\n").collect()
 }
 
@@ -308,11 +312,14 @@ fn payloads() -> Vec<Vec<u8>> {
 
 /// Returns those of its messages that are images.
 fn pictures() -> Vec<Vec<u8>> {
-    let is_picture = |data: &Vec<u8>| {
-        decode::<msgs::Image<'_>>(data).is_ok_and(|image| image.width > 0)
-            || decode::<msgs::CompressedImage<'_>>(data).is_ok_and(|image| image.data.len() > 20)
-    };
-    payloads().into_iter().filter(is_picture).collect()
+    payloads()
+        .into_iter()
+        .filter(|data| {
+            decode::<msgs::Image<'_>>(data).is_ok_and(|image| image.width > 0)
+                || decode::<msgs::CompressedImage<'_>>(data)
+                    .is_ok_and(|image| image.data.len() > 20)
+        })
+        .collect()
 }
 
 fn messages(bytes: &[u8], _: &Path) {

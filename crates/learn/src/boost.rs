@@ -92,9 +92,11 @@ impl<'a> Boosting<'a> {
     /// Starts with equal total weights of both classes. `is_person` is the class of each sample of
     /// the table.
     pub fn new(table: &'a Levels, is_person: impl Iterator<Item = bool>) -> Self {
-        let sign = |is: bool| if is { 1.0 } else { -1.0 };
-        let truth: Vec<f32> =
-            is_person.map(sign).chain(std::iter::repeat(-1.0)).take(table.samples).collect();
+        let truth: Vec<f32> = is_person
+            .map(|is| if is { 1.0 } else { -1.0 })
+            .chain(std::iter::repeat(-1.0))
+            .take(table.samples)
+            .collect();
         let of = |class: f32| truth.iter().filter(|t| **t == class).count().max(1) as f32;
         let counts = [of(-1.0), of(1.0)];
         let weights = truth.iter().map(|t| 0.5 / counts[usize::from(*t > 0.0)]).collect();
@@ -214,8 +216,11 @@ impl Growing<'_> {
 
 /// Returns the cut with the largest explained sum of squares, and that sum.
 fn cut(histogram: &[[f32; 2]; LEVELS]) -> (f32, usize) {
+    fn explained([weight, sum]: [f32; 2]) -> f32 {
+        if weight > 1e-9 { sum * sum / weight } else { 0.0 }
+    }
+
     let total = histogram.iter().fold([0.0, 0.0], |[w, s], bin| [w + bin[0], s + bin[1]]);
-    let explained = |[weight, sum]: [f32; 2]| if weight > 1e-9 { sum * sum / weight } else { 0.0 };
     let mut left = [0.0_f32; 2];
     let mut best = (f32::NEG_INFINITY, 0);
     // A cut above the last level would leave one side empty.
@@ -246,7 +251,10 @@ mod tests {
 
     /// Generates points in a square; those of one class are in a disc in its middle.
     fn disc() -> (Vec<[f32; 2]>, Vec<bool>) {
-        let number = |k: u64| (mix(k) >> 40) as f32 / (1_u64 << 24) as f32 - 0.5;
+        fn number(k: u64) -> f32 {
+            (mix(k) >> 40) as f32 / (1_u64 << 24) as f32 - 0.5
+        }
+
         let points: Vec<[f32; 2]> = (0..600).map(|k| [number(2 * k), number(2 * k + 1)]).collect();
         let truth = points.iter().map(|[x, y]| x * x + y * y < 0.1).collect();
         (points, truth)

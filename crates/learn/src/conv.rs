@@ -297,6 +297,10 @@ mod tests {
 
     #[test]
     fn the_gradient_is_that_of_small_steps_whatever_stride_and_dilation() {
+        fn close(slope: f64, found: f32) {
+            assert!((slope - f64::from(found)).abs() < 0.02, "{slope} {found}");
+        }
+
         let (mut conv, mut input) = (conv::<3, 4, 1, 2>(), input(5, 6));
         let weigh = numbers(5 * 6 * 4, 0.9);
         let loss = |conv: &Conv<3, 4, 3, 1, 2>, input: &Map<3>| -> f64 {
@@ -308,9 +312,6 @@ mod tests {
         let mut gradient = Conv::default();
         let mut of_input = Map::new(5, 6);
         conv.backward(&input, &of_out, &mut gradient, Some(&mut of_input));
-        let close = |slope: f64, found: f32| {
-            assert!((slope - f64::from(found)).abs() < 0.02, "{slope} {found}");
-        };
         for k in (0..conv.weights.len()).step_by(7) {
             let before = loss(&conv, &input);
             conv.weights[k] += 0.1;

@@ -68,7 +68,10 @@ mod tests {
 
     #[test]
     fn the_weights_that_the_examples_were_drawn_from_are_found() {
-        let true_odds = |a: f64, b: f64| 3.0 * a - 2.0 * b + 0.5;
+        fn true_odds(a: f64, b: f64) -> f64 {
+            3.0 * a - 2.0 * b + 0.5
+        }
+
         let grid = (0..400).map(|k| (f64::from(k % 20) / 10.0 - 1.0, f64::from(k / 20) / 10.0));
         let examples: Vec<_> = grid
             .map(|(a, b)| {
@@ -83,7 +86,10 @@ mod tests {
 
     #[test]
     fn a_ridge_keeps_what_can_be_told_apart_without_error_finite() {
-        let of = |x: f64| Example { features: [x], target: f64::from(x > 0.0), weight: 1.0 };
+        fn of(x: f64) -> Example<1> {
+            Example { features: [x], target: f64::from(x > 0.0), weight: 1.0 }
+        }
+
         let [weight] = logistic(&[of(-1.0), of(1.0)], 0.01);
         assert!(weight > 1.0 && weight < 10.0, "{weight}");
     }

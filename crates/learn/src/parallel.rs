@@ -30,9 +30,12 @@ fn at_once<S: Sync, T: Send>(
     // All threads are joined before the first failure counts: a thread that panics and is not
     // joined makes the scope panic.
     let results: Vec<Result<T>> = std::thread::scope(|scope| {
-        let start =
-            |thing| std::thread::Builder::new().spawn_scoped(scope, move || guarded(thing)).ok();
-        let running: Vec<_> = things.iter().map(start).collect();
+        let running: Vec<_> = things
+            .iter()
+            .map(|thing| {
+                std::thread::Builder::new().spawn_scoped(scope, move || guarded(thing)).ok()
+            })
+            .collect();
         let results = running.into_iter().zip(things).map(|(thread, thing)| match thread {
             Some(thread) => thread.join().unwrap_or_else(died),
             // No thread could be started for it.
@@ -49,15 +52,18 @@ mod tests {
 
     #[test]
     fn results_are_in_order_and_the_first_failure_counts() {
+        fn fails(n: &u64) -> Result<()> {
+            match n {
+                3 | 4 => Err(Error::Other(format!("{n}"))),
+                _ => Ok(()),
+            }
+        }
+
         let mut parts = Vec::new();
         let things: Vec<u64> = (0..40).collect();
         let squares = side_by_side(&things, |n| Ok(n * n), &mut |part| parts.push(part)).unwrap();
         assert_eq!(squares, things.iter().map(|n| n * n).collect::<Vec<_>>());
         assert!(parts.is_sorted() && parts.last() == Some(&1.0), "{parts:?}");
-        let fails = |n: &u64| match n {
-            3 | 4 => Err(Error::Other(format!("{n}"))),
-            _ => Ok(()),
-        };
         let failure = side_by_side(&things, fails, &mut |_| {}).unwrap_err();
         assert_eq!(failure.to_string(), "3");
         let panics = side_by_side(&things, |_| -> Result<()> { panic!("on purpose") }, &mut |_| {});

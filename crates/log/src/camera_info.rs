@@ -437,11 +437,12 @@ mod tests {
 
     #[test]
     fn models_are_read_with_all_their_numbers_of_coefficients() {
-        let lens = |model: &str, count: u32| {
+        fn lens(model: &str, count: u32) -> Distortion {
             let d = (1..=count).map(f64::from).collect();
             let info = CameraInfo { d, distortion_model: model.into(), ..info() };
             intrinsics(&info, false).unwrap().lens.distortion
-        };
+        }
+
         assert_eq!(lens("plumb_bob", 4), Distortion::PlumbBob([1.0, 2.0, 3.0, 4.0, 0.0]));
         for count in [8, 12, 14] {
             let expected: Vec<f64> = (1..=count).map(f64::from).collect();

@@ -364,10 +364,13 @@ mod tests {
 
     #[test]
     fn static_poses_leave_out_what_moves() {
+        fn x(tf: &TfBuffer) -> Option<f64> {
+            tf.static_pose("base", "camera").map(|pose| pose.translation.x)
+        }
+
         let mut tf = TfBuffer::default();
         tf.insert(&link("base", "head", 10.0, pose(5.0, 1.0)), false);
         tf.insert(&link("head", "camera", 0.0, pose(0.2, 0.0)), true);
-        let x = |tf: &TfBuffer| tf.static_pose("base", "camera").map(|pose| pose.translation.x);
         assert_eq!((x(&tf), tf.static_pose("base", "elsewhere")), (Some(0.2), None));
         let saved = tf.saved("/camera");
         tf.insert(&link("head", "camera", 0.0, pose(0.3, 0.0)), true);

@@ -594,9 +594,18 @@ fn detections_of_types_that_are_not_read_are_listed_with_those_that_are() {
 
 #[test]
 fn a_scanner_of_another_clock_is_told_with_the_offset() {
-    let unset = |_| Stamp::default();
-    let simulated = |index| Stamp::default().plus_seconds(12.0 + 0.1 * f64::from(index));
-    let hour = |index| recorded(index).plus_seconds(3600.0);
+    fn unset(_: u32) -> Stamp {
+        Stamp::default()
+    }
+
+    fn simulated(index: u32) -> Stamp {
+        Stamp::default().plus_seconds(12.0 + 0.1 * f64::from(index))
+    }
+
+    fn hour(index: u32) -> Stamp {
+        recorded(index).plus_seconds(3600.0)
+    }
+
     let clocks: [(&str, &dyn Fn(u32) -> Stamp); 3] = [
         ("its stamps are not set", &unset),
         ("s before it, by another clock", &simulated),

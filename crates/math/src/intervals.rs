@@ -177,8 +177,12 @@ fn independent_trials(clusters: &[[u64; 2]], rate: f64, trials: f64) -> f64 {
     if rate <= 0.0 || rate >= 1.0 {
         return count;
     }
-    let off = |[successes, of]: &[u64; 2]| (*successes as f64 - rate * *of as f64).powi(2);
-    let square = clusters.iter().map(off).sum::<f64>() * count / (count - 1.0);
+    let square = clusters
+        .iter()
+        .map(|[successes, of]| (*successes as f64 - rate * *of as f64).powi(2))
+        .sum::<f64>()
+        * count
+        / (count - 1.0);
     let alike = (rate * (1.0 - rate) * trials * trials / square).min(trials);
     alike * (normal_quantile(CONFIDENCE) / student_quantile(clusters.len() - 1)).powi(2)
 }
@@ -233,8 +237,9 @@ pub fn draws_interval(draws: usize, figure: impl Fn(&[usize]) -> f64) -> Option<
 
 /// Returns the interval of the mean of one value a draw; as [`draws_interval`].
 pub fn mean_interval(values: &[f64]) -> Option<Interval> {
-    let mean = |drawn: &[usize]| drawn.iter().map(|&i| values[i]).sum::<f64>() / drawn.len() as f64;
-    draws_interval(values.len(), mean)
+    draws_interval(values.len(), |drawn| {
+        drawn.iter().map(|&i| values[i]).sum::<f64>() / drawn.len() as f64
+    })
 }
 
 #[cfg(test)]

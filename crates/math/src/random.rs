@@ -132,8 +132,9 @@ impl RandomSource for XorShift64 {
 /// ```
 pub fn fingerprint(bytes: impl IntoIterator<Item = u8>) -> u64 {
     const PRIME: u64 = 0x0100_0000_01b3;
-    let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(PRIME);
-    bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, step)
+    bytes
+        .into_iter()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME))
 }
 
 /// Returns the first number of [`SplitMix64`] from this seed: it looks random, and different seeds
@@ -186,7 +187,10 @@ mod tests {
 
     #[test]
     fn streams_of_a_seed_differ_and_repeat() {
-        let first = |stream| ChaCha::new(3, stream).next_u64();
+        fn first(stream: u64) -> u64 {
+            ChaCha::new(3, stream).next_u64()
+        }
+
         assert_eq!(first(1), first(1));
         assert_ne!(first(1), first(2));
     }
@@ -226,11 +230,12 @@ mod tests {
 
     #[test]
     fn shuffling_keeps_all_and_repeats() {
-        let shuffled = |seed| {
+        fn shuffled(seed: u64) -> Vec<u32> {
             let mut items: Vec<u32> = (0..50).collect();
             SplitMix64::new(seed).shuffle(&mut items);
             items
-        };
+        }
+
         let mut items = shuffled(3);
         assert_eq!(items, shuffled(3));
         assert_ne!(items, shuffled(4));

@@ -83,12 +83,15 @@ fn patterns_beyond(rest: &[f64], sum: f64, bar: f64) -> f64 {
 }
 
 fn drawn_sum(sizes: &[f64], random: &mut SplitMix64) -> f64 {
-    let of_word = |sizes: &[f64]| {
-        let signs = random.next_u64();
-        let signed = |(bit, size): (usize, &f64)| if signs >> bit & 1 == 0 { *size } else { -size };
-        sizes.iter().enumerate().map(signed).sum::<f64>()
-    };
-    sizes.chunks(u64::BITS as usize).map(of_word).sum()
+    sizes
+        .chunks(u64::BITS as usize)
+        .map(|sizes| {
+            let signs = random.next_u64();
+            let signed =
+                |(bit, size): (usize, &f64)| if signs >> bit & 1 == 0 { *size } else { -size };
+            sizes.iter().enumerate().map(signed).sum::<f64>()
+        })
+        .sum()
 }
 
 /// Returns the p-values of several comparisons as large as they have to be for any of
@@ -120,8 +123,11 @@ mod tests {
     fn counted(differences: &[f64]) -> f64 {
         let observed = differences.iter().sum::<f64>().abs();
         let sum = |signs: u32| -> f64 {
-            let signed = |(i, d): (usize, &f64)| if signs >> i & 1 == 0 { *d } else { -d };
-            differences.iter().enumerate().map(signed).sum()
+            differences
+                .iter()
+                .enumerate()
+                .map(|(i, d)| if signs >> i & 1 == 0 { *d } else { -d })
+                .sum()
         };
         let patterns = 1u32 << differences.len();
         let beyond = (0..patterns).filter(|signs| sum(*signs).abs() >= observed - 1e-9).count();
@@ -149,8 +155,11 @@ mod tests {
 
     #[test]
     fn drawn_patterns_agree_with_all_of_them_and_never_say_zero() {
+        fn uniform(random: &mut SplitMix64) -> f64 {
+            random.positive_uniform() - 0.3
+        }
+
         let mut random = SplitMix64::new(5);
-        let uniform = |random: &mut SplitMix64| random.positive_uniform() - 0.3;
         let many: Vec<f64> = (0..20).map(|_| uniform(&mut random)).collect();
         let exact = sign_flip(&many).unwrap();
         let one_more: Vec<f64> = many.iter().copied().chain([0.0]).collect();
@@ -177,7 +186,10 @@ mod tests {
 
     #[test]
     fn below_six_draws_nothing_is_significant() {
-        let same_way = |draws: usize| sign_flip(&vec![0.1; draws]).unwrap();
+        fn same_way(draws: usize) -> f64 {
+            sign_flip(&vec![0.1; draws]).unwrap()
+        }
+
         assert!((1..6).all(|draws| !is_significant(same_way(draws))));
         assert!(is_significant(same_way(6)));
     }

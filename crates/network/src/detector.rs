@@ -160,8 +160,7 @@ pub(crate) fn start(
     let names = ClassNames::of(&bytes);
     let own = *limits;
     let load = move || runtime(bytes, &own);
-    let about = move |network: &mut Box<dyn Network>| Ok(About::of(network, names, size));
-    Worker::start(load, about, limits.load_deadline)
+    Worker::start(load, move |network| Ok(About::of(network, names, size)), limits.load_deadline)
 }
 
 /// Describes the network in a file, and runs it once on a grey image.
@@ -175,7 +174,10 @@ pub fn inspect(path: &Path, size: Option<[usize; 2]>, limits: &Limits) -> Result
 
 /// Returns the index of the input that takes the image.
 fn image_port(inputs: &[Port]) -> Result<usize, String> {
-    let is_image = |port: &Port| port.shape.len() == 4;
+    fn is_image(port: &Port) -> bool {
+        port.shape.len() == 4
+    }
+
     let images: Vec<usize> = (0..inputs.len()).filter(|k| is_image(&inputs[*k])).collect();
     let [image] = images[..] else {
         let count = images.len();
@@ -227,8 +229,10 @@ fn with_sizes(inputs: &[Port], input: InputSize, image: Tensor) -> Vec<Tensor> {
     // The boxes come back in pixels of the input, whatever the image was.
     let size = vec![input.width as f32, input.height as f32];
     let sizes = Tensor::new(vec![1, 2], size).unwrap_or_default();
-    let tensor = |port: &Port| if port.name == SIZES { sizes.clone() } else { image.clone() };
-    inputs.iter().map(tensor).collect()
+    inputs
+        .iter()
+        .map(|port| if port.name == SIZES { sizes.clone() } else { image.clone() })
+        .collect()
 }
 
 /// Returns the outputs for an image without anything in it.

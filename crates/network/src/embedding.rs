@@ -160,14 +160,17 @@ impl EmbeddingNetwork {
 
 /// Copies the part of an image inside a box; without pixels if there is none.
 fn cut(image: &RgbImage, part: &Rect) -> RgbImage {
+    // A box of less than a pixel has one.
+    fn end(from: usize, to: f64, most: usize) -> usize {
+        (to.round() as usize).clamp(from + 1, most)
+    }
+
     let inside = part.clipped(image.width(), image.height());
     if !part.is_sane() || inside.area() <= 0.0 {
         return RgbImage::default();
     }
     let left = inside.x as usize;
     let top = inside.y as usize;
-    // A box of less than a pixel has one.
-    let end = |from: usize, to: f64, most: usize| (to.round() as usize).clamp(from + 1, most);
     let right = end(left, inside.x + inside.width, image.width());
     let bottom = end(top, inside.y + inside.height, image.height());
     RgbImage::from_fn(right - left, bottom - top, |x, y| image.row(top + y)[left + x])

@@ -326,11 +326,13 @@ pub(crate) fn count_cells(input: InputSize, strides: &[usize]) -> usize {
 
 /// Returns the shapes of named outputs.
 pub(crate) fn shapes_of(outputs: &[(&str, &Tensor)]) -> Vec<OutputShape> {
-    let shape = |(name, tensor): &(&str, &Tensor)| OutputShape {
-        name: (*name).to_owned(),
-        shape: tensor.shape().to_vec(),
-    };
-    outputs.iter().map(shape).collect()
+    outputs
+        .iter()
+        .map(|(name, tensor)| OutputShape {
+            name: (*name).to_owned(),
+            shape: tensor.shape().to_vec(),
+        })
+        .collect()
 }
 
 /// Returns the family of a network by the shapes and the numbers of its outputs.
@@ -389,9 +391,10 @@ mod tests {
 
     /// Returns the family of outputs of zeros, which every family with their shapes may have.
     fn of_shapes(shapes: &[(&str, &[usize])], input: InputSize) -> Result<Family, String> {
-        let zeros = |(_, shape): &(&str, &[usize])| {
+        fn zeros((_, shape): &(&str, &[usize])) -> Tensor {
             Tensor::new(shape.to_vec(), vec![0.0; shape.iter().product()]).unwrap()
-        };
+        }
+
         let tensors: Vec<Tensor> = shapes.iter().map(zeros).collect();
         let named: Vec<(&str, &Tensor)> =
             shapes.iter().map(|(name, _)| *name).zip(&tensors).collect();
@@ -400,7 +403,10 @@ mod tests {
 
     #[test]
     fn published_networks_are_recognised() {
-        let only = |shape: &[usize]| of_shapes(&[("output", shape)], INPUT).unwrap();
+        fn only(shape: &[usize]) -> Family {
+            of_shapes(&[("output", shape)], INPUT).unwrap()
+        }
+
         assert_eq!(only(&[1, 84, 8400]), Family::YoloV8);
         assert_eq!(only(&[1, 5, 8400]), Family::YoloV8, "a single class");
         assert_eq!(only(&[1, 300, 6]), Family::YoloV10);
@@ -422,10 +428,13 @@ mod tests {
 
     #[test]
     fn other_shapes_are_refused_with_those_that_are_known() {
+        fn wrong(shape: &[usize]) -> bool {
+            of_shapes(&[("output", shape)], INPUT).is_err()
+        }
+
         let why = of_shapes(&[("logits", &[1, 1000])], INPUT).unwrap_err();
         assert!(why.contains("`logits` [1, 1000]") && why.contains("640 x 640"), "{why}");
         assert!(Family::ALL.iter().all(|family| why.contains(family.name())), "{why}");
-        let wrong = |shape: &[usize]| of_shapes(&[("output", shape)], INPUT).is_err();
         assert!(wrong(&[1, 4, 8400]) && wrong(&[1, 8500, 32]));
         assert!(wrong(&[2, 8400, 85]) && wrong(&[]));
         assert!(wrong(&[1, 6, 56]), "MoveNet has its channels last");

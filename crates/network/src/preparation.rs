@@ -125,12 +125,13 @@ struct Tap {
 /// half.
 fn taps(from: usize, to: usize) -> Vec<Tap> {
     let last = from - 1;
-    let tap = |index: usize| {
-        let at = ((index as f64 + 0.5) * from as f64 / to as f64 - 0.5).clamp(0.0, last as f64);
-        let first = at as usize;
-        Tap { first, second: (first + 1).min(last), weight: (at - first as f64) as f32 }
-    };
-    (0..to).map(tap).collect()
+    (0..to)
+        .map(|index| {
+            let at = ((index as f64 + 0.5) * from as f64 / to as f64 - 0.5).clamp(0.0, last as f64);
+            let first = at as usize;
+            Tap { first, second: (first + 1).min(last), weight: (at - first as f64) as f32 }
+        })
+        .collect()
 }
 
 impl Preparation {
@@ -200,12 +201,16 @@ mod tests {
 
     #[test]
     fn padding_is_centred_or_on_the_right_and_below() {
-        let value = |fit: Fit, row: usize| {
+        fn value(fit: Fit, row: usize) -> f32 {
             let preparation = Preparation { fit, ..PLAIN };
             let (tensor, _) = preparation.apply(&image(), INPUT).unwrap();
             tensor.values()[128 + row * 8]
-        };
-        let rows = |fit: Fit| [0, 2, 5, 7].map(|row| value(fit, row));
+        }
+
+        fn rows(fit: Fit) -> [f32; 4] {
+            [0, 2, 5, 7].map(|row| value(fit, row))
+        }
+
         assert_eq!(rows(Fit::Centre), [114.0, 200.0, 200.0, 114.0]);
         assert_eq!(rows(Fit::TopLeft), [200.0, 200.0, 114.0, 114.0]);
         assert_eq!(rows(Fit::Stretch), [200.0; 4]);

@@ -146,9 +146,12 @@ impl Network for RtenNetwork {
         let options = Some(self.options.clone());
         let outputs = self.model.run(values, self.model.output_ids(), options);
         let outputs = outputs.map_err(|why| format!("it cannot be run: {why}"))?;
-        let known = |(port, value): (&Port, Value)| {
-            to_tensor(value).ok_or_else(|| format!("the output {port} is no tensor of numbers"))
-        };
-        self.outputs.iter().zip(outputs).map(known).collect()
+        self.outputs
+            .iter()
+            .zip(outputs)
+            .map(|(port, value)| {
+                to_tensor(value).ok_or_else(|| format!("the output {port} is no tensor of numbers"))
+            })
+            .collect()
     }
 }

@@ -405,12 +405,16 @@ mod tests {
     /// A damaged file must not exhaust the stack before its graphs are counted.
     #[test]
     fn messages_that_are_nested_too_deep_are_refused() {
-        let nested = |depth: usize| {
+        fn nested(depth: usize) -> Vec<u8> {
             // Field 5 of an operator is an attribute, field 6 of that another graph.
             (0..depth)
                 .fold(node("Relu", "x", "y"), |graph, _| field(1, &field(5, &field(6, &graph))))
-        };
-        let check = |depth| check_encoding(&field(7, &nested(depth)), Part::Model, 0);
+        }
+
+        fn check(depth: usize) -> Result<(), String> {
+            check_encoding(&field(7, &nested(depth)), Part::Model, 0)
+        }
+
         assert!(check(MAX_MESSAGES / 3 - 2).is_ok());
         let why = check(MAX_MESSAGES / 3 + 2).unwrap_err();
         assert!(why.contains("nested more than"), "{why}");
@@ -437,9 +441,10 @@ mod tests {
 
     #[test]
     fn constants_that_ask_for_huge_tensors_are_refused() {
-        let make = |kind: &str, numbers: &[i64]| {
+        fn make(kind: &str, numbers: &[i64]) -> Result<Survey, String> {
             survey(&[node(kind, "shape", "y"), sizes("shape", numbers)].concat())
-        };
+        }
+
         assert!(make("ConstantOfShape", &[1, 64, 80, 80]).is_ok());
         let why = make("ConstantOfShape", &[1 << 20, 1 << 20]).unwrap_err();
         assert!(why.contains("`ConstantOfShape` makes a tensor of 1099511627776"), "{why}");
@@ -450,11 +455,12 @@ mod tests {
 
     #[test]
     fn attributes_that_ask_for_huge_outputs_are_refused() {
-        let with = |name: &str, numbers: &[u8]| {
+        fn with(name: &str, numbers: &[u8]) -> Result<Survey, String> {
             let attribute = [field(1, name.as_bytes()), numbers.to_vec()].concat();
             let parts = [field(2, b"y"), field(4, b"AveragePool"), field(5, &attribute)].concat();
             survey(&field(1, &parts))
-        };
+        }
+
         // 256 and 257, as a number by itself and in a packed list, and the least negative number.
         assert!(with("pads", &[8 << 3, 0x80, 2]).is_ok());
         let why = with("pads", &[8 << 3, 0x81, 2]).unwrap_err();
@@ -467,9 +473,12 @@ mod tests {
 
     #[test]
     fn damage_is_found_in_every_message() {
+        fn survey(bytes: &[u8]) -> Result<Survey, String> {
+            Survey::of(bytes, &Limits::default())
+        }
+
         let graph = node("Relu", "x", "y");
         let version = |content: &[u8]| [field(7, &graph), field(8, content)].concat();
-        let survey = |bytes: &[u8]| Survey::of(bytes, &Limits::default());
         assert!(survey(&version(&[2 << 3, 17])).is_ok());
         // A group, and a field that ends early, in the version of the operators.
         assert!(survey(&version(&[2 << 3 | 3, 17])).unwrap_err().contains("truncated"));

@@ -291,6 +291,10 @@ mod tests {
 
     #[test]
     fn grids_of_one_shape_are_told_apart() {
+        fn coco(width: usize) -> Result<Family, String> {
+            of_rows(&[1, 84, width], |cell| with(pixels(cell), &vec![0.1; width - 4]))
+        }
+
         let six = [1, 84, 6];
         let raw = of_rows(&six, |cell| with(offsets(cell), &[0.1, 0.4]));
         assert_eq!(raw, Ok(Family::Yolox));
@@ -302,25 +306,28 @@ mod tests {
         assert!(why.contains("`yolox` (YOLOX) or `yolov8`"), "{why}");
         let one = of_rows(&[1, 84, 5], |cell| with(pixels(cell), &[0.1]));
         assert_eq!(one, Ok(Family::YoloV8), "an objectness needs a class");
-        let coco = |width: usize| {
-            of_rows(&[1, 84, width], |cell| with(pixels(cell), &vec![0.1; width - 4]))
-        };
         assert_eq!((coco(84), coco(85)), (Ok(Family::YoloV8), Ok(Family::Yolox)));
     }
 
     /// The list of `network-family-by-shape` of the field data: one box, and nothing else.
     #[test]
     fn a_list_with_a_row_for_each_cell_is_no_grid() {
-        let row = |cell: usize| match cell {
-            0 => vec![15.0, 5.0, 35.0, 60.0, 0.9, 0.0],
-            _ => vec![0.0; 6],
-        };
+        fn row(cell: usize) -> Vec<f32> {
+            match cell {
+                0 => vec![15.0, 5.0, 35.0, 60.0, 0.9, 0.0],
+                _ => vec![0.0; 6],
+            }
+        }
+
         assert_eq!(of_rows(&[1, 84, 6], row), Ok(Family::YoloV10));
     }
 
     #[test]
     fn lists_of_one_box_are_told_from_other_rows() {
-        let list = |row: &[f32]| of_rows(&[1, row.len()], |_| row.to_vec());
+        fn list(row: &[f32]) -> Result<Family, String> {
+            of_rows(&[1, row.len()], |_| row.to_vec())
+        }
+
         assert_eq!(list(&[0.0, 10.0, 5.0, 30.0, 60.0, 0.0, 0.8]), Ok(Family::YoloV10));
         assert_eq!(list(&[10.0, 5.0, 30.0, 60.0, 0.8, 0.0]), Ok(Family::YoloV10));
         assert!(list(&[0.2, -0.1, 0.3, 0.6, 0.1, -0.2, 0.8]).is_err());
@@ -343,10 +350,13 @@ mod tests {
 
     #[test]
     fn lists_of_one_image_may_begin_with_its_number() {
-        let row = |cell: usize| match cell {
-            0 => vec![0.0, 15.0, 5.0, 35.0, 60.0, 0.0, 0.9],
-            _ => vec![0.0; 7],
-        };
+        fn row(cell: usize) -> Vec<f32> {
+            match cell {
+                0 => vec![0.0, 15.0, 5.0, 35.0, 60.0, 0.0, 0.9],
+                _ => vec![0.0; 7],
+            }
+        }
+
         assert_eq!(of_rows(&[1, 84, 7], row), Ok(Family::YoloV10), "as many as cells");
         assert_eq!(of_rows(&[1, 30, 7], row), Ok(Family::YoloV10));
     }
@@ -383,9 +393,10 @@ mod tests {
 
     #[test]
     fn grids_in_fractions_of_the_image_are_no_offsets() {
-        let of = |width: usize| {
+        fn of(width: usize) -> Result<Family, String> {
             of_rows(&[1, 84, width], |cell| with(fractions(cell), &vec![0.1; width - 4]))
-        };
+        }
+
         assert_eq!((of(84), of(85)), (Ok(Family::YoloV8), Ok(Family::Yolox)));
         assert_eq!(of(5), Ok(Family::YoloV8));
         let why = of(6).unwrap_err();
@@ -404,12 +415,11 @@ mod tests {
 
     #[test]
     fn nanodet_before_plus_is_known_by_its_distributions() {
-        let logits = |count: usize| (0..count).map(|k| k as f32 - 3.0).collect::<Vec<f32>>();
-        for bins in NANODET_M_BINS {
-            let row = |_: usize| with(vec![0.1; 80], &logits(4 * bins));
-            assert_eq!(of_rows(&[1, 84, 80 + 4 * bins], row), Ok(Family::NanoDetM));
+        fn logits(count: usize) -> Vec<f32> {
+            (0..count).map(|k| k as f32 - 3.0).collect::<Vec<f32>>()
         }
-        let by_stride = |scores: f32| {
+
+        fn by_stride(scores: f32) -> Result<Family, String> {
             let tensor = |cells: usize, row: &[f32]| {
                 Tensor::new(vec![1, cells, row.len()], row.repeat(cells)).unwrap()
             };
@@ -418,7 +428,14 @@ mod tests {
             let named: Vec<(&str, &Tensor)> =
                 outputs.iter().flatten().map(|output| ("", output)).collect();
             recognise(&named, INPUT)
-        };
+        }
+
+        for bins in NANODET_M_BINS {
+            assert_eq!(
+                of_rows(&[1, 84, 80 + 4 * bins], |_| with(vec![0.1; 80], &logits(4 * bins))),
+                Ok(Family::NanoDetM)
+            );
+        }
         assert_eq!(by_stride(0.1), Ok(Family::NanoDetM));
         assert!(by_stride(-4.0).unwrap_err().contains("not its numbers"), "logits");
     }
@@ -434,9 +451,12 @@ mod unit_tests {
 
     #[test]
     fn a_list_has_the_unit_of_its_confident_boxes() {
+        fn of(rows: &[[f32; 6]]) -> Option<BoxUnit> {
+            unit_of_list(&list(rows), 0.5)
+        }
+
         let fraction = [0.25, 0.3, 0.4, 1.02, 0.9, 0.0];
         let pixels = [40.0, 48.0, 64.0, 160.0, 0.9, 3.0];
-        let of = |rows: &[[f32; 6]]| unit_of_list(&list(rows), 0.5);
         assert_eq!(of(&[fraction, [0.0; 6]]), Some(BoxUnit::Fractions));
         assert_eq!(of(&[fraction, pixels]), Some(BoxUnit::Pixels));
         assert_eq!(of(&[[0.0; 6]; 3]), None, "nothing was found");

@@ -61,6 +61,11 @@ fn two_people() -> RgbImage {
 
 #[test]
 fn the_part_of_the_image_in_the_box_is_described() {
+    fn cosine(a: &[f32], b: &[f32]) -> f32 {
+        let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+        dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
+    }
+
     for name in ["osnet.onnx", "omz.onnx"] {
         let mut network = network(name);
         let mut vector = |x: f64, width: f64| {
@@ -70,10 +75,6 @@ fn the_part_of_the_image_in_the_box_is_described() {
         let red = vector(10.0, 60.0);
         let blue = vector(120.0, 60.0);
         let outside = vector(-40.0, 80.0);
-        let cosine = |a: &[f32], b: &[f32]| {
-            let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
-            dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
-        };
         assert!(cosine(&red, &blue) < 0.5, "{name}");
         assert!(cosine(&red, &outside) > 0.999, "{name}: the part inside the image counts");
         assert_eq!(network.embed(&two_people(), &Rect::new(300.0, 0.0, 9.0, 9.0)), Ok(None));

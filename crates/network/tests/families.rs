@@ -202,7 +202,10 @@ fn choices_that_do_not_fit_are_refused() {
 /// Returns the file of YOLOX, of which the first of two classes is that of the blob, with these names
 /// in its metadata.
 fn with_names(names: &str) -> Vec<u8> {
-    let field = |number: u8, bytes: &[u8]| [&[number << 3 | 2, bytes.len() as u8], bytes].concat();
+    fn field(number: u8, bytes: &[u8]) -> Vec<u8> {
+        [&[number << 3 | 2, bytes.len() as u8], bytes].concat()
+    }
+
     let entry = [field(1, b"names"), field(2, names.as_bytes())].concat();
     [fs::read(path("yolox.onnx")).unwrap(), field(14, &entry)].concat()
 }
@@ -275,7 +278,10 @@ fn lists_of_wide_people_name_the_order_of_corners() {
 
 #[test]
 fn paths_that_are_no_files_are_refused() {
-    let why = |name: &str| inspect(&path(name), None, &Limits::default()).unwrap_err();
+    fn why(name: &str) -> String {
+        inspect(&path(name), None, &Limits::default()).unwrap_err()
+    }
+
     assert!(why("none.onnx").contains("cannot be read"));
     assert!(why("").contains("is a directory"));
     assert!(why("yolox.json").contains("no ONNX file"), "{}", why("yolox.json"));

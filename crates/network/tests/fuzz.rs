@@ -233,9 +233,10 @@ fn files_that_once_did_harm_are_survived() {
 
 #[test]
 fn mutated_files_are_survived() {
-    let number = |name: &str, usual: u64| {
+    fn number(name: &str, usual: u64) -> u64 {
         env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
-    };
+    }
+
     let seed = number("TAGALONG_FUZZ_SEED", 1);
     let files = number("TAGALONG_FUZZ_FILES", 1000);
     // Panics of the runtime are contained by its thread; their messages would hide all others.

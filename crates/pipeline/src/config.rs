@@ -501,7 +501,10 @@ fn check_weighing(
     detectors: &[DetectorSlot],
     span: Range<usize>,
 ) -> Result<(), ConfigError> {
-    let weighs = |slot: &DetectorSlot| slot.settings.roles.contains(&Role::Weigh);
+    fn weighs(slot: &DetectorSlot) -> bool {
+        slot.settings.roles.contains(&Role::Weigh)
+    }
+
     // A filter that weighs scenes would have no measurement without such a detector.
     if !filter.plugin().requirements().likelihood || detectors.iter().any(weighs) {
         return Ok(());

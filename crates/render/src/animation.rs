@@ -97,10 +97,11 @@ mod tests {
         let pictures: Vec<_> = (0..3)
             .map(|i| {
                 let path = home.path().join(format!("{i}.png"));
-                let square = |x, _| {
+                RgbaImage::from_fn(80, 40, |x, _| {
                     if x / 20 == i { Rgba([250, 10, 10, 255]) } else { Rgba([20, 20, 20, 255]) }
-                };
-                RgbaImage::from_fn(80, 40, square).save(&path).unwrap();
+                })
+                .save(&path)
+                .unwrap();
                 path
             })
             .collect();

@@ -83,10 +83,11 @@ fn a_person_shows_in_the_image_and_from_above() {
 
 #[test]
 fn small_images_are_enlarged_to_640_columns_and_all_pictures_have_one_even_size() {
-    let size = |scene: &OverlayData| {
+    fn size(scene: &OverlayData) -> (usize, usize) {
         let picture = picture(scene, &Trails::default(), DEBUG);
         (picture.width(), picture.height())
-    };
+    }
+
     let image = (640, 480);
     let plan = 480 * 4 / 5;
     assert_eq!(size(&scene(&[], Vec::new())), (image.0 + plan, image.1 + legend::height_px(DEBUG)));
@@ -103,6 +104,11 @@ fn small_images_are_enlarged_to_640_columns_and_all_pictures_have_one_even_size(
 
 #[test]
 fn points_of_a_scan_are_in_the_plan() {
+    // 3 m ahead and 1 m to the left, by 50 pixels a metre, of a robot at column 180 and row 400.
+    fn at(k: &usize) -> bool {
+        (k % 360).abs_diff(130) <= 1 && (k / 360).abs_diff(250) <= 1
+    }
+
     let empty = scene(&[], Vec::new());
     let scanned = OverlayData { scan: vec![Point2::new(3.0, 1.0)], ..scene(&[], Vec::new()) };
     let plan =
@@ -111,8 +117,6 @@ fn points_of_a_scan_are_in_the_plan() {
     let with = plan(&scanned);
     let changed: Vec<usize> =
         (0..without.pixels().len()).filter(|k| without.pixels()[*k] != with.pixels()[*k]).collect();
-    // 3 m ahead and 1 m to the left, by 50 pixels a metre, of a robot at column 180 and row 400.
-    let at = |k: &usize| (k % 360).abs_diff(130) <= 1 && (k / 360).abs_diff(250) <= 1;
     assert!(!changed.is_empty() && changed.iter().all(at), "{changed:?}");
 }
 

@@ -149,12 +149,15 @@ mod tests {
 
     #[test]
     fn differences_are_listed_in_time_and_name_the_pipeline() {
-        let task = |pipeline: &str, events| TaskResult {
-            pipeline: pipeline.into(),
-            log: "log".into(),
-            events,
-            ..TaskResult::default()
-        };
+        fn task(pipeline: &str, events: Vec<EventRow>) -> TaskResult {
+            TaskResult {
+                pipeline: pipeline.into(),
+                log: "log".into(),
+                events,
+                ..TaskResult::default()
+            }
+        }
+
         let stranger = EventRow { person: Some(2), ..at(1.0) };
         let tasks = vec![
             task("a", vec![at(1.0), at(9.0)]),

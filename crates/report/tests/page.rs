@@ -302,6 +302,10 @@ fn places<'a>(page: &str, texts: impl IntoIterator<Item = &'a str>) -> Vec<usize
 
 #[test]
 fn pipelines_stand_in_the_order_of_their_scores_and_the_plot_comes_first() {
+    fn sections(page: &str) -> Vec<usize> {
+        places(page, ["<section id=\"speed\"", "<section id=\"results\""])
+    }
+
     let mut benchmark = on_logs(2, &[("a", 0.3), ("b", 0.9), ("c", 0.6)]);
     // The best of all is on one log only.
     benchmark.tasks.extend(with_hota(&[("d", "log 0", 0.99)]).tasks);
@@ -310,7 +314,6 @@ fn pipelines_stand_in_the_order_of_their_scores_and_the_plot_comes_first() {
     let found =
         places(table, ["</svg> b</span>", "</svg> c</span>", "</svg> a</span>", "</svg> d</span>"]);
     assert!(found.is_sorted(), "{found:?}");
-    let sections = |page: &str| places(page, ["<section id=\"speed\"", "<section id=\"results\""]);
     assert!(!sections(&page).is_sorted(), "without times there is no plot");
     let timings = common::timings(&benchmark);
     assert!(sections(&html(&benchmark, Some(&timings))).is_sorted());
@@ -385,17 +388,21 @@ fn one_log_shows_no_interval() {
 
 #[test]
 fn people_are_counted_once_whatever_the_number_of_seeds() {
-    let task = |log: &str, seed, never_confirmed| TaskResult {
-        pipeline: "a".into(),
-        log: log.into(),
-        seed,
-        image: Some(Scores { truth_ids: 4, never_confirmed, ..Scores::default() }),
-        ..TaskResult::default()
-    };
-    let mut tasks = vec![task("x", 1, 1), task("x", 2, 1)];
-    let summary = |tasks: &[TaskResult]| {
+    fn task(log: &str, seed: u64, never_confirmed: u64) -> TaskResult {
+        TaskResult {
+            pipeline: "a".into(),
+            log: log.into(),
+            seed,
+            image: Some(Scores { truth_ids: 4, never_confirmed, ..Scores::default() }),
+            ..TaskResult::default()
+        }
+    }
+
+    fn summary(tasks: &[TaskResult]) -> Summary {
         Summary::new(&Benchmark { tasks: tasks.to_vec(), ..Benchmark::default() })
-    };
+    }
+
+    let mut tasks = vec![task("x", 1, 1), task("x", 2, 1)];
     let one = summary(&tasks);
     let found = one.pipelines[0].people_found.unwrap();
     assert_eq!((found.estimate, one.pipelines[0].people), (0.75, 4));

@@ -150,7 +150,14 @@ fn find(bytes: &[u8], part: &[u8]) -> Option<usize> {
 }
 
 fn parse_head(bytes: &[u8]) -> Result<Request, Response> {
-    let wrong = |why: &str| Response::refusal(400, why);
+    fn wrong(why: &str) -> Response {
+        Response::refusal(400, why)
+    }
+
+    fn is_name(b: u8) -> bool {
+        b.is_ascii_alphanumeric() || b"-_".contains(&b)
+    }
+
     let text = std::str::from_utf8(bytes).map_err(|_| wrong("the headers are no text"))?;
     if text.chars().any(|c| c.is_control() && c != '\r' && c != '\n' && c != '\t') {
         return Err(wrong("the headers have control characters"));
@@ -169,7 +176,6 @@ fn parse_head(bytes: &[u8]) -> Result<Request, Response> {
     let mut headers: Vec<(String, String)> = Vec::new();
     for line in lines {
         let (name, value) = line.split_once(':').ok_or_else(|| wrong("a header has no colon"))?;
-        let is_name = |b: u8| b.is_ascii_alphanumeric() || b"-_".contains(&b);
         if name.is_empty() || !name.bytes().all(is_name) || value.contains(['\r', '\n']) {
             return Err(wrong("a header has a name or a value that is none"));
         }

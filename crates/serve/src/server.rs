@@ -166,7 +166,10 @@ impl Guard {
 
     /// Returns the path behind the key of a request that may be answered.
     fn admit<'a>(&self, request: &'a Request) -> Result<&'a str, Response> {
-        let refuse = |why: &str| Err(Response::refusal(403, why));
+        fn refuse(why: &str) -> Result<&str, Response> {
+            Err(Response::refusal(403, why))
+        }
+
         let host = request.header("host").unwrap_or_default();
         if !self.is_own(host) {
             return refuse("the host is not this server; open its address as numbers");

@@ -397,25 +397,28 @@ pub fn lead_of(walkers: &[Walker], i: usize) -> Option<Lead> {
 pub fn others(walkers: &[Walker], i: usize, now_s: f64) -> Vec<Point2<f64>> {
     let group = |j: usize| walkers[j].beside.map_or(j, |(leader, _)| leader);
     let place = |j: usize| walkers[j].stance.place;
-    let counts = |j: &usize| {
-        *j != i
-            && walkers[*j].is_there(now_s)
-            && (group(*j) != group(i) || (place(*j) - place(i)).norm() < TOO_NEAR_M)
-    };
-    (0..walkers.len()).filter(counts).map(place).collect()
+    (0..walkers.len())
+        .filter(|j| {
+            *j != i
+                && walkers[*j].is_there(now_s)
+                && (group(*j) != group(i) || (place(*j) - place(i)).norm() < TOO_NEAR_M)
+        })
+        .map(place)
+        .collect()
 }
 
 /// Returns the walker that hides each walker, seen from a place: the middle of the hidden body lies
 /// behind a walker at least 0.3 m nearer, 0.2 m to either side of whose middle count as body.
 pub fn hidden_by(walkers: &[Walker], seen_from: &Point2<f64>) -> Vec<Option<usize>> {
+    fn hides(near: (f64, f64), far: (f64, f64)) -> bool {
+        near.0 + 0.3 < far.0 && angle_between(near.1, far.1).abs() < (0.2 / near.0.max(0.3)).atan()
+    }
+
     let polar: Vec<(f64, f64)> = walkers
         .iter()
         .map(|w| w.stance.place - seen_from)
         .map(|way| (way.norm(), way.y.atan2(way.x)))
         .collect();
-    let hides = |near: (f64, f64), far: (f64, f64)| {
-        near.0 + 0.3 < far.0 && angle_between(near.1, far.1).abs() < (0.2 / near.0.max(0.3)).atan()
-    };
     polar.iter().map(|far| polar.iter().position(|near| hides(*near, *far))).collect()
 }
 
@@ -459,6 +462,10 @@ mod tests {
 
     #[test]
     fn a_seated_person_gets_up_and_walks() {
+        fn feet_m(w: &Walker) -> f64 {
+            w.stance.place.x + feet_ahead_m(&w.person.build, w.stance.seated)
+        }
+
         let settings = PersonSettings {
             path: vec![[1.0, 1.0], [4.0, 1.0]],
             posture: Posture::Seated,
@@ -466,7 +473,6 @@ mod tests {
             ..PersonSettings::default()
         };
         let mut walkers = [Walker::new(Person::subject(1), settings)];
-        let feet_m = |w: &Walker| w.stance.place.x + feet_ahead_m(&w.person.build, w.stance.seated);
         let on_chair_m = feet_m(&walkers[0]);
         walk(&mut walkers, 2.0, |w| assert_eq!(w[0].stance.seated, 1.0));
         let mut lean_rad = 0f64;
@@ -578,8 +584,14 @@ mod tests {
 
     #[test]
     fn tricks_are_played_behind_somebody() {
-        let stands = || walker(&[[2.0, 0.0]], Trick::None);
-        let passes = |trick| walker(&[[4.0, -2.0], [4.0, 2.0]], trick);
+        fn stands() -> Walker {
+            walker(&[[2.0, 0.0]], Trick::None)
+        }
+
+        fn passes(trick: Trick) -> Walker {
+            walker(&[[4.0, -2.0], [4.0, 2.0]], trick)
+        }
+
         let mut back = [stands(), passes(Trick::TurnBack)];
         walk(&mut back, 8.0, |_| {});
         assert!(back[1].stance.place.y < -1.5, "{}", back[1].stance.place);

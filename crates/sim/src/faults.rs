@@ -322,9 +322,10 @@ impl InjectedFault {
 
     /// Returns the reason why the fault cannot be injected into a scene, if there is one.
     fn problem(&self, scene: &Scene) -> Option<String> {
-        let is_within = |value: Option<f64>, least: f64, most: f64| {
+        fn is_within(value: Option<f64>, least: f64, most: f64) -> bool {
             value.is_none_or(|value| (least..=most).contains(&value))
-        };
+        }
+
         let shown = self.kind.map_or("random", FaultKind::name);
         if !is_within(self.at_s, 0.0, 86_400.0) {
             return Some(format!("faults.inject: at_s of {shown} must be in 0 to 86400"));
@@ -389,14 +390,15 @@ impl FromStr for InjectedFault {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let seconds = |text: &str| -> Result<f64, String> {
+        fn seconds(text: &str) -> Result<f64, String> {
             let value: f64 = text.parse().map_err(|_| format!("`{text}` is no time in seconds"))?;
             if (0.0..=86_400.0).contains(&value) {
                 Ok(value)
             } else {
                 Err(format!("{text} s must be in 0 to 86400"))
             }
-        };
+        }
+
         let parts = text.split_once('@');
         let kind = parts.map_or(text, |(kind, _)| kind);
         let mut fault = match kind {
@@ -491,7 +493,10 @@ mod tests {
 
     #[test]
     fn arguments_have_a_kind_and_times() {
-        let read = |text: &str| text.parse::<InjectedFault>();
+        fn read(text: &str) -> Result<InjectedFault, String> {
+            text.parse::<InjectedFault>()
+        }
+
         let delay = InjectedFault::new(FaultKind::Delay);
         assert_eq!(read("delay"), Ok(delay.clone()));
         assert_eq!(read("delay@4.5"), Ok(delay.clone().at(4.5)));
@@ -504,11 +509,12 @@ mod tests {
 
     #[test]
     fn the_seed_draws_what_is_left_out() {
-        let drawn = |seed: u64| {
+        fn drawn(seed: u64) -> ScheduledFault {
             let mut scene = Scene { seed, ..Scene::default() };
             scene.faults.inject.push(InjectedFault::random());
             scene.scheduled_faults()[0]
-        };
+        }
+
         assert_eq!(drawn(1), drawn(1));
         let kinds: std::collections::BTreeSet<FaultKind> =
             (0..300).map(|seed| drawn(seed).kind).collect();

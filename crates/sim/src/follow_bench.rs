@@ -125,6 +125,10 @@ impl Maker {
     }
 
     fn circular(&mut self) {
+        fn at(angle: f64) -> [f64; 2] {
+            [15.0 + CIRCLE_M * angle.cos(), 15.0 + CIRCLE_M * angle.sin()]
+        }
+
         self.start([30.0, 30.0], [[8.0, 15.0], [28.0, 15.0]], (0.5, 2.0));
         let people = self.bench.people;
         // Uniform on the circle under the condition that neighbours are apart: the rest of the
@@ -137,7 +141,6 @@ impl Maker {
         shares.sort_by(f64::total_cmp);
         for (i, share) in shares.into_iter().enumerate() {
             let angle = turn_rad + share + apart_rad * i as f64;
-            let at = |angle: f64| [15.0 + CIRCLE_M * angle.cos(), 15.0 + CIRCLE_M * angle.sin()];
             self.add_person(vec![at(angle), at(angle + PI)], AtEnd::Return);
         }
     }
@@ -282,12 +285,16 @@ mod tests {
 
     #[test]
     fn layouts_are_those_of_the_published_scenes() {
-        let corridor = scene("corridor", 4, 1);
-        let block = |at, size_m| Block { at, size_m, heading_deg: 0.0 };
-        let corridor_blocks = [block([20.0, 1.1], [40.0, 2.2]), block([20.0, 8.9], [40.0, 2.2])];
-        let near = |a: &Block, b: &Block| {
+        fn block(at: [f64; 2], size_m: [f64; 2]) -> Block {
+            Block { at, size_m, heading_deg: 0.0 }
+        }
+
+        fn near(a: &Block, b: &Block) -> bool {
             distance_m(a.at, b.at) < 1e-9 && distance_m(a.size_m, b.size_m) < 1e-9
-        };
+        }
+
+        let corridor = scene("corridor", 4, 1);
+        let corridor_blocks = [block([20.0, 1.1], [40.0, 2.2]), block([20.0, 8.9], [40.0, 2.2])];
         assert!(corridor.blocks.iter().zip(&corridor_blocks).all(|(a, b)| near(a, b)));
         assert!(distance_m(corridor.robot.start, [6.7, 5.0]) < 1e-9);
         let crossing = scene("crossing", 2, 1);

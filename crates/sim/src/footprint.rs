@@ -111,7 +111,10 @@ mod tests {
 
     #[test]
     fn distances_are_those_to_the_nearest_edge() {
-        let distance = |x: f64, y: f64| signed_distance(&LONG, &Point2::new(x, y));
+        fn distance(x: f64, y: f64) -> f64 {
+            signed_distance(&LONG, &Point2::new(x, y))
+        }
+
         for (x, y, expected) in [
             (0.9, 0.0, 0.5),
             (-0.3, 0.1, 0.2),
@@ -144,10 +147,10 @@ mod tests {
 
     #[test]
     fn a_bumper_is_pressed_within_its_arc() {
-        let gap = |bearing_deg: f64, distance_m| Gap {
-            bearing_rad: f64::to_radians(bearing_deg),
-            distance_m,
-        };
+        fn gap(bearing_deg: f64, distance_m: f64) -> Gap {
+            Gap { bearing_rad: f64::to_radians(bearing_deg), distance_m }
+        }
+
         let front = [-60.0, 60.0];
         assert!(gap(0.0, 0.01).presses(front) && gap(-59.0, -0.1).presses(front));
         assert!(!gap(0.0, 0.05).presses(front) && !gap(61.0, 0.0).presses(front));

@@ -159,21 +159,25 @@ mod tests {
 
     /// Balls of half a metre at these places.
     fn world(places: &[[f64; 2]]) -> World {
-        let ball = |at: &[f64; 2]| {
+        fn ball(at: &[f64; 2]) -> Shape {
             let form = Form::Ellipsoid(Vector3::repeat(0.5));
             let at = Point3::new(at[0], at[1], 0.2);
             Shape::new(form, at, Rotation3::identity(), Material::plain([0.5; 3]))
-        };
+        }
+
         let objects = vec![Object::new(places.iter().map(ball).collect(), Some(1), true)];
         World::new(&Arc::new(Stage::new(objects, Vec::new(), 100.0)), Vec::new())
     }
 
     #[test]
     fn rays_go_round_the_robot_and_meet_what_is_nearest() {
+        fn near(range: f32, metres: f32) -> bool {
+            (range - metres).abs() < 1e-5
+        }
+
         let world = world(&[[3.0, 1.0], [5.0, 1.0], [1.0, 4.0], [0.3, 1.0]]);
         let robot = Isometry3::translation(1.0, 1.0, 0.0);
         let ranges = FOUR.measure(&world, &robot, 1);
-        let near = |range: f32, metres: f32| (range - metres).abs() < 1e-5;
         assert!(ranges[0].is_nan(), "behind, something is too near: {ranges:?}");
         assert_eq!(ranges[1], f32::INFINITY, "nothing to the right");
         assert!(near(ranges[2], 1.5) && near(ranges[3], 2.5), "ahead and left: {ranges:?}");

@@ -405,12 +405,13 @@ mod tests {
 
     #[test]
     fn the_log_is_mistaken_about_the_cone_by_little_and_otherwise_for_each_seed() {
-        let off_deg = |seed| {
-            let settings = CameraSettings { mirror: MirrorSettings::default(), ..settings() };
-            let camera = MirrorCamera::new(&settings, &mut Random::new(seed, 1));
-            (camera.panorama.mirror.half_angle_rad - camera.mirror.half_angle_rad).to_degrees()
-        };
-        let all: Vec<f64> = (0..400).map(off_deg).collect();
+        let all: Vec<f64> = (0..400)
+            .map(|seed| {
+                let settings = CameraSettings { mirror: MirrorSettings::default(), ..settings() };
+                let camera = MirrorCamera::new(&settings, &mut Random::new(seed, 1));
+                (camera.panorama.mirror.half_angle_rad - camera.mirror.half_angle_rad).to_degrees()
+            })
+            .collect();
         let deviation = (all.iter().map(|off| off * off).sum::<f64>() / 400.0).sqrt();
         assert!((0.08..0.11).contains(&deviation), "{deviation}");
         assert!(all.iter().all(|off| off.abs() < 0.201));

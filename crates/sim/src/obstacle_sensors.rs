@@ -434,7 +434,10 @@ mod tests {
 
     #[test]
     fn sensors_without_a_name_or_with_the_same_are_refused() {
-        let refused = |text: &str| Scene::parse(text).unwrap_err().to_string();
+        fn refused(text: &str) -> String {
+            Scene::parse(text).unwrap_err().to_string()
+        }
+
         assert!(refused("[[ranges]]\n").contains("needs a name"));
         let twice = "[[ranges]]\nname = \"front\"\n[[bumpers]]\nname = \"front\"\n";
         assert!(refused(twice).contains("are called `front`"));

@@ -394,11 +394,17 @@ mod tests {
 
     #[test]
     fn a_poncho_fills_the_sides_and_a_laptop_is_before_the_chest() {
+        fn hip(extras: &[Extra]) -> Option<Material> {
+            met(extras, [0.2, 0.5]).map(|(_, shape)| shape.material)
+        }
+
+        fn chest(extras: &[Extra]) -> (f64, Shape) {
+            met(extras, [0.0, 0.76]).unwrap()
+        }
+
         let top = Person::subject(3).look.top;
-        let hip = |extras: &[Extra]| met(extras, [0.2, 0.5]).map(|(_, shape)| shape.material);
         assert_ne!(hip(&[]), Some(top), "hands and trousers");
         assert_eq!(hip(&[Extra::Poncho]), Some(top));
-        let chest = |extras: &[Extra]| met(extras, [0.0, 0.76]).unwrap();
         let ((bare, _), (held, screen)) = (chest(&[]), chest(&[Extra::Laptop]));
         assert!(bare - held > 0.15, "{bare} {held}");
         assert!(screen.material.infrared < 0.05, "glass");

@@ -80,7 +80,10 @@ mod tests {
 
     #[test]
     fn streams_differ_and_repeat() {
-        let draw = |stream| Random::new(3, stream).uniform();
+        fn draw(stream: u64) -> f64 {
+            Random::new(3, stream).uniform()
+        }
+
         assert_eq!(draw(1), draw(1));
         assert_ne!(draw(1), draw(2));
     }

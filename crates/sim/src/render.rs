@@ -304,12 +304,15 @@ mod tests {
 
     #[test]
     fn every_strip_is_seen_from_where_the_robot_is_then() {
+        fn pose(part: f64) -> Isometry3<f64> {
+            Isometry3::rotation(Vector3::z() * 0.2 * part)
+        }
+
         let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 23.5, cy: 17.0, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 50, 40, 0.2, 0.0, 0.0);
         let balls = [-0.4, 0.5].map(|y| shape(0, [1.2, y, 0.2], 0.3));
         let balls = vec![Object::new(balls.to_vec(), None, true)];
         let world = World::new(&Arc::new(Stage::new(balls, vec![], 100.0)), vec![]);
-        let pose = |part: f64| Isometry3::rotation(Vector3::z() * 0.2 * part);
         let rolling =
             WorldCamera { world: &world, camera: &camera, pose: &pose, lit: true }.draw(2);
         for (rows, part) in [(0..16, 0.2), (16..32, 0.6), (32..40, 0.9)] {

@@ -283,8 +283,11 @@ mod tests {
 
     #[test]
     fn it_comes_after_who_walks_ahead_and_stays_away() {
+        fn leader(step: usize) -> Point2<f64> {
+            Point2::new(3.0, 3.0 + (0.008 * step as f64).min(4.0))
+        }
+
         let mut robot = robot(RobotSettings { behind_m: 1.5, ..RobotSettings::default() });
-        let leader = |step: usize| Point2::new(3.0, 3.0 + (0.008 * step as f64).min(4.0));
         for step in 0..1500 {
             robot.decide(step as f64 * 0.02, Some(leader(step)));
             robot.step(step as f64 * 0.02, 0.02);

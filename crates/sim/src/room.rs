@@ -603,6 +603,14 @@ mod tests {
 
     #[test]
     fn what_looks_like_people_looks_different_each_time() {
+        fn is_sane((form, z): &(Form, f64)) -> bool {
+            let sizes = match *form {
+                Form::Ellipsoid(half) | Form::Block(half) => half,
+                Form::Capsule { length, first, second } => Vector3::new(length, first, second),
+            };
+            sizes.min() > 0.0 && sizes.max() < 3.0 && (-0.2..2.1).contains(z)
+        }
+
         use FurnitureKind as K;
         let kinds = [
             K::CoatStand,
@@ -622,13 +630,6 @@ mod tests {
             for (i, one) in all.iter().enumerate() {
                 assert!(!all[..i].contains(one), "{kind:?}");
             }
-            let is_sane = |(form, z): &(Form, f64)| {
-                let sizes = match *form {
-                    Form::Ellipsoid(half) | Form::Block(half) => half,
-                    Form::Capsule { length, first, second } => Vector3::new(length, first, second),
-                };
-                sizes.min() > 0.0 && sizes.max() < 3.0 && (-0.2..2.1).contains(z)
-            };
             assert!(all.iter().flatten().all(is_sane), "{kind:?}");
         }
         let parts = |kind| (0..20).map(|seed| forms(kind, seed).len()).collect::<Vec<_>>();
@@ -656,13 +657,14 @@ mod tests {
 
     #[test]
     fn an_open_door_can_be_looked_through() {
-        let ray = |open_door| {
+        fn ray(open_door: bool) -> f64 {
             let settings = RoomSettings { open_door, ..RoomSettings::default() };
             let eye = Point3::new(4.0, 0.3 * settings.size_m[1], 1.0);
             let hits = room(&settings);
             let hits = hits.shapes.iter().filter_map(|s| s.meet(&eye, &Vector3::x()));
             hits.fold(f64::INFINITY, f64::min)
-        };
+        }
+
         assert!(
             (ray(false) - 4.97).abs() < 0.01 && (ray(true) - 6.9).abs() < 0.02,
             "{}",

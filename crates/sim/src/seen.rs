@@ -215,12 +215,14 @@ fn enter_ball(start: &Vector3<f64>, step: &Vector3<f64>, tangent2: f64) -> f64 {
 /// Slabs: Kay & Kajiya 1986.
 #[inline(always)]
 fn enter_block(start: &Vector3<f64>, step: &Vector3<f64>) -> f64 {
-    let along = |start: f64, step: f64| {
+    #[inline(always)]
+    fn along(start: f64, step: f64) -> (f64, f64) {
         let inverse = 1.0 / step;
         let a = (-1.0 - start) * inverse;
         let b = (1.0 - start) * inverse;
         (a.min(b), a.max(b))
-    };
+    }
+
     let x = along(start.x, step.x);
     let y = along(start.y, step.y);
     let z = along(start.z, step.z);

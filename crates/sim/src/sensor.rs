@@ -395,10 +395,11 @@ mod tests {
 
     #[test]
     fn near_far_and_black_things_are_not_seen() {
-        let holes = |hit: Hit| {
+        fn holes(hit: Hit) -> usize {
             let depth = SENSOR.measure(&Image::filled(40, 40, hit), 3, 2);
             depth.pixels().iter().filter(|d| d.is_nan()).count()
-        };
+        }
+
         assert_eq!(holes(wall(2.0, 0.6)), 0);
         assert_eq!((holes(wall(0.4, 0.6)), holes(wall(9.0, 0.9))), (1600, 1600));
         assert!(holes(wall(4.0, 0.03)) > 1500);

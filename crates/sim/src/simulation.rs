@@ -465,8 +465,9 @@ impl Simulation {
             people.push(Object::new(shapes, Some(id), true));
             uppers.push(upper);
         }
-        let floor = |one: &Approacher| self.scene.room.floor_m(&one.place);
-        people.extend(self.trolleys().map(|trolley| trolley.trolley(floor(trolley))));
+        people.extend(
+            self.trolleys().map(|trolley| trolley.trolley(self.scene.room.floor_m(&trolley.place))),
+        );
         (World::new(&self.stage, people), uppers)
     }
 

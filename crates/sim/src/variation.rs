@@ -160,8 +160,9 @@ impl Change {
         table: &'r mut DeTable<'a>,
         key: &'a str,
     ) -> &'r mut Spanned<DeValue<'a>> {
-        let empty = || Spanned::new(self.span.clone(), DeValue::Table(DeTable::new()));
-        table.entry(Spanned::new(self.span.clone(), key.into())).or_insert_with(empty)
+        table
+            .entry(Spanned::new(self.span.clone(), key.into()))
+            .or_insert_with(|| Spanned::new(self.span.clone(), DeValue::Table(DeTable::new())))
     }
 
     fn item<'a, 'r>(
@@ -313,12 +314,13 @@ impl Rule {
     /// The copy of another value, if that is the rule.
     fn copy(&self, root: &DeTable<'_>) -> Result<Option<Change>, ConfigError> {
         let Source::SameAs(other) = &self.source else { return Ok(None) };
-        let missing = || {
-            let message =
-                format!("`{}` cannot be the same as `{other}`: it is not there", self.key);
-            ConfigError { message, span: Some(self.span.clone()) }
-        };
-        let value = find(root, other).ok_or_else(missing)?.clone();
+        let value = find(root, other)
+            .ok_or_else(|| {
+                let message =
+                    format!("`{}` cannot be the same as `{other}`: it is not there", self.key);
+                ConfigError { message, span: Some(self.span.clone()) }
+            })?
+            .clone();
         let value = toml::Value::deserialize(ValueDeserializer::from(value))?.to_string();
         Ok(Some(Change { key: self.key.clone(), value, span: self.span.clone() }))
     }
@@ -355,10 +357,13 @@ impl Written {
 }
 
 fn range(low: &toml::Value, high: &toml::Value) -> Option<Source> {
+    fn number(v: &toml::Value) -> Option<f64> {
+        v.as_float().or_else(|| v.as_integer().map(|i| i as f64))
+    }
+
     if let (Some(low), Some(high)) = (low.as_integer(), high.as_integer()) {
         return Some(Source::Whole(low, high));
     }
-    let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
     Some(Source::Between(number(low)?, number(high)?))
 }
 

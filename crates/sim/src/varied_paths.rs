@@ -161,7 +161,10 @@ offset = [0.1, 0.2]
 
     #[test]
     fn half_of_the_seeds_are_mirrored_as_a_whole() {
-        let is_mirrored = |scene: &Scene| scene.robot.start == [1.0, 8.0];
+        fn is_mirrored(scene: &Scene) -> bool {
+            scene.robot.start == [1.0, 8.0]
+        }
+
         let all: Vec<Scene> = (0..100).map(|k| scene(Split::Test, k, 0.0, true)).collect();
         let mirrored = all.iter().filter(|scene| is_mirrored(scene)).count();
         assert!((35..=65).contains(&mirrored), "{mirrored}");

@@ -303,12 +303,13 @@ fn meet<'a>(
     ray: &Vector3<f64>,
 ) -> Option<(f64, Option<u16>, &'a Shape)> {
     let per_length = 1.0 / ray.norm_squared();
-    let meet = |(person, shape): (Option<u16>, &'a Shape)| {
-        // The bounding ball is cheap, and most solids miss most rays.
-        let near = shape.near(eye, ray, per_length);
-        Some((near.then(|| shape.meet(eye, ray)).flatten()?, person, shape))
-    };
-    solids.filter_map(meet).min_by(|a, b| a.0.total_cmp(&b.0))
+    solids
+        .filter_map(|(person, shape)| {
+            // The bounding ball is cheap, and most solids miss most rays.
+            let near = shape.near(eye, ray, per_length);
+            Some((near.then(|| shape.meet(eye, ray)).flatten()?, person, shape))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// Returns the direction of a ray after a mirror with this normal.

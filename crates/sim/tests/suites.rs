@@ -7,10 +7,13 @@ use std::path::PathBuf;
 use tagalong_sim::{ApproachBy, CameraKind, Event, Scene, Shot, Simulation, Split, Variant};
 
 fn suites() -> Vec<(String, String)> {
+    fn name(path: &PathBuf) -> String {
+        path.file_stem().unwrap().to_string_lossy().into_owned()
+    }
+
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../configs/scenes");
     let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
     paths.sort();
-    let name = |path: &PathBuf| path.file_stem().unwrap().to_string_lossy().into_owned();
     paths.iter().map(|path| (name(path), fs::read_to_string(path).unwrap())).collect()
 }
 

@@ -13,7 +13,6 @@
 //! ```
 
 mod gallery;
-mod realism;
 mod record;
 pub mod sample;
 pub mod scenes;
@@ -31,19 +30,16 @@ use tagalong_app::format::Format;
 use tagalong_app::outcome::{CUT_SHORT, Ended, Failure, Outcome, make_room_for, print, say, spare};
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
-use tagalong_config::{FileLimit, PathText, Registry, nearest, read_text};
+use tagalong_config::{FileLimit, PathText, nearest, read_text};
 use tagalong_log::write::WriteError;
 use tagalong_math::counted;
 use tagalong_sim::{Event, Scene, Simulation, Split, Variant};
-
-use crate::realism::realism;
 
 /// Arguments of `tagalong simulate`.
 #[derive(Args, Debug)]
 pub struct SimulateArgs {
     /// The scene, a TOML file.
-    #[arg(required_unless_present = "realism")]
-    pub scene: Option<PathBuf>,
+    pub scene: PathBuf,
     /// The log to write [default: runs/SCENE.mcap].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
@@ -62,13 +58,6 @@ pub struct SimulateArgs {
     /// Threads that render; the log is the same [default: as many as there are].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub threads: Option<u8>,
-    /// Simulate no scene, but check how realistic simulated worlds are, and print it.
-    #[arg(long, conflicts_with_all = ["scene", "output", "gallery", "seed", "split", "set", "threads"])]
-    pub realism: bool,
-    /// Random variants of each random scene of the checks.
-    #[arg(long, value_name = "N", default_value_t = 8, requires = "realism",
-          value_parser = clap::value_parser!(u64).range(1..=1000))]
-    pub seeds: u64,
     /// Replace the log if it is there.
     #[arg(long)]
     pub overwrite: bool,
@@ -82,8 +71,8 @@ pub struct SimulateArgs {
 /// # Errors
 /// A scene that cannot be read or is wrong, and an output path that cannot be written, are exit
 /// code 2; a disk that fails is 1.
-pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
-    let Some(path) = &args.scene else { return realism(registry, args.seeds, args.format) };
+pub fn simulate(args: &SimulateArgs) -> Outcome {
+    let path = &args.scene;
     let variant = Variant { seed: args.seed, split: args.split, set: args.set.clone() };
     let scene = read(path, &variant)?;
     let simulation = Simulation::new(&scene, threads(args.threads));
@@ -101,8 +90,8 @@ pub fn simulate(args: &SimulateArgs, registry: &Registry) -> Outcome {
 
 fn write(simulation: Simulation, scene: &Scene, log: &Path, format: Format) -> Outcome {
     let signals = Signals::listen()?;
-    let goes_on = || signals.received().is_none();
-    let images = record(simulation, scene, log, &goes_on).map_err(Failure::failed)?;
+    let images = record(simulation, scene, log, &|| signals.received().is_none())
+        .map_err(Failure::failed)?;
     if let Some(signal) = signals.received() {
         say(CUT_SHORT);
         return Ok(Ended::BySignal(signal));
@@ -263,17 +252,11 @@ mod tests {
 
     #[test]
     fn injected_faults_are_in_the_log() {
-        let depth = |frame: &LogFrame| -> Vec<u32> {
+        fn depth(frame: &LogFrame) -> Vec<u32> {
             frame.frame.depth().unwrap().pixels().iter().map(|z| z.to_bits()).collect()
-        };
-        let frozen = logged(FaultKind::FreezeDepth);
-        let first = depth(&within(&frozen)[0]);
-        assert_eq!(within(&frozen).len(), 20);
-        assert!(within(&frozen).iter().all(|frame| depth(frame) == first));
-        assert!(depth(&frozen[45]) != depth(&frozen[46]));
+        }
 
-        let blank = logged(FaultKind::BlankDepth);
-        let is_dark = |frame: &LogFrame, column: usize| {
+        fn is_dark(frame: &LogFrame, column: usize) -> bool {
             frame
                 .frame
                 .depth()
@@ -283,7 +266,15 @@ mod tests {
                 .skip(column)
                 .step_by(64)
                 .all(|z| z.is_nan())
-        };
+        }
+
+        let frozen = logged(FaultKind::FreezeDepth);
+        let first = depth(&within(&frozen)[0]);
+        assert_eq!(within(&frozen).len(), 20);
+        assert!(within(&frozen).iter().all(|frame| depth(frame) == first));
+        assert!(depth(&frozen[45]) != depth(&frozen[46]));
+
+        let blank = logged(FaultKind::BlankDepth);
         assert!(within(&blank).iter().all(|frame| (0..64).all(|column| is_dark(frame, column))));
         let dark = logged(FaultKind::DarkColumns);
         for frame in within(&dark) {
@@ -348,8 +339,9 @@ mod tests {
             assert!(off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-9);
             let a = logged.frame.depth().unwrap();
             let b = drawn.depth().unwrap();
-            let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
-            assert!(a.pixels().iter().zip(b.pixels()).all(same));
+            assert!(
+                a.pixels().iter().zip(b.pixels()).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
+            );
             let a = &logged.frame.laser().unwrap().points;
             let b = &drawn.laser().unwrap().points;
             assert_eq!(a.len(), b.len());

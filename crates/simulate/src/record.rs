@@ -303,12 +303,16 @@ fn millimetres(depth_m: f32) -> [u8; 2] {
 
 /// Returns static transforms to sensors from the frame of their poses.
 fn mount(parent: &str, sensors: impl IntoIterator<Item = (String, Isometry3<f64>)>) -> TFMessage {
-    let transform = |(child_frame_id, pose): (String, Isometry3<f64>)| TransformStamped {
-        header: Header::new(EPOCH, parent),
-        child_frame_id,
-        transform: (&pose).into(),
-    };
-    TFMessage { transforms: sensors.into_iter().map(transform).collect() }
+    TFMessage {
+        transforms: sensors
+            .into_iter()
+            .map(|(child_frame_id, pose)| TransformStamped {
+                header: Header::new(EPOCH, parent),
+                child_frame_id,
+                transform: (&pose).into(),
+            })
+            .collect(),
+    }
 }
 
 fn range(header: Header, kind: RangeKind, reading: &RangeReading) -> Range {
@@ -375,24 +379,33 @@ fn command(reading: &OdometryReading) -> TwistStamped {
 }
 
 fn truth(captured: Stamp, people: &[Truth]) -> TruthFrame {
-    let corners = |rect: Rect| [rect.x, rect.y, rect.width, rect.height];
-    let person = |truth: &Truth| TruthPerson {
-        id: i64::from(truth.id),
-        head_in_robot_m: Some(truth.head_in_robot.coords.into()),
-        torso_in_robot_m: Some(truth.torso_in_robot.coords.into()),
-        upper_body_px: truth.upper_body.map(corners),
-        visible_px: truth.visible.map(corners),
-        visible: truth.visible_fraction,
-        occluder: truth.occluder.map(i64::from),
-        ignore: truth.ignore,
-        joints: truth.joints.iter().map(joint).collect(),
-    };
+    fn corners(rect: Rect) -> [f64; 4] {
+        [rect.x, rect.y, rect.width, rect.height]
+    }
+
+    fn person(truth: &Truth) -> TruthPerson {
+        TruthPerson {
+            id: i64::from(truth.id),
+            head_in_robot_m: Some(truth.head_in_robot.coords.into()),
+            torso_in_robot_m: Some(truth.torso_in_robot.coords.into()),
+            upper_body_px: truth.upper_body.map(corners),
+            visible_px: truth.visible.map(corners),
+            visible: truth.visible_fraction,
+            occluder: truth.occluder.map(i64::from),
+            ignore: truth.ignore,
+            joints: truth.joints.iter().map(joint).collect(),
+        }
+    }
+
     TruthFrame { stamp_ns: captured.nanos(), people: people.iter().map(person).collect() }
 }
 
 fn joint(joint: &Joint) -> (String, TruthJoint) {
     // A tenth of a millimetre and of a pixel: all digits would be most of a log without colour.
-    let rounded = |value: f64, parts: f64| (value * parts).round() / parts;
+    fn rounded(value: f64, parts: f64) -> f64 {
+        (value * parts).round() / parts
+    }
+
     let in_robot_m = <[f64; 3]>::from(joint.in_robot.coords).map(|m| rounded(m, 1e4));
     let px = joint.pixel.map(|pixel| [pixel.x, pixel.y].map(|px| rounded(px, 10.0)));
     (joint.name.into(), TruthJoint { in_robot_m, px, in_sight: joint.in_sight })

@@ -166,7 +166,10 @@ fn count_up(image: &GreyImage, of: impl Fn(u8) -> u32) -> u64 {
 /// Returns true if one image is so much brighter that semi-global matching, which also compares
 /// brightness, does worse.
 fn are_unequal(left: &GreyImage, right: &GreyImage) -> bool {
-    let sum = |image: &GreyImage| count_up(image, u32::from);
+    fn sum(image: &GreyImage) -> u64 {
+        count_up(image, u32::from)
+    }
+
     let left = sum(left) as f64;
     let right = sum(right) as f64;
     left.max(right) > MAX_RATIO * left.min(right)
@@ -178,10 +181,11 @@ fn unusable(
     right: &GreyImage,
     rectification: &Rectification,
 ) -> Option<&'static str> {
-    let range = |image: &GreyImage| {
+    fn range(image: &GreyImage) -> (u8, u8) {
         let pixels = image.pixels().iter();
         pixels.fold((u8::MAX, 0), |(low, high), p| (low.min(*p), high.max(*p)))
-    };
+    }
+
     let bright = |image: &GreyImage| {
         let bright = count_up(image, |p| u32::from(p >= SATURATED));
         bright as f64 > MAX_SATURATED * image.pixels().len() as f64

@@ -54,10 +54,13 @@ impl Level {
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn slopes(sides: [(&[u8], &[u8]); 3], slopes: &mut [u8]) {
+    fn rise(left: u8, right: u8) -> i16 {
+        i16::from(right).wrapping_sub(i16::from(left))
+    }
+
     let width = slopes.len();
     let [(a, b), (c, d), (e, f)] = sides.map(|(left, right)| (&left[..width], &right[..width]));
     for x in 0..width {
-        let rise = |left: u8, right: u8| i16::from(right).wrapping_sub(i16::from(left));
         let sum = rise(a[x], b[x]).wrapping_add(rise(e[x], f[x]));
         let sum = sum.wrapping_add(rise(c[x], d[x]).wrapping_mul(2));
         slopes[x] = (128 + (sum >> 1)).clamp(0, 255) as u8;

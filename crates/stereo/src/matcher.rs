@@ -181,9 +181,11 @@ pub(crate) fn size_error(left: &GreyImage, right: &GreyImage) -> Option<Error> {
 /// disparity is likely where the image has an edge (equation 14 of the paper).
 fn penalties(settings: &StereoSettings) -> Penalties {
     let StereoSettings { small_penalty, large_penalty, edge_penalty, .. } = *settings;
-    let at = |difference: usize| {
-        let lower = f64::from(large_penalty) * 8.0 / (difference.max(8) as f64);
-        (lower as u8).max(edge_penalty)
-    };
-    Penalties { small: small_penalty, large: std::array::from_fn(at) }
+    Penalties {
+        small: small_penalty,
+        large: std::array::from_fn(|difference| {
+            let lower = f64::from(large_penalty) * 8.0 / (difference.max(8) as f64);
+            (lower as u8).max(edge_penalty)
+        }),
+    }
 }

@@ -125,11 +125,12 @@ fn find(left: &GreyImage, right: &GreyImage, (x, y): (usize, usize), reach: i32)
 
 /// Returns the mean difference of two patches, apart from their mean brightness.
 fn difference(a: &GreyImage, b: &GreyImage, at_a: (usize, usize), at_b: (usize, usize)) -> f32 {
-    const SIDE: usize = 2 * RADIUS + 1;
-    let rows = |image: &GreyImage, (x, y): (usize, usize), row: usize| -> [i32; SIDE] {
+    fn rows(image: &GreyImage, (x, y): (usize, usize), row: usize) -> [i32; SIDE] {
         let row = &image.row(y + row - RADIUS)[x - RADIUS..];
         std::array::from_fn(|i| i32::from(row[i]))
-    };
+    }
+
+    const SIDE: usize = 2 * RADIUS + 1;
     let mut differences = [[0_i32; SIDE]; SIDE];
     for (row, line) in differences.iter_mut().enumerate() {
         let a = rows(a, at_a, row);

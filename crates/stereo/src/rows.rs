@@ -28,7 +28,10 @@ impl Rows {
     /// Returns the values `dx` columns right of and `dy` rows below the row's pixels, each at most
     /// 2; more values follow after the last pixel's.
     pub fn from(&self, dx: i32, dy: i32) -> &[u8] {
-        let at = |offset: i32| (REACH as i32 + offset) as usize;
+        fn at(offset: i32) -> usize {
+            (REACH as i32 + offset) as usize
+        }
+
         &self.padded[at(dy)][at(dx)..]
     }
 }

@@ -135,8 +135,14 @@ fn limit(row: &mut [f32], before: &[f32], behind: &[f32]) -> u32 {
 /// first and the last column have a neighbour on one side only.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn find_textured(rows: [&[u8]; 3], least: u8, textured: &mut [u32]) {
-    let rise = |a: u8, b: u8| i16::from(b).wrapping_sub(i16::from(a));
-    let slope = |[a, b, c]: [i16; 3]| a.wrapping_add(b.wrapping_mul(2)).wrapping_add(c).abs() / 2;
+    fn rise(a: u8, b: u8) -> i16 {
+        i16::from(b).wrapping_sub(i16::from(a))
+    }
+
+    fn slope([a, b, c]: [i16; 3]) -> i16 {
+        a.wrapping_add(b.wrapping_mul(2)).wrapping_add(c).abs() / 2
+    }
+
     let mask = |slope: i16| if slope >= i16::from(least) { u32::MAX } else { 0 };
     let last = textured.len() - 1;
     for (x, from, to) in [(0, 0, 1.min(last)), (last, last.saturating_sub(1), last)] {

@@ -60,7 +60,10 @@ fn the_examples_find_the_people() {
 
 #[test]
 fn a_log_gives_the_same_tracks_each_time() {
-    let run = || tracks(&people(), &mut Pipeline::builtin("depth-ekf").unwrap()).unwrap();
+    fn run() -> Vec<String> {
+        tracks(&people(), &mut Pipeline::builtin("depth-ekf").unwrap()).unwrap()
+    }
+
     let first = run();
     assert!(first.len() > 20, "{}", first.len());
     assert_eq!(first, run());
@@ -68,7 +71,10 @@ fn a_log_gives_the_same_tracks_each_time() {
 
 #[test]
 fn the_input_of_the_config_reaches_the_reader() {
-    let config = |line: &str| format!("extends = \"depth-ekf.toml\"\n[input]\n{line}\n");
+    fn config(line: &str) -> String {
+        format!("extends = \"depth-ekf.toml\"\n[input]\n{line}\n")
+    }
+
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../pipeline/configs");
     let registry = builtin_registry();
     let frames = |line: &str| {

@@ -141,7 +141,10 @@ mod tests {
 
     #[test]
     fn people_enter_at_the_lower_border_and_not_at_the_upper_one() {
-        let of = |y: f64| births_per_m2(&detection(270.0, y), &camera(), &SETTINGS);
+        fn of(y: f64) -> f64 {
+            births_per_m2(&detection(270.0, y), &camera(), &SETTINGS)
+        }
+
         assert_eq!([of(0.0), of(100.0), of(375.0)], [0.05, 0.05, 0.2]);
     }
 

@@ -270,26 +270,30 @@ mod tests {
 
     #[test]
     fn two_people_one_behind_the_other_are_two_unless_their_range_is_unknown() {
+        fn vague(d: Detection) -> Detection {
+            Detection { covariance: Matrix3::identity() * 4.0, ..d }
+        }
+
         let settings = MergeSettings::default();
         let near = person(3.0, 0.0);
         let far = person(3.6, 0.0);
         assert!(near.rect().unwrap().iou(&far.rect().unwrap()) > settings.same_person_iou);
         assert!(!is_same_person(&near, &far, &settings));
-        let vague = |d: Detection| Detection { covariance: Matrix3::identity() * 4.0, ..d };
         assert!(is_same_person(&vague(near), &vague(far), &settings));
     }
 
     #[test]
     fn detections_at_one_place_are_of_one_person_whatever_the_image_says() {
-        let settings = MergeSettings::default();
-        let at = |x: f64, y: f64, region_x: f64| {
+        fn at(x: f64, y: f64, region_x: f64) -> Detection {
             let region = Rect::new(region_x, 0.0, 100.0, 100.0);
             Detection {
                 image: Some(ImageBox::upper_body(region)),
                 covariance: Matrix3::identity() * 0.02,
                 ..person(x, y)
             }
-        };
+        }
+
+        let settings = MergeSettings::default();
         let first = at(3.0, 0.0, 0.0);
         assert!(is_same_person(&first, &at(3.0, 0.24, 500.0), &settings));
         assert!(!is_same_person(&first, &at(3.0, 0.26, 500.0), &settings));
@@ -335,10 +339,13 @@ mod tests {
     /// Track 7 has two alternatives; track 9 shares the second one, and the third is spent.
     #[test]
     fn a_detection_goes_to_the_track_that_it_is_most_probably_of() {
+        fn pair(track: usize, detection: usize, weight: f64) -> Association {
+            Association { track, detection, weight }
+        }
+
         let mut set = DetectionSet::default();
         let detections = [person(2.0, 0.0), person(3.0, 0.0), person(4.0, 0.0), person(5.0, 0.0)];
         set.add(detections.map(|detection| PendingDetection::new(detection, 0, true)));
-        let pair = |track, detection, weight| Association { track, detection, weight };
         let pairs = vec![pair(0, 0, 0.6), pair(0, 1, 0.3), pair(1, 1, 0.5)];
         let answer = Associations { pairs, spent: vec![2] };
         set.take_over(&answer, &tracks(&[7, 9]), &[0, 1, 2, 3]);

@@ -249,9 +249,12 @@ mod tests {
             boxes in prop::collection::vec(
                 (prop::array::uniform2(-200.0..800.0f64), 0.0..300.0f64, 0.5..9.0f64), 1..9),
         ) {
+            fn at(ahead_m: f64) -> Point3<f64> {
+                Point3::new(ahead_m, 0.0, 1.2)
+            }
+
             let camera = camera();
             let region = |([x, y], side, _): &([f64; 2], f64, f64)| Rect::new(*x, *y, *side, *side);
-            let at = |ahead_m: f64| Point3::new(ahead_m, 0.0, 1.2);
             let mut occluders: Vec<Occluder> = Vec::new();
             for b in &boxes[1..] {
                 occluders.push(Occluder::new(region(b), &at(b.2), &Matrix3::zeros(), &camera));
@@ -413,10 +416,11 @@ mod tests {
 
     #[test]
     fn who_hides_somebody_is_nearer_by_a_gap() {
-        let hides = |gap_m: f64, sigma_m: f64| {
+        fn hides(gap_m: f64, sigma_m: f64) -> bool {
             let near = Point3::new(2.0, 0.0, 1.2);
             behind(near, sigma_m, Point3::new(2.0 + gap_m, 0.0, 1.2)) == Visibility::Hidden
-        };
+        }
+
         assert!(hides(0.31, 0.0) && !hides(0.29, 0.0), "0.3 m");
         assert!(hides(0.61, 0.2) && !hides(0.59, 0.2), "three standard deviations");
     }

@@ -175,8 +175,11 @@ mod tests {
     }
 
     fn columns(candidates: &[Candidate]) -> Vec<(u32, f64)> {
+        fn column(joints: &Joints) -> f64 {
+            joints.upper_body_middle().map_or(0.0, |at| at.x)
+        }
+
         let found = joints_of(candidates);
-        let column = |joints: &Joints| joints.upper_body_middle().map_or(0.0, |at| at.x);
         found.iter().map(|(track, joints)| (track.0, column(joints))).collect()
     }
 

@@ -179,15 +179,18 @@ mod tests {
         }
 
         fn detect(&mut self, _: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
-            let detection = |score: &f64| {
-                Detection::new(
-                    "test",
-                    Point3::new(3.0, 0.0, 1.6),
-                    Matrix3::identity() * 0.01,
-                    *score,
-                )
-            };
-            Ok(self.0.iter().map(detection).collect())
+            Ok(self
+                .0
+                .iter()
+                .map(|score| {
+                    Detection::new(
+                        "test",
+                        Point3::new(3.0, 0.0, 1.6),
+                        Matrix3::identity() * 0.01,
+                        *score,
+                    )
+                })
+                .collect())
         }
     }
 
@@ -227,10 +230,15 @@ mod tests {
             requires_box: false,
             shared: None,
         };
-        let too_sure =
-            |found: &PendingDetection| Ok((found.detection.score > 8.0).then_some("sure"));
-        let (best, dropped) =
-            stage.find_track(&frame, &[0, 1], &track(), too_sure, &mut Funnel::default()).unwrap();
+        let (best, dropped) = stage
+            .find_track(
+                &frame,
+                &[0, 1],
+                &track(),
+                |found| Ok((found.detection.score > 8.0).then_some("sure")),
+                &mut Funnel::default(),
+            )
+            .unwrap();
         assert_eq!(best.unwrap().detection.score, 3.0);
         let dropped: Vec<(f64, Option<Fate>)> =
             dropped.into_iter().map(|one| (one.detection.score, one.fate)).collect();

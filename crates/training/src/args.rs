@@ -19,6 +19,10 @@ pub struct TrainArgs {
     /// configs/models/PLUGIN.toml].
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// Folder of the models that have not seen a room, PLUGIN.without-ROOM.toml; without it, they are
+    /// written beside the model.
+    #[arg(long, value_name = "DIR")]
+    pub left_out: Option<PathBuf>,
     /// A folder of real data (logs, people, negatives); without it, only simulated rooms are used.
     #[arg(long, value_name = "DIR")]
     pub data: Option<PathBuf>,

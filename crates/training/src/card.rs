@@ -143,7 +143,10 @@ impl WindowCard {
 }
 
 fn line(share: Share) -> String {
-    let percent = |fraction: f64| format!("{:.1}", 100.0 * fraction);
+    fn percent(fraction: f64) -> String {
+        format!("{:.1}", 100.0 * fraction)
+    }
+
     let fraction = share.count as f64 / share.of.max(1) as f64;
     format!(
         "{} of {} ({} %, 95 % interval {} to {})",

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point2, Point3};
-use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, write_file};
+use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, write_file};
 use tagalong_app::serialize::to_toml;
 use tagalong_app::threads::threads;
 use tagalong_config::{AnnotatedPerson, FileLimit, Trainer, read_text};
@@ -60,7 +60,7 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     let path = session.model.with_extension("card.toml");
     let card = card(args, scenes, &fitted.figures)?;
     write_file(&path, &card)?;
-    write_left_out(&session.model, &fitted.without)?;
+    write_left_out(session, &fitted.without)?;
     print(&card)?;
     say(&format!("{} and {}", session.model.display(), path.display()));
     Ok(Ended::Well)
@@ -98,18 +98,33 @@ pub(super) fn room_logs() -> impl Iterator<Item = String> {
     ROOMS.into_iter().map(|(_, log)| format!("logs/{log}.mcap"))
 }
 
-/// Writes the models that have not seen a room beside the one that has seen all.
+/// Writes the models that have not seen a room, to the folder that was asked for or beside the model
+/// that has seen all.
 ///
 /// # Errors
-/// A file that cannot be written: exit code 1.
-pub(super) fn write_left_out(model: &Path, left_out: &[(String, String)]) -> Result<(), Failure> {
-    left_out.iter().try_for_each(|(room, text)| write_file(&without(model, room), text))
+/// A folder that cannot be made, and a file that cannot be written: exit code 1.
+pub(super) fn write_left_out(
+    session: &Session<'_>,
+    left_out: &[(String, String)],
+) -> Result<(), Failure> {
+    let folder = session.args.left_out.as_deref();
+    if let Some(folder) = folder.filter(|_| !left_out.is_empty()) {
+        make_folder(folder)?;
+    }
+    for (room, text) in left_out {
+        write_file(&without(&session.model, folder, room), text)?;
+    }
+    Ok(())
 }
 
 /// Returns the path of the model that has not seen a room.
-fn without(model: &Path, room: &str) -> PathBuf {
+fn without(model: &Path, folder: Option<&Path>, room: &str) -> PathBuf {
     let stem = model.file_stem().unwrap_or_default().to_string_lossy();
-    model.with_file_name(format!("{stem}.without-{}.toml", room.replace(' ', "-")))
+    let beside = model.with_file_name(format!("{stem}.without-{}.toml", room.replace(' ', "-")));
+    match (folder, beside.file_name()) {
+        (Some(folder), Some(name)) => folder.join(name),
+        _ => beside,
+    }
 }
 
 fn show_scene(number: u64, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {
@@ -240,4 +255,18 @@ fn card(args: &TrainArgs, scenes: u64, figures: &toml::Table) -> Result<String, 
 
 fn with_key(key: &str, table: &toml::Table) -> toml::Table {
     toml::Table::from_iter([(key.to_owned(), toml::Value::Table(table.clone()))])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_without_a_room_are_beside_the_model_or_in_the_folder_that_is_asked_for() {
+        let model = Path::new("models/depth-net.toml");
+        let beside = without(model, None, "um and filinha");
+        assert_eq!(beside, Path::new("models/depth-net.without-um-and-filinha.toml"));
+        let apart = without(model, Some(Path::new("left/out")), "lab2");
+        assert_eq!(apart, Path::new("left/out/depth-net.without-lab2.toml"));
+    }
 }

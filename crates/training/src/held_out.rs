@@ -34,7 +34,10 @@ pub struct Share {
 
 impl Share {
     fn new(count: u64, of: u64) -> Self {
-        let rounded = |v: f64| (v * 1e5).round() / 1e5;
+        fn rounded(v: f64) -> f64 {
+            (v * 1e5).round() / 1e5
+        }
+
         let (lower, upper) = wilson(count, of, CONFIDENCE)
             .map_or((0.0, 1.0), |i| (rounded(i.lower), rounded(i.upper)));
         Self { count, of, lower, upper }
@@ -174,10 +177,16 @@ impl Tally {
 
     /// Returns the figures.
     pub fn effect(&self) -> Effect {
-        let share = |(count, of)| Share::new(count, of);
-        let [plain, verified] = &self.tracks;
+        fn share((count, of): (u64, u64)) -> Share {
+            Share::new(count, of)
+        }
+
         // A verifier may also cause false tracks; more of them count as none removed.
-        let fewer = |before: u64, after: u64| Share::new(before.saturating_sub(after), before);
+        fn fewer(before: u64, after: u64) -> Share {
+            Share::new(before.saturating_sub(after), before)
+        }
+
+        let [plain, verified] = &self.tracks;
         let people = plain.people.len() as u64;
         let kept = plain.people.intersection(&verified.people).count() as u64;
         Effect {
@@ -210,10 +219,13 @@ fn count(rows: &mut [(u64, u64); 3], label: Label, rejected: bool) {
 
 /// Returns the people that count and have a track on them.
 fn covered_by(tracks: &[&Track], people: &[Known]) -> BTreeSet<i64> {
-    let is_covered = |known: &&Known| {
-        !known.ignore && tracks.iter().any(|t| (floor(t) - known.floor).norm() <= TRACKED_M)
-    };
-    people.iter().filter(is_covered).map(|known| known.id).collect()
+    people
+        .iter()
+        .filter(|known| {
+            !known.ignore && tracks.iter().any(|t| (floor(t) - known.floor).norm() <= TRACKED_M)
+        })
+        .map(|known| known.id)
+        .collect()
 }
 
 /// Returns true for a track without a person nearby.

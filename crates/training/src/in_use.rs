@@ -131,16 +131,20 @@ mod tests {
 
     #[test]
     fn what_proposes_is_the_detector_in_use_with_lower_thresholds() {
+        fn of(text: String) -> Value {
+            let config: Table = text.parse().unwrap();
+            let settings = config["detectors"][0].get("config").cloned();
+            settings.unwrap_or_else(|| Table::new().into())
+        }
+
+        fn cost(config: &Value) -> Option<f64> {
+            config.get("discover_cost").and_then(Value::as_float)
+        }
+
         for kind in [CameraKind::Rgbd, CameraKind::Stereo] {
             let in_use = InUse::of(kind).unwrap();
-            let of = |text: String| {
-                let config: Table = text.parse().unwrap();
-                let settings = config["detectors"][0].get("config").cloned();
-                settings.unwrap_or_else(|| Table::new().into())
-            };
             let plain = of(in_use.plain());
             let low = of(in_use.proposing().unwrap());
-            let cost = |config: &Value| config.get("discover_cost").and_then(Value::as_float);
             assert!(cost(&low) > cost(&plain).or(Some(0.16)));
             assert_eq!(low.get("even_cost"), plain.get("even_cost"), "{kind:?}");
         }

@@ -44,9 +44,12 @@ fn with_people(visit: impl FnOnce(Take<'_>) -> Result<(), Failure>) -> Vec<(Use,
 /// Returns the largest correlation of a picture that is not trained with to one that is, or to its
 /// mirror image; asserts that there are enough of either kind.
 fn most_alike(shown: &[(Use, Vec<f32>)]) -> f32 {
+    fn product(a: &[f32], b: &[f32]) -> f32 {
+        a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>()
+    }
+
     let of = |is_fit: bool| shown.iter().filter(move |(use_, _)| (*use_ == Use::Fit) == is_fit);
     assert!(of(true).count() > 100 && of(false).count() > 50, "{}", shown.len());
-    let product = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
     let alike = of(false).flat_map(|(_, tested)| {
         let both = [tested.clone(), mirrored(tested)];
         of(true).map(move |(_, trained)| product(&both[0], trained).max(product(&both[1], trained)))

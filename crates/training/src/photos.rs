@@ -64,10 +64,12 @@ pub fn photos(data: &Path, held_out: bool) -> Vec<Photo> {
 
 fn pictures(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let is_picture = |path: &PathBuf| {
-        path.extension().and_then(|e| e.to_str()).is_some_and(|e| ["jpg", "png"].contains(&e))
-    };
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(is_picture).collect();
+    let mut files: Vec<PathBuf> = entries
+        .map(|entry| entry.path())
+        .filter(|path| {
+            path.extension().and_then(|e| e.to_str()).is_some_and(|e| ["jpg", "png"].contains(&e))
+        })
+        .collect();
     files.sort();
     files
 }
@@ -85,12 +87,13 @@ fn photograph(path: &Path) -> String {
 /// Returns the groups of crops: photographs with consecutive numbers were taken one after the
 /// other, and often show the same people.
 fn runs(crops: &[PathBuf]) -> Vec<u64> {
-    let numbered = |path: &PathBuf| {
+    fn numbered(path: &PathBuf) -> (String, u64) {
         let name = photograph(path);
         let series = name.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
         let number = name[series.len()..].parse().unwrap_or(0_u64);
         (series, number)
-    };
+    }
+
     let taken: BTreeSet<(String, u64)> = crops.iter().map(numbered).collect();
     let first = |crop: &PathBuf| {
         let (series, number) = numbered(crop);
@@ -172,7 +175,10 @@ impl PictureSignature {
     }
 
     fn is_like(&self, other: &Self) -> bool {
-        let product = |a: &Patch, b: &Patch| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+        fn product(a: &Patch, b: &Patch) -> f32 {
+            a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>()
+        }
+
         let shows = |all: &[Patch], middle| all.iter().any(|p| product(p, middle) >= Self::ALIKE);
         shows(&self.all, &other.middle) || shows(&other.all, &self.middle)
     }
@@ -205,8 +211,8 @@ pub fn mean_cells(image: &GreyImage, columns: usize, rows: usize) -> Vec<f32> {
         let xs = part(column, columns, image.width());
         let ys = part(row, rows, image.height());
         let count = (xs.len() * ys.len()) as f32;
-        let sum = |y: usize| image.row(y)[xs.clone()].iter().map(|v| f32::from(*v)).sum::<f32>();
-        ys.map(sum).sum::<f32>() / count
+        ys.map(|y| image.row(y)[xs.clone()].iter().map(|v| f32::from(*v)).sum::<f32>()).sum::<f32>()
+            / count
     };
     (0..columns * rows).map(|at| mean(at % columns, at / columns)).collect()
 }
@@ -267,13 +273,14 @@ impl Photo {
                 let least = width.min(height).min(40.0);
                 let most = (0.6 * width.min(height)).max(least);
                 let count = if width < 200.0 { 1 } else { SQUARES };
-                let square = |_| {
-                    let side = chance.between(least, most);
-                    let x = chance.between(0.0, width - side);
-                    let y = chance.between(0.0, height - side);
-                    Rect::new(x, y, side, side)
-                };
-                (0..count).map(square).collect()
+                (0..count)
+                    .map(|_| {
+                        let side = chance.between(least, most);
+                        let x = chance.between(0.0, width - side);
+                        let y = chance.between(0.0, height - side);
+                        Rect::new(x, y, side, side)
+                    })
+                    .collect()
             }
         }
     }
@@ -320,7 +327,10 @@ mod tests {
 
     #[test]
     fn mirror_images_and_other_cuts_look_alike() {
-        let wave = |at: f64| 60.0 * at.sin();
+        fn wave(at: f64) -> f64 {
+            60.0 * at.sin()
+        }
+
         let image = GreyImage::from_fn(50, 50, |x, y| {
             let x = x as f64;
             let y = y as f64;

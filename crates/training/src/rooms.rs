@@ -117,9 +117,12 @@ struct RobotView {
 impl RobotView {
     /// Returns a random place in view, within the detector's range and inside the room.
     fn place(&self, chance: &mut SplitMix64) -> [f64; 2] {
+        fn inside(at: f64, size: f64) -> f64 {
+            at.clamp(0.5, size - 0.5)
+        }
+
         let distance = chance.between(1.8, 5.5);
         let angle = chance.between(-0.5, 0.5);
-        let inside = |at: f64, size: f64| at.clamp(0.5, size - 0.5);
         [
             inside(self.start[0] + distance * angle.cos(), self.room[0]),
             inside(self.start[1] + distance * angle.sin(), self.room[1]),

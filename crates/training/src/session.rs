@@ -175,8 +175,14 @@ impl<'a> Session<'a> {
             let proposing = self.in_use(CameraKind::Rgbd)?.proposing()?;
             for log in self.train_logs() {
                 let mut pipeline = pipeline(&proposing, self.registry)?;
-                let group = |who: Option<i64>| fingerprint(&format!("{log} {who:?}"));
-                self.in_log(data, log, &mut |seen| propose(&mut pipeline, seen, group, &mut show))?;
+                self.in_log(data, log, &mut |seen| {
+                    propose(
+                        &mut pipeline,
+                        seen,
+                        |who| fingerprint(&format!("{log} {who:?}")),
+                        &mut show,
+                    )
+                })?;
             }
         }
         // The remainder by 5 marks the held-out groups, so the share is taken from the quotient.

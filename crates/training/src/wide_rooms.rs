@@ -124,9 +124,12 @@ struct View {
 impl View {
     /// Returns a random place in view or just beside it, inside the room.
     fn place(&self, chance: &mut SplitMix64, [near_m, far_m]: [f64; 2]) -> [f64; 2] {
+        fn inside(at: f64, size: f64) -> f64 {
+            at.clamp(0.35, size - 0.35)
+        }
+
         let distance = chance.between(near_m, far_m);
         let angle = chance.between(-self.half_rad, self.half_rad);
-        let inside = |at: f64, size: f64| at.clamp(0.35, size - 0.35);
         [
             inside(self.start[0] + distance * angle.cos(), self.size_m[0]),
             inside(self.start[1] + distance * angle.sin(), self.size_m[1]),
@@ -191,7 +194,9 @@ mod tests {
         assert!(count(&|scene| scene.camera.height_m < 0.8) > 50, "small robots");
         assert!(count(&|scene| scene.camera.height_m > 1.6) > 30, "cameras under the ceiling");
         assert!(count(&|scene| scene.people.is_empty()) > 10, "empty rooms");
-        let is_seated = |scene: &Scene| scene.people.iter().any(|p| p.posture == Posture::Seated);
-        assert!(count(&is_seated) > 30, "seated people");
+        assert!(
+            count(&|scene| scene.people.iter().any(|p| p.posture == Posture::Seated)) > 30,
+            "seated people"
+        );
     }
 }

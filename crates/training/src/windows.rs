@@ -52,7 +52,7 @@ pub(super) fn train(
     let fitted = trainer.fit(tell).map_err(Failure::failed)?;
     session.bar.finish_and_clear();
     write_file(&session.model, &fitted.model)?;
-    frames::write_left_out(&session.model, &fitted.without)?;
+    frames::write_left_out(session, &fitted.without)?;
     let path = session.model.with_extension("card.toml");
     let card = WindowCard::new(session.args, sources, shown, fitted.figures);
     let text = card.to_text()?;

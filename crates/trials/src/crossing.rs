@@ -100,11 +100,12 @@ fn follow(
     let mut in_view_since = None;
     for (moment, report) in trial.moments.iter().zip(&run.reports) {
         let truth = moment.truth.iter().find(|truth| truth.id == person);
-        let inside = |t: &&Truth| {
+        let Some(truth) = truth.filter(|t| {
             in_image(t, &trial.camera) >= rules.min_in_image
                 && t.visible_fraction >= rules.min_visible
+        }) else {
+            continue;
         };
-        let Some(truth) = truth.filter(inside) else { continue };
         // A frame that the pipeline skipped tells nothing about the tracks.
         if !report.outcome.is_processed() {
             continue;

@@ -311,10 +311,12 @@ mod tests {
 
     #[test]
     fn late_frames_are_in_order_in_a_log_and_not_on_a_robot() {
+        fn sorted(all: &[SimulatedFrame]) -> bool {
+            all.windows(2).all(|p| p[0].frame.stamp < p[1].frame.stamp)
+        }
+
         let log = simulated(Draw::new(&scene(), 1));
         let live = simulated(Draw::live(&scene(), 1));
-        let sorted =
-            |all: &[SimulatedFrame]| all.windows(2).all(|p| p[0].frame.stamp < p[1].frame.stamp);
         assert!(sorted(&log), "{:?}", stamps(&log));
         assert!(!sorted(&live), "{:?}", stamps(&live));
         assert!(log.len() == live.len() && log.len() < 80);
@@ -421,15 +423,21 @@ mod tests {
 
     #[test]
     fn frozen_odometry_is_new_and_stands_still() {
+        fn inside(one: &&SimulatedFrame) -> bool {
+            (1.1..3.0).contains(&at_s(one))
+        }
+
         let all = broken(FaultKind::OdometryFrozen);
         assert!(all.iter().all(|one| one.frame.odometry_age_s == 0.0));
-        let inside = |one: &&SimulatedFrame| (1.1..3.0).contains(&at_s(one));
         assert!(all.iter().filter(inside).all(|one| moved_m(one) == 0.0));
         let places = all.iter().filter(inside).map(|one| one.world_from_robot.translation.x);
         let first = places.clone().next().unwrap();
         assert!(places.last().unwrap() - first > 0.3, "the robot drives on");
-        let outside = |one: &&SimulatedFrame| (0.5..1.0).contains(&at_s(one)) || at_s(one) >= 3.0;
-        assert!(all.iter().filter(outside).all(|one| moved_m(one) > 0.0));
+        assert!(
+            all.iter()
+                .filter(|one| (0.5..1.0).contains(&at_s(one)) || at_s(one) >= 3.0)
+                .all(|one| moved_m(one) > 0.0)
+        );
     }
 
     #[test]
@@ -474,12 +482,13 @@ mod tests {
 
     /// Readings of one source in each frame, with their ages.
     fn readings_of(all: &[SimulatedFrame], name: &str) -> Vec<(f64, ObstacleData)> {
-        let of = |one: &SimulatedFrame| {
-            let readings = one.frame.sensor::<ObstacleReadings>().ok()?.clone();
-            let reading = readings.0.iter().find(|reading| &*reading.source == name)?.clone();
-            Some((reading.age_s, reading.data))
-        };
-        all.iter().filter_map(of).collect()
+        all.iter()
+            .filter_map(|one| {
+                let readings = one.frame.sensor::<ObstacleReadings>().ok()?.clone();
+                let reading = readings.0.iter().find(|reading| &*reading.source == name)?.clone();
+                Some((reading.age_s, reading.data))
+            })
+            .collect()
     }
 
     #[test]
@@ -533,11 +542,14 @@ mod tests {
         while let Some(one) = draw.next_frame() {
             draw.steer(WheelSpeeds { left: 0.4, right: 0.4 });
             let readings = one.frame.sensor::<ObstacleReadings>().unwrap();
-            let range_m = |reading: &ObstacleReading| match reading.data {
-                ObstacleData::Range(reading) => reading.range_m,
-                _ => f64::INFINITY,
-            };
-            let nearest_m = readings.0.iter().map(range_m).fold(f64::INFINITY, f64::min);
+            let nearest_m = readings
+                .0
+                .iter()
+                .map(|reading| match reading.data {
+                    ObstacleData::Range(reading) => reading.range_m,
+                    _ => f64::INFINITY,
+                })
+                .fold(f64::INFINITY, f64::min);
             frames.push((draw.simulation().clearance(0.25).things_m, nearest_m));
         }
         frames

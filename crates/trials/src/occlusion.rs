@@ -126,10 +126,11 @@ fn existed(reports: &[FrameReport], id: TrackId) -> bool {
 /// Returns the confirmed, observed track that is nearest to a person, if it is near enough and no
 /// other person is nearer to it.
 fn track_at(trial: &Trial, report: &FrameReport, index: usize, person: u16) -> Option<TrackId> {
-    let moment = &trial.moments[index];
-    let distance = |truth: &Truth, track: &tagalong_core::Track| {
+    fn distance(truth: &Truth, track: &tagalong_core::Track) -> f64 {
         (track.estimate.person.position - truth.head_in_robot).xy().norm()
-    };
+    }
+
+    let moment = &trial.moments[index];
     let own = truth(trial, index, person)?;
     report
         .tracks

@@ -18,8 +18,12 @@ pub fn each<T: Send>(
     keep: impl Fn(Trial) -> Result<T, TrialError> + Sync,
     done: impl Fn(usize) + Sync,
 ) -> Result<Vec<T>, TrialError> {
-    let trial = |scene: &Scene| Trial::new(scene, contenders, registry, 1).and_then(&keep);
-    in_order(scenes, threads, trial, done)
+    in_order(
+        scenes,
+        threads,
+        |scene| Trial::new(scene, contenders, registry, 1).and_then(&keep),
+        done,
+    )
 }
 
 /// Returns the results of `work` on each thing, in the order of the things, `threads` at a time;

@@ -198,8 +198,14 @@ mod tests {
 
     #[test]
     fn a_trail_stays_on_the_floor_while_the_robot_turns() {
-        let person = |at| TrackData { id: 1, state: "seen", at, z: 1.6, ..TrackData::default() };
-        let frame = |at| Some(FrameData { tracks: vec![person(at)], ..FrameData::default() });
+        fn person(at: [f64; 2]) -> TrackData {
+            TrackData { id: 1, state: "seen", at, z: 1.6, ..TrackData::default() }
+        }
+
+        fn frame(at: [f64; 2]) -> Option<FrameData> {
+            Some(FrameData { tracks: vec![person(at)], ..FrameData::default() })
+        }
+
         let mut frames = vec![frame([4.0, 0.0]), None, frame([4.0, 0.5])];
         add_trails_at(&mut frames, 0..2, &camera(), &Isometry2::identity());
         assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [320, 240], "straight ahead");

@@ -85,13 +85,16 @@ mod tests {
 
     #[test]
     fn images_become_smaller_until_they_fit() {
+        fn total(images: &[String]) -> usize {
+            images.iter().map(String::len).sum::<usize>()
+        }
+
         let mut roomy = Pictures::within(40_000_000, 4);
         let mut tight = Pictures::within(200_000, 4);
         for at in 0..4 {
             roomy.add(at, &noisy());
             tight.add(at, &noisy());
         }
-        let total = |images: &[String]| images.iter().map(String::len).sum::<usize>();
         assert!(roomy.summary().unwrap().contains("640 px"), "{:?}", roomy.summary());
         assert!(!tight.summary().unwrap().contains("640 px"), "{:?}", tight.summary());
         let roomy = roomy.into_images().unwrap();

@@ -136,7 +136,10 @@ impl RideFacts {
 
     /// Returns the result in one line.
     pub fn summary(&self) -> String {
-        let metres = |room: Option<f64>| room.map_or("-".into(), |room| format!("{room:.2} m"));
+        fn metres(room: Option<f64>) -> String {
+            room.map_or("-".into(), |room| format!("{room:.2} m"))
+        }
+
         let share = self.distance_share().map_or("-".into(), |s| format!("{:.0} %", 100.0 * s));
         let stands = self.never_moved.as_ref();
         let stands = stands.map_or(String::new(), |why| format!("; the robot never moved ({why})"));

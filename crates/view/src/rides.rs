@@ -100,8 +100,14 @@ pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
 /// Orders rides: those with a contact first, then those in which the robot never moved, then by the
 /// least room, then by the share of the time in which the distance was kept.
 fn worse_first(a: &RideFacts, b: &RideFacts) -> std::cmp::Ordering {
-    let room = |ride: &RideFacts| ride.room_m().unwrap_or(f64::INFINITY);
-    let share = |ride: &RideFacts| ride.distance_share().unwrap_or(1.0);
+    fn room(ride: &RideFacts) -> f64 {
+        ride.room_m().unwrap_or(f64::INFINITY)
+    }
+
+    fn share(ride: &RideFacts) -> f64 {
+        ride.distance_share().unwrap_or(1.0)
+    }
+
     b.touches()
         .cmp(&a.touches())
         .then(b.never_moved.is_some().cmp(&a.never_moved.is_some()))
@@ -234,10 +240,11 @@ fn kept(ride: &RideFacts) -> String {
 
 /// Returns the text of each column, and whether it is bad.
 fn cells(ride: &RideFacts) -> [(String, bool); 7] {
-    let metres = |room: Option<f64>| {
+    fn metres(room: Option<f64>) -> (String, bool) {
         let text = room.map_or("-".into(), |room| format!("{room:.2} m"));
         (text, room.is_some_and(|room| room < 0.0))
-    };
+    }
+
     let share = ride.distance_share();
     let in_view = if ride.time_s > 0.0 { ride.in_view_s / ride.time_s } else { 0.0 };
     [

@@ -106,10 +106,11 @@ impl PageTruth {
 }
 
 fn shown(truth: &Truth, odom_from_robot: &Isometry2<f64>) -> TruthBox {
-    let tenth = |v: f64| (v * 10.0).round() / 10.0;
     TruthBox {
         id: truth.id,
-        box_px: truth.region.map(|r| [r.x, r.y, r.width, r.height].map(tenth)),
+        box_px: truth
+            .region
+            .map(|r| [r.x, r.y, r.width, r.height].map(|v| (v * 10.0).round() / 10.0)),
         at: truth.floor_m.map(|floor| {
             let place = odom_from_robot * Point2::from(floor);
             [place.x, place.y].map(|v| (v * 1e3).round() / 1e3)
@@ -170,12 +171,18 @@ mod tests {
     use crate::page::data::TrackData;
 
     fn run(boxes: &[Option<[f64; 4]>]) -> RunData {
-        let frame = |box_px: &Option<[f64; 4]>| {
-            let track = |box_px| TrackData { id: 7, state: "seen", box_px, ..TrackData::default() };
-            let tracks = box_px.iter().map(|b| track(*b)).collect();
-            Some(FrameData { tracks, ..FrameData::default() })
-        };
-        RunData { frames: boxes.iter().map(frame).collect(), ..RunData::default() }
+        RunData {
+            frames: boxes
+                .iter()
+                .map(|box_px| {
+                    let track =
+                        |box_px| TrackData { id: 7, state: "seen", box_px, ..TrackData::default() };
+                    let tracks = box_px.iter().map(|b| track(*b)).collect();
+                    Some(FrameData { tracks, ..FrameData::default() })
+                })
+                .collect(),
+            ..RunData::default()
+        }
     }
 
     #[test]

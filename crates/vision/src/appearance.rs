@@ -165,18 +165,22 @@ impl<'f> Patch<'f> {
 
     /// Returns the pixels that belong to the person.
     fn pixels(&self) -> impl Iterator<Item = (i64, i64)> {
-        let step = |size: f64| (size / SAMPLES as f64).max(1.0);
+        fn step(size: f64) -> f64 {
+            (size / SAMPLES as f64).max(1.0)
+        }
+
         let across = step(self.area.width);
         let down = step(self.area.height);
         let columns = (self.area.width / across) as usize;
         let rows = (self.area.height / down) as usize;
-        let at = move |i: usize| {
-            let row = i / columns.max(1);
-            let column = i % columns.max(1);
-            let x = self.area.x + (column as f64 + 0.5) * across;
-            (x as i64, (self.area.y + (row as f64 + 0.5) * down) as i64)
-        };
-        (0..rows * columns).map(at).filter(|(x, y)| self.is_body(*x, *y))
+        (0..rows * columns)
+            .map(move |i| {
+                let row = i / columns.max(1);
+                let column = i % columns.max(1);
+                let x = self.area.x + (column as f64 + 0.5) * across;
+                (x as i64, (self.area.y + (row as f64 + 0.5) * down) as i64)
+            })
+            .filter(|(x, y)| self.is_body(*x, *y))
     }
 
     fn is_body(&self, x: i64, y: i64) -> bool {
@@ -197,12 +201,15 @@ impl<'f> Patch<'f> {
     }
 
     fn edges(&self) -> Option<Histogram<EDGES>> {
+        fn slope(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+            Some(0.5 * (b? - a?))
+        }
+
         let grey = self.frame.grey().ok()?;
         let mut histogram = [0.0; EDGES];
         let mut count = 0;
         for (x, y) in self.pixels() {
             let at = |dx, dy| grey.get(x + dx, y + dy).map(f64::from);
-            let slope = |a: Option<f64>, b: Option<f64>| Some(0.5 * (b? - a?));
             let across = slope(at(-1, 0), at(1, 0)).unwrap_or(0.0);
             let down = slope(at(0, -1), at(0, 1)).unwrap_or(0.0);
             histogram[edge(across, down)] += 1.0;
@@ -284,7 +291,10 @@ mod tests {
 
     #[test]
     fn hues_go_round() {
-        let of = |[r, g, b]: [f64; 3]| hue(r, g, b, r.max(g).max(b), 1.0);
+        fn of([r, g, b]: [f64; 3]) -> f64 {
+            hue(r, g, b, r.max(g).max(b), 1.0)
+        }
+
         assert_eq!(of([1.0, 0.0, 0.0]), 0.0);
         assert!((of([0.0, 1.0, 0.0]) - 1.0 / 3.0).abs() < 1e-12);
         assert!((of([0.0, 0.0, 1.0]) - 2.0 / 3.0).abs() < 1e-12);
@@ -370,8 +380,14 @@ mod tests {
 
     #[test]
     fn vectors_differ_by_their_angle() {
-        let looks = |x: f32, y: f32| Appearance::of_vector(1.6, Some(Arc::new([x, y])));
-        let difference = |other: Appearance| looks(1.0, 0.0).difference(&other).mean().unwrap();
+        fn looks(x: f32, y: f32) -> Appearance {
+            Appearance::of_vector(1.6, Some(Arc::new([x, y])))
+        }
+
+        fn difference(other: Appearance) -> f64 {
+            looks(1.0, 0.0).difference(&other).mean().unwrap()
+        }
+
         assert_eq!(difference(looks(1.0, 0.0)), 0.0);
         assert!((difference(looks(0.6, 0.8)) - 0.4).abs() < 1e-6);
         assert_eq!([difference(looks(0.0, 1.0)), difference(looks(-1.0, 0.0))], [1.0; 2]);
@@ -446,14 +462,17 @@ mod tests {
 
         #[test]
         fn a_shirt_and_trousers_are_looked_at_and_nothing_beside_them() {
+            fn naked(x: usize, y: usize) -> [u8; 3] {
+                match (x, y) {
+                    (144..=175, 86..124) | (146..=173, 151..189) => GREEN,
+                    _ => RED,
+                }
+            }
+
             let looks = looks_of(&person(0.0), &frame(dressed, None));
             assert!((share(&looks.torso, 0) - 1.0).abs() < 1e-9, "{looks:?}");
             assert!((share(&looks.legs, 8) - 1.0).abs() < 1e-9, "{looks:?}");
             assert_eq!(looks.height_m, 1.6);
-            let naked = |x: usize, y: usize| match (x, y) {
-                (144..=175, 86..124) | (146..=173, 151..189) => GREEN,
-                _ => RED,
-            };
             let looks = looks_of(&person(0.0), &frame(naked, None));
             let part = share(&looks.torso, 0);
             assert!((0.01..0.3).contains(&part), "nor is less looked at: {part}");
@@ -471,8 +490,15 @@ mod tests {
                     _ => 1.5,
                 })
             };
-            let striped = |x: usize, _: usize| if (155..165).contains(&x) { RED } else { GREEN };
-            let looks = |metres| looks_of(&person(0.0), &frame(striped, Some(depth(metres))));
+            let looks = |metres| {
+                looks_of(
+                    &person(0.0),
+                    &frame(
+                        |x, _| if (155..165).contains(&x) { RED } else { GREEN },
+                        Some(depth(metres)),
+                    ),
+                )
+            };
             assert!((share(&looks(2.0).torso, 0) - 1.0).abs() < 1e-9);
             assert!(looks(2.4).torso.is_some() && looks(1.75).torso.is_some());
             assert!(looks(2.45).torso.is_none() && looks(1.7).torso.is_none());
@@ -499,7 +525,10 @@ mod tests {
 
         #[test]
         fn stripes_are_told_from_hoops() {
-            let grey = |value: usize| [(value % 256) as u8; 3];
+            fn grey(value: usize) -> [u8; 3] {
+                [(value % 256) as u8; 3]
+            }
+
             let across = frame(|x, _| grey(16 * (x % 8)), None);
             let down = frame(|_, y| grey(16 * (y % 8)), None);
             let [across, down, even] = [across, down, frame(|_, _| GREEN, None)]

@@ -35,8 +35,11 @@ impl Gallery {
 
     /// Returns the difference from the most similar remembered appearance; `None` without one.
     pub fn nearest(&self, appearance: &Appearance) -> Option<AppearanceDifference> {
+        fn mean(d: &AppearanceDifference) -> f64 {
+            d.mean().unwrap_or(0.0)
+        }
+
         let differences = self.all.iter().map(|known| appearance.difference(known));
-        let mean = |d: &AppearanceDifference| d.mean().unwrap_or(0.0);
         differences.min_by(|a, b| mean(a).total_cmp(&mean(b)))
     }
 }
@@ -49,7 +52,10 @@ mod tests {
 
     #[test]
     fn only_new_appearances_are_remembered_and_the_first_ones_are_never_forgotten() {
-        let in_colour = |colour| Appearance::in_one_colour(1.6, Some(colour));
+        fn in_colour(colour: usize) -> Appearance {
+            Appearance::in_one_colour(1.6, Some(colour))
+        }
+
         let mut gallery = Gallery::default();
         for colour in [1, 1, 2, 1, 2] {
             gallery.add(in_colour(colour), KEPT);

@@ -88,8 +88,9 @@ pub fn ground_of_depth(
     settings: &GroundSettings,
 ) -> Option<Ground> {
     let step = (depth.width() / 160).max(1);
-    let columns = || (0..depth.width()).step_by(step);
-    let pixels = (0..depth.height()).step_by(step).flat_map(|y| columns().map(move |x| (x, y)));
+    let pixels = (0..depth.height())
+        .step_by(step)
+        .flat_map(|y| (0..depth.width()).step_by(step).map(move |x| (x, y)));
     let points: Vec<Point3<f64>> = pixels
         .filter_map(|(x, y)| {
             let reading = f64::from(depth.row(y)[x]);

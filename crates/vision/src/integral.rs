@@ -89,10 +89,13 @@ mod tests {
             pixels in prop::collection::vec(any::<u8>(), 12 * 9),
             x in 0..14usize, y in 0..11usize, w in 0..14usize, h in 0..11usize,
         ) {
+            fn inside(to: usize, most: usize) -> usize {
+                to.min(most)
+            }
+
             let Some(image) = GreyImage::from_pixels(12, 9, pixels) else {
                 return Err(TestCaseError::fail("108 pixels are 12 by 9"));
             };
-            let inside = |to: usize, most: usize| to.min(most);
             let rows = inside(y, 9)..inside(y + h, 9);
             let columns = inside(x, 12)..inside(x + w, 12);
             let slow: u32 = rows

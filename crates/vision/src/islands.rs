@@ -60,8 +60,10 @@ mod tests {
     fn can_be_cut(points: &[[i64; 2]], gap: i64) -> bool {
         (0..2).any(|axis| {
             let (first, last) = bounds(points, axis);
-            let is_empty = |place: i64| points.iter().all(|point| point[axis] != place);
-            (first + 1..last - gap + 2).any(|start| (start..start + gap - 1).all(is_empty))
+            (first + 1..last - gap + 2).any(|start| {
+                (start..start + gap - 1)
+                    .all(|place| points.iter().all(|point| point[axis] != place))
+            })
         })
     }
 

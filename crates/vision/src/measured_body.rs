@@ -148,7 +148,10 @@ fn head_area(whole: &Rect, px_per_m: f64) -> Rect {
 
 /// Returns readings of an area inside of the image, evenly spaced.
 fn readings(depth: &DepthImage, area: &Rect) -> Vec<Reading> {
-    let step = |size: f64| (size / SAMPLES).ceil().max(1.0) as usize;
+    fn step(size: f64) -> usize {
+        (size / SAMPLES).ceil().max(1.0) as usize
+    }
+
     let columns = area.x as usize..(area.right() as usize).min(depth.width());
     let rows = area.y as usize..(area.bottom() as usize).min(depth.height());
     let mut found = Vec::new();

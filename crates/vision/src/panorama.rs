@@ -317,14 +317,15 @@ mod tests {
 
     #[test]
     fn a_smooth_scene_is_what_it_is_in_every_direction() {
-        let panorama = panorama(480, [2.3, -1.7], 480, 120);
-        let colour = |bearing: f64, elevation: f64| {
+        fn colour(bearing: f64, elevation: f64) -> [f64; 3] {
             [
                 120.0 + 90.0 * (2.0 * bearing).sin(),
                 128.0 + 100.0 * elevation,
                 120.0 + 90.0 * bearing.cos(),
             ]
-        };
+        }
+
+        let panorama = panorama(480, [2.3, -1.7], 480, 120);
         let raw = RgbImage::from_fn(480, 480, |x, y| {
             let from = Point2::new(x as f64, y as f64) - panorama.mirror.centre_px;
             let elevation = panorama.mirror.elevation(from.norm());

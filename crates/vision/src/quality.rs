@@ -88,11 +88,14 @@ mod tests {
     #[test]
     fn steps_are_those_near_the_median_and_not_of_what_is_nearer_or_farther() {
         // Around 2 m in steps of 4 mm; nearer ones in many steps of 1 mm, farther ones of 10 mm.
-        let reading = |x: usize| match x {
-            0..60 => 1.0 + 0.001 * x as f32,
-            60..100 => 1.92 + 0.004 * (x - 60) as f32,
-            _ => 2.3 + 0.01 * (x - 100) as f32,
-        };
+        fn reading(x: usize) -> f32 {
+            match x {
+                0..60 => 1.0 + 0.001 * x as f32,
+                60..100 => 1.92 + 0.004 * (x - 60) as f32,
+                _ => 2.3 + 0.01 * (x - 100) as f32,
+            }
+        }
+
         let both = DepthImage::from_fn(160, 1, |x, _| reading(x));
         let [no_nearer, no_farther] = [60..160, 0..100].map(|range: std::ops::Range<usize>| {
             DepthImage::from_fn(range.len(), 1, |x, _| reading(range.start + x))

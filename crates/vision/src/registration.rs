@@ -158,11 +158,14 @@ struct Changes {
 
 impl Changes {
     fn of(grey: &GreyImage, ceiling: u8) -> Self {
+        fn next(at: usize, size: usize) -> usize {
+            (at + 1).min(size - 1)
+        }
+
         let width = grey.width();
         let height = grey.height();
         let at = |x: usize, y: usize| grey.row(y)[x];
         let change = |a: u8, b: u8| a.abs_diff(b).min(ceiling);
-        let next = |at: usize, size: usize| (at + 1).min(size - 1);
         let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         Self {
             width,
@@ -307,12 +310,13 @@ mod tests {
 
     #[test]
     fn the_gain_is_what_the_offset_adds_to_none() {
-        let gain = |offset| {
+        fn gain(offset: [i64; 2]) -> f64 {
             let mut overlap = EdgeOverlap::new(OverlapSettings::default());
             let (grey, depth) = scene(offset, &[(40, 30, 24), (85, 45, 30)]);
             overlap.add(&grey, &depth);
             overlap.offset().unwrap().gain
-        };
+        }
+
         assert_eq!(gain([0, 0]), 0.0);
         assert!(gain([6, 4]) > 1.0, "{}", gain([6, 4]));
     }

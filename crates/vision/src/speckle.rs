@@ -166,11 +166,12 @@ mod tests {
         change: impl Fn(u16, &dyn Fn(i64, i64) -> u16) -> u16,
     ) -> Vec<u16> {
         let places = (0..values.len()).map(|i| ((i % width) as i64, (i / width) as i64));
-        let pixel = |(x, y)| {
-            let beside = |dx: i64, dy: i64| at(values, width, x + dx, y + dy);
-            change(beside(0, 0), &beside)
-        };
-        places.map(pixel).collect()
+        places
+            .map(|(x, y)| {
+                let beside = |dx: i64, dy: i64| at(values, width, x + dx, y + dy);
+                change(beside(0, 0), &beside)
+            })
+            .collect()
     }
 
     fn one_surface(a: u16, b: u16) -> bool {
@@ -183,12 +184,13 @@ mod tests {
     const HALF: [(i64, i64); 4] = [(-1, -1), (0, -1), (1, -1), (-1, 0)];
 
     fn slowly(values: &[u16], width: usize) -> Vec<u16> {
-        let is_alone = |middle: u16, beside: &dyn Fn(i64, i64) -> u16| {
+        fn is_alone(middle: u16, beside: &dyn Fn(i64, i64) -> u16) -> bool {
             HALF.iter().all(|(dx, dy)| {
                 !one_surface(middle, beside(*dx, *dy)) && !one_surface(middle, beside(-dx, -dy))
             })
-        };
-        let close = |middle: u16, beside: &dyn Fn(i64, i64) -> u16| {
+        }
+
+        fn close(middle: u16, beside: &dyn Fn(i64, i64) -> u16) -> u16 {
             let around = HALF.iter().flat_map(|(dx, dy)| [beside(*dx, *dy), beside(-dx, -dy)]);
             let mut read: Vec<u16> = around.filter(|value| *value > 0).collect();
             read.sort_unstable();
@@ -196,7 +198,8 @@ mod tests {
                 (0, 4..) => read[read.len() / 2],
                 _ => middle,
             }
-        };
+        }
+
         let kept =
             slow(values, width, |middle, beside| if is_alone(middle, beside) { 0 } else { middle });
         (0..CLOSINGS).fold(kept, |values, _| slow(&values, width, close))
@@ -250,11 +253,14 @@ mod tests {
 
     /// A wall at 4 m with a post of two pixels at 2 m, and a shadow of three pixels beside it.
     fn scene() -> Vec<u16> {
-        let row = |x: usize| match x {
-            5 | 6 => 1000,
-            7..=9 => 0,
-            _ => 500,
-        };
+        fn row(x: usize) -> u16 {
+            match x {
+                5 | 6 => 1000,
+                7..=9 => 0,
+                _ => 500,
+            }
+        }
+
         (0..12 * 16).map(|i| row(i % 16)).collect()
     }
 
@@ -281,13 +287,16 @@ mod tests {
 
     #[test]
     fn pixels_missing_at_random_come_back() {
+        fn holes(values: &[u16]) -> usize {
+            values.iter().filter(|value| **value == 0).count()
+        }
+
         let mut random = 1u32;
         let mut missing = || {
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             random >> 31 == 0
         };
         let values: Vec<u16> = (0..100 * 100).map(|_| if missing() { 0 } else { 500 }).collect();
-        let holes = |values: &[u16]| values.iter().filter(|value| **value == 0).count();
         assert!((4_500..5_500).contains(&holes(&values)), "{}", holes(&values));
         let clean = cleaned(values, 100);
         assert!(holes(&clean) < 100, "{}", holes(&clean));

@@ -242,7 +242,10 @@ mod tests {
 
     #[test]
     fn a_wall_is_behind_the_plane_and_what_is_not_measured_is_nowhere() {
-        let wall = |x: usize| if x < 160 { 3.5 } else { f32::NAN };
+        fn wall(x: usize) -> f32 {
+            if x < 160 { 3.5 } else { f32::NAN }
+        }
+
         let depth = DepthImage::from_fn(320, 320, |x, _| wall(x));
         let plane = Upright::new(&camera(), &Point3::new(3.0, 0.0, 1.6)).unwrap();
         let of = |plane: &Upright, row: usize, column: usize| {

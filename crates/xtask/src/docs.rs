@@ -61,9 +61,9 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
     };
     let mut programs = Programs::default();
     for document in documents(workspace)? {
-        let print = |command: &str| printed(workspace, &mut programs, command);
-        let filled = filled(&document.text, wanted, print)
-            .with_context(|| format!("in {}", document.path.display()))?;
+        let filled =
+            filled(&document.text, wanted, |command| printed(workspace, &mut programs, command))
+                .with_context(|| format!("in {}", document.path.display()))?;
         let filled = sentences::filled(workspace, &document.path, &filled)?;
         if filled != document.text {
             workspace.write(&document.path, &filled)?;
@@ -72,8 +72,7 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
     }
     if let Some(part) = slow {
         let all = slow_parts(workspace)?;
-        let is_printed = |one: &Part| one.command.contains(part);
-        figures::note(workspace, &all, is_printed)?;
+        figures::note(workspace, &all, |one| one.command.contains(part))?;
     }
     Ok(())
 }
@@ -93,8 +92,8 @@ pub fn fill_from(workspace: &Workspace, part: &str, file: &Path) -> Result<()> {
         named.join("; ")
     );
     for document in documents(workspace)? {
-        let print = |_: &str| Ok(text.trim().to_owned());
-        let filled = filled(&document.text, |command| command == named[0], print)?;
+        let filled =
+            filled(&document.text, |command| command == named[0], |_| Ok(text.trim().to_owned()))?;
         if filled != document.text {
             workspace.write(&document.path, &filled)?;
             eprintln!("docs: {} is filled from {}", document.path.display(), file.display());
@@ -137,14 +136,17 @@ fn slow_parts(workspace: &Workspace) -> Result<Vec<Part>> {
 
 /// Complains about fast parts that are stale.
 pub fn stale(workspace: &Workspace) -> Result<Vec<String>> {
+    // Slow parts are compared only when they are filled.
+    fn wanted(command: &str) -> bool {
+        !is_slow(command)
+    }
+
     let mut complaints = Vec::new();
     let mut programs = Programs::default();
     for document in documents(workspace)? {
-        // Slow parts are compared only when they are filled.
-        let wanted = |command: &str| !is_slow(command);
-        let print = |command: &str| printed(workspace, &mut programs, command);
-        let filled = filled(&document.text, wanted, print)
-            .with_context(|| format!("in {}", document.path.display()))?;
+        let filled =
+            filled(&document.text, wanted, |command| printed(workspace, &mut programs, command))
+                .with_context(|| format!("in {}", document.path.display()))?;
         let filled = sentences::filled(workspace, &document.path, &filled)?;
         if filled != document.text {
             let name = document.path.display();
@@ -409,7 +411,9 @@ mod tests {
 
     #[test]
     fn a_part_without_an_end_is_an_error() {
-        let print = |_: &str| Ok(String::new());
-        assert!(filled("<!-- begin: tagalong list -->\nold\n", |_| true, print).is_err());
+        assert!(
+            filled("<!-- begin: tagalong list -->\nold\n", |_| true, |_| Ok(String::new()))
+                .is_err()
+        );
     }
 }

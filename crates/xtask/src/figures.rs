@@ -144,14 +144,17 @@ impl Files {
     /// in the command or in the table.
     fn named(&self, part: &Part) -> Vec<PathBuf> {
         let words: BTreeSet<&str> = words(&part.command).chain(words(&part.table)).collect();
-        let is_named = |path: &&PathBuf| {
-            let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-            let is_config = NAMED.iter().any(|folder| path.parent() == Some(Path::new(folder)));
-            let is_toml = path.extension().is_some_and(|extension| extension == "toml");
-            is_config && is_toml && words.contains(stem)
-                || path.to_str().is_some_and(|path| words.contains(path))
-        };
-        self.all.iter().filter(is_named).cloned().collect()
+        self.all
+            .iter()
+            .filter(|path| {
+                let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+                let is_config = NAMED.iter().any(|folder| path.parent() == Some(Path::new(folder)));
+                let is_toml = path.extension().is_some_and(|extension| extension == "toml");
+                is_config && is_toml && words.contains(stem)
+                    || path.to_str().is_some_and(|path| words.contains(path))
+            })
+            .cloned()
+            .collect()
     }
 
     /// Returns the files that a config reads: those that it names, and the models of its plugins.

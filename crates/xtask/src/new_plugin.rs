@@ -177,11 +177,12 @@ fn fill(text: &str, name: &str) -> String {
 
 /// `leg-width` as `LegWidth`.
 fn type_name(name: &str) -> String {
-    let capital = |word: &str| {
-        let (first, rest) = word.split_at(1);
-        first.to_uppercase() + rest
-    };
-    name.split('-').map(capital).collect()
+    name.split('-')
+        .map(|word| {
+            let (first, rest) = word.split_at(1);
+            first.to_uppercase() + rest
+        })
+        .collect()
 }
 
 #[cfg(test)]

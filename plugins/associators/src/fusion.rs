@@ -110,7 +110,10 @@ mod tests {
 
         #[test]
         fn a_sum_multiplies_odds(overlap in 0.01..0.99f64, log_ratio in -5.0..5.0f64) {
-            let odds = |p: f64| p / (1.0 - p);
+            fn odds(p: f64) -> f64 {
+                p / (1.0 - p)
+            }
+
             let both = SUM.similarity(overlap, log_ratio);
             let expected = odds(overlap) * log_ratio.exp();
             prop_assert!((odds(both) / expected - 1.0).abs() < 1e-6, "{both}");

@@ -319,8 +319,10 @@ mod tests {
         fit: impl Fn(&Track, &Detection) -> Option<Fit>,
         (settings, miss_factor): (&PairCost, f64),
     ) -> Vec<Option<usize>> {
-        let row = |track| detections.iter().map(|detection| fit(track, detection)).collect();
-        let fits: Vec<Vec<Option<Fit>>> = tracks.iter().map(row).collect();
+        let fits: Vec<Vec<Option<Fit>>> = tracks
+            .iter()
+            .map(|track| detections.iter().map(|detection| fit(track, detection)).collect())
+            .collect();
         assign_fits(&fits, detections.len(), settings.at_gate(), miss_factor)
     }
 

@@ -30,6 +30,10 @@ impl NetworkInput {
     /// # Errors
     /// [`tagalong_core::Error::MissingImage`] for a frame without intensity.
     pub fn new(frame: &Frame, candidate: &Detection, with_depth: bool) -> Result<Option<Self>> {
+        fn intensity(value: &f32) -> u8 {
+            *value as u8
+        }
+
         let grey = frame.grey()?;
         let depth = frame.depth().ok().filter(|_| with_depth);
         let Some(plane) = Upright::new(&frame.camera, &candidate.position) else {
@@ -38,15 +42,17 @@ impl NetworkInput {
         if with_depth && depth.is_none() {
             return Ok(None);
         }
-        let steps = |behind_m: Option<f32>| {
-            // A surface farther from the plane than this is not part of the person anyway.
-            behind_m.map_or(UNKNOWN, |m| (m.clamp(-REACH_M, REACH_M) / STEP_M).round() as i8)
-        };
         let behind = match depth {
-            Some(depth) => plane.behind_m(depth, EVERY).map(steps).collect(),
+            Some(depth) => plane
+                .behind_m(depth, EVERY)
+                .map(|behind_m| {
+                    // A surface farther from the plane than this is not part of the person anyway.
+                    behind_m
+                        .map_or(UNKNOWN, |m| (m.clamp(-REACH_M, REACH_M) / STEP_M).round() as i8)
+                })
+                .collect(),
             None => vec![UNKNOWN; Self::DEPTH[0] * Self::DEPTH[1]],
         };
-        let intensity = |value: &f32| *value as u8;
         let seen = plane.grey(grey);
         Ok(seen.map(|seen| Self { grey: seen.grey.iter().map(intensity).collect(), behind }))
     }
@@ -87,11 +93,14 @@ mod tests {
 
     #[test]
     fn depth_is_beside_the_plane_cut_off_and_known_or_not() {
-        let at = |x: usize| match x {
-            0..32 => 0.5,
-            32..40 => 2.25,
-            _ => f32::NAN,
-        };
+        fn at(x: usize) -> f32 {
+            match x {
+                0..32 => 0.5,
+                32..40 => 2.25,
+                _ => f32::NAN,
+            }
+        }
+
         let depth = DepthImage::from_fn(64, 64, |x, _| at(x));
         let frame = frame(picture(true, 1)).with_depth(Arc::new(depth));
         let view = NetworkInput::new(&frame, &candidate(), true).unwrap().unwrap();

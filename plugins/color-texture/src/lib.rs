@@ -42,7 +42,7 @@ pub const NAME: &str = "color-texture";
 
 /// Registers the plugin, and its trainer if that is compiled in.
 pub fn register(registry: &mut Registry) {
-    registry.verifier(NAME, "colour, texture and surface of a candidate (P1)", ColorTexture::new);
+    registry.verifier(NAME, "colour, texture and surface of a candidate", ColorTexture::new);
     #[cfg(feature = "train")]
     registry.training(
         NAME,

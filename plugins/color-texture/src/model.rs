@@ -174,7 +174,10 @@ mod tests {
     use super::*;
 
     fn model() -> Model {
-        let stump = |feature, threshold, below, above| Stump { feature, threshold, below, above };
+        fn stump(feature: usize, threshold: f32, below: f32, above: f32) -> Stump {
+            Stump { feature, threshold, below, above }
+        }
+
         let trees = vec![
             Tree {
                 feature: 3,

@@ -22,8 +22,9 @@ pub(crate) fn disc(radius: f64, step: i64) -> impl Iterator<Item = (i64, i64)> {
     let step = step.max(1);
     let reach = (radius.max(0.0) as i64 / step).min(200);
     let places = move |i: i64| (-reach..=reach).map(move |j| (j * step, i * step));
-    let inside = move |(x, y): &(i64, i64)| ((x * x + y * y) as f64) <= radius * radius;
-    (-reach..=reach).flat_map(places).filter(inside)
+    (-reach..=reach)
+        .flat_map(places)
+        .filter(move |(x, y)| ((x * x + y * y) as f64) <= radius * radius)
 }
 
 /// Returns `count` offsets spread evenly over a ring: a spiral in steps of the golden angle.
@@ -61,13 +62,16 @@ mod tests {
 
     #[test]
     fn a_ring_is_filled_evenly() {
+        fn radius((x, y): &(f64, f64)) -> f64 {
+            x.hypot(*y)
+        }
+
         let from = 40.0;
         let to = 100.0;
         let count = 400;
         let all: Vec<(f64, f64)> =
             ring(from, to, count).map(|(x, y)| (x as f64, y as f64)).collect();
         assert_eq!(all.len(), count);
-        let radius = |(x, y): &(f64, f64)| x.hypot(*y);
         assert!(all.iter().all(|at| (from - 1.0..to + 1.0).contains(&radius(at))));
         // Half of the area lies within the root of the mean square of the two radii.
         let half = (0.5 * (from * from + to * to)).sqrt();
@@ -83,11 +87,14 @@ mod tests {
     /// Offsets so large that whole pixels hardly matter.
     #[test]
     fn a_ring_turns_by_the_golden_angle_from_its_inner_to_its_outer_radius() {
+        // The first and last have half a step to the edges: a 120th of the area.
+        fn at(part: f64) -> f64 {
+            1e5 * (1.0 + part * 3.0).sqrt()
+        }
+
         let all: Vec<(f64, f64)> = ring(1e5, 2e5, 60).map(|(x, y)| (x as f64, y as f64)).collect();
         let radii: Vec<f64> = all.iter().map(|(x, y)| x.hypot(*y)).collect();
         assert!(radii.is_sorted());
-        // The first and last have half a step to the edges: a 120th of the area.
-        let at = |part: f64| 1e5 * (1.0 + part * 3.0).sqrt();
         assert!((radii[0] - at(0.5 / 60.0)).abs() < 1.0, "{}", radii[0]);
         assert!((radii[59] - at(59.5 / 60.0)).abs() < 1.0, "{}", radii[59]);
         // (3 - sqrt 5) half turns.

@@ -6,7 +6,7 @@ use tagalong_core::{Error, Result};
 use crate::learning::Learning;
 
 /// Settings of `compressive`. Distances in the image are in widths of the box:
-/// a pixel of the papers, whose boxes are some 64 pixels wide, is 0.016.
+/// a pixel of a box that is 64 pixels wide is 0.016.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {

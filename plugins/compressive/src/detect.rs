@@ -464,8 +464,8 @@ mod tests {
     /// The weight of the past after a sighting so sure and so far aside, widths.
     fn after(config: &Config, track: &Track, found: Option<(f64, f32)>) -> Option<f64> {
         let region = track.estimate.region;
-        let aside = |widths: f64| Rect { x: region.x + widths * region.width, ..region };
-        let found = found.map(|(off, sure)| (aside(off), sure));
+        let found =
+            found.map(|(off, sure)| (Rect { x: region.x + off * region.width, ..region }, sure));
         config.learning.rule().memory(config, track, found, false)
     }
 
@@ -507,6 +507,11 @@ mod tests {
 
     #[test]
     fn the_place_of_a_box_moves_and_grows_with_it() {
+        // Depth that is measured is known better than one that is expected.
+        fn spread(at: &Detection) -> f64 {
+            at.covariance[(0, 0)].sqrt()
+        }
+
         let config = Config::default();
         let camera = camera();
         let track = track(true, false);
@@ -534,8 +539,6 @@ mod tests {
         let up = |pixel: nalgebra::Point2<f64>| before.centre().y - pixel.y;
         let ratio = up(camera.project(&grown.position).unwrap()) / up(from);
         assert!((ratio - 2.0).abs() < 1e-6, "{ratio}");
-        // Depth that is measured is known better than one that is expected.
-        let spread = |at: &Detection| at.covariance[(0, 0)].sqrt();
         let guessed = sighting(&config, &camera, &track, before, None);
         assert!((guessed.position - expected).norm() < 1e-9);
         assert!((spread(&there) - config.sigma_depth_m).abs() < 0.02, "{}", spread(&there));

@@ -74,11 +74,12 @@ impl Features {
 impl Rectangle {
     /// Left, top, right, bottom in a box of so many pixels; at least one pixel.
     pub fn pixels(&self, width: usize, height: usize) -> [usize; 4] {
-        let span = |from: f64, length: f64, size: usize| {
+        fn span(from: f64, length: f64, size: usize) -> (usize, usize) {
             let start = ((from * size as f64).round() as usize).min(size.saturating_sub(1));
             let end = ((from + length) * size as f64).round() as usize;
             (start, end.clamp(start + 1, size.max(start + 1)))
-        };
+        }
+
         let (left, right) = span(self.left, self.width, width);
         let (top, bottom) = span(self.top, self.height, height);
         [left, top, right, bottom]
@@ -145,9 +146,10 @@ impl Scaled {
 
     /// True if the box with this upper left corner lies in the image.
     pub fn fits(&self, integral: &Integral, x: i64, y: i64) -> bool {
-        let inside = |from: i64, size: usize, whole: usize| {
+        fn inside(from: i64, size: usize, whole: usize) -> bool {
             from >= 0 && size > 0 && from as usize + size <= whole
-        };
+        }
+
         integral.stride() == self.stride
             && inside(x, self.width, integral.width())
             && inside(y, self.height, integral.height())

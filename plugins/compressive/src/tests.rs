@@ -199,12 +199,10 @@ fn answer(config: Config) -> (bool, Vec<&'static str>) {
 
 #[test]
 fn the_best_box_has_to_be_sure_and_ahead_of_other_places() {
-    let config = |search_radius, min_confidence, min_lead| Config {
-        search_radius,
-        min_confidence,
-        min_lead,
-        ..Config::default()
-    };
+    fn config(search_radius: f64, min_confidence: f64, min_lead: f64) -> Config {
+        Config { search_radius, min_confidence, min_lead, ..Config::default() }
+    }
+
     assert_eq!(answer(config(0.4, -1e6, 0.0)), (true, vec![]));
     assert_eq!(answer(config(0.4, 1e6, 0.0)), (false, vec!["appearance: confidence"]));
     // Within 0.4 widths there is no other place; within a whole one there are some.
@@ -239,10 +237,13 @@ fn grown(config: Config, expected_m: f64, widened: f64) -> f64 {
 
 #[test]
 fn the_size_goes_by_the_distance_and_does_not_jump() {
+    // The box is some 50 pixels wide: whole pixels are 2 % of it.
+    fn near(found: f64, expected: f64) -> bool {
+        (found - expected).abs() < 0.021
+    }
+
     let config = Config { min_confidence: -1e6, ..Config::default() };
     let by_box = Config { scale_from_depth: false, ..config.clone() };
-    // The box is some 50 pixels wide: whole pixels are 2 % of it.
-    let near = |found: f64, expected: f64| (found - expected).abs() < 0.021;
     let cases = [
         (&config, 2.9, 1.0, 3.0 / 2.9),
         (&config, 2.0, 1.0, 1.08),

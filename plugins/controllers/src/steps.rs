@@ -30,7 +30,9 @@ mod tests {
 
     #[test]
     fn steps_are_neither_negative_nor_long() {
-        let step = |dt| step_s(&EgoMotion::at_rest(dt));
-        assert_eq!([0.1, 0.5, 7.0, -1.0, f64::NAN].map(step), [0.1, 0.5, 0.5, 0.0, 0.0]);
+        assert_eq!(
+            [0.1, 0.5, 7.0, -1.0, f64::NAN].map(|dt| step_s(&EgoMotion::at_rest(dt))),
+            [0.1, 0.5, 0.5, 0.0, 0.0]
+        );
     }
 }

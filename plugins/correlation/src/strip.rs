@@ -47,9 +47,12 @@ pub(crate) struct Lattice {
 impl Lattice {
     /// Cells of the size of those of a picture in `square`, and so many more on each side.
     pub(crate) fn around(square: &Rect, aside: i64, down: i64) -> Self {
+        fn more(cells: i64) -> usize {
+            SIDE + 2 * cells as usize
+        }
+
         let step = square.width / SIDE as f64;
         let corner = [square.x - step * aside as f64, square.y - step * down as f64].into();
-        let more = |cells: i64| SIDE + 2 * cells as usize;
         Self { corner, step, columns: more(aside), rows: more(down) }
     }
 

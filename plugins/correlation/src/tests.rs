@@ -180,7 +180,7 @@ fn who_left_is_forgotten() {
 
 #[test]
 fn each_person_is_remembered_as_long_as_the_track_of_that_person() {
-    let detected = |later: &[Track]| {
+    fn detected(later: &[Track]) -> bool {
         let mut detector = Correlation::new(Config::default()).unwrap();
         detector.learn(&World::at(HEAD).frame(), &[track(HEAD, true)]).unwrap();
         detector.learn(&in_shadow().frame(), later).unwrap();
@@ -188,7 +188,8 @@ fn each_person_is_remembered_as_long_as_the_track_of_that_person() {
         let mut funnel = Funnel::default();
         detector.detect(&in_shadow().frame(), &Query::Track(&expected), &mut funnel).unwrap();
         funnel.count("correlation: not seen well yet") == 0
-    };
+    }
+
     let lost = track(HEAD, false);
     let other = Track { id: TrackId(4), ..track(HEAD, false) };
     assert!(detected(std::slice::from_ref(&lost)) && detected(&[lost, other.clone()]));
@@ -260,8 +261,11 @@ proptest! {
 /// Chequers of two brightnesses, 2.0 and more from their mean.
 #[test]
 fn without_contrast_there_is_no_correlation() {
-    let sign = |x: usize, y: usize| if (x + y).is_multiple_of(2) { 1.0 } else { -1.0 };
-    let correlation = |own: f32, seen: f64| {
+    fn sign(x: usize, y: usize) -> f64 {
+        if (x + y).is_multiple_of(2) { 1.0 } else { -1.0 }
+    }
+
+    fn correlation(own: f32, seen: f64) -> f64 {
         let grey = GreyImage::from_fn(64, 64, |x, y| (128.0 + seen * sign(x, y)) as u8);
         let depth = DepthImage::filled(64, 64, 2.5);
         let corner = Point2::new(10.0, 10.0);
@@ -272,7 +276,8 @@ fn without_contrast_there_is_no_correlation() {
         let body = [1.0; CELLS];
         let count = CELLS as f32;
         strip.fit(&Picture { grey: std::array::from_fn(cell), body, count }, 0, 0).correlation
-    };
+    }
+
     assert!((correlation(2.5, 3.0) - 1.0).abs() < 1e-3);
     assert_eq!([correlation(1.5, 9.0), correlation(9.0, 1.0), correlation(0.0, 0.0)], [0.0; 3]);
 }
@@ -318,7 +323,7 @@ fn the_best_place_must_be_good_and_better_than_all_others() {
 
 #[test]
 fn people_are_searched_as_far_as_they_can_have_got_but_not_farther() {
-    let reach = |aside: f64, up: f64| {
+    fn reach(aside: f64, up: f64) -> (i64, i64) {
         let mut track = track(HEAD, false);
         track.estimate.covariance = SMatrix::zeros();
         // Ahead of the camera, aside is to the left; the distance does not count.
@@ -326,7 +331,8 @@ fn people_are_searched_as_far_as_they_can_have_got_but_not_farther() {
             track.estimate.covariance[(axis, axis)] = sigma * sigma;
         }
         crate::detect::reach(&Config::default(), &camera(), &track)
-    };
+    }
+
     // Three standard deviations in cells of 2.375 cm.
     assert_eq!(reach(0.1, 0.05), (13, 7));
     assert_eq!(reach(1.0, 1.0), (26, 9), "0.6 m aside, 0.2 m up and down");
@@ -353,7 +359,7 @@ fn aside_is_across_the_ray_of_the_camera() {
 
 #[test]
 fn who_is_not_in_plain_view_is_not_remembered() {
-    let learned = |track: Track, config: Config| {
+    fn learned(track: Track, config: Config) -> bool {
         let mut detector = Correlation::new(config).unwrap();
         detector.learn(&World::at(HEAD).frame(), std::slice::from_ref(&track)).unwrap();
         let mut funnel = Funnel::default();
@@ -361,8 +367,12 @@ fn who_is_not_in_plain_view_is_not_remembered() {
         let search = Query::Track(&expected);
         detector.detect(&in_shadow().frame(), &search, &mut funnel).unwrap();
         funnel.count("correlation: not seen well yet") == 0
-    };
-    let seen = || track(HEAD, true);
+    }
+
+    fn seen() -> Track {
+        track(HEAD, true)
+    }
+
     assert!(learned(seen(), Config::default()));
     assert!(!learned(track(HEAD, false), Config::default()), "nobody is seen");
     assert!(!learned(Track { occluded: true, ..seen() }, Config::default()));
@@ -411,8 +421,10 @@ fn brightness_is_that_between_four_pixels_and_depth_that_of_the_nearest() {
     let sloped = brightness(&grey, Point2::new(2.75, 1.75)).unwrap();
     assert!((sloped - (22.5 + 3.75)).abs() < 1e-4, "{sloped}");
     let depth = DepthImage::from_pixels(2, 1, vec![1.0, 2.0]).unwrap();
-    let at = |x: f64| nearest(&depth, Point2::new(x, 0.9));
-    assert_eq!([-0.1, 0.0, 0.9, 1.1, 2.0].map(at), [None, Some(1.0), Some(1.0), Some(2.0), None]);
+    assert_eq!(
+        [-0.1, 0.0, 0.9, 1.1, 2.0].map(|x| nearest(&depth, Point2::new(x, 0.9))),
+        [None, Some(1.0), Some(1.0), Some(2.0), None]
+    );
 }
 
 #[test]

@@ -185,11 +185,14 @@ mod tests {
     #[test]
     fn a_range_is_that_of_the_beam_in_this_direction() {
         let mut cloud = sphere();
-        let nearer = |point: &Point3<f64>| {
-            let ray = point - cloud.scanner;
-            if ray.y > 0.0 { cloud.scanner + 0.5 * ray } else { *point }
-        };
-        cloud.points = cloud.points.iter().map(nearer).collect();
+        cloud.points = cloud
+            .points
+            .iter()
+            .map(|point| {
+                let ray = point - cloud.scanner;
+                if ray.y > 0.0 { cloud.scanner + 0.5 * ray } else { *point }
+            })
+            .collect();
         let beams = Beams::new(&cloud);
         let range_m = |x: f64, y: f64, z: f64| beams.range_m(&Point3::new(x, y, z));
         assert!((range_m(1.3, 1.0, 1.0).unwrap() - 2.0).abs() < 1e-6);

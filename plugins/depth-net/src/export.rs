@@ -49,6 +49,15 @@ pub(crate) fn export(config: Config, context: &Context) -> Result<ExportedNetwor
 }
 
 fn graph(model: &Model) -> OnnxGraph {
+    fn part(graph: &mut OnnxGraph, output: &str, from: usize, count: usize) {
+        let choice: Vec<f32> =
+            (0..4 * count).map(|at| f32::from(at % 4 == from + at / 4)).collect();
+        let name = format!("{output}.choice");
+        graph.constant(&name, &[count, 4, 1, 1], &choice);
+        let kernel = [("kernel_shape", Attribute::Ints(&[1, 1]))];
+        graph.operator("Conv", &["shifted", &name], output, &kernel);
+    }
+
     let Net { first, second, third, fourth, fifth, last } = &model.net;
     let mut graph = OnnxGraph::new(NAME);
     graph.note("card", CARD);
@@ -74,14 +83,6 @@ fn graph(model: &Model) -> OnnxGraph {
     graph.constant("shift", &[1, 4, 1, 1], &[offset, 0.0, 0.0, HEAD_M]);
     graph.operator("Mul", &["answer", "scale"], "scaled", &[]);
     graph.operator("Add", &["scaled", "shift"], "shifted", &[]);
-    let part = |graph: &mut OnnxGraph, output: &str, from: usize, count: usize| {
-        let choice: Vec<f32> =
-            (0..4 * count).map(|at| f32::from(at % 4 == from + at / 4)).collect();
-        let name = format!("{output}.choice");
-        graph.constant(&name, &[count, 4, 1, 1], &choice);
-        let kernel = [("kernel_shape", Attribute::Ints(&[1, 1]))];
-        graph.operator("Conv", &["shifted", &name], output, &kernel);
-    };
     part(&mut graph, "log_odds", 0, 1);
     part(&mut graph, "head", 1, 3);
     graph.output("log_odds", &ONE);

@@ -59,9 +59,9 @@ pub(crate) fn peaks_of(views: &Views, passes: &[Pass], least: f64, separation_m:
     let mut all = Vec::new();
     for ((quarter, map), pass) in views.maps.iter().zip(passes) {
         let found = peaks(map, pass, least, separation_m);
-        let is_own =
-            |peak: &Peak| views.beams.is_none() || peak.head.y.atan2(peak.head.x).abs() <= OWN_RAD;
-        let own = found.into_iter().filter(is_own);
+        let own = found.into_iter().filter(|peak| {
+            views.beams.is_none() || peak.head.y.atan2(peak.head.x).abs() <= OWN_RAD
+        });
         all.extend(own.map(|peak| Peak { head: quarter.robot_of(peak.head), ..peak }));
     }
     apart(all, separation_m)

@@ -292,12 +292,13 @@ mod tests {
             let pixel = Point2::new(x as f64, y as f64);
             // Along the ray, nearest first.
             let mut depths_m = (0..120).map(|step| head.x - 0.3 + 0.005 * f64::from(step));
-            let is_hit = |depth_m: &f64| {
-                let off = camera.back_project(pixel, *depth_m) - head;
-                let is_body = off.z < -0.05 && off.xy().norm() < 0.09;
-                off.norm() < HALF_HEAD_M || is_body
-            };
-            depths_m.find(is_hit).unwrap_or(wall_m) as f32
+            depths_m
+                .find(|depth_m| {
+                    let off = camera.back_project(pixel, *depth_m) - head;
+                    let is_body = off.z < -0.05 && off.xy().norm() < 0.09;
+                    off.norm() < HALF_HEAD_M || is_body
+                })
+                .unwrap_or(wall_m) as f32
         })
     }
 

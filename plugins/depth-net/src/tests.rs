@@ -70,14 +70,17 @@ fn it_keeps_the_promises_of_its_kinds() {
 
 #[test]
 fn people_are_found_from_every_height_and_the_near_one_without_a_head() {
+    fn is_near(d: &Detection, person: &Truth) -> bool {
+        (d.position.xy() - person.head_in_robot.xy()).norm() < 0.6
+    }
+
     for height_m in [0.4, 0.8, 1.2, 1.6] {
         let (frame, truth) = room(height_m, NEAR_AND_FAR);
         let found = found(&frame);
-        let is_near = |d: &Detection, person: &Truth| {
-            (d.position.xy() - person.head_in_robot.xy()).norm() < 0.6
-        };
-        let is_person = |d: &Detection| truth.iter().any(|person| is_near(d, person));
-        assert!(found.iter().all(is_person), "{height_m} m: {found:?}");
+        assert!(
+            found.iter().all(|d| truth.iter().any(|person| is_near(d, person))),
+            "{height_m} m: {found:?}"
+        );
         for person in &truth {
             let off = |d: &Detection| (d.position.xy() - person.head_in_robot.xy()).norm();
             let nearest = found.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
@@ -221,9 +224,10 @@ fn without_depth_the_detector_complains_and_the_verifier_is_undecided() {
 
 #[test]
 fn settings_that_cannot_work_are_refused_by_name() {
-    let refusal = |config: Config| {
+    fn refusal(config: Config) -> String {
         DepthNet::new(config, &context()).err().map_or(String::new(), |error| error.to_string())
-    };
+    }
+
     assert!(refusal(Config { sigma_m: 0.0, ..Config::default() }).contains("sigma_m"));
     assert!(
         refusal(Config { model: "nowhere.toml".into(), ..Config::default() })
@@ -240,12 +244,14 @@ mod training {
     use crate::{FloorMap, Model, Net, Pass, Training};
 
     fn people(truth: &[Truth]) -> Vec<AnnotatedPerson> {
-        let of = |person: &Truth| AnnotatedPerson {
-            head: person.head_in_robot,
-            counts: true,
-            visible: person.visible_fraction,
-        };
-        truth.iter().map(of).collect()
+        truth
+            .iter()
+            .map(|person| AnnotatedPerson {
+                head: person.head_in_robot,
+                counts: true,
+                visible: person.visible_fraction,
+            })
+            .collect()
     }
 
     fn trainer(training: Training) -> DepthNetTrainer {
@@ -280,6 +286,10 @@ mod training {
 
     #[test]
     fn each_real_room_gets_a_model_that_does_not_depend_on_it() {
+        fn net(text: &str) -> Net {
+            Model::from_text(text).unwrap().net
+        }
+
         let short = Training { steps: 2, real_steps: 2, batch: 4, ..Training::default() };
         let fitted = |changed: bool| {
             let mut trainer = trainer(short.clone());
@@ -292,7 +302,6 @@ mod training {
         let after = fitted(true);
         let rooms: Vec<&str> = before.without.iter().map(|(room, _)| room.as_str()).collect();
         assert_eq!(rooms, ["another", "third"]);
-        let net = |text: &str| Model::from_text(text).unwrap().net;
         assert_eq!(net(&before.without[1].1), net(&after.without[1].1), "it has not seen the room");
         assert_ne!(net(&before.without[0].1), net(&after.without[0].1), "this one has");
         assert_ne!(net(&before.model), net(&after.model), "and so has the shipped one");
@@ -301,6 +310,10 @@ mod training {
     /// Each part of the network a little larger and smaller.
     #[test]
     fn the_gradient_is_that_of_small_steps() {
+        fn weight(k: usize) -> f32 {
+            ((k as f32) * 12.9898).sin() * 0.01
+        }
+
         let (frame, _) = room(1.2, NEAR_AND_FAR);
         let map = FloorMap::new(&frame.camera, frame.depth().unwrap());
         let mut net = crate::train::start(4);
@@ -310,7 +323,6 @@ mod training {
         net.look(&map, &mut pass);
         let mut gradient = Net::default();
         let mut of = Pass::default();
-        let weight = |k: usize| ((k as f32) * 12.9898).sin() * 0.01;
         for (k, slope) in of.answer.values.iter_mut().enumerate() {
             *slope = if map.in_view[k / 4] { weight(k) } else { 0.0 };
         }

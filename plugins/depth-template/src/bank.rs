@@ -70,11 +70,13 @@ pub struct Template {
 impl Template {
     fn new(rows: Vec<TemplateRow>, half_width: i64) -> Self {
         let person = rows.iter().map(|row| (row.to - row.from) as f64).sum();
-        let beside = |row: &TemplateRow| {
-            let sides = [row.guard_from + half_width, half_width + 1 - row.guard_to];
-            sides.map(|pixels| pixels.max(0) as f64).iter().sum::<f64>()
-        };
-        let background = rows.iter().map(beside).sum();
+        let background = rows
+            .iter()
+            .map(|row| {
+                let sides = [row.guard_from + half_width, half_width + 1 - row.guard_to];
+                sides.map(|pixels| pixels.max(0) as f64).iter().sum::<f64>()
+            })
+            .sum();
         Self { rows, half_width, person, background }
     }
 }
@@ -207,11 +209,12 @@ impl<'a> Cutter<'a> {
         let scale = pose.px_per_m();
         let half_width = pose.half_width();
         let (sin, cos) = (f64::from(pose.roll) * ROLL_STEP_DEG).to_radians().sin_cos();
-        let column = |dx: i64| {
-            let x = dx as f64 / scale;
-            Column { dx, right_m: x * cos, up_m: x * sin }
-        };
-        let columns = (-half_width..=half_width).map(column).collect();
+        let columns = (-half_width..=half_width)
+            .map(|dx| {
+                let x = dx as f64 / scale;
+                Column { dx, right_m: x * cos, up_m: x * sin }
+            })
+            .collect();
         Self { relief, scale, turn: (sin, cos), columns, face: relief.at(0.0, 0.0) }
     }
 
@@ -350,13 +353,14 @@ mod tests {
 
     #[test]
     fn a_pose_is_the_nearest_of_the_bank() {
-        let steps = |pitch: f64, roll: f64| {
+        fn steps(pitch: f64, roll: f64) -> (i8, i8) {
             let pitch = pitch * PITCH_STEP_DEG;
             let roll = roll * ROLL_STEP_DEG;
             let pose =
                 Pose::nearest(Direction::Along, pitch.to_radians(), roll.to_radians(), 100.0);
             (pose.pitch, pose.roll)
-        };
+        }
+
         assert_eq!(steps(0.4, -0.4), (0, 0));
         assert_eq!(steps(0.6, -0.6), (1, -1));
         assert_eq!([steps(-3.0, -20.0), steps(9.0, 20.0)], [(-1, -15), (4, 15)]);
@@ -392,10 +396,11 @@ mod tests {
 
     #[test]
     fn a_person_leaning_right_has_the_shoulders_on_the_left() {
-        let middle = |t: &Template| {
+        fn middle(t: &Template) -> i64 {
             let row = t.rows.iter().find(|r| r.dy == 35).unwrap();
             row.from + row.to
-        };
+        }
+
         assert!(
             middle(&widths(Direction::Along, 12.0)) < middle(&widths(Direction::Along, 0.0)) - 8
         );

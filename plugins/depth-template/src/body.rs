@@ -51,12 +51,14 @@ impl Relief {
     const CELL_M: f64 = Self::SIDE_M / Self::SIZE as f64;
 
     fn new(cells: Vec<f64>) -> Self {
-        let extent = |line: &[f64]| {
-            let is_body = |cell: &f64| !cell.is_nan();
-            let first = line.iter().position(is_body).unwrap_or(Self::SIZE);
-            first..line.iter().rposition(is_body).map_or(0, |last| last + 1)
-        };
-        let extents = cells.chunks(Self::SIZE).map(extent).collect();
+        let extents = cells
+            .chunks(Self::SIZE)
+            .map(|line| {
+                let is_body = |cell: &f64| !cell.is_nan();
+                let first = line.iter().position(is_body).unwrap_or(Self::SIZE);
+                first..line.iter().rposition(is_body).map_or(0, |last| last + 1)
+            })
+            .collect();
         Self { cells, extents }
     }
 
@@ -150,10 +152,13 @@ impl Ellipsoid {
 
     /// Returns the cells along an axis of the image in which the ellipsoid can lie.
     fn cells(&self, axis: &Vector3<f64>) -> Range<usize> {
+        // A cell more on each side, so that rounding cannot cut the border off.
+        fn cell(m: f64) -> f64 {
+            (m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64
+        }
+
         let middle = axis.dot(&self.centre);
         let reach = axis.dot(&(self.spread * axis)).sqrt();
-        // A cell more on each side, so that rounding cannot cut the border off.
-        let cell = |m: f64| (m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64;
         let from = (cell(middle - reach).floor() - 1.0).max(0.0) as usize;
         let to = (cell(middle + reach).ceil() + 1.0).max(0.0) as usize;
         from..to.min(Relief::SIZE)
@@ -192,13 +197,14 @@ mod tests {
             let discriminant = b * b - a * c;
             (discriminant >= 0.0).then(|| (-b - discriminant.sqrt()) / a)
         };
-        let cell = |i: usize| {
-            let x = middle_m(i % Relief::SIZE);
-            let y = middle_m(i / Relief::SIZE);
-            let origin = Vector3::new(0.0, -1.0, 0.0) * x + Vector3::new(-sin, 0.0, -cos) * y;
-            body_parts().iter().filter_map(|part| hit(part, &origin)).fold(f64::NAN, f64::min)
-        };
-        (0..Relief::SIZE * Relief::SIZE).map(cell).collect()
+        (0..Relief::SIZE * Relief::SIZE)
+            .map(|i| {
+                let x = middle_m(i % Relief::SIZE);
+                let y = middle_m(i / Relief::SIZE);
+                let origin = Vector3::new(0.0, -1.0, 0.0) * x + Vector3::new(-sin, 0.0, -cos) * y;
+                body_parts().iter().filter_map(|part| hit(part, &origin)).fold(f64::NAN, f64::min)
+            })
+            .collect()
     }
 
     proptest! {
@@ -206,19 +212,28 @@ mod tests {
 
         #[test]
         fn a_relief_is_that_of_all_parts_in_all_cells(yaw in -4.0..4.0f64, pitch in -0.3..1.1f64) {
-            let bits = |cells: &[f64]| cells.iter().map(|cell| cell.to_bits()).collect::<Vec<_>>();
+            fn bits(cells: &[f64]) -> Vec<u64> {
+                cells.iter().map(|cell| cell.to_bits()).collect::<Vec<_>>()
+            }
+
             prop_assert_eq!(bits(&render(yaw, pitch).cells), bits(&slow(yaw, pitch)));
         }
     }
 
     #[test]
     fn a_point_is_found_without_rounding_towards_minus_infinity() {
+        fn cell(m: f64) -> f64 {
+            ((m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64).floor()
+        }
+
+        fn inside(v: f64) -> bool {
+            0.0 <= v && v < Relief::SIZE as f64
+        }
+
         let relief = render(0.0, 0.0);
         let slow = |right_m: f64, down_m: f64| {
-            let cell = |m: f64| ((m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64).floor();
             let x = cell(right_m);
             let y = cell(down_m);
-            let inside = |v: f64| 0.0 <= v && v < Relief::SIZE as f64;
             let is_inside = inside(x) && inside(y);
             if is_inside { relief.cells[y as usize * Relief::SIZE + x as usize] } else { f64::NAN }
         };

@@ -178,8 +178,11 @@ mod tests {
 
     #[test]
     fn boundary_points_lie_left_right_and_above_at_their_distance() {
+        fn at((x, y): (i64, i64), depth_m: f32) -> (i64, i64, f32) {
+            (x, y, depth_m)
+        }
+
         let [left, right, above] = [(28, 40), (72, 40), (50, 18)];
-        let at = |(x, y): (i64, i64), depth_m| (x, y, depth_m);
         assert!(passes(&[], 3));
         for side in [left, right] {
             assert!(!passes(&[at(side, 3.0)], 3), "{side:?} contradicts");
@@ -210,9 +213,10 @@ mod tests {
 
     #[test]
     fn a_head_is_as_wide_as_what_goes_on_at_its_depth() {
-        let width = |things: &[(i64, i64, f32)]| {
+        fn width(things: &[(i64, i64, f32)]) -> f64 {
             head_width_m(&with_things(things), &Local::upright(50, 40, 3.0, 100.0))
-        };
+        }
+
         // 17 pixels of 1 cm.
         assert!((width(&[]) - 0.17).abs() < 1e-9, "{}", width(&[]));
         // A piece beside it at its depth, behind a gap that shows the wall, is apart;
@@ -229,13 +233,14 @@ mod tests {
 
     #[test]
     fn a_body_is_what_most_probes_below_a_head_meet() {
-        let below = |legs_m: f32, from: usize| {
+        fn below(legs_m: f32, from: usize) -> f64 {
             let depth = DepthImage::from_fn(100, 140, |x, y| {
                 let is_body = (35..65).contains(&x) && y >= from;
                 if is_body { legs_m } else { 6.0 }
             });
             body_below(&RowSums::new(&depth, 1), &Local::upright(50, 40, 3.0, 100.0))
-        };
+        }
+
         assert_eq!(below(3.0, 50), 1.0);
         assert_eq!(below(3.2, 50), 1.0, "a body is deep");
         assert_eq!(below(3.4, 50), 0.0, "a wall behind");
@@ -250,9 +255,12 @@ mod tests {
 
     #[test]
     fn a_shoulder_has_the_head_aslant_above_it_and_a_head_has_nothing() {
+        fn at(x: i64, y: i64, depth_m: f64) -> Local {
+            Local::upright(x, y, depth_m, 100.0)
+        }
+
         let rows = from_the_side();
         let config = DepthTemplateConfig::default();
-        let at = |x, y, depth_m| Local::upright(x, y, depth_m, 100.0);
         assert!(is_below_something(&rows, &at(65, 65, 2.85), &config));
         assert!(!is_below_something(&rows, &at(50, 40, 3.0), &config));
         assert!(!boundary(&rows, &at(65, 65, 2.85), &config));

@@ -20,17 +20,17 @@ pub enum Cost {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DepthTemplateConfig {
-    /// Nearest and farthest face, m of depth (P4: 0.5 to 5.5).
+    /// Nearest and farthest face, m of depth.
     pub min_depth_m: f64,
     /// Farthest face, m of depth.
     pub max_depth_m: f64,
-    /// Lowest head centre above the floor, m (P4: 0.7; a standing adult's is
-    /// above 1.3, a monitor on a desk reaches 1.15).
+    /// Lowest head centre above the floor, m: a standing adult's is above 1.3, a monitor on a desk
+    /// reaches 1.15.
     pub min_head_height_m: f64,
-    /// Highest head centre above the floor, m (P4: 2.0).
+    /// Highest head centre above the floor, m.
     pub max_head_height_m: f64,
-    /// A boundary point passes if it is this much farther than the head, m
-    /// (P4: 1.0, which loses people in front of walls).
+    /// A boundary point passes if it is this much farther than the head, m;
+    /// 1.0 loses people in front of walls.
     pub boundary_margin_m: f64,
     /// Distance of the boundary points left, right and above from the head
     /// centre, m.
@@ -44,7 +44,7 @@ pub struct DepthTemplateConfig {
     /// Part of the probes below the head that must show a body, 0 to 1.
     pub min_body: f64,
     /// Body directions that have a template: `along` (from the front or the
-    /// back), `left`, `right`. P4 has three and does not say which.
+    /// back), `left`, `right`.
     pub directions: Vec<Direction>,
     /// Comparison of silhouettes with the image.
     pub cost: Cost,
@@ -80,7 +80,7 @@ pub struct DepthTemplateConfig {
     /// Followed people are searched within this radius of the prediction, m,
     /// or three standard deviations, whichever is smaller.
     pub follow_radius_m: f64,
-    /// Background of the frame as a percentile of its depths, for the cost `squared` (P3, P4: 90).
+    /// Background of the frame as a percentile of its depths, for the cost `squared`.
     pub background_percentile: f64,
     /// Log-likelihood of a person in an imagined scene that fits perfectly and is wholly visible
     /// (role `weigh`), nats. Neighbouring pixels err alike, so that this is far below the number of

@@ -452,6 +452,18 @@ mod tests {
 
     #[test]
     fn the_depth_of_a_head_is_the_median_of_the_readings_near_it() {
+        fn of(image: &DepthImage) -> f64 {
+            head_depth_m(image, 30.0, 30.0, 100.0, 2.0)
+        }
+
+        fn turned(x: usize) -> f32 {
+            if x < 32 { 2.1 } else { 2.0 }
+        }
+
+        fn beside(x: usize) -> f32 {
+            if x < 33 { 3.0 } else { 1.8 }
+        }
+
         // 100 pixels a metre: a patch of 12 cm is 13 pixels wide.
         let depth = |face: &dyn Fn(usize) -> f32| {
             DepthImage::from_fn(60, 60, |x, y| {
@@ -459,13 +471,9 @@ mod tests {
                 if inside { face(x) } else { 2.2 }
             })
         };
-        let of = |image: &DepthImage| head_depth_m(image, 30.0, 30.0, 100.0, 2.0);
         assert!((of(&depth(&|_| 2.1)) - 2.1).abs() < 1e-6);
-        let nose = |x: usize| if x == 30 { 1.9 } else { 2.0 };
-        assert!((of(&depth(&nose)) - 2.0).abs() < 1e-6);
-        let turned = |x: usize| if x < 32 { 2.1 } else { 2.0 };
+        assert!((of(&depth(&|x| if x == 30 { 1.9 } else { 2.0 })) - 2.0).abs() < 1e-6);
         assert!((of(&depth(&turned)) - 2.1).abs() < 1e-6, "eight of thirteen columns");
-        let beside = |x: usize| if x < 33 { 3.0 } else { 1.8 };
         assert!((of(&depth(&beside)) - 1.8).abs() < 1e-6, "what is 0.25 m off is no face");
         assert_eq!(of(&depth(&|_| f32::NAN)), 2.0);
     }

@@ -90,7 +90,7 @@ pub fn register(registry: &mut Registry) {
     registry.trial_values(NAME, TRIAL_VALUES);
     registry.detector(
         NAME,
-        "head-and-shoulder silhouettes in depth images (P1, P3, P4)",
+        "head-and-shoulder silhouettes in depth images",
         |config: DepthTemplateConfig, _| DepthTemplate::new(config),
     );
 }

@@ -348,7 +348,10 @@ mod tests {
     #[test]
     fn the_squared_cost_does_not_depend_on_the_range() {
         // The same wall, so the same error in every background pixel.
-        let ratio = |cost| cost_of(cost, 4.0, 6.0) / cost_of(cost, 2.0, 6.0);
+        fn ratio(cost: Cost) -> f64 {
+            cost_of(cost, 4.0, 6.0) / cost_of(cost, 2.0, 6.0)
+        }
+
         assert!((ratio(Cost::Squared) - 1.0).abs() < 0.1, "{}", ratio(Cost::Squared));
     }
 }

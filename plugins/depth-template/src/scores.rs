@@ -226,11 +226,12 @@ mod tests {
 
     #[test]
     fn levels_follow_the_depth() {
-        let away = |depth_m: f64, behind_m: f64| {
+        fn away(depth_m: f64, behind_m: f64) -> usize {
             let a = Levels::of_face(depth_m).behind(behind_m);
             let b = Levels::of_face(depth_m + behind_m).behind(0.0);
             a.0.abs_diff(b.0)
-        };
+        }
+
         assert!((5..60).all(|d| away(0.1 * f64::from(d), 0.2 * f64::from(d) * 0.1) <= 1));
     }
 }

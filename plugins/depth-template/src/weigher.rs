@@ -123,11 +123,13 @@ impl Weigher {
         let view = tools.view_of(frame, &image);
         let log = |scene: &[Person]| {
             let mut cast = |way: Option<Direction>| {
-                let placed = |p: &Person| {
-                    let way = way.unwrap_or_else(|| direction(p, &frame.camera));
-                    tools.place(p, way, &frame.camera, &view)
-                };
-                let mut cast: Vec<PlacedPerson> = scene.iter().filter_map(placed).collect();
+                let mut cast: Vec<PlacedPerson> = scene
+                    .iter()
+                    .filter_map(|p| {
+                        let way = way.unwrap_or_else(|| direction(p, &frame.camera));
+                        tools.place(p, way, &frame.camera, &view)
+                    })
+                    .collect();
                 cast.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m).then(a.x.cmp(&b.x)));
                 likelihood.log_likelihood(&cast)
             };
@@ -176,8 +178,11 @@ impl Likelihood for Weigher {
         cast.clear();
         for scene in people.chunks(people_per_scene.max(1)) {
             let before = cast.len();
-            let placed = |p| tools.place(p, direction(p, &frame.camera), &frame.camera, &view);
-            cast.extend(scene.iter().filter_map(placed));
+            cast.extend(
+                scene.iter().filter_map(|p| {
+                    tools.place(p, direction(p, &frame.camera), &frame.camera, &view)
+                }),
+            );
             cast[before..].sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m).then(a.x.cmp(&b.x)));
             counts.push(cast.len() - before);
         }
@@ -483,8 +488,9 @@ impl Silhouette {
 
     /// Returns every `step`-th row from the one number `phase` on.
     fn thinned(&self, phase: usize) -> &[TemplateRow] {
-        let every = || self.rows.iter().skip(phase).step_by(self.step as usize);
-        self.thinned[phase].get_or_init(|| with_reliefs(self.pose, every()))
+        self.thinned[phase].get_or_init(|| {
+            with_reliefs(self.pose, self.rows.iter().skip(phase).step_by(self.step as usize))
+        })
     }
 }
 

@@ -113,6 +113,11 @@ impl Cascade {
     /// # Errors
     /// The first fault, as one sentence.
     pub fn check(&self) -> Result<(), String> {
+        fn are_right(parts: &[(Part, f32)], fits: &dyn Fn(&Part) -> bool) -> bool {
+            (2..=3).contains(&parts.len())
+                && parts.iter().all(|(part, weight)| fits(part) && weight.is_finite())
+        }
+
         if !(8..=256).contains(&self.width) || !(8..=256).contains(&self.height) {
             return Err(format!("its windows are {} x {} pixels", self.width, self.height));
         }
@@ -130,10 +135,6 @@ impl Cascade {
             let bottom = down.map(|down| down + part.y);
             let is_inside = right.is_some_and(|x| x <= self.width) && part.x >= part.height;
             is_inside && bottom.is_some_and(|y| y <= self.height)
-        };
-        let are_right = |parts: &[(Part, f32)], fits: &dyn Fn(&Part) -> bool| {
-            (2..=3).contains(&parts.len())
-                && parts.iter().all(|(part, weight)| fits(part) && weight.is_finite())
         };
         let is_right = |feature: &Feature| match feature {
             Feature::Haar(parts) => are_right(parts, &|part| fits(part, 1)),

@@ -136,10 +136,9 @@ impl Compiled {
             })),
         };
         let looks: Vec<WindowFeature> = cascade.features.iter().map(look).collect();
-        let weak = |tree: &Tree| Weak::new(tree, &looks);
         let stages = cascade.stages.iter().map(|stage| Stage {
             threshold: stage.threshold,
-            weak: stage.trees.iter().map(weak).collect(),
+            weak: stage.trees.iter().map(|tree| Weak::new(tree, &looks)).collect(),
         });
         let stages = stages.collect();
         let middle = cascade.middle();

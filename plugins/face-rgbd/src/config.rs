@@ -151,7 +151,10 @@ impl Training {
     /// Refuses settings outside their ranges.
     #[cfg(feature = "train")]
     pub(crate) fn check(&self) -> Result<()> {
-        let is_part = |v: f64| v > 0.0 && v < 1.0;
+        fn is_part(v: f64) -> bool {
+            v > 0.0 && v < 1.0
+        }
+
         let counts = [self.stages, self.max_trees, self.depth, self.features, self.others];
         let fine = is_part(self.min_hit_rate)
             && is_part(self.max_false_alarm)

@@ -127,8 +127,12 @@ impl Detector for FaceRgbd {
         self.search(frame, near, funnel)?;
         self.grouping.group(&self.hits, self.config.min_neighbours);
         let depth = frame.depth().ok();
-        let of = |group| self.detection(&frame.camera, depth, group);
-        let mut found: Vec<Detection> = self.grouping.kept().iter().filter_map(of).collect();
+        let mut found: Vec<Detection> = self
+            .grouping
+            .kept()
+            .iter()
+            .filter_map(|group| self.detection(&frame.camera, depth, group))
+            .collect();
         let all = found.len();
         found.retain(|detection| detection.score >= self.config.min_score);
         funnel.drop_many("face: log-odds", (all - found.len()) as u64);
@@ -270,6 +274,10 @@ mod tests {
 
     #[test]
     fn a_search_near_a_track_finds_one_face_within_its_box() {
+        fn looked_at(funnel: &Funnel) -> u64 {
+            funnel.count("window: no face")
+        }
+
         let (all, whole) = detect(&mut detector(eager()), &frame(None), &EVERYWHERE);
         let upper_body = Rect::new(40.0, 30.0, 60.0, 60.0);
         let (found, part) =
@@ -278,17 +286,17 @@ mod tests {
         assert!(all.len() > 1);
         let face = camera().project(&found[0].position).unwrap();
         assert!(upper_body.inflated(0.1).contains(face), "{face}");
-        let looked_at = |funnel: &Funnel| funnel.count("window: no face");
         assert!(looked_at(&part) > 0 && 3 * looked_at(&part) < looked_at(&whole));
     }
 
     #[test]
     fn depth_says_where_faces_are_looked_for_unless_it_is_told_not_to() {
-        let looked_at = |config: Config, depth_m: Option<f32>| {
+        fn looked_at(config: Config, depth_m: Option<f32>) -> (u64, u64) {
             let (_, funnel) = detect(&mut detector(config), &frame(depth_m), &EVERYWHERE);
             let points = funnel.count("point: depth and height");
             (funnel.count("window: no face"), points)
-        };
+        }
+
         let (everywhere, no_points) = looked_at(eager(), None);
         let (here, points) = looked_at(eager(), Some(2.0));
         let (nowhere, all_points) = looked_at(eager(), Some(9.0));

@@ -64,7 +64,7 @@ const REMEDIES: &[Remedy] = &[
 /// Registers the plugin, and its trainer if that is compiled in.
 pub fn register(registry: &mut Registry) {
     registry.remedies(NAME, REMEDIES);
-    registry.detector(NAME, "faces by a cascade, where depth allows them (P2)", FaceRgbd::new);
+    registry.detector(NAME, "faces by a cascade, where depth allows them", FaceRgbd::new);
     #[cfg(feature = "train")]
     registry.training(
         TRAINER,

@@ -190,7 +190,10 @@ fn around(points: impl Iterator<Item = [i64; 2]>) -> Rect {
 
 /// Returns the pixel of a sampling point: the middle of its cell.
 fn place(at: usize, columns: usize) -> (i64, i64) {
-    let middle = |cell: usize| (cell * GRID_PX + GRID_PX / 2) as i64;
+    fn middle(cell: usize) -> i64 {
+        (cell * GRID_PX + GRID_PX / 2) as i64
+    }
+
     (middle(at % columns), middle(at / columns))
 }
 
@@ -280,11 +283,12 @@ mod tests {
 
     /// The cells in which windows of a size may have their centre.
     fn allowed(proposals: &Proposals) -> Vec<(usize, usize)> {
-        let cells = (0..POINTS.1).flat_map(|y| (0..POINTS.0).map(move |x| (x, y)));
-        let window = |(x, y): &(usize, usize)| {
+        fn window((x, y): &(usize, usize)) -> Rect {
             let corner = |cell: usize| (cell * GRID_PX) as f64;
             Rect::new(corner(*x), corner(*y), GRID_PX as f64, GRID_PX as f64)
-        };
+        }
+
+        let cells = (0..POINTS.1).flat_map(|y| (0..POINTS.0).map(move |x| (x, y)));
         cells.filter(|cell| proposals.allows(&window(cell))).collect()
     }
 
@@ -294,10 +298,13 @@ mod tests {
 
     #[test]
     fn windows_may_be_where_a_face_would_be_so_large_and_beside_that() {
+        fn side(metres: f64) -> f64 {
+            metres * FOCAL_PX / 2.0
+        }
+
         let config = Config::default();
         let (mut proposals, counts) = sampled(&[block(5..9, 2.0, false)], &config);
         assert_eq!(counts, [(POINTS.0 * POINTS.1) as u64, 12, 12]);
-        let side = |metres: f64| metres * FOCAL_PX / 2.0;
         for metres in [config.min_face_m + 0.001, config.max_face_m - 0.001] {
             proposals.for_side(&camera(), side(metres), &config);
             assert_eq!(allowed(&proposals), cells(4..10, 5..10), "{metres}");
@@ -324,9 +331,11 @@ mod tests {
 
     #[test]
     fn regions_with_skin_are_searched_first_and_one_always() {
-        let blocks =
-            || [block(2..6, 2.0, false), block(8..12, 2.0, true), block(14..18, 2.0, false)];
-        let searched = |max_points: usize| {
+        fn blocks() -> [Block; 3] {
+            [block(2..6, 2.0, false), block(8..12, 2.0, true), block(14..18, 2.0, false)]
+        }
+
+        fn searched(max_points: usize) -> (u64, Vec<bool>) {
             let config = Config { max_points, ..Config::default() };
             let (mut proposals, counts) = sampled(&blocks(), &config);
             assert_eq!(counts[1], 36);
@@ -334,7 +343,8 @@ mod tests {
             let columns: Vec<bool> =
                 [3, 9, 15].map(|column| allowed(&proposals).contains(&(column, 7))).to_vec();
             (counts[2], columns)
-        };
+        }
+
         assert_eq!(searched(36), (36, vec![true, true, true]));
         assert_eq!(searched(35), (24, vec![true, true, false]), "of equals the first");
         assert_eq!(searched(24), (24, vec![true, true, false]));
@@ -344,10 +354,11 @@ mod tests {
 
     #[test]
     fn regions_end_where_depth_jumps() {
-        let counts = |apart_m: f32| {
+        fn counts(apart_m: f32) -> [u64; 3] {
             let config = Config { max_points: 1, ..Config::default() };
             sampled(&[block(4..8, 2.0, true), block(8..12, 2.0 + apart_m, false)], &config).1
-        };
+        }
+
         assert_eq!(counts(0.1), [300, 24, 24], "one surface");
         assert_eq!(counts(0.2), [300, 24, 12], "two");
         // Points one above the other are one surface as well.
@@ -374,7 +385,10 @@ mod tests {
 
     #[test]
     fn skin_is_that_of_the_rule() {
-        let is_skin = |colour: [u8; 3]| skin(&RgbImage::filled(1, 1, colour), 0, 0);
+        fn is_skin(colour: [u8; 3]) -> bool {
+            skin(&RgbImage::filled(1, 1, colour), 0, 0)
+        }
+
         let cases = [
             (SKIN, true),
             ([96, 41, 21], true),

@@ -77,8 +77,7 @@ impl Scanner {
         let height = size(cascade.height);
         let region = |x: usize, y: usize| Rect::new(size(x), size(y), width, height);
         for area in areas {
-            let wanted = |x, y| propose(&region(x, y));
-            self.size(image, cascade, scale, area, &wanted, &mut |seen| {
+            self.size(image, cascade, scale, area, &|x, y| propose(&region(x, y)), &mut |seen| {
                 let region = region(seen.part.x + seen.x, seen.part.y + seen.y);
                 hits.push(Hit { region, margin: seen.margin });
             });

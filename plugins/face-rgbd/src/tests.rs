@@ -20,7 +20,18 @@ fn part(x: usize, y: usize, width: usize, height: usize) -> Part {
 
 /// Two stages: a stump and a tree, with numbers that pass some of the noise.
 pub(crate) fn small() -> Cascade {
-    let pair = |at: Part, half: Part| Feature::Haar(vec![(at, -1.0), (half, 2.0)]);
+    fn pair(at: Part, half: Part) -> Feature {
+        Feature::Haar(vec![(at, -1.0), (half, 2.0)])
+    }
+
+    fn node(feature: usize, limit: f32, next: [Next; 2]) -> Node {
+        Node { feature, split: Split::Below(limit), next }
+    }
+
+    fn stage(threshold: f32, trees: Vec<Vec<Node>>) -> Stage {
+        Stage { threshold, trees }
+    }
+
     let features = vec![
         pair(part(1, 1, 8, 6), part(1, 1, 4, 6)),
         pair(part(2, 3, 5, 8), part(2, 3, 5, 4)),
@@ -31,11 +42,9 @@ pub(crate) fn small() -> Cascade {
         ]),
     ];
     let leaf = Next::Leaf;
-    let node = |feature, limit, next| Node { feature, split: Split::Below(limit), next };
     let stump = vec![node(0, 0.01, [leaf(-1.0), leaf(0.6)])];
     let tree =
         vec![node(1, 0.0, [Next::Node(1), leaf(-0.5)]), node(2, 0.02, [leaf(0.75), leaf(-0.25)])];
-    let stage = |threshold, trees| Stage { threshold, trees };
     let stages = vec![stage(0.5, vec![stump]), stage(0.3, vec![tree])];
     Cascade { width: 12, height: 12, features, stages, calibration: Some((1.5, -2.0)) }
 }
@@ -50,8 +59,11 @@ fn binary() -> Cascade {
 
 /// [`small`] with rectangles that are turned by 45 degrees.
 fn tilted() -> Cascade {
+    fn pair(at: Part, half: Part) -> Feature {
+        Feature::Tilted(vec![(at, -1.0), (half, 2.0)])
+    }
+
     let mut cascade = small();
-    let pair = |at: Part, half: Part| Feature::Tilted(vec![(at, -1.0), (half, 2.0)]);
     cascade.features[0] = pair(part(5, 1, 4, 5), part(5, 1, 2, 5));
     cascade.features[1] = pair(part(6, 0, 6, 6), part(6, 0, 6, 3));
     cascade.stages[0].trees[0][0].split = Split::Below(0.02);
@@ -61,9 +73,12 @@ fn tilted() -> Cascade {
 /// The sum of the values in a turned part of a window: those above the diagonals from its lowest
 /// corner, without those above the diagonals from its left and its right one.
 fn slow_tilted(image: &GreyImage, (left, top): (usize, usize), part: &Part) -> f64 {
+    fn is_above(px: i64, py: i64, (x, y): (i64, i64)) -> bool {
+        (px - x + 1).abs() < y - py
+    }
+
     let [x, y, width, height] =
         [left + part.x, top + part.y, part.width, part.height].map(|v| v as i64);
-    let is_above = |px: i64, py: i64, (x, y): (i64, i64)| (px - x + 1).abs() < y - py;
     let count = |px: i64, py: i64| {
         let corners = [(x, y), (x - height, y + height), (x + width, y + width)];
         let [upper, left, right] = corners.map(|at| i64::from(is_above(px, py, at)));
@@ -129,8 +144,11 @@ fn slow_stages(image: &GreyImage, at: (usize, usize), cascade: &Cascade) -> usiz
             }
         }
     };
-    let passes = |stage: &&Stage| stage.trees.iter().map(leaf).sum::<f32>() >= stage.threshold;
-    cascade.stages.iter().take_while(passes).count()
+    cascade
+        .stages
+        .iter()
+        .take_while(|stage| stage.trees.iter().map(leaf).sum::<f32>() >= stage.threshold)
+        .count()
 }
 
 /// The windows that pass, in OpenCV's order: the one after a window that fails the first stage is
@@ -271,12 +289,15 @@ fn windows_without_contrast_are_left_out() {
 
 #[test]
 fn a_cascade_survives_its_file() {
-    for cascade in [small(), binary(), tilted()] {
-        let read = Cascade::from_xml(&cascade.to_xml()).unwrap();
-        let without = |cascade: &Cascade| Cascade {
+    fn without(cascade: &Cascade) -> Cascade {
+        Cascade {
             stages: cascade.stages.iter().map(|s| Stage { threshold: 0.0, ..s.clone() }).collect(),
             ..cascade.clone()
-        };
+        }
+    }
+
+    for cascade in [small(), binary(), tilted()] {
+        let read = Cascade::from_xml(&cascade.to_xml()).unwrap();
         assert_eq!(without(&read), without(&cascade));
         for (a, b) in read.stages.iter().zip(&cascade.stages) {
             assert!((a.threshold - b.threshold).abs() < 1e-6);
@@ -310,7 +331,10 @@ fn a_tree_without_nodes_is_refused() {
 
 #[test]
 fn like_windows_are_one_face_and_single_ones_none() {
-    let hit = |x: f64, y: f64, side: f64| Hit { region: Rect::new(x, y, side, side), margin: 0.5 };
+    fn hit(x: f64, y: f64, side: f64) -> Hit {
+        Hit { region: Rect::new(x, y, side, side), margin: 0.5 }
+    }
+
     let near = [hit(10.0, 10.0, 30.0), hit(11.0, 12.0, 30.0), hit(12.0, 11.0, 31.0)];
     let hits = [&near[..], &[hit(80.0, 10.0, 30.0)]].concat();
     let groups = grouped(&hits, 2);
@@ -325,25 +349,35 @@ fn like_windows_are_one_face_and_single_ones_none() {
 /// The results of `cv2.groupRectangles(.., 3, 0.2)` of OpenCV 4.14.
 #[test]
 fn groups_are_rounded_as_opencv_does() {
-    let hit = |x: f64, y: f64, side: f64| Hit { region: Rect::new(x, y, side, side), margin: 0.0 };
-    let mean = |a: Hit, b: Hit| grouped(&[a, b, a, b], 3)[0].region;
+    fn hit(x: f64, y: f64, side: f64) -> Hit {
+        Hit { region: Rect::new(x, y, side, side), margin: 0.0 }
+    }
+
+    fn mean(a: Hit, b: Hit) -> Rect {
+        grouped(&[a, b, a, b], 3)[0].region
+    }
+
+    // A fifth of the larger one's side is rounded, too: 5.6 to 6, 6.4 to 6.
+    fn inside(side: f64, off: f64) -> bool {
+        let groups = [&[hit(0.0, 0.0, side); 5][..], &[hit(-off, 0.0, 20.0); 4]].concat();
+        grouped(&groups, 3).len() == 1
+    }
+
     // Halves go to the even number: 10.5 to 10, 11.5 to 12.
     let low = mean(hit(10.0, 11.0, 20.0), hit(11.0, 12.0, 21.0));
     assert_eq!(low, Rect::new(10.0, 12.0, 20.0, 20.0));
     let high = mean(hit(11.0, 10.0, 21.0), hit(12.0, 11.0, 22.0));
     assert_eq!(high, Rect::new(12.0, 10.0, 22.0, 22.0));
-    // A fifth of the larger one's side is rounded, too: 5.6 to 6, 6.4 to 6.
-    let inside = |side: f64, off: f64| {
-        let groups = [&[hit(0.0, 0.0, side); 5][..], &[hit(-off, 0.0, 20.0); 4]].concat();
-        grouped(&groups, 3).len() == 1
-    };
     assert!(inside(28.0, 6.0) && !inside(28.0, 7.0));
     assert!(inside(32.0, 6.0) && !inside(32.0, 7.0));
 }
 
 #[test]
 fn a_smaller_group_inside_a_stronger_one_goes() {
-    let hit = |x: f64, side: f64| Hit { region: Rect::new(x, x, side, side), margin: 0.1 };
+    fn hit(x: f64, side: f64) -> Hit {
+        Hit { region: Rect::new(x, x, side, side), margin: 0.1 }
+    }
+
     let large = [hit(0.0, 60.0); 5];
     let small = [hit(20.0, 20.0); 3];
     assert_eq!(grouped(&[&large[..], &small].concat(), 2).len(), 1);
@@ -353,11 +387,12 @@ fn a_smaller_group_inside_a_stronger_one_goes() {
 /// Compiled cascades hold offsets, which are those of one layout.
 #[test]
 fn all_sizes_of_an_image_share_a_layout_and_other_images_and_steps_do_not() {
-    let layout = |image_width: usize, width: usize, step: usize| {
+    fn layout(image_width: usize, width: usize, step: usize) -> (usize, usize, usize) {
         let mut level = Level::default();
         level.fill(&noise(image_width, 60, 1), (width, 30), step);
         level.layout()
-    };
+    }
+
     assert_eq!(layout(60, 40, 1), layout(60, 50, 1));
     assert_ne!(layout(60, 40, 1), layout(80, 40, 1));
     assert_ne!(layout(60, 40, 1), layout(60, 40, 2));

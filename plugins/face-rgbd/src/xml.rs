@@ -47,8 +47,11 @@ impl Cascade {
     }
 
     fn write(&self, out: &mut String) -> std::fmt::Result {
+        fn trees(stage: &Stage) -> usize {
+            stage.trees.len()
+        }
+
         let kind = if self.is_normalised() { "HAAR" } else { "LBP" };
-        let trees = |stage: &Stage| stage.trees.len();
         let most = self.stages.iter().map(trees).max().unwrap_or(0);
         let width = self.width;
         let height = self.height;
@@ -100,7 +103,10 @@ fn write_tree(tree: &Tree, out: &mut String) -> std::fmt::Result {
 }
 
 fn write_feature(feature: &Feature, out: &mut String) -> std::fmt::Result {
-    let text = |p: &Part| format!("{} {} {} {}", p.x, p.y, p.width, p.height);
+    fn text(p: &Part) -> String {
+        format!("{} {} {} {}", p.x, p.y, p.width, p.height)
+    }
+
     match feature {
         Feature::Binary(part) => writeln!(out, "<_><rect>{}</rect></_>", text(part)),
         Feature::Haar(parts) | Feature::Tilted(parts) => {
@@ -174,12 +180,13 @@ fn feature(feature: Element<'_, '_>) -> XmlResult<Feature> {
     if let Some(rect) = child(feature, "rect") {
         return Ok(Feature::Binary(part(&numbers::<f64>(rect)?)?));
     }
-    let weighted = |rect: Element<'_, '_>| {
-        let words = numbers::<f64>(rect)?;
-        let weight = words.get(4).ok_or("a rectangle has no weight")?;
-        Ok((part(&words)?, *weight as f32))
-    };
-    let parts = elements(wanted(feature, "rects")?).map(weighted).collect::<XmlResult<Vec<_>>>()?;
+    let parts = elements(wanted(feature, "rects")?)
+        .map(|rect| {
+            let words = numbers::<f64>(rect)?;
+            let weight = words.get(4).ok_or("a rectangle has no weight")?;
+            Ok((part(&words)?, *weight as f32))
+        })
+        .collect::<XmlResult<Vec<_>>>()?;
     let parts = parts.into_iter().filter(|(_, weight)| *weight != 0.0).collect();
     let tilted = child(feature, "tilted").and_then(|tilted| tilted.text());
     let is_tilted = tilted.is_some_and(|tilted| tilted.trim() == "1");

@@ -9,7 +9,7 @@ use crate::{Coverage, Kind};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Machine that classifies windows: `trees`, or `linear` as in P2.
+    /// Machine that classifies windows: `trees` on fine cells, or `linear` on normalised blocks.
     pub machine: Kind,
     /// Part of a person that windows show: `upper-body`, or `whole-body`, which machine `linear`
     /// does not know.

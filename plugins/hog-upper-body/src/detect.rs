@@ -163,8 +163,11 @@ impl<'a> Proposer<'a> {
     fn goes_on_above(&self, depth: &DepthImage, square: &Rect, face_m: f64) -> bool {
         let y = (square.y - ABOVE * square.height) as i64;
         let column = |i: usize| (square.x + square.width * (0.25 + 0.125 * i as f64)) as i64;
-        let is_same = |m: &f32| (f64::from(*m) - face_m).abs() < self.config.above_m;
-        (0..TAPS).filter_map(|i| depth.get(column(i), y)).filter(is_same).count() > TAPS / 2
+        (0..TAPS)
+            .filter_map(|i| depth.get(column(i), y))
+            .filter(|m| (f64::from(*m) - face_m).abs() < self.config.above_m)
+            .count()
+            > TAPS / 2
     }
 
     fn is_near(&self, square: &Rect) -> bool {

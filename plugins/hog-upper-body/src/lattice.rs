@@ -139,7 +139,10 @@ fn add_places(rows: [&[Counts]; TAPS], sums: &mut Vec<Counts>) {
 /// Returns the median of the valid readings (of an even number the farther one). The bits of
 /// positive numbers are in the order of the numbers.
 fn median(readings: [f32; TAPS * TAPS]) -> f32 {
-    let key = |metres: f32| if is_reading(metres) { metres.to_bits() } else { u32::MAX };
+    fn key(metres: f32) -> u32 {
+        if is_reading(metres) { metres.to_bits() } else { u32::MAX }
+    }
+
     let mut keys = readings.map(key);
     keys.sort_unstable();
     f32::from_bits(keys[keys.partition_point(|key| *key < u32::MAX) / 2])

@@ -77,7 +77,7 @@ pub fn register(registry: &mut Registry) {
     registry.remedies(NAME, REMEDIES);
     registry.detector(
         NAME,
-        "heads and shoulders by gradients and a linear machine (P2)",
+        "heads and shoulders by gradients, with boosted trees or a linear machine",
         HogUpperBody::new,
     );
     #[cfg(feature = "train")]

@@ -19,7 +19,7 @@ const FORMAT: &str = "hog-upper-body 3";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// Normalised blocks of cells and a linear machine, as in P2.
+    /// Normalised blocks of cells and a linear machine.
     Linear,
     /// Finer cells and boosted trees: fewer errors.
     #[default]
@@ -258,7 +258,10 @@ fn bias(levels: &[f32]) -> Result<f32, String> {
 }
 
 fn weights(bytes: &[u8]) -> Result<Vec<f32>, String> {
-    let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+    fn number(b: &[u8]) -> f32 {
+        f32::from_le_bytes([b[0], b[1], b[2], b[3]])
+    }
+
     let weights: Vec<f32> = bytes.chunks_exact(4).map(number).collect();
     if weights.len() != NUMBERS {
         return Err(format!("it has {} weights, expected {NUMBERS}", weights.len()));

@@ -29,16 +29,25 @@ fn it_conforms() {
 
 /// Histogram of one cell, gradient by gradient, over the whole image.
 fn slow_cell(pixels: &[f32], width: usize, cell: (usize, usize)) -> [f32; BINS] {
+    fn centre(cell: usize) -> f32 {
+        (cell * CELL) as f32 + 0.5 * CELL as f32
+    }
+
+    fn away(pixel: usize, cell: usize) -> f32 {
+        (pixel as f32 - 0.5 - centre(cell)).abs()
+    }
+
+    fn near(d: f32) -> f32 {
+        (1.0 - d / CELL as f32).max(0.0)
+    }
+
     let height = pixels.len() / width;
     let root = |x: usize, y: usize| pixels[y * width + x].sqrt();
-    let centre = |cell: usize| (cell * CELL) as f32 + 0.5 * CELL as f32;
     let mut histogram = [0.0; BINS];
     for y in 1..height - 1 {
         for x in 1..width - 1 {
             let gx = root(x + 1, y) - root(x - 1, y);
             let gy = root(x, y + 1) - root(x, y - 1);
-            let away = |pixel: usize, cell: usize| (pixel as f32 - 0.5 - centre(cell)).abs();
-            let near = |d: f32| (1.0 - d / CELL as f32).max(0.0);
             let share = near(away(x, cell.0)) * near(away(y, cell.1));
             let angle = gy.atan2(gx).rem_euclid(std::f32::consts::PI);
             for (bin, sum) in histogram.iter_mut().enumerate() {
@@ -54,6 +63,10 @@ fn slow_cell(pixels: &[f32], width: usize, cell: (usize, usize)) -> [f32; BINS] 
 
 #[test]
 fn blocks_are_those_of_the_slow_reference() {
+    fn norm(v: &[f32]) -> f32 {
+        v.iter().map(|v| v * v).sum::<f32>().sqrt()
+    }
+
     let image = noise(50, 42, 9);
     let pixels: Vec<f32> = image.pixels().iter().map(|v| f32::from(*v)).collect();
     let mut blocks = Blocks::default();
@@ -63,7 +76,6 @@ fn blocks_are_those_of_the_slow_reference() {
         let cells = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
         let mut slow: Vec<f32> =
             cells.iter().flat_map(|cell| slow_cell(&pixels, 50, *cell)).collect();
-        let norm = |v: &[f32]| v.iter().map(|v| v * v).sum::<f32>().sqrt();
         let length = norm(&slow) + 0.1 * BLOCK as f32 / 255.0_f32.sqrt();
         slow.iter_mut().for_each(|v| *v = (*v / length).min(0.2));
         let length = norm(&slow) + 1e-3;
@@ -209,16 +221,16 @@ fn channels_are_those_of_the_slow_reference() {
 
 #[test]
 fn two_people_one_behind_the_other_both_stay() {
-    let window = |x: f64, depth_m: Option<f64>, sum: f32| Window {
-        region: Rect::new(x, 0.0, 50.0, 50.0),
-        depth_m,
-        sum,
-    };
-    let merged = |a: Option<f64>, b: Option<f64>| {
+    fn window(x: f64, depth_m: Option<f64>, sum: f32) -> Window {
+        Window { region: Rect::new(x, 0.0, 50.0, 50.0), depth_m, sum }
+    }
+
+    fn merged(a: Option<f64>, b: Option<f64>) -> Vec<Window> {
         let mut windows = vec![window(0.0, a, 1.0), window(5.0, b, 2.0)];
         merge(&mut windows, Coverage::UpperBody, 0.4, 0.4);
         windows
-    };
+    }
+
     assert_eq!(merged(Some(2.0), Some(2.1)).len(), 1);
     assert_eq!(merged(Some(2.0), Some(2.6)).len(), 2);
     assert_eq!(merged(None, Some(2.6)).len(), 1);
@@ -227,13 +239,16 @@ fn two_people_one_behind_the_other_both_stay() {
 
 #[test]
 fn whole_bodies_side_by_side_are_told_apart_by_their_boxes() {
-    let at =
-        |y: f64, sum: f32| Window { region: Rect::new(0.0, y, 50.0, 50.0), depth_m: None, sum };
-    let left = |coverage: Coverage| {
+    fn at(y: f64, sum: f32) -> Window {
+        Window { region: Rect::new(0.0, y, 50.0, 50.0), depth_m: None, sum }
+    }
+
+    fn left(coverage: Coverage) -> usize {
         let mut windows = vec![at(0.0, 2.0), at(25.0, 1.0)];
         merge(&mut windows, coverage, 0.4, 0.4);
         windows.len()
-    };
+    }
+
     // The squares have a third in common, the bodies seven tenths.
     assert_eq!([Coverage::UpperBody, Coverage::WholeBody].map(left), [2, 1]);
 }
@@ -264,6 +279,11 @@ proptest! {
     fn a_part_of_the_image_gives_the_same_windows(
         slope in -2.0..2.0f64, width in 10.0..90.0f64, every in 1..4_usize,
     ) {
+        fn order(window: &Window) -> [i64; 3] {
+                let region = window.region;
+                [region.width, region.y, region.x].map(|v| (v * 1e3) as i64)
+            }
+
         let image = noise(200, 150, 4);
         let part = |square: &Rect| {
             let across = square.x - 80.0 - slope * (square.y - 40.0);
@@ -276,10 +296,6 @@ proptest! {
             let mut all = scan(&|_| true);
             all.retain(|window| part(&window.region));
             let mut some = scan(&part);
-            let order = |window: &Window| {
-                let region = window.region;
-                [region.width, region.y, region.x].map(|v| (v * 1e3) as i64)
-            };
             all.sort_by_key(order);
             some.sort_by_key(order);
             prop_assert_eq!(all.len(), some.len());
@@ -484,7 +500,10 @@ mod training {
 
     #[test]
     fn settings_that_cannot_work_are_refused() {
-        let of = |training| HogTrainer::new(Kind::Linear.into(), training, 1).is_ok();
+        fn of(training: Training) -> bool {
+            HogTrainer::new(Kind::Linear.into(), training, 1).is_ok()
+        }
+
         assert!(of(Training::default()));
         assert!(!of(Training { person_penalty: 0.0, ..Training::default() }));
         assert!(!of(Training { other_penalty: f64::INFINITY, ..Training::default() }));

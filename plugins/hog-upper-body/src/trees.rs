@@ -132,7 +132,10 @@ mod tests {
 
     #[test]
     fn the_second_question_is_that_of_the_first_answer() {
-        let value = |numbers: [f32; 3]| TREE.value(&numbers);
+        fn value(numbers: [f32; 3]) -> f32 {
+            TREE.value(&numbers)
+        }
+
         assert_eq!([value([0.0, 0.0, 1.0]), value([0.0, 1.0, 0.0])], [1.0, 2.0]);
         assert_eq!([value([1.0, 1.0, 0.0]), value([1.0, 0.0, 1.0])], [3.0, 4.0]);
         assert_eq!(value([0.5, 0.0, 0.5]), 4.0, "the threshold itself is not below");
@@ -140,11 +143,12 @@ mod tests {
 
     #[test]
     fn a_tree_that_asks_beyond_the_window_is_refused() {
-        let read = |number: usize| {
+        fn read(number: usize) -> [bool; 2] {
             let tree = Tree { numbers: [number as u16, 0, 0], ..TREE };
             [Coverage::UpperBody, Coverage::WholeBody]
                 .map(|coverage| from_bytes(&to_bytes(&[tree]), vec![0.0], coverage).is_ok())
-        };
+        }
+
         let [upper, whole] = [Coverage::UpperBody, Coverage::WholeBody].map(channel_numbers);
         assert_eq!([read(upper - 1), read(upper)], [[true, true], [false, true]]);
         assert_eq!([read(whole - 1), read(whole)], [[false, true], [false, false]]);

@@ -12,12 +12,12 @@ pub enum Method {
     /// One person after the other, from front to back, each with the nearer ones held (MacCormick
     /// and Blake 1999). For any number of people.
     Partitioned,
-    /// The scene of each particle is compared with the image (P3, II-C).
+    /// The scene of each particle is compared with the image.
     All,
     /// A full table over the lateral positions of two people is computed, and looked up by each
-    /// particle (P3, III: 21 x 61).
+    /// particle.
     Table,
-    /// Some particles are compared; the likelihood of all is the sum of kernels at these (P3, III).
+    /// Some particles are compared; the likelihood of all is the sum of kernels at these.
     Kde,
     /// Some particles are compared; the likelihood of all is interpolated by a Gaussian process
     /// with the same kernels.
@@ -28,7 +28,7 @@ pub enum Method {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Chosen {
-    /// The most likely ones of the previous frame (P3).
+    /// The most likely ones of the previous frame.
     PreviousBest,
     /// Predicted ones at regular intervals, and a coarse grid of 3 x 3 places.
     Spread,
@@ -40,11 +40,11 @@ pub enum Chosen {
 pub struct Config {
     /// Method for people with overlapping silhouettes.
     pub method: Method,
-    /// Number of particles of a single person (P3: 100).
+    /// Number of particles of a single person.
     #[schemars(range(min = 1, max = 100000))]
     pub particles: usize,
     /// `all`, `table`, `kde`, `gp`: number of particles of each of two people that are combined
-    /// with each other (P3: 25, which makes 625).
+    /// with each other, all with all: 25 make 625.
     #[schemars(range(min = 1, max = 300))]
     pub joint_side: usize,
     /// `partitioned`: most particles of a group; their number follows from their spread (KLD
@@ -58,7 +58,7 @@ pub struct Config {
     #[schemars(range(min = -10.0, max = 10.0))]
     pub kld_quantile: f64,
     /// Only the position across the viewing ray is sampled; depth, height and velocity are small
-    /// Kalman filters in each particle. Otherwise all are sampled, as in P3.
+    /// Kalman filters in each particle. Otherwise all are sampled.
     pub marginalise: bool,
     /// Spectral density of a person's white acceleration, m²/s³.
     #[schemars(range(min = 0.0, max = 1e3))]
@@ -78,11 +78,11 @@ pub struct Config {
     #[schemars(range(min = 0.0, max = 1e3))]
     pub initial_velocity_variance: f64,
     /// `table`, `kde`, `gp` with `marginalise = false`: two people that are weighed together keep
-    /// their depth and height, as P3 assumes for a short occlusion. The map contains no information
+    /// their depth and height, as if they moved across the view. The map contains no information
     /// on them.
     pub hold_depth: bool,
     /// People face in the direction of the best of three templates. If false, or if all fit alike,
-    /// in the direction of the track's velocity (P3); a standing person outside of groups faces by
+    /// in the direction of the track's velocity; a standing person outside of groups faces by
     /// the image in both cases.
     pub facing_by_image: bool,
     /// Part of the particles that is moved to the detection, 0 to 1.
@@ -111,27 +111,27 @@ pub struct Config {
     pub split_m: f64,
     /// ... and their squares have not overlapped in this many frames in a row.
     pub split_frames: u32,
-    /// `kde`, `gp`: number of particles that are compared with the image (P3: 30 or 50).
+    /// `kde`, `gp`: number of particles that are compared with the image.
     #[schemars(range(min = 1, max = 1000))]
     pub points: usize,
     /// `kde`, `gp`: selection of these particles.
     pub chosen: Chosen,
-    /// Width of the kernel along the lateral position of the near person, m (P3: 0.04).
+    /// Width of the kernel along the lateral position of the near person, m.
     #[schemars(range(min = 1e-4, max = 10.0))]
     pub kernel_near_m: f64,
-    /// Width of the kernel along the lateral position of the far person, m (P3: 0.1).
+    /// Width of the kernel along the lateral position of the far person, m.
     #[schemars(range(min = 1e-4, max = 10.0))]
     pub kernel_far_m: f64,
     /// `gp`: variance of the likelihood that the kernels do not explain.
     #[schemars(range(min = 1e-9, max = 10.0))]
     pub nugget: f64,
-    /// `table`: largest lateral position of the near person, m (P3: 0.3).
+    /// `table`: largest lateral position of the near person, m.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub reach_near_m: f64,
-    /// `table`: largest lateral position of the far person, m (P3: 0.9).
+    /// `table`: largest lateral position of the far person, m.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub reach_far_m: f64,
-    /// `table`: spacing of the positions, m (P3: 0.03).
+    /// `table`: spacing of the positions, m.
     #[schemars(range(min = 5e-3, max = 10.0))]
     pub step_m: f64,
     /// After people leave a group, their colours are compared with those before; they exchange

@@ -91,11 +91,13 @@ impl JointParticle {
 
     /// Splits a group along the borders of the wanted ones.
     fn split(&mut self, mut group: Group, wanted: &[BTreeSet<TrackId>]) {
-        let columns = |people: &BTreeSet<TrackId>| -> Vec<usize> {
-            (0..group.people()).filter(|i| people.contains(&group.ids[*i])).collect()
-        };
-        let parts: Vec<Vec<usize>> =
-            wanted.iter().map(columns).filter(|part| !part.is_empty()).collect();
+        let parts: Vec<Vec<usize>> = wanted
+            .iter()
+            .map(|people: &BTreeSet<TrackId>| -> Vec<usize> {
+                (0..group.people()).filter(|i| people.contains(&group.ids[*i])).collect()
+            })
+            .filter(|part| !part.is_empty())
+            .collect();
         if parts.len() < 2 {
             self.groups.push(group);
             return;
@@ -107,8 +109,10 @@ impl JointParticle {
 
     /// Merges the groups that make up a wanted one.
     fn join(&mut self, people: &BTreeSet<TrackId>) {
-        let is_part = |group: &mut Group| group.ids.iter().any(|id| people.contains(id));
-        let parts: Vec<Group> = self.groups.extract_if(.., is_part).collect();
+        let parts: Vec<Group> = self
+            .groups
+            .extract_if(.., |group| group.ids.iter().any(|id| people.contains(id)))
+            .collect();
         let joined = parts.into_iter().reduce(|a, b| a.merge(b, &self.config));
         self.groups.extend(joined);
     }

@@ -130,7 +130,10 @@ impl Group {
 
     /// Returns the number of cells of 10 cm, for all people jointly, that the rows occupy.
     pub(crate) fn occupied(&self) -> usize {
-        let cell = |p: &Particle| [p.mean[0], p.mean[1]].map(|v| (v / CELL_M).floor() as i64);
+        fn cell(p: &Particle) -> [i64; 2] {
+            [p.mean[0], p.mean[1]].map(|v| (v / CELL_M).floor() as i64)
+        }
+
         // Rows of negligible weight would make the distribution look wider than it is.
         let heavy = 0.01 / self.rows() as f64;
         let rows = (0..self.rows()).filter(|row| self.weights[*row] > heavy);
@@ -250,13 +253,15 @@ mod tests {
 
     /// A single person at places along Y with these weights.
     fn at_places(id: u32, places: &[f64], weights: &[f64]) -> Group {
-        let particle = |y: &f64| Particle {
-            mean: Vector5::new(2.0, *y, 1.6, 0.0, 0.1),
-            covariance: Matrix5::identity() * 0.01,
-        };
         Group {
             ids: vec![TrackId(id)],
-            parts: places.iter().map(particle).collect(),
+            parts: places
+                .iter()
+                .map(|y| Particle {
+                    mean: Vector5::new(2.0, *y, 1.6, 0.0, 0.1),
+                    covariance: Matrix5::identity() * 0.01,
+                })
+                .collect(),
             weights: weights.to_vec(),
             likelihoods: weights.to_vec(),
             random: Random::new(1, u64::from(id)),

@@ -54,7 +54,7 @@ use tagalong_config::Registry;
 pub fn register(registry: &mut Registry) {
     registry.filter(
         "joint-particle",
-        "particles that weigh scenes of overlapping silhouettes (P3)",
+        "particles that weigh scenes of overlapping silhouettes",
         |config: Config, context| JointParticle::new(config, context.seed),
     );
 }

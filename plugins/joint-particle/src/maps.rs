@@ -253,12 +253,16 @@ mod tests {
     }
 
     fn correlation(a: &[f64], b: &[f64]) -> f64 {
-        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        fn mean(v: &[f64]) -> f64 {
+            v.iter().sum::<f64>() / v.len() as f64
+        }
+
+        fn dot(x: &[f64], mx: f64, y: &[f64], my: f64) -> f64 {
+            x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum()
+        }
+
         let ma = mean(a);
         let mb = mean(b);
-        let dot = |x: &[f64], mx: f64, y: &[f64], my: f64| -> f64 {
-            x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum()
-        };
         dot(a, ma, b, mb) / (dot(a, ma, a, ma) * dot(b, mb, b, mb)).sqrt()
     }
 
@@ -293,7 +297,10 @@ mod tests {
 
     #[test]
     fn kernels_fall_by_the_root_of_e_at_40_and_100_mm() {
-        let at = |config: &Config, place| Kernel::new(config).at(&[0.0, 0.0], &place);
+        fn at(config: &Config, place: [f64; 2]) -> f64 {
+            Kernel::new(config).at(&[0.0, 0.0], &place)
+        }
+
         let right = Config::default();
         for place in [[0.04, 0.0], [0.0, 0.1]] {
             assert!((at(&right, place) - (-0.5f64).exp()).abs() < 1e-12);

@@ -59,9 +59,12 @@ fn components<'a>(
     people: impl Iterator<Item = TrackId>,
     links: impl Iterator<Item = &'a (TrackId, TrackId)>,
 ) -> Vec<BTreeSet<TrackId>> {
+    fn find(groups: &[BTreeSet<TrackId>], id: &TrackId) -> Option<usize> {
+        groups.iter().position(|g| g.contains(id))
+    }
+
     let mut groups: Vec<BTreeSet<TrackId>> = people.map(|id| BTreeSet::from([id])).collect();
     for (a, b) in links {
-        let find = |groups: &[BTreeSet<TrackId>], id| groups.iter().position(|g| g.contains(id));
         if let (Some(one), Some(other)) = (find(&groups, a), find(&groups, b))
             && one != other
         {
@@ -81,11 +84,14 @@ mod tests {
     use super::*;
 
     fn people(places: &[(f64, f64)]) -> BTreeMap<TrackId, Estimate> {
-        let estimate = |(x, y): &(f64, f64)| Estimate {
-            person: Person { position: Point3::new(*x, *y, 1.6), velocity: Vector2::zeros() },
-            covariance: Matrix5::identity(),
-            region: Rect::new(300.0 - 250.0 * y / x, 100.0, 150.0 / x, 150.0 / x),
-        };
+        fn estimate((x, y): &(f64, f64)) -> Estimate {
+            Estimate {
+                person: Person { position: Point3::new(*x, *y, 1.6), velocity: Vector2::zeros() },
+                covariance: Matrix5::identity(),
+                region: Rect::new(300.0 - 250.0 * y / x, 100.0, 150.0 / x, 150.0 / x),
+            }
+        }
+
         (1..).map(TrackId).zip(places.iter().map(estimate)).collect()
     }
 
@@ -103,13 +109,14 @@ mod tests {
 
     #[test]
     fn hysteresis_asks_for_frames_and_metres() {
-        let frames = |config: &Config, y: f64| {
+        fn frames(config: &Config, y: f64) -> usize {
             let mut overlaps = Overlaps::default();
             let mut together =
                 |y| overlaps.groups(&people(&[(2.0, 0.0), (2.1, y)]), config).len() == 1;
             assert!(together(0.1));
             (0..20).filter(|_| together(y)).count()
-        };
+        }
+
         let usual = Config { split_frames: 3, split_m: 0.8, ..Config::default() };
         assert_eq!(frames(&usual, 1.2), 2);
         assert_eq!(frames(&usual, 0.75), 20, "still near");
@@ -120,10 +127,11 @@ mod tests {
     #[test]
     fn squares_are_enlarged_before_they_are_asked() {
         // Squares of 75 pixels, their left edges 80 pixels apart.
-        let meet = |inflate| {
+        fn meet(inflate: f64) -> bool {
             let config = Config { inflate, ..Config::default() };
             Overlaps::default().groups(&people(&[(2.0, 0.0), (2.0, 0.64)]), &config).len() == 1
-        };
+        }
+
         assert_eq!([0.0, 0.06, 0.07, 0.1].map(meet), [false, false, true, true]);
         let up = inflated(&Rect::new(10.0, 20.0, 40.0, 60.0), 0.1);
         assert_eq!(up, Rect::new(8.0, 17.0, 44.0, 66.0));

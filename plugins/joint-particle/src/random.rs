@@ -49,11 +49,12 @@ mod tests {
 
     #[test]
     fn shuffling_keeps_all_and_repeats() {
-        let shuffled = |seed| {
+        fn shuffled(seed: u64) -> Vec<u32> {
             let mut items: Vec<u32> = (0..50).collect();
             Random::new(seed, 0).shuffle(&mut items);
             items
-        };
+        }
+
         let mut sorted = shuffled(3);
         assert_eq!(sorted, shuffled(3));
         assert_ne!(sorted, shuffled(4));

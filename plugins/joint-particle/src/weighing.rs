@@ -501,6 +501,10 @@ mod tests {
 
     #[test]
     fn likelihoods_multiply_what_was_believed_before() {
+        fn off((a, b): (&f64, &f64)) -> f64 {
+            (a - b).abs()
+        }
+
         let detection = sighting(nalgebra::Point3::new(2.0, 0.0, 1.6), [0.1; 3]);
         let config = Config { particles: 3, ..Config::default() };
         let first = Particle::of(&detection, &config);
@@ -508,7 +512,6 @@ mod tests {
         group.weights = vec![0.6, 0.3, 0.1];
         take_in(&mut group, &[0.0, 4f64.ln(), 2f64.ln()]);
         let expected = [0.3, 0.6, 0.1];
-        let off = |(a, b): (&f64, &f64)| (a - b).abs();
         assert!(group.weights.iter().zip(&expected).map(off).all(|off| off < 1e-12));
         assert!(group.likelihoods.iter().zip(&[0.25, 1.0, 0.5]).map(off).all(|off| off < 1e-12));
     }
@@ -547,14 +550,16 @@ mod tests {
 
     #[test]
     fn a_body_faces_where_a_template_fits_unless_all_fit_alike() {
-        let way = |likelihood: &Formula| {
+        fn way(likelihood: &Formula) -> Option<Vector2<f64>> {
             looking(&Config::default(), likelihood, |group, look| facing(group, 0, look).unwrap())
-        };
-        assert_eq!(way(&Formula::flat(3.0)), None);
-        let of = |fits: fn(f64) -> bool| {
+        }
+
+        fn of(fits: fn(f64) -> bool) -> Option<f64> {
             let nats = move |p: &Person| if fits(p.velocity.y) { 5.0 } else { 0.0 };
             way(&Formula::new(move |scene| scene.iter().map(nats).sum())).map(|way| way.y.round())
-        };
+        }
+
+        assert_eq!(way(&Formula::flat(3.0)), None);
         assert_eq!(of(|vy| vy > 0.3), Some(1.0));
         assert_eq!(of(|vy| vy < -0.3), Some(-1.0));
         assert_eq!(of(|vy| vy > -0.3), Some(0.0), "one of the three does not fit");
@@ -562,12 +567,13 @@ mod tests {
 
     #[test]
     fn no_look_tells_depth_or_height_better_than_it_can() {
-        let mut rig = crate::tests::rig::Rig::new(Config::default(), 1);
-        rig.start(1, [2.0, 0.0, 1.6], [0.2, 1e-6, 0.2]);
-        let sharp = |p: &Person| {
+        fn sharp(p: &Person) -> f64 {
             let off = [p.position.x - 2.0, p.position.z - 1.6].map(|off| (off / 0.004).powi(2));
             -0.5 * (off[0] + off[1])
-        };
+        }
+
+        let mut rig = crate::tests::rig::Rig::new(Config::default(), 1);
+        rig.start(1, [2.0, 0.0, 1.6], [0.2, 1e-6, 0.2]);
         rig.look(&Formula::new(move |scene| scene.iter().map(sharp).sum()));
         let covariance = rig.estimate(1).covariance;
         let [along, up] = [0, 2].map(|i| covariance[(i, i)].sqrt());
@@ -620,11 +626,12 @@ mod tests {
     /// is spent on the others.
     #[test]
     fn places_of_the_nearer_person_that_do_not_fit_are_left_before_the_next() {
-        let config = Config { method: Method::Partitioned, ..Config::default() };
-        let fits = |scene: &[Person]| -> f64 {
+        fn fits(scene: &[Person]) -> f64 {
             let near = scene.iter().find(|person| person.position.x < 2.5);
             near.map_or(0.0, |near| -0.5 * (near.position.y / 0.001).powi(2))
-        };
+        }
+
+        let config = Config { method: Method::Partitioned, ..Config::default() };
         let (effective, rows) = looking(&config, &Formula::new(fits), |group, look| {
             partitioned(group, look).unwrap();
             (effective_size(&group.weights), group.rows() as f64)

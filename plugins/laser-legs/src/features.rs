@@ -135,8 +135,9 @@ fn circle(points: &[Point2<f64>], middle: &Point2<f64>) -> (f64, f64) {
     let Some(fitted) = fitted else { return (STRAIGHT_M, 0.0) };
     let at = fitted.xy();
     let radius = (fitted.z + at.norm_squared()).max(0.0).sqrt();
-    let off = |point: &Point2<f64>| ((point - middle - at).norm() - radius).powi(2);
-    let mean_square = points.iter().map(off).sum::<f64>() / points.len() as f64;
+    let mean_square =
+        points.iter().map(|point| ((point - middle - at).norm() - radius).powi(2)).sum::<f64>()
+            / points.len() as f64;
     (radius.min(STRAIGHT_M), mean_square.sqrt().min(STRAIGHT_M))
 }
 
@@ -151,13 +152,14 @@ fn boundary(points: &[Point2<f64>]) -> [f64; 2] {
 
 /// Returns the mean curvature of the circles through three neighbouring points, 1/m.
 fn curvature(points: &[Point2<f64>]) -> f64 {
-    let of_three = |three: &[Point2<f64>]| {
+    fn of_three(three: &[Point2<f64>]) -> f64 {
         let ab = three[1] - three[0];
         let bc = three[2] - three[1];
         let ac = three[2] - three[0];
         let doubled_area = (ab.x * ac.y - ab.y * ac.x).abs();
         2.0 * doubled_area / (ab.norm() * bc.norm() * ac.norm()).max(1e-9)
-    };
+    }
+
     let count = points.len().saturating_sub(2);
     let sum: f64 = points.windows(3).map(of_three).sum();
     (sum / count.max(1) as f64).min(SHARP)

@@ -52,8 +52,11 @@ impl PastScans {
 
     /// Adds the present scan; `scanner` is the place of the scanner in the robot frame.
     pub(crate) fn add(&mut self, beams: &Beams, scanner: Vector2<f64>) {
-        let bearing = |point: &Point2<f64>| point.y.atan2(point.x);
-        let both = beams.points.iter().map(bearing).zip(beams.ranges.iter().copied());
+        let both = beams
+            .points
+            .iter()
+            .map(|point| point.y.atan2(point.x))
+            .zip(beams.ranges.iter().copied());
         let mut bearings: Vec<(f64, f64)> = both.collect();
         // Sorted once, so that each question is a binary search.
         bearings.sort_by(|a, b| a.0.total_cmp(&b.0));

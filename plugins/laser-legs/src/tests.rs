@@ -93,6 +93,12 @@ fn two_legs_make_a_person_and_one_makes_a_less_certain_one() {
 /// By a model that gives each segment log-odds of 2.0.
 #[test]
 fn the_log_odds_of_a_person_are_those_of_the_legs_and_a_setting() {
+    fn of(config: &Config, things: &Rounds) -> Detection {
+        let found = detections(config.clone(), scan(720, things, Isometry3::identity()));
+        let [one] = &found[..] else { panic!("{found:?}") };
+        one.clone()
+    }
+
     let folder = tempfile::tempdir().unwrap();
     let leaf = Node { feature: 0, below: 0.0, next: [0, 0], leaves: [0.5, 0.5] };
     let model = Model { trees: vec![vec![leaf]], slope: 2.0, offset: 1.0 };
@@ -104,11 +110,6 @@ fn the_log_odds_of_a_person_are_those_of_the_legs_and_a_setting() {
         single_log_odds: -0.9,
         limit: 100.0,
         ..Config::default()
-    };
-    let of = |config: &Config, things: &Rounds| {
-        let found = detections(config.clone(), scan(720, things, Isometry3::identity()));
-        let [one] = &found[..] else { panic!("{found:?}") };
-        one.clone()
     };
     let pair = of(&config, &LEGS);
     let single = of(&config, &LEGS[..1]);
@@ -205,10 +206,11 @@ fn the_segments_are_those_of_the_things_at_any_resolution() {
 /// 2 m away, with 1.5 rays of 0.1 rad: 0.1 m and 0.3 m more.
 #[test]
 fn a_segment_ends_at_a_jump_of_so_many_rays() {
-    let count = |places: &[(u32, [f64; 2])]| {
+    fn count(places: &[(u32, [f64; 2])]) -> usize {
         let settings = Segmentation { min_points: 1, ..Segmentation::default() };
         reflections(places).segments(&settings).len()
-    };
+    }
+
     assert_eq!(count(&[(0, [2.0, 0.0]), (1, [2.0, 0.39])]), 1);
     assert_eq!(count(&[(0, [2.0, 0.0]), (1, [2.0, 0.41])]), 2);
     assert_eq!(count(&[(0, [2.0, 0.0]), (2, [2.0, 0.1])]), 1, "one ray without a reflection");
@@ -335,7 +337,10 @@ fn the_circle_is_that_of_least_squares() {
 
 #[test]
 fn a_model_survives_its_file_and_a_broken_one_is_refused() {
-    let leaf = |value: f32| Node { feature: 3, below: 0.5, next: [0, 0], leaves: [value, -value] };
+    fn leaf(value: f32) -> Node {
+        Node { feature: 3, below: 0.5, next: [0, 0], leaves: [value, -value] }
+    }
+
     let root = Node { feature: 0, below: 0.25, next: [1, 0], leaves: [0.0, -1.0] };
     let model = Model { trees: vec![vec![root, leaf(0.75)]], slope: 2.0, offset: -0.5 };
     let text = model.to_text().unwrap();
@@ -361,11 +366,12 @@ fn a_model_survives_its_file_and_a_broken_one_is_refused() {
 
 #[test]
 fn settings_out_of_range_are_refused() {
-    let broken = |change: fn(&mut Config)| {
+    fn broken(change: fn(&mut Config)) -> bool {
         let mut config = Config::default();
         change(&mut config);
         LaserLegs::new(config, &context()).is_err()
-    };
+    }
+
     assert!(broken(|c| c.segments.jump_m = f64::NAN) && broken(|c| c.training.trees.clear()));
     assert!(broken(|c| c.training.every_ray = vec![1]) && broken(|c| c.pair_sigma_m = 0.0));
 }
@@ -433,8 +439,10 @@ mod training {
             (Some(48), Some(96), Some(10))
         );
         let model = Model::from_text(&fitted.model).unwrap();
-        let figure = |key: &str| fitted.figures[key].as_float().unwrap();
-        assert!((figure("slope") - model.slope).abs() < 1e-4 && model.slope > 0.01);
+        assert!(
+            (fitted.figures["slope"].as_float().unwrap() - model.slope).abs() < 1e-4
+                && model.slope > 0.01
+        );
         let row = fitted.figures["cross_validation"].as_array().unwrap()[0].as_table().unwrap();
         let part = |key: &str| row[key].as_float().unwrap();
         assert!(part("legs_accepted") > 0.9 && part("others_accepted") < 0.1, "{row:?}");

@@ -71,8 +71,9 @@ impl LegTrainer {
         for step in steps {
             let beams = Beams::new(scan, step);
             let segments = beams.segments(&self.segments);
-            let is_narrow = |s: &&Segment| beams.width((*s).clone()) <= self.segments.max_width_m;
-            for segment in segments.iter().filter(is_narrow) {
+            for segment in
+                segments.iter().filter(|s| beams.width((*s).clone()) <= self.segments.max_width_m)
+            {
                 let at = beams.middle(segment.clone()) + scanner;
                 let apart = places.iter().map(|place| (place - at).norm());
                 let nearest = apart.fold(f64::INFINITY, f64::min);
@@ -194,8 +195,11 @@ fn calibrated(trial: &Trial) -> Vec<(f64, bool)> {
 
 /// Converts a grown tree; its numbers are rounded so that a file is short.
 fn tree(questions: &[Question]) -> Tree {
-    let short = |value: f32| (value * 1e4).round() / 1e4;
-    let node = |question: &Question| {
+    fn short(value: f32) -> f32 {
+        (value * 1e4).round() / 1e4
+    }
+
+    fn node(question: &Question) -> Node {
         let [(first, low), (second, high)] = question.next.each_ref().map(|next| match *next {
             Next::Question(index) => (index, 0.0),
             Next::Leaf(value) => (0, short(value)),
@@ -206,7 +210,8 @@ fn tree(questions: &[Question]) -> Tree {
             next: [first, second],
             leaves: [low, high],
         }
-    };
+    }
+
     questions.iter().map(node).collect()
 }
 

@@ -75,6 +75,10 @@ impl Blob {
     /// Measures a run of columns; `None` if no row of it has enough pixels. `colours` is the image
     /// from which `counts` were computed.
     pub fn measure(run: Run, counts: &Counts, colours: &[u8]) -> Option<Self> {
+        fn full(count: &u32) -> bool {
+            *count >= ROW_PIXELS
+        }
+
         let columns = &counts.columns;
         let width = columns.len();
         let height = |column: usize| f64::from(columns[column]);
@@ -87,7 +91,6 @@ impl Blob {
             .chunks_exact(width)
             .map(|row| core.iter().map(|column| u32::from(row[*column])).sum())
             .collect();
-        let full = |count: &u32| *count >= ROW_PIXELS;
         let top = rows.iter().position(full)?;
         let lowest = rows.iter().rposition(full)?;
         let middle = above(&rows, 0.5);

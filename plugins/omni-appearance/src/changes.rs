@@ -40,10 +40,13 @@ struct Past {
 impl Changes {
     /// Adds a motion of the robot, and forgets images that are older than needed.
     pub(crate) fn move_by(&mut self, motion: &EgoMotion) {
+        fn is_old(past: &Past) -> bool {
+            past.since.is_some_and(|since| since.dt >= STEP_S)
+        }
+
         for past in &mut self.past {
             past.since = Some(past.since.map_or(*motion, |since| since.then(motion)));
         }
-        let is_old = |past: &Past| past.since.is_some_and(|since| since.dt >= STEP_S);
         while self.past.get(1).is_some_and(is_old) {
             self.forget_oldest();
         }
@@ -57,15 +60,16 @@ impl Changes {
     /// Compares an image with that of [`Changes::motion`], which is moved with the robot as `sweep`
     /// estimates it. Without such an image nothing is compared.
     pub(crate) fn compare(&mut self, sweep: &mut Sweep, warps: &[Warp], colours: &[u8]) {
+        fn differs((now, before): (&[u8], &[f32])) -> bool {
+            now.iter().zip(before).any(|(now, before)| (f32::from(*now) - before).abs() > SAME)
+        }
+
         self.changed.clear();
         let Some(past) = self.motion().and(self.past.front()) else { return };
         self.moved.clear();
         self.moved.extend(past.colours.iter().map(|colour| f32::from(*colour)));
         sweep.apply(warps, colours, &mut self.moved, &mut []);
         let pixels = colours.chunks_exact(3).zip(self.moved.chunks_exact(3));
-        let differs = |(now, before): (&[u8], &[f32])| {
-            now.iter().zip(before).any(|(now, before)| (f32::from(*now) - before).abs() > SAME)
-        };
         self.changed.extend(pixels.map(|pixel| u8::from(differs(pixel))));
     }
 

@@ -11,10 +11,10 @@ use crate::Blob;
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Distance {
-    /// The network of the paper: three features, four hidden units.
+    /// A network of three features and four hidden units.
     Network,
-    /// The same network, trained as in the paper: by back-propagation at a rate of 0.3.
-    Printed,
+    /// The same network, trained by gradient descent: back-propagation at a rate of 0.3.
+    Gradient,
     /// A network with all measured features as inputs.
     Rich,
     /// Ridge regression on the lower edge, its square, its inverse, width and area.
@@ -44,7 +44,7 @@ impl PartialEq for AfterMeasuring {
 pub struct Config {
     /// Model file, relative to the config; empty: the built-in model.
     pub model: String,
-    /// Method for the distance: `network`, `printed`, `rich`, `ridge` or `analytic`.
+    /// Method for the distance: `network`, `gradient`, `rich`, `ridge` or `analytic`.
     pub distance: Distance,
     /// Name of the person in the model with the fit to use; `general` for the fit to
     /// all people, `nearest` for the person with the closest appearance.
@@ -165,7 +165,10 @@ mod tests {
 
     #[test]
     fn each_setting_has_its_bounds() {
-        let checked = |line: &str| toml::from_str::<Config>(line).unwrap().check();
+        fn checked(line: &str) -> Result<()> {
+            toml::from_str::<Config>(line).unwrap().check()
+        }
+
         let good = [
             "background_frames = 10000",
             "threshold_sigmas = 100.0",

@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn a_place_is_known_along_the_ray_by_the_distance_and_across_it_by_the_bearing() {
-        let spread = |visible: f64| {
+        fn spread(visible: f64) -> (f64, f64) {
             let at = Point3::new(0.3 + 1.8, -2.4, 1.6);
             let c = detector().covariance(&at, &camera(), [3.0, 0.25], visible);
             let out = Vector3::new(0.6, -0.8, 0.0);
@@ -213,7 +213,8 @@ mod tests {
             assert!(out.dot(&(c * aside)).abs() < 1e-12);
             assert!((c[(2, 2)] - 0.04).abs() < 1e-12 && c[(0, 2)].abs() + c[(1, 2)].abs() < 1e-12);
             (out.dot(&(c * out)), aside.dot(&(c * aside)))
-        };
+        }
+
         let bearing = 3.0 * 1.0_f64.to_radians();
         let across = bearing * bearing + 0.03 * 0.03;
         let (along, whole) = spread(1.0);

@@ -103,12 +103,15 @@ pub(crate) fn divided(run: Run, width: usize, expected: &[Expected]) -> Vec<Part
         let own = parts.iter().filter(|(owner, _)| *owner == who).map(|(_, part)| *part);
         own.max_by_key(|part| part.length)
     };
-    let part = |(who, expected): (usize, &Expected)| {
-        let run = largest(who)?;
-        let visible = (run.length as f64 / (2.0 * expected.half).max(1.0)).min(1.0);
-        (visible >= LEAST_VISIBLE).then_some(Part { run, visible })
-    };
-    inside.iter().enumerate().filter_map(part).collect()
+    inside
+        .iter()
+        .enumerate()
+        .filter_map(|(who, expected)| {
+            let run = largest(who)?;
+            let visible = (run.length as f64 / (2.0 * expected.half).max(1.0)).min(1.0);
+            (visible >= LEAST_VISIBLE).then_some(Part { run, visible })
+        })
+        .collect()
 }
 
 /// Returns the people that are expected in a run and not hidden behind others, from near to far.
@@ -119,10 +122,12 @@ fn visible(run: Run, width: usize, expected: &[Expected]) -> Vec<Expected> {
     let mut seen: Vec<Expected> = Vec::new();
     for person in inside {
         let is_on = |who: &Expected, column: usize| who.is_near(column, width, 1.0);
-        let shown = |column: &usize| {
-            is_on(&person, *column) && !seen.iter().any(|nearer| is_on(nearer, *column))
-        };
-        let columns = run.columns(width).filter(shown).count() as f64;
+        let columns = run
+            .columns(width)
+            .filter(|column| {
+                is_on(&person, *column) && !seen.iter().any(|nearer| is_on(nearer, *column))
+            })
+            .count() as f64;
         if columns >= LEAST_VISIBLE * 2.0 * person.half {
             seen.push(person);
         }
@@ -188,7 +193,10 @@ mod tests {
 
     #[test]
     fn a_run_is_of_the_people_whose_middle_it_holds_also_across_the_seam() {
-        let holds = |column: f64| shares(&expected(column, 8.0, 2.0), run(470, 20), 480);
+        fn holds(column: f64) -> bool {
+            shares(&expected(column, 8.0, 2.0), run(470, 20), 480)
+        }
+
         assert_eq!([469.0, 470.0, 479.0, 5.0, 9.0].map(holds), [false, true, true, true, true]);
         assert_eq!([10.0, 100.0].map(holds), [false, false]);
     }

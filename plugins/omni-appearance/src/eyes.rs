@@ -48,8 +48,9 @@ impl Eyes {
 
     /// Returns true once the background is known.
     pub fn is_ready(&self) -> bool {
-        let known = |scene: &ImageState| scene.background.frames() >= self.config.background_frames;
-        self.scene.as_ref().is_some_and(known)
+        self.scene
+            .as_ref()
+            .is_some_and(|scene| scene.background.frames() >= self.config.background_frames)
     }
 
     /// Returns the blobs of an image that may be people, the largest first. Empty while the
@@ -208,11 +209,14 @@ impl ImageState {
 
     /// Lets the background follow the pixels that are not taken for people.
     fn adapt(&mut self, frame: &Frame, config: &Config) -> Result<()> {
+        fn seconds(s: f64) -> f32 {
+            if s > 0.0 { s as f32 } else { f32::INFINITY }
+        }
+
         if self.background.frames() < config.background_frames {
             return Ok(());
         }
         let dt_s = frame.motion.dt as f32;
-        let seconds = |s: f64| if s > 0.0 { s as f32 } else { f32::INFINITY };
         let adapt_s = seconds(config.adapt_s);
         let absorb_s = seconds(config.absorb_s);
         // Errors of the odometry accumulate in a moved background, so it is renewed soon.

@@ -153,8 +153,12 @@ struct Scaled {
 
 impl Scaled {
     fn cost(&self, network: &Network, weights: &DVector<f64>) -> f64 {
-        let error = |(x, t): (&Vec<f64>, &f64)| (network.forward(|i| x[i]) - t).powi(2);
-        let errors = self.inputs.iter().zip(&self.targets).map(error).sum::<f64>();
+        let errors = self
+            .inputs
+            .iter()
+            .zip(&self.targets)
+            .map(|(x, t)| (network.forward(|i| x[i]) - t).powi(2))
+            .sum::<f64>();
         errors + self.decay * weights.norm_squared()
     }
 }
@@ -220,11 +224,14 @@ mod tests {
 
     const FIT: Fit =
         Fit { hidden: 4, decay: 1e-4, restarts: 3, steps: 100, descent: Descent::Marquardt };
-    const PRINTED: Fit =
+    const DESCENT: Fit =
         Fit { decay: 0.0, steps: 2000, descent: Descent::BackPropagation { rate: 0.3 }, ..FIT };
 
     fn samples(count: usize) -> (Vec<Vec<f64>>, Vec<f64>) {
-        let x = |i: usize| vec![(i as f64 * 0.37) % 3.0, (i as f64 * 0.61) % 2.0];
+        fn x(i: usize) -> Vec<f64> {
+            vec![(i as f64 * 0.37) % 3.0, (i as f64 * 0.61) % 2.0]
+        }
+
         let inputs: Vec<Vec<f64>> = (0..count).map(x).collect();
         let targets = inputs.iter().map(|x| 2.0 + x[0].sin() + 0.5 * x[0] * x[1]).collect();
         (inputs, targets)
@@ -274,18 +281,18 @@ mod tests {
     }
 
     #[test]
-    fn back_propagation_at_the_printed_rate_learns_more_slowly() {
+    fn back_propagation_learns_more_slowly() {
         let (inputs, targets) = samples(150);
         let network = |fit: Fit| fit.network(&inputs[..100], &targets[..100], 3);
         let mean = |network: &Network| {
             (100..150).map(|i| (network.answer(&inputs[i]) - targets[i]).abs()).sum::<f64>() / 50.0
         };
-        let printed = network(PRINTED);
-        assert_eq!(printed, network(PRINTED));
-        let slow = mean(&printed);
+        let by_descent = network(DESCENT);
+        assert_eq!(by_descent, network(DESCENT));
+        let slow = mean(&by_descent);
         let fast = mean(&network(FIT));
         assert!(fast < 0.5 * slow && slow < 0.1, "{fast} {slow}");
-        assert!(mean(&network(Fit { steps: 20, ..PRINTED })) > 2.0 * slow);
+        assert!(mean(&network(Fit { steps: 20, ..DESCENT })) > 2.0 * slow);
     }
 
     /// One step computed by hand: along the mean gradient, times the rate.
@@ -298,7 +305,7 @@ mod tests {
             hidden: vec![vec![0.5, -0.25]],
             output: vec![2.0, 0.125],
         };
-        let step = Fit { steps: 1, ..PRINTED };
+        let step = Fit { steps: 1, ..DESCENT };
         let (_, after) = step.descend(network, &[vec![1.0], vec![-2.0]], &[1.0, 0.5]);
         let mut slopes = [0.0; 4];
         for (x, target) in [(1.0, 1.0), (-2.0, 0.5)] {
@@ -315,14 +322,14 @@ mod tests {
     }
 
     #[test]
-    fn at_the_printed_rate_numbers_of_pixels_must_be_scaled() {
+    fn numbers_of_pixels_must_be_scaled_for_back_propagation() {
         // An input of some hundred pixels, like the third feature.
         let pixels: Vec<Vec<f64>> = (0..50).map(|i| vec![300.0 + 20.0 * f64::from(i)]).collect();
         let metres: Vec<f64> = (0..50).map(|i| 5.0 - 0.08 * f64::from(i)).collect();
-        let scaled = PRINTED.network(&pixels, &metres, 3);
-        let start = PRINTED.random(&pixels, &metres, 3);
+        let scaled = DESCENT.network(&pixels, &metres, 3);
+        let start = DESCENT.random(&pixels, &metres, 3);
         let raw = Network { mean: vec![0.0], scale: vec![1.0], target: [0.0, 1.0], ..start };
-        let (_, raw) = PRINTED.descend(raw, &pixels, &metres);
+        let (_, raw) = DESCENT.descend(raw, &pixels, &metres);
         let off = |network: &Network| {
             let off = pixels.iter().zip(&metres).map(|(x, m)| (network.answer(x) - m).abs());
             off.fold(0.0, f64::max)

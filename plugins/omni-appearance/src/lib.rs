@@ -69,7 +69,7 @@ pub fn register(registry: &mut Registry) {
     registry.remedies(NAME, REMEDIES);
     registry.detector(
         NAME,
-        "people in the panorama of a conical mirror, distance by a small network (P5)",
+        "people in the panorama of a conical mirror, distance by a small network",
         OmniAppearance::new,
     );
     #[cfg(feature = "train")]

@@ -69,16 +69,16 @@ pub struct Head {
     pub ridge_sigma: Line,
     /// Standard deviation of the network.
     pub network_sigma: Line,
-    /// Standard deviation of the network that was trained by back-propagation.
-    pub printed_sigma: Line,
+    /// Standard deviation of the network that was trained by gradient descent.
+    pub gradient_sigma: Line,
     /// Standard deviation of the rich network.
     pub rich_sigma: Line,
     /// Ridge regression.
     pub ridge: Ridge,
     /// Network of three features.
     pub network: Network,
-    /// The same network, trained by back-propagation.
-    pub printed: Network,
+    /// The same network, trained by gradient descent.
+    pub gradient: Network,
     /// Network of all features.
     pub rich: Network,
 }
@@ -142,7 +142,7 @@ impl Head {
     ) -> (f64, f64) {
         let (distance, sigma) = match how {
             Distance::Network => (self.network.answer(&features.values()), self.network_sigma),
-            Distance::Printed => (self.printed.answer(&features.values()), self.printed_sigma),
+            Distance::Gradient => (self.gradient.answer(&features.values()), self.gradient_sigma),
             Distance::Rich => (self.rich.answer(&camera.inputs(features)), self.rich_sigma),
             Distance::Ridge => (self.ridge.answer(features), self.ridge_sigma),
             Distance::Analytic => {
@@ -157,11 +157,11 @@ impl Head {
             self.analytic_sigma,
             self.ridge_sigma,
             self.network_sigma,
-            self.printed_sigma,
+            self.gradient_sigma,
             self.rich_sigma,
         ];
         self.network.is_sane(3)
-            && self.printed.is_sane(3)
+            && self.gradient.is_sane(3)
             && self.rich.is_sane(INPUTS)
             && self.ridge.is_sane()
             && self.floor_offset_m.is_finite()
@@ -263,7 +263,7 @@ struct File {
     people: Vec<Person>,
 }
 
-const FORMAT: &str = "omni-distance 2";
+const FORMAT: &str = "omni-distance 3";
 
 impl Model {
     /// Returns the fit for a person: by name, the fit to all people for `general`, and for
@@ -387,12 +387,12 @@ mod tests {
         assert!(head.is_sane());
         let broken: [fn(&mut Head); 9] = [
             |h| h.network.output.clear(),
-            |h| h.printed.output.clear(),
+            |h| h.gradient.output.clear(),
             |h| h.rich.output.clear(),
             |h| h.ridge.scale[0] = -1.0,
             |h| h.floor_offset_m = f64::NAN,
             |h| h.analytic_sigma.start = f64::NAN,
-            |h| h.printed_sigma.slope = f64::INFINITY,
+            |h| h.gradient_sigma.slope = f64::INFINITY,
             |h| h.network_sigma.slope = f64::NAN,
             |h| h.rich_sigma.start = f64::INFINITY,
         ];

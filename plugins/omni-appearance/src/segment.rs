@@ -152,11 +152,12 @@ fn divided(run: &Run, columns: &[u16], valley: f64) -> Vec<Run> {
 /// Returns means of three columns, within the run.
 fn smoothed(run: &Run, columns: &[u16]) -> Vec<f64> {
     let counts: Vec<f64> = run.columns(columns.len()).map(|c| f64::from(columns[c])).collect();
-    let mean = |at: usize| {
-        let part = &counts[at.saturating_sub(1)..(at + 2).min(counts.len())];
-        part.iter().sum::<f64>() / part.len() as f64
-    };
-    (0..counts.len()).map(mean).collect()
+    (0..counts.len())
+        .map(|at| {
+            let part = &counts[at.saturating_sub(1)..(at + 2).min(counts.len())];
+            part.iter().sum::<f64>() / part.len() as f64
+        })
+        .collect()
 }
 
 /// Test for shadows: the colours are darker, and all by about the same part.
@@ -169,7 +170,10 @@ struct Shadow {
 
 impl Shadow {
     fn new(config: &Config, tinted: bool) -> Self {
-        let fixed = |part: f64| (ONE * part).round() as u32;
+        fn fixed(part: f64) -> u32 {
+            (ONE * part).round() as u32
+        }
+
         // No value is above this limit, so the test is never true.
         let least = if tinted { fixed(config.shadow_min) } else { u32::MAX };
         Self { least, most: fixed(config.shadow_max), tint: fixed(config.shadow_tint) }

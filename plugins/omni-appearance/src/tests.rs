@@ -126,8 +126,11 @@ fn three_people_are_three() {
     let found = see(&mut detector, &frame(20, &camera, &places));
     assert_eq!(found.len(), 3);
     for place in places {
-        let near = |d: &&Detection| (d.position.xy() - place).norm() < 0.35;
-        assert_eq!(found.iter().filter(near).count(), 1, "{place}");
+        assert_eq!(
+            found.iter().filter(|d| (d.position.xy() - place).norm() < 0.35).count(),
+            1,
+            "{place}"
+        );
     }
 }
 

@@ -22,7 +22,7 @@ pub struct Training {
     /// The paper's network: three inputs, four hidden units (P5, section 4.4).
     pub network: Fit,
     /// The same network, by back-propagation.
-    pub printed: Fit,
+    pub gradient: Fit,
     /// Network of all features.
     pub rich: Fit,
     /// Weight of the squared weights of the ridge regression, per sample.
@@ -39,7 +39,7 @@ impl Default for Training {
         let descent = Descent::BackPropagation { rate: 0.3 };
         Self {
             network,
-            printed: Fit { decay: 0.0, steps: 2000, descent, ..network },
+            gradient: Fit { decay: 0.0, steps: 2000, descent, ..network },
             rich: Fit { hidden: 8, decay: 3e-2, ..network },
             ridge: 1e-4,
             block_frames: 15,
@@ -94,7 +94,7 @@ impl Sample {
     pub fn distance(&self, head: &Head, how: Distance) -> f64 {
         match how {
             Distance::Network => head.network.answer(&self.features.values()),
-            Distance::Printed => head.printed.answer(&self.features.values()),
+            Distance::Gradient => head.gradient.answer(&self.features.values()),
             Distance::Rich => head.rich.answer(&self.inputs()),
             Distance::Ridge => head.ridge.answer(&self.features),
             Distance::Analytic => self.floor_m + head.floor_offset_m,
@@ -202,8 +202,7 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
         return Err(Error::Other(format!("{} samples are too few to fit", samples.len())));
     }
     let targets: Vec<f64> = samples.iter().map(|s| s.distance_m).collect();
-    let printed: Vec<Vec<f64>> =
-        samples.iter().map(|s| s.features.values()[..3].to_vec()).collect();
+    let three: Vec<Vec<f64>> = samples.iter().map(|s| s.features.values()[..3].to_vec()).collect();
     let all: Vec<Vec<f64>> = samples.iter().map(|s| s.inputs().to_vec()).collect();
     let flat = Line { start: 0.0, slope: 0.0 };
     let mut head = Head {
@@ -212,11 +211,11 @@ pub fn head(samples: &[Sample], training: &Training, seed: u64) -> Result<Head> 
         analytic_sigma: flat,
         ridge_sigma: flat,
         network_sigma: flat,
-        printed_sigma: flat,
+        gradient_sigma: flat,
         rich_sigma: flat,
         ridge: ridge(samples, training.ridge),
-        network: training.network.network(&printed, &targets, seed),
-        printed: training.printed.network(&printed, &targets, seed),
+        network: training.network.network(&three, &targets, seed),
+        gradient: training.gradient.network(&three, &targets, seed),
         rich: training.rich.network(&all, &targets, seed),
     };
     let answers: Vec<Answers> = samples.iter().map(|sample| sample.answers(&head)).collect();
@@ -229,7 +228,7 @@ pub type Answers = [f64; WAYS.len()];
 
 /// All methods for the distance.
 pub const WAYS: [Distance; 5] =
-    [Distance::Network, Distance::Printed, Distance::Rich, Distance::Ridge, Distance::Analytic];
+    [Distance::Network, Distance::Gradient, Distance::Rich, Distance::Ridge, Distance::Analytic];
 
 /// Returns for each sample the distances by a head that was fitted without the sample's part.
 ///
@@ -272,7 +271,7 @@ impl Head {
     fn believe(&mut self, samples: &[Sample], answers: &[Answers]) {
         [
             self.network_sigma,
-            self.printed_sigma,
+            self.gradient_sigma,
             self.rich_sigma,
             self.ridge_sigma,
             self.analytic_sigma,
@@ -304,6 +303,10 @@ fn spread(pairs: impl Iterator<Item = (f64, f64)>) -> Line {
 }
 
 fn ridge(samples: &[Sample], weight: f64) -> Ridge {
+    fn array(values: &[f64]) -> [f64; 5] {
+        std::array::from_fn(|i| values[i])
+    }
+
     let terms: Vec<[f64; 5]> = samples.iter().map(|s| Ridge::terms(&s.features)).collect();
     let (mean, scale): (Vec<f64>, Vec<f64>) =
         (0..5).map(|i| mean_and_scale(terms.iter().map(|t| t[i]))).unzip();
@@ -317,7 +320,6 @@ fn ridge(samples: &[Sample], weight: f64) -> Ridge {
     penalties[0] = 0.0;
     let equations = NormalEquations::new(&x, &y);
     let solved = equations.solve(&penalties, equations.right_side());
-    let array = |values: &[f64]| std::array::from_fn(|i| values[i]);
     Ridge {
         weights: std::array::from_fn(|i| solved.as_ref().map_or(0.0, |w| w[i])),
         mean: array(&mean),
@@ -355,17 +357,19 @@ pub fn model(
         head.believe(samples, &held_out(samples, held, training, seed)?);
         Ok::<Head, Error>(head)
     };
-    let person = |(id, own): (&u64, &Vec<Sample>)| {
-        Ok(Person {
-            name: format!("person-{id}"),
-            signature: signature(own),
-            head: believed(own, HeldOut::Blocks, mix(seed ^ id))?,
-        })
-    };
     Ok(Model {
         geometry,
         general: believed(samples, HeldOut::People, seed)?,
-        people: people.iter().map(person).collect::<Result<_>>()?,
+        people: people
+            .iter()
+            .map(|(id, own)| {
+                Ok(Person {
+                    name: format!("person-{id}"),
+                    signature: signature(own),
+                    head: believed(own, HeldOut::Blocks, mix(seed ^ id))?,
+                })
+            })
+            .collect::<Result<_>>()?,
     })
 }
 
@@ -490,6 +494,10 @@ mod tests {
 
     #[test]
     fn the_ridge_finds_a_straight_line_and_shrinks_with_its_weight() {
+        fn norm(ridge: &Ridge) -> f64 {
+            ridge.weights[1..].iter().map(|w| w * w).sum::<f64>()
+        }
+
         let mut all = samples(60);
         for sample in &mut all {
             let f = sample.features;
@@ -500,7 +508,6 @@ mod tests {
             assert!((free.answer(&sample.features) - sample.distance_m).abs() < 1e-4);
         }
         let held = ridge(&all, 10.0);
-        let norm = |ridge: &Ridge| ridge.weights[1..].iter().map(|w| w * w).sum::<f64>();
         assert!(norm(&held) < 0.1 * norm(&free));
         assert!((held.weights[0] - free.weights[0]).abs() < 1e-6, "the mean is not held");
         // One weight of one term, by hand: x'y / (x'x + n w), with x of deviation 1.
@@ -529,16 +536,19 @@ mod tests {
     /// sample reveals the samples it was fitted to.
     #[test]
     fn answers_come_from_everybody_else() {
+        fn key(held: HeldOut, sample: &Sample) -> u64 {
+            match held {
+                HeldOut::Blocks => sample.frame / 4 % 5,
+                HeldOut::People => sample.person % 5,
+            }
+        }
+
         let mut all = samples(60);
         for (number, sample) in all.iter_mut().enumerate() {
             sample.floor_m = sample.distance_m - 0.1 * ((number * number) % 17) as f64;
         }
         let training = Training { block_frames: 4, ..quick() };
         let analytic = WAYS.iter().position(|way| *way == Distance::Analytic).unwrap();
-        let key = |held: HeldOut, sample: &Sample| match held {
-            HeldOut::Blocks => sample.frame / 4 % 5,
-            HeldOut::People => sample.person % 5,
-        };
         for held in [HeldOut::Blocks, HeldOut::People] {
             let answers = held_out(&all, held, &training, 1).unwrap();
             for (sample, said) in all.iter().zip(&answers) {
@@ -555,11 +565,14 @@ mod tests {
     }
 
     fn quick() -> Training {
+        fn few(fit: Fit) -> Fit {
+            Fit { restarts: 1, steps: 5, ..fit }
+        }
+
         let training = Training::default();
-        let few = |fit: Fit| Fit { restarts: 1, steps: 5, ..fit };
         Training {
             network: few(training.network),
-            printed: few(training.printed),
+            gradient: few(training.gradient),
             rich: few(training.rich),
             ..training
         }
@@ -588,7 +601,7 @@ mod tests {
             let said = held_out(samples, held, &quick(), seed).unwrap();
             let lines = [
                 head.network_sigma,
-                head.printed_sigma,
+                head.gradient_sigma,
                 head.rich_sigma,
                 head.ridge_sigma,
                 head.analytic_sigma,
@@ -615,15 +628,16 @@ mod tests {
         assert_eq!(folds.len(), WAYS.len());
         // The floor is 0.1 m short for all samples, so the held-out mean corrects it.
         assert_eq!(folds["analytic_error_m"].as_float(), Some(0.0));
-        assert!(folds.contains_key("printed_error_m"));
+        assert!(folds.contains_key("gradient_error_m"));
         assert_eq!(rounded(0.123_449), toml::Value::Float(0.1234));
     }
 
     #[test]
     fn bearings_differ_by_the_shorter_way_round() {
-        let off = |a: f64, b: f64| {
+        fn off(a: f64, b: f64) -> f64 {
             Sample { bearing_rad: a, true_bearing_rad: b, ..sample(0) }.bearing_error_rad()
-        };
+        }
+
         assert!((off(3.1, -3.1) - (std::f64::consts::TAU - 6.2)).abs() < 1e-12);
         assert!((off(-0.2, 0.1) - 0.3).abs() < 1e-12);
     }

@@ -99,9 +99,9 @@ impl Loaded {
     fn answer(&mut self, frame: &Frame, config: &Config) -> Result<Answer> {
         let least = self.thresholds.discover.min(self.thresholds.track) as f32;
         let iou = config.suppress_iou;
-        let find = |image: &_| self.network.find(image, &self.preparation, least, iou);
-        let found = with_colours(frame, find)?
-            .map_err(|why| Error::Model { path: self.path.clone(), why })?;
+        let found =
+            with_colours(frame, |image| self.network.find(image, &self.preparation, least, iou))?
+                .map_err(|why| Error::Model { path: self.path.clone(), why })?;
         Ok(found.map_or(Answer::Late, |people| Answer::People(people.into())))
     }
 }

@@ -182,11 +182,12 @@ fn a_weak_box_is_the_person_of_a_confirmed_track_alone() {
 /// them from zero on.
 #[test]
 fn the_threshold_of_newcomers_is_the_zero_of_scores() {
-    let score = |discover_score: f64, brightness: u8| {
+    fn score(discover_score: f64, brightness: u8) -> Option<f64> {
         let config = Config { discover_score, ..config(Family::Yolox) };
         let found = detect(&mut detector(config), &frame(1, brightness));
         found.first().map(|detection| detection.score)
-    };
+    }
+
     let by_default = score(0.5, 240).unwrap();
     assert!((score(0.2, 240).unwrap() - by_default - 4.0_f64.ln()).abs() < 1e-6);
     assert_eq!(score(0.5, 170), None);
@@ -197,10 +198,11 @@ fn the_threshold_of_newcomers_is_the_zero_of_scores() {
 
 #[test]
 fn thresholds_are_those_of_the_family_unless_they_are_set() {
-    let of = |config: Config, family| {
+    fn of(config: Config, family: Family) -> [f64; 2] {
         let Thresholds { discover, track } = config.thresholds(family);
         [discover, track]
-    };
+    }
+
     assert_eq!(of(Config::default(), Family::Yolox), [0.5, 0.2]);
     assert_eq!(of(Config::default(), Family::MoveNet), [0.2, 0.4 * 0.2]);
     let set = Config { discover_score: 0.0, ..Config::default() };
@@ -237,11 +239,12 @@ fn the_preparation_is_that_of_the_family_but_for_the_settings() {
 
 #[test]
 fn settings_of_boxes_and_words_stand_beside_the_others() {
-    let text = "{ family = 'rt-detr', colours = 'auto', fit = 'top-left', height_m = 1.6 }";
-    let read = |text: &str| {
+    fn read(text: &str) -> Result<Config, String> {
         let value = toml::de::DeValue::parse(text).unwrap();
         parse_settings::<Config>(Some(value)).map_err(|error| error.message)
-    };
+    }
+
+    let text = "{ family = 'rt-detr', colours = 'auto', fit = 'top-left', height_m = 1.6 }";
     let expected = Config {
         family: OrAuto::Chosen(Family::RtDetr),
         fit: OrAuto::Chosen(Fit::TopLeft),

@@ -46,8 +46,14 @@ fn detect(detector: &mut RecordedDetections, frame: &Frame) -> Vec<Detection> {
 /// A track manager starts tracks from zero on.
 #[test]
 fn newcomers_are_judged_by_the_threshold_of_their_detector() {
-    let config = |min_score: f64| Config { min_score, ..Config::default() };
-    let rounded = |config: &Config, score| (config.score_of(score) * 1e6).round() / 1e6;
+    fn config(min_score: f64) -> Config {
+        Config { min_score, ..Config::default() }
+    }
+
+    fn rounded(config: &Config, score: f64) -> f64 {
+        (config.score_of(score) * 1e6).round() / 1e6
+    }
+
     assert_eq!(rounded(&config(0.2), 0.2), 0.0);
     assert_eq!(rounded(&config(0.5), 0.8), (4.0_f64.ln() * 1e6).round() / 1e6);
     assert_eq!(config(0.7).score_of(0.7), config(0.5).score_of(0.7), "even odds start tracks");
@@ -95,8 +101,11 @@ fn a_whole_body_becomes_an_upper_body_with_a_place() {
 
 #[test]
 fn a_whole_body_can_be_tracked_as_the_box_that_it_is() {
+    fn config(body: BoxedBody) -> Config {
+        with_boxes(BoxSettings { body, ..BoxSettings::default() })
+    }
+
     let text = whole_body(Point3::new(3.0, 0.4, 1.585));
-    let config = |body| with_boxes(BoxSettings { body, ..BoxSettings::default() });
     let mut square = of_file(&text, config(BoxedBody::Full)).unwrap();
     let mut whole = of_file(&text, config(BoxedBody::FullBox)).unwrap();
     let square = detect(&mut square, &frame(2, None)).remove(0);
@@ -209,7 +218,10 @@ fn a_search_near_a_track_finds_the_right_box_first() {
 
 #[test]
 fn mistakes_are_named_by_file_and_line() {
-    let message = |text: &str| of_file(text, Config::default()).err().unwrap().to_string();
+    fn message(text: &str) -> String {
+        of_file(text, Config::default()).err().unwrap().to_string()
+    }
+
     assert!(message("1,-1,5,5,9,9,1\n2,-1,5,5\n").contains("det.txt`, line 2: 4 fields"));
     assert!(message("0,-1,5,5,9,9,1\n").contains("numbered from 1"));
     assert!(message("1700000000,-1,5,5,9,9,1\n").contains("up to 1000000000"));
@@ -250,7 +262,10 @@ fn finds_near(at: Point3<f64>, config: Config) -> bool {
 
 #[test]
 fn near_a_track_is_what_is_near_on_the_floor() {
-    let at = |x: f64, y: f64| finds_near(Point3::new(x, y, 1.6), Config::default());
+    fn at(x: f64, y: f64) -> bool {
+        finds_near(Point3::new(x, y, 1.6), Config::default())
+    }
+
     assert!(at(3.79, 0.0) && at(3.0, -0.79) && !at(3.81, 0.0) && !at(3.6, 0.6));
     assert!(finds_near(Point3::new(3.0, 0.0, 1.2), Config::default()), "whatever the height");
     // The same direction, and so nearly the same box, a metre behind.
@@ -274,6 +289,10 @@ fn the_most_like_of_several_near_a_track_comes_first() {
 
 #[test]
 fn boxes_without_a_score_are_certain_and_blank_lines_are_none() {
+    fn refused(text: &str) -> bool {
+        of_file(text, Config::default()).is_err()
+    }
+
     let text = "\n 1 , -1, 100, 100, 50, 170\n\n1,-1,300,100,50,170,0.8\n";
     let even = Config { min_score: 0.5, ..Config::default() };
     let mut detector = of_file(text, even).unwrap();
@@ -281,7 +300,6 @@ fn boxes_without_a_score_are_certain_and_blank_lines_are_none() {
     let scores: Vec<f64> = found.iter().map(|d| d.score).collect();
     let sure = (0.999_f64 / 0.001).ln();
     assert!((scores[0] - sure).abs() < 1e-9 && (scores[1] - 4.0_f64.ln()).abs() < 1e-9);
-    let refused = |text: &str| of_file(text, Config::default()).is_err();
     assert!(
         refused("1.5,-1,5,5,9,9,1") && refused("1,-1,5,5,-9,9,1") && refused("1,-1,5,5,9,-9,1")
     );

@@ -13,10 +13,10 @@ pub enum Scaling {
     /// cells of 16 signed directions, each divided by the gradient strength around it; then the
     /// vector is scaled to length 1.
     Gradients,
-    /// Grey values are divided by 255, so that they are 0 to 1. With the paper's gamma nearly all
+    /// Grey values are divided by 255, so that they are 0 to 1. With a gamma of 8 nearly all
     /// patches are far from each other.
     Fraction,
-    /// No normalisation; grey values are 0 to 255. The paper prints this, and with its gamma every
+    /// No normalisation; grey values are 0 to 255. With a gamma of 8 every
     /// patch is practically infinitely far from every other.
     Raw,
 }
@@ -50,7 +50,7 @@ pub struct Training {
     pub scaling: Scaling,
     /// Fraction of its side by which a candidate's square is enlarged.
     pub grow: f64,
-    /// Widths of the kernel `exp(-gamma |a - b|^2)` to try (P4: 8).
+    /// Widths of the kernel `exp(-gamma |a - b|^2)` to try.
     pub gammas: Vec<f64>,
     /// Penalties of a training error to try; each class is weighted by the inverse of its share.
     pub penalties: Vec<f64>,
@@ -62,9 +62,9 @@ pub struct Training {
     pub max_samples: usize,
     /// Most support vectors in the model file; each takes half a kilobyte.
     pub max_vectors: usize,
-    /// Most examples of people, sampled at random (P4: 438); 0: all.
+    /// Most examples of people, sampled at random; 0: all.
     pub people: usize,
-    /// Most examples of other objects, sampled at random (P4: 146); 0: all.
+    /// Most examples of other objects, sampled at random; 0: all.
     pub others: usize,
 }
 

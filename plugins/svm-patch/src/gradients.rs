@@ -80,8 +80,10 @@ mod tests {
 
     #[test]
     fn a_ramp_has_one_direction_and_the_opposite_ramp_the_opposite_one() {
-        let ramp =
-            |slope: f32| -> Patch { std::array::from_fn(|at| 100.0 + slope * (at % SIDE) as f32) };
+        fn ramp(slope: f32) -> Patch {
+            std::array::from_fn(|at| 100.0 + slope * (at % SIDE) as f32)
+        }
+
         for (slope, direction) in [(5.0, 0), (-5.0, DIRECTIONS / 2)] {
             let described = of(&ramp(slope));
             for histogram in described.chunks_exact(DIRECTIONS) {

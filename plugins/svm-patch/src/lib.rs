@@ -46,7 +46,7 @@ pub const NAME: &str = "svm-patch";
 
 /// Registers the plugin, and its trainer if that is compiled in.
 pub fn register(registry: &mut Registry) {
-    registry.verifier(NAME, "a support vector machine on 20x20 grey patches (P4)", SvmPatch::new);
+    registry.verifier(NAME, "a support vector machine on 20x20 grey patches", SvmPatch::new);
     #[cfg(feature = "train")]
     registry.training(
         NAME,

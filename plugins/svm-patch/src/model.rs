@@ -218,7 +218,11 @@ fn step_of(vector: &Patch) -> f32 {
 /// Returns the largest absolute value.
 #[inline(always)]
 fn largest(patch: &Patch) -> f32 {
-    let larger = |a: f32, b: f32| if b > a { b } else { a };
+    #[inline(always)]
+    fn larger(a: f32, b: f32) -> f32 {
+        if b > a { b } else { a }
+    }
+
     let mut lanes = [0.0; 16];
     for values in patch.as_chunks::<16>().0 {
         for (lane, value) in lanes.iter_mut().zip(values) {

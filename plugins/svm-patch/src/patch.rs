@@ -165,12 +165,13 @@ mod tests {
     /// A standard deviation of one grey value is the least.
     #[test]
     fn a_patch_with_less_contrast_is_flat() {
-        let length = |amplitude: f32| {
+        fn length(amplitude: f32) -> f32 {
             let mut patch: Patch =
                 std::array::from_fn(|at| 90.0 + if at % 2 == 0 { amplitude } else { -amplitude });
             normalise(&mut patch);
             patch.iter().map(|v| v * v).sum::<f32>()
-        };
+        }
+
         assert!((length(1.02) - 1.0).abs() < 1e-4);
         assert_eq!(length(0.98), 0.0);
     }

@@ -154,6 +154,10 @@ mod training {
     /// that the answer no longer depends on the patch.
     #[test]
     fn the_printed_width_on_unscaled_patches_is_constant() {
+        fn first(training: Training) -> Trial {
+            trainer(training, 60).trials(&mut |_| {}).unwrap().remove(0)
+        }
+
         let printed = Training {
             scaling: Scaling::Raw,
             gammas: vec![8.0],
@@ -162,7 +166,6 @@ mod training {
             ..Training::default()
         };
         let scaled = Training { scaling: Scaling::Unit, ..printed.clone() };
-        let first = |training| trainer(training, 60).trials(&mut |_| {}).unwrap().remove(0);
         let raw = first(printed);
         let unit = first(scaled);
         // Each of the two folds has its own constant.

@@ -37,9 +37,9 @@ const EYES: [(Eye, &str); 2] =
     [(Eye::Printed, "omni-appearance-as-printed"), (Eye::Ours, "omni-appearance")];
 
 const WAYS: [Way; 7] = [
-    ("as printed: features and back-propagation", Eye::Printed, Distance::Printed),
+    ("as printed: features and back-propagation", Eye::Printed, Distance::Gradient),
     ("printed features, small weights preferred", Eye::Printed, Distance::Network),
-    ("shadows left out, back-propagation", Eye::Ours, Distance::Printed),
+    ("shadows left out, back-propagation", Eye::Ours, Distance::Gradient),
     ("network 3-4-1", Eye::Ours, Distance::Network),
     ("ridge", Eye::Ours, Distance::Ridge),
     ("analytic", Eye::Ours, Distance::Analytic),
@@ -101,7 +101,10 @@ fn settings(text: &str) -> Result<Config, toml::de::Error> {
 
 /// Simulates a scene and collects the samples of both detectors in it.
 fn room(lab: &Lab, scene: &Scene, shipped: &[Shipped; 2]) -> Result<Room, ReproduceError> {
-    let collector = |shipped: &Shipped| Collector::new(shipped.config.clone()).map_err(failed);
+    fn collector(shipped: &Shipped) -> Result<Collector, ReproduceError> {
+        Collector::new(shipped.config.clone()).map_err(failed)
+    }
+
     let mut collectors = [collector(&shipped[0])?, collector(&shipped[1])?];
     let mut draw = Draw::new(scene, lab.jobs);
     while let Some(simulated) = draw.next_frame() {
@@ -148,8 +151,9 @@ fn errors(samples: &[Sample], head: &Head, how: Distance) -> Vec<f64> {
 
 /// Returns the errors of all methods in one room, by a head for each of [`EYES`].
 fn of_ways(parts: [&[Sample]; EYES.len()], heads: [&Head; EYES.len()]) -> Vec<Vec<f64>> {
-    let way = |(_, eye, how): &Way| errors(parts[*eye as usize], heads[*eye as usize], *how);
-    WAYS.iter().map(way).collect()
+    WAYS.iter()
+        .map(|(_, eye, how)| errors(parts[*eye as usize], heads[*eye as usize], *how))
+        .collect()
 }
 
 /// Returns the errors of all methods in one room, fitted to samples of that room, and counts the
@@ -179,8 +183,9 @@ fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceE
         columns.push(rooms.iter().map(within).collect::<Result<_, _>>()?);
     }
     let heads = [&shipped[0].head, &shipped[1].head];
-    let elsewhere = |room: &Room| of_ways([&room.samples[0], &room.samples[1]], heads);
-    columns.push(rooms.iter().map(elsewhere).collect());
+    columns.push(
+        rooms.iter().map(|room| of_ways([&room.samples[0], &room.samples[1]], heads)).collect(),
+    );
     let published = Cell { deviation: Some(0.167), ..Cell::number(0.126, 3) };
     let mut cells = vec![published];
     cells.resize(columns.len(), Cell::default());
@@ -230,6 +235,11 @@ fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceE
 
 /// Builds the table for Fig. 5, of which the values are lost.
 fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
+    // The deviation over rooms is not that of samples, which the other tables show.
+    fn cell(draws: &[Vec<f64>]) -> Cell {
+        Cell { deviation: None, ..over_draws(draws, 3) }
+    }
+
     let mut parts = Vec::new();
     for room in rooms {
         let [training, test] = Split::Place.divide(room.of(Eye::Ours), 0);
@@ -244,8 +254,6 @@ fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
             plain.push(vec![pearson(&values, &truth)]);
             ranked.push(vec![pearson(&ranks(&values), &ranks(&truth))]);
         }
-        // The deviation over rooms is not that of samples, which the other tables show.
-        let cell = |draws: &[Vec<f64>]| Cell { deviation: None, ..over_draws(draws, 3) };
         Row::ours(name, vec![cell(&plain), cell(&ranked)])
     };
     Ok(Table {
@@ -266,11 +274,12 @@ fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
 }
 
 fn pearson(a: &[f64], b: &[f64]) -> f64 {
+    fn product(x: &[f64], mx: f64, y: &[f64], my: f64) -> f64 {
+        x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum::<f64>()
+    }
+
     let ma = mean(a);
     let mb = mean(b);
-    let product = |x: &[f64], mx: f64, y: &[f64], my: f64| {
-        x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum::<f64>()
-    };
     product(a, ma, b, mb) / (product(a, ma, a, ma) * product(b, mb, b, mb)).sqrt()
 }
 
@@ -290,9 +299,10 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 
 fn bearings(rooms: &[Room]) -> Table {
     let row = |name: &str, eye: Eye| {
-        let of_room =
-            |room: &Room| room.of(eye).iter().map(|s| s.bearing_error_rad().to_degrees()).collect();
-        let draws: Vec<Vec<f64>> = rooms.iter().map(of_room).collect();
+        let draws: Vec<Vec<f64>> = rooms
+            .iter()
+            .map(|room| room.of(eye).iter().map(|s| s.bearing_error_rad().to_degrees()).collect())
+            .collect();
         Row::ours(name, vec![over_draws(&draws, 2)])
     };
     let published = Cell { deviation: Some(1.60), ..Cell::number(2.01, 2) };
@@ -384,8 +394,11 @@ fn of_persons(rooms: &[Room], strangers: &Head) -> Result<Table, ReproduceError>
         // A person counts only with all models, which are compared on the same samples.
         if let [first, second] = &people[..] {
             for [own, other] in [[first, second], [second, first]] {
-                let is_own = |sample: &&Sample| sample.person.to_string() == own.name;
-                let tested: Vec<Sample> = test.iter().filter(is_own).copied().collect();
+                let tested: Vec<Sample> = test
+                    .iter()
+                    .filter(|sample| sample.person.to_string() == own.name)
+                    .copied()
+                    .collect();
                 let heads = [&own.head, &other.head, &both, strangers];
                 for (all, head) in errors_of.iter_mut().zip(heads) {
                     all.extend(errors(&tested, head, Distance::Network));
@@ -491,7 +504,7 @@ mod tests {
 
     #[test]
     fn a_model_of_the_own_is_taken_where_the_image_tells_who_it_is() {
-        let sample = |person: u64, frame: u64| {
+        fn sample(person: u64, frame: u64) -> Sample {
             let distance_m = 1.5 + 0.02 * frame as f64;
             let bottom = if person == 0 { 100.0 } else { 130.0 } - 20.0 * distance_m;
             let features = tagalong_omni_appearance::Features {
@@ -514,7 +527,8 @@ mod tests {
                 person,
                 frame,
             }
-        };
+        }
+
         let samples: Vec<Sample> =
             [0, 1].iter().flat_map(|p| (0..60).map(move |f| sample(*p, f))).collect();
         let people = persons(&samples).unwrap();
@@ -541,7 +555,7 @@ mod tests {
         let trained = trained.printed();
         let used = settings(printed).unwrap();
         assert!(used.after_measuring.is_some(), "the seam");
-        assert_eq!(used.distance, Distance::Printed);
+        assert_eq!(used.distance, Distance::Gradient);
         assert_eq!(used.model, "models/omni-distance-as-printed.toml");
         let Config { model, distance, .. } = used.clone();
         assert_eq!(Config { model, distance, ..trained }, used);

@@ -62,17 +62,23 @@ fn station(camera: &Camera) -> Option<Station> {
 
 /// Returns a guess with other errors for each webcam.
 fn guessed(truth: &[Station]) -> Vec<Station> {
-    let (metres, radians, part) = GUESS;
     // The bits of the number give each of the four webcams other signs.
-    let sign = |number: usize, bit: usize| if (number >> bit) & 1 == 0 { 1.0 } else { -1.0 };
-    let off = |(number, station): (usize, &Station)| Station {
-        at: station.at + Vector2::new(sign(number, 0), sign(number, 1)) * metres,
-        heading_rad: station.heading_rad + sign(number, 1) * radians,
-        pitch_down_rad: station.pitch_down_rad + sign(number, 0) * radians,
-        focal_px: station.focal_px * (1.0 + sign(number, 0) * part),
-        ..*station
-    };
-    truth.iter().enumerate().map(off).collect()
+    fn sign(number: usize, bit: usize) -> f64 {
+        if (number >> bit) & 1 == 0 { 1.0 } else { -1.0 }
+    }
+
+    let (metres, radians, part) = GUESS;
+    truth
+        .iter()
+        .enumerate()
+        .map(|(number, station)| Station {
+            at: station.at + Vector2::new(sign(number, 0), sign(number, 1)) * metres,
+            heading_rad: station.heading_rad + sign(number, 1) * radians,
+            pitch_down_rad: station.pitch_down_rad + sign(number, 0) * radians,
+            focal_px: station.focal_px * (1.0 + sign(number, 0) * part),
+            ..*station
+        })
+        .collect()
 }
 
 /// Returns the distances between measured and known positions, cm.

@@ -41,11 +41,11 @@ const STEPS: [(&str, &str, &str); 6] = [
     ("misprint: u is the last difference, with its noise", SEAMLESS, LAST_U),
     (
         "lack: 24 images of background, which follows the light",
-        "model = \"models/omni-distance-as-printed.toml\"\ndistance = \"printed\"\n\
+        "model = \"models/omni-distance-as-printed.toml\"\ndistance = \"gradient\"\n\
          shadow_min = 1.0\nvalley = 0.0\nmax_people = 1",
         LAST_U,
     ),
-    ("lack: shadows are left out", "distance = \"printed\"\nvalley = 0.0\nmax_people = 1", LAST_U),
+    ("lack: shadows are left out", "distance = \"gradient\"\nvalley = 0.0\nmax_people = 1", LAST_U),
     (
         "lack: the network prefers small weights",
         "distance = \"network\"\nvalley = 0.0\nmax_people = 1",
@@ -53,7 +53,7 @@ const STEPS: [(&str, &str, &str); 6] = [
     ),
     ("lack: four states, the detection's noise", "valley = 0.0\nmax_people = 1", OURS),
 ];
-const SEAMLESS: &str = "model = \"models/omni-distance-as-printed.toml\"\ndistance = \"printed\"\n\
+const SEAMLESS: &str = "model = \"models/omni-distance-as-printed.toml\"\ndistance = \"gradient\"\n\
     background_frames = 5\nadapt_s = 0.0\nabsorb_s = 0.0\nshadow_min = 1.0\nvalley = 0.0\n\
     max_people = 1";
 const OURS: &str = "plugin = \"floor-kalman\"";
@@ -84,8 +84,9 @@ pub(super) fn kalman(lab: &Lab) -> Result<Findings, ReproduceError> {
     let mut contenders = Vec::new();
     for (_, distance) in DISTANCES {
         let detector = format!("distance = \"{distance}\"");
-        let of = |(name, filter): &(&str, &str)| contender(name, config(&detector, filter));
-        contenders.extend(FILTERS.iter().map(of));
+        contenders.extend(
+            FILTERS.iter().map(|(name, filter)| contender(name, config(&detector, filter))),
+        );
     }
     contenders.push(lab.contender(PRINTED)?);
     contenders.extend(
@@ -106,11 +107,14 @@ pub(crate) fn rooms(lab: &Lab) -> Result<Vec<Scene>, ReproduceError> {
 
 /// Returns the errors of the answers of each run, m.
 pub(crate) fn answers_m(trial: Trial) -> Result<Vec<Vec<f64>>, TrialError> {
-    let of_run = |run: &Run| {
-        let truths = trial.moments.iter().map(the_person).enumerate();
-        truths.filter_map(|(at, truth)| error_m(run, at, truth?)).collect()
-    };
-    Ok(trial.runs.iter().map(of_run).collect())
+    Ok(trial
+        .runs
+        .iter()
+        .map(|run| {
+            let truths = trial.moments.iter().map(the_person).enumerate();
+            truths.filter_map(|(at, truth)| error_m(run, at, truth?)).collect()
+        })
+        .collect())
 }
 
 /// Returns the person in view: the people are in the room one after the other.
@@ -159,7 +163,10 @@ fn walk(trial: Trial) -> Result<Walk, TrialError> {
 /// Builds the table of section 6.2, with the gain over the first row; `first` is the number of the
 /// first filter among the contenders.
 fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
-    let published = |mean, deviation| Cell { deviation: Some(deviation), ..Cell::number(mean, 3) };
+    fn published(mean: f64, deviation: f64) -> Cell {
+        Cell { deviation: Some(deviation), ..Cell::number(mean, 3) }
+    }
+
     let mut rows = vec![
         Row::published("appearance model", with_empty(published(0.154, 0.094))),
         Row::published("with Kalman filter", with_empty(published(0.145, 0.092))),

@@ -50,6 +50,8 @@ const FRESH: &str = "Each draw is another room with other furniture, light, peop
 /// Returns rooms with two people each, one after the other, each for `each_s`.
 pub(crate) fn in_turn(lab: &Lab, seeds: u64, each_s: f64) -> Result<Vec<Scene>, ReproduceError> {
     let scenes = lab.scenes("omni-room", &[], lab.seeds(seeds))?;
-    let alone = |scene: Scene| Scene { webcams: Vec::new(), ..scene.in_turn(each_s) };
-    Ok(scenes.into_iter().map(alone).collect())
+    Ok(scenes
+        .into_iter()
+        .map(|scene| Scene { webcams: Vec::new(), ..scene.in_turn(each_s) })
+        .collect())
 }

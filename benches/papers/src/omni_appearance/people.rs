@@ -52,11 +52,14 @@ fn scenes(lab: &Lab, name: &str, people: usize) -> Result<Vec<Scene>, ReproduceE
 
 fn judged(trial: Trial) -> Result<Vec<PipelineResult>, TrialError> {
     let judge = Judge::default();
-    let done = |run| {
-        let judged = judge.judge(&trial, run)?;
-        Ok(PipelineResult { tally: judged.tally, errors_m: judged.errors_in_robot_m })
-    };
-    trial.runs.iter().map(done).collect()
+    trial
+        .runs
+        .iter()
+        .map(|run| {
+            let judged = judge.judge(&trial, run)?;
+            Ok(PipelineResult { tally: judged.tally, errors_m: judged.errors_in_robot_m })
+        })
+        .collect()
 }
 
 fn table(title: &str, trials: &[Vec<PipelineResult>]) -> Table {

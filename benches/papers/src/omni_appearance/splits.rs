@@ -101,12 +101,14 @@ mod tests {
             person: frame / 120,
             frame,
         };
-        let wrapped = |mut sample: Sample| {
-            let (sine, cosine) = sample.true_bearing_rad.sin_cos();
-            sample.true_bearing_rad = sine.atan2(cosine);
-            sample
-        };
-        (0..240).map(sample).map(wrapped).collect()
+        (0..240)
+            .map(sample)
+            .map(|mut sample| {
+                let (sine, cosine) = sample.true_bearing_rad.sin_cos();
+                sample.true_bearing_rad = sine.atan2(cosine);
+                sample
+            })
+            .collect()
     }
 
     #[test]

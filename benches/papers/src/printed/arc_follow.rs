@@ -224,11 +224,12 @@ mod tests {
 
     #[test]
     fn the_curvature_has_no_bound_and_the_corrected_one_has() {
-        let near = target(0.25, 0.1, Vector2::new(0.5, 0.0));
-        let curvature = |wheels: WheelSpeeds| {
+        fn curvature(wheels: WheelSpeeds) -> f64 {
             let turn_rate = (wheels.right - wheels.left) / (2.0 * WHEELS.half_separation_m);
             turn_rate / (0.5 * (wheels.left + wheels.right))
-        };
+        }
+
+        let near = target(0.25, 0.1, Vector2::new(0.5, 0.0));
         let config = Config { stand_off_m: 0.2, latency_s: 0.0, ..Config::default() };
         let printed = curvature(settled(&mut printed(config), &near));
         assert!((printed - 4.0 * 0.1 / 0.0725).abs() < 1e-9, "{printed}");
@@ -252,8 +253,9 @@ mod tests {
 
     #[test]
     fn it_drives_away_from_a_person_behind_whom_the_corrected_law_turns_to() {
-        let behind = |_| (Point2::new(-2.0, 0.01), Vector2::zeros());
-        let end = |controller: &mut dyn Controller| *drive(controller, 150, behind).last().unwrap();
+        let end = |controller: &mut dyn Controller| {
+            *drive(controller, 150, |_| (Point2::new(-2.0, 0.01), Vector2::zeros())).last().unwrap()
+        };
         assert!(end(&mut printed(Config::default()))[0] > 3.0);
         let [range_m, bearing_rad] = end(&mut corrected());
         assert!((range_m - 1.4).abs() < 0.05 && bearing_rad.abs() < 0.05);
@@ -261,14 +263,16 @@ mod tests {
 
     #[test]
     fn it_loses_a_person_who_walks_around_it_at_the_stand_off() {
-        let around = |step: u32| {
+        fn around(step: u32) -> (Point2<f64>, Vector2<f64>) {
             let (sin, cos) = (0.03 * f64::from(step)).sin_cos();
             (Point2::new(1.4 * cos, 1.4 * sin), Vector2::new(-sin, cos) * 0.42)
-        };
-        let worst_deg = |controller: &mut dyn Controller| {
+        }
+
+        fn worst_deg(controller: &mut dyn Controller) -> f64 {
             let bearings = drive(controller, 200, around).into_iter().map(|[_, b]| b.abs());
             bearings.fold(0.0, f64::max).to_degrees()
-        };
+        }
+
         assert!(worst_deg(&mut printed(Config::default())) > 90.0);
         assert!(worst_deg(&mut corrected()) < 25.0);
     }

@@ -294,12 +294,13 @@ mod tests {
 
     #[test]
     fn a_robot_that_backs_up_is_subtracted_the_other_way_and_one_that_waits_not_at_all() {
-        let speed = |forward: f64, dt: f64| {
+        fn speed(forward: f64, dt: f64) -> f64 {
             let mut state = state_at(3.0);
             let motion = EgoMotion { forward, ..EgoMotion::at_rest(dt) };
             filter(Config::default()).predict(&mut state, &motion);
             state.mean[3]
-        };
+        }
+
         assert!((speed(-0.05, 0.1) - 0.5).abs() < 1e-12 && (speed(0.05, 0.1) + 0.5).abs() < 1e-12);
         assert_eq!(speed(0.05, 0.0), 0.0);
     }
@@ -324,18 +325,7 @@ mod tests {
 
     #[test]
     fn the_update_loses_symmetry_and_is_otherwise_that_of_the_textbook() {
-        for update in [false, true] {
-            let filter = filter(Config { update, sigma_v_m: 0.3, ..Config::default() });
-            let mut state = state_at(3.0);
-            let p = state.covariance[(0, 0)];
-            let seen = detection(Point3::new(3.5, 0.0, 1.6), 0.01);
-            let (nis, measured) = filter.correct(&mut state, &seen, &camera()).nis.unwrap();
-            let gain = p / (p + 0.09);
-            assert!((state.mean[0] - 3.0 - 0.5 * gain).abs() < 1e-12);
-            assert!((state.covariance[(0, 0)] - (1.0 - gain) * p).abs() < 1e-12);
-            assert!((nis - 0.25 / (p + 0.09)).abs() < 1e-12 && measured == 3);
-        }
-        let asymmetry = |update: bool| {
+        fn asymmetry(update: bool) -> f64 {
             let config = Config { noise: false, measurement: false, update, ..Config::default() };
             let filter = filter(config);
             let mut world = World { robot: Isometry2::identity(), random: SplitMix64::new(1) };
@@ -350,19 +340,32 @@ mod tests {
                 worst = worst.max((state.covariance - state.covariance.transpose()).norm());
             }
             worst
-        };
+        }
+
+        for update in [false, true] {
+            let filter = filter(Config { update, sigma_v_m: 0.3, ..Config::default() });
+            let mut state = state_at(3.0);
+            let p = state.covariance[(0, 0)];
+            let seen = detection(Point3::new(3.5, 0.0, 1.6), 0.01);
+            let (nis, measured) = filter.correct(&mut state, &seen, &camera()).nis.unwrap();
+            let gain = p / (p + 0.09);
+            assert!((state.mean[0] - 3.0 - 0.5 * gain).abs() < 1e-12);
+            assert!((state.covariance[(0, 0)] - (1.0 - gain) * p).abs() < 1e-12);
+            assert!((nis - 0.25 / (p + 0.09)).abs() < 1e-12 && measured == 3);
+        }
         assert_eq!(asymmetry(false), 0.0);
         assert!(asymmetry(true) > 0.0);
     }
 
     #[test]
     fn one_variance_serves_all_detections_and_an_unmeasured_height_is_not_counted() {
-        let moved = |config: Config, sigma_m: f64| {
+        fn moved(config: Config, sigma_m: f64) -> f64 {
             let mut state = state_at(3.0);
             let seen = detection(Point3::new(3.5, 0.0, 1.6), sigma_m);
             filter(config).correct(&mut state, &seen, &camera());
             state.mean[0] - 3.0
-        };
+        }
+
         assert_eq!(moved(Config::default(), 0.5), moved(Config::default(), 0.01));
         assert!(moved(corrected(), 0.5) < 0.1 * moved(corrected(), 0.01));
         let mut seen = detection(Point3::new(3.1, 0.0, 0.0), 0.05);

@@ -85,7 +85,10 @@ mod tests {
     #[test]
     fn a_track_is_given_a_detection_that_does_not_overlap_and_by_the_corrected_cost_one_that_does()
     {
-        let boxed = |x: f64| Rect::new(x, 0.0, 10.0, 10.0);
+        fn boxed(x: f64) -> Rect {
+            Rect::new(x, 0.0, 10.0, 10.0)
+        }
+
         let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(50.0))];
         let seen = [2.0, 51.0].map(|x| detection_in(boxed(x)));
         let base =

@@ -184,13 +184,14 @@ mod tests {
 
     #[test]
     fn noise_is_uniform_and_the_same_for_every_track_and_corrected_normal() {
-        let largest = |steps: &PrintedSteps, seed| {
+        fn largest(steps: &PrintedSteps, seed: u64) -> f64 {
             let mut random = Random::new(seed, 0);
             let mut dimensions: Vec<Random> = (0..5).map(|d| Random::new(d, 0)).collect();
             let drawn: Vec<Vector5<f64>> =
                 (0..400).map(|_| steps.noise(&mut random, &mut dimensions)).collect();
             drawn.iter().fold(0.0, |most: f64, noise| most.max(noise.amax()))
-        };
+        }
+
         let end = 3f64.sqrt();
         assert!((0.99 * end..=end).contains(&largest(&PRINTED, 1)));
         assert_eq!(largest(&PRINTED, 1), largest(&PRINTED, 2), "seeded alike");

@@ -241,9 +241,12 @@ mod tests {
         }
 
         fn covers(&self, x: i64, y: i64) -> bool {
+            fn middle(a: i64, b: i64) -> i64 {
+                (a + b) / 2
+            }
+
             let row = self.template.rows.iter().find(|row| row.dy == y - self.y);
             row.is_some_and(|row| {
-                let middle = |a: i64, b: i64| (a + b) / 2;
                 (middle(row.from, row.guard_from)..middle(row.to, row.guard_to))
                     .contains(&(x - self.x))
             })
@@ -265,8 +268,11 @@ mod tests {
         background_m: f64,
         [is_rms, whole_image]: [bool; 2],
     ) -> Option<f64> {
+        fn half(p: &Painted) -> i64 {
+            p.template.half_width
+        }
+
         let image = frame.derived::<Working>().unwrap();
-        let half = |p: &Painted| p.template.half_width;
         let mut left = cast.iter().map(|p| p.x - half(p)).min()?;
         let mut right = cast.iter().map(|p| p.x + half(p)).max()?;
         let mut top = cast.iter().map(|p| p.y + p.template.rows[0].dy).min()?;
@@ -329,17 +335,19 @@ mod tests {
 
     #[test]
     fn the_printed_form_tells_less_of_large_windows_than_a_root_mean_square() {
-        let d = |is_rms, x: f64| {
+        fn d(is_rms: bool, x: f64) -> f64 {
             // A person expected where there is only the wall.
             let frame = frame(picture(&[]));
             let log = weigher(1.0, is_rms).log_likelihood(&frame, &[standing(x, 0.0)]).unwrap();
             (-2.0 * (log + (2.0 * PI).sqrt().ln())).sqrt()
-        };
+        }
+
         // The square of the window is four times as large at half the distance.
-        let ratio = |is_rms| {
+        fn ratio(is_rms: bool) -> f64 {
             let of_depth = |x: f64| d(is_rms, x) / (f64::from(WALL_M) - x);
             of_depth(3.6) / of_depth(1.8)
-        };
+        }
+
         assert!((ratio(true) - 1.0).abs() < 0.15, "{}", ratio(true));
         assert!((ratio(false) - 2.0).abs() < 0.3, "{}", ratio(false));
     }

@@ -45,7 +45,7 @@ struct Step {
 }
 
 fn threshold() -> Step {
-    let keys = |most: &f64| {
+    fn keys(most: &f64) -> Vec<(&str, f64)> {
         vec![
             ("detectors.0.config.discover_cost", *most),
             ("detectors.0.config.even_cost", 1.2 * most),
@@ -53,7 +53,8 @@ fn threshold() -> Step {
             ("detectors.0.config.refine_cost", 2.0 * most),
             ("detectors.0.config.score_per_cost", 4.0 / most),
         ]
-    };
+    }
+
     Step { goal: Goal::Sightings, tried: THRESHOLDS.iter().map(keys).collect() }
 }
 
@@ -122,8 +123,8 @@ fn of_walks(
     let scenes = lab.scenes_of(Split::Validation, "square-walk", &set, lab.seeds(4))?;
     let stereo = variants::stereo_settings(&lab.contender(all[0].of)?)?;
     lab.progress.begin(scenes.len(), "walks to fit with");
-    let draw = |scene: &Scene| Walk::draw(scene, &stereo);
-    let walks = in_order(&scenes, lab.jobs, draw, |_| lab.progress.step())?;
+    let walks =
+        in_order(&scenes, lab.jobs, |scene| Walk::draw(scene, &stereo), |_| lab.progress.step())?;
     let mut findings = Findings::default();
     for variant in all.iter().filter(|variant| variant.is_printed()) {
         let rest = [noise(), start_and_gate()];
@@ -150,8 +151,12 @@ fn fitted(
         let tried = step.tried.iter().map(|keys| variants::with(&config, keys));
         let all: Vec<Contender> = tried.collect::<Result<_, _>>()?;
         lab.progress.begin(walks.len(), variant.name);
-        let judge = |walk: &Walk| scores(walk.trial(&all, lab)?);
-        let of_walks = in_order(walks, lab.jobs, judge, |_| lab.progress.step())?;
+        let of_walks = in_order(
+            walks,
+            lab.jobs,
+            |walk| scores(walk.trial(&all, lab)?),
+            |_| lab.progress.step(),
+        )?;
         let scores: Vec<Score> =
             (0..all.len()).map(|at| Score::of_all(of_walks.iter().map(|walk| &walk[at]))).collect();
         let best = best(&scores, step.goal);
@@ -182,15 +187,19 @@ fn fitted(
 
 /// Formats the first key, or both if there are two; the rest follow from the first.
 fn named(keys: &[(&str, f64)]) -> String {
-    let word =
-        |(key, value): &(&str, f64)| format!("{} = {value}", key.rsplit('.').next().unwrap_or(key));
-    let words = keys.iter().take(if keys.len() > 2 { 1 } else { 2 }).map(word);
+    let words = keys
+        .iter()
+        .take(if keys.len() > 2 { 1 } else { 2 })
+        .map(|(key, value)| format!("{} = {value}", key.rsplit('.').next().unwrap_or(key)));
     words.collect::<Vec<_>>().join(", ")
 }
 
 impl Walk {
     fn draw(scene: &Scene, stereo: &StereoSettings) -> Result<Self, TrialError> {
-        let failed = |error: tagalong_core::Error| TrialError::Witness(error.to_string());
+        fn failed(error: tagalong_core::Error) -> TrialError {
+            TrialError::Witness(error.to_string())
+        }
+
         let mut draw = Draw::new(scene, 1);
         let mut stereo = StereoDepth::new(stereo.clone()).map_err(failed)?;
         let camera = draw.camera().clone();
@@ -216,10 +225,12 @@ impl Walk {
     }
 
     fn trial(&self, contenders: &[Contender], lab: &Lab) -> Result<Trial, TrialError> {
+        fn run(one: &Contender) -> Run {
+            Run { pipeline: one.name.clone(), reports: vec![], worked_ms: 0.0 }
+        }
+
         let pipelines = contenders.iter().map(|one| one.pipeline(lab.registry, self.seed));
         let mut pipelines = pipelines.collect::<Result<Vec<Pipeline>, _>>()?;
-        let run =
-            |one: &Contender| Run { pipeline: one.name.clone(), reports: vec![], worked_ms: 0.0 };
         let mut runs: Vec<Run> = contenders.iter().map(run).collect();
         for (frame, _) in &self.shots {
             // A new frame for each trial, so that the data derived from it are freed afterwards.

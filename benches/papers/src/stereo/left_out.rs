@@ -138,10 +138,11 @@ fn table(
     [others, persons]: [u64; 2],
     seeds: u64,
 ) -> Page {
-    let cells = |of: [Judged; VERIFIERS.len()]| {
+    fn cells(of: [Judged; VERIFIERS.len()]) -> Vec<Cell> {
         let each = of.into_iter().flat_map(|judged| [share(judged.without), share(judged.with)]);
         std::iter::once(Cell::number(of[0].with[0] as f64, 0)).chain(each).collect()
-    };
+    }
+
     let of_kind = |at: usize| std::array::from_fn(|verifier| things[verifier][at]);
     let sum = |of: [Judged; KINDS.len()]| {
         of.iter().fold(Judged::default(), |sum, one| Judged {
@@ -316,7 +317,10 @@ mod tests {
 
     #[test]
     fn people_are_counted_once_and_kinds_add_up() {
-        let judged = |with, without| Judged { with, without };
+        fn judged(with: [u64; 2], without: [u64; 2]) -> Judged {
+            Judged { with, without }
+        }
+
         let things = [[judged([10, 9], [10, 5]); KINDS.len()]; VERIFIERS.len()];
         let people = [judged([60, 6], [60, 12]); VERIFIERS.len()];
         let page = table(&things, &people, [3, 4], 2);

@@ -29,23 +29,27 @@ pub fn occlusion(lab: &Lab) -> Result<Findings, ReproduceError> {
 }
 
 fn cases(trial: Trial) -> Result<Vec<Case>, TrialError> {
-    let case = |occlusion: Occlusion| Case {
-        hidden_s: occlusion.duration_s,
-        gap_m: occlusion.gap_m,
-        outcomes: trial.runs.iter().map(|run| outcome(&trial, run, &occlusion)).collect(),
-    };
-    Ok(occlusions(&trial).into_iter().map(case).collect())
+    Ok(occlusions(&trial)
+        .into_iter()
+        .map(|occlusion| Case {
+            hidden_s: occlusion.duration_s,
+            gap_m: occlusion.gap_m,
+            outcomes: trial.runs.iter().map(|run| outcome(&trial, run, &occlusion)).collect(),
+        })
+        .collect())
 }
 
 fn table(cases: &[Case], draws: usize) -> Table {
     let mut rows = Vec::new();
     for gap in GAP_M.windows(2) {
         for hidden in HIDDEN_S.windows(2) {
-            let within = |case: &&Case| {
-                (gap[0]..gap[1]).contains(&case.gap_m)
-                    && (hidden[0]..hidden[1]).contains(&case.hidden_s)
-            };
-            let some: Vec<&Case> = cases.iter().filter(within).collect();
+            let some: Vec<&Case> = cases
+                .iter()
+                .filter(|case| {
+                    (gap[0]..gap[1]).contains(&case.gap_m)
+                        && (hidden[0]..hidden[1]).contains(&case.hidden_s)
+                })
+                .collect();
             let name = format!("gap {}-{} m, hidden {}-{} s", gap[0], gap[1], hidden[0], hidden[1]);
             rows.push(Row::ours(name, row(&some)));
         }
@@ -68,12 +72,13 @@ fn table(cases: &[Case], draws: usize) -> Table {
 
 /// Returns the share of kept identities for each pipeline.
 fn row(cases: &[&Case]) -> Vec<Cell> {
-    let share = |at: usize| {
-        let tracked = || cases.iter().map(|case| case.outcomes[at]).filter(tracked_before);
-        let kept = tracked().filter(|outcome| *outcome == Outcome::Kept).count() as u64;
-        Cell::share(kept, tracked().count() as u64, 0)
-    };
-    (0..PIPELINES.len()).map(share).collect()
+    (0..PIPELINES.len())
+        .map(|at| {
+            let tracked = || cases.iter().map(|case| case.outcomes[at]).filter(tracked_before);
+            let kept = tracked().filter(|outcome| *outcome == Outcome::Kept).count() as u64;
+            Cell::share(kept, tracked().count() as u64, 0)
+        })
+        .collect()
 }
 
 fn tracked_before(outcome: &Outcome) -> bool {

@@ -56,10 +56,13 @@ fn times(
     total_ms: f64,
     source: &str,
 ) -> Result<Findings, ReproduceError> {
+    fn number(ms: Option<f64>) -> Cell {
+        Cell::number(ms.unwrap_or(f64::NAN), 0)
+    }
+
     let contenders = lab.contenders(names)?;
     let frames = frames(lab, &contenders)?;
     let all = published.iter().copied().chain([Some(total_ms)]);
-    let number = |ms: Option<f64>| Cell::number(ms.unwrap_or(f64::NAN), 0);
     let mut rows = vec![Row::published("Core2Duo, 2.6 GHz", all.map(number).collect())];
     for (at, name) in names.iter().enumerate() {
         rows.push(Row::ours(format!("{name}, median"), cells(&frames[at], 0.5)));
@@ -94,17 +97,18 @@ pub fn boundary_points(lab: &Lab) -> Result<Findings, ReproduceError> {
     let frames = frames(lab, &contenders)?;
     let discovery =
         |at: usize| -> Vec<f64> { frames[at].iter().map(|groups| groups[DETECTION]).collect() };
-    let row = |at: usize| {
-        let times = discovery(at);
-        let time = |part| Cell::number(percentile(&times, part).unwrap_or(f64::NAN), 1);
-        Row::ours(forms[at].0, vec![time(0.5), time(0.95)])
-    };
     Ok(Table {
         title: "Time of person detection at 512x384, by where silhouettes are compared (P4, \
                 section II-B)"
             .into(),
         columns: vec!["median ms".into(), "95 % below ms".into()],
-        rows: (0..forms.len()).map(row).collect(),
+        rows: (0..forms.len())
+            .map(|at| {
+                let times = discovery(at);
+                let time = |part| Cell::number(percentile(&times, part).unwrap_or(f64::NAN), 1);
+                Row::ours(forms[at].0, vec![time(0.5), time(0.95)])
+            })
+            .collect(),
         notes: vec![
             format!(
                 "{} frames with two people in view, one at a time on this machine; \

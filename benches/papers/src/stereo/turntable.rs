@@ -47,12 +47,13 @@ pub fn directions(lab: &Lab) -> Result<Findings, ReproduceError> {
     let subsets: Vec<Contender> =
         SUBSETS.iter().map(|subset| detector(lab, subset)).collect::<Result<_, _>>()?;
     let turns = turns(lab, &ONE_STEREO_TURN, &subsets)?;
-    let row = |which: usize| Row::ours(SUBSETS[which].join(", "), found(&turns, which));
     Ok(Table {
         title: "Directions of a turning body in which it is found, % (P1, Fig. 4; P4, Fig. 3)"
             .into(),
         columns: columns(),
-        rows: (0..SUBSETS.len()).map(row).collect(),
+        rows: (0..SUBSETS.len())
+            .map(|which| Row::ours(SUBSETS[which].join(", "), found(&turns, which)))
+            .collect(),
         notes: vec![
             format!(
                 "{} images, one each 15 degrees; every image by itself; intervals: 95 %, with the \
@@ -77,13 +78,14 @@ pub fn background(lab: &Lab) -> Result<Findings, ReproduceError> {
         .map(|percentile| with(&printed, &[(PERCENTILE, *percentile)]))
         .collect::<Result<_, _>>()?;
     let turns = turns(lab, &ONE_STEREO_TURN, &percentiles)?;
-    let row = |which: usize| Row::ours(format!("K = {}", PERCENTILES[which]), found(&turns, which));
     Ok(Table {
         title: "Directions of a turning body in which the printed comparison finds it, %, by the \
                 percentile K of the background (P4, section II-A)"
             .into(),
         columns: columns(),
-        rows: (0..PERCENTILES.len()).map(row).collect(),
+        rows: (0..PERCENTILES.len())
+            .map(|which| Row::ours(format!("K = {}", PERCENTILES[which]), found(&turns, which)))
+            .collect(),
         notes: vec![
             format!(
                 "{} images, one each 15 degrees; every image by itself; intervals: 95 %, with the \
@@ -103,12 +105,18 @@ pub fn background(lab: &Lab) -> Result<Findings, ReproduceError> {
 /// # Errors
 /// As [`Lab::trials`].
 pub fn depth(lab: &Lab) -> Result<Findings, ReproduceError> {
+    fn about_1(distance: f64) -> Cell {
+        Cell::number(if distance == 3.0 { 1.0 } else { f64::NAN }, 0)
+    }
+
+    fn row(name: &str, errors: Vec<Cell>) -> Row {
+        Row::ours(name, errors)
+    }
+
     let shipped = lab.contender("stereo-ekf")?;
     let by_radius = with(&shipped, &[(BEHIND, HEAD_RADIUS_M)])?;
     let pair = turns(lab, &ONE_STEREO_TURN, &[shipped, by_radius.clone()])?.concat();
     let camera = turns(lab, &ONE_TURN, &[by_radius])?.concat();
-    let about_1 = |distance| Cell::number(if distance == 3.0 { 1.0 } else { f64::NAN }, 0);
-    let row = |name: &str, errors| Row::ours(name, errors);
     let rows = vec![
         Row::published("accuracy, about, % of the range", DISTANCES_M.map(about_1).to_vec()),
         row(
@@ -144,25 +152,28 @@ fn errors(
     unit: fn(f64, f64) -> f64,
     digits: usize,
 ) -> Vec<Cell> {
-    let at = |distance: usize| {
-        let here = images.iter().filter(|image| image.distance == distance);
-        let error = |image: &TurntableImage| Some(unit(image.errors_m[pipeline]?, image.range_m));
-        Cell::mean(&here.filter_map(error).collect::<Vec<_>>(), digits)
-    };
-    (0..DISTANCES_M.len()).map(at).collect()
+    (0..DISTANCES_M.len())
+        .map(|distance| {
+            let here = images.iter().filter(|image| image.distance == distance);
+            let error =
+                |image: &TurntableImage| Some(unit(image.errors_m[pipeline]?, image.range_m));
+            Cell::mean(&here.filter_map(error).collect::<Vec<_>>(), digits)
+        })
+        .collect()
 }
 
 /// Returns the share of images in which a contender finds the person, at each distance.
 fn found(turns: &[Vec<TurntableImage>], which: usize) -> Vec<Cell> {
-    let share = |distance: usize| {
-        let turn = |turn: &Vec<TurntableImage>| {
-            let at = || turn.iter().filter(move |image| image.distance == distance);
-            let hits = at().filter(|image| image.errors_m[which].is_some()).count() as u64;
-            [hits, at().count() as u64]
-        };
-        Cell::clustered(&turns.iter().map(turn).collect::<Vec<_>>(), 0)
-    };
-    (0..DISTANCES_M.len()).map(share).collect()
+    (0..DISTANCES_M.len())
+        .map(|distance| {
+            let turn = |turn: &Vec<TurntableImage>| {
+                let at = || turn.iter().filter(move |image| image.distance == distance);
+                let hits = at().filter(|image| image.errors_m[which].is_some()).count() as u64;
+                [hits, at().count() as u64]
+            };
+            Cell::clustered(&turns.iter().map(turn).collect::<Vec<_>>(), 0)
+        })
+        .collect()
 }
 
 fn columns() -> Vec<String> {
@@ -200,11 +211,14 @@ fn look(trial: &Trial, at: usize) -> Option<TurntableImage> {
     let away = |distance: &f64| (distance - moment.truth[0].head_in_robot.x).abs();
     let nearest = (0..DISTANCES_M.len())
         .min_by(|a, b| away(&DISTANCES_M[*a]).total_cmp(&away(&DISTANCES_M[*b])))?;
-    let error = |run: &tagalong_trials::Run| {
-        let found = sighting(&run.reports[at].candidates, moment)?;
-        Some(self::range_m(&found.position, &trial.camera) - range_m)
-    };
-    let errors_m = trial.runs.iter().map(error).collect();
+    let errors_m = trial
+        .runs
+        .iter()
+        .map(|run| {
+            let found = sighting(&run.reports[at].candidates, moment)?;
+            Some(self::range_m(&found.position, &trial.camera) - range_m)
+        })
+        .collect();
     Some(TurntableImage { distance: nearest, range_m, errors_m })
 }
 

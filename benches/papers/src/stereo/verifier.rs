@@ -148,10 +148,13 @@ fn rows(
     tallies: &[Tally],
     cells: fn(&Tally, &Tally) -> Vec<Cell>,
 ) -> Vec<Row> {
-    let row = |(pipeline, tally): (&&str, &Tally)| {
-        Row::ours(format!("{name}, {pipeline}"), cells(tally, &tallies[0]))
-    };
-    pipelines.iter().zip(tallies).map(row).collect()
+    pipelines
+        .iter()
+        .zip(tallies)
+        .map(|(pipeline, tally)| {
+            Row::ours(format!("{name}, {pipeline}"), cells(tally, &tallies[0]))
+        })
+        .collect()
 }
 
 fn sightings_table(rows: Vec<Row>, simulated: &str) -> Table {
@@ -270,11 +273,14 @@ impl Tally {
     }
 
     fn compare(&mut self, plain: &[BTreeSet<u16>], own: &[BTreeSet<u16>]) {
+        fn ever(frames: &[BTreeSet<u16>]) -> BTreeSet<u16> {
+            frames.iter().flatten().copied().collect()
+        }
+
         for (before, now) in plain.iter().zip(own) {
             self.covered[0] += before.len() as u64;
             self.covered[1] += before.difference(now).count() as u64;
         }
-        let ever = |frames: &[BTreeSet<u16>]| frames.iter().flatten().copied().collect();
         let (before, now): (BTreeSet<u16>, BTreeSet<u16>) = (ever(plain), ever(own));
         self.tracked = [before.len() as u64, before.difference(&now).count() as u64];
     }
@@ -376,7 +382,10 @@ mod tests {
 
     #[test]
     fn who_had_a_track_without_the_verifier_is_lost_without_one_now() {
-        let set = |ids: &[u16]| ids.iter().copied().collect::<BTreeSet<u16>>();
+        fn set(ids: &[u16]) -> BTreeSet<u16> {
+            ids.iter().copied().collect::<BTreeSet<u16>>()
+        }
+
         let mut tally = Tally::default();
         tally.compare(&[set(&[1, 2]), set(&[1])], &[set(&[1]), set(&[1, 3])]);
         assert_eq!((tally.covered, tally.tracked), ([3, 1], [2, 1]));
@@ -387,7 +396,10 @@ mod tests {
 
     #[test]
     fn what_is_seen_is_the_nearest_thing_if_it_is_near() {
-        let piece = |kind, x| Furniture { kind, at: [x, 0.0], heading_deg: 0.0 };
+        fn piece(kind: FurnitureKind, x: f64) -> Furniture {
+            Furniture { kind, at: [x, 0.0], heading_deg: 0.0 }
+        }
+
         let stand = FurnitureKind::CoatStand;
         let lamp = FurnitureKind::FloorLamp;
         let furniture = [piece(stand, 3.0), piece(lamp, 4.0)];

@@ -74,19 +74,23 @@ const WHEEL_ERRORS: [&str; 4] = ["0", "0.001", "0.002", "0.005"];
 /// As [`Lab::trials`].
 pub fn by_wheels(lab: &Lab) -> Result<Findings, ReproduceError> {
     let contenders = lab.contenders(&["stereo-svm-ekf", "stereo-verified"])?;
-    let walks = |error: &&str| {
-        let set = [&FOLLOWED[..], &[("robot.wheel_bias", *error)]].concat();
-        let scenes = lab.scenes("square-walk", &set, lab.seeds(20))?;
-        lab.trials(&format!("walks with wheels off by {error}"), &scenes, &contenders, errors)
-    };
-    let columns: Vec<Vec<Walk>> = WHEEL_ERRORS.iter().map(walks).collect::<Result<_, _>>()?;
+    let columns: Vec<Vec<Walk>> = WHEEL_ERRORS
+        .iter()
+        .map(|error| {
+            let set = [&FOLLOWED[..], &[("robot.wheel_bias", *error)]].concat();
+            let scenes = lab.scenes("square-walk", &set, lab.seeds(20))?;
+            lab.trials(&format!("walks with wheels off by {error}"), &scenes, &contenders, errors)
+        })
+        .collect::<Result<_, _>>()?;
     Ok(wheels_table(&columns).into())
 }
 
 fn wheels_table(columns: &[Vec<Walk>]) -> Table {
     let row = |name: &str, of: fn(&Walk) -> &[f64]| {
-        let cell = |walks: &Vec<Walk>| mean_mm(&walks.iter().map(of).collect());
-        Row::ours(name, columns.iter().map(cell).collect())
+        Row::ours(
+            name,
+            columns.iter().map(|walks| mean_mm(&walks.iter().map(of).collect())).collect(),
+        )
     };
     let draws = columns.first().map_or(0, Vec::len);
     Table {
@@ -167,14 +171,17 @@ fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
 /// Returns the position errors of the walker by the odometry alone.
 fn drift(moments: &[Moment], walker: Option<u16>) -> Vec<f64> {
     let Some(first) = moments.first() else { return Vec::new() };
-    let off = |moment: &Moment| {
-        let seen = moment.truth.iter().find(|truth| Some(truth.id) == walker && !truth.ignore)?;
-        let head = seen.head_in_robot.xy();
-        let real = first.world_from_robot.inverse() * moment.world_from_robot * head;
-        let believed = first.odom_from_robot.inverse() * moment.odom_from_robot * head;
-        Some((real - believed).norm())
-    };
-    moments.iter().filter_map(off).collect()
+    moments
+        .iter()
+        .filter_map(|moment| {
+            let seen =
+                moment.truth.iter().find(|truth| Some(truth.id) == walker && !truth.ignore)?;
+            let head = seen.head_in_robot.xy();
+            let real = first.world_from_robot.inverse() * moment.world_from_robot * head;
+            let believed = first.odom_from_robot.inverse() * moment.odom_from_robot * head;
+            Some((real - believed).norm())
+        })
+        .collect()
 }
 
 /// Returns the position errors of the walker for a predictor of constant velocity.
@@ -270,11 +277,14 @@ fn table(walks: &[Walk], variants: &[Variant]) -> Table {
 }
 
 fn cells(walks: &Walks<'_>) -> Vec<Cell> {
+    fn millimetres(metres: Option<f64>) -> Cell {
+        Cell::number(1e3 * metres.unwrap_or(f64::NAN), 0)
+    }
+
     let all: Vec<f64> = walks.concat();
     let worst: Vec<f64> =
         walks.iter().filter_map(|walk| walk.iter().copied().reduce(f64::max)).collect();
     let error = PositionError::of(&all).unwrap_or_default();
-    let millimetres = |metres: Option<f64>| Cell::number(1e3 * metres.unwrap_or(f64::NAN), 0);
     vec![
         mean_mm(walks),
         millimetres(Some(error.p95_m)),
@@ -318,12 +328,15 @@ mod tests {
 
     #[test]
     fn drift_is_what_the_odometry_does_to_the_true_place_of_the_walker() {
-        let moment = |at: f64, ids: &[u16]| Moment {
-            stamp: Stamp::default(),
-            truth: ids.iter().map(|id| truth(*id, Point3::new(2.0, 0.0, 1.6))).collect(),
-            odom_from_robot: Isometry2::new(Vector2::new(at, 0.0), 0.1 * at),
-            world_from_robot: Isometry2::new(Vector2::new(5.0 + at, 1.0), 0.0),
-        };
+        fn moment(at: f64, ids: &[u16]) -> Moment {
+            Moment {
+                stamp: Stamp::default(),
+                truth: ids.iter().map(|id| truth(*id, Point3::new(2.0, 0.0, 1.6))).collect(),
+                odom_from_robot: Isometry2::new(Vector2::new(at, 0.0), 0.1 * at),
+                world_from_robot: Isometry2::new(Vector2::new(5.0 + at, 1.0), 0.0),
+            }
+        }
+
         let moments = [moment(0.0, &[1, 2]), moment(1.0, &[2, 1]), moment(2.0, &[2])];
         let found = drift(&moments, Some(1));
         assert_eq!(found.len(), 2, "who is not there has no place");
@@ -333,12 +346,15 @@ mod tests {
 
     #[test]
     fn the_pace_is_kept_while_less_than_half_shows() {
-        let moment = |at_s: f64, y: f64, visible_fraction: f64| Moment {
-            stamp: Stamp::default().plus_seconds(at_s),
-            truth: vec![Truth { visible_fraction, ..truth(1, Point3::new(at_s, y, 1.6)) }],
-            odom_from_robot: Isometry2::identity(),
-            world_from_robot: Isometry2::identity(),
-        };
+        fn moment(at_s: f64, y: f64, visible_fraction: f64) -> Moment {
+            Moment {
+                stamp: Stamp::default().plus_seconds(at_s),
+                truth: vec![Truth { visible_fraction, ..truth(1, Point3::new(at_s, y, 1.6)) }],
+                odom_from_robot: Isometry2::identity(),
+                world_from_robot: Isometry2::identity(),
+            }
+        }
+
         let moments = [(0.0, 0.0, 1.0), (0.1, 0.0, 0.5), (0.2, 0.3, 0.4), (0.3, 0.4, 0.9)]
             .map(|(at_s, y, part)| moment(at_s, y, part));
         let found = kept_pace(&moments, Some(1));

@@ -63,8 +63,9 @@ impl Cameras {
         while !best.as_ref().is_some_and(fits) && sights.len() > 2 {
             let misfit = |s: &[Sight]| fix(s).map_or(f64::INFINITY, |fix| fix.misfit_rad);
             let ways = (0..sights.len()).map(|left_out| {
-                let others = |at: usize| (at != left_out).then_some(sights[at]);
-                (0..sights.len()).filter_map(others).collect::<Vec<Sight>>()
+                (0..sights.len())
+                    .filter_map(|at| (at != left_out).then_some(sights[at]))
+                    .collect::<Vec<Sight>>()
             });
             let fittest = ways.min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
             sights = fittest.unwrap_or_default();
@@ -215,11 +216,13 @@ mod tests {
     /// Returns the cameras that see a place, some of them with an error of the bearing, rad.
     fn sights(place: Point2<f64>, errors: &[(usize, f64)]) -> Vec<Sight> {
         let stations = stations();
-        let sight = |(station, error): &(usize, f64)| {
-            let bearing = stations[*station].towards(&place) + error;
-            Sight { station: *station, pixel: pixel(&stations[*station], bearing) }
-        };
-        errors.iter().map(sight).collect()
+        errors
+            .iter()
+            .map(|(station, error)| {
+                let bearing = stations[*station].towards(&place) + error;
+                Sight { station: *station, pixel: pixel(&stations[*station], bearing) }
+            })
+            .collect()
     }
 
     #[test]
@@ -244,8 +247,11 @@ mod tests {
 
     #[test]
     fn one_camera_or_parallel_directions_are_no_place() {
+        fn sight(station: usize) -> Sight {
+            Sight { station, pixel: Point2::new(159.5, 110.0) }
+        }
+
         let stations = stations();
-        let sight = |station| Sight { station, pixel: Point2::new(159.5, 110.0) };
         assert_eq!(triangulate(&stations, &[sight(0)], 0.01), None);
         assert_eq!(triangulate(&stations, &[sight(0), sight(0)], 0.01), None);
         assert_eq!(triangulate(&stations, &[sight(0), sight(9)], 0.01), None);

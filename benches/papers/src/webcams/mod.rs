@@ -211,9 +211,12 @@ fn known(moments: &[(Stamp, Vec<Sight>)], places: &Places) -> Vec<Known> {
 
 /// Splits the places into one in `every` to calibrate with, and the others.
 fn divided(known: Vec<Known>, every: usize) -> (Vec<Known>, Vec<Known>) {
+    fn places(part: Vec<(usize, Known)>) -> Vec<Known> {
+        part.into_iter().map(|(_, known)| known).collect()
+    }
+
     let (used, held): (Vec<_>, Vec<_>) =
         known.into_iter().enumerate().partition(|(at, _)| at % every.max(1) == 0);
-    let places = |part: Vec<(usize, Known)>| part.into_iter().map(|(_, known)| known).collect();
     (places(used), places(held))
 }
 
@@ -223,17 +226,21 @@ mod tests {
 
     #[test]
     fn sights_of_one_moment_come_together() {
-        let at = |ms: u64, station| {
+        fn at(ms: u64, station: usize) -> (Stamp, Sight) {
             let sight = Sight { station, pixel: Point2::origin() };
             (Stamp::from_nanos(ms * 1_000_000), sight)
-        };
+        }
+
         let found = moments(&[at(0, 0), at(20, 1), at(333, 0), at(340, 2), at(700, 3)]);
         assert_eq!(found.iter().map(|(_, s)| s.len()).collect::<Vec<_>>(), [2, 2, 1]);
     }
 
     #[test]
     fn one_place_in_so_many_is_used() {
-        let place = |x: usize| Known { place: Point2::new(x as f64, 0.0), sights: Vec::new() };
+        fn place(x: usize) -> Known {
+            Known { place: Point2::new(x as f64, 0.0), sights: Vec::new() }
+        }
+
         let (used, held) = divided((0..7).map(place).collect(), 3);
         assert_eq!(used, [place(0), place(3), place(6)]);
         assert_eq!(held.len(), 4);

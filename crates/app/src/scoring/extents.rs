@@ -50,7 +50,10 @@ mod tests {
     use super::*;
 
     fn note(truth_height: f64, report_height: f64, recall: Option<f64>) -> Option<String> {
-        let region = |height| Some(Region { x: 0.0, y: 0.0, width: 60.0, height });
+        fn region(height: f64) -> Option<Region> {
+            Some(Region { x: 0.0, y: 0.0, width: 60.0, height })
+        }
+
         let frame = Frame {
             truths: vec![Truth { region: region(truth_height), ..Truth::default() }],
             reports: vec![Report { region: region(report_height), ..Report::default() }],

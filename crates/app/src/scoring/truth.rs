@@ -406,6 +406,10 @@ fn of_person(person: &TruthPerson) -> (Truth, TruthPosition) {
 
 /// Distinguishes formats by their first line.
 fn kind_of(path: &Path) -> Result<Kind, Failure> {
+    fn has_class(fields: &[&str]) -> bool {
+        fields.get(2).is_some_and(|f| f.parse::<f64>().is_err())
+    }
+
     match path.extension().and_then(|extension| extension.to_str()) {
         // A log is binary, so its ending decides; the text formats have no reliable ending.
         Some("mcap") => return Ok(Kind::Log),
@@ -415,7 +419,6 @@ fn kind_of(path: &Path) -> Result<Kind, Failure> {
     let text = read_text(path)?;
     let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
     let blank_separated: Vec<&str> = first.split_whitespace().collect();
-    let has_class = |fields: &[&str]| fields.get(2).is_some_and(|f| f.parse::<f64>().is_err());
     Ok(match first {
         _ if first.contains("x_laser_m") => Kind::Floor,
         _ if first.contains("ub_x") || first.contains("head_x") => Kind::People,
@@ -448,12 +451,13 @@ mod tests {
 
     #[test]
     fn the_upper_body_of_a_person_who_crouches_is_as_large_as_that_of_one_upright() {
-        let file = TruthFile { whole_bodies: true, ..TruthFile::empty(Kind::Mot) };
-        let whole = |top: f64| {
+        fn whole(top: f64) -> Region {
             let [feet, head] =
                 [0.0, top].map(|z| camera().project(&Point3::new(3.0, 0.0, z)).unwrap().y);
             Region { x: 280.0, y: head, width: 80.0, height: feet - head }
-        };
+        }
+
+        let file = TruthFile { whole_bodies: true, ..TruthFile::empty(Kind::Mot) };
         let [upright, crouching] =
             [1.75, 1.1].map(|top| file.compared(whole(top), Some(&camera())));
         assert!((upright.width - crouching.width).abs() < 1.0, "{upright:?} {crouching:?}");

@@ -203,6 +203,10 @@ mod tests {
 
     #[test]
     fn a_room_replaces_built_in_models_of_its_plugins_alone() {
+        fn model(slot: &toml::Value) -> String {
+            slot["config"]["model"].as_str().unwrap().to_owned()
+        }
+
         let models = BTreeMap::from([("net".to_owned(), PathBuf::from("/without.toml"))]);
         let text = "seed = 1\n[[detectors]]\nplugin = 'net'\nconfig = { model = '' }\n\
                     [[detectors]]\nplugin = 'net'\nconfig = { model = 'mine.toml' }\n\
@@ -210,7 +214,6 @@ mod tests {
                     [filter]\nplugin = 'net'\nconfig = { model = '' }\n";
         let text = with_models(&text.parse().unwrap(), &models).unwrap().unwrap();
         let root: toml::Table = text.parse().unwrap();
-        let model = |slot: &toml::Value| slot["config"]["model"].as_str().unwrap().to_owned();
         assert_eq!(model(&root["detectors"][0]), "/without.toml");
         assert_eq!(model(&root["detectors"][1]), "mine.toml");
         assert_eq!(model(&root["verifiers"][0]), "");

@@ -37,12 +37,18 @@ impl Detector for Legs {
         query: &Query<'_>,
         _: &mut Funnel,
     ) -> Result<Vec<Detection>> {
+        fn apart(a: &Point3<f64>, b: &Point3<f64>) -> f64 {
+            (a - b).norm()
+        }
+
+        fn within([least, most]: [f64; 2], width_m: f64) -> bool {
+            least <= width_m && width_m < most
+        }
+
         // It only discovers, and finds no tracked person again.
         if matches!(query, Query::Track(_)) {
             return Ok(Vec::new());
         }
-        let apart = |a: &Point3<f64>, b: &Point3<f64>| (a - b).norm();
-        let within = |[least, most]: [f64; 2], width_m| least <= width_m && width_m < most;
         let points = &frame.scan()?.points;
         let segments = points.chunk_by(|a, b| apart(a, b) < self.jump_m).filter(|s| s.len() >= 3);
         let ends = segments.map(|segment| (segment[0], segment[segment.len() - 1]));

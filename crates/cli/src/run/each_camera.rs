@@ -82,7 +82,10 @@ fn args_for(args: &RunArgs, camera: &str) -> RunArgs {
 
 /// Returns the name of a camera as that of a folder: `front_camera` for `/front_camera`.
 pub(super) fn folder_name(camera: &str) -> String {
-    let kept = |letter: char| letter.is_alphanumeric() || "-_".contains(letter);
+    fn kept(letter: char) -> bool {
+        letter.is_alphanumeric() || "-_".contains(letter)
+    }
+
     let name = camera.trim_matches('/').chars();
     name.map(|letter| if kept(letter) { letter } else { '-' }).collect()
 }

@@ -510,8 +510,11 @@ fn a_config_for_robots_with_odometry_is_not_for_a_log_without() {
 fn images_that_make_no_frames_are_told() {
     let home = tempfile::tempdir().unwrap();
     let log = home.path().join("apart.mcap");
-    let apart = |_, at| at + 600_000_000_000;
-    broken::write(good(), &log, &Changes { depth_stamp: Some(apart), ..Changes::default() });
+    broken::write(
+        good(),
+        &log,
+        &Changes { depth_stamp: Some(|_, at| at + 600_000_000_000), ..Changes::default() },
+    );
     let (code, said) = doctor(&config(), &log, &[]);
     let read = finding(&said, "frames-read");
     assert_eq!((code, read["severity"].as_str()), (3, Some("bad")), "{said:#}");

@@ -322,7 +322,7 @@ fn the_shipped_network_is_the_one_that_the_export_writes() {
 fn an_export_takes_the_weights_of_a_model_file() {
     let home = tempfile::tempdir().unwrap();
     let models = "../../configs/models";
-    let other = format!("{models}/depth-net.without-lab2.toml");
+    let other = "../../benches/models/depth-net.without-lab2.toml";
     let file = home.path().join("net.onnx");
     let export = |weights: &str| {
         let told = tagalong()
@@ -332,7 +332,7 @@ fn an_export_takes_the_weights_of_a_model_file() {
             .unwrap();
         (code(&told), text(&told.stderr))
     };
-    assert_eq!(export(&other).0, 0);
+    assert_eq!(export(other).0, 0);
     let shipped = fs::read(format!("{models}/depth-net.onnx")).unwrap();
     assert_ne!(fs::read(&file).unwrap(), shipped);
     let (code, why) = export("none.toml");

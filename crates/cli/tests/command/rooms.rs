@@ -303,8 +303,9 @@ fn a_signal_leaves_whole_files_and_a_second_run_goes_on() {
         .spawn()
         .unwrap();
     let waited = std::time::Instant::now();
-    let kept = || fs::read_dir(home.folder.path().join("bench/rooms")).map_or(0, Iterator::count);
-    while kept() < 2 && waited.elapsed().as_secs() < 60 {
+    while fs::read_dir(home.folder.path().join("bench/rooms")).map_or(0, Iterator::count) < 2
+        && waited.elapsed().as_secs() < 60
+    {
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     let pid = child.id().to_string();

@@ -8,11 +8,14 @@ use super::pose::mount_lines;
 
 /// Checks that the frames of tf are connected, and that the camera's is an optical one.
 pub fn frames(evidence: &Evidence) -> Option<Finding> {
+    fn ok(measured: String) -> Option<Finding> {
+        Some(Finding::new("frames", Severity::Ok, measured))
+    }
+
     let facts = &evidence.inspection.facts;
     let tf = &evidence.inspection.transforms;
     let camera = evidence.samples.camera.as_ref()?;
     let name = facts.camera_frame.clone().unwrap_or_default();
-    let ok = |measured: String| Some(Finding::new("frames", Severity::Ok, measured));
     if evidence.input.camera.is_some() {
         return ok("the pose of the camera comes from [input.camera]".into());
     }

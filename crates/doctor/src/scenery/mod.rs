@@ -196,8 +196,12 @@ mod tests {
             let scenery = Room::default().with(thing).seen(40, 0.0).judge();
             // Cut by the image border, a wide board is as narrow as a person.
             let place = |moment: &Moment| thing.place(0.1 * (moment.index - 1) as f64);
-            let whole = |moment: &&Moment| place(moment).y.abs() < 0.9;
-            let count: usize = scenery.moments.iter().filter(whole).map(|m| m.blobs.len()).sum();
+            let count: usize = scenery
+                .moments
+                .iter()
+                .filter(|moment| place(moment).y.abs() < 0.9)
+                .map(|m| m.blobs.len())
+                .sum();
             assert_eq!(count, 0, "{thing:?}");
         }
     }

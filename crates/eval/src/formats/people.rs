@@ -46,13 +46,12 @@ impl Row {
     /// takes the head's place in the camera to the floor frame that the tracks
     /// use, in metres; it gives nothing where that is not known.
     pub fn truth(&self, floor_from_camera: impl Fn([f64; 3]) -> Option<[f64; 2]>) -> (u32, Truth) {
-        let view = |distance_m| View { visible: self.visible, distance_m };
         let truth = Truth {
             id: self.id,
             region: self.upper_body,
             floor_m: self.head_in_camera_m.and_then(floor_from_camera),
             role: if self.ignore { Role::Ignored } else { Role::Counts },
-            view: self.distance_m().map(view),
+            view: self.distance_m().map(|distance_m| View { visible: self.visible, distance_m }),
         };
         (self.frame, truth)
     }

@@ -475,7 +475,10 @@ mod tests {
 
     #[test]
     fn a_person_who_stands_or_leaves_needs_less_room_than_one_who_comes() {
-        let most = |closing| allowed(moving(1.5, 0.0, closing), AHEAD, 0.9).most;
+        fn most(closing: f64) -> f64 {
+            allowed(moving(1.5, 0.0, closing), AHEAD, 0.9).most
+        }
+
         assert!(most(1.6) < most(0.0) && most(0.0) < most(-0.8), "{} {}", most(0.0), most(-0.8));
         let settings = CollisionMonitorSettings::default();
         assert!((reach_m(&settings, 0.0, 0.5) - 0.25).abs() < 1e-12);
@@ -498,10 +501,11 @@ mod tests {
 
     #[test]
     fn before_the_followed_person_a_last_distance_is_kept() {
-        let followed = |x, closing| {
+        fn followed(x: f64, closing: f64) -> f64 {
             let kind = HazardKind::Followed(closing);
             allowed(Hazard { kind, ..still(x, 0.0) }, AHEAD, 0.9).most
-        };
+        }
+
         assert_eq!(followed(0.5, 0.0), 0.0, "0.25 m before the front");
         assert!(followed(1.0, 0.0) > 0.3, "{}", followed(1.0, 0.0));
         assert!(followed(1.0, 1.0) < followed(1.0, 0.0));

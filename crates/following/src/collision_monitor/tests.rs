@@ -41,8 +41,10 @@ fn depth_at(frame: usize, x: f64, turn: f64) -> DepthImage {
 
 /// Returns the distance from (x, 0) to a square wall of half side 4 m in a direction.
 fn wall_m(x: f64, angle: f64) -> f64 {
-    let along =
-        |from: f64, step: f64| if step > 0.0 { (4.0 - from) / step } else { (-4.0 - from) / step };
+    fn along(from: f64, step: f64) -> f64 {
+        if step > 0.0 { (4.0 - from) / step } else { (-4.0 - from) / step }
+    }
+
     along(x, angle.cos()).min(along(0.0, angle.sin()))
 }
 
@@ -184,7 +186,7 @@ fn a_floor_and_the_followed_person_do_not_change_and_are_no_contradiction() {
 
 #[test]
 fn depth_in_few_columns_stops_and_in_half_of_them_slows() {
-    let share = |is_lit: fn(usize) -> bool| {
+    fn share(is_lit: fn(usize) -> bool) -> (Allowance, f64) {
         let mut monitor = settled();
         let seen = depth_at(20, 0.0, 0.0);
         let depth =
@@ -193,7 +195,8 @@ fn depth_in_few_columns_stops_and_in_half_of_them_slows() {
         monitor.update(&frame, &frame.motion, &[], None);
         // By the share alone: an object that hides columns would stop the robot, too.
         (monitor.by_coverage(AHEAD, 0.9, &BRAKING), speed(&monitor))
-    };
+    }
+
     let (few, speed_mps) = share(|u| u % 8 == 0);
     assert_eq!((few.most, few.stops, speed_mps), (0.0, Reason::Unknown, 0.0));
     let (half, _) = share(|u| u % 2 == 0);
@@ -204,7 +207,7 @@ fn depth_in_few_columns_stops_and_in_half_of_them_slows() {
 
 #[test]
 fn columns_that_were_dark_from_the_start_are_unknown_but_for_the_border() {
-    let share = |dark: fn(usize) -> bool| {
+    fn share(dark: fn(usize) -> bool) -> f64 {
         let mut monitor = monitor();
         for index in 0..20 {
             let seen = depth_at(index, 0.0, 0.0);
@@ -218,7 +221,8 @@ fn columns_that_were_dark_from_the_start_are_unknown_but_for_the_border() {
             monitor.update(&frame, &frame.motion, &[], None);
         }
         speed(&monitor)
-    };
+    }
+
     assert_eq!(share(|u| u % 8 != 0), 0.0);
     assert_eq!(share(|u| !(15..145).contains(&u)), f64::INFINITY, "an empty border");
 }
@@ -239,9 +243,12 @@ fn rays_that_say_nothing_ahead_stop_the_robot() {
     for instead in [0.0, f64::NAN, f64::INFINITY] {
         let mut monitor = monitor();
         for index in 0..20 {
-            let ahead = |deg: i32| (deg.abs() < 30).then_some(instead);
-            let frame =
-                frame(index, EgoMotion::at_rest(0.1), None, Some(scan_at(index, 0.0, 0.0, ahead)));
+            let frame = frame(
+                index,
+                EgoMotion::at_rest(0.1),
+                None,
+                Some(scan_at(index, 0.0, 0.0, |deg| (deg.abs() < 30).then_some(instead))),
+            );
             monitor.update(&frame, &frame.motion, &[], None);
         }
         let allowed = monitor.allowance(AHEAD, 0.9, &BRAKING);
@@ -253,8 +260,15 @@ fn rays_that_say_nothing_ahead_stop_the_robot() {
 /// high above is passed below.
 #[test]
 fn what_a_scan_met_holds_until_the_next_one() {
+    fn legs(deg: i32) -> Option<f64> {
+        (deg.abs() <= 2).then_some(1.6)
+    }
+
+    fn dust(deg: i32) -> Option<f64> {
+        (deg == 0).then_some(1.0)
+    }
+
     let mut monitor = monitor();
-    let legs = |deg: i32| (deg.abs() <= 2).then_some(1.6);
     for index in 0..20 {
         let frame =
             frame(index, EgoMotion::at_rest(0.1), None, Some(scan_at(index, 0.0, 0.0, legs)));
@@ -266,7 +280,6 @@ fn what_a_scan_met_holds_until_the_next_one() {
     monitor.update(&empty, &on, &[], None);
     let near = speed(&monitor);
     assert!(near < 0.7 && far > 0.9, "{far} {near}");
-    let dust = |deg: i32| (deg == 0).then_some(1.0);
     let mut dusty = self::monitor();
     for index in 0..20 {
         let frame =
@@ -278,8 +291,7 @@ fn what_a_scan_met_holds_until_the_next_one() {
 
 #[test]
 fn what_is_nearer_than_a_scanner_measures_is_there() {
-    let mut monitor = monitor();
-    let scan = |index| {
+    fn scan(index: usize) -> LaserScan {
         let LaserScan { points, rays, .. } = scan_at(index, 0.0, 0.0, |_| None);
         let ahead = scan_at(index, 0.0, 0.0, |deg: i32| (deg.abs() < 20).then_some(0.35));
         let unread = ahead.rays.iter().filter(|ray| (160..200).contains(*ray));
@@ -293,7 +305,9 @@ fn what_is_nearer_than_a_scanner_measures_is_there() {
             unread: unread.collect(),
             ..ahead
         }
-    };
+    }
+
+    let mut monitor = monitor();
     for index in 0..20 {
         let frame = frame(index, EgoMotion::at_rest(0.1), None, Some(scan(index)));
         monitor.update(&frame, &frame.motion, &[], None);
@@ -305,7 +319,7 @@ fn what_is_nearer_than_a_scanner_measures_is_there() {
 /// appeared.
 #[test]
 fn what_appears_in_a_free_place_needs_more_room_than_what_stands() {
-    let since = |first: usize| {
+    fn since(first: usize) -> Allowance {
         let mut monitor = monitor();
         for index in 0..24 {
             let thing = |deg: i32| (index >= first && (80..100).contains(&deg)).then_some(1.2);
@@ -314,7 +328,8 @@ fn what_appears_in_a_free_place_needs_more_room_than_what_stands() {
             monitor.update(&frame, &frame.motion, &[], None);
         }
         monitor.allowance(AHEAD, 0.9, &BRAKING)
-    };
+    }
+
     assert_eq!(since(0), Allowance::FREE);
     let appeared = since(22);
     assert!(appeared.most < 0.3 && appeared.slower == Reason::Near, "{appeared:?}");
@@ -326,7 +341,7 @@ fn what_appears_in_a_free_place_needs_more_room_than_what_stands() {
 
 #[test]
 fn a_person_is_kept_away_from_and_with_the_separation_off_is_a_thing() {
-    let near = |separation: bool, closing: f64| {
+    fn near(separation: bool, closing: f64) -> f64 {
         let settings =
             CollisionMonitorSettings { separation, ..CollisionMonitorSettings::default() };
         let mut monitor = monitor_of(settings);
@@ -337,7 +352,8 @@ fn a_person_is_kept_away_from_and_with_the_separation_off_is_a_thing() {
             monitor.update(&frame, &frame.motion, std::slice::from_ref(&track), None);
         }
         speed(&monitor)
-    };
+    }
+
     assert!(near(true, 1.2) < near(true, 0.0) && near(true, 0.0) < 0.9);
     assert_eq!(near(false, 1.2), f64::INFINITY);
 }
@@ -345,7 +361,7 @@ fn a_person_is_kept_away_from_and_with_the_separation_off_is_a_thing() {
 /// The followed person is an obstacle at the last moment, also where they are only predicted.
 #[test]
 fn the_followed_person_is_not_run_over() {
-    let before = |x: f64, unseen_s: f64| {
+    fn before(x: f64, unseen_s: f64) -> f64 {
         let mut monitor = monitor();
         let track = Track { unseen_s, seen: false, ..target(x, 0.0, Vector2::zeros()) };
         for index in 0..20 {
@@ -354,7 +370,8 @@ fn the_followed_person_is_not_run_over() {
             monitor.update(&frame, &frame.motion, std::slice::from_ref(&track), Some(track.id));
         }
         speed(&monitor)
-    };
+    }
+
     assert_eq!(before(2.4, 0.0), f64::INFINITY);
     for unseen_s in [0.0, 0.8, 2.5] {
         assert_eq!(before(0.7, unseen_s), 0.0, "{unseen_s}");
@@ -405,7 +422,10 @@ fn sonar(range_m: f64) -> ObstacleData {
 
 #[test]
 fn a_sonar_sees_what_depth_does_not() {
-    let most = |range_m| speed(&with_readings(SourceKind::Range, 20, |_| sonar(range_m)));
+    fn most(range_m: f64) -> f64 {
+        speed(&with_readings(SourceKind::Range, 20, |_| sonar(range_m)))
+    }
+
     assert_eq!(most(f64::INFINITY), f64::INFINITY);
     assert!(most(0.9) < 0.7, "{}", most(0.9));
     assert_eq!(most(0.3), 0.0);
@@ -415,9 +435,10 @@ fn a_sonar_sees_what_depth_does_not() {
 
 #[test]
 fn a_bumper_stops_while_it_is_pressed() {
-    let reason = |pressed| {
+    fn reason(pressed: bool) -> Option<Reason> {
         with_readings(SourceKind::Bumper, 20, |_| ObstacleData::Bumper(pressed)).stop_reason(0.5)
-    };
+    }
+
     assert_eq!((reason(true), reason(false)), (Some(Reason::Contact), None));
 }
 
@@ -504,9 +525,10 @@ fn after_a_jump_of_the_clock_no_place_is_known() {
 /// A wall is 4 m away; a scan meets something at 0.9 m.
 #[test]
 fn something_in_a_polygon_stops_or_slows_the_robot() {
-    let square = |side_m: f64| {
+    fn square(side_m: f64) -> Vec<[f64; 2]> {
         vec![[side_m, side_m], [side_m, -side_m], [-side_m, -side_m], [-side_m, side_m]]
-    };
+    }
+
     let settings = CollisionMonitorSettings {
         stop: square(0.5),
         slowdown: square(1.0),

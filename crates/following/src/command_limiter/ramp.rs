@@ -90,8 +90,9 @@ mod tests {
 
     /// Returns the motions on the way to a speed.
     fn way(from: Axis, target: f64, steps: usize) -> Vec<Axis> {
-        let next = |axis: &Axis| Some(axis.towards(target, 0.05, &LIMITS));
-        std::iter::successors(Some(from), next).take(steps + 1).collect()
+        std::iter::successors(Some(from), |axis| Some(axis.towards(target, 0.05, &LIMITS)))
+            .take(steps + 1)
+            .collect()
     }
 
     #[test]

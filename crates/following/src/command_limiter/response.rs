@@ -85,6 +85,10 @@ impl ResponseCheck {
 
     /// Adds the newest command.
     pub(super) fn add(&mut self, command: &Command) {
+        fn oldest(commands: &VecDeque<Command>) -> Option<Stamp> {
+            commands.front().map(|first| first.stamp)
+        }
+
         if !self.is_driving {
             return;
         }
@@ -93,7 +97,6 @@ impl ResponseCheck {
             self.clear();
         }
         self.commands.push_back(*command);
-        let oldest = |commands: &VecDeque<Command>| commands.front().map(|first| first.stamp);
         while oldest(&self.commands).is_some_and(|at| command.stamp.seconds_since(at) > KEPT_S) {
             self.commands.pop_front();
         }
@@ -303,8 +306,10 @@ mod tests {
     #[test]
     fn a_base_that_obeys_at_once_has_no_delay() {
         let last = judged(200, stop_and_go, late(1));
-        let is_short = |response: &Response| matches!(response, Response::Within(s) if *s < 0.1);
-        assert!(last.iter().all(is_short), "{last:?}");
+        assert!(
+            last.iter().all(|response| matches!(response, Response::Within(s) if *s < 0.1)),
+            "{last:?}"
+        );
     }
 
     #[test]

@@ -293,10 +293,11 @@ fn before_a_wall_the_robot_stops_without_an_emergency() {
 
 #[test]
 fn an_obstacle_slows_and_then_stops() {
-    let speed = |at_m| {
+    fn speed(at_m: f64) -> Command {
         let (mut limiter, _) = at_speed(0.8, 0.8);
         limiter.limit(&wish(40, 0.8, 0.8), something(at_m))
-    };
+    }
+
     assert_eq!(speed(2.5).reason, Reason::Follow);
     let near = speed(0.6);
     assert_eq!(near.reason, Reason::Obstacle);
@@ -427,13 +428,17 @@ fn a_turn_that_is_not_free_is_slower_or_none() {
 
 #[test]
 fn odometry_that_is_old_or_no_number_and_late_images_stop() {
-    let reason = |frame: Frame| {
+    fn reason(frame: Frame) -> (Reason, bool) {
         let (mut limiter, _) = at_speed(0.8, 0.8);
         limiter.check_motion(&frame);
         let command = limiter.limit(&wish(40, 0.8, 0.8), free);
         (command.reason, command.wheels == WheelSpeeds::STOP)
-    };
-    let still = || moved(EgoMotion::at_rest(0.1));
+    }
+
+    fn still() -> Frame {
+        moved(EgoMotion::at_rest(0.1))
+    }
+
     assert_eq!(reason(still()), (Reason::Follow, false));
     assert_eq!(reason(still().with_odometry_age(0.3)), (Reason::Slow, false));
     for age_s in [0.51, f64::INFINITY, f64::NAN] {
@@ -545,11 +550,12 @@ fn commands_say_until_when_they_hold_and_what_they_answer_to() {
 
 #[test]
 fn odometry_may_be_as_fast_as_the_setting_says_in_all_directions() {
-    let is_fault = |forward: f64, left: f64, dt: f64| {
+    fn is_fault(forward: f64, left: f64, dt: f64) -> bool {
         let mut limiter = limiter();
         limiter.check_motion(&moved(EgoMotion { forward, left, ..EgoMotion::at_rest(dt) }));
         limiter.fault().is_some()
-    };
+    }
+
     assert!(!is_fault(0.29, 0.0, 0.1) && is_fault(0.31, 0.0, 0.1), "3 m/s");
     assert!(!is_fault(0.0, -0.29, 0.1) && is_fault(0.0, -0.31, 0.1) && is_fault(-0.31, 0.0, 0.1));
     assert!(!is_fault(0.2, 0.2, 0.1) && is_fault(0.22, 0.22, 0.1), "both at once");

@@ -249,11 +249,10 @@ mod tests {
 
     /// Returns a person that walks up to a distance within twenty frames and then stands.
     fn walk_up(id: u32, to_m: f64, y: f64) -> impl Iterator<Item = Track> {
-        let at = move |i: u32| match i {
+        (0..60).map(move |i| match i {
             0..20 => track(id, to_m + 0.1 * f64::from(20 - i), y, 1.0),
             _ => track(id, to_m, y, 0.0),
-        };
-        (0..60).map(at)
+        })
     }
 
     #[test]

@@ -264,21 +264,26 @@ impl TargetLock {
 
     /// Returns the appearance of all tracks that are seen whole.
     fn looks(&self, frame: &Frame, tracks: &[Track]) -> Result<BTreeMap<TrackId, Appearance>> {
-        let whole = |track: &&Track| track.confirmed && track.seen && !track.occluded;
+        fn whole(track: &&Track) -> bool {
+            track.confirmed && track.seen && !track.occluded
+        }
+
         let all = tracks.iter().filter(|track| self.settings.remember && whole(track));
         all.map(|track| Ok((track.id, self.describer.of(&track.estimate, frame)?))).collect()
     }
 
     /// Returns the similarity of all tracks to the person.
     fn likeness(&self, looks: &BTreeMap<TrackId, Appearance>) -> Vec<Likeness> {
-        let of = |(track, looks): (&TrackId, &Appearance)| {
-            let differences = self.memory.differences(looks)?;
-            // The clamp keeps one frame of unusual light from outweighing all others.
-            let log_odds = differences.log_odds(&self.settings.looks).clamp(-CERTAIN, CERTAIN);
-            let probability = self.settings.looks.calibrated(probability(log_odds));
-            Some(Likeness { track: *track, probability, log_odds, differences })
-        };
-        looks.iter().filter_map(of).collect()
+        looks
+            .iter()
+            .filter_map(|(track, looks)| {
+                let differences = self.memory.differences(looks)?;
+                // The clamp keeps one frame of unusual light from outweighing all others.
+                let log_odds = differences.log_odds(&self.settings.looks).clamp(-CERTAIN, CERTAIN);
+                let probability = self.settings.looks.calibrated(probability(log_odds));
+                Some(Likeness { track: *track, probability, log_odds, differences })
+            })
+            .collect()
     }
 
     /// Follows the track that the chooser picks, if it picks one.
@@ -475,9 +480,11 @@ impl TargetLock {
             let mut others = tracks.iter().filter(|t| is_own(t) || t.seen && !is_known(t));
             others.any(|other| other.id != track.id && !self.are_apart(other, track))
         };
-        let stays =
-            |track: &&Track| is_known(track) && track.unseen_s <= UNSEEN_S && !may_be_taken(track);
-        let stay = tracks.iter().filter(stays).map(|track| track.id).collect();
+        let stay = tracks
+            .iter()
+            .filter(|track| is_known(track) && track.unseen_s <= UNSEEN_S && !may_be_taken(track))
+            .map(|track| track.id)
+            .collect();
         // Collected before `self.others` changes, because `is_known` reads it.
         let beside: Vec<&Track> = tracks.iter().filter(|t| !is_own(t) && is_beside(t)).collect();
         self.others = stay;

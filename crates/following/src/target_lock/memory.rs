@@ -63,9 +63,10 @@ pub struct Differences {
 impl Differences {
     /// Returns the log-odds that it is the person; an unknown difference adds nothing.
     pub(crate) fn log_odds(&self, settings: &LooksSettings) -> f64 {
-        let say = |difference: Option<f64>, [even, weight]: [f64; 2]| {
+        fn say(difference: Option<f64>, [even, weight]: [f64; 2]) -> f64 {
             difference.map_or(0.0, |difference| weight * (even - difference))
-        };
+        }
+
         say(self.torso, settings.torso)
             + say(self.legs, settings.legs)
             + say(self.texture, settings.texture)
@@ -119,8 +120,10 @@ mod tests {
         let mut memory = Memory::default();
         memory.learn(looks(1.6, Some(1)));
         memory.learn_other(looks(1.6, Some(2)));
-        let rivals = |colour| memory.differences(&looks(1.6, Some(colour))).unwrap().rivals;
-        assert_eq!([1, 2, 3].map(rivals), [Some(1.0), Some(-1.0), Some(0.0)]);
+        assert_eq!(
+            [1, 2, 3].map(|colour| memory.differences(&looks(1.6, Some(colour))).unwrap().rivals),
+            [Some(1.0), Some(-1.0), Some(0.0)]
+        );
     }
 
     #[test]

@@ -126,40 +126,50 @@ mod tests {
     }
 
     fn wished(x: f64, y: f64, lost_s: f64) -> (f64, f64) {
+        fn rounded(number: f64) -> f64 {
+            (number * 1e6).round() / 1e6
+        }
+
         let twist = wish(&last(x, y), lost_s).unwrap();
-        let rounded = |number: f64| (number * 1e6).round() / 1e6;
         (rounded(twist.linear_mps), rounded(twist.angular_rps))
     }
 
     #[test]
     fn it_drives_at_the_speed_of_the_settings_and_turns_by_the_bearing() {
+        fn bearing(rad: f64) -> f64 {
+            wished(3.0 * rad.cos(), 3.0 * rad.sin(), 1.5).0
+        }
+
         assert_eq!(wished(3.0, 0.0, 1.5), (0.4, 0.0));
         let (speed, turn) = wished(3.0, 0.6, 1.5);
         assert!(speed == 0.4 && (turn - 1.5 * 0.2_f64.atan()).abs() < 1e-5, "{speed} {turn}");
         assert_eq!(wished(3.0, -3.0, 1.5), (0.0, -0.5), "turns first, no faster than it may");
-        let bearing = |rad: f64| wished(3.0 * rad.cos(), 3.0 * rad.sin(), 1.5).0;
         assert_eq!((bearing(0.34), bearing(-0.36)), (0.4, 0.0));
     }
 
     #[test]
     fn it_waits_first_and_is_there_when_near_or_after_a_while() {
+        fn looks_round(x: f64, lost_s: f64) -> bool {
+            wished(x, 0.0, lost_s) == (0.0, -0.5)
+        }
+
         assert_eq!(
             (wish(&last(3.0, 0.0), 0.99), wish(&last(3.0, 0.0), 1.0).is_some()),
             (None, true)
         );
         assert!(wish(&last(3.0, 0.0), 20.0).is_some());
-        let looks_round = |x: f64, lost_s: f64| wished(x, 0.0, lost_s) == (0.0, -0.5);
         assert!(looks_round(0.59, 1.5) && !looks_round(0.61, 1.5), "as near as 0.6 m");
         assert!(looks_round(3.0, 9.1) && !looks_round(3.0, 8.9), "a second and eight");
     }
 
     #[test]
     fn it_looks_round_to_where_the_person_went() {
-        let way = |y: f64, velocity_y: f64| {
+        fn way(y: f64, velocity_y: f64) -> f64 {
             let velocity = Vector2::new(0.0, velocity_y);
             let last = LastSeen { place: Point2::new(0.5, y), velocity, ago_s: 1.0 };
             Search::default().wish(&settings(), &last, None, 1.5).unwrap().angular_rps
-        };
+        }
+
         assert!(way(0.0, 0.5) > 0.0 && way(0.0, -0.5) < 0.0);
         // In the second and a half for which the person is assumed to go on, they cross the middle.
         assert!(way(0.2, -0.1) > 0.0 && way(0.2, -0.2) < 0.0);
@@ -177,11 +187,12 @@ mod tests {
 
     #[test]
     fn a_way_that_is_free_again_is_not_blocked() {
-        let drives = |blocked: &[bool]| {
+        fn drives(blocked: &[bool]) -> bool {
             let mut search = Search::default();
             blocked.iter().for_each(|now| search.add_block(*now, 0.4));
             search.wish(&settings(), &last(3.0, 0.0), None, 3.0).unwrap().linear_mps > 0.0
-        };
+        }
+
         assert!(drives(&[true, true]) && !drives(&[true, true, true]));
         assert!(drives(&[true, true, false, true, true]));
     }

@@ -160,9 +160,12 @@ impl LooksSettings {
     /// # Errors
     /// [`Error::Settings`] names the key and the remedy.
     pub fn check(&self) -> Result<()> {
-        let rises = |pair: &[[f64; 2]]| pair[1][0] > pair[0][0] && pair[1][1] >= pair[0][1];
-        let is_share = |value: &f64| (0.0..=1.0).contains(value);
-        let are_shares = self.calibration.as_flattened().iter().all(is_share);
+        fn rises(pair: &[[f64; 2]]) -> bool {
+            pair[1][0] > pair[0][0] && pair[1][1] >= pair[0][1]
+        }
+
+        let are_shares =
+            self.calibration.as_flattened().iter().all(|value| (0.0..=1.0).contains(value));
         if are_shares && self.calibration.windows(2).all(rises) {
             return Ok(());
         }

@@ -349,7 +349,7 @@ mod tests {
 
     #[test]
     fn what_is_no_image_is_refused_with_the_reason() {
-        let refused = |change: fn(&mut PointCloud2<'static>), word: &str| {
+        fn refused(change: fn(&mut PointCloud2<'static>), word: &str) {
             let mut cloud = cloud(CloudAxes::Optical, false);
             change(&mut cloud);
             let error = camera_of_cloud(&cloud, &Limits::default()).unwrap_err().to_string();
@@ -358,7 +358,8 @@ mod tests {
                 size_of_cloud(&cloud, &Limits::default()).is_err() || word == "lidar",
                 "{word}"
             );
-        };
+        }
+
         refused(|cloud| (cloud.width, cloud.height) = (1200, 1), "height 1");
         refused(|cloud| cloud.fields[1].name = "Y".into(), "`y`");
         refused(|cloud| cloud.fields[2].datatype = 8, "`z`");

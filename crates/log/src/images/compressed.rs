@@ -321,7 +321,10 @@ fn depth_of(
     limits: &Limits,
     pixel: impl Fn(u16) -> f32,
 ) -> Result<DepthImage, ImageError> {
-    let lost = |why: &str| ImageError::Codec(why.into());
+    fn lost(why: &str) -> ImageError {
+        ImageError::Codec(why.into())
+    }
+
     if body.starts_with(PNG) {
         if let Some(depth) = deep_png::decode(body, limits, &pixel) {
             return Ok(depth);

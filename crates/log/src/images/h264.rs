@@ -340,8 +340,8 @@ mod tests {
 
     /// Returns the packets of the pictures; each begins with a delimiter.
     fn split(stream: &[u8]) -> Vec<&[u8]> {
-        let is_start = |at: &usize| stream[*at..].starts_with(&[0, 0, 0, 1, 9]);
-        let starts: Vec<usize> = (0..stream.len()).filter(is_start).collect();
+        let starts: Vec<usize> =
+            (0..stream.len()).filter(|at| stream[*at..].starts_with(&[0, 0, 0, 1, 9])).collect();
         let ends = starts.iter().copied().skip(1).chain([stream.len()]);
         starts.iter().zip(ends).map(|(start, end)| &stream[*start..end]).collect()
     }

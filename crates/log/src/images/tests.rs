@@ -388,8 +388,14 @@ fn a_jpeg_of_giant_size_is_refused() {
 
 /// Returns a progressive JPEG with its first scan repeated until there are `scans` of them.
 fn with_scans(scans: usize) -> Vec<u8> {
-    let is_marker = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0x00 | 0xd0..=0xd7 | 0xff);
-    let starts = |pair: &&[u8]| *pair == [0xff, 0xda];
+    fn is_marker(pair: &[u8]) -> bool {
+        pair[0] == 0xff && !matches!(pair[1], 0x00 | 0xd0..=0xd7 | 0xff)
+    }
+
+    fn starts(pair: &&[u8]) -> bool {
+        *pair == [0xff, 0xda]
+    }
+
     let data = PROGRESSIVE_JPEG;
     let has = data.windows(2).filter(starts).count();
     let first = data.windows(2).position(|pair| starts(&pair)).unwrap();

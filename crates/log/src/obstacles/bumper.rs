@@ -197,7 +197,10 @@ mod tests {
 
     #[test]
     fn of_the_hazards_only_bumps_are_contacts() {
-        let hazard = |kind| HazardDetection { header: Header::new(at(1.0), "bumper"), kind };
+        fn hazard(kind: u8) -> HazardDetection {
+            HazardDetection { header: Header::new(at(1.0), "bumper"), kind }
+        }
+
         for (kinds, expected) in [(vec![], false), (vec![2, 5], false), (vec![2, 1], true)] {
             let mut bumper = Bumper::new(Contact::Hazards);
             let header = Header::new(at(1.0), "base_link");
@@ -218,7 +221,10 @@ mod tests {
 
     #[test]
     fn states_and_contacts_say_what_is_pressed() {
-        let header = || Header::new(at(1.0), "base_link");
+        fn header() -> Header {
+            Header::new(at(1.0), "base_link")
+        }
+
         let mut bumper = Bumper::new(Contact::of("turtlebot3_msgs/msg/SensorState").unwrap());
         take(&mut bumper, 1.0, &BumperState { header: header(), bumper: 2 });
         assert_eq!(state(&mut bumper, 1.0), Some(true));

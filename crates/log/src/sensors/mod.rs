@@ -182,7 +182,10 @@ mod tests {
 
     #[test]
     fn message_types_are_known_with_and_without_their_middle_part() {
-        let input_of = |schema| SensorType::of_message(schema).map(|sensor| sensor.input);
+        fn input_of(schema: &str) -> Option<Input> {
+            SensorType::of_message(schema).map(|sensor| sensor.input)
+        }
+
         for schema in ["sensor_msgs/msg/LaserScan", "sensor_msgs/LaserScan"] {
             assert_eq!(input_of(schema), Some(Input::Laser));
         }

@@ -123,8 +123,9 @@ impl Listening {
     pub fn start(&self) -> Result<LiveSource, LogError> {
         let scan = Arc::new(self.gathering.scan(&self.name));
         let mut tally = tally_of(&scan);
-        let reread = || Ok(Box::new(self.held.iter()) as Box<dyn Messages + '_>);
-        let plan = plan(scan, &self.input, &self.limits, self.inputs, &mut tally, &reread)?;
+        let plan = plan(scan, &self.input, &self.limits, self.inputs, &mut tally, &|| {
+            Ok(Box::new(self.held.iter()) as Box<dyn Messages + '_>)
+        })?;
         let assembly = Assembly::new(plan, tally);
         let channels = self.channels.clone().into_iter();
         let channels = channels.filter(|(_, channel)| assembly.reads(channel)).collect();

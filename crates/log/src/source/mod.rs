@@ -130,8 +130,9 @@ impl FrameSource {
         inputs: Inputs,
     ) -> Result<Self, LogError> {
         let mut tally = tally_of(&scan);
-        let reread = || Ok(Box::new(PartsWalker::new(&scan, limits)?) as Box<dyn Messages>);
-        let plan = plan(Arc::clone(&scan), input, limits, inputs, &mut tally, &reread)?;
+        let plan = plan(Arc::clone(&scan), input, limits, inputs, &mut tally, &|| {
+            Ok(Box::new(PartsWalker::new(&scan, limits)?) as Box<dyn Messages>)
+        })?;
         let mut source = Self {
             walker: PartsWalker::new(&scan, limits)?,
             assembly: Assembly::new(plan, tally),

@@ -66,9 +66,11 @@ fn words_of(topic: &str) -> Option<String> {
 /// Splits a group at left and right if each side has depth of its own, which are two devices and no
 /// stereo pair.
 fn by_side(scan: &Scan, group: Vec<String>) -> Vec<Rig> {
-    let is_depth = |name: &&String| scan.topics[*name].content == Content::Depth;
-    let with_depth: Vec<Side> =
-        group.iter().filter(is_depth).map(|name| TopicName::of(name).side).collect();
+    let with_depth: Vec<Side> = group
+        .iter()
+        .filter(|name| scan.topics[*name].content == Content::Depth)
+        .map(|name| TopicName::of(name).side)
+        .collect();
     let mut sides: BTreeMap<Side, Vec<String>> = BTreeMap::new();
     if with_depth.contains(&Side::Left) && with_depth.contains(&Side::Right) {
         for name in group {

@@ -139,8 +139,11 @@ fn pictures_of_depth_are_neither_depth_nor_colour() {
         let (source, _saved) = open(log, Inputs::ANY);
         let account = source.account();
         assert_eq!(account.used_as("colour").unwrap().topic, "/camera/color/image_raw");
-        let named = |topic: &&TopicUse| topic.topic == "/camera/depth/image_colored";
-        let entry = account.topics.iter().find(named).unwrap();
+        let entry = account
+            .topics
+            .iter()
+            .find(|topic| topic.topic == "/camera/depth/image_colored")
+            .unwrap();
         assert!(entry.problem.as_ref().unwrap().starts_with("its name says depth"), "{entry}");
         assert_eq!(
             entry.remedy.as_deref(),
@@ -159,8 +162,7 @@ fn pictures_that_were_made_of_a_cameras_images_are_of_that_camera() {
     let (source, _saved) = open(log, Inputs::ANY);
     let account = source.account();
     assert_eq!(account.used_as("colour").unwrap().topic, "/camera/color/image_raw");
-    let is_copy = |topic: &&TopicUse| topic.topic.ends_with("annotated");
-    let copy = account.topics.iter().find(is_copy).unwrap();
+    let copy = account.topics.iter().find(|topic| topic.topic.ends_with("annotated")).unwrap();
     assert_eq!(copy.problem.as_deref(), Some("/camera/color/image_raw is used"));
     assert!(!source.notes().iter().any(|note| note.contains("camera =")), "{:?}", source.notes());
 }
@@ -202,8 +204,8 @@ const WALK: &[u8] = include_bytes!("../data/walk.h264");
 
 /// Returns the packets of the pictures; each begins with a delimiter.
 fn packets() -> Vec<&'static [u8]> {
-    let is_start = |at: &usize| WALK[*at..].starts_with(&[0, 0, 0, 1, 9]);
-    let starts: Vec<usize> = (0..WALK.len()).filter(is_start).collect();
+    let starts: Vec<usize> =
+        (0..WALK.len()).filter(|at| WALK[*at..].starts_with(&[0, 0, 0, 1, 9])).collect();
     let ends = starts.iter().copied().skip(1).chain([WALK.len()]);
     starts.iter().zip(ends).map(|(start, end)| &WALK[*start..end]).collect()
 }
@@ -237,6 +239,11 @@ fn with_video(kind: &str, packets: &[&[u8]]) -> LogWriter {
 
 #[test]
 fn video_makes_the_frames_like_any_other_images() {
+    fn brightness(found: &LogFrame) -> u64 {
+        let grey = found.frame.grey().unwrap();
+        grey.pixels().iter().map(|v| u64::from(*v)).sum::<u64>() / (160 * 120)
+    }
+
     let colour = Inputs::ANY.require(Input::Colour);
     for kind in ["foxglove", "ffmpeg", "compressed"] {
         let (mut source, _saved) = open(with_video(kind, &packets()), colour);
@@ -245,10 +252,6 @@ fn video_makes_the_frames_like_any_other_images() {
         let image = found[11].frame.colour().unwrap();
         assert_eq!((image.width(), image.height()), (160, 120));
         assert!(!source.data_lost(), "{kind}: {:?}", source.notes());
-        let brightness = |found: &LogFrame| {
-            let grey = found.frame.grey().unwrap();
-            grey.pixels().iter().map(|v| u64::from(*v)).sum::<u64>() / (160 * 120)
-        };
         assert!((60..200).contains(&brightness(&found[0])), "{}", brightness(&found[0]));
     }
 }

@@ -41,11 +41,12 @@ fn intervals_of_a_mean_cover_it_as_often_as_promised() {
 
 /// Rides of which each has its own rate, about 80 % on the mean, and 1 to 12 trials.
 fn rides(count: usize, random: &mut SplitMix64) -> Vec<[u64; 2]> {
-    let ride = |random: &mut SplitMix64| {
+    fn ride(random: &mut SplitMix64) -> [u64; 2] {
         let rate = random.positive_uniform().powf(0.25);
         let trials = 1 + random.next_u64() % 12;
         [(0..trials).filter(|_| random.positive_uniform() < rate).count() as u64, trials]
-    };
+    }
+
     (0..count).map(|_| ride(random)).collect()
 }
 
@@ -85,21 +86,31 @@ fn a_mean_has_the_interval_of_student() {
 
 #[test]
 fn a_figure_of_all_draws_together_has_an_interval_too() {
+    fn sum(of: &[f64], drawn: &[usize]) -> f64 {
+        drawn.iter().map(|&i| of[i]).sum::<f64>()
+    }
+
     // A ratio of sums: by the textbook (Cochran, 1977, section 6.3) its error is close
     // to the spread of the residuals over the mean of the denominators.
     let parts = [3.0, 6.0, 4.0, 9.0, 5.0];
     let wholes = [5.0, 9.0, 8.0, 12.0, 6.0];
-    let sum = |of: &[f64], drawn: &[usize]| drawn.iter().map(|&i| of[i]).sum::<f64>();
     let interval = draws_interval(5, |drawn| sum(&parts, drawn) / sum(&wholes, drawn)).unwrap();
     assert_eq!(interval.estimate, 27.0 / 40.0);
-    let residual = |i: usize| (parts[i] - 27.0 / 40.0 * wholes[i]).powi(2);
-    let error = ((0..5).map(residual).sum::<f64>() / 4.0 / 5.0).sqrt() / 8.0;
+    let error =
+        ((0..5).map(|i| (parts[i] - 27.0 / 40.0 * wholes[i]).powi(2)).sum::<f64>() / 4.0 / 5.0)
+            .sqrt()
+            / 8.0;
     let half = 0.5 * (interval.upper - interval.lower) / student_quantile(4);
     assert!((half / error - 1.0).abs() < 0.1, "{half} {error}");
 }
 
 #[test]
 fn one_draw_and_draws_that_agree_tell_no_spread() {
+    // Without one of them there is no figure: nothing tells its spread.
+    fn ratio(drawn: &[usize]) -> f64 {
+        if drawn.contains(&0) { 0.5 } else { f64::NAN }
+    }
+
     assert_eq!(mean_interval(&[0.7]), Some(Interval::open(0.7)));
     assert_eq!(mean_interval(&[0.1; 7]).unwrap().ends(), None);
     assert_eq!(mean_interval(&[]), None);
@@ -108,10 +119,11 @@ fn one_draw_and_draws_that_agree_tell_no_spread() {
     assert_eq!(clustered_share(&[[7, 9], [0, 0]]), Some(Interval::open(7.0 / 9.0)));
     assert_eq!(clustered_share(&[[0, 0]]), None);
     assert_eq!(Interval::open(0.5).within(0.0, 1.0).ends(), None);
-    let first = |drawn: &[usize]| [0.3][drawn[0]];
-    assert_eq!(draws_interval(1, first), Some(Interval::open(0.3)), "asked of no draws");
-    // Without one of them there is no figure: nothing tells its spread.
-    let ratio = |drawn: &[usize]| if drawn.contains(&0) { 0.5 } else { f64::NAN };
+    assert_eq!(
+        draws_interval(1, |drawn| [0.3][drawn[0]]),
+        Some(Interval::open(0.3)),
+        "asked of no draws"
+    );
     assert_eq!(draws_interval(2, ratio), Some(Interval::open(0.5)));
 }
 
@@ -176,17 +188,21 @@ fn wilson_agrees_with_its_published_example() {
 
 /// Returns the probability of at most `events` events in `trials` trials.
 fn at_most(events: u64, trials: u64, rate: f64) -> f64 {
-    let term = |count: u64| {
-        let choose = (1..=count).map(|k| ((trials - count + k) as f64 / k as f64).ln());
-        let rest = (trials - count) as f64 * (-rate).ln_1p();
-        (choose.sum::<f64>() + count as f64 * rate.ln() + rest).exp()
-    };
-    (0..=events).map(term).sum()
+    (0..=events)
+        .map(|count| {
+            let choose = (1..=count).map(|k| ((trials - count + k) as f64 / k as f64).ln());
+            let rest = (trials - count) as f64 * (-rate).ln_1p();
+            (choose.sum::<f64>() + count as f64 * rate.ln() + rest).exp()
+        })
+        .sum()
 }
 
 #[test]
 fn exact_bounds_are_those_of_tables_and_of_their_definition() {
-    let bound = |events, trials| exact_upper_bound(events, trials, 0.95).unwrap();
+    fn bound(events: u64, trials: u64) -> f64 {
+        exact_upper_bound(events, trials, 0.95).unwrap()
+    }
+
     // One event in ten, of the tables; none: 1 - 0.05^(1/n).
     assert!((bound(1, 10) - 0.394_16).abs() < 1e-4, "{}", bound(1, 10));
     for trials in [10, 1000, 10_000, 1_000_000] {

@@ -121,8 +121,11 @@ impl Matcher {
         let flipped = rows > cols;
         self.cost.clear();
         if flipped {
-            let column = |col: usize| weights[col..].iter().step_by(cols);
-            self.cost.extend((0..cols).flat_map(column).map(|weight| -weight.max(0.0)));
+            self.cost.extend(
+                (0..cols)
+                    .flat_map(|col| weights[col..].iter().step_by(cols))
+                    .map(|weight| -weight.max(0.0)),
+            );
         } else {
             self.cost.extend(weights.iter().map(|weight| -weight.max(0.0)));
         }

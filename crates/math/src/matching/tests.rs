@@ -26,9 +26,11 @@ fn problem() -> impl Strategy<Value = (u32, u32, Vec<Edge>)> {
         ];
         let edges =
             prop::collection::vec(weight, (rows * cols) as usize).prop_map(move |weights| {
-                let pair =
-                    |(i, weight)| Edge { row: i as u32 / cols, col: i as u32 % cols, weight };
-                weights.into_iter().enumerate().map(pair).collect()
+                weights
+                    .into_iter()
+                    .enumerate()
+                    .map(|(i, weight)| Edge { row: i as u32 / cols, col: i as u32 % cols, weight })
+                    .collect()
             });
         (Just(rows), Just(cols), edges)
     })

@@ -248,8 +248,11 @@ mod tests {
 
     #[test]
     fn what_cannot_be_read_names_the_path_and_the_cause() {
+        fn shown(path: &Path) -> String {
+            ConfigSource::open(path).unwrap_err().to_string()
+        }
+
         let folder = tempfile::tempdir().unwrap();
-        let shown = |path: &Path| ConfigSource::open(path).unwrap_err().to_string();
         assert!(shown(folder.path()).ends_with("is a directory, not a config"));
         assert!(shown(&folder.path().join("none.toml")).starts_with("cannot read config "));
         let odd = folder.path().join("odd.toml");
@@ -259,7 +262,10 @@ mod tests {
 
     #[test]
     fn an_unknown_name_gets_the_nearest_one() {
-        let shown = |name: &str| ConfigSource::builtin(name).unwrap_err().to_string();
+        fn shown(name: &str) -> String {
+            ConfigSource::builtin(name).unwrap_err().to_string()
+        }
+
         assert!(shown("depth-verifed").ends_with("; did you mean `depth-verified`?"));
         assert!(shown("?").contains("; there are: depth-alone, "), "{}", shown("?"));
     }

@@ -32,8 +32,14 @@ fn a_section_may_name_no_plugin_only_where_a_default_of_its_kind_is_registered()
 
 #[test]
 fn mistakes_are_shown_with_their_place_and_the_remedy() {
-    let plain = |rest: &str| format!("{FILTER}{SCRIPT}{rest}");
-    let own = |line: &str| format!("{line}\n{FILTER}{SCRIPT}");
+    fn plain(rest: &str) -> String {
+        format!("{FILTER}{SCRIPT}{rest}")
+    }
+
+    fn own(line: &str) -> String {
+        format!("{line}\n{FILTER}{SCRIPT}")
+    }
+
     let weighing = "filter = { plugin = 'odd', config = { how = 'weighs' } }\n";
     let cases: Vec<(String, &[&str])> = vec![
         (
@@ -334,7 +340,10 @@ fn settings_may_be_at_their_bounds_and_not_beyond() {
 
 #[test]
 fn a_limit_beyond_its_ceiling_is_shown_with_its_line_and_the_remedy() {
-    let refused = |line: &str| build(&format!("seed = 1\n{line}\n{PLAIN}")).map(drop).unwrap_err();
+    fn refused(line: &str) -> String {
+        build(&format!("seed = 1\n{line}\n{PLAIN}")).map(drop).unwrap_err()
+    }
+
     for (line, words) in [
         ("robot.max_speed_mps = 50.0", "max_speed_mps` must lie between 0.05 and 0.9, not 50"),
         ("command_limiter.valid_s = 3600.0", "valid_s` must lie between 0.05 and 0.5, not 3600"),
@@ -349,10 +358,11 @@ fn a_limit_beyond_its_ceiling_is_shown_with_its_line_and_the_remedy() {
 
 #[test]
 fn a_controller_without_sensors_of_obstacles_is_refused_unless_the_config_says_so() {
-    let with = |head: &str| {
+    fn with(head: &str) -> Result<(), String> {
         let text = format!("{head}\n{PLAIN}[controller]\nplugin = 'drive'\n");
         build(&text).map(drop)
-    };
+    }
+
     let blind = "without = ['depth', 'laser']";
     let refused = with(blind).unwrap_err();
     for words in ["config.toml:1:", "no sensor of obstacles", "obstacles = \"none\"", "without = "]
@@ -367,10 +377,11 @@ fn a_controller_without_sensors_of_obstacles_is_refused_unless_the_config_says_s
 
 #[test]
 fn a_source_without_the_data_of_a_controller_is_refused_unless_the_config_says_so() {
-    let check = |head: &str, tail: &str, sources: Sources| {
+    fn check(head: &str, tail: &str, sources: Sources) -> Result<(), MissingSource> {
         let text = format!("{head}\n{PLAIN}{tail}");
         build(&text).unwrap().check_sources(sources)
-    };
+    }
+
     let all = Sources { depth: true, right: false, laser: true, odometry: true };
     let eyes = Sources { depth: false, laser: false, ..all };
     let odometry = Sources { odometry: false, ..all };
@@ -391,10 +402,11 @@ fn a_source_without_the_data_of_a_controller_is_refused_unless_the_config_says_s
 
 #[test]
 fn a_robot_that_cannot_stop_before_the_person_is_refused() {
-    let with = |keeps_m: f64| {
+    fn with(keeps_m: f64) -> Result<(), String> {
         let config = format!("config = {{ how = 'keeps {keeps_m}' }}");
         build(&format!("{PLAIN}[controller]\nplugin = 'drive'\n{config}\n")).map(|_| ())
-    };
+    }
+
     // 0.45 m of reaction, 0.495 m of braking within the limit of the jerk and a margin of 0.3 m.
     assert_eq!(with(1.25), Ok(()));
     let refused = with(1.24).unwrap_err();

@@ -367,6 +367,10 @@ mod tests {
 
     #[test]
     fn values_are_put_where_they_belong() {
+        fn count(text: &str) -> usize {
+            text.lines().count()
+        }
+
         let resolved = World::default().pipeline(PLAIN).resolved();
         let two = toml::Value::Integer(2);
         let script = toml::Value::Integer(7);
@@ -375,7 +379,6 @@ mod tests {
         let text = with_values(&resolved, &values).unwrap();
         let changed = World::default().pipeline(&text).resolved();
         assert!(changed.contains("confirm_hits = 2\n") && changed.contains("script = 7\n"));
-        let count = |text: &str| text.lines().count();
         assert_eq!(count(&changed), count(&resolved));
         assert!(with_values(&resolved, &[("manager.config.no_such", &two)]).is_err());
         assert!(with_values(&resolved, &[("detectors.9.every", &two)]).is_err());

@@ -32,7 +32,7 @@ fn config(appearance: &str, sections: &str) -> String {
 /// the left one.
 #[test]
 fn vectors_say_whose_detection_it_is_where_places_do_not() {
-    let seen = |appearance: &str, weight: f64| {
+    fn seen(appearance: &str, weight: f64) -> Vec<u32> {
         let both = (0..8).map(|_| vec![person(3.0, 0.5), person(3.0, -0.5)]);
         let world = World::of(both.chain([vec![person(3.0, -0.1)]]));
         let sections =
@@ -49,7 +49,8 @@ fn vectors_say_whose_detection_it_is_where_places_do_not() {
         let last = reports.last().unwrap();
         let is_seen = last.tracks.iter().filter(|track| track.seen);
         is_seen.map(|track| track.id.0).collect::<Vec<_>>()
-    };
+    }
+
     let [left, right] = [1, 2];
     assert_eq!(seen("", 0.0), [right]);
     assert_eq!(seen("", 50.0), [left]);

@@ -68,24 +68,28 @@ fn people(turned: f64) -> Vec<Detection> {
 fn run(config: &str, motion: impl Fn(u64) -> EgoMotion) -> Vec<FrameReport> {
     let world = World::of((1..=FRAMES).map(|index| people(heading(index))));
     let mut pipeline = world.pipeline(config);
-    let step = |index: u64| {
-        let blank = frame(index, 0.1 * index as f64);
-        let grey = image(heading(index), &people(heading(index)));
-        let images = Images { grey: Some(Arc::new(grey)), ..Images::default() };
-        let frame = Frame::new(index, blank.stamp, blank.camera, motion(index), images);
-        pipeline.step(&frame).unwrap()
-    };
-    (1..=FRAMES).map(step).collect()
+    (1..=FRAMES)
+        .map(|index| {
+            let blank = frame(index, 0.1 * index as f64);
+            let grey = image(heading(index), &people(heading(index)));
+            let images = Images { grey: Some(Arc::new(grey)), ..Images::default() };
+            let frame = Frame::new(index, blank.stamp, blank.camera, motion(index), images);
+            pipeline.step(&frame).unwrap()
+        })
+        .collect()
 }
 
 /// Returns the numbers of the left and of the right person in each frame that shows both.
 fn numbers(reports: &[FrameReport]) -> Vec<[u32; 2]> {
-    let pair = |report: &FrameReport| {
-        let mut seen: Vec<_> = report.tracks.iter().filter(|track| track.seen).collect();
-        seen.sort_by(|a, b| a.estimate.region.x.total_cmp(&b.estimate.region.x));
-        <[u32; 2]>::try_from(seen.iter().map(|track| track.id.0).collect::<Vec<_>>()).ok()
-    };
-    reports.iter().skip(3).filter_map(pair).collect()
+    reports
+        .iter()
+        .skip(3)
+        .filter_map(|report| {
+            let mut seen: Vec<_> = report.tracks.iter().filter(|track| track.seen).collect();
+            seen.sort_by(|a, b| a.estimate.region.x.total_cmp(&b.estimate.region.x));
+            <[u32; 2]>::try_from(seen.iter().map(|track| track.id.0).collect::<Vec<_>>()).ok()
+        })
+        .collect()
 }
 
 fn by_image() -> String {
@@ -94,7 +98,10 @@ fn by_image() -> String {
 
 #[test]
 fn people_keep_their_numbers_before_a_camera_that_jerks() {
-    let still = |_| EgoMotion::at_rest(0.1);
+    fn still(_: u64) -> EgoMotion {
+        EgoMotion::at_rest(0.1)
+    }
+
     let with = numbers(&run(&by_image(), still));
     assert!(with.len() as u64 >= FRAMES - 4, "{with:?}");
     assert!(with.iter().all(|pair| *pair == with[0]), "{with:?}");
@@ -125,11 +132,12 @@ fn no_robot_drives_by_it() {
 /// The odometry of a log is better than any image; what it says stays.
 #[test]
 fn a_log_with_odometry_keeps_it() {
-    let by_wheels = |index: u64| {
+    fn by_wheels(index: u64) -> EgoMotion {
         let step = Isometry2::rotation(heading(index) - heading(index.saturating_sub(1)));
         let motion = EgoMotion::between(&Isometry2::identity(), &step, 0.1, 0.01);
         EgoMotion { forward: 1e-4, ..motion }
-    };
+    }
+
     let reports = run(&by_image(), by_wheels);
     for (index, report) in (1..).zip(&reports).skip(1) {
         assert_eq!(report.motion, by_wheels(index), "{index}");

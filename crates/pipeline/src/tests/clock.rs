@@ -41,12 +41,13 @@ fn t1_a_clock_set_back_ends_all_tracks_once() {
 
 #[test]
 fn t1_the_robot_stands_until_three_fresh_frames_came() {
-    let config =
-        format!("{PLAIN}\n[manager.config]\nconfirm_hits = 1\n[controller]\nplugin = 'drive'");
-    let drives = |config: &str| -> Vec<bool> {
+    fn drives(config: &str) -> Vec<bool> {
         let (_, reports) = at(&[10.0, 10.1, 1.0, 1.1, 1.2, 1.3], config);
         reports.iter().map(|r| r.command.unwrap().wheels.left != 0.0).collect()
-    };
+    }
+
+    let config =
+        format!("{PLAIN}\n[manager.config]\nconfirm_hits = 1\n[controller]\nplugin = 'drive'");
     let without_memory = config.clone() + "\n[target]\nremember = false\n";
     assert_eq!(drives(&without_memory), [true, true, false, false, false, true]);
     assert_eq!(drives(&config)[2..], [false; 4], "whoever is there has to look like the person");
@@ -92,13 +93,14 @@ fn t2_a_slow_log_has_no_gaps() {
 
 #[test]
 fn t3_a_duplicate_is_processed_once() {
+    fn tracks(reports: &[FrameReport]) -> Vec<String> {
+        let processed = reports.iter().filter(|r| r.outcome.is_processed());
+        processed.map(|r| format!("{:?} {:?} {:?}", r.stamp, r.tracks, r.nis)).collect::<Vec<_>>()
+    }
+
     let (_, twice) = at(&[0.0, 0.1, 0.1, 0.1, 0.2, 0.3, 0.3, 0.4], PLAIN);
     let (_, once) = at(&[0.0, 0.1, 0.2, 0.3, 0.4], PLAIN);
     assert_eq!(twice.iter().map(|r| r.funnel.count("frame: duplicate")).sum::<u64>(), 3);
-    let tracks = |reports: &[FrameReport]| {
-        let processed = reports.iter().filter(|r| r.outcome.is_processed());
-        processed.map(|r| format!("{:?} {:?} {:?}", r.stamp, r.tracks, r.nis)).collect::<Vec<_>>()
-    };
     assert_eq!(tracks(&twice), tracks(&once));
 }
 
@@ -114,13 +116,14 @@ fn t4_a_late_frame_is_dropped_and_counted() {
 
 #[test]
 fn the_motion_over_a_skipped_frame_is_not_lost() {
-    let world = World::of((0..4).map(|_| vec![person(3.0, 0.0)]));
-    let mut pipeline = world.pipeline(PLAIN);
-    let moving = |index, t_s, forward| {
+    fn moving(index: u64, t_s: f64, forward: f64) -> Frame {
         let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.05) };
         let still = frame(index, t_s);
         Frame::new(index, still.stamp, still.camera.clone(), motion, still.images())
-    };
+    }
+
+    let world = World::of((0..4).map(|_| vec![person(3.0, 0.0)]));
+    let mut pipeline = world.pipeline(PLAIN);
     for (index, t_s, forward) in [(1, 0.0, 0.0), (2, 0.0, 0.03), (3, 0.1, 0.04)] {
         pipeline.step(moving(index, t_s, forward)).unwrap();
     }

@@ -60,6 +60,10 @@ fn t7_a_jump_that_the_frame_source_has_seen_is_a_fault_at_this_very_frame() {
 
 #[test]
 fn c1_another_calibration_freezes_the_tracks_and_holds_the_robot() {
+    fn place(track: &Track) -> Point3<f64> {
+        track.estimate.person.position
+    }
+
     let (world, mut pipeline) = driving("");
     let before = pipeline.step(frame(21, 2.1)).unwrap().tracks;
     let asked = world.asked.lock().unwrap().len();
@@ -67,7 +71,6 @@ fn c1_another_calibration_freezes_the_tracks_and_holds_the_robot() {
     let turn = std::f64::consts::FRAC_PI_2;
     let motion = EgoMotion { forward: 0.2, turn, ..EgoMotion::at_rest(0.1) };
     let report = pipeline.step(after(22, 2.2, motion).with_changed_calibration(true)).unwrap();
-    let place = |track: &Track| track.estimate.person.position;
     let held = &report.tracks[0];
     let was = &before[0];
     assert_eq!((held.id, held.seen, held.confirmed), (was.id, false, true));
@@ -165,16 +168,18 @@ fn s6_whoever_jumps_or_stands_anywhere_gets_commands_within_the_limits() {
 
 #[test]
 fn a_robot_that_is_disarmed_stands_until_it_is_armed() {
+    fn moves_at(pipeline: &mut Pipeline, i: u64) -> bool {
+        is_moving(&pipeline.step(frame(i, i as f64 * 0.1)).unwrap().command.unwrap())
+    }
+
+    // Each frame is shown: a pause would reset the clock.
+    fn moves(pipeline: &mut Pipeline, frames: std::ops::RangeInclusive<u64>) -> bool {
+        frames.filter(|i| moves_at(pipeline, *i)).count() > 0
+    }
+
     let world = World::of((0..60).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
     let config = format!("{PLAIN}\n[controller]\nplugin = 'drive'\n");
     let mut pipeline = world.pipeline(&config);
-    let moves_at = |pipeline: &mut Pipeline, i: u64| {
-        is_moving(&pipeline.step(frame(i, i as f64 * 0.1)).unwrap().command.unwrap())
-    };
-    // Each frame is shown: a pause would reset the clock.
-    let moves = |pipeline: &mut Pipeline, frames: std::ops::RangeInclusive<u64>| {
-        frames.filter(|i| moves_at(pipeline, *i)).count() > 0
-    };
     assert!(moves(&mut pipeline, 1..=20));
     pipeline.disarm("a button");
     assert_eq!(pipeline.fault(), Some("a button"));

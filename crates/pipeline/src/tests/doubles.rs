@@ -307,7 +307,10 @@ impl Associator for Weighs {
     }
 
     fn associate(&mut self, tracks: &[Track], found: &[Detection], _: &Gate) -> Associations {
-        let pair = |track, detection, weight| Association { track, detection, weight };
+        fn pair(track: usize, detection: usize, weight: f64) -> Association {
+            Association { track, detection, weight }
+        }
+
         let pairs = match self.0.how.as_str() {
             "impossible" => vec![pair(7, 0, 1.0), pair(0, 9, 1.0), pair(0, 0, f64::NAN)],
             weight => (0..tracks.len().min(found.len()))

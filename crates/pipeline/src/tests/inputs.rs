@@ -34,7 +34,10 @@ fn tracks(config: &str, frame: impl Fn(u64) -> Frame) -> String {
 /// A detector that fires only without depth shows that there is none.
 #[test]
 fn what_a_config_does_without_is_not_there() {
-    let plain = |index: u64| frame(index, index as f64 * 0.1);
+    fn plain(index: u64) -> Frame {
+        frame(index, index as f64 * 0.1)
+    }
+
     let config = script("perhaps depth");
     assert_ne!(tracks(&config, with_depth), tracks(&config, plain), "depth makes a difference");
     let without = format!("without = ['depth']\n{config}");
@@ -44,10 +47,11 @@ fn what_a_config_does_without_is_not_there() {
 
 #[test]
 fn an_image_that_nothing_declares_is_told_from_one_that_the_log_lacks() {
-    let step = |frame: &Frame| {
+    fn step(frame: &Frame) -> String {
         let mut pipeline = world().pipeline(&script("forgets to declare"));
         pipeline.step(frame).unwrap_err().to_string()
-    };
+    }
+
     let undeclared = step(&with_depth(1));
     assert!(undeclared.contains("`script` uses depth images without declaring"), "{undeclared}");
     assert!(undeclared.contains("Input::Depth"), "{undeclared}");
@@ -123,12 +127,15 @@ impl Detector for RadarDetector {
 
 #[test]
 fn a_sensor_that_another_crate_defines_reaches_the_plugins_that_declare_it() {
+    fn seen(index: u64) -> Frame {
+        frame(index, index as f64 * 0.1).with_sensor(Radar(vec![2.5]))
+    }
+
     let mut registry = world().registry();
     registry.detector("radar", "reads echoes", |_: Config, _| Ok(RadarDetector));
     let config = PLAIN.replace("'script'", "'radar'");
     let mut pipeline = Pipeline::builder(&registry).from_toml(&config).unwrap();
     assert_eq!(pipeline.inputs(), Inputs::NONE.require(Radar::INPUT));
-    let seen = |index| frame(index, index as f64 * 0.1).with_sensor(Radar(vec![2.5]));
     let report = pipeline.step(seen(1)).unwrap();
     assert_eq!(report.tracks[0].estimate.person.position.x, 2.5);
     let lacking = pipeline.step(frame(2, 0.2)).unwrap_err().to_string();

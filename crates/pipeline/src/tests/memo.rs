@@ -36,10 +36,12 @@ fn untimed(report: FrameReport) -> String {
 /// Reports of several pipelines for the same frames, step by step side by side.
 fn together(pipelines: &mut [Pipeline]) -> Vec<Vec<String>> {
     let frames: Vec<Frame> = (1..=20).map(|i| bare_frame(i, i as f64 * 0.1)).collect();
-    let of = |frame| -> Vec<String> {
-        pipelines.iter_mut().map(|p| untimed(p.step(frame).unwrap())).collect()
-    };
-    frames.iter().map(of).collect()
+    frames
+        .iter()
+        .map(|frame| -> Vec<String> {
+            pipelines.iter_mut().map(|p| untimed(p.step(frame).unwrap())).collect()
+        })
+        .collect()
 }
 
 fn texts() -> Vec<String> {

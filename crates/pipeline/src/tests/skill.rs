@@ -10,7 +10,10 @@ const FOLLOWING: &str = "[controller]\nplugin = 'drive'\n[target]\n";
 /// Returns a pipeline that sees a near person aside, one ahead, and from frame 20 on one that walks up
 /// to 1.5 m and stands.
 fn ride(target: &str) -> Ride {
-    let walker = |i: i32| 1.5 + 0.1 * f64::from((45 - i).max(0));
+    fn walker(i: i32) -> f64 {
+        1.5 + 0.1 * f64::from((45 - i).max(0))
+    }
+
     let world = World::of((0..200).map(|i| {
         let mut people = vec![(1.2, 0.9), (3.0, -0.5)];
         people.extend((i >= 20).then(|| (walker(i), 0.2)));

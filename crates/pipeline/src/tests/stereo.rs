@@ -21,7 +21,10 @@ fn with_images(images: Images) -> Frame {
 }
 
 fn pair() -> Images {
-    let noise = |x: usize, y: usize| (x * x * 31 + y * y * 17 + x * y) as u8;
+    fn noise(x: usize, y: usize) -> u8 {
+        (x * x * 31 + y * y * 17 + x * y) as u8
+    }
+
     let image = GreyImage::from_fn(640, 480, |x, y| noise(x + 20, y));
     Images {
         grey: Some(Arc::new(GreyImage::from_fn(640, 480, noise))),

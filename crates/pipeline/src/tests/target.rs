@@ -86,7 +86,10 @@ fn a_nearer_person_takes_over_for_a_while_after_the_choice() {
 
 #[test]
 fn somebody_can_be_chosen_by_number() {
-    let people = |_| vec![tall(1.6, 2.0, 0.0), tall(1.6, 4.0, 0.0)];
+    fn people(_: i32) -> Vec<Detection> {
+        vec![tall(1.6, 2.0, 0.0), tall(1.6, 4.0, 0.0)]
+    }
+
     let far = ride("", 3, people)[2].tracks.iter().map(|t| t.id.0).max().unwrap();
     let reports = ride(&format!("track = {far}"), 5, people);
     assert_eq!(followed(&reports[4]), Some(far));
@@ -152,11 +155,14 @@ fn who_walked_beside_the_person_is_not_taken_for_them_while_in_sight() {
 
 #[test]
 fn nobody_comes_back_from_farther_than_they_can_have_got() {
-    let people = |i| match i {
-        0..20 => vec![tall(1.6, 1.5, 0.0)],
-        20..33 => vec![],
-        _ => vec![tall(1.6, 9.5, 0.0)],
-    };
+    fn people(i: i32) -> Vec<Detection> {
+        match i {
+            0..20 => vec![tall(1.6, 1.5, 0.0)],
+            20..33 => vec![],
+            _ => vec![tall(1.6, 9.5, 0.0)],
+        }
+    }
+
     let reports = ride("", 45, people);
     assert_eq!(reports[44].target, None, "8 m in less than three seconds");
     let reports = ride("reach_mps = 9.0", 45, people);
@@ -194,10 +200,16 @@ fn without_a_memory_a_track_is_followed_while_it_lives() {
 
 #[test]
 fn the_robot_looks_for_whoever_is_lost_where_it_may_and_gives_up() {
-    let people = |i| if i < 20 { vec![tall(1.6, 3.0, 0.0)] } else { vec![] };
+    fn people(i: i32) -> Vec<Detection> {
+        if i < 20 { vec![tall(1.6, 3.0, 0.0)] } else { vec![] }
+    }
+
+    fn moves(r: &FrameReport) -> bool {
+        r.command.unwrap().wheels != tagalong_core::WheelSpeeds::STOP
+    }
+
     let search = "search = { enabled = true, give_up_s = 4.0 }";
     let reports = ride(search, 120, people);
-    let moves = |r: &FrameReport| r.command.unwrap().wheels != tagalong_core::WheelSpeeds::STOP;
     assert!(reports[55..65].iter().all(moves), "looks for them");
     assert!(reports[100..].iter().all(|r| !moves(r)), "has given up");
     assert!(ride("", 120, people)[45..].iter().all(|r| !moves(r)), "not allowed to");

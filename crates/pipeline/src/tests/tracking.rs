@@ -39,8 +39,14 @@ fn a_high_score_confirms_at_once() {
 /// the track's region is where the filter expects the person in the image.
 #[test]
 fn a_detection_without_a_box_is_tracked_all_the_same() {
-    let boxless = |x, y| Detection { image: None, ..person(x, y) };
-    let two = || vec![boxless(3.0, 0.0), boxless(3.6, 0.0)];
+    fn boxless(x: f64, y: f64) -> Detection {
+        Detection { image: None, ..person(x, y) }
+    }
+
+    fn two() -> Vec<Detection> {
+        vec![boxless(3.0, 0.0), boxless(3.6, 0.0)]
+    }
+
     let reports = World::of((0..3).map(|_| two())).run(PLAIN, 3, 0.1);
     assert_eq!(ids(&reports[2]), [1, 2]);
     let track = &reports[2].tracks[0];
@@ -62,7 +68,7 @@ fn a_filter_of_boxes_receives_no_detection_without_one() {
 /// the left one.
 #[test]
 fn appearance_says_whose_detection_it_is_where_places_do_not() {
-    let seen = |weight: f64| {
+    fn seen(weight: f64) -> Vec<u32> {
         let both = (0..8).map(|_| vec![person(3.0, 0.5), person(3.0, -0.5)]);
         let world = World::of(both.chain([vec![person(3.0, -0.1)]]));
         let config = format!(
@@ -83,7 +89,8 @@ fn appearance_says_whose_detection_it_is_where_places_do_not() {
         let last = reports.last().unwrap();
         let is_seen = last.tracks.iter().filter(|track| track.seen);
         is_seen.map(|track| track.id.0).collect::<Vec<_>>()
-    };
+    }
+
     let [left, right] = [1, 2];
     assert_eq!(seen(0.0), [right]);
     assert_eq!(seen(50.0), [left]);
@@ -131,9 +138,12 @@ fn behind_somebody(somebody: bool) -> Vec<FrameReport> {
 
 #[test]
 fn a_person_hidden_behind_another_coasts_and_keeps_the_number() {
+    fn hidden(r: &FrameReport) -> bool {
+        r.tracks.iter().any(|t| t.occluded && !t.seen)
+    }
+
     let reports = behind_somebody(true);
     assert!(reports.iter().all(|r| ids(r) == [1, 2]), "no track ends, none is added");
-    let hidden = |r: &FrameReport| r.tracks.iter().any(|t| t.occluded && !t.seen);
     assert!(reports.iter().filter(|r| hidden(r)).count() >= 10);
     assert!(reports.iter().all(|r| r.tracks.iter().all(|t| !(t.occluded && t.seen))));
 }
@@ -143,17 +153,25 @@ fn a_person_hidden_behind_another_coasts_and_keeps_the_number() {
 fn spread_of_second(how: &str, frames: Vec<Vec<Detection>>) -> (f64, f64) {
     let many = frames.len() as u64;
     let reports = World::of(frames).run(&format!("{how}\n{PLAIN}"), many, 0.1);
-    let of_second = |c: &&Candidate| c.fate == Fate::Matched(TrackId(2));
-    let seen = reports.last().unwrap().candidates.iter().find(of_second).unwrap();
+    let seen = reports
+        .last()
+        .unwrap()
+        .candidates
+        .iter()
+        .find(|c| c.fate == Fate::Matched(TrackId(2)))
+        .unwrap();
     let covariance = &seen.detection.covariance;
     (covariance[(0, 0)].sqrt(), covariance[(1, 1)].sqrt())
 }
 
 #[test]
 fn who_is_half_hidden_is_seen_aside_also_by_one_who_is_too_near_to_be_found() {
+    fn alone(y: f64) -> Vec<Detection> {
+        vec![person(4.0, y)]
+    }
+
     let near = person(2.0, 0.0);
     let both = |y: f64| vec![near.clone(), person(4.0, y)];
-    let alone = |y: f64| vec![person(4.0, y)];
     let seen = |how, y: f64| spread_of_second(how, vec![both(y), both(y), both(y), alone(y)]);
     let how = "occlusion.body_width_m = 0.5";
     let off = seen("", 0.4);
@@ -174,8 +192,10 @@ fn a_person_who_should_be_visible_and_is_not_ends_soon() {
 
 #[test]
 fn a_person_who_left_the_image_is_kept_a_little_longer_but_not_seen() {
-    let leaves = |i: i32| if i < 12 { vec![person(2.0, 0.12 * f64::from(i))] } else { vec![] };
-    let reports = World::of((0..50).map(leaves)).run(PLAIN, 50, 0.1);
+    let reports = World::of(
+        (0..50).map(|i| if i < 12 { vec![person(2.0, 0.12 * f64::from(i))] } else { vec![] }),
+    )
+    .run(PLAIN, 50, 0.1);
     assert!(!reports[20].tracks[0].seen && !reports[20].tracks[0].occluded);
     let last = reports.iter().rposition(|r| !r.tracks.is_empty()).unwrap();
     assert!(last > 11 + 15 && last < 11 + 25, "{last}");
@@ -200,11 +220,18 @@ fn three_misses_are_needed_however_slow_the_log_is() {
 
 #[test]
 fn the_gate_grows_with_the_time_between_frames() {
-    let walk = |i: i32| vec![person(3.0, -1.5 + f64::from(i))];
-    let numbers = |dt_s: f64| ids(&World::of((0..3).map(walk)).run(PLAIN, 3, dt_s)[2]).len();
-    let wide = |gate_m: f64| {
+    fn walk(i: i32) -> Vec<Detection> {
+        vec![person(3.0, -1.5 + f64::from(i))]
+    }
+
+    fn numbers(dt_s: f64) -> usize {
+        ids(&World::of((0..3).map(walk)).run(PLAIN, 3, dt_s)[2]).len()
+    }
+
+    fn wide(gate_m: f64) -> String {
         format!("associator.config.gate = 1e3\nassociator.config.gate_m = {gate_m}\n{PLAIN}")
-    };
+    }
+
     let slow = World::of((0..3).map(walk)).run(&wide(0.3), 3, 0.5);
     assert_eq!(ids(&slow[2]), [1], "1 m in half a second");
     let fast = World::of((0..3).map(walk)).run(&wide(0.3), 3, 0.1);
@@ -316,8 +343,14 @@ fn the_better_sighting_of_a_followed_person_is_kept() {
 fn a_search_for_one_person_does_not_steal_anothers_sighting() {
     // Two people side by side; then one is gone, and the searches for both tracks find the other
     // one. Track 1 is the nearer one and searches first.
-    let both = || vec![person(2.9, 0.2), person(3.0, -0.2)];
-    let one = || vec![person(3.0, -0.2)];
+    fn both() -> Vec<Detection> {
+        vec![person(2.9, 0.2), person(3.0, -0.2)]
+    }
+
+    fn one() -> Vec<Detection> {
+        vec![person(3.0, -0.2)]
+    }
+
     let world = World::of((0..10).map(|i| if i < 5 { both() } else { one() }));
     let reports = world.run(FOLLOWING, 10, 0.1);
     assert_eq!(ids(&reports[4]), [1, 2]);
@@ -436,11 +469,12 @@ fn overlap_in_the_image_can_decide_who_is_who() {
 
 #[test]
 fn the_same_run_gives_the_same_reports() {
-    let walk = |i: i32| {
+    fn walk(i: i32) -> Vec<Detection> {
         let y = 0.1 * f64::from(i % 7);
         vec![person(3.0, y), person(4.0, -y), person(2.0, 1.0 - y), scored(-1.0, person(5.0, y))]
-    };
-    let run = || {
+    }
+
+    fn run() -> String {
         let reports = World::of((0..20).map(walk)).run(FOLLOWING, 20, 0.1);
         let timeless = reports.into_iter().map(|r| FrameReport {
             timings: vec![],
@@ -449,7 +483,8 @@ fn the_same_run_gives_the_same_reports() {
             ..r
         });
         format!("{:?}", timeless.collect::<Vec<_>>())
-    };
+    }
+
     assert_eq!(run(), run());
 }
 
@@ -464,7 +499,10 @@ fn all_stages_are_timed() {
 
 /// A coat stand: doubted in most frames, believed in one of four.
 fn first_track_of_a_coat_stand(lifecycle: &str) -> Option<usize> {
-    let score = |i: i32| if i % 4 == 3 { 1.5 } else { -2.0 };
+    fn score(i: i32) -> f64 {
+        if i % 4 == 3 { 1.5 } else { -2.0 }
+    }
+
     let world = World::of((0..20).map(|i| vec![scored(score(i), person(3.0, 0.0))]));
     let reports = world.run(&format!("{PLAIN}[manager.config]\n{lifecycle}"), 20, 0.1);
     reports.iter().position(|report| !report.tracks.is_empty())
@@ -478,7 +516,10 @@ fn where_somebody_was_rejected_one_look_starts_no_track() {
 
 #[test]
 fn who_comes_to_a_doubted_place_is_believed_a_little_later() {
-    let score = |i: i32| if i < 10 { -3.0 } else { 2.5 };
+    fn score(i: i32) -> f64 {
+        if i < 10 { -3.0 } else { 2.5 }
+    }
+
     let world = World::of((0..20).map(|i| vec![scored(score(i), person(3.0, 0.0))]));
     let reports = world.run(&format!("{PLAIN}[manager.config]\ndoubt_s = 3.0"), 20, 0.1);
     let first = reports.iter().position(|report| !report.tracks.is_empty()).unwrap();
@@ -495,7 +536,10 @@ fn associated(how: &str, frames: u64) -> Vec<FrameReport> {
 
 #[test]
 fn a_track_that_is_probably_missed_is_missed() {
-    let seen = |how: &str| associated(how, 2)[1].tracks[0].seen;
+    fn seen(how: &str) -> bool {
+        associated(how, 2)[1].tracks[0].seen
+    }
+
     assert!(seen("1.0") && seen("0.6") && !seen("0.4"));
     let ended = associated("0.4", 9).iter().any(|report| !report.ended.is_empty());
     assert!(ended, "never confirmed");

@@ -135,11 +135,12 @@ mod tests {
     proptest! {
         #[test]
         fn the_front_is_what_nobody_beats(values in prop::collection::vec((1u8..9, 0u8..9), 0..9)) {
+            fn beats(a: &Mark<'_>, b: &Mark<'_>) -> bool { a.ms <= b.ms && a.accuracy >= b.accuracy
+                && (a.ms, a.accuracy) != (b.ms, b.accuracy) }
+
             let marks: Vec<Mark<'_>> = values.iter().enumerate().map(|(series, &(ms, accuracy))| {
                 Mark { name: "", series, ms: ms.into(), accuracy: accuracy.into() }
             }).collect();
-            let beats = |a: &Mark<'_>, b: &Mark<'_>| a.ms <= b.ms && a.accuracy >= b.accuracy
-                && (a.ms, a.accuracy) != (b.ms, b.accuracy);
             let mut slow: Vec<_> = marks.iter()
                 .filter(|m| !marks.iter().any(|other| beats(other, m)))
                 .map(|m| (m.ms as u8, m.accuracy as u8)).collect();

@@ -38,7 +38,7 @@ impl Page<'_> {
         let pipelines = self.view.pipelines.iter().enumerate();
         let known = pipelines.filter_map(|(series, name)| {
             let accuracy = self.summary.pipeline(name)?.figures.get(&MAIN.key(place))?.mean;
-            let ms = mean(self.times(timings, name).iter().map(|t| t.frame_ms_p50))?;
+            let ms = mean_of_finite(self.times(timings, name).iter().map(|t| t.frame_ms_p50))?;
             Some((series, (*name).to_owned(), ms, accuracy))
         });
         let known: Vec<_> = known.collect();
@@ -115,7 +115,7 @@ impl StageRow {
     fn new(stage: &str, times: &[[f64; 4]], is_total: bool) -> Self {
         let max_ms = times.iter().map(|t| t[3]).fold(f64::NAN, f64::max);
         let [p50_ms, p95_ms, p99_ms] =
-            [0, 1, 2].map(|i| mean(times.iter().map(|t| t[i])).unwrap_or(f64::NAN));
+            [0, 1, 2].map(|i| mean_of_finite(times.iter().map(|t| t[i])).unwrap_or(f64::NAN));
         Self { stage: stage.to_owned(), p50_ms, p95_ms, p99_ms, max_ms, is_total }
     }
 
@@ -149,7 +149,7 @@ fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
 }
 
 /// Returns the mean of the finite values.
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+fn mean_of_finite(values: impl Iterator<Item = f64>) -> Option<f64> {
     let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     tagalong_math::mean(&finite)
 }

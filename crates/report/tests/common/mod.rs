@@ -199,8 +199,11 @@ fn missed(seed: u64) -> Vec<MissedPerson> {
 
 /// Returns one moment for each log.
 fn moments(tasks: &[TaskResult]) -> Vec<Moment> {
+    fn track(task: &TaskResult) -> (String, Vec<(i64, [f64; 4])>) {
+        (task.pipeline.clone(), vec![(12, [390.0, 100.0, 62.0, 60.0])])
+    }
+
     let logs: BTreeSet<&str> = tasks.iter().map(|task| task.log.as_str()).collect();
-    let track = |task: &TaskResult| (task.pipeline.clone(), vec![(12, [390.0, 100.0, 62.0, 60.0])]);
     let moment = |log: &str| Moment {
         log: log.to_owned(),
         frame: MOMENT,

@@ -110,7 +110,10 @@ impl<S: Site> Connections<S> {
 
     /// Closes the connection that has waited longest; returns false if all are being answered.
     fn close_oldest(&mut self) -> bool {
-        let is_slow = |connection: &Connection| !matches!(connection.work, Work::Whole(_));
+        fn is_slow(connection: &Connection) -> bool {
+            !matches!(connection.work, Work::Whole(_))
+        }
+
         let slow = self.open.iter().enumerate().filter(|(_, connection)| is_slow(connection));
         let oldest = slow.min_by_key(|(_, connection)| connection.since).map(|(at, _)| at);
         oldest.map(|at| self.open.swap_remove(at)).is_some()

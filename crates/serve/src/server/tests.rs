@@ -62,9 +62,15 @@ impl Running {
                 Response::json(&path)
             }
         };
-        let serve =
-            move || server.serve_with(&Arc::new(site), start, || stopped.load(Ordering::Relaxed));
-        Self { bound, token, changes, stop, thread: Some(thread::spawn(serve)) }
+        Self {
+            bound,
+            token,
+            changes,
+            stop,
+            thread: Some(thread::spawn(move || {
+                server.serve_with(&Arc::new(site), start, || stopped.load(Ordering::Relaxed))
+            })),
+        }
     }
 
     /// Sends bytes, and returns the status and the whole answer.
@@ -241,12 +247,13 @@ fn a_site_that_panics_or_is_slow_holds_up_no_other_request() {
 
 /// Opens connections that begin a request, or ask for a page, and then do nothing more.
 fn slow_clients(running: &Running, count: usize, sent: &[u8]) -> Vec<TcpStream> {
-    let client = |_| {
-        let mut stream = TcpStream::connect(running.bound).unwrap();
-        stream.write_all(sent).unwrap();
-        stream
-    };
-    (0..count).map(client).collect()
+    (0..count)
+        .map(|_| {
+            let mut stream = TcpStream::connect(running.bound).unwrap();
+            stream.write_all(sent).unwrap();
+            stream
+        })
+        .collect()
 }
 
 #[test]

@@ -57,11 +57,12 @@ fn the_linear_program_is_as_good_as_trying_all_velocities() {
 /// Time until the bodies of two agents touch at these velocities, stepped, s.
 fn touch_s(me: &Agent, other: &Agent, velocity: Vector2<f64>, theirs: Vector2<f64>) -> f64 {
     let radius_m = me.radius_m + other.radius_m + 0.2;
-    let touches = |step: &i32| {
-        let at_s = f64::from(*step) * 0.01;
-        (other.place + theirs * at_s - (me.place + velocity * at_s)).norm() < radius_m - 1e-6
-    };
-    (0..1000).find(touches).map_or(f64::INFINITY, |step| f64::from(step) * 0.01)
+    (0..1000)
+        .find(|step| {
+            let at_s = f64::from(*step) * 0.01;
+            (other.place + theirs * at_s - (me.place + velocity * at_s)).norm() < radius_m - 1e-6
+        })
+        .map_or(f64::INFINITY, |step| f64::from(step) * 0.01)
 }
 
 #[test]

@@ -101,7 +101,10 @@ mod tests {
 
     #[test]
     fn people_are_hidden_by_bodies_blocks_and_distance() {
-        let at = |x: f64, y: f64| Point2::new(x, y);
+        fn at(x: f64, y: f64) -> Point2<f64> {
+            Point2::new(x, y)
+        }
+
         let from = at(5.0, 5.0);
         let seen = |more: &str, places: &[Point2<f64>]| simulation(more).in_sight(&from, places);
         assert_eq!(seen("", &[at(8.0, 5.0), at(7.0, 5.0)]), [false, true], "behind another");

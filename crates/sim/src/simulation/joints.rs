@@ -35,12 +35,15 @@ pub(super) fn joints(
     world_from_robot: &Isometry3<f64>,
     spot: impl Fn(&Point3<f64>) -> Spot,
 ) -> Vec<Joint> {
-    let joint = |(name, at): (&'static str, Point3<f64>)| {
-        let (pixel, in_sight) = spot(&at).unzip();
-        let in_robot = world_from_robot.inverse_transform_point(&at);
-        Joint { name, in_robot, pixel, in_sight: in_sight.unwrap_or(false) }
-    };
-    skeleton.joints().into_iter().map(joint).collect()
+    skeleton
+        .joints()
+        .into_iter()
+        .map(|(name, at)| {
+            let (pixel, in_sight) = spot(&at).unzip();
+            let in_robot = world_from_robot.inverse_transform_point(&at);
+            Joint { name, in_robot, pixel, in_sight: in_sight.unwrap_or(false) }
+        })
+        .collect()
 }
 
 /// Returns how a joint of a person appears in an image through a lens.

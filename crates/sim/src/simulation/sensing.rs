@@ -31,12 +31,10 @@ enum Device {
 
 impl Sensing {
     pub(super) fn new(scene: &Scene) -> Self {
-        let sensor = |name: &str, rate_hz: f64, device: Device| Sensor {
-            name: name.into(),
-            rate_hz,
-            delivered: 0,
-            device,
-        };
+        fn sensor(name: &str, rate_hz: f64, device: Device) -> Sensor {
+            Sensor { name: name.into(), rate_hz, delivered: 0, device }
+        }
+
         let mut sensors = Vec::new();
         for laser in &scene.lasers {
             let device = Device::Scanner(Arc::new(laser.clone()));

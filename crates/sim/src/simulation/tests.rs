@@ -14,8 +14,10 @@ fn events(text: &str, threads: usize) -> Vec<Event> {
 }
 
 fn shots(text: &str, threads: usize) -> Vec<Shot> {
-    let of = |event| if let Event::Shot(shot) = event { Some(*shot) } else { None };
-    events(text, threads).into_iter().filter_map(of).collect()
+    events(text, threads)
+        .into_iter()
+        .filter_map(|event| if let Event::Shot(shot) = event { Some(*shot) } else { None })
+        .collect()
 }
 
 #[test]
@@ -33,13 +35,14 @@ fn the_same_scene_is_the_same_whatever_the_number_of_threads() {
 
 #[test]
 fn depth_is_the_same_without_colour() {
+    fn bits(shot: &Shot) -> Vec<u32> {
+        shot.images.depth.iter().flat_map(|d| d.pixels()).map(|z| z.to_bits()).collect()
+    }
+
     let with = shots(SMALL, 2);
     let without = shots(&SMALL.replace("[camera]\n", "[camera]\ncolour = false\n"), 2);
     assert!(with.len() == without.len() && with[0].images.colour.is_some());
     for (a, b) in with.iter().zip(&without) {
-        let bits = |shot: &Shot| -> Vec<u32> {
-            shot.images.depth.iter().flat_map(|d| d.pixels()).map(|z| z.to_bits()).collect()
-        };
         assert!(b.images.colour.is_none() && bits(a) == bits(b));
         assert_eq!(a.truth, b.truth);
     }
@@ -110,12 +113,7 @@ fn a_rolling_shutter_slants_the_image_and_the_truth_with_it() {
 
 #[test]
 fn depth_may_be_taken_later_than_colour_and_changes_nothing_else() {
-    let text = "duration_s = 2.0\n[camera]\nwidth = 96\nheight = 72\nmount_error_deg = 0.0\nbaseline_m = 0.8\n\
-        [robot]\nstart = [5.0, 3.0]\npath = [[8.0, 3.0]]\n\
-        [[people]]\npath = [[7.0, 4.0], [7.0, 5.0]]\n";
-    let together = shots(text, 2);
-    let later = shots(&text.replace("[camera]\n", "[camera]\ndepth_offset_s = 0.02\n"), 2);
-    let ahead = |shot: &Shot| {
+    fn ahead(shot: &Shot) -> f64 {
         let depth = shot.images.depth.as_ref().unwrap();
         let middle = (20..50).flat_map(|y| (60..90).map(move |x| (x, y)));
         let seen: Vec<f64> = middle
@@ -124,7 +122,13 @@ fn depth_may_be_taken_later_than_colour_and_changes_nothing_else() {
             .map(f64::from)
             .collect();
         seen.iter().sum::<f64>() / seen.len() as f64
-    };
+    }
+
+    let text = "duration_s = 2.0\n[camera]\nwidth = 96\nheight = 72\nmount_error_deg = 0.0\nbaseline_m = 0.8\n\
+        [robot]\nstart = [5.0, 3.0]\npath = [[8.0, 3.0]]\n\
+        [[people]]\npath = [[7.0, 4.0], [7.0, 5.0]]\n";
+    let together = shots(text, 2);
+    let later = shots(&text.replace("[camera]\n", "[camera]\ndepth_offset_s = 0.02\n"), 2);
     for (a, b) in together.iter().zip(&later) {
         assert_eq!((&a.images.colour, &a.truth), (&b.images.colour, &b.truth));
         assert_eq!(b.depth_ns, b.captured_ns + 20_000_000);
@@ -172,14 +176,17 @@ fn a_stereo_pair_is_shifted_by_the_disparity() {
 
 #[test]
 fn events_come_in_the_order_of_recording_and_late_images_after_their_time() {
+    fn recorded(event: &Event) -> u64 {
+        match event {
+            Event::Odometry(reading) => reading.at_ns,
+            Event::NoOdometry { at_ns } => *at_ns,
+            Event::Shot(shot) => shot.recorded_ns,
+            Event::Sensor(reading) => reading.at_ns,
+            Event::Webcam(shot) => shot.captured_ns,
+        }
+    }
+
     let text = format!("{SMALL}[faults]\nlate = 0.5\ndropped = 0.2\n");
-    let recorded = |event: &Event| match event {
-        Event::Odometry(reading) => reading.at_ns,
-        Event::NoOdometry { at_ns } => *at_ns,
-        Event::Shot(shot) => shot.recorded_ns,
-        Event::Sensor(reading) => reading.at_ns,
-        Event::Webcam(shot) => shot.captured_ns,
-    };
     let events = events(&text, 2);
     assert!(events.windows(2).all(|pair| recorded(&pair[0]) <= recorded(&pair[1])));
     let shots: Vec<_> = shots(&text, 2);
@@ -215,9 +222,10 @@ fn a_mirror_shows_people_all_around_and_the_seam_cuts_nobody() {
 
 #[test]
 fn webcams_deliver_at_their_own_rates() {
-    let webcam =
-        |event: &Event| if let Event::Webcam(shot) = event { Some(shot.webcam) } else { None };
-    let numbers: Vec<usize> = events(OMNI, 2).iter().filter_map(webcam).collect();
+    let numbers: Vec<usize> = events(OMNI, 2)
+        .iter()
+        .filter_map(|event| if let Event::Webcam(shot) = event { Some(shot.webcam) } else { None })
+        .collect();
     let of = |number| numbers.iter().filter(|n| **n == number).count();
     assert_eq!((of(0), of(1)), (3, 5));
 }
@@ -352,18 +360,22 @@ fn the_own_body_hides_a_joint_too() {
 /// In a room whose floor the sun reaches, before and after it comes through the windows.
 #[test]
 fn sunlight_makes_images_bright_and_takes_away_depth() {
-    let shot = |sun_lux: f64| {
+    fn shot(sun_lux: f64) -> Shot {
         let text = format!(
             "seed = 4\nduration_s = 0.2\n[camera]\nwidth = 160\nheight = 120\npitch_down_deg = 15.0\n\
              [light.day]\nsun_lux = {sun_lux:?}\nsky_lux = 0.0\nelevation_deg = 35.0\n"
         );
         shots(&text, 2).swap_remove(0)
-    };
+    }
+
+    fn at(x: usize, y: usize) -> usize {
+        y * 160 + x
+    }
+
     let overcast = shot(0.0);
     let sunny = shot(30_000.0);
     let [dark, bright] = [&overcast, &sunny].map(|shot| shot.images.colour.clone().unwrap());
     let [all, left] = [&overcast, &sunny].map(|shot| shot.images.depth.clone().unwrap());
-    let at = |x: usize, y: usize| y * 160 + x;
     let lit = (0..160 * 120).filter(|i| bright.pixels()[*i][1] > 250 && dark.pixels()[*i][1] < 200);
     let lit: Vec<usize> = lit.collect();
     assert!(lit.len() > 300, "{} white pixels", lit.len());
@@ -391,13 +403,14 @@ fn sunlight_makes_images_bright_and_takes_away_depth() {
 
 #[test]
 fn a_footprint_takes_the_place_of_the_disc() {
-    let at = |footprint: &str, heading_deg: f64| {
+    fn at(footprint: &str, heading_deg: f64) -> Clearance {
         let text = format!(
             "[room]\nsize_m = [9.0, 6.0]\n[robot]\nstart = [2.0, 3.0]\nheading_deg = {heading_deg:?}\n\
              {footprint}\n[[people]]\npath = [[3.5, 3.0]]\n"
         );
         Simulation::new(&Scene::parse(&text).unwrap(), 1).clearance(0.25)
-    };
+    }
+
     let long = "footprint = [[0.6, 0.2], [-0.1, 0.2], [-0.1, -0.2], [0.6, -0.2]]";
     assert!((at("", 0.0).people_m - 1.05).abs() < 1e-9);
     assert!((at(long, 0.0).people_m - 0.7).abs() < 1e-9);

@@ -72,9 +72,10 @@ fn a_least_depth_that_is_too_near_is_told_and_the_rest_is_matched() {
 
 #[test]
 fn threads_are_bound_and_never_none() {
-    let of = |threads: usize, most: usize| {
+    fn of(threads: usize, most: usize) -> usize {
         StereoSettings { threads, ..StereoSettings::default() }.on_threads(most).threads
-    };
+    }
+
     assert_eq!([of(0, 3), of(8, 3), of(1, 3), of(0, 0)], [3, 3, 1, 1]);
 }
 

@@ -88,11 +88,14 @@ proptest! {
         baselines in 0.0..2.0_f32,
         step in 0.0..3.0_f32,
     ) {
+        fn holes(image: &[f32]) -> usize {
+            image.iter().filter(|v| v.is_nan()).count()
+        }
+
         let slow = reference::without_holes(&values, 12, (most, baselines), step);
         let mut fast = values.clone();
         let bounds = fill::Most { px: most, baselines, step };
         let filled = fill::holes(&mut fast, 12, &bounds);
-        let holes = |image: &[f32]| image.iter().filter(|v| v.is_nan()).count();
         prop_assert_eq!(filled as usize, holes(&values) - holes(&fast));
         for (fast, slow) in fast.iter().zip(&slow) {
             let close = (fast - slow).abs() < 1e-5 || (fast.is_nan() && slow.is_nan());
@@ -107,6 +110,14 @@ proptest! {
         least in 1..60u8,
         threads in 1..5usize,
     ) {
+        fn bits(row: &[f32]) -> Vec<u32> {
+            row.iter().map(|v| v.to_bits()).collect::<Vec<u32>>()
+        }
+
+        fn holes(row: &[f32]) -> usize {
+            row.iter().filter(|v| v.is_nan()).count()
+        }
+
         let (image, width) = (&image[0], image[0].width());
         let values = &values[..image.pixels().len()];
         let rows = values.chunks(width).enumerate();
@@ -114,9 +125,7 @@ proptest! {
             rows.flat_map(|(y, row)| reference::supported(row, image, y, least.into())).collect();
         let mut fast = values.to_vec();
         let dropped = TextureTest::default().apply(image, least, threads, &mut fast);
-        let bits = |row: &[f32]| row.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
         prop_assert_eq!(bits(&fast), bits(&slow));
-        let holes = |row: &[f32]| row.iter().filter(|v| v.is_nan()).count();
         prop_assert_eq!(dropped as usize, holes(&fast) - holes(values));
     }
 
@@ -238,12 +247,18 @@ proptest! {
         min_pixels in 0..30usize,
         step in 0.0..1.5_f32,
     ) {
+        fn bits(image: &[f32]) -> Vec<u32> {
+            image.iter().map(|v| v.to_bits()).collect::<Vec<u32>>()
+        }
+
+        fn holes(image: &[f32]) -> usize {
+            image.iter().filter(|v| v.is_nan()).count()
+        }
+
         let slow = reference::without_speckles(&values, 12, min_pixels, step);
         let mut fast = values.clone();
         let erased = SpeckleFilter::default().apply(&mut fast, 12, min_pixels, step);
-        let bits = |image: &[f32]| image.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
         prop_assert_eq!(bits(&fast), bits(&slow));
-        let holes = |image: &[f32]| image.iter().filter(|v| v.is_nan()).count();
         prop_assert_eq!(erased as usize, holes(&fast) - holes(&values));
     }
 
@@ -268,11 +283,15 @@ proptest! {
 
 /// Generates a left image of smooth noise, and the right one that shows it shifted.
 pub fn noise_pair(width: usize, height: usize, disparity: usize) -> (GreyImage, GreyImage) {
-    let hash = |x: usize, y: usize| {
+    fn hash(x: usize, y: usize) -> usize {
         let h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
         ((h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D) >> 24) as usize
-    };
-    let mean = |x: usize, y: usize| (0..9).map(|i| hash(x + i % 3, y + i / 3)).sum::<usize>() / 9;
+    }
+
+    fn mean(x: usize, y: usize) -> usize {
+        (0..9).map(|i| hash(x + i % 3, y + i / 3)).sum::<usize>() / 9
+    }
+
     let left = GreyImage::from_fn(width, height, |x, y| mean(x, y) as u8);
     let right = GreyImage::from_fn(width, height, |x, y| mean(x + disparity, y) as u8);
     (left, right)
@@ -340,7 +359,10 @@ fn grain(salt: u32, at: usize, sigma: f32) -> f32 {
 
 #[test]
 fn faint_surfaces_are_neither_too_near_nor_too_far() {
-    let pattern = |x: f32, y: f32| 90.0 + 9.0 * (0.31 * x + 0.2 * y).sin() + 9.0 * (0.43 * x).cos();
+    fn pattern(x: f32, y: f32) -> f32 {
+        90.0 + 9.0 * (0.31 * x + 0.2 * y).sin() + 9.0 * (0.43 * x).cos()
+    }
+
     let image = |salt, shift: f32| {
         GreyImage::from_fn(200, 120, |x, y| {
             (pattern(x as f32 + shift, y as f32) + grain(salt, 200 * y + x, 1.5)).round() as u8

@@ -13,11 +13,13 @@ fn clamped(image: &GreyImage, x: i64, y: i64) -> u8 {
 }
 
 pub fn census(image: &GreyImage, noise: u8, x: i64, y: i64) -> Vec<bool> {
-    let darker = |(dx, dy): &(i32, i32)| {
-        let neighbour = clamped(image, x + i64::from(*dx), y + i64::from(*dy));
-        i16::from(neighbour) < i16::from(clamped(image, x, y)) - i16::from(noise)
-    };
-    NEIGHBOURS.iter().map(darker).collect()
+    NEIGHBOURS
+        .iter()
+        .map(|(dx, dy)| {
+            let neighbour = clamped(image, x + i64::from(*dx), y + i64::from(*dy));
+            i16::from(neighbour) < i16::from(clamped(image, x, y)) - i16::from(noise)
+        })
+        .collect()
 }
 
 /// Counts the bits in which disparity `d` differs at the left image's pixel; the border of the
@@ -197,8 +199,11 @@ fn sobel(image: &GreyImage, x: i64, y: i64) -> u32 {
 /// Drops the smooth pixels of row `y` that differ from their textured neighbours, or
 /// have none on a side.
 pub fn supported(row: &[f32], image: &GreyImage, y: usize, least: u32) -> Vec<f32> {
+    fn tolerance(d: f32) -> f32 {
+        0.75_f32.max(0.1 * d)
+    }
+
     let is_anchor = |x: &usize| !row[*x].is_nan() && sobel(image, *x as i64, y as i64) >= least;
-    let tolerance = |d: f32| 0.75_f32.max(0.1 * d);
     let keeps = |x: usize| {
         let sides = ((0..x).rev().find(is_anchor), (x + 1..row.len()).find(is_anchor));
         let (Some(a), Some(b)) = sides else { return false };

@@ -350,7 +350,10 @@ fn place(track: &Track) -> Point2<f64> {
 
 /// Returns true if a nearer person hides part of another one in the image.
 fn covers(near: &Track, far: &Track) -> bool {
-    let range = |track: &Track| place(track).coords.norm();
+    fn range(track: &Track) -> f64 {
+        place(track).coords.norm()
+    }
+
     let overlap = near.estimate.region.iou(&far.estimate.region);
     near.id != far.id && range(near) < range(far) && overlap > COVERED
 }

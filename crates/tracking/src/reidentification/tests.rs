@@ -205,8 +205,11 @@ fn a_detection_that_looks_like_the_person_of_a_track_speaks_for_it() {
 /// the cosine distance.
 #[test]
 fn the_log_odds_of_half_the_distance_give_it_back() {
+    fn distance(log_ratio: f64) -> f64 {
+        1.0 / (1.0 + log_ratio.exp())
+    }
+
     let half = AppearanceEvidence::HalfDistance;
-    let distance = |log_ratio: f64| 1.0 / (1.0 + log_ratio.exp());
     for difference in [0.001, 0.1, 0.24] {
         let log_ratio = half.log_ratio(difference, 0.25);
         assert!((distance(log_ratio) - 0.5 * difference).abs() < 1e-12, "{difference}");

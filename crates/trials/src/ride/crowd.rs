@@ -49,14 +49,16 @@ pub struct CrowdMeasures {
 impl CrowdMeasures {
     /// Measures a ride; `None` in a scene whose people do not react.
     pub fn of(ticks: &[Tick]) -> Option<Self> {
+        fn touches(tick: &Tick) -> bool {
+            tick.clearance.people_m < WIDER_M || tick.clearance.things_m < 0.0
+        }
+
         let samples = samples(ticks);
         if samples.is_empty() {
             return None;
         }
         let end_s = samples.last().map_or(0.0, |sample| sample.at_s);
         let mut ride = ticks.iter().take_while(|tick| tick.at_s <= end_s + 1e-6);
-        let touches =
-            |tick: &Tick| tick.clearance.people_m < WIDER_M || tick.clearance.things_m < 0.0;
         let mut out_of_sight = 0;
         let mut longest_search = 0;
         let mut all = Self { success: !ride.any(touches), ..Self::default() };
@@ -206,9 +208,10 @@ mod tests {
 
     #[test]
     fn ten_seconds_out_of_sight_are_a_search_and_more_are_a_failure() {
-        let hidden = |until_s: f64| {
+        fn hidden(until_s: f64) -> CrowdMeasures {
             ride(move |at_s, _, view| view.target_in_sight = !(2.0..until_s).contains(&at_s))
-        };
+        }
+
         let search = hidden(11.99);
         assert!(search.search_success && near(search.out_of_sight_s, 10.0), "{search:?}");
         assert!(near(search.search_m, 10.0), "{search:?}");

@@ -259,12 +259,13 @@ impl RideJudge {
 
     fn likeness(&self, ride: &Ride) -> Vec<(Likeness, bool)> {
         let frames = ride.moments.iter().zip(&ride.reports);
-        let of_frame = |(moment, report): (&Moment, &FrameReport)| -> Vec<(Likeness, bool)> {
-            let track = |id| report.tracks.iter().find(|track| track.id == id);
-            let likeness = report.lock.iter().flat_map(|lock| &lock.likeness);
-            likeness.filter_map(|l| Some((*l, self.is_of(track(l.track)?, moment)))).collect()
-        };
-        frames.flat_map(of_frame).collect()
+        frames
+            .flat_map(|(moment, report): (&Moment, &FrameReport)| -> Vec<(Likeness, bool)> {
+                let track = |id| report.tracks.iter().find(|track| track.id == id);
+                let likeness = report.lock.iter().flat_map(|lock| &lock.likeness);
+                likeness.filter_map(|l| Some((*l, self.is_of(track(l.track)?, moment)))).collect()
+            })
+            .collect()
     }
 }
 
@@ -381,15 +382,17 @@ mod tests {
     use crate::testing::trial;
 
     fn looks(whom: &[(Whom, bool)]) -> Vec<JudgedFrame> {
-        let look = |(at, (whom, in_view)): (usize, &(Whom, bool))| JudgedFrame {
-            at_s: at as f64 * 0.5,
-            dt_s: 0.5,
-            whom: *whom,
-            in_view: *in_view,
-            range_m: Some(1.8),
-            speed_mps: Some(0.0),
-        };
-        whom.iter().enumerate().map(look).collect()
+        whom.iter()
+            .enumerate()
+            .map(|(at, (whom, in_view))| JudgedFrame {
+                at_s: at as f64 * 0.5,
+                dt_s: 0.5,
+                whom: *whom,
+                in_view: *in_view,
+                range_m: Some(1.8),
+                speed_mps: Some(0.0),
+            })
+            .collect()
     }
 
     #[test]
@@ -465,15 +468,18 @@ mod tests {
 
     #[test]
     fn the_nearest_time_is_that_of_the_least_room_to_anything() {
-        let tick = |at_s: f64, people_m, things_m| Tick {
-            at_s,
-            speed_mps: 0.5,
-            turn_rate: 0.0,
-            clearance: Clearance { people_m, things_m },
-            approach: None,
-            reason: None,
-            crowd: None,
-        };
+        fn tick(at_s: f64, people_m: f64, things_m: f64) -> Tick {
+            Tick {
+                at_s,
+                speed_mps: 0.5,
+                turn_rate: 0.0,
+                clearance: Clearance { people_m, things_m },
+                approach: None,
+                reason: None,
+                crowd: None,
+            }
+        }
+
         let ticks = [tick(0.1, 1.0, 2.0), tick(0.2, f64::INFINITY, 0.4), tick(0.3, 0.5, 2.0)];
         assert_eq!(nearest_s(ticks.iter()), Some(0.2));
         let alone = [tick(0.1, f64::INFINITY, f64::INFINITY)];

@@ -65,8 +65,9 @@ impl Live {
             Page::new(&heading, name, config, Arc::clone(&newest)).map_err(io::Error::other)?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
-        let serve = move || server.serve(&Arc::new(page), || stopped.load(Ordering::Relaxed));
-        let thread = thread::Builder::new().name("live page".into()).spawn(serve)?;
+        let thread = thread::Builder::new()
+            .name("live page".into())
+            .spawn(move || server.serve(&Arc::new(page), || stopped.load(Ordering::Relaxed)))?;
         Ok(Self { newest, address, bound, stop, thread: Some(thread) })
     }
 

@@ -170,13 +170,18 @@ mod tests {
     use crate::page::moment::TrackState;
 
     fn moment(tracks: &[(u32, bool)]) -> Moment {
-        let state = |&(id, seen): &(u32, bool)| TrackState {
-            id,
-            seen,
-            confirmed: true,
-            ..TrackState::default()
-        };
-        Moment { tracks: tracks.iter().map(state).collect(), ..Moment::default() }
+        Moment {
+            tracks: tracks
+                .iter()
+                .map(|&(id, seen)| TrackState {
+                    id,
+                    seen,
+                    confirmed: true,
+                    ..TrackState::default()
+                })
+                .collect(),
+            ..Moment::default()
+        }
     }
 
     fn kinds(frames: &[&[(u32, bool)]]) -> Vec<(usize, &'static str)> {
@@ -217,13 +222,14 @@ mod tests {
 
     #[test]
     fn the_causes_of_stops_and_slow_downs_are_told_once_each() {
-        let of = |motion: &str, reason: &str| {
+        fn of(motion: &str, reason: &str) -> Moment {
             let mut moment = moment(&[]);
             let drive =
                 DriveNote { motion: motion.into(), reason: reason.into(), ..DriveNote::default() };
             moment.notes.drive = Some(drive);
             moment
-        };
+        }
+
         let moments = [
             of("drives", "follow"),
             of("slower", "near"),
@@ -241,13 +247,14 @@ mod tests {
 
     #[test]
     fn a_change_of_the_lock_is_told_with_its_cause() {
-        let of = |lock: &str| {
+        fn of(lock: &str) -> Moment {
             let mut moment = moment(&[]);
             let lock = lock.to_owned();
             let why = "out of sight".to_owned();
             moment.notes.drive = Some(DriveNote { lock, why, ..DriveNote::default() });
             moment
-        };
+        }
+
         let mut watch = Watch::default();
         for (at, state) in ["locked", "locked", "lost"].into_iter().enumerate() {
             watch.take(at, 0.1 * at as f64, &of(state));

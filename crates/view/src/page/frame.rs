@@ -100,15 +100,18 @@ fn candidate_data(note: &CandidateNote) -> CandidateData {
 /// Returns the funnel; the places of candidates are left to the candidates, which say more.
 fn dropped_data(notes: &FrameNotes) -> Vec<DroppedData> {
     let of_candidates: BTreeSet<&str> = notes.candidates.iter().filter_map(dropping_test).collect();
-    let data = |dropped: &DroppedNote| {
-        let is_known = of_candidates.contains(dropped.test.as_str());
-        DroppedData {
-            test: dropped.test.clone(),
-            n: dropped.count,
-            boxes: if is_known { Vec::new() } else { dropped.boxes_px.clone() },
-        }
-    };
-    notes.dropped.iter().map(data).collect()
+    notes
+        .dropped
+        .iter()
+        .map(|dropped| {
+            let is_known = of_candidates.contains(dropped.test.as_str());
+            DroppedData {
+                test: dropped.test.clone(),
+                n: dropped.count,
+                boxes: if is_known { Vec::new() } else { dropped.boxes_px.clone() },
+            }
+        })
+        .collect()
 }
 
 fn rounded(value: f64, parts: f64) -> f64 {
@@ -231,14 +234,13 @@ mod tests_of_data {
 
     #[test]
     fn places_of_candidates_are_not_shown_twice() {
+        fn note(test: &str) -> DroppedNote {
+            DroppedNote { test: test.into(), count: 1, boxes_px: vec![[1.0, 2.0, 3.0, 4.0]] }
+        }
+
         let mut notes = FrameNotes::default();
         let fate = FateNote::Dropped("verifier".into());
         notes.candidates = vec![CandidateNote { fate, ..CandidateNote::default() }];
-        let note = |test: &str| DroppedNote {
-            test: test.into(),
-            count: 1,
-            boxes_px: vec![[1.0, 2.0, 3.0, 4.0]],
-        };
         notes.dropped = vec![note("verifier"), note("head width")];
         let boxes: Vec<usize> = dropped_data(&notes).iter().map(|d| d.boxes.len()).collect();
         assert_eq!(boxes, [0, 1]);

@@ -117,7 +117,8 @@ impl AlignmentInput<'_> {
             self.keyframe.points.iter().filter_map(|p| self.look(p, level, &stance)).collect();
         // At least one squared grey level, the order of quantisation: a perfect match would
         // otherwise have infinite weight.
-        let usual = median(looks.iter().map(|look| look.difference.mean_square))?.max(1.0);
+        let usual =
+            median_of_enough(looks.iter().map(|look| look.difference.mean_square))?.max(1.0);
         let mut equations =
             Equations { matrix: Matrix4::zeros(), vector: State::zeros(), seen: looks.len() };
         for look in &looks {
@@ -216,7 +217,7 @@ fn pose(state: &State) -> Isometry2<f64> {
 }
 
 /// Returns the median; `None` of fewer than [`LEAST_POINTS`] values.
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+fn median_of_enough(values: impl Iterator<Item = f64>) -> Option<f64> {
     let values: Vec<f64> = values.collect();
     (values.len() >= LEAST_POINTS).then(|| tagalong_math::median(values)).flatten()
 }

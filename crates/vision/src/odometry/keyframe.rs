@@ -95,6 +95,11 @@ fn point(
     depth: &DepthImage,
     corner: (usize, usize),
 ) -> Option<Point> {
+    // A pixel with an odd index lies half a pixel off the centre of its pixel at half size.
+    fn odd(at: usize) -> f64 {
+        -0.5 * (at % 2) as f64
+    }
+
     let range = settings.min_depth_m as f32..=settings.max_depth_m as f32;
     // `slopes` compares pixels that are two apart; the setting is per pixel.
     let least = (2.0 * settings.min_slope) as f32;
@@ -114,8 +119,6 @@ fn point(
     if place.z < LOWEST_M {
         return None;
     }
-    // A pixel with an odd index lies half a pixel off the centre of its pixel at half size.
-    let odd = |at: usize| -0.5 * (at % 2) as f64;
     Some(Point {
         place,
         patches: [Patch::new(images[0], x, y)?, Patch::new(images[1], x / 2, y / 2)?],
@@ -146,8 +149,9 @@ fn surface_m(depth: &DepthImage, x: usize, y: usize) -> Option<f32> {
     let y = y as i64;
     let here = depth.get(x, y)?;
     let around = [(x - NEAR, y), (x + NEAR, y), (x, y - NEAR), (x, y + NEAR)];
-    let is_elsewhere = |there: f32| (there - here).abs() >= SAME_SURFACE * here;
-    let is_border = around.into_iter().any(|(x, y)| depth.get(x, y).is_none_or(is_elsewhere));
+    let is_border = around.into_iter().any(|(x, y)| {
+        depth.get(x, y).is_none_or(|there| (there - here).abs() >= SAME_SURFACE * here)
+    });
     (here.is_finite() && !is_border).then_some(here)
 }
 
@@ -200,7 +204,10 @@ mod tests {
 
     #[test]
     fn nothing_is_below_the_floor() {
-        let points = |scale| points_of_floor(&OdometrySettings::default(), &[], scale).points.len();
+        fn points(scale: f64) -> usize {
+            points_of_floor(&OdometrySettings::default(), &[], scale).points.len()
+        }
+
         assert!(points(1.0) > 20 && points(1.1) > 20);
         assert_eq!(points(1.4), 0);
     }

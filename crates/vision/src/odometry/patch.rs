@@ -33,14 +33,16 @@ pub struct Difference {
 impl Patch {
     /// Cuts the patch around a pixel; `None` too near to the border of the image.
     pub fn new(image: &GreyImage, x: usize, y: usize) -> Option<Self> {
-        let is_inside = |at: usize, size: usize| at > HALF && at + HALF + 1 < size;
+        fn is_inside(at: usize, size: usize) -> bool {
+            at > HALF && at + HALF + 1 < size
+        }
+
         if !(is_inside(x, image.width()) && is_inside(y, image.height())) {
             return None;
         }
         let at = |x: usize, y: usize| f32::from(image.row(y)[x]);
         let each = |value: &dyn Fn(usize, usize) -> f32| {
-            let pixel = |i: usize| value(x + i % SIDE - HALF, y + i / SIDE - HALF);
-            without_mean(std::array::from_fn(pixel))
+            without_mean(std::array::from_fn(|i| value(x + i % SIDE - HALF, y + i / SIDE - HALF)))
         };
         let slopes = [
             each(&|x, y| 0.5 * (at(x + 1, y) - at(x - 1, y))),
@@ -69,8 +71,10 @@ impl Patch {
 
 /// Samples the brightness around a position, bilinearly.
 fn sample(image: &GreyImage, middle: Vector2<f64>) -> Option<[f32; PIXELS]> {
-    let is_inside =
-        |at: f64, size: usize| at >= HALF as f64 && at + ((HALF + 1) as f64) < size as f64;
+    fn is_inside(at: f64, size: usize) -> bool {
+        at >= HALF as f64 && at + ((HALF + 1) as f64) < size as f64
+    }
+
     if !(is_inside(middle.x, image.width()) && is_inside(middle.y, image.height())) {
         return None;
     }

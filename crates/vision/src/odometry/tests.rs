@@ -152,11 +152,14 @@ fn a_bare_wall_leaves_the_wheels_alone() {
 
 #[test]
 fn who_walks_before_a_bare_wall_is_no_landmark() {
-    let walking = |step: usize| World {
-        contrast: 0.0,
-        somebody: Some(Point2::new(2.2, -0.3 + 0.06 * step as f64)),
-        ..WALLPAPER
-    };
+    fn walking(step: usize) -> World {
+        World {
+            contrast: 0.0,
+            somebody: Some(Point2::new(2.2, -0.3 + 0.06 * step as f64)),
+            ..WALLPAPER
+        }
+    }
+
     let (_, by_wheels) = wheels_alone();
     let (_, known) = error(&drive(walking, true).0);
     let (_, unknown) = error(&drive(walking, false).0);
@@ -167,10 +170,10 @@ fn who_walks_before_a_bare_wall_is_no_landmark() {
 /// The points of the wall agree with each other, those of the person do not fit.
 #[test]
 fn an_unknown_person_before_a_textured_wall_is_outvoted() {
-    let walking = |step: usize| World {
-        somebody: Some(Point2::new(2.2, -0.3 + 0.06 * step as f64)),
-        ..WALLPAPER
-    };
+    fn walking(step: usize) -> World {
+        World { somebody: Some(Point2::new(2.2, -0.3 + 0.06 * step as f64)), ..WALLPAPER }
+    }
+
     let (place, heading) = error(&drive(walking, false).0);
     let (_, by_wheels) = wheels_alone();
     assert!(place < 0.03 && heading < 0.6 * by_wheels, "{place} m, {heading} rad");

@@ -151,7 +151,10 @@ mod tests {
 
     #[test]
     fn a_changed_argument_is_told() {
-        let items = |text: &str| public(&[("lib.rs", text)]);
+        fn items(text: &str) -> Vec<String> {
+            public(&[("lib.rs", text)])
+        }
+
         let known = items("pub fn step(time_s: f64) {}").join("\n");
         assert_eq!(differences(&known, &items("pub fn step(time_s: f64) { loop {} }")), None);
         let told = differences(&known, &items("pub fn step(time_s: f32) {}")).unwrap();

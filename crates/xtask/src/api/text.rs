@@ -49,11 +49,14 @@ pub fn is_test(attributes: &[Attribute]) -> bool {
 
 /// Returns the attributes that users depend on, each behind a space.
 fn attributes(attributes: &[Attribute]) -> String {
-    let counts = |attribute: &&Attribute| {
-        let names = ["derive", "non_exhaustive", "cfg", "must_use", "deprecated"];
-        names.iter().any(|name| attribute.path().is_ident(name))
-    };
-    attributes.iter().filter(counts).map(|attribute| format!(" {}", short(attribute))).collect()
+    attributes
+        .iter()
+        .filter(|attribute| {
+            let names = ["derive", "non_exhaustive", "cfg", "must_use", "deprecated"];
+            names.iter().any(|name| attribute.path().is_ident(name))
+        })
+        .map(|attribute| format!(" {}", short(attribute)))
+        .collect()
 }
 
 /// Returns an attribute without its reason.

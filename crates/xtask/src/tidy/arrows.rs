@@ -145,7 +145,10 @@ fn may(folder: &str, allowed: Option<&[&str]>, target: &str, dev: bool) -> bool 
 
 /// Returns true if `target` is one of [`WORDS`] that `folder` may use.
 fn is_word(folder: &str, target: &str) -> bool {
-    let place = |name: &str| WORDS.iter().position(|word| *word == name);
+    fn place(name: &str) -> Option<usize> {
+        WORDS.iter().position(|word| *word == name)
+    }
+
     let own = folder.strip_prefix("crates/").and_then(place);
     place(target).is_some_and(|target| own.is_none_or(|own| target < own))
 }

@@ -136,10 +136,13 @@ fn is_import(line: &str) -> bool {
 
 /// Adds the paths of several names in a piece of code that is no `use`.
 fn add_paths(code: &str, uses: &mut Uses) {
+    fn in_path(c: char) -> bool {
+        c.is_alphanumeric() || c == '_' || c == ':'
+    }
+
     if code.lines().any(is_import) {
         return;
     }
-    let in_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
     for word in code.split(|c| !in_path(c)) {
         if word.contains("::") {
             uses.push((false, names(word)));
@@ -252,8 +255,10 @@ mod tests {
             (place(&file).unwrap().1, uses(text))
         });
         let modules = placed.collect();
-        let named = |circle: BTreeSet<&Names>| circle.iter().map(|m| m.join("::")).collect();
-        circles(&modules).into_iter().map(named).collect()
+        circles(&modules)
+            .into_iter()
+            .map(|circle| circle.iter().map(|m| m.join("::")).collect())
+            .collect()
     }
 
     #[test]

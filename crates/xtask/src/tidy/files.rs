@@ -95,8 +95,11 @@ mod tests {
 
     #[test]
     fn a_read_without_a_limit_is_for_tests_alone() {
+        fn complaints(file: &str, text: &str) -> usize {
+            unbounded(Path::new(file), text).count()
+        }
+
         let read = "let text = std::fs::read_to_string(path)?;\n";
-        let complaints = |file: &str, text: &str| unbounded(Path::new(file), text).count();
         assert_eq!(complaints("crates/a/src/b.rs", read), 1);
         assert_eq!(complaints("crates/a/tests/b.rs", read), 0);
         assert_eq!(complaints("crates/a/src/tests/b.rs", read), 0);

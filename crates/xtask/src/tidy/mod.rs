@@ -7,6 +7,7 @@ mod commands;
 mod files;
 mod licences;
 mod names;
+mod papers;
 mod paths;
 pub mod plugins;
 mod words;
@@ -26,6 +27,7 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     complaints.extend(circles::check(workspace)?);
     complaints.extend(files::check(workspace)?);
     complaints.extend(names::check(workspace)?);
+    complaints.extend(papers::check(workspace)?);
     complaints.extend(words::check(workspace)?);
     complaints.extend(crate::faults::check(workspace)?);
     let documents = markdown::documents(workspace)?;

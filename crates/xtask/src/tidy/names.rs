@@ -46,8 +46,11 @@ fn is_shared_code(file: &str) -> bool {
 
 /// Returns the lines before the tests of a file that are no comments, with their numbers.
 fn code_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    fn is_code(line: &str) -> bool {
+        !line.trim_start().starts_with("//")
+    }
+
     let code = text.lines().take_while(|line| line.trim() != "#[cfg(test)]").enumerate();
-    let is_code = |line: &str| !line.trim_start().starts_with("//");
     code.filter(move |(_, line)| is_code(line)).map(|(at, line)| (at + 1, line))
 }
 

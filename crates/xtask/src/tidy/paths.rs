@@ -73,7 +73,10 @@ fn lacks_heading(
 
 /// Returns the words in backticks that look like paths.
 fn backticked(line: &str) -> impl Iterator<Item = &str> {
-    let in_path = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
+    fn in_path(c: char) -> bool {
+        c.is_ascii_alphanumeric() || "._-/".contains(c)
+    }
+
     let quoted = line.split('`').skip(1).step_by(2);
     quoted.filter(move |text| {
         text.contains('/') && !text.starts_with('/') && text.chars().all(in_path)

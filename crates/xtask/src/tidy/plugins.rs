@@ -119,8 +119,10 @@ fn tests_conformance(workspace: &Workspace, folder: &str) -> Result<bool> {
 
 /// Returns the parts that a README lacks, and the lines of the template that it still has.
 fn gaps(readme: &str) -> Vec<String> {
-    let lacks = |part: &&&str| !readme.lines().any(|line| line.starts_with(**part));
-    let missing = README_PARTS.iter().filter(lacks).map(|part| format!("has no part `{part}`"));
+    let missing = README_PARTS
+        .iter()
+        .filter(|part| !readme.lines().any(|line| line.starts_with(**part)))
+        .map(|part| format!("has no part `{part}`"));
     let unfilled = PLACEHOLDERS.iter().filter(|text| readme.contains(**text));
     let unfilled = unfilled.map(|text| format!("still says `{text}`, as the template does"));
     missing.chain(unfilled).collect()

@@ -58,7 +58,10 @@ impl Habits {
     }
 
     fn count_words(&mut self, text: &str) {
-        let is_part = |c: char| c.is_alphabetic() || c == '-';
+        fn is_part(c: char) -> bool {
+            c.is_alphabetic() || c == '-'
+        }
+
         for word in text.split(|c| !is_part(c)).filter(|word| word.contains(char::is_alphabetic)) {
             let word = word.to_lowercase();
             self.words += 1;
@@ -111,6 +114,10 @@ impl fmt::Display for Habits {
 /// Complains if the comments of all sources together break a limit, with the files that most of
 /// it comes from.
 pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
+    fn bad(habits: &Habits) -> usize {
+        habits.openings + habits.persons + habits.whats
+    }
+
     let mut total = Habits::default();
     let mut of_files = BTreeMap::new();
     for file in workspace.files()? {
@@ -124,7 +131,6 @@ pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
     let mut complaints: Vec<String> =
         total.complaints().into_iter().map(|text| format!("comments: {text}")).collect();
     if !complaints.is_empty() {
-        let bad = |habits: &Habits| habits.openings + habits.persons + habits.whats;
         let mut worst: Vec<_> = of_files.iter().filter(|(_, habits)| bad(habits) > 0).collect();
         worst.sort_by_key(|(_, habits)| std::cmp::Reverse(bad(habits)));
         complaints.extend(worst.iter().take(10).map(|(f, h)| format!("{}: {h}", f.display())));

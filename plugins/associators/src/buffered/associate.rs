@@ -134,10 +134,11 @@ mod tests {
     /// The boxes touch no more; enlarged by 0.6 widths on each side they share 22 of 66 pixels.
     #[test]
     fn boxes_that_do_not_overlap_are_enlarged() {
-        let with = |buffer: f64| {
+        fn with(buffer: f64) -> Vec<(usize, usize)> {
             let config = Config { buffer, second_buffer: buffer, ..Config::default() };
             pairs(&answer(&config, &[track(1, 0.0)], &[detection(21.0, 3.0)]))
-        };
+        }
+
         assert_eq!((with(0.1), with(0.6)), (vec![], vec![(0, 0)]));
     }
 
@@ -205,7 +206,7 @@ mod tests {
     /// The track goes 8 pixels a frame; the filter has not noticed.
     #[test]
     fn a_track_is_expected_by_the_mean_velocity_of_its_observations() {
-        let after = |motion: Motion| {
+        fn after(motion: Motion) -> Vec<(usize, usize)> {
             let config = Config { motion, buffer: 0.0, second_buffer: 0.0, ..Config::default() };
             let mut associator = Buffered::new(config).unwrap();
             for frame in 1..=3 {
@@ -214,7 +215,8 @@ mod tests {
             }
             associator.associate(&[track(1, 0.0)], &[], &GATE);
             pairs(&associator.associate(&[track(1, 0.0)], &[detection(40.0, 3.0)], &GATE))
-        };
+        }
+
         assert_eq!(after(Motion::Observed), [(0, 0)]);
         assert_eq!(after(Motion::Predicted), []);
     }

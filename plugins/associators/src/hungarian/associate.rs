@@ -90,7 +90,10 @@ mod tests {
     /// looks like nothing that is seen.
     #[test]
     fn the_better_of_place_and_appearance_counts_where_the_settings_say_so() {
-        let boxed = |x: f64| Rect::new(x, 0.0, 20.0, 40.0);
+        fn boxed(x: f64) -> Rect {
+            Rect::new(x, 0.0, 20.0, 40.0)
+        }
+
         let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(2.0))];
         let seen = [1.0, 4.0].map(|x| detection_in(boxed(x)));
         let looks = [vec![-3.0, 6.0], vec![-3.0, -3.0]];
@@ -134,7 +137,10 @@ mod tests {
 
     #[test]
     fn a_track_is_given_the_detection_that_overlaps() {
-        let boxed = |x: f64| Rect::new(x, 0.0, 10.0, 10.0);
+        fn boxed(x: f64) -> Rect {
+            Rect::new(x, 0.0, 10.0, 10.0)
+        }
+
         let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(50.0))];
         let seen = [2.0, 51.0].map(|x| detection_in(boxed(x)));
         let settings = Config { cost: Cost::Overlap, ..Config::default() };

@@ -82,9 +82,14 @@ impl Associator for Jpda {
         let pairs = Pairs { tracks, detections, gate };
         let fits = pairs
             .fits(&pairs.all(), &pair_cost, |track, found| pair_cost.fit(track, found, gate.dt_s));
-        let ratio = |fit: Option<Fit>| fit.map_or(0.0, |fit| self.likelihood_ratio(&fit));
-        let ratios: Vec<Vec<f64>> =
-            fits.into_iter().map(|row| row.into_iter().map(ratio).collect()).collect();
+        let ratios: Vec<Vec<f64>> = fits
+            .into_iter()
+            .map(|row| {
+                row.into_iter()
+                    .map(|fit| fit.map_or(0.0, |fit| self.likelihood_ratio(&fit)))
+                    .collect()
+            })
+            .collect();
         let together = clusters(tracks.len(), detections.len(), |t, d| ratios[t][d] > 0.0);
         let pairs = together.iter().flat_map(|cluster| self.weigh_cluster(cluster, &ratios));
         Associations { pairs: pairs.collect(), spent: Vec::new() }

@@ -158,13 +158,17 @@ mod tests {
     /// The direction speaks for the left one of equal overlap only as far as the detection is sure.
     #[test]
     fn the_direction_counts_by_the_certainty_of_the_detection() {
-        let ahead = |score: f64| [detection(at(14.0, 6.0), 3.0), detection(at(21.0, 0.0), score)];
-        let with = |score: f64| {
+        fn ahead(score: f64) -> [Detection; 2] {
+            [detection(at(14.0, 6.0), 3.0), detection(at(21.0, 0.0), score)]
+        }
+
+        fn with(score: f64) -> Vec<(usize, usize)> {
             let stages = StageSettings { strong_log_odds: -9.0, ..StageSettings::default() };
             let config = Config { stages, direction_weight: 0.35, ..Config::default() };
             let track = [track_in(1, at(16.0, 0.0))];
             pairs(&walking(config).associate(&track, &ahead(score), &GATE))
-        };
+        }
+
         assert_eq!((with(3.0), with(-2.0)), (vec![(0, 1)], vec![(0, 0)]));
     }
 

@@ -49,8 +49,10 @@ fn cells(
     [down, right]: [i64; 2],
     mirrored: bool,
 ) -> impl Iterator<Item = usize> {
-    let from =
-        |at: usize, by: i64, size: usize| (at as i64 - by).clamp(0, size as i64 - 1) as usize;
+    fn from(at: usize, by: i64, size: usize) -> usize {
+        (at as i64 - by).clamp(0, size as i64 - 1) as usize
+    }
+
     (0..rows * columns).map(move |cell| {
         let row = from(cell / columns, down, rows);
         let column = from(cell % columns, right, columns);

@@ -149,6 +149,10 @@ impl Trainer for NetTrainer {
     }
 
     fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
+        fn thousandths(value: f64) -> f64 {
+            (value * 1e3).round() / 1e3
+        }
+
         // A network that leaves a part out is trained a little faster than one of all.
         let folds = self.training.folds as f64;
         let first = (folds - 1.0) / folds;
@@ -156,7 +160,6 @@ impl Trainer for NetTrainer {
         let everything: Vec<usize> = (0..self.examples.len()).collect();
         let net = self.network(&everything, &mut |part| progress(first + (1.0 - first) * part))?;
         let Line { slope, offset } = platt(&said);
-        let thousandths = |value: f64| (value * 1e3).round() / 1e3;
         let model = Model { net, slope: thousandths(slope), offset: thousandths(offset) };
         Ok(Fitted {
             model: model.to_text(),

@@ -83,11 +83,14 @@ mod tests {
 
     #[test]
     fn somebody_looks_the_same_near_and_far() {
-        let legs = |left: f64, up: f64| match (left.abs(), up) {
-            (l, u) if u < 0.9 && (l - 0.12).abs() < 0.06 => 30,
-            (l, u) if (0.9..1.5).contains(&u) && l < 0.2 => 90,
-            _ => 200,
-        };
+        fn legs(left: f64, up: f64) -> u8 {
+            match (left.abs(), up) {
+                (l, u) if u < 0.9 && (l - 0.12).abs() < 0.06 => 30,
+                (l, u) if (0.9..1.5).contains(&u) && l < 0.2 => 90,
+                _ => 200,
+            }
+        }
+
         let near = numbers(2.4, legs);
         let far = numbers(4.8, legs);
         let off: f32 = near.iter().zip(&far).map(|(a, b)| (a - b).abs()).sum();

@@ -19,9 +19,12 @@ const DARK: f32 = 50.0;
 
 /// Colours of head and torso, where they lie on the candidate in depth.
 pub fn push(colour: &Grid<[f32; 3]>, surface: Option<&Surface>, out: &mut Vec<f32>) {
-    let is_on = |cell: &usize| surface.is_none_or(|surface| surface.is_on(*cell));
     let numbers = |zone: Zone| {
-        let cells: Vec<[f32; 3]> = zone.cells().filter(is_on).map(|cell| colour[cell]).collect();
+        let cells: Vec<[f32; 3]> = zone
+            .cells()
+            .filter(|cell| surface.is_none_or(|surface| surface.is_on(*cell)))
+            .map(|cell| colour[cell])
+            .collect();
         zone_numbers(&cells)
     };
     let head = numbers(HEAD);

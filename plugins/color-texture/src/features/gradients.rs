@@ -175,12 +175,13 @@ mod tests {
 
     #[test]
     fn a_vertical_edge_has_the_direction_of_its_gradient_whatever_the_light() {
-        let edge = |dark: f32, bright: f32| -> Vec<f32> {
+        fn edge(dark: f32, bright: f32) -> Vec<f32> {
             let grey = std::array::from_fn(|c| if c % SIDE < 18 { dark } else { bright });
             let mut out = Vec::new();
             push(&grey, &mut out);
             out
-        };
+        }
+
         let weak = edge(80.0, 140.0);
         let strong = edge(20.0, 240.0);
         let inverted = edge(240.0, 20.0);

@@ -163,7 +163,7 @@ mod tests {
     /// A colour image is looked at where its pixels are those of the grey one.
     #[test]
     fn a_colour_image_of_another_size_is_unknown() {
-        let known = |side: usize| {
+        fn known(side: usize) -> bool {
             let grey = frame(picture(true, 1));
             let images = Images {
                 grey: Some(Arc::new(picture(true, 1))),
@@ -176,7 +176,8 @@ mod tests {
             features.look(&frame, &candidate()).unwrap();
             assert!(!features.has_depth());
             features.values()[Family::Colour.range()].iter().all(|v| v.is_finite())
-        };
+        }
+
         assert!(known(64) && !known(32));
     }
 }

@@ -100,8 +100,10 @@ fn roundness(surface: &Surface, zone: Zone) -> f32 {
         let part = (right - left) / 4;
         let mean =
             |from: usize, to: usize| spread((from..to).map(|c| surface.0[row * SIDE + c]))[0];
-        let ends = || 0.5 * (mean(left, left + part) + mean(right - part, right));
-        (part > 0).then(|| ends() - mean(left + part, right - part))
+        (part > 0).then(|| {
+            (0.5 * (mean(left, left + part) + mean(right - part, right)))
+                - mean(left + part, right - part)
+        })
     });
     spread(rows)[0]
 }
@@ -112,8 +114,9 @@ fn roughness(surface: &Surface, zone: Zone) -> f32 {
     // A bend over an edge of the candidate is that of the background.
     let all_on = |cell: &usize| [cell - 1, *cell, cell + 1].iter().all(|c| surface.is_on(*c));
     let d = |cell: usize| surface.0[cell];
-    let bend = |cell: usize| (d(cell - 1) - 2.0 * d(cell) + d(cell + 1)).abs();
-    spread(inner.cells().filter(all_on).map(bend))[0]
+    spread(
+        inner.cells().filter(all_on).map(|cell| (d(cell - 1) - 2.0 * d(cell) + d(cell + 1)).abs()),
+    )[0]
 }
 
 /// Parts of the window without a reading, on the candidate, nearer.

@@ -30,10 +30,11 @@ pub fn push(grey: &Grid<f32>, out: &mut Vec<f32>) {
 }
 
 fn patterns(grey: &Grid<f32>, zone: Zone) -> [f32; PATTERNS] {
-    let mut histogram = [0.0; PATTERNS];
-    let inner = |cell: &usize| {
+    fn inner(cell: &usize) -> bool {
         (1..SIDE - 1).contains(&(cell / SIDE)) && (1..SIDE - 1).contains(&(cell % SIDE))
-    };
+    }
+
+    let mut histogram = [0.0; PATTERNS];
     let mut count = 0.0f32;
     for cell in zone.cells().filter(inner) {
         histogram[pattern(grey, cell)] += 1.0;

@@ -105,8 +105,11 @@ pub struct Surface(pub [f32; SIDE * ROWS]);
 impl Surface {
     /// The surface of a square; `None` where the head has no depth.
     pub fn new(depth: &DepthImage, region: &Rect) -> Option<Self> {
+        fn step(length: f64) -> f64 {
+            length / SIDE as f64
+        }
+
         let around = region.inflated(GROW);
-        let step = |length: f64| length / SIDE as f64;
         let at = |cell: usize| {
             let x = around.x + step(around.width) * ((cell % SIDE) as f64 + 0.5);
             let y = around.y + step(around.height) * ((cell / SIDE) as f64 + 0.5);

@@ -22,12 +22,13 @@ pub struct Examples {
 impl Examples {
     /// From [`COUNT`] numbers of each candidate.
     pub fn new(values: &[f32], is_person: Vec<bool>, weights: Vec<f64>) -> Self {
-        let column = |feature: usize| values.iter().skip(feature).step_by(COUNT).copied();
-        let thresholds: Vec<Vec<f32>> = (0..COUNT).map(|f| thresholds(column(f))).collect();
-        let bin = |value: f32, thresholds: &[f32]| {
+        fn bin(value: f32, thresholds: &[f32]) -> u8 {
             let below = || thresholds.partition_point(|t| *t <= value) as u8;
             if value.is_nan() { UNKNOWN } else { below() }
-        };
+        }
+
+        let column = |feature: usize| values.iter().skip(feature).step_by(COUNT).copied();
+        let thresholds: Vec<Vec<f32>> = (0..COUNT).map(|f| thresholds(column(f))).collect();
         let bins = (0..COUNT).map(|f| column(f).map(|v| bin(v, &thresholds[f])).collect());
         Self { bins: bins.collect(), thresholds, is_person, weights }
     }
@@ -37,9 +38,10 @@ impl Examples {
 fn thresholds(column: impl Iterator<Item = f32>) -> Vec<f32> {
     let mut sorted: Vec<f32> = column.filter(|v| v.is_finite()).collect();
     sorted.sort_by(f32::total_cmp);
-    let quantile = |k: usize| sorted.get(sorted.len() * k / (THRESHOLDS + 1)).copied();
-    let mut thresholds: Vec<f32> =
-        (1..=THRESHOLDS).filter_map(quantile).map(|v| (v * 1e4).round() / 1e4).collect();
+    let mut thresholds: Vec<f32> = (1..=THRESHOLDS)
+        .filter_map(|k| sorted.get(sorted.len() * k / (THRESHOLDS + 1)).copied())
+        .map(|v| (v * 1e4).round() / 1e4)
+        .collect();
     thresholds.dedup();
     thresholds
 }
@@ -84,10 +86,12 @@ pub fn boost(
         let losses: Vec<Sums> =
             sums.iter().enumerate().map(|(k, s)| loss(examples, k, *s)).collect();
         let order = mix(seed ^ (round as u64) << 32);
-        let is_tried = |feature: &usize| {
-            (mix(order ^ *feature as u64) >> 11) as f64 / (1u64 << 53) as f64 <= training.features
-        };
-        let tried: Vec<usize> = (0..COUNT).filter(is_tried).collect();
+        let tried: Vec<usize> = (0..COUNT)
+            .filter(|feature| {
+                (mix(order ^ *feature as u64) >> 11) as f64 / (1u64 << 53) as f64
+                    <= training.features
+            })
+            .collect();
         let grower = Grower { examples, losses: &losses, tried: &tried, training };
         trees.extend(grower.tree(chosen, &mut sums));
     }

@@ -55,14 +55,19 @@ impl TreeTrainer {
     /// People and others weigh the same, with depth and without; together they
     /// weigh as much as there are candidates.
     fn weights(&self) -> Vec<f64> {
-        let cell = |l: &Labelled| usize::from(l.example.is_person) * 2 + usize::from(l.has_depth);
+        fn cell(l: &Labelled) -> usize {
+            usize::from(l.example.is_person) * 2 + usize::from(l.has_depth)
+        }
+
         let mut counts = [0.0; 4];
         self.examples.iter().for_each(|l| counts[cell(l)] += 1.0);
         let without = if counts[1] * counts[3] > 0.0 { self.training.without_depth } else { 1.0 };
         let share = [without, 1.0 - without];
         let total = self.examples.len() as f64;
-        let weight = |l: &Labelled| 0.5 * total * share[usize::from(l.has_depth)] / counts[cell(l)];
-        self.examples.iter().map(weight).collect()
+        self.examples
+            .iter()
+            .map(|l| 0.5 * total * share[usize::from(l.has_depth)] / counts[cell(l)])
+            .collect()
     }
 
     fn trials(&self, examples: &Examples, progress: &mut dyn FnMut(f64)) -> Result<Vec<Trial>> {
@@ -158,11 +163,15 @@ impl Trainer for TreeTrainer {
 impl Trial {
     /// Weighted cross-entropy of the sums as log-odds.
     fn loss(&self) -> f64 {
-        let sign = |judged: &Judged| if judged.is_person { 1.0 } else { -1.0 };
-        let loss = |judged: &Judged| {
+        fn sign(judged: &Judged) -> f64 {
+            if judged.is_person { 1.0 } else { -1.0 }
+        }
+
+        fn loss(judged: &Judged) -> f64 {
             let f = -sign(judged) * judged.sum;
             judged.weight * (f.max(0.0) + (-f.abs()).exp().ln_1p())
-        };
+        }
+
         let weight: f64 = self.held_out.iter().map(|judged| judged.weight).sum();
         self.held_out.iter().map(loss).sum::<f64>() / weight
     }
@@ -195,13 +204,14 @@ impl Trial {
 
 /// Returns the share of each family in the votes of the trees.
 fn influence(model: &Model) -> toml::Table {
-    let reach = |stump: &Stump| f64::from((stump.above - stump.below).abs());
-    let stumps = || model.trees.iter().flat_map(|tree| [tree.below, tree.above]);
-    let first = |tree: &Tree| {
+    fn first(tree: &Tree) -> (usize, f64) {
         let mean = |stump: &Stump| 0.5 * (stump.below + stump.above);
         let reach = f64::from((mean(&tree.above) - mean(&tree.below)).abs());
         (tree.feature, reach)
-    };
+    }
+
+    let reach = |stump: &Stump| f64::from((stump.above - stump.below).abs());
+    let stumps = || model.trees.iter().flat_map(|tree| [tree.below, tree.above]);
     let all: Vec<(usize, f64)> =
         stumps().map(|s| (s.feature, reach(&s))).chain(model.trees.iter().map(first)).collect();
     let total: f64 = all.iter().map(|(_, reach)| reach).sum();
@@ -281,12 +291,10 @@ mod tests {
 
     #[test]
     fn the_loss_is_the_weighted_cross_entropy() {
-        let judged = |sum: f64, is_person: bool, weight: f64| Judged {
-            sum,
-            is_person,
-            has_depth: true,
-            weight,
-        };
+        fn judged(sum: f64, is_person: bool, weight: f64) -> Judged {
+            Judged { sum, is_person, has_depth: true, weight }
+        }
+
         let held_out = vec![judged(2.0, true, 1.0), judged(1.0, false, 3.0)];
         let expected = ((1.0 + (-2.0_f64).exp()).ln() + 3.0 * (1.0 + 1.0_f64.exp()).ln()) / 4.0;
         let loss = Trial { trees: 1, held_out }.loss();
@@ -295,14 +303,12 @@ mod tests {
 
     #[test]
     fn influence_is_the_share_of_the_votes() {
+        fn stump(feature: usize, below: f32, above: f32) -> Stump {
+            Stump { feature, threshold: 0.0, below, above }
+        }
+
         let gradients = Family::Gradients.range().start;
         let texture = Family::Texture.range().start;
-        let stump = |feature: usize, below: f32, above: f32| Stump {
-            feature,
-            threshold: 0.0,
-            below,
-            above,
-        };
         let below = stump(texture, -1.0, 1.0);
         let above = stump(gradients, 0.0, 1.0);
         let tree = Tree { feature: gradients, threshold: 0.0, below, above };

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::{Error, Result};
 
-/// The way to the target (P1, Figure 7; P4, Figure 8).
+/// Way to the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Path {
     /// The circle that leaves along the robot's heading and meets the target.
@@ -22,7 +22,7 @@ pub struct Config {
     /// The way to the target: "A" on a circle, "B" turn first and then
     /// straight, "C" turn while driving.
     pub path: Path,
-    /// Divisor of the radius of the circle on path C (k in P1, section 3): 1.5 to 2.5 for usual
+    /// Divisor of the radius of the circle on path C: 1.5 to 2.5 for usual
     /// fields of view. No unit.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub path_gain: f64,
@@ -108,7 +108,7 @@ impl Config {
         Ok(())
     }
 
-    /// k of P1, section 3: path A is path C with a gain of one; path B drives
+    /// Returns the divisor of the radius: path A is path C with a gain of one; path B drives
     /// straight.
     pub(crate) fn gain(&self) -> f64 {
         match self.path {

@@ -93,7 +93,10 @@ impl Drive {
 
 #[test]
 fn settings_that_cannot_work_are_refused() {
-    let refused = |config: Config| ArcFollow::new(config).unwrap_err().to_string();
+    fn refused(config: Config) -> String {
+        ArcFollow::new(config).unwrap_err().to_string()
+    }
+
     let unfit = refused(Config { max_deceleration: f64::NAN, ..Config::default() });
     assert!(unfit.contains("`max_deceleration` must be positive"), "{unfit}");
     let angles = refused(Config { turn_in_place_deg: [60.0, 30.0], ..Config::default() });

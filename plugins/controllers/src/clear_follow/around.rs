@@ -90,7 +90,10 @@ impl NearestObstacles {
 }
 
 fn keep_nearer(place: &mut Option<Obstacle>, thing: Obstacle) {
-    let range = |thing: &Obstacle| thing.at.coords.norm_squared();
+    fn range(thing: &Obstacle) -> f64 {
+        thing.at.coords.norm_squared()
+    }
+
     if place.is_none_or(|known| range(&thing) < range(&known)) {
         *place = Some(thing);
     }
@@ -145,6 +148,10 @@ mod tests {
     /// A camera 1 m above the floor that sees a board 1 m ahead, to the left.
     #[test]
     fn what_is_looked_at_replaces_what_was_remembered_there() {
+        fn all(_: &Point2<f64>) -> bool {
+            true
+        }
+
         use tagalong_geometry::{Distortion, Pinhole};
         let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0);
@@ -155,7 +162,6 @@ mod tests {
             around.look(&camera, depth, heights, is_thing);
             around.places().map(|at| at.coords.norm()).fold(9.0, f64::min)
         };
-        let all = |_: &Point2<f64>| true;
         assert!((least(&board(10), [0.1, 1.5], &all) - 1.0_f64.hypot(0.35)).abs() < 0.1);
         assert!((least(&board(0), [0.1, 1.5], &all) - 3.0).abs() < 0.1, "the board is gone");
         let unknown = DepthImage::filled(40, 30, f32::NAN);

@@ -75,9 +75,12 @@ impl ClearFollow {
     }
 
     fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<Twist> {
+        fn is_sensible(number: f64) -> bool {
+            number > 0.0 && number <= MOST
+        }
+
         let wheels = &scene.wheels;
         let max_mps = scene.max_speed_mps;
-        let is_sensible = |number: f64| number > 0.0 && number <= MOST;
         if !is_sensible(wheels.half_separation_m) || !is_sensible(max_mps) {
             return None;
         }

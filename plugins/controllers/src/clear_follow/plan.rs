@@ -153,10 +153,13 @@ mod tests {
 
     #[test]
     fn it_minds_where_people_walk_to_and_not_where_they_are() {
+        fn speed(walker: Walker) -> f64 {
+            planned(&[], &[walker]).linear_mps
+        }
+
         let leaves = Walker { at: Point2::new(1.0, 0.1), velocity: Vector2::new(0.0, 1.4) };
         let comes = Walker { at: Point2::new(0.9, -1.2), velocity: Vector2::new(0.0, 1.0) };
         let stays = Walker { velocity: Vector2::zeros(), ..leaves };
-        let speed = |walker| planned(&[], &[walker]).linear_mps;
         assert_eq!(planned(&[], &[leaves]), AHEAD, "gone by then");
         assert!(speed(comes) < 0.8 || planned(&[], &[comes]).angular_rps != 0.0);
         assert!(speed(stays) < 0.8 || planned(&[], &[stays]).angular_rps != 0.0);
@@ -218,11 +221,14 @@ mod tests {
 
     #[test]
     fn each_change_has_its_price() {
+        fn near(found: f64, expected: f64) {
+            assert!((found - expected).abs() < 1e-9, "{found}")
+        }
+
         let config = Config::default();
         let price = |twist, things: &[Point2<f64>], others: &[Walker]| {
             cost(&config, AHEAD, twist, &around(things, others))
         };
-        let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found}");
         near(price(AHEAD, &[], &[]), 0.0);
         near(price(Twist { linear_mps: 0.35, ..AHEAD }, &[], &[]), 0.5);
         near(price(Twist { angular_rps: -0.6, ..AHEAD }, &[], &[]), 0.15);

@@ -86,8 +86,9 @@ fn what_stands_in_the_way_is_gone_round_and_a_wall_stops_it() {
     assert!(free.left == free.right && free.left > 0.8, "{free:?}");
     let wall = settled(&DepthImage::filled(40, 30, 0.45)).unwrap();
     assert!(wall.left + wall.right < 0.05, "{wall:?}");
-    let post = |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 };
-    let round = settled(&DepthImage::from_fn(40, 30, post)).unwrap();
+    let round =
+        settled(&DepthImage::from_fn(40, 30, |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 }))
+            .unwrap();
     assert!((round.left - round.right).abs() > 0.05 && round.left + round.right > 0.1, "{round:?}");
 }
 
@@ -110,12 +111,13 @@ fn it_speeds_up_and_slows_down_no_faster_than_it_may() {
 
 #[test]
 fn it_turns_by_the_bearing_and_as_fast_as_the_person_walks_around_it() {
-    let turn = |x: f64, y: f64, velocity: Vector2<f64>| {
+    fn turn(x: f64, y: f64, velocity: Vector2<f64>) -> f64 {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let person = target(x, y, velocity);
         let wheels = command(&mut controller, EgoMotion::at_rest(0.0), None, Some(&person));
         (wheels.right - wheels.left) / (2.0 * WHEELS.half_separation_m)
-    };
+    }
+
     assert!((turn(2.0, 1.0, Vector2::zeros()) - 0.5_f64.atan()).abs() < 1e-9);
     assert!((turn(2.0, 0.0, Vector2::new(0.0, 0.8)) - 0.4).abs() < 1e-9);
     assert!((turn(2.0, 0.0, Vector2::new(0.8, 0.0))).abs() < 1e-9);
@@ -174,8 +176,7 @@ fn it_drives_the_more_slowly_the_more_it_has_to_turn() {
 /// The person is straight ahead, so that all of the turn is the detour around the post.
 #[test]
 fn a_detour_keeps_its_curvature_while_the_robot_speeds_up() {
-    let post = |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 };
-    let depth = DepthImage::from_fn(40, 30, post);
+    let depth = DepthImage::from_fn(40, 30, |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 });
     let person = target(4.0, 0.0, Vector2::zeros());
     let first = |max_acceleration: f64| {
         let config = Config { max_acceleration, ..prompt() };
@@ -196,13 +197,14 @@ fn a_detour_keeps_its_curvature_while_the_robot_speeds_up() {
 
 #[test]
 fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
-    let speed = |unseen_s: f64| {
+    fn speed(unseen_s: f64) -> f64 {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let person = Track { seen: false, unseen_s, ..target(4.0, 0.0, Vector2::zeros()) };
         let still = EgoMotion::at_rest(0.1);
         let steps = (0..30).map(|_| command(&mut controller, still, None, Some(&person)).left);
         steps.last().unwrap()
-    };
+    }
+
     assert!((speed(0.5) - 0.9).abs() < 1e-9 && (speed(0.75) - 0.45).abs() < 1e-9);
     for unseen_s in [1.0, 30.0, f64::NAN] {
         assert_eq!(speed(unseen_s), 0.0);
@@ -216,6 +218,10 @@ fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
 
 #[test]
 fn the_person_is_no_obstacle_and_others_are() {
+    fn body(x: usize, _: usize) -> f32 {
+        if (17..23).contains(&x) { 1.5 } else { 6.0 }
+    }
+
     let person = target(1.6, 0.0, Vector2::new(0.8, 0.0));
     let settled = |depth: Option<DepthImage>, other: Option<Track>| {
         let mut controller = ClearFollow::new(prompt()).unwrap();
@@ -228,7 +234,6 @@ fn the_person_is_no_obstacle_and_others_are() {
         (0..30).map(|_| controller.command(&scene)).last().unwrap()
     };
     let free = settled(None, None);
-    let body = |x, _| if (17..23).contains(&x) { 1.5 } else { 6.0 };
     assert_eq!(settled(Some(DepthImage::from_fn(40, 30, body)), None), free);
     let mut other = target(0.9, 0.1, Vector2::zeros());
     other.id = tagalong_core::TrackId(2);
@@ -237,7 +242,7 @@ fn the_person_is_no_obstacle_and_others_are() {
 
 #[test]
 fn what_a_turn_has_moved_out_of_the_image_is_remembered_for_a_while() {
-    let after = |seconds: f64| {
+    fn after(seconds: f64) -> bool {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let person = target(4.0, 0.0, Vector2::zeros());
         let still = EgoMotion::at_rest(0.1);
@@ -248,7 +253,8 @@ fn what_a_turn_has_moved_out_of_the_image_is_remembered_for_a_while() {
             .map(|_| command(&mut controller, still, None, Some(&person)));
         let wheels = steps.last().unwrap();
         (wheels.left - wheels.right).abs() > 0.05
-    };
+    }
+
     assert!(after(4.0) && !after(8.0));
 }
 

@@ -148,7 +148,10 @@ impl Trainer for DepthNetTrainer {
     }
 
     fn fit(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Fitted> {
-        let is_test = |sample: &Sample| sample.group % TEST_SHARE == TEST_SHARE - 1;
+        fn is_test(sample: &Sample) -> bool {
+            sample.group % TEST_SHARE == TEST_SHARE - 1
+        }
+
         let simulated = self.chosen(|sample| sample.room.is_none() && !is_test(sample));
         let test = self.chosen(|sample| sample.room.is_none() && is_test(sample));
         if simulated.is_empty() {
@@ -250,14 +253,20 @@ fn models_without(folds: Vec<Fold>, in_simulation: &Score) -> Vec<(String, Strin
         if scores.is_empty() { in_simulation.clone() } else { Score::all(&scores) }
     };
     let calibrations: Vec<Score> = (0..folds.len()).map(others).collect();
-    let model = |(fold, score): (Fold, Score)| (fold.room, finished(fold.net, &score).to_text());
-    folds.into_iter().zip(calibrations).map(model).collect()
+    folds
+        .into_iter()
+        .zip(calibrations)
+        .map(|(fold, score)| (fold.room, finished(fold.net, &score).to_text()))
+        .collect()
 }
 
 /// Rounds the weights as in a file and calibrates the log-odds by answers that were held out.
 fn finished(mut net: Net, held_out: &Score) -> Model {
+    fn thousandths(value: f64) -> f64 {
+        (value * 1e3).round() / 1e3
+    }
+
     let Line { slope, offset } = platt(&held_out.answers());
-    let thousandths = |value: f64| (value * 1e3).round() / 1e3;
     for value in net.parts_mut().into_iter().flatten() {
         *value = (*value * STEPS).round() / STEPS;
     }
@@ -312,7 +321,10 @@ mod tests {
 
     /// Returns the largest difference of two networks relative to the largest value.
     fn apart(a: &[f32], b: &[f32]) -> f32 {
-        let largest = |values: &mut dyn Iterator<Item = f32>| values.fold(0.0, f32::max);
+        fn largest(values: &mut dyn Iterator<Item = f32>) -> f32 {
+            values.fold(0.0, f32::max)
+        }
+
         let most = largest(&mut a.iter().map(|value| value.abs()));
         largest(&mut a.iter().zip(b).map(|(a, b)| (a - b).abs())) / most
     }
@@ -340,15 +352,19 @@ mod tests {
 
     #[test]
     fn a_batch_has_the_share_of_real_frames_that_is_set() {
-        let training = |real_share| Training { batch: 5, real_share, ..Training::default() };
+        fn training(real_share: f64) -> Training {
+            Training { batch: 5, real_share, ..Training::default() }
+        }
+
         // Real frames are empty, simulated ones have a person, so the networks differ.
-        let of = |real_share: f64, real: bool| {
+        fn of(real_share: f64, real: bool) -> Vec<f32> {
             let mut trainer = trainer(training(real_share));
             add(&mut trainer, true, None, 0);
             add(&mut trainer, false, real.then_some("a room"), 1);
             let (simulated, real): (Chosen, Chosen) = (vec![0], vec![1; usize::from(real)]);
             values(&trainer.trained(start(1), 3, [&simulated, &real], 0.01, &mut |_| {}).unwrap())
-        };
+        }
+
         assert_eq!(of(0.0, true), of(1.0, false), "without real frames the share is nothing");
         assert_ne!(of(0.0, true), of(0.2, true));
         assert_ne!(of(0.2, true), of(1.0, true));
@@ -413,16 +429,22 @@ mod tests {
     #[test]
     fn a_model_without_a_room_is_calibrated_by_the_others() {
         // Answers that are spread more need a smaller slope.
-        let answers = |scale: f64| {
+        fn answers(scale: f64) -> Score {
             Score::of((0..40).map(|k| (scale * f64::from(k - 20), k * 7 % 40 < k, 0.0)).collect())
-        };
-        let fold = |room: &str, scale: f64| Fold {
-            room: room.into(),
-            net: start(1),
-            score: answers(scale),
-        };
-        let slope = |text: &str| Model::from_text(text).unwrap().slope;
-        let of = |scale: f64| finished(start(1), &answers(scale)).slope;
+        }
+
+        fn fold(room: &str, scale: f64) -> Fold {
+            Fold { room: room.into(), net: start(1), score: answers(scale) }
+        }
+
+        fn slope(text: &str) -> f64 {
+            Model::from_text(text).unwrap().slope
+        }
+
+        fn of(scale: f64) -> f64 {
+            finished(start(1), &answers(scale)).slope
+        }
+
         let both = models_without(vec![fold("a", 0.1), fold("b", 0.3)], &answers(0.5));
         assert_eq!([slope(&both[0].1), slope(&both[1].1)], [of(0.3), of(0.1)]);
         assert!(of(0.1) > 2.0 * of(0.3), "{} {}", of(0.1), of(0.3));

@@ -86,7 +86,10 @@ impl Sample {
 
     /// Returns the depth image.
     pub fn depth(&self) -> DepthImage {
-        let metres = |step: u16| if step == 0 { f32::NAN } else { f32::from(step) * STEP_M };
+        fn metres(step: u16) -> f32 {
+            if step == 0 { f32::NAN } else { f32::from(step) * STEP_M }
+        }
+
         let pixels = self.steps.iter().map(|step| metres(*step)).collect();
         DepthImage::from_pixels(self.camera.width, self.camera.height, pixels).unwrap_or_default()
     }
@@ -153,9 +156,10 @@ fn degrade(depth: &mut DepthImage, draws: &mut Draws) {
     }
     if draws.chance(0.5) {
         let sigma = draws.between(0.0, 0.004);
-        let noisy =
-            |metres: &mut f32| *metres += *metres * *metres * (sigma * draws.normal()) as f32;
-        depth.pixels_mut().iter_mut().for_each(noisy);
+        depth
+            .pixels_mut()
+            .iter_mut()
+            .for_each(|metres| *metres += *metres * *metres * (sigma * draws.normal()) as f32);
     }
 }
 
@@ -219,17 +223,23 @@ mod tests {
     /// Where the scene grows by some hundredths, the surface of the person moves as the answer does.
     #[test]
     fn the_map_grows_with_the_answer() {
-        let sample = sample();
-        let distance = |[x, y]: [f64; 2]| x.hypot(y);
-        let mean = |cells: &[[f64; 2]]| {
+        fn distance([x, y]: [f64; 2]) -> f64 {
+            x.hypot(y)
+        }
+
+        fn mean(cells: &[[f64; 2]]) -> [f64; 2] {
             let sum = cells.iter().fold([0.0; 2], |sum, cell| [sum[0] + cell[0], sum[1] + cell[1]]);
             sum.map(|sum| sum / cells.len() as f64)
-        };
+        }
+
+        fn floor(row: f64, column: f64) -> [f64; 2] {
+            [0.2 + 0.1 * (row + 0.5), 0.1 * (column + 0.5) - 3.2]
+        }
+
+        let sample = sample();
         let mut pairs = Vec::new();
         for seed in 0..60 {
             let (map, targets) = sample.varied(&mut Draws(mix(seed)));
-            let floor =
-                |row: f64, column: f64| [0.2 + 0.1 * (row + 0.5), 0.1 * (column + 0.5) - 3.2];
             let cells: Vec<[f64; 2]> =
                 targets.places().into_iter().map(|[row, column]| floor(row, column)).collect();
             if cells.len() < 4 {
@@ -271,12 +281,13 @@ mod tests {
 
     /// Returns the variations of an image of one depth by some seeds.
     fn degraded(metres: f32) -> Vec<DepthImage> {
-        let vary = |seed: u64| {
-            let mut depth = DepthImage::filled(120, 90, metres);
-            degrade(&mut depth, &mut Draws(mix(seed)));
-            depth
-        };
-        (0..200).map(vary).collect()
+        (0..200)
+            .map(|seed| {
+                let mut depth = DepthImage::filled(120, 90, metres);
+                degrade(&mut depth, &mut Draws(mix(seed)));
+                depth
+            })
+            .collect()
     }
 
     /// Returns the readings of an image.
@@ -307,14 +318,21 @@ mod tests {
 
     #[test]
     fn readings_are_lost_here_and_there_in_blocks_and_far_away() {
-        let lost = |metres: f32| -> Vec<f64> {
+        fn lost(metres: f32) -> Vec<f64> {
             let share = |depth: &DepthImage| 1.0 - readings(depth).len() as f64 / (120.0 * 90.0);
             degraded(metres).iter().map(share).collect()
-        };
+        }
+
+        fn whole(shares: &[f64]) -> usize {
+            shares.iter().filter(|share| **share < 1e-9).count()
+        }
+
+        fn none_left(shares: &[f64]) -> usize {
+            shares.iter().filter(|share| **share > 1.0 - 1e-9).count()
+        }
+
         let near = lost(2.9);
         let far = lost(6.0);
-        let whole = |shares: &[f64]| shares.iter().filter(|share| **share < 1e-9).count();
-        let none_left = |shares: &[f64]| shares.iter().filter(|share| **share > 1.0 - 1e-9).count();
         // Nothing within 3 m is too far; a fifth of the cameras ends before 5.5 m.
         assert_eq!(none_left(&near), 0);
         assert!((20..65).contains(&none_left(&far)), "{}", none_left(&far));
@@ -348,6 +366,10 @@ mod tests {
 
     #[test]
     fn a_cut_image_shows_the_same_points() {
+        fn same(a: &f32, b: &f32) -> bool {
+            a == b || a.is_nan() && b.is_nan()
+        }
+
         let sample = sample();
         let mut shifted = 0;
         let mut whole = 0;
@@ -358,7 +380,6 @@ mod tests {
             let pixel = |camera: &Camera| camera.project(&Point3::new(2.5, 0.4, 1.2)).unwrap();
             let top = (pixel(&sample.camera).y - pixel(&camera).y).round() as usize;
             for y in [0, image.height() - 1] {
-                let same = |a: &f32, b: &f32| a == b || a.is_nan() && b.is_nan();
                 let depth = sample.depth();
                 assert!(image.row(y).iter().zip(depth.row(y + top)).all(|(a, b)| same(a, b)));
             }
@@ -391,8 +412,11 @@ mod tests {
 
     #[test]
     fn numbers_that_look_random_are_spread_as_they_say() {
+        fn mean(values: &[f64]) -> f64 {
+            values.iter().sum::<f64>() / values.len() as f64
+        }
+
         let mut draws = Draws(3);
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let normal: Vec<f64> = (0..4000).map(|_| draws.normal()).collect();
         let squares: Vec<f64> = normal.iter().map(|v| v * v).collect();
         assert!(mean(&normal).abs() < 0.05 && (mean(&squares) - 1.0).abs() < 0.06);

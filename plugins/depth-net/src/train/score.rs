@@ -34,12 +34,13 @@ impl Score {
     /// Adds the answer to a sample.
     pub fn add(&mut self, map: &FloorMap, pass: &Pass, sample: &Sample) {
         let surfaces = surfaces_m2(&sample.people, &sample.camera, &sample.depth());
-        let counts = |k: &usize| {
-            let person = &sample.people[*k];
-            let is_seen = surfaces[*k] > SEEN_M2 && person.visible >= VISIBLE;
-            person.counts && is_seen && person.head.xy().coords.norm() < COUNTED_M
-        };
-        let mut missing: Vec<usize> = (0..sample.people.len()).filter(counts).collect();
+        let mut missing: Vec<usize> = (0..sample.people.len())
+            .filter(|k| {
+                let person = &sample.people[*k];
+                let is_seen = surfaces[*k] > SEEN_M2 && person.visible >= VISIBLE;
+                person.counts && is_seen && person.head.xy().coords.norm() < COUNTED_M
+            })
+            .collect();
         self.frames += 1;
         self.people += missing.len();
         for peak in peaks(map, pass, LEAST, SEPARATION_M) {
@@ -85,10 +86,13 @@ impl Score {
 
     /// Returns recall and false people per frame of peaks with at least these log-odds.
     fn at(&self, least: f64) -> (f64, f64) {
+        fn of(count: usize, all: usize) -> f64 {
+            count as f64 / all.max(1) as f64
+        }
+
         let count = |is: bool| {
             self.found.iter().filter(|(logit, person, _)| *logit >= least && *person == is).count()
         };
-        let of = |count: usize, all: usize| count as f64 / all.max(1) as f64;
         (of(count(true), self.people), of(count(false), self.frames))
     }
 
@@ -132,17 +136,16 @@ mod tests {
     /// Returns a sample of a wall 3 m away with people; each is a place, whether it counts, and
     /// the visible part.
     fn sample(people: &[([f64; 2], bool, f64)]) -> Sample {
+        fn person(([x, y], counts, visible): &([f64; 2], bool, f64)) -> AnnotatedPerson {
+            AnnotatedPerson { head: Point3::new(*x, *y, 1.6), counts: *counts, visible: *visible }
+        }
+
         let lens =
             Pinhole { fx: 120.0, fy: 120.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
         let camera = Arc::new(Camera::mounted(lens, 320, 240, 1.1, 0.0, 0.0));
         let depth = Some(Arc::new(DepthImage::filled(320, 240, 3.0)));
         let images = Images { depth, ..Images::default() };
         let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
-        let person = |([x, y], counts, visible): &([f64; 2], bool, f64)| AnnotatedPerson {
-            head: Point3::new(*x, *y, 1.6),
-            counts: *counts,
-            visible: *visible,
-        };
         let people: Vec<AnnotatedPerson> = people.iter().map(person).collect();
         Sample::new(&frame, &people, None, 0).unwrap()
     }
@@ -188,13 +191,14 @@ mod tests {
 
     #[test]
     fn people_count_if_they_are_near_and_seen() {
-        let counted = |at: [f64; 2], counts: bool, visible: f64| {
+        fn counted(at: [f64; 2], counts: bool, visible: f64) -> usize {
             let sample = sample(&[(at, counts, visible)]);
             let found = score(&sample, &[(at, 2.0)]);
             // A peak at a person that does not count is neither found nor false.
             assert_eq!(found.found.len(), found.people, "{at:?}");
             found.people
-        };
+        }
+
         assert_eq!(counted(HERE, true, 1.0), 1);
         assert_eq!(counted(HERE, true, VISIBLE), 1);
         assert_eq!(counted(HERE, true, VISIBLE - 0.01), 0, "hidden for the most part");

@@ -82,11 +82,14 @@ impl Targets {
     /// Returns the answers with left and right exchanged.
     pub fn mirrored(&self) -> Self {
         let side = FloorMap::CELLS;
-        let of = |k: usize| match self.cells[k / side * side + side - 1 - k % side] {
-            Target::Person([x, y, height]) => Target::Person([x, -y, height]),
-            other => other,
-        };
-        Self { cells: (0..side * side).map(of).collect() }
+        Self {
+            cells: (0..side * side)
+                .map(|k| match self.cells[k / side * side + side - 1 - k % side] {
+                    Target::Person([x, y, height]) => Target::Person([x, -y, height]),
+                    other => other,
+                })
+                .collect(),
+        }
     }
 
     /// Writes the gradient of the loss by the answer, and returns the number of cells of people.
@@ -164,10 +167,11 @@ mod tests {
 
     #[test]
     fn the_slope_of_the_loss_is_that_of_small_steps() {
-        let loss = |log_odds: f64| {
+        fn loss(log_odds: f64) -> f64 {
             let p = 1.0 / (1.0 + (-log_odds).exp());
             -(1.0 - p) * p.ln()
-        };
+        }
+
         for log_odds in [-6.0, -1.0, 0.0, 0.7, 5.0] {
             let slope = (loss(log_odds + 1e-5) - loss(log_odds - 1e-5)) / 2e-5;
             assert!((slope - f64::from(focal(log_odds as f32))).abs() < 1e-4, "{log_odds}");
@@ -204,6 +208,10 @@ mod tests {
     /// A wall through the axes of two people: 0.6 m of it are theirs, from the feet to above the head.
     #[test]
     fn the_surface_of_a_person_is_what_the_camera_sees_of_it() {
+        fn person(x: f64, y: f64) -> AnnotatedPerson {
+            AnnotatedPerson { head: nalgebra::Point3::new(x, y, 1.6), counts: true, visible: 1.0 }
+        }
+
         let lens = tagalong_geometry::Pinhole {
             fx: 120.0,
             fy: 120.0,
@@ -212,11 +220,6 @@ mod tests {
             distortion: tagalong_geometry::Distortion::None,
         };
         let camera = Camera::mounted(lens, 320, 240, 1.1, 0.0, 0.0);
-        let person = |x: f64, y: f64| AnnotatedPerson {
-            head: nalgebra::Point3::new(x, y, 1.6),
-            counts: true,
-            visible: 1.0,
-        };
         let people = [person(3.0, 0.0), person(3.0, 1.5), person(5.0, 0.0)];
         let found = surfaces_m2(&people, &camera, &DepthImage::filled(320, 240, 3.0));
         assert!((found[0] - 0.9).abs() < 0.1 && (found[1] - 0.9).abs() < 0.1, "{found:?}");

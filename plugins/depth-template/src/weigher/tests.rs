@@ -15,6 +15,10 @@ fn frame(pixels: Vec<f32>) -> Frame {
 
 /// Computes the weight of a scene pixel by pixel: which person is in front at each one?
 fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
+    fn inside(span: Option<Span>, x: i64) -> bool {
+        span.is_some_and(|(a, b)| a <= x && x < b)
+    }
+
     let config = DepthTemplateConfig::default();
     let image = frame.derived::<Working>().unwrap();
     let mut tools = weigher.tools();
@@ -24,7 +28,6 @@ fn slow(weigher: &Weigher, frame: &Frame, scene: &[Person]) -> f64 {
         .filter_map(|p| tools.place(p, direction(p, &frame.camera), &frame.camera, &view))
         .collect();
     cast.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
-    let inside = |span: Option<Span>, x: i64| span.is_some_and(|(a, b)| a <= x && x < b);
     let mut weight = 0.0;
     for (k, person) in cast.iter().enumerate() {
         let mut sum = 0;
@@ -169,7 +172,10 @@ fn a_visible_person_weighs_all_and_a_hidden_one_nothing() {
 
 #[test]
 fn a_person_weighs_as_much_at_any_range() {
-    let of = |x| weight(&painted(&[standing(x, 0.0)]), &[standing(x, 0.0)]);
+    fn of(x: f64) -> f64 {
+        weight(&painted(&[standing(x, 0.0)]), &[standing(x, 0.0)])
+    }
+
     assert!((of(1.6) - of(3.2)).abs() < 1.5, "{} {}", of(1.6), of(3.2));
 }
 

@@ -102,12 +102,13 @@ fn kept(tree: &[Question], features: &[Feature], cascade: &mut Cascade) -> Tree 
         boost::Next::Question(to) => Next::Node(to),
         boost::Next::Leaf(value) => Next::Leaf(value),
     };
-    let node = |question: &Question| {
-        cascade.features.push(features[question.feature].clone());
-        let split = Split::Below(question.below);
-        Node { feature: cascade.features.len() - 1, split, next: question.next.map(next) }
-    };
-    tree.iter().map(node).collect()
+    tree.iter()
+        .map(|question| {
+            cascade.features.push(features[question.feature].clone());
+            let split = Split::Below(question.below);
+            Node { feature: cascade.features.len() - 1, split, next: question.next.map(next) }
+        })
+        .collect()
 }
 
 /// Returns the largest threshold that this part of the sums reaches.
@@ -129,10 +130,13 @@ mod tests {
 
     #[test]
     fn the_blocks_of_a_feature_lie_side_by_side_and_balance() {
-        let of = |kind: (usize, usize)| match haar_feature(kind, part(1, 2, 3, 4)) {
-            Feature::Haar(parts) => parts,
-            other => panic!("{other:?}"),
-        };
+        fn of(kind: (usize, usize)) -> Vec<(Part, f32)> {
+            match haar_feature(kind, part(1, 2, 3, 4)) {
+                Feature::Haar(parts) => parts,
+                other => panic!("{other:?}"),
+            }
+        }
+
         assert_eq!(of((2, 1)), [(part(1, 2, 6, 4), -1.0), (part(4, 2, 3, 4), 2.0)]);
         assert_eq!(of((1, 2)), [(part(1, 2, 3, 8), -1.0), (part(1, 6, 3, 4), 2.0)]);
         assert_eq!(of((3, 1)), [(part(1, 2, 9, 4), -1.0), (part(4, 2, 3, 4), 3.0)]);

@@ -48,10 +48,13 @@ impl Patch {
 /// averaging over skipped pixels. Outside the picture its border is continued. The window is turned
 /// clockwise about its middle by `tilt`, rad.
 pub(super) fn window(grey: &GreyImage, region: &Rect, tilt: f64, side: usize) -> GreyImage {
+    fn clamp(v: i64, length: usize) -> i64 {
+        v.clamp(0, length.max(1) as i64 - 1)
+    }
+
     let scale = region.width / side as f64;
     let middle = region.centre();
     let (sin, cos) = tilt.sin_cos();
-    let clamp = |v: i64, length: usize| v.clamp(0, length.max(1) as i64 - 1);
     let at = |x: i64, y: i64| {
         f64::from(grey.get(clamp(x, grey.width()), clamp(y, grey.height())).unwrap_or_default())
     };

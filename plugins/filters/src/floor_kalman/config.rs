@@ -36,14 +36,13 @@ pub struct Config {
     pub form: Form,
     /// Covariance of detections: `detection`, `fixed` or `polar`.
     pub measurement: Measurement,
-    /// Q of the forms without velocity: xx, xy, yy in room axes, m² per `step_s`
-    /// (P5, equation 10).
+    /// Q of the forms without velocity: xx, xy, yy in room axes, m² per `step_s`.
     #[schemars(inner(range(min = -999_999, max = 999_999)))]
     pub process_m2: [f64; 3],
     /// The time between two images to which Q belongs, s.
     #[schemars(range(min = 1e-3, max = 1e3))]
     pub step_s: f64,
-    /// R of `fixed`: xx, xy, yy in room axes, m² (P5, equation 10).
+    /// R of `fixed`: xx, xy, yy in room axes, m².
     #[schemars(inner(range(min = -999_999, max = 999_999)))]
     pub measurement_m2: [f64; 3],
     /// Of `polar`: standard deviation of the range at the robot, m.

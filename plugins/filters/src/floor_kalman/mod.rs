@@ -26,7 +26,7 @@ pub const NAME: &str = "floor-kalman";
 pub fn register(registry: &mut Registry) {
     registry.filter(
         NAME,
-        "Kalman filter on the floor plan in room coordinates (P5)",
+        "Kalman filter on the floor plan in room coordinates",
         |config: Config, _| FloorKalman::new(config),
     );
 }

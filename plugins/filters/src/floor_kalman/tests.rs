@@ -82,11 +82,12 @@ fn a_still_person_is_filtered_by_equations_5_to_9() {
 
 #[test]
 fn a_walk_is_foreseen_by_those_who_know_a_velocity() {
-    let ahead = |form| {
+    fn ahead(form: Form) -> f64 {
         let mut filter = after_a_walk(Config { form, ..Config::default() });
         filter.predict(&EgoMotion::at_rest(1.0 / 3.0), &camera());
         estimate(&filter).person.position.x - 8.2
-    };
+    }
+
     assert!(ahead(Form::Still) < -0.19, "{}", ahead(Form::Still));
     for foreseen in [ahead(Form::LastDifference), ahead(Form::ConstantVelocity)] {
         assert!(foreseen.abs() < 0.03, "{foreseen}");
@@ -119,13 +120,14 @@ fn noise_in_room_axes_is_turned_by_the_heading_of_the_room() {
 
 #[test]
 fn a_polar_measurement_is_wide_where_it_is_far() {
-    let spread = |range: f64| {
+    fn spread(range: f64) -> (f64, f64) {
         let config = Config { measurement: Measurement::Polar, ..Config::default() };
         let mut filter = FloorKalman::new(config).unwrap();
         filter.start(ID, &sighting(0.0, range), &camera());
         let c = estimate(&filter).covariance;
         (c[(1, 1)].sqrt(), c[(0, 0)].sqrt())
-    };
+    }
+
     let ((near_along, near_across), (far_along, far_across)) = (spread(1.0), spread(6.0));
     assert!((near_along - 0.08).abs() < 1e-9 && (far_along - 0.23).abs() < 1e-9);
     assert!((far_across / near_across - 6.0).abs() < 1e-6);
@@ -133,7 +135,10 @@ fn a_polar_measurement_is_wide_where_it_is_far() {
 
 #[test]
 fn settings_that_cannot_work_are_refused() {
-    let refused = |config: Config| FloorKalman::new(config).is_err();
+    fn refused(config: Config) -> bool {
+        FloorKalman::new(config).is_err()
+    }
+
     assert!(refused(Config { process_m2: [1.0, 2.0, 1.0], ..Config::default() }));
     assert!(refused(Config { measurement_m2: [f64::NAN, 0.0, 1.0], ..Config::default() }));
     assert!(refused(Config { step_s: 0.0, ..Config::default() }));
@@ -143,6 +148,10 @@ fn settings_that_cannot_work_are_refused() {
 /// errors of two posteriors: many walks, drawn and filtered.
 #[test]
 fn the_prediction_by_differences_is_as_uncertain_as_it_says() {
+    fn noisy(at: Vector2<f64>, n: &mut dyn FnMut() -> f64) -> Vector2<f64> {
+        at + Vector2::new(n(), n()) * 0.02_f64.sqrt()
+    }
+
     let config = Config { form: Form::LastDifference, ..Config::default() };
     let mut state = 7u64;
     let mut normal = move || {
@@ -159,9 +168,6 @@ fn the_prediction_by_differences_is_as_uncertain_as_it_says() {
     let mut said = 0.0;
     for _ in 0..4000 {
         let mut truth = [Vector2::zeros(), Vector2::new(0.1, 0.0)];
-        let noisy = |at: Vector2<f64>, n: &mut dyn FnMut() -> f64| {
-            at + Vector2::new(n(), n()) * 0.02_f64.sqrt()
-        };
         let mut state = State::new(noisy(truth[1], &mut normal), &r, (1.6, 0.01), &config);
         for step in 0..3 {
             let noise = root * Vector2::new(normal(), normal());
@@ -249,6 +255,14 @@ impl Textbook {
 /// those of the textbook's filter in the room.
 #[test]
 fn four_states_are_those_of_a_filter_written_down() {
+    fn dynamic(m: &Matrix2<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(2, 2, |i, j| m[(i, j)])
+    }
+
+    fn turn(pose: &Isometry2<f64>) -> Matrix2<f64> {
+        *pose.rotation.to_rotation_matrix().matrix()
+    }
+
     let config = Config { room_heading_deg: 30.0, ..Config::default() };
     let q = config.acceleration_noise;
     let speed = config.initial_speed_mps;
@@ -259,10 +273,8 @@ fn four_states_are_those_of_a_filter_written_down() {
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&r);
         Detection { covariance, ..sighting(x, y) }
     };
-    let dynamic = |m: &Matrix2<f64>| DMatrix::from_fn(2, 2, |i, j| m[(i, j)]);
     let mut room_from_robot = Isometry2::new(Vector2::zeros(), -30.0_f64.to_radians());
     filter.start(ID, &sighting(2.0, 1.0), &camera());
-    let turn = |pose: &Isometry2<f64>| *pose.rotation.to_rotation_matrix().matrix();
     let start = room_from_robot * Point2::new(2.0, 1.0);
     let mut covariance = DMatrix::from_diagonal_element(4, 4, speed * speed);
     let first = turn(&room_from_robot) * r * turn(&room_from_robot).transpose();
@@ -314,19 +326,21 @@ fn four_states_are_those_of_a_filter_written_down() {
 
 #[test]
 fn the_height_is_filtered_by_itself_and_kept_where_it_is_not_measured() {
-    let mut filter = FloorKalman::new(Config { height_noise: 0.2, ..Config::default() }).unwrap();
-    let with_height = |z: f64, variance: f64| {
+    fn with_height(z: f64, variance: f64) -> Detection {
         let mut detection = sighting(2.0, 0.0);
         detection.position.z = z;
         detection.covariance[(2, 2)] = variance;
         detection
-    };
-    filter.start(ID, &with_height(1.5, 0.04), &camera());
-    filter.predict(&EgoMotion::at_rest(0.5), &camera());
-    let height = |filter: &FloorKalman| {
+    }
+
+    fn height(filter: &FloorKalman) -> (f64, f64) {
         let found = estimate(filter);
         (found.person.position.z, found.covariance[(2, 2)])
-    };
+    }
+
+    let mut filter = FloorKalman::new(Config { height_noise: 0.2, ..Config::default() }).unwrap();
+    filter.start(ID, &with_height(1.5, 0.04), &camera());
+    filter.predict(&EgoMotion::at_rest(0.5), &camera());
     let prior = 0.04 + 0.2 * 0.2 * 0.5;
     assert!((height(&filter).1 - prior).abs() < 1e-12);
     see(&mut filter, &with_height(1.8, 0.03));
@@ -410,6 +424,15 @@ fn the_noise_of_differences_is_that_of_the_joint_covariance() {
 
 #[test]
 fn each_number_has_its_least_and_its_most() {
+    fn checked(key: &str, value: f64) -> Option<String> {
+        let config: Config = toml::from_str(&format!("{key} = {value:?}")).unwrap();
+        FloorKalman::new(config).err().map(|error| error.to_string())
+    }
+
+    fn covariance(measurement_m2: [f64; 3]) -> Config {
+        Config { measurement_m2, ..Config::default() }
+    }
+
     let least = [
         ("step_s", 1e-3),
         ("sigma_range_m", 1e-3),
@@ -420,17 +443,12 @@ fn each_number_has_its_least_and_its_most() {
         ("height_noise", 0.0),
         ("room_heading_deg", -360.0),
     ];
-    let checked = |key: &str, value: f64| {
-        let config: Config = toml::from_str(&format!("{key} = {value:?}")).unwrap();
-        FloorKalman::new(config).err().map(|error| error.to_string())
-    };
     for (key, least) in least {
         assert_eq!((checked(key, least), checked(key, 1000.0)), (None, None), "{key}");
         for wrong in [least - 1e-7, 1000.1] {
             assert!(checked(key, wrong).is_some_and(|why| why.contains(key)), "{key} {wrong}");
         }
     }
-    let covariance = |measurement_m2| Config { measurement_m2, ..Config::default() };
     assert!(FloorKalman::new(covariance([9e5, 0.0, 9e5])).is_ok());
     assert!(FloorKalman::new(covariance([1e6, 0.0, 9e5])).is_err());
     assert!(FloorKalman::new(covariance([1.0, 2.0, 1.0])).is_err());

@@ -132,6 +132,11 @@ impl State {
     /// Compensates the robot's own motion, and that of the camera on the robot: the head is moved in
     /// space, and the box with it.
     fn turn_with(&mut self, motion: &EgoMotion, camera: &Camera) {
+        // The floor keeps the ratio of the widths finite for a head beside the lens.
+        fn depth(camera: &Camera, place: &RobotPoint) -> f64 {
+            camera.depth_of(&place.position).max(MIN_RANGE_M)
+        }
+
         let before = self.seen();
         let last = before.in_space(&self.camera);
         let place = match self.behind.take() {
@@ -145,9 +150,6 @@ impl State {
             return;
         };
         self.doubt_the_motion(&before, &after, motion, camera);
-        // The floor keeps the ratio of the widths finite for a head beside the lens.
-        let depth =
-            |camera: &Camera, place: &RobotPoint| camera.depth_of(&place.position).max(MIN_RANGE_M);
         self.image[4] *= depth(&self.camera, &last) / depth(camera, &place);
         self.image[4] *= zoom(&self.camera, camera);
         self.image.fixed_rows_mut::<2>(2).copy_from(&after.velocity);

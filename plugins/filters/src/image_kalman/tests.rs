@@ -112,9 +112,12 @@ fn whoever_the_robot_turns_its_back_on_is_found_again_where_they_were() {
 /// second.
 #[test]
 fn a_person_behind_the_robot_walks_on() {
+    fn at(frame: usize) -> Point3<f64> {
+        Point3::new(3.0, -0.5 + 0.5 * DT_S * frame as f64, 1.6)
+    }
+
     let config = Config::default();
     let camera = camera();
-    let at = |frame: usize| Point3::new(3.0, -0.5 + 0.5 * DT_S * frame as f64, 1.6);
     let sightings: Vec<Detection> = (0..40).map(|frame| person(at(frame))).collect();
     let mut state = fed(config.clone(), &sightings, EgoMotion::at_rest(DT_S));
     let motion = EgoMotion { turn: 0.15, ..EgoMotion::at_rest(DT_S) };
@@ -183,13 +186,14 @@ fn a_box_of_any_shape_keeps_its_shape() {
 
 #[test]
 fn a_depth_that_is_a_guess_stays_uncertain() {
+    fn sigma(seen: &Detection) -> f64 {
+        let state = fed(Config::default(), &vec![seen.clone(); 3], EgoMotion::at_rest(DT_S));
+        state.estimate(&camera()).covariance[(0, 0)].sqrt()
+    }
+
     let sure = person(Point3::new(4.0, 0.3, 1.6));
     let toward = camera().robot_from_camera.rotation * Vector3::z();
     let guess = Detection { covariance: toward * toward.transpose(), ..sure.clone() };
-    let sigma = |seen: &Detection| {
-        let state = fed(Config::default(), &vec![seen.clone(); 3], EgoMotion::at_rest(DT_S));
-        state.estimate(&camera()).covariance[(0, 0)].sqrt()
-    };
     assert!(sigma(&sure) < 0.05 && sigma(&guess) > 0.5, "{} {}", sigma(&sure), sigma(&guess));
 }
 
@@ -362,10 +366,11 @@ fn doubts(range_m: f64, [forward, left, turn]: [f64; 3]) -> [f64; 3] {
 
 #[test]
 fn errors_of_the_odometry_add_to_what_they_move() {
-    let near = |found: [f64; 3], expected: [f64; 3]| {
+    fn near(found: [f64; 3], expected: [f64; 3]) {
         let off = |i: usize| (found[i] - expected[i]).abs() < 1e-3 * expected[i].max(0.01);
         assert!((0..3).all(off), "{found:?} {expected:?}");
-    };
+    }
+
     near(doubts(4.0, [0.0, 0.0, 0.02]), [(525.0 * 0.02f64).powi(2), 0.0, 0.0]);
     near(doubts(4.0, [0.0, 0.1, 0.0]), [(525.0 * 0.1 / 4.0f64).powi(2), 0.0, 0.0]);
     near(doubts(4.0, [0.1, 0.0, 0.0]), [0.0, 0.0, 0.01]);
@@ -586,7 +591,7 @@ fn without_a_gap_nothing_is_filtered_anew() {
 
 #[test]
 fn a_velocity_may_decay() {
-    let after = |velocity_decay_s: f64| {
+    fn after(velocity_decay_s: f64) -> (f64, f64) {
         let config = Config { velocity_decay_s, ..Config::default() };
         let mut state = fed(config.clone(), &sliding(30), EgoMotion::at_rest(DT_S));
         let place = state.image[0];
@@ -595,7 +600,8 @@ fn a_velocity_may_decay() {
             state.predict(&config, &EgoMotion::at_rest(0.1), &camera());
         }
         ((state.image[0] - place) / speed, state.image[2] / speed)
-    };
+    }
+
     let (way_s, left) = after(0.0);
     assert!((way_s - 10.0).abs() < 1e-9 && left == 1.0, "{way_s} {left}");
     // The whole way of a decaying velocity is the time constant times the velocity.
@@ -624,14 +630,15 @@ fn a_shaking_camera_moves_boxes_and_gives_them_no_velocity() {
 
 #[test]
 fn the_box_of_a_detection_may_be_reported_as_it_is() {
-    let region = |observed_boxes: bool| {
+    fn region(observed_boxes: bool) -> (bool, Rect) {
         let config = Config { observed_boxes, ..Config::default() };
         let sightings = sliding(3);
         let mut state = fed(config.clone(), &sightings, EgoMotion::at_rest(DT_S));
         let seen = state.estimate(&camera()).region;
         state.predict(&config, &EgoMotion::at_rest(DT_S), &camera());
         (seen == sightings[2].rect().unwrap(), state.estimate(&camera()).region)
-    };
+    }
+
     let filtered = region(false);
     let observed = region(true);
     assert_eq!((filtered.0, observed.0), (false, true));

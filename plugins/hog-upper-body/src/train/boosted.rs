@@ -32,6 +32,10 @@ pub(crate) fn boosted(
 /// Converts a tree to the form that is run; a leaf in place of a question becomes a question with
 /// the same value for both answers.
 fn flat(questions: &[Question]) -> Tree {
+    fn leaf(next: &Next) -> f32 {
+        if let Next::Leaf(value) = next { *value } else { 0.0 }
+    }
+
     let mut tree = Tree::default();
     let mut set = |at: usize, question: &Question| {
         (tree.numbers[at], tree.below[at]) = (question.feature as u16, question.below);
@@ -42,7 +46,6 @@ fn flat(questions: &[Question]) -> Tree {
             set(1 + side, &questions[*to]);
         }
     }
-    let leaf = |next: &Next| if let Next::Leaf(value) = next { *value } else { 0.0 };
     for (side, next) in questions[0].next.iter().enumerate() {
         let pair = match next {
             Next::Question(to) => questions[*to].next.map(|next| leaf(&next)),

@@ -84,8 +84,7 @@ fn proposals(frame: &Frame, depth: &DepthImage) -> Vec<(tagalong_geometry::Rect,
         let grid = Grid::new((camera.width, camera.height), side);
         wanted.clear();
         proposer.propose(&grid, &mut wanted);
-        let square = |w: &Wanted| Some((grid.square(w.x, w.y), w.depth_m?));
-        found.extend(wanted.iter().filter_map(square));
+        found.extend(wanted.iter().filter_map(|w| Some((grid.square(w.x, w.y), w.depth_m?))));
     }
     found
 }

@@ -258,8 +258,9 @@ impl HogTrainer {
         let Machine::Trees(trees) = &mut model.machine else { return };
         let apart = self.people.iter().filter(|(use_, _)| *use_ == Use::Calibration);
         let ways = apart.map(|(_, numbers)| trees.on_the_way(numbers).collect());
-        let found = |way: &Vec<f32>| way.last().is_some_and(|last| *last >= near_miss);
-        let ways: Vec<Vec<f32>> = ways.filter(found).collect();
+        let ways: Vec<Vec<f32>> = ways
+            .filter(|way: &Vec<f32>| way.last().is_some_and(|last| *last >= near_miss))
+            .collect();
         if !ways.is_empty() {
             trees.least = least_on_the_way(&ways);
         }
@@ -380,8 +381,13 @@ fn search(scanner: &mut Scanner, picture: &GreyImage, least: f32) -> Vec<crate::
     let sides = std::iter::successors(Some(SMALLEST_PX), |side| Some(side * SCALE_STEP));
     let sides = sides.take_while(|side| *side <= most);
     let mut found = Vec::new();
-    let all = |grid: &Grid, wanted: &mut Vec<Wanted>| wanted.extend(grid.windows(|_| Some(None)));
-    scanner.scan(picture, sides, least, all, &mut found);
+    scanner.scan(
+        picture,
+        sides,
+        least,
+        |grid, wanted| wanted.extend(grid.windows(|_| Some(None))),
+        &mut found,
+    );
     found
 }
 
@@ -478,14 +484,15 @@ mod tests {
 
     #[test]
     fn trees_reject_as_early_as_the_people_of_the_calibration_allow() {
-        let least = |people: Vec<(Use, Vec<f32>)>| {
+        fn least(people: Vec<(Use, Vec<f32>)>) -> Vec<f32> {
             let mut trainer = HogTrainer::new(Kind::Trees.into(), Training::default(), 1).unwrap();
             trainer.people = people;
             let mut model = trees();
             trainer.hurry(&mut model);
             let Machine::Trees(trees) = model.machine else { return Vec::new() };
             trees.least
-        };
+        }
+
         let good = (Use::Calibration, numbers(1.0));
         let late = (Use::Calibration, numbers(0.0));
         assert_eq!(least(vec![]), [HOPELESS; 2], "nothing is known");
@@ -505,11 +512,14 @@ mod tests {
     /// One round that ends far below a near miss for some: they are not found anyway.
     #[test]
     fn people_that_are_missed_anyway_do_not_hold_the_trees_up() {
+        fn person(first: f32) -> (Use, Vec<f32>) {
+            (Use::Calibration, numbers(first))
+        }
+
         let tree =
             crate::Tree { numbers: [0; 3], below: [0.5; 3], values: [-2.0, -2.0, -0.125, -0.125] };
         let mut model = of_trees(Trees::new(vec![tree; ROUND], HOPELESS));
         let mut trainer = HogTrainer::new(Kind::Trees.into(), Training::default(), 1).unwrap();
-        let person = |first: f32| (Use::Calibration, numbers(first));
         trainer.people = vec![person(1.0), person(1.0), person(0.0)];
         assert!(-16.0 < trainer.near_miss(), "the sum of the last one");
         trainer.hurry(&mut model);

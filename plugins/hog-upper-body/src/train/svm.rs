@@ -89,13 +89,14 @@ mod tests {
     /// The primal: |w|²/2 + sum of penalties times squared hinges.
     fn primal(windows: &Windows, width: usize, penalty: [f64; 2], w: &[f32], bias: f32) -> f64 {
         let half = 0.5 * f64::from(dot(w, w) + bias * bias);
-        let loss = |i: usize| {
-            let sign = if windows.is_person[i] { 1.0 } else { -1.0 };
-            let sum = dot(w, &windows.numbers[i * width..(i + 1) * width]) + bias;
-            penalty[usize::from(windows.is_person[i])]
-                * f64::from((1.0 - sign * sum).max(0.0)).powi(2)
-        };
-        half + (0..windows.len()).map(loss).sum::<f64>()
+        half + (0..windows.len())
+            .map(|i| {
+                let sign = if windows.is_person[i] { 1.0 } else { -1.0 };
+                let sum = dot(w, &windows.numbers[i * width..(i + 1) * width]) + bias;
+                penalty[usize::from(windows.is_person[i])]
+                    * f64::from((1.0 - sign * sum).max(0.0)).powi(2)
+            })
+            .sum::<f64>()
     }
 
     #[test]

@@ -33,7 +33,10 @@ const BESIDE: usize = 7;
 
 #[test]
 fn each_method_compares_as_many_scenes_as_it_says() {
-    let with = |method, points| Config { method, points, ..drawn() };
+    fn with(method: Method, points: usize) -> Config {
+        Config { method, points, ..drawn() }
+    }
+
     assert_eq!(scenes_of_two(with(Method::All, 50)), 625 + BESIDE);
     assert_eq!(scenes_of_two(with(Method::Table, 50)), 1281 + BESIDE);
     assert_eq!(scenes_of_two(with(Method::Kde, 50)), 50 + BESIDE);
@@ -45,11 +48,12 @@ fn each_method_compares_as_many_scenes_as_it_says() {
 
 #[test]
 fn there_are_as_many_particles_as_asked_for() {
-    let rows = |config: Config| {
+    fn rows(config: Config) -> usize {
         let mut rig = pair(config);
         rig.look(&Formula::flat(3.0));
         rig.columns(2).len()
-    };
+    }
+
     assert_eq!(rows(Config { joint_side: 7, ..drawn() }), 49);
     assert_eq!(rows(Config { particles: 80, method: Method::Partitioned, ..drawn() }), 80);
     let mut alone = Rig::new(Config { particles: 33, ..Config::default() }, 1);
@@ -59,7 +63,7 @@ fn there_are_as_many_particles_as_asked_for() {
 
 #[test]
 fn a_wide_belief_gets_as_many_particles_as_its_spread_asks() {
-    let rows = |config: Config| {
+    fn rows(config: Config) -> usize {
         let mut rig = Rig::new(config, 2);
         rig.start(1, [2.0, 0.0, 1.6], [0.02, 0.5, EXACT]);
         rig.look(&Formula::new(|scene: &[Person]| {
@@ -67,7 +71,8 @@ fn a_wide_belief_gets_as_many_particles_as_its_spread_asks() {
         }));
         rig.look(&Formula::flat(3.0));
         rig.columns(1).len()
-    };
+    }
+
     let config = Config { particles: 50, max_particles: 100_000, ..Config::default() };
     let usual = rows(config.clone());
     assert!((100..400).contains(&usual), "{usual}");
@@ -79,7 +84,7 @@ fn a_wide_belief_gets_as_many_particles_as_its_spread_asks() {
 
 #[test]
 fn marginalised_particles_keep_what_is_not_drawn_as_a_gaussian() {
-    let scattered = |marginalise| {
+    fn scattered(marginalise: bool) -> (f64, f64) {
         let mut rig = Rig::new(Config { marginalise, ..Config::default() }, 1);
         rig.start(1, [2.0, 0.0, 1.6], [EXACT, EXACT, 0.1]);
         rig.look(&Formula::flat(3.0));
@@ -88,7 +93,8 @@ fn marginalised_particles_keep_what_is_not_drawn_as_a_gaussian() {
         let (low, high) =
             rows.iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
         (high - low, rig.estimate(1).covariance[(2, 2)].sqrt())
-    };
+    }
+
     let ((kept, sigma), (drawn, spread)) = (scattered(true), scattered(false));
     assert!(kept < 0.1 && drawn > 5.0, "{kept} {drawn} pixels");
     assert!((sigma - 0.1).abs() < 0.005 && (spread - 0.1).abs() < 0.03, "{sigma} {spread}");
@@ -96,7 +102,7 @@ fn marginalised_particles_keep_what_is_not_drawn_as_a_gaussian() {
 
 #[test]
 fn who_is_weighed_together_keeps_depth_and_height_where_these_are_held() {
-    let spreads = |hold_depth, method, people| {
+    fn spreads(hold_depth: bool, method: Method, people: i32) -> [f64; 3] {
         let config = Config { hold_depth, method, chosen: Chosen::Spread, ..drawn() };
         let mut rig = Rig::new(config, 4);
         rig.start(1, [2.0, 0.0, 1.6], [EXACT, 0.05, EXACT]);
@@ -106,7 +112,8 @@ fn who_is_weighed_together_keeps_depth_and_height_where_these_are_held() {
         (0..5).for_each(|_| drop(rig.look(&Formula::flat(3.0))));
         let covariance = rig.estimate(1).covariance;
         [covariance[(0, 0)].sqrt(), covariance[(2, 2)].sqrt(), covariance[(1, 1)].sqrt()]
-    };
+    }
+
     for method in [Method::Table, Method::Kde, Method::Gp] {
         let [along, up, across] = spreads(true, method, 2);
         assert!(along < 1e-3 && up < 1e-3 && across > 0.05, "{along} {up} {across}");
@@ -186,13 +193,14 @@ fn a_heading_turns_against_the_robot() {
 
 #[test]
 fn a_part_of_the_particles_starts_again_at_a_sighting() {
-    let moved = |from_detection, marginalise| {
+    fn moved(from_detection: f64, marginalise: bool) -> usize {
         let mut rig = Rig::new(Config { from_detection, marginalise, ..Config::default() }, 4);
         rig.start(1, [2.0, 0.0, 1.6], [0.01; 3]);
         let seen = [(1, sighting(Point3::new(2.0, 0.5, 1.6), [0.01; 3]))];
         rig.look_after(EgoMotion::at_rest(0.1), &Formula::flat(3.0), &seen, None);
         rig.columns(1).iter().filter(|x| **x < 49.5 - 12.0).count()
-    };
+    }
+
     for marginalise in [true, false] {
         let parts = [0.0, 0.1, 0.5, 1.0].map(|part| moved(part, marginalise));
         assert_eq!(parts, [0, 10, 50, 100]);
@@ -206,10 +214,12 @@ fn frames_seen(config: &Config, nats: f64, sighted: bool) -> usize {
     rig.start(1, [2.0, 0.0, 1.6], [0.02; 3]);
     let seen = [(1, sighting(Point3::new(2.0, 0.0, 1.6), [0.02; 3]))];
     let sightings = if sighted { &seen[..] } else { &[] };
-    let look = |_: &usize| {
-        !rig.look_after(EgoMotion::at_rest(0.1), &Formula::flat(nats), sightings, None).is_empty()
-    };
-    (0..10).filter(look).count()
+    (0..10)
+        .filter(|_| {
+            !rig.look_after(EgoMotion::at_rest(0.1), &Formula::flat(nats), sightings, None)
+                .is_empty()
+        })
+        .count()
 }
 
 #[test]
@@ -230,8 +240,10 @@ fn support_is_asked_of_who_was_found_who_was_not_and_who_was_not_for_long() {
 #[test]
 fn who_is_hidden_explains_nothing_and_is_not_seen() {
     // Only the near person is visible.
-    let hidden =
-        |scene: &[Person]| 7.0 * scene.iter().filter(|p| p.position.x < 2.5).count() as f64;
+    fn hidden(scene: &[Person]) -> f64 {
+        7.0 * scene.iter().filter(|p| p.position.x < 2.5).count() as f64
+    }
+
     let mut rig = pair(Config::default());
     assert_eq!(rig.look(&Formula::new(hidden)), [1]);
     assert_eq!(pair(Config::default()).look(&Formula::flat(7.0)), [1, 2]);
@@ -258,7 +270,10 @@ fn displacements(config: Config, seed: u64) -> [Vec<f64>; 2] {
 }
 
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    fn dot(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>()
+    }
+
     dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
 }
 
@@ -311,7 +326,7 @@ fn a_scheme_may_share_noise_from_generators_of_the_dimensions() {
 
 #[test]
 fn a_scheme_may_report_the_prediction() {
-    let of = |config| {
+    fn of(config: Config) -> f64 {
         let mut rig = Rig::new(config, 1);
         rig.start(1, [2.0, 0.0, 1.6], [EXACT; 3]);
         for frame in 1..12 {
@@ -322,7 +337,8 @@ fn a_scheme_may_report_the_prediction() {
             rig.look(&Formula::new(log));
         }
         rig.place(1).y - 1.1
-    };
+    }
+
     let ahead = Config { sampling: Sampling::new(Ahead), ..drawn() };
     assert!(of(drawn()).abs() < 0.05 && of(ahead.clone()) > 0.04, "{}", of(ahead));
 }
@@ -385,19 +401,21 @@ fn the_compared_places_of_both_count_from_the_near_one() {
 
 /// Two people with particles that move to their detections alone.
 fn walked(swap_margin: f64, mirrored: bool) -> Rig {
+    // The second person faces left, the first one towards the robot.
+    fn facing(scene: &[Person]) -> f64 {
+        let fits = |p: &&Person| (p.velocity.y > 0.3) == (p.position.y < 0.0);
+        5.0 * scene.len() as f64 + 2.0 * scene.iter().filter(fits).count() as f64
+    }
+
     let config = Config { from_detection: 1.0, swap_margin, ..Config::default() };
     let mut rig = Rig::new(config, 1);
     let at = |y: f64| sighting(Point3::new(2.0, y, 1.6), [0.02; 3]);
     rig.start(1, [2.0, 0.7, 1.6], [0.02; 3]);
     rig.start(2, [2.0, -0.7, 1.6], [0.02; 3]);
     let image = |mirrored: bool| {
-        let shade = |x: usize, _| if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] };
-        Some(RgbImage::from_fn(100, 80, shade))
-    };
-    // The second person faces left, the first one towards the robot.
-    let facing = |scene: &[Person]| {
-        let fits = |p: &&Person| (p.velocity.y > 0.3) == (p.position.y < 0.0);
-        5.0 * scene.len() as f64 + 2.0 * scene.iter().filter(fits).count() as f64
+        Some(RgbImage::from_fn(100, 80, |x, _| {
+            if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] }
+        }))
     };
     let mut look = |y: f64, mirrored| {
         let sightings = [(1, at(y)), (2, at(-y))];
@@ -430,6 +448,11 @@ fn people_who_come_out_with_each_others_colours_get_each_others_names() {
 
 #[test]
 fn who_is_forgotten_leaves_the_others_as_they_were() {
+    // A track number that is used again has no heading from before.
+    fn left(scene: &[Person]) -> f64 {
+        5.0 * scene.iter().filter(|p| p.velocity.y > 0.3).count() as f64
+    }
+
     use tagalong_core::{Filter, TrackId};
     let mut rig = pair(Config::default());
     rig.start(3, [2.5, -1.5, 1.6], [0.05; 3]);
@@ -441,8 +464,6 @@ fn who_is_forgotten_leaves_the_others_as_they_were() {
     assert_eq!(rig.columns(2).len(), Config::default().particles);
     rig.filter.stop(TrackId(2));
     assert!(!rig.columns(3).is_empty() && rig.columns(2).is_empty());
-    // A track number that is used again has no heading from before.
-    let left = |scene: &[Person]| 5.0 * scene.iter().filter(|p| p.velocity.y > 0.3).count() as f64;
     rig.look(&Formula::new(left));
     rig.filter.stop(TrackId(3));
     rig.start(3, [2.5, 0.0, 1.6], [0.05; 3]);

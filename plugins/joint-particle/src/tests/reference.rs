@@ -203,8 +203,10 @@ impl ApparentPositions {
 
     /// The same for people in the robot's axes, by their bearings.
     fn scene(self, scene: &[Person]) -> f64 {
-        let lateral =
-            |person: &Person, depth_m: f64| depth_m * person.position.y / person.position.x;
+        fn lateral(person: &Person, depth_m: f64) -> f64 {
+            depth_m * person.position.y / person.position.x
+        }
+
         let near = scene.iter().find(|p| p.position.x < 2.5).map(|p| lateral(p, NEAR_M));
         let far = scene.iter().find(|p| p.position.x >= 2.5).map(|p| lateral(p, FAR_M));
         let of_near = near.map_or(0.0, |near| self.near_log(near));

@@ -46,8 +46,9 @@ pub fn trials(
     let each = training.gammas.iter().flat_map(|g| training.penalties.iter().map(|c| (*g, *c)));
     let grid: Vec<(f64, f64)> = each.collect();
     let attempt = |&(gamma, penalty): &(f64, f64)| {
-        let fit = |fitted: &[&Sample]| solver::fit(fitted, sampler, gamma, penalty);
-        let held_out = hold_out(samples, &parts, training.folds, fit)?;
+        let held_out = hold_out(samples, &parts, training.folds, |fitted| {
+            solver::fit(fitted, sampler, gamma, penalty)
+        })?;
         Ok(Trial { gamma, penalty, held_out })
     };
     side_by_side(&grid, attempt, progress)

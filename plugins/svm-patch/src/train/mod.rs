@@ -132,8 +132,10 @@ fn rounded(value: f64) -> toml::Value {
 }
 
 fn check(training: &Training) -> Result<()> {
-    let positive =
-        |values: &[f64]| !values.is_empty() && values.iter().all(|v| v.is_finite() && *v > 0.0);
+    fn positive(values: &[f64]) -> bool {
+        !values.is_empty() && values.iter().all(|v| v.is_finite() && *v > 0.0)
+    }
+
     let rules = [
         (positive(&training.gammas), "gammas", "must be positive numbers"),
         (positive(&training.penalties), "penalties", "must be positive numbers"),

@@ -65,10 +65,10 @@ mod tests {
 
     #[test]
     fn a_class_weighs_as_much_as_the_other_one_whatever_its_share() {
-        let sample = |is_person| Sample {
-            patch: Box::new([0.0; PIXELS]),
-            example: Example { is_person, group: 1 },
-        };
+        fn sample(is_person: bool) -> Sample {
+            Sample { patch: Box::new([0.0; PIXELS]), example: Example { is_person, group: 1 } }
+        }
+
         let all: Vec<Sample> = (0..40).map(|k| sample(k < 10)).collect();
         let all: Vec<&Sample> = all.iter().collect();
         let (for_people, for_others) = penalties(&all, 3.0).unwrap();
@@ -81,13 +81,16 @@ mod tests {
     /// the solver's own has another parameter.
     #[test]
     fn the_model_separates_what_it_was_fitted_to() {
+        fn example(k: usize) -> Example {
+            Example { is_person: k.is_multiple_of(3), group: k as u64 }
+        }
+
         let patch = |k: usize| {
             let mut patch = Box::new([0.0; PIXELS]);
             patch[k] = 1.0;
             patch[(7 * k + 3) % PIXELS] += 0.5;
             patch
         };
-        let example = |k: usize| Example { is_person: k.is_multiple_of(3), group: k as u64 };
         let samples: Vec<Sample> =
             (0..24).map(|k| Sample { patch: patch(k), example: example(k) }).collect();
         let of: Vec<&Sample> = samples.iter().collect();

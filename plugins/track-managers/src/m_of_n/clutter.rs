@@ -125,8 +125,12 @@ mod tests {
         let mut clutter = ClutterMap::default();
         clutter.add_evidence(&scored(-4.0, person(3.0, 0.0)), &settings());
         clutter.add_evidence(&scored(-2.0, person(3.0, 0.5)), &settings());
-        let at = |y: f64| clutter.clone().add_evidence(&person(3.0, y), &settings());
-        assert_eq!([0.0, 0.2, 0.29, 0.81].map(at), [-3.0, -3.0, -1.0, 1.0], "the nearest counts");
+        assert_eq!(
+            [0.0, 0.2, 0.29, 0.81]
+                .map(|y| clutter.clone().add_evidence(&person(3.0, y), &settings())),
+            [-3.0, -3.0, -1.0, 1.0],
+            "the nearest counts"
+        );
         clutter.clear();
         assert_eq!(clutter.add_evidence(&person(3.0, 0.0), &settings()), 1.0);
     }

@@ -98,10 +98,15 @@ fn confirmed(config: Config, score: f64, observations: &[Observation]) -> bool {
 
 #[test]
 fn hits_confirm_only_if_they_are_close_to_each_other() {
+    fn config() -> Config {
+        Config { confirm_hits: 3, confirm_within: 5, tentative_misses: 9, ..Config::default() }
+    }
+
+    fn hits(observations: &[Observation]) -> bool {
+        confirmed(config(), 1.0, observations)
+    }
+
     use Observation::{Missed, NotSearched, Occluded, OutOfView};
-    let config =
-        || Config { confirm_hits: 3, confirm_within: 5, tentative_misses: 9, ..Config::default() };
-    let hits = |observations: &[Observation]| confirmed(config(), 1.0, observations);
     assert!(!hits(&[DETECTED]) && hits(&[DETECTED, DETECTED]), "the first detection counts");
     assert!(hits(&[Missed, DETECTED, Missed, DETECTED]), "three of five");
     assert!(!hits(&[Missed, Missed, DETECTED, Missed, DETECTED]), "of six");
@@ -112,12 +117,13 @@ fn hits_confirm_only_if_they_are_close_to_each_other() {
 
 #[test]
 fn two_hits_in_a_row_confirm_where_images_are_far_apart() {
-    use Observation::{Missed, Occluded};
     // The frames of the rig are an eighth of a second apart.
-    let hits = |confirm_apart_s: f64, observations: &[Observation]| {
+    fn hits(confirm_apart_s: f64, observations: &[Observation]) -> bool {
         let config = Config { confirm_hits: 4, confirm_within: 5, ..Config::default() };
         confirmed(Config { confirm_apart_s, ..config }, 1.0, observations)
-    };
+    }
+
+    use Observation::{Missed, Occluded};
     assert!(hits(0.125, &[DETECTED]) && hits(0.125, &[Occluded, DETECTED]));
     assert!(!hits(0.125, &[Missed, DETECTED]), "not in a row");
     assert!(!hits(0.126, &[DETECTED; 2]) && !hits(0.0, &[DETECTED; 2]));
@@ -127,8 +133,11 @@ fn two_hits_in_a_row_confirm_where_images_are_far_apart() {
 
 #[test]
 fn hits_that_are_probably_no_person_confirm_no_track() {
+    fn config() -> Config {
+        Config { drop_score: -9.0, ..Config::default() }
+    }
+
     let doubtful = Observation::Detected { log_odds: -0.5 };
-    let config = || Config { drop_score: -9.0, ..Config::default() };
     assert!(!confirmed(config(), 0.1, &[doubtful; 6]));
     assert!(confirmed(config(), 0.1, &[Observation::Updated; 2]), "no score, no doubt");
     let sure = Observation::Detected { log_odds: 4.0 };
@@ -140,8 +149,11 @@ fn hits_that_are_probably_no_person_confirm_no_track() {
 
 #[test]
 fn scores_are_smoothed_and_misses_speak_against_a_person() {
+    fn score(observations: &[Observation]) -> f64 {
+        live(Config::default(), 1.0, observations).0.score
+    }
+
     use Observation::{Missed, NotSearched, Occluded, OutOfView, Updated};
-    let score = |observations: &[Observation]| live(Config::default(), 1.0, observations).0.score;
     let sure = Observation::Detected { log_odds: 3.0 };
     assert!((score(&[sure]) - 1.6).abs() < 1e-12, "0.3 of the way");
     assert!((score(&[Missed]) - 0.4).abs() < 1e-12, "0.3 of the way to -1");
@@ -222,12 +234,13 @@ fn candidates_are_dropped_by_the_test_that_they_fail() {
 
 #[test]
 fn a_place_that_was_rejected_is_doubted_until_a_reset() {
-    let mut manager = MOfN::new(Config { doubt_s: 3.0, ..Config::default() }).unwrap();
-    let initiate = |manager: &mut MOfN, score: f64| {
+    fn initiate(manager: &mut MOfN, score: f64) -> Initiation {
         let seen = scored(score, person(3.0, 0.0));
         let new = Unassociated { detection: &seen, detector_log_odds: 5.0, discovered: true };
         manager.initiate(TrackId(1), &new)
-    };
+    }
+
+    let mut manager = MOfN::new(Config { doubt_s: 3.0, ..Config::default() }).unwrap();
     assert_eq!(initiate(&mut manager, -4.0), Initiation::Drop("verifier"));
     assert_eq!(initiate(&mut manager, 1.0), Initiation::Drop("doubt"));
     assert_eq!(initiate(&mut manager, 0.0), Initiation::Drop("doubt"));
@@ -237,7 +250,10 @@ fn a_place_that_was_rejected_is_doubted_until_a_reset() {
 
 #[test]
 fn settings_that_cannot_work_are_refused() {
-    let refusal = |config: Config| MOfN::new(config).err().map(|error| error.to_string());
+    fn refusal(config: Config) -> Option<String> {
+        MOfN::new(config).err().map(|error| error.to_string())
+    }
+
     let default = Config::default;
     assert_eq!(refusal(default()), None);
     for (config, key) in [

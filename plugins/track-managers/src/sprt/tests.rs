@@ -136,7 +136,7 @@ fn a_person_who_stands_from_the_first_frame_is_kept_by_sure_looks() {
 /// The robot drives past: each view is a look of its own.
 #[test]
 fn looks_from_elsewhere_count_in_full() {
-    let confirmed_s = |drives: bool| {
+    fn confirmed_s(drives: bool) -> f64 {
         let mut scene = Scene::new(Config::default());
         for i in 0..15 {
             let forward = if drives { 0.1 } else { 0.0 };
@@ -144,7 +144,8 @@ fn looks_from_elsewhere_count_in_full() {
             scene.frame(EgoMotion { forward, ..still() }, Some(detection(x, 1.5)));
         }
         scene.confirmed_s
-    };
+    }
+
     assert!(confirmed_s(true) > 0.5 && confirmed_s(false) == 0.0);
 }
 
@@ -166,15 +167,16 @@ fn a_thing_stays_clutter_while_the_robot_drives() {
 /// 0.5 m beside the place it is no clutter, and at it neither after two minutes or a reset.
 #[test]
 fn clutter_is_of_its_place_and_time() {
+    fn starts(manager: &mut Sprt, x: f64) -> bool {
+        let seen = detection(x, 1.0);
+        let new = Unassociated { detection: &seen, detector_log_odds: 1.0, discovered: true };
+        matches!(manager.initiate(TrackId(9), &new), Initiation::Start(_))
+    }
+
     let mut scene = Scene::new(Config::default());
     for _ in 0..40 {
         scene.frame(still(), Some(detection(4.0, 1.0)));
     }
-    let starts = |manager: &mut Sprt, x: f64| {
-        let seen = detection(x, 1.0);
-        let new = Unassociated { detection: &seen, detector_log_odds: 1.0, discovered: true };
-        matches!(manager.initiate(TrackId(9), &new), Initiation::Start(_))
-    };
     assert!(!starts(&mut scene.manager, 4.0) && starts(&mut scene.manager, 4.5));
     scene.manager.predict(&EgoMotion::at_rest(120.0));
     assert!(starts(&mut scene.manager, 4.0));
@@ -219,11 +221,12 @@ fn a_thing_that_is_found_at_two_places_has_not_moved() {
 
 #[test]
 fn verifiers_keep_a_person_who_stands_from_the_first_frame_and_no_thing() {
-    let confirmed_s = |score: f64| {
+    fn confirmed_s(score: f64) -> f64 {
         let mut scene = Scene::new(verified());
         (0..300).for_each(|_| scene.frame(still(), Some(detection(3.0, score))));
         scene.confirmed_s
-    };
+    }
+
     assert!(confirmed_s(10.0) > 29.0 && confirmed_s(6.0) < 2.3);
 }
 
@@ -244,7 +247,7 @@ fn a_thing_that_was_believed_once_ends_when_it_is_doubted() {
 /// A person walks to a wall and out of sight, and the detector goes on finding the wall.
 #[test]
 fn a_track_that_changes_over_to_a_thing_ends() {
-    let confirmed_s = |score: f64| {
+    fn confirmed_s(score: f64) -> f64 {
         let mut scene = Scene::new(verified());
         for i in 0..200 {
             let x = 5.0 - 0.1 * f64::from(i.min(20));
@@ -252,7 +255,8 @@ fn a_track_that_changes_over_to_a_thing_ends() {
             scene.frame(still(), Some(detection(x, score)));
         }
         scene.confirmed_s
-    };
+    }
+
     assert!(confirmed_s(-2.0) < 9.0, "{}", confirmed_s(-2.0));
     assert!(confirmed_s(6.0) > 19.0, "a person who stops is less clear, and stays");
 }

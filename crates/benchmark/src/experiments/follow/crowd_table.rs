@@ -87,13 +87,14 @@ mod tests {
 
     #[test]
     fn rides_among_people_have_a_row_and_others_have_none() {
-        let ride = |crowd| Followed {
-            ridden: Ridden { crowd, ..Ridden::default() },
-            ..Followed::default()
-        };
-        let measured = |success, path_m| {
+        fn ride(crowd: Option<CrowdMeasures>) -> Followed {
+            Followed { ridden: Ridden { crowd, ..Ridden::default() }, ..Followed::default() }
+        }
+
+        fn measured(success: bool, path_m: f64) -> Followed {
             ride(Some(CrowdMeasures { success, path_m, ..CrowdMeasures::default() }))
-        };
+        }
+
         let rides = [measured(true, 4.0), measured(false, 6.0), ride(None)];
         let row = row("a", &rides.iter().collect::<Vec<_>>()).unwrap();
         let values: Vec<_> = row.cells[..4].iter().map(|cell| cell.value).collect();

@@ -18,6 +18,10 @@ const FEATURES: usize = 11;
 
 /// Fits the settings of the lock's probabilities to the true identities.
 pub fn looks(results: &[Followed]) -> LooksSettings {
+    fn known(weight: f64, offset: f64, usual: [f64; 2]) -> [f64; 2] {
+        if weight == 0.0 && offset == 0.0 { usual } else { term(weight, offset) }
+    }
+
     let sightings = results.iter().flat_map(|followed| &followed.ridden.likeness);
     let examples: Vec<Example<FEATURES>> = sightings
         .map(|(like, same)| Example {
@@ -42,9 +46,6 @@ pub fn looks(results: &[Followed]) -> LooksSettings {
     // Colours have no weight where a network describes people, and the other way round: such a term
     // keeps its default.
     let usual = LooksSettings::default();
-    let known = |weight: f64, offset: f64, usual: [f64; 2]| {
-        if weight == 0.0 && offset == 0.0 { usual } else { term(weight, offset) }
-    };
     LooksSettings {
         torso: known(torso, torso_0, usual.torso),
         legs: known(legs, legs_0, usual.legs),

@@ -131,11 +131,10 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     let times = |a: fn(&Ridden) -> f64, b: fn(&Ridden) -> f64| {
         // Rides without any of that time would be a division by zero.
         let of: Vec<&Ridden> = rides.iter().copied().filter(|ride| b(ride) > 0.0).collect();
-        let ratio = |drawn: &[usize]| {
+        draws_interval(of.len(), |drawn| {
             let sum = |f: fn(&Ridden) -> f64| drawn.iter().map(|&i| f(of[i])).sum::<f64>();
             sum(a) / sum(b)
-        };
-        draws_interval(of.len(), ratio)
+        })
     };
     let part = |a, b, digits| {
         Cell::estimate(times(a, b).map(|share| share.within(0.0, 1.0)), digits).percent()
@@ -368,8 +367,11 @@ mod tests {
 
     #[test]
     fn calibrated_probabilities_are_shown_beside_those_before() {
+        fn count(table: &Table, row: usize) -> Option<f64> {
+            table.rows[row].cells[0].value
+        }
+
         let seeds = Split::Test.seeds(0, 1).unwrap();
-        let count = |table: &Table, row: usize| table.rows[row].cells[0].value;
         let both = tables(&[seen(0.75, 0.45)], seeds);
         assert_eq!([count(&both[1], 4), count(&both[1], 7)], [Some(1.0), Some(0.0)]);
         assert_eq!([count(&both[2], 4), count(&both[2], 7)], [Some(0.0), Some(1.0)]);
@@ -393,7 +395,10 @@ mod tests {
 
     #[test]
     fn each_value_of_a_sweep_over_scenes_has_a_row_for_all_of_them() {
-        let group = |name: &str, rides| (name.to_owned(), rides);
+        fn group(name: &str, rides: usize) -> (String, usize) {
+            (name.to_owned(), rides)
+        }
+
         assert_eq!(named(&[("a", None), ("a", None)]), [group("a", 2)]);
         let two = [("a", None), ("b", None)];
         assert_eq!(named(&two), [group("a", 1), group("b", 1), group("all scenes", 2)]);

@@ -457,8 +457,9 @@ impl Heights {
 
     /// Returns the middle of each height, m.
     fn metres(self) -> impl Iterator<Item = f64> {
-        let is_set = move |bit: &u16| self.0 & (1 << bit) != 0;
-        (0..16).filter(is_set).map(|bit| (f64::from(bit) + 0.5) * BAND_M)
+        (0..16)
+            .filter(move |bit| self.0 & (1 << bit) != 0)
+            .map(|bit| (f64::from(bit) + 0.5) * BAND_M)
     }
 }
 

@@ -336,6 +336,10 @@ fn where_the_image_went_dark_from_top_to_bottom_somebody_stands() {
 /// texture, and nothing where it is smooth but for the noise of the camera.
 #[test]
 fn what_a_stereo_pair_cannot_match_for_want_of_texture_is_no_object() {
+    fn noisy(u: usize, v: usize) -> u8 {
+        100 + ((7 * u + 3 * v) % 5) as u8
+    }
+
     let settings = settings();
     let seen = with_box(9.0, 0.0);
     let dark =
@@ -346,7 +350,6 @@ fn what_a_stereo_pair_cannot_match_for_want_of_texture_is_no_object() {
                 if (30..50).contains(&u) { f32::NAN } else { seen.row(v)[u] }
             },
         );
-    let noisy = |u: usize, v: usize| 100 + ((7 * u + 3 * v) % 5) as u8;
     for (stripes, expected) in [(40, Some(HIDES_M - 0.25)), (0, None)] {
         let mut surroundings = memory();
         let image =

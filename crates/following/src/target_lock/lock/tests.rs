@@ -83,12 +83,13 @@ fn who_comes_back_has_to_look_like_the_person_five_times() {
 
 #[test]
 fn nobody_is_told_apart_from_a_person_who_is_out_of_sight() {
-    let is_known = |seen: bool| {
+    fn is_known(seen: bool) -> bool {
         let mut lock = new_lock(settings());
         steps(&mut lock, 20, &tall(1.6));
         step(&mut lock, &[Track { seen, ..tall(1.6) }, somebody(2, 2.0, 1.5)]);
         lock.others.contains(&TrackId(2))
-    };
+    }
+
     assert!(is_known(true) && !is_known(false));
 }
 
@@ -119,15 +120,17 @@ fn somebody_who_came_near_may_have_been_taken_for_the_person() {
 
 #[test]
 fn in_front_is_what_the_settings_say() {
-    let chosen = |track: Track| {
+    fn chosen(track: Track) -> bool {
         let mut lock = new_lock(settings());
         step(&mut lock, &[track]);
         lock.followed().is_some()
-    };
-    let at = |degrees: f64, range_m: f64| {
+    }
+
+    fn at(degrees: f64, range_m: f64) -> bool {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         chosen(somebody(1, range_m * cosine, range_m * sine))
-    };
+    }
+
     assert!(at(44.0, 2.0) && at(-44.0, 2.0) && !at(46.0, 2.0) && !at(-46.0, 2.0));
     assert!(at(30.0, 4.9) && !at(30.0, 5.1));
     assert!(!chosen(Track { confirmed: false, ..somebody(1, 2.0, 0.0) }));
@@ -154,12 +157,15 @@ fn nobody_is_farther_than_they_can_have_walked() {
 
 #[test]
 fn what_stood_beside_the_person_is_another_for_a_minute() {
+    fn is_other(lock: &TargetLock, x: f64) -> bool {
+        lock.is_other(&somebody(9, x, 0.0))
+    }
+
     let mut lock = new_lock(settings());
     lock.note_other(&somebody(7, 3.0, 0.0));
     let mut walks = somebody(8, 5.0, 0.0);
     walks.estimate.person.velocity.x = 0.5;
     lock.note_other(&walks);
-    let is_other = |lock: &TargetLock, x: f64| lock.is_other(&somebody(9, x, 0.0));
     assert!(is_other(&lock, 3.39) && !is_other(&lock, 3.41) && !is_other(&lock, 5.0));
     assert!(lock.is_other(&somebody(8, 9.0, 0.0)), "by the number of the track");
     lock.move_along(&EgoMotion { forward: 1.0, ..EgoMotion::at_rest(59.0) });

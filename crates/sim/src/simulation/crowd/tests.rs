@@ -40,12 +40,16 @@ fn all_arrive(simulation: &Simulation) -> bool {
 
 /// People on a circle, all of whom walk to the opposite point.
 fn circle(people: usize) -> Vec<[[f64; 2]; 2]> {
-    let at = |angle: f64| [10.0 + 5.0 * angle.cos(), 10.0 + 5.0 * angle.sin()];
-    let way = |i: usize| {
-        let angle = TAU * i as f64 / people as f64;
-        [at(angle), at(angle + 0.5 * TAU)]
-    };
-    (0..people).map(way).collect()
+    fn at(angle: f64) -> [f64; 2] {
+        [10.0 + 5.0 * angle.cos(), 10.0 + 5.0 * angle.sin()]
+    }
+
+    (0..people)
+        .map(|i| {
+            let angle = TAU * i as f64 / people as f64;
+            [at(angle), at(angle + 0.5 * TAU)]
+        })
+        .collect()
 }
 
 #[test]

@@ -29,13 +29,17 @@ fn events(faults: &[InjectedFault]) -> Vec<Event> {
 }
 
 fn shots_of(faults: &[InjectedFault]) -> Vec<Shot> {
-    let of = |event| if let Event::Shot(shot) = event { Some(*shot) } else { None };
-    events(faults).into_iter().filter_map(of).collect()
+    events(faults)
+        .into_iter()
+        .filter_map(|event| if let Event::Shot(shot) = event { Some(*shot) } else { None })
+        .collect()
 }
 
 fn readings(faults: &[InjectedFault]) -> Vec<OdometryReading> {
-    let of = |event| if let Event::Odometry(reading) = event { Some(reading) } else { None };
-    events(faults).into_iter().filter_map(of).collect()
+    events(faults)
+        .into_iter()
+        .filter_map(|event| if let Event::Odometry(reading) = event { Some(reading) } else { None })
+        .collect()
 }
 
 fn is_within(at_ns: u64) -> bool {
@@ -166,7 +170,10 @@ fn noise_has_the_size_that_is_asked_for() {
 
 #[test]
 fn broken_rays_are_those_ahead() {
-    let ahead = |ray: &usize| (*ray as f64 + 0.5 - 36.0).abs() <= 9.0;
+    fn ahead(ray: &usize) -> bool {
+        (*ray as f64 + 0.5 - 36.0).abs() <= 9.0
+    }
+
     let mut kinds = [0; 3];
     for (shot, whole) in broken(fault(FaultKind::LaserInvalid)) {
         let ranges = shot.laser.unwrap();
@@ -257,19 +264,21 @@ fn odometry_that_is_no_number_or_silent_or_frozen_is_whole_before_and_after() {
 
 #[test]
 fn wrong_odometry_measures_a_part_of_the_motion() {
+    fn moved(pair: &[OdometryReading]) -> f64 {
+        (pair[0].odom_from_robot.inverse() * pair[1].odom_from_robot).translation.vector.norm()
+    }
+
+    fn turned(pair: &[OdometryReading]) -> f64 {
+        pair[1].encoders[0].angle_rad - pair[0].encoders[0].angle_rad
+    }
+
     let whole = readings(&[]);
     let wrong = readings(&[fault(FaultKind::OdometryWrong).with_size(0.5)]);
     for (pair, wrong) in whole.windows(2).zip(wrong.windows(2)) {
-        let moved = |pair: &[OdometryReading]| {
-            (pair[0].odom_from_robot.inverse() * pair[1].odom_from_robot).translation.vector.norm()
-        };
         // The step that ends within the fault is the first wrong one.
         let factor = if is_within(pair[1].at_ns) { 0.5 } else { 1.0 };
         assert!((moved(wrong) - factor * moved(pair)).abs() < 1e-9);
         assert!((wrong[1].speed_mps - factor * pair[1].speed_mps).abs() < 1e-12);
-        let turned = |pair: &[OdometryReading]| {
-            pair[1].encoders[0].angle_rad - pair[0].encoders[0].angle_rad
-        };
         assert!((turned(wrong) - factor * turned(pair)).abs() < 1e-9);
     }
     assert!(whole.iter().zip(&wrong).take(50).all(|(whole, wrong)| whole == wrong));
@@ -322,6 +331,10 @@ fn a_calibration_that_changes_is_told_and_the_images_stay() {
 
 #[test]
 fn a_mount_that_moves_is_told_and_one_that_is_knocked_is_not() {
+    fn ahead(camera: &Camera) -> Vector3<f64> {
+        camera.robot_from_camera.rotation * Vector3::z()
+    }
+
     for (kind, is_told) in [(FaultKind::MountMoved, true), (FaultKind::MountKnocked, false)] {
         for (shot, whole) in broken(fault(kind)) {
             assert_ne!(depth_bits(&shot), depth_bits(&whole));
@@ -330,7 +343,6 @@ fn a_mount_that_moves_is_told_and_one_that_is_knocked_is_not() {
         }
         let moved = simulation(&[fault(kind)]);
         let mounted = moved.injector.mounted(moved.camera(), 1_500_000_000);
-        let ahead = |camera: &Camera| camera.robot_from_camera.rotation * Vector3::z();
         let turned = ahead(&mounted).angle(&ahead(moved.camera())).to_degrees();
         assert!((turned - 10.0).abs() < 1e-6 && ahead(&mounted).y > 0.1, "{turned}");
     }
@@ -380,7 +392,7 @@ fn wheels_that_fail_do_not_obey() {
 
 #[test]
 fn the_same_seed_gives_the_same_faults() {
-    let broken = |seed: u64| {
+    fn broken(seed: u64) -> Vec<Vec<u32>> {
         let mut scene = Scene::parse(SCENE).unwrap();
         scene.seed = seed;
         scene.faults.inject = vec![fault(FaultKind::NoiseDepth), fault(FaultKind::DarkColumns)];
@@ -388,17 +400,19 @@ fn the_same_seed_gives_the_same_faults() {
         let events = std::iter::from_fn(|| simulation.next_event());
         let of = |event| if let Event::Shot(shot) = event { Some(depth_bits(&shot)) } else { None };
         events.filter_map(of).collect::<Vec<_>>()
-    };
+    }
+
     assert_eq!(broken(3), broken(3));
     assert_ne!(broken(3)[12], broken(4)[12]);
 }
 
 #[test]
 fn further_sensors_fall_silent_or_repeat_themselves() {
-    let readings = |faults: &[InjectedFault]| -> Vec<SensorReading> {
+    fn readings(faults: &[InjectedFault]) -> Vec<SensorReading> {
         let of = |event| if let Event::Sensor(reading) = event { Some(reading) } else { None };
         events(faults).into_iter().filter_map(of).collect()
-    };
+    }
+
     let whole = readings(&[]);
     let silent = readings(&[fault(FaultKind::DropSensors)]);
     assert_eq!((whole.len(), silent.len()), (30, 20));

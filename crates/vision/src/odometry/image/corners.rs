@@ -73,10 +73,13 @@ mod tests {
 
     #[test]
     fn the_corners_of_a_board_are_found_and_its_edges_are_not() {
+        fn off(v: f64) -> f64 {
+            (v / 48.0 - (v / 48.0).round()).abs() * 48.0
+        }
+
         let board = found(|x, y| if (x / 48 + y / 48) % 2 == 0 { 30 } else { 220 });
         assert!(board.len() >= 3, "{board:?}");
         for at in &board {
-            let off = |v: f64| (v / 48.0 - (v / 48.0).round()).abs() * 48.0;
             assert!(off(at.x) < 9.0 && off(at.y) < 9.0, "{at}");
         }
         let stripes = found(|x, _| if (x / 48) % 2 == 0 { 30 } else { 220 });

@@ -43,9 +43,12 @@ pub(super) fn track(
 /// Returns the shift of a whole image to another, pixels of its full size, to the pixel of the
 /// coarsest image: for a camera that jerks by more than a patch shows.
 pub(super) fn whole_shift(from: &[GreyImage], to: &[GreyImage]) -> Vector2<f64> {
+    fn reach(side: usize) -> i64 {
+        (REACH * side as f64) as i64
+    }
+
     let level = from.len().min(to.len()).saturating_sub(1);
     let (Some(from), Some(to)) = (from.get(level), to.get(level)) else { return Vector2::zeros() };
-    let reach = |side: usize| (REACH * side as f64) as i64;
     let columns = reach(from.width());
     let rows = reach(from.height());
     let mut best = (misfit(from, to, (0, 0)), (0, 0));
@@ -117,13 +120,17 @@ mod tests {
 
     /// A pattern without a period: random brightness in squares of 16 pixels, and smooth between.
     fn pattern(x: f64, y: f64) -> f64 {
-        let knot = |i: f64, j: f64| {
+        fn knot(i: f64, j: f64) -> f64 {
             let at = (i + 1000.0) * 4000.0 + j + 1000.0;
             (tagalong_math::number_at(5, at as u64) >> 56) as f64
-        };
+        }
+
+        fn smooth(part: f64) -> f64 {
+            part * part * (3.0 - 2.0 * part)
+        }
+
         let i = (x / 16.0).floor();
         let j = (y / 16.0).floor();
-        let smooth = |part: f64| part * part * (3.0 - 2.0 * part);
         let across = smooth(x / 16.0 - i);
         let down = smooth(y / 16.0 - j);
         let row = |j: f64| knot(i, j) + across * (knot(i + 1.0, j) - knot(i, j));

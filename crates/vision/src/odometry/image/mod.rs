@@ -124,9 +124,10 @@ impl View {
         let near = AGREES * self.nominal.width as f64 / lens.fx;
         let ray = |at: Point2<f64>| self.nominal.ray(at).xy();
         let people: Vec<Rect> = people.iter().map(|person| outline(&person.region)).collect();
-        let is_free = |at: &Point2<f64>| people.iter().all(|person| !holds(person, at));
-        let from: Vec<Point2<f64>> =
-            corners(&self.levels, settings).into_iter().filter(is_free).collect();
+        let from: Vec<Point2<f64>> = corners(&self.levels, settings)
+            .into_iter()
+            .filter(|at| people.iter().all(|person| !holds(person, at)))
+            .collect();
         let fit = |guess: Vector2<f64>| {
             let found = |at: &Point2<f64>| track(&self.levels, &next.levels, *at, guess);
             let pairs = from.iter().filter_map(|at| Some([ray(*at), ray(found(at)?)]));
@@ -175,8 +176,9 @@ impl View {
         let mount = settled(&level, &self.nominal, motion.dt, settings.settle_s);
         // Without odometry a log says that the robot stands, surely or not.
         let is_at_rest = [motion.forward, motion.left, motion.turn] == [0.0; 3];
-        let moves = |fit: &&SwingFit| is_at_rest && fit.swing != Swing::default();
-        let by_image = found.filter(moves).map(|fit| self.moved(fit, pan, motion, settings));
+        let by_image = found
+            .filter(|fit| is_at_rest && fit.swing != Swing::default())
+            .map(|fit| self.moved(fit, pan, motion, settings));
         Some((by_image.unwrap_or(motion), mount))
     }
 

@@ -230,8 +230,9 @@ mod tests {
         let least = |least| SwingFit::of_agreeing(&pairs, NEAR, least).is_some();
         assert!(least(36) && !least(37));
         let mut random = SplitMix64::new(7);
-        let mut any = || Vector2::new(random.between(-0.6, 0.6), random.between(-0.5, 0.5));
-        let noise: Vec<Pair> = rays().map(|at| [at, any()]).collect();
+        let noise: Vec<Pair> = rays()
+            .map(|at| [at, Vector2::new(random.between(-0.6, 0.6), random.between(-0.5, 0.5))])
+            .collect();
         assert_eq!(SwingFit::of_agreeing(&noise, NEAR, 8), None, "none agree");
     }
 
@@ -256,7 +257,10 @@ mod tests {
 
     #[test]
     fn the_uncertainty_is_that_of_the_points() {
-        let off = |i: usize| Vector2::new((i % 3) as f64 - 1.0, (i / 3 % 3) as f64 - 1.0) * 1e-3;
+        fn off(i: usize) -> Vector2<f64> {
+            Vector2::new((i % 3) as f64 - 1.0, (i / 3 % 3) as f64 - 1.0) * 1e-3
+        }
+
         let pairs: Vec<Pair> = rays().enumerate().map(|(i, at)| [at, at + off(i)]).collect();
         let found = SwingFit::of_agreeing(&pairs, NEAR, 12).unwrap();
         // A deviation of 0.82e-3 along either axis, over the root of 60 points.
@@ -268,6 +272,10 @@ mod tests {
     /// Two numbers of a point less the four of the motion: nine points have 14, twice as many 32.
     #[test]
     fn few_points_are_the_less_certain_by_the_numbers_that_the_motion_takes() {
+        fn variance(agreeing: &[&Pair]) -> f64 {
+            SwingFit::of(known([0.0; 3], 1.0), agreeing).unwrap().sigma_pan.powi(2)
+        }
+
         let pairs: Vec<Pair> = rays()
             .take(9)
             .enumerate()
@@ -275,9 +283,6 @@ mod tests {
             .collect();
         let once: Vec<&Pair> = pairs.iter().collect();
         let twice = [&once[..], &once[..]].concat();
-        let variance = |agreeing: &[&Pair]| {
-            SwingFit::of(known([0.0; 3], 1.0), agreeing).unwrap().sigma_pan.powi(2)
-        };
         let ratio = variance(&twice) / variance(&once);
         assert!((ratio - 14.0 / 32.0).abs() < 1e-9, "{ratio}");
     }

@@ -111,10 +111,13 @@ fn view(image: &GreyImage) -> View {
 /// Each second step zooms in, the others out.
 #[test]
 fn a_sequence_that_pans_zooms_and_rolls_is_followed_to_half_a_pixel() {
-    let look = |step: f64| Look {
-        tilt_pan_roll: [0.01 * step, 0.023 * step, 0.008 * step],
-        zoom: if step % 2.0 == 1.0 { 1.02 } else { 1.0 },
-    };
+    fn look(step: f64) -> Look {
+        Look {
+            tilt_pan_roll: [0.01 * step, 0.023 * step, 0.008 * step],
+            zoom: if step % 2.0 == 1.0 { 1.02 } else { 1.0 },
+        }
+    }
+
     let looks: Vec<Look> = (0..8).map(|step| look(f64::from(step))).collect();
     let views: Vec<View> = looks.iter().map(|look| view(&image(*look, 1.0))).collect();
     for (views, looks) in views.windows(2).zip(looks.windows(2)) {
@@ -149,10 +152,13 @@ fn an_image_that_goes_to_the_right_is_a_turn_to_the_left() {
 
 #[test]
 fn an_image_that_goes_down_is_a_camera_that_nods_up_and_returns() {
+    fn pitch(moved: &CameraMoved) -> f64 {
+        moved.camera.as_ref().map_or(0.05, Camera::pitch_down_rad)
+    }
+
     let nod = tilted(-0.02);
     let images = [image(STRAIGHT, 1.0), image(nod, 1.0)];
     let moved = seen(settings(), &images).0;
-    let pitch = |moved: &CameraMoved| moved.camera.as_ref().map_or(0.05, Camera::pitch_down_rad);
     let expected = 0.03;
     assert!((pitch(&moved) - expected).abs() < 1e-3, "{}", pitch(&moved));
     assert!(moved.motion.unwrap().turn.abs() < 1e-3, "{moved:?}");
@@ -179,7 +185,10 @@ fn an_image_that_grows_is_a_way_ahead() {
 /// More of the image shows the person, walking to the right, than anything else.
 #[test]
 fn a_person_who_is_known_is_left_out() {
-    let at = |x: f64| Rect::new(x, 0.0, 150.0, 240.0);
+    fn at(x: f64) -> Rect {
+        Rect::new(x, 0.0, 150.0, 240.0)
+    }
+
     let views = [at(30.0), at(36.0)].map(|person| view(&room(person)));
     let position = Point3::new(2.0, 0.0, 1.6);
     let person = Person { position, velocity: Vector2::zeros() };

@@ -49,7 +49,10 @@ fn a_target_at_rest_keeps_sine_of_bearing_over_a_power_of_range() {
 
 #[test]
 fn path_c_faces_the_target_long_before_path_a() {
-    let at_the_end = |path| approach(bare(path, 2.0)).last().unwrap().1.to_degrees();
+    fn at_the_end(path: Path) -> f64 {
+        approach(bare(path, 2.0)).last().unwrap().1.to_degrees()
+    }
+
     let circle = at_the_end(Path::A);
     let turning = at_the_end(Path::C);
     assert!((circle - 8.6).abs() < 0.1, "{circle}");
@@ -201,13 +204,14 @@ fn it_keeps_the_stand_off_to_a_person_who_walks() {
 
 #[test]
 fn it_never_backs_up_and_slows_down_in_bends() {
-    let towards = target(0.8, 0.0, Vector2::new(-1.0, 0.0));
-    assert_eq!(settled(Config::default(), &towards), WheelSpeeds::STOP);
-    let at = |degrees: f64| {
+    fn at(degrees: f64) -> f64 {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let config = Config { latency_s: 0.0, ..Config::default() };
         speed(settled(config, &target(2.0 * cos, 2.0 * sin, Vector2::zeros())))
-    };
+    }
+
+    let towards = target(0.8, 0.0, Vector2::new(-1.0, 0.0));
+    assert_eq!(settled(Config::default(), &towards), WheelSpeeds::STOP);
     assert!((at(45.0) / at(0.0) - 0.5).abs() < 1e-9, "{} {}", at(45.0), at(0.0));
 }
 
@@ -222,10 +226,11 @@ fn saturated_wheels_keep_the_curvature() {
 
 #[test]
 fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
-    let after = |unseen_s| {
+    fn after(unseen_s: f64) -> WheelSpeeds {
         let person = Track { seen: false, unseen_s, ..target(4.0, 1.0, Vector2::zeros()) };
         settled(Config::default(), &person)
-    };
+    }
+
     assert_eq!(after(0.45), after(0.0));
     assert!(speed(after(0.8)) < 0.5 * speed(after(0.0)) && speed(after(0.8)) > 0.0);
     for unseen_s in [1.0, 30.0, f64::INFINITY, f64::NAN] {
@@ -253,7 +258,7 @@ fn a_robot_that_answers_late_does_the_same_later() {
 
 #[test]
 fn it_turns_too_far_if_it_does_not_know_of_its_latency() {
-    let overshoot = |latency_s| {
+    fn overshoot(latency_s: f64) -> f64 {
         let config = Config { bearing_gain_per_s: 4.0, latency_s, ..Config::default() };
         let mut drive = Drive::new(config, 0.05, 6);
         let place = Point2::new(0.0, 1.3);
@@ -262,7 +267,8 @@ fn it_turns_too_far_if_it_does_not_know_of_its_latency() {
             drive.polar(place).1
         });
         -bearings.fold(0.0, f64::min).to_degrees()
-    };
+    }
+
     assert!(overshoot(0.0) > 10.0, "{}", overshoot(0.0));
     assert!(overshoot(0.3) < 1.0, "{}", overshoot(0.3));
 }

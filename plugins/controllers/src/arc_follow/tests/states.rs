@@ -89,10 +89,13 @@ proptest! {
 
     #[test]
     fn commands_are_finite_and_limited_and_zero_without_a_target(config in config(), row in row()) {
+        fn fits(speed: f64) -> bool {
+            speed.is_finite() && speed.abs() <= MAX_MPS * (1.0 + 1e-9)
+        }
+
         let wheels = run(&config, &row);
         let mut before = 0.0;
         for (state, wheels) in row.iter().zip(&wheels) {
-            let fits = |speed: f64| speed.is_finite() && speed.abs() <= MAX_MPS * (1.0 + 1e-9);
             prop_assert!(fits(wheels.left) && fits(wheels.right), "{wheels:?}");
             prop_assert!(state.is_there || *wheels == WheelSpeeds::STOP);
             let nowhere = state.place.iter().any(|c| !c.is_finite());

@@ -260,13 +260,14 @@ fn the_update_keeps_the_covariance_symmetric() {
 
 #[test]
 fn a_detections_own_covariance_decides_how_far_it_is_believed() {
-    let move_by = |config: Config, far_sigma_m: f64| {
+    fn move_by(config: Config, far_sigma_m: f64) -> f64 {
         let filter = filter(config);
         let mut state = belief_at(Point3::new(3.0, 0.0, 1.6));
         let seen = detection(Point3::new(3.5, 0.0, 1.6), far_sigma_m);
         filter.correct(&mut state, &seen, &camera());
         state.mean[0] - 3.0
-    };
+    }
+
     assert!(move_by(Config::default(), 0.5) < 0.1 * move_by(Config::default(), 0.01));
 }
 
@@ -321,13 +322,14 @@ fn settings_that_cannot_work_are_refused() {
 
 #[test]
 fn by_students_t_an_outlier_pulls_less_and_a_good_detection_as_much() {
-    let pull = |student_dof: f64, off_m: f64| {
+    fn pull(student_dof: f64, off_m: f64) -> f64 {
         let filter = filter(Config { student_dof, ..Config::default() });
         let mut state = filter.start(&detection(Point3::new(3.0, 0.0, 1.6), 0.1));
         let seen = detection(Point3::new(3.0 + off_m, 0.0, 1.6), 0.1);
         filter.correct(&mut state, &seen, &camera());
         state.mean[0] - 3.0
-    };
+    }
+
     assert!((pull(4.0, 0.05) - pull(0.0, 0.05)).abs() < 1e-12);
     // By hand: prior and noise have the same variance on each axis.
     let variance = 0.1f64.powi(2) + Config::default().extra_sigma_m.powi(2);
@@ -394,14 +396,15 @@ fn every_number_has_its_bound_and_zero_is_allowed_where_it_means_none() {
 
 #[test]
 fn the_weight_of_an_outlier_depends_on_how_much_was_measured() {
-    let pull = |covariance_of_height: f64| {
+    fn pull(covariance_of_height: f64) -> f64 {
         let filter = filter(Config { student_dof: 4.0, ..Config::default() });
         let mut state = filter.start(&detection(Point3::new(3.0, 0.0, 1.6), 0.1));
         let mut seen = detection(Point3::new(3.6, 0.0, 1.6), 0.1);
         seen.covariance[(2, 2)] = covariance_of_height;
         filter.correct(&mut state, &seen, &camera());
         state.mean[0] - 3.0
-    };
+    }
+
     // With three coordinates right, an error in one of them says less of the detection.
     assert!(pull(0.01) > pull(1e6) + 1e-3, "{} {}", pull(0.01), pull(1e6));
 }

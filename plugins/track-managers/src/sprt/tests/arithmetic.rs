@@ -226,12 +226,13 @@ fn misses_count_below_the_bound() {
 
 #[test]
 fn each_still_second_speaks_against_a_person_up_to_a_bound() {
-    let config = Config { still_log_odds: -0.75, repeated: 1.0, ..looks_only() };
-    let mut bench = Bench::new(config, 3.0, 3.0);
-    let after = |frames: u32, bench: &mut Bench| {
+    fn after(frames: u32, bench: &mut Bench) -> f64 {
         (0..frames).for_each(|_| _ = bench.look(0.1, 3.0, 3.0));
         bench.track.score
-    };
+    }
+
+    let config = Config { still_log_odds: -0.75, repeated: 1.0, ..looks_only() };
+    let mut bench = Bench::new(config, 3.0, 3.0);
     assert_near(after(10, &mut bench), 3.0 - 0.75);
     assert_near(after(20, &mut bench), 3.0 - 1.5);
     // Time in which it is not seen says nothing of its motion.
@@ -275,7 +276,7 @@ fn a_pause_is_no_stay() {
 
 #[test]
 fn a_track_within_its_uncertainty_or_the_bound_has_not_moved() {
-    let score = |x: f64, variance: f64| {
+    fn score(x: f64, variance: f64) -> f64 {
         let mut bench = Bench::new(Config { repeated: 1.0, ..looks_only() }, 3.0, 2.0);
         bench.track.estimate.covariance *= variance / 1e-4;
         bench.look(0.1, 3.25, 2.0);
@@ -283,7 +284,8 @@ fn a_track_within_its_uncertainty_or_the_bound_has_not_moved() {
             bench.look(0.1, x, 2.0);
         }
         bench.track.score
-    };
+    }
+
     assert_near(score(3.5, 0.0), 6.0);
     assert_near(score(3.55, 0.0), 9.0);
     // Three standard deviations of 0.2 m on the floor are 0.6 m.
@@ -380,11 +382,12 @@ fn clutter_outweighs_the_thing_that_left_it() {
 
 #[test]
 fn clutter_fades_is_renewed_where_it_is_seen_and_is_forgotten() {
-    let faded = |by: f64| {
+    fn faded(by: f64) -> Bench {
         let mut bench = Bench::clutter(Config { clutter_s: 60.0, ..looks_only() }, 4.0, 1.0);
         bench.manager.predict(&EgoMotion::at_rest(60.0 * by.ln()));
         bench
-    };
+    }
+
     let mut bench = faded(2.0);
     assert!(!bench.is_clutter(4.0, 2.1) && bench.is_clutter(4.0, 1.9));
     assert!(bench.is_clutter(4.0, 3.9), "seen, it is back");

@@ -6,7 +6,8 @@ use tagalong_geometry::Rect;
 use tagalong_sim::Truth;
 use tagalong_trials::{SimulatedFrame, TrialError};
 
-use super::{Check, depth, deviation, mean, scene, simulated};
+use super::{Check, depth, deviation, scene, simulated};
+use crate::draws::mean;
 
 /// Camera, and the limits of its check.
 pub struct Rig {
@@ -54,8 +55,10 @@ pub fn checks(rig: &Rig, seeds: u64) -> Result<Vec<Check>, TrialError> {
             .for_each(|simulated| offsets.extend(displacements(&simulated)));
     }
     let share = |wanted: i64| {
-        let held = |o: &&f64| (o.round() as i64).clamp(-BINS, BINS) == wanted;
-        100.0 * offsets.iter().filter(held).count() as f64 / offsets.len().max(1) as f64
+        100.0
+            * offsets.iter().filter(|o| (o.round() as i64).clamp(-BINS, BINS) == wanted).count()
+                as f64
+            / offsets.len().max(1) as f64
     };
     let mut checks: Vec<Check> = (-BINS..=BINS)
         .map(|bin| Check::told(group, format!("edges displaced by {}", name(bin)), share(bin), "%"))

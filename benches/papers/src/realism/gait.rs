@@ -5,7 +5,8 @@
 use nalgebra::Point3;
 use tagalong_trials::TrialError;
 
-use super::{Check, mean, scene, simulated};
+use super::{Check, scene, simulated};
+use crate::draws::mean;
 
 const GROUP: &str = "gait";
 /// Requested speeds of the people, m/s.
@@ -21,6 +22,10 @@ pub fn checks() -> Result<Vec<Check>, TrialError> {
 }
 
 fn of_speed(speed_mps: f64) -> Option<Vec<Check>> {
+    fn near(wanted: f64, part: f64) -> [f64; 2] {
+        [(1.0 - part) * wanted, (1.0 + part) * wanted].map(rounded)
+    }
+
     let heads = heads(speed_mps);
     let first = heads.first()?;
     let last = heads.last()?;
@@ -32,7 +37,6 @@ fn of_speed(speed_mps: f64) -> Option<Vec<Check>> {
     let bob =
         heads.iter().map(|h| h.z).fold((f64::MAX, f64::MIN), |(a, b), z| (a.min(z), b.max(z)));
     let wanted_rate = 2.0 * relative.sqrt() / 1.346;
-    let near = |wanted: f64, part: f64| [(1.0 - part) * wanted, (1.0 + part) * wanted].map(rounded);
     let at = format!("at {speed:.2} m/s");
     let length = speed / steps_per_s;
     Some(vec![

@@ -7,7 +7,8 @@ use tagalong_core::DepthImage;
 use tagalong_stereo::StereoSettings;
 use tagalong_trials::TrialError;
 
-use super::{Check, depth, deviation, mean, scene, simulated_with};
+use super::{Check, depth, deviation, scene, simulated_with};
+use crate::draws::mean;
 
 /// Distances of the wall, m.
 const RANGES_M: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];

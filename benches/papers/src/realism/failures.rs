@@ -8,11 +8,12 @@ use tagalong_pipeline::{Candidate, Fate};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Trial, TrialError, each};
 
-use super::{Check, mean, scene, scenes};
+use super::{Check, scene, scenes};
+use crate::draws::mean;
 
 const GROUP: &str = "failures that must show";
-const EMPTY: &str = include_str!("../../configs/scenes/empty-clutter.toml");
-const EKF: &str = include_str!("../../configs/depth-ekf.toml");
+const EMPTY: &str = include_str!("../../../../configs/scenes/empty-clutter.toml");
+const EKF: &str = include_str!("../../../../configs/depth-ekf.toml");
 
 pub fn checks(registry: &Registry, seeds: u64) -> Result<Vec<Check>, TrialError> {
     let alarms = false_alarms(registry, seeds)?;
@@ -30,13 +31,14 @@ fn ekf() -> Contender {
 
 /// Returns the number of accepted detections in rooms without people, per image.
 fn false_alarms(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
-    let scenes: Vec<Scene> =
-        scenes(EMPTY, seeds).into_iter().map(|scene| Scene { duration_s: 6.0, ..scene }).collect();
-    let count = |trial: Trial| {
+    fn count(trial: Trial) -> Result<f64, TrialError> {
         let reports = &trial.runs[0].reports;
         let believed = reports.iter().flat_map(|r| &r.candidates).filter(|c| is_believed(c));
         Ok(believed.count() as f64 / reports.len().max(1) as f64)
-    };
+    }
+
+    let scenes: Vec<Scene> =
+        scenes(EMPTY, seeds).into_iter().map(|scene| Scene { duration_s: 6.0, ..scene }).collect();
     Ok(mean(&each(&scenes, &[ekf()], registry, threads(None), count, |_| ())?))
 }
 
@@ -46,15 +48,16 @@ fn is_believed(candidate: &Candidate) -> bool {
 
 /// Returns the share of single coat stands, three metres ahead, with an accepted detection.
 fn coat_stands(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
-    let stand = |seed: u64| {
-        scene(&format!(
-            "seed = {seed}\nduration_s = 0.4\n[robot]\nstart = [1.0, 3.0]\n[[furniture]]\n\
-             kind = \"coat-stand\"\nat = [4.0, 3.0]\nheading_deg = {}\n",
-            45 * seed % 360
-        ))
-    };
     // Eight seeds cover all headings, 45 degrees apart.
-    let scenes: Vec<Scene> = (1..=seeds.max(8)).map(stand).collect();
+    let scenes: Vec<Scene> = (1..=seeds.max(8))
+        .map(|seed| {
+            scene(&format!(
+                "seed = {seed}\nduration_s = 0.4\n[robot]\nstart = [1.0, 3.0]\n[[furniture]]\n\
+             kind = \"coat-stand\"\nat = [4.0, 3.0]\nheading_deg = {}\n",
+                45 * seed % 360
+            ))
+        })
+        .collect();
     let stand_at = Point2::new(3.0, 0.0);
     let taken = |trial: Trial| {
         let all = trial.runs[0].reports.iter().flat_map(|r| &r.candidates);

@@ -1,4 +1,4 @@
-//! `tagalong simulate --realism`: checks that the simulated world is hard in the ways in which the
+//! `tagalong-papers realism`: checks that the simulated world is hard in the ways in which the
 //! real one is. Each check is a figure, its limits, and whether it holds; one that does not is
 //! reported as clearly as one that does.
 
@@ -10,6 +10,7 @@ mod walls;
 
 use std::fmt::Write as _;
 
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tagalong_app::format::Format;
@@ -22,9 +23,21 @@ use tagalong_sim::{CameraKind, Scene, Variant};
 use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::{Draw, SimulatedFrame, TrialError};
 
+/// Arguments of `tagalong-papers realism`.
+#[derive(Args, Debug)]
+pub struct RealismArgs {
+    /// Random variants of each random scene of the checks.
+    #[arg(long, value_name = "N", default_value_t = 8,
+          value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// Output format.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
 /// Figure with its limits.
 #[derive(Clone, Debug, Serialize)]
-pub struct Check {
+struct Check {
     /// Group of the check.
     pub group: &'static str,
     /// Description of the figure.
@@ -91,11 +104,11 @@ const PARTS: [(&str, Part); 7] = [
     ("depth patches", |_, seeds| patches::checks(seeds)),
 ];
 
-/// Runs all checks and prints them, with so many `seeds` where a scene is random.
+/// Runs all checks and prints them.
 ///
 /// # Errors
 /// A plugin that fails on a simulated frame.
-pub fn realism(registry: &Registry, seeds: u64, format: Format) -> Outcome {
+pub fn realism(args: &RealismArgs, registry: &Registry) -> Outcome {
     let bar = ProgressBar::new(PARTS.len() as u64);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} checks {msg}") {
         bar.set_style(style);
@@ -103,11 +116,11 @@ pub fn realism(registry: &Registry, seeds: u64, format: Format) -> Outcome {
     let mut checks = Vec::new();
     for (name, part) in PARTS {
         bar.set_message(name);
-        checks.extend(part(registry, seeds).map_err(Failure::failed)?);
+        checks.extend(part(registry, args.seeds).map_err(Failure::failed)?);
         bar.inc(1);
     }
     bar.finish_and_clear();
-    match format {
+    match args.format {
         Format::Text => print(&text(&checks))?,
         Format::Json => print(&to_json("the checks", &checks)?)?,
     }
@@ -155,7 +168,10 @@ fn scene(text: &str) -> Scene {
 /// Returns the same scene with as many seeds: other noise, and new values of everything that
 /// varies.
 fn scenes(text: &str, seeds: u64) -> Vec<Scene> {
-    let variant = |seed| Variant { seed: Some(seed), ..Variant::default() };
+    fn variant(seed: u64) -> Variant {
+        Variant { seed: Some(seed), ..Variant::default() }
+    }
+
     (0..seeds).map(|seed| scene_with(text, &variant(seed))).collect()
 }
 
@@ -186,10 +202,6 @@ fn depth(frame: &Frame) -> Option<&DepthImage> {
     frame.depth().ok()
 }
 
-fn mean(values: &[f64]) -> f64 {
-    tagalong_math::mean(values).unwrap_or(0.0)
-}
-
 fn deviation(values: &[f64]) -> f64 {
     tagalong_math::mean_and_deviation(values).map_or(0.0, |(_, deviation)| deviation)
 }
@@ -211,8 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn mean_and_deviation() {
-        assert_eq!((mean(&[1.0, 3.0]), deviation(&[1.0, 3.0])), (2.0, 1.0));
-        assert_eq!(mean(&[]), 0.0);
+    fn the_deviation_of_no_values_is_zero() {
+        assert_eq!((deviation(&[1.0, 3.0]), deviation(&[])), (1.0, 0.0));
     }
 }

@@ -16,7 +16,8 @@ use tagalong_geometry::Rect;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_trials::TrialError;
 
-use super::{Check, mean, scene, simulated};
+use super::{Check, scene, simulated};
+use crate::draws::mean;
 
 const GROUP: &str = "simulated against real depth patches";
 /// Folder of the recordings with annotated people, relative to the repository.
@@ -34,6 +35,14 @@ const RIDGE: f64 = 0.05;
 type Sample = DVector<f64>;
 
 pub fn checks(seeds: u64) -> Result<Vec<Check>, TrialError> {
+    fn count(folds: &[Vec<Sample>]) -> f64 {
+        folds.iter().map(Vec::len).sum::<usize>() as f64
+    }
+
+    fn within(folds: &[Vec<Sample>]) -> f64 {
+        cross_validated(&folds[..1], &folds[1..2])
+    }
+
     let real: Vec<Vec<Sample>> =
         REAL.iter().filter_map(|name| recording(&log(name))).filter(|l| l.len() >= 5).collect();
     if real.len() < 2 {
@@ -41,8 +50,6 @@ pub fn checks(seeds: u64) -> Result<Vec<Check>, TrialError> {
         return Ok(vec![Check::skipped(GROUP, why)]);
     }
     let sim = rooms(real.len(), seeds);
-    let count = |folds: &[Vec<Sample>]| folds.iter().map(Vec::len).sum::<usize>() as f64;
-    let within = |folds: &[Vec<Sample>]| cross_validated(&folds[..1], &folds[1..2]);
     let what = format!("area under the curve, left out by recording ({} folds)", real.len());
     let limit = [f64::NEG_INFINITY, 0.8];
     Ok(vec![
@@ -145,10 +152,10 @@ fn cell(depth: &DepthImage, square: &Rect, side: usize, row: usize, column: usiz
         .collect()
 }
 
+/// Returns the median of the finite values.
 fn median(values: &[f32]) -> Option<f32> {
-    let mut finite: Vec<f32> = values.iter().copied().filter(|z| z.is_finite()).collect();
-    finite.sort_by(f32::total_cmp);
-    finite.get(finite.len() / 2).copied()
+    let finite = values.iter().copied().filter(|z| z.is_finite());
+    tagalong_math::median(finite.map(f64::from)).map(|middle| middle as f32)
 }
 
 /// Returns the median step between neighbours, in thousandths of the squared range.
@@ -160,17 +167,19 @@ fn roughness(pixels: &[f32], trunk_m: f32) -> f64 {
 /// Returns the mean area under the ROC curve over held-out folds. With a single fold, every other
 /// sample is held out.
 fn cross_validated(a: &[Vec<Sample>], b: &[Vec<Sample>]) -> f64 {
-    if a.len() < 2 {
-        let halves = |all: &[Vec<Sample>]| -> Vec<Vec<Sample>> {
-            let half = |odd: usize| all[0].iter().skip(odd).step_by(2).cloned().collect();
-            vec![half(0), half(1)]
-        };
-        return cross_validated(&halves(a), &halves(b));
+    fn halves(all: &[Vec<Sample>]) -> Vec<Vec<Sample>> {
+        let half = |odd: usize| all[0].iter().skip(odd).step_by(2).cloned().collect();
+        vec![half(0), half(1)]
     }
-    let others = |all: &[Vec<Sample>], fold: usize| -> Vec<Sample> {
+
+    fn others(all: &[Vec<Sample>], fold: usize) -> Vec<Sample> {
         let kept = all.iter().enumerate().filter(|(at, _)| *at != fold);
         kept.flat_map(|(_, samples)| samples.iter().cloned()).collect()
-    };
+    }
+
+    if a.len() < 2 {
+        return cross_validated(&halves(a), &halves(b));
+    }
     let areas = (0..a.len()).filter_map(|fold| {
         let weights = discriminant(&others(a, fold), &others(b, fold))?;
         let score =
@@ -182,12 +191,13 @@ fn cross_validated(a: &[Vec<Sample>], b: &[Vec<Sample>]) -> f64 {
 
 /// Returns Fisher's linear discriminant with a ridge, larger on `a`.
 fn discriminant(a: &[Sample], b: &[Sample]) -> Option<DVector<f64>> {
-    let size = a.first()?.len();
-    let centre = |all: &[Sample]| all.iter().sum::<DVector<f64>>() / all.len() as f64;
-    let scatter = |all: &[Sample], centre: &DVector<f64>| {
+    fn scatter(all: &[Sample], centre: &DVector<f64>) -> DMatrix<f64> {
         all.iter().map(|s| (s - centre) * (s - centre).transpose()).sum::<DMatrix<f64>>()
             / all.len() as f64
-    };
+    }
+
+    let size = a.first()?.len();
+    let centre = |all: &[Sample]| all.iter().sum::<DVector<f64>>() / all.len() as f64;
     if b.is_empty() {
         return None;
     }
