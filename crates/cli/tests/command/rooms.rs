@@ -201,9 +201,9 @@ fn settings_that_contradict_each_other_are_left_out_and_counted() {
     let home = Home::new();
     let tune = "manager.config.confirm_hits = [3, 4]\nmanager.config.confirm_within = [3, 5]";
     home.config("near", "[manager.config]\nconfirm_within = 4\n", tune);
-    let text = fs::read_to_string(home.path("configs/near.toml")).unwrap();
+    let config = fs::read_to_string(home.path("configs/near.toml")).unwrap();
     // The section of the detector ends before that of the life cycle.
-    assert!(text.contains("[manager.config]"));
+    assert!(config.contains("[manager.config]"));
     let fitted = home.fitted(&[]);
     assert_eq!((fitted["settings"].as_u64(), fitted["refused"].as_u64()), (Some(3), Some(1)));
     let tune = "manager.config.confirm_hits = [4]\nmanager.config.confirm_within = [3]";
