@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::Isometry3;
-use tagalong_core::Track;
 use tagalong_eval::formats::floor::{self, Row as TruthRow};
 use tagalong_eval::{FloorClear, FloorPoint, FloorScan, FloorTally};
 use tagalong_log::{FrameSource, InputSettings, Limits};

@@ -12,7 +12,7 @@ use tagalong_learn::{Line, accepted, area, parts, platt};
 
 use crate::config::Config;
 use crate::model::{Node, Tree};
-use crate::{Beams, COUNT, Features, Model, Segment, Segmentation, Training, features};
+use crate::{Beams, COUNT, Features, Model, Segmentation, Training, features};
 
 /// Farthest distance of the middle of a leg from the place below the head of its person, m.
 const BELOW_M: f64 = 0.5;

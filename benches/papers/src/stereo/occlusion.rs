@@ -1,6 +1,6 @@
 //! P4, Fig. 7: identities after full occlusions.
 
-use tagalong_trials::{Occlusion, Outcome, Trial, TrialError, occlusions, outcome};
+use tagalong_trials::{Outcome, Trial, TrialError, occlusions, outcome};
 
 use super::{PIPELINES, STEREO};
 use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry2, Point2, Point3};
-use tagalong_app::frame_notes::{CandidateNote, DriveNote, DroppedNote, FateNote, FrameNotes};
+use tagalong_app::frame_notes::{CandidateNote, DriveNote, FateNote, FrameNotes};
 use tagalong_app::remedies::Remedies;
 use tagalong_geometry::{Camera, Rect};
 use toml::Table;
@@ -185,6 +185,7 @@ pub fn add_trails(
 #[cfg(test)]
 mod tests_of_data {
     use nalgebra::Vector2;
+    use tagalong_app::frame_notes::DroppedNote;
     use tagalong_config::{Registry, Remedy};
     use tagalong_geometry::{Distortion, Pinhole};
 

@@ -11,7 +11,7 @@ use super::{DRAWN, HogTrainer};
 use crate::depth_channel::depth_numbers;
 use crate::detect::{Proposer, sides};
 use crate::lattice::Lattice;
-use crate::{Config, Coverage, DepthTrees, Grid, Kind, Wanted};
+use crate::{Config, Coverage, DepthTrees, Grid, Kind};
 
 /// Overlap (IoU) from which on a window is one of a person.
 const PERSON: f64 = 0.6;

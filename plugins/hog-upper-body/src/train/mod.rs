@@ -25,8 +25,8 @@ use tagalong_learn::{
 
 use crate::coverage::FILLED;
 use crate::{
-    Coverage, Grid, Kind, Layout, Machine, Model, Scanner, Training, Trees, Wanted, merge,
-    window_numbers, window_of,
+    Coverage, Kind, Layout, Machine, Model, Scanner, Training, Trees, merge, window_numbers,
+    window_of,
 };
 
 /// Smallest upper-body square in the search for false alarms, pixels, and the ratio of the sizes.
