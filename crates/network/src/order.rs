@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn people_may_lie_down_later() {
         let mut shapes = Shapes::default();
-        assert_eq!(refused(&mut shapes, 15, &people(10.0, 30.0, 0.9)), None);
+        assert_eq!(refused(&mut shapes, 30, &people(10.0, 30.0, 0.9)), None);
         assert_eq!(refused(&mut shapes, 5000, &people(30.0, 10.0, 0.9)), None);
     }
 }

@@ -188,7 +188,10 @@ pub(super) fn unread_detections(topic: &Topic) -> Option<String> {
         return None;
     }
     Some(match unread_encoding(&topic.encoding) {
-        None => format!("its type is not read; {} are", detection_types()),
+        None => format!(
+            "its type is not read; {} are: convert the messages to one of them",
+            detection_types()
+        ),
         Some((why, remedy)) => format!("{why}: {remedy}"),
     })
 }
