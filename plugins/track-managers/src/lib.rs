@@ -7,10 +7,11 @@
 //! use tagalong_track_managers::m_of_n::{Config, MOfN};
 //!
 //! let mut manager = MOfN::new(Config::default())?;
-//! let detection = detection_at(3.0, 0.0);
-//! let new = Unassociated { detection: &detection, detector_log_odds: 2.0, discovered: true };
+//! let mut detection = detection_at(3.0, 0.0);
+//! detection.score = 1.0; // the log-odds that this is a person
+//! let new = Unassociated { detection: &detection, detector_log_odds: 1.0, discovered: true };
 //! let Initiation::Start(health) = manager.initiate(TrackId(1), &new) else { unreachable!() };
-//! assert!(!health.confirmed, "one detection is not enough");
+//! assert!(!health.confirmed, "one such detection is not enough");
 //! # Ok::<(), tagalong_core::Error>(())
 //! ```
 
