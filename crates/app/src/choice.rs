@@ -139,7 +139,7 @@ impl Fittings {
             Some((last, others)) => format!("{} and {last}", others.join(", ")),
         };
         let mut unusable: Vec<&str> =
-            self.account.curable().filter_map(|topic| topic.could_be).collect();
+            self.account.curable().filter_map(|topic| topic.could_be).map(words_of).collect();
         unusable.dedup();
         if unusable.is_empty() {
             usable

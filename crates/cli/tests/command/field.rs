@@ -317,6 +317,7 @@ fn a_scan_that_cannot_be_is_refused_by_its_field() {
     chosen.says(&["angle_increment is 0"]);
     let doctor = self::ran("doctor", "extends = \"laser-follow.toml\"\n", &log, &[]);
     doctor.says(&["angle_increment is 0", "/scan: no usable scan", "0 frames of 60"]);
+    doctor.says(&["the config needs laser; nothing in the log can be used"]);
     for untrue in ["over 0 degrees", "nothing to complain about"] {
         assert!(!doctor.said.contains(untrue), "{}", doctor.said);
     }

@@ -19,7 +19,15 @@ pub fn needs(evidence: &Evidence) -> Option<Finding> {
         return Some(Finding::new("needs", severity, missing.to_string()).why(why));
     }
     let Some(LogError::Missing { wanted, hint, .. }) = &evidence.refusal else {
-        let measured = format!("the config needs {}; the log has {usable}", words(evidence.inputs));
+        let needed = words(evidence.inputs);
+        if usable.is_empty() {
+            let measured = format!("the config needs {needed}; nothing in the log can be used");
+            let finding = Finding::new("needs", Severity::Bad, measured);
+            return Some(
+                finding.remedy("`tagalong inspect` says of each topic why it cannot be used"),
+            );
+        }
+        let measured = format!("the config needs {needed}; the log has {usable}");
         return Some(Finding::new("needs", Severity::Ok, measured));
     };
     let hint = hint.trim_start_matches("; ");
