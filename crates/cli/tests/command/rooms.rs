@@ -107,9 +107,9 @@ fn a_room_has_no_say_in_what_is_chosen_without_it() {
         &people(12).lines().take(4).map(|l| format!("{l}\n")).collect::<String>(),
     );
     let after = home.fitted(&["--objective", "MOTA"]);
-    assert_eq!(chosen(&after), [4.0, 2.0, 2.0], "{after}");
+    assert_eq!(chosen(&after), [4.0, 2.0, 4.0], "room B has three times as many people: {after}");
     assert!(mota(&after, 0, "without") < -1.0, "{after}");
-    assert_eq!(mota(&after, 0, "with_all"), 0.0);
+    assert!(mota(&after, 0, "with_all") < -1.0, "{after}");
     assert_eq!(mota(&after, 1, "without"), 0.0);
 }
 
