@@ -423,11 +423,11 @@ mod tests {
         let forms =
             OF_P3.with_otherwise((OF_P3.contenders)(&lab, &OF_P3.configs).unwrap()).unwrap();
         assert_eq!(forms.len(), 4);
-        let filter = |form: &Contender| parsed(form).unwrap()["filter"]["config"].clone();
-        let detector = |form: &Contender| parsed(form).unwrap()["detectors"][0]["config"].clone();
-        assert_eq!(filter(&forms[3])["condensation"].as_bool(), Some(false));
-        assert_eq!(detector(&forms[3])["whole_image"].as_bool(), Some(true));
-        assert_ne!(filter(&forms[0]), filter(&forms[3]), "the printed form stays");
+        let printed = parsed(&forms[0]).unwrap();
+        let other = parsed(&forms[3]).unwrap();
+        assert_eq!(other["filter"]["config"]["condensation"].as_bool(), Some(false));
+        assert_eq!(other["detectors"][0]["config"]["whole_image"].as_bool(), Some(true));
+        assert_ne!(printed["filter"], other["filter"], "the printed form stays");
         let draw = draw([(1, 0, &[0.0]), (1, 0, &[88.0]), (1, 0, &[100.0]), (1, 0, &[29.0])]);
         let table = OF_P3.table(&[], &[draw]);
         let headlines: Vec<_> = table.rows.iter().map(|row| row.cells[5].value.unwrap()).collect();

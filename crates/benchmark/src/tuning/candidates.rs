@@ -103,7 +103,12 @@ mod tests {
     }
 
     fn three() -> [Tunable; 3] {
-        ["a", "b", "c"].map(|key| tunable(key, 2, &[1, 2, 3, 4]))
+        three_with(2)
+    }
+
+    /// Three settings that are as in the config, each with four values.
+    fn three_with(now: i64) -> [Tunable; 3] {
+        ["a", "b", "c"].map(|key| tunable(key, now, &[1, 2, 3, 4]))
     }
 
     #[test]
@@ -121,11 +126,10 @@ mod tests {
     /// say in what is chosen without it.
     #[test]
     fn the_settings_of_the_config_decide_nothing() {
-        let with_now = |now: i64| ["a", "b", "c"].map(|key| tunable(key, now, &[1, 2, 3, 4]));
-        assert_eq!(candidates(&with_now(2), 64, 1), candidates(&with_now(9), 64, 1));
-        assert_eq!(candidates(&with_now(2), 20, 1), candidates(&with_now(9), 20, 1));
-        let sampled = candidates(&with_now(9), 20, 1);
-        assert!(!sampled.contains(&shipped(&with_now(9))));
+        assert_eq!(candidates(&three_with(2), 64, 1), candidates(&three_with(9), 64, 1));
+        assert_eq!(candidates(&three_with(2), 20, 1), candidates(&three_with(9), 20, 1));
+        let sampled = candidates(&three_with(9), 20, 1);
+        assert!(!sampled.contains(&shipped(&three_with(9))));
     }
 
     #[test]

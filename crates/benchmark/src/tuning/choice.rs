@@ -235,12 +235,11 @@ mod tests {
     #[test]
     fn a_room_without_a_say_chooses_nothing() {
         let figures = table(&[[0.5, 0.5, 0.9], [0.6, 0.6, 0.1]]);
-        let chosen = |has_say: [bool; 3]| {
-            let poll = Poll { has_say: has_say.to_vec(), ..alike() };
-            leave_one_out(&figures, Objective::Hota, &poll)
-        };
-        assert_eq!(chosen([true; 3]), Choice { without: vec![0, 0, 1], with_all: 0 });
-        assert_eq!(chosen([true, true, false]), Choice { without: vec![1, 1, 1], with_all: 1 });
+        let choice = leave_one_out(&figures, Objective::Hota, &alike());
+        assert_eq!(choice, Choice { without: vec![0, 0, 1], with_all: 0 });
+        let poll = Poll { has_say: vec![true, true, false], ..alike() };
+        let choice = leave_one_out(&figures, Objective::Hota, &poll);
+        assert_eq!(choice, Choice { without: vec![1, 1, 1], with_all: 1 });
     }
 
     /// The second candidate gains in the room with nine people of ten.

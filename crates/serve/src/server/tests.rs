@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::connections::{CONNECTIONS, THREADS};
 use super::*;
 
-/// Deadline of what must happen at once, so that a server that hangs fails its test.
+/// Deadline of events that come at once, so that a server that hangs fails its test.
 const DEADLINE: Duration = Duration::from_secs(60);
 
-/// Times of clients that are far beyond any test: what waits for them hangs.
+/// Times of clients that are far beyond any test: a server that waits for them hangs.
 const FOR_EVER: Limits = {
     let far = Duration::from_secs(24 * 3600);
     Limits { silence: far, request: far, reading: far }

@@ -11,7 +11,7 @@ use super::{Followed, crowd_table};
 const BINS: usize = 10;
 
 /// Columns of the scores. Those that tell controllers apart come first; nearly all rides are kept, also
-/// by a controller that finds nobody again.
+/// by a controller that finds no person again.
 const COLUMNS: [&str; 14] = [
     "rides",
     "in view %",
