@@ -22,7 +22,7 @@ use tagalong_log::msgs::{
 };
 use tagalong_log::{
     CameraSettings, DisparitySettings, FrameSource, Input, InputSettings, Inputs, Limits, LogError,
-    LogFrame, MountSettings, TopicUse,
+    LogFrame, MountSettings,
 };
 
 const DEPTH: Inputs = Inputs::ANY.require(Input::Colour).require(Input::Depth);

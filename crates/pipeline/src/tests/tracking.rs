@@ -3,7 +3,7 @@ use std::sync::Arc;
 use tagalong_core::{Detection, Frame, Images, RgbImage, TrackId};
 
 use super::doubles::{PLAIN, World, frame, person, scored};
-use crate::{Candidate, Fate, FrameReport, Weighing};
+use crate::{Fate, FrameReport, Weighing};
 
 fn ids(report: &FrameReport) -> Vec<u32> {
     let mut ids: Vec<u32> = report.tracks.iter().map(|t| t.id.0).collect();
