@@ -24,7 +24,14 @@ pub fn json(benchmark: &Benchmark) -> serde_json::Result<String> {
     let version = serde_json::to_string(view.version)?;
     let summary = serde_json::to_string(&Summary::new(benchmark))?;
     let tasks = tasks.join(",\n");
-    Ok(format!("{{\"version\":{version},\n\"summary\":{summary},\n\"tasks\":[\n{tasks}\n]}}\n"))
+    let copies = if view.copies.is_empty() {
+        String::new()
+    } else {
+        format!("\"copies\":{},\n", serde_json::to_string(view.copies)?)
+    };
+    Ok(format!(
+        "{{\"version\":{version},\n{copies}\"summary\":{summary},\n\"tasks\":[\n{tasks}\n]}}\n"
+    ))
 }
 
 fn task_json(task: &TaskResult) -> serde_json::Result<String> {

@@ -213,7 +213,7 @@ fn the_shipped_model_is_one() {
     assert_eq!(Model::from_text(&model.to_text().unwrap()).unwrap(), model);
     assert_eq!(model.people.len(), 2);
     let refused = |from: &str, to: &str| Model::from_text(&text.replace(from, to)).unwrap_err();
-    assert!(refused("distance 2", "distance 9").contains("distance 9"));
+    assert!(refused("distance 3", "distance 9").contains("distance 9"));
     assert!(refused("\"width\"", "\"girth\"").contains("features"));
     assert!(refused("floor_offset_m = ", "floor_offset_m = inf #").contains("finite"));
 }

@@ -49,9 +49,8 @@ fn a_check_with_a_log_tries_it() {
     config(home.path(), "");
     let told = answer(&["check", "nearest.toml", "walk.mcap"], home.path());
     assert!(told.contains("walk.mcap: fits"), "{told}");
-    for input in ["depth", "odometry"] {
-        assert!(told.contains(&format!("\n  {input}: /")), "the topic of the {input}: {told}");
-    }
+    assert!(told.contains("\n  depth: /"), "the topic of the depth: {told}");
+    assert!(told.contains("\n  no odometry: "), "{told}");
     assert!(!home.path().join("runs").exists(), "a check writes nothing");
 }
 
