@@ -131,11 +131,14 @@ const checkLayers = async (page, data) => {
   if (!dropped) return;
   await scrub(page, dropped.at);
   const count = () => page.$$eval("#image-0 .box.dropped", (all) => all.length);
+  const explained = () => page.$eval('#picture-0 [data-layer="dropped"]', (mark) => mark.checkVisibility());
   await page.uncheck("#show-dropped");
   assert.equal(await count(), 0, "dropped candidates are off");
+  assert.equal(await explained(), false, "the legend explains what is not shown");
   await page.evaluate(() => document.activeElement.blur());
   await page.keyboard.press("d");
   assert.ok((await count()) > 0, "the key D shows dropped candidates");
+  assert.equal(await explained(), true, "the legend explains dropped candidates");
 };
 
 const visit = async (browser, { way, colorScheme, viewport }) => {

@@ -144,8 +144,8 @@ impl RideFacts {
         let stands = self.never_moved.as_ref();
         let stands = stands.map_or(String::new(), |why| format!("; the robot never moved ({why})"));
         format!(
-            "{}{stands}{}; least room to people {}, to things {}; distance kept for {share} of the time; \
-             followed another person for {:.1} s",
+            "{}{stands}{}; least room to people {}, to things {}; distance kept for {share} of the time in \
+             which the person was followed and walked slowly; followed another person for {:.1} s",
             if self.kept { "the person was kept" } else { "the person was not kept" },
             if self.touches() { "; the robot touched something" } else { "" },
             metres(self.clearance_people_m),

@@ -170,10 +170,16 @@ fn list(folder: &Path, from: Option<&Path>, rides: &[Ride]) -> String {
         main id="main" tabindex="-1" {
             p {
                 "The worst ride is first: contacts, then rides in which the robot never moved, then the least "
-                "room to a person or a thing while the robot moved, then the share of the time in which it kept its distance. A link opens the "
-                "ride where it came nearest."
+                "room to a person or a thing while the robot moved, then the distance kept. A link opens the "
+                "ride where the robot came nearest."
             }
             (table(rides, from))
+            p class="soft" {
+                "Distance kept: share of the time near the stand-off, of that in which the person was followed and "
+                "walked slowly. Person kept: followed to the end or rightly given up, and nobody else for long. "
+                "Wrong person: time in which another person or a thing was followed. In view: share of the time in "
+                "which the camera saw the person."
+            }
         }
         footer { p { "Made by Tagalong " (env!("CARGO_PKG_VERSION")) "." } }
         script { (PreEscaped(ROLES)) }

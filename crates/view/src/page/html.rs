@@ -137,10 +137,14 @@ fn stage(names: &[&str]) -> Markup {
                     div class="views" {
                         figure class="picture" id=(format!("picture-{number}")) {
                             svg class="image" id=(format!("image-{number}")) role="img" aria-label=(format!("Image with the tracks of {name}")) {}
+                            figcaption class="legend" { (image_marks()) }
                         }
                         figure class="above" {
                             svg class="plan" id=(format!("plan-{number}")) role="img" aria-label=(format!("Plan from above of {name}")) {}
-                            figcaption class="legend" id=(format!("zones-{number}")) hidden { (zones()) }
+                            figcaption class="legend" {
+                                (plan_marks())
+                                span class="zones" id=(format!("zones-{number}")) hidden { (zones()) }
+                            }
                         }
                     }
                 }
@@ -154,11 +158,35 @@ fn mark(class: &str, text: &str) -> Markup {
     html! { span { span class=(format!("mark {class}")) {} (text) } }
 }
 
+/// Renders the meaning of the boxes in the image; those of a layer are shown with it.
+fn image_marks() -> Markup {
+    html! {
+        (mark("box-seen", "seen"))
+        (mark("box-guess", "not seen: predicted"))
+        (mark("box-tentative", "not confirmed yet"))
+        span data-layer="truth" { (mark("box-truth", "annotated")) }
+        span data-layer="truth" { (mark("box-miss", "missed")) }
+        span data-layer="dropped" { (mark("box-dropped", "dropped")) }
+    }
+}
+
+/// Renders the meaning of the marks in the plan.
+fn plan_marks() -> Markup {
+    html! {
+        (mark("dot", "seen"))
+        (mark("dot ring", "not seen"))
+        span data-layer="truth" { (mark("spot", "annotated")) }
+        span data-layer="truth" { (mark("spot missed", "missed")) }
+        span data-layer="dropped" { (mark("crossed", "dropped")) }
+    }
+}
+
 /// Renders the meaning of the marks around a robot that is driven.
 fn zones() -> Markup {
     html! {
         (mark("way", "way until it stands"))
-        (mark("stands", "a person who comes nearer stops it"))
+        span data-zone="people" { (mark("stands", "a person who comes nearer stops it")) }
+        span data-zone="things" { (mark("stands", "a thing that is nearer stops it")) }
         (mark("slower", "slows it at full speed"))
         (mark("things", "obstacle"))
         (mark("movers", "moves"))

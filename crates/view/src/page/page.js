@@ -153,13 +153,16 @@
         node.dataset.track = track.id;
         parts.push(node);
       }
+    }
+    // Below the labels, so that it hides none.
+    if (state.question) parts.push(outline(state.question.box, "asked", k, 2, "the place in question"));
+    if (frame) {
       const taken = [];
       for (const track of frame.tracks) {
         const sign = frame.target === track.id ? "◎" : "";
         parts.push(label(taken, shownBox(track), `${sign}${track.id}${STATES[track.state]} · ${fixed(track.d, 1)} m`, k));
       }
     }
-    if (state.question) parts.push(outline(state.question.box, "asked", k, 2, "the place in question"));
     // A picture of its own cuts off what lies outside of the image.
     target.replaceChildren(svg("svg", { x: 0, y: 0, width: WIDTH, height: HEIGHT }, ...parts.filter(Boolean)));
   };
@@ -355,6 +358,22 @@
     target.replaceChildren(...parts.filter(Boolean));
   };
 
+  // ---- legends ---------------------------------------------------------------------------------
+
+  // A layer that is off has no marks to explain.
+  const drawLegends = () => {
+    const isOn = { truth: data.truth && id("show-truth").checked, dropped: id("show-dropped").checked };
+    for (const mark of document.querySelectorAll("[data-layer]")) mark.hidden = !isOn[mark.dataset.layer];
+  };
+
+  // Without zones for people things alone stop the robot.
+  const fitZones = (run, number) => {
+    const zones = id(`zones-${number}`);
+    zones.hidden = !run.robot;
+    const shown = run.robot && run.robot.people ? "people" : "things";
+    for (const mark of zones.querySelectorAll("[data-zone]")) mark.hidden = mark.dataset.zone !== shown;
+  };
+
   // ---- time line -------------------------------------------------------------------------------
 
   // Lanes: each track in the first one that is free again.
@@ -482,8 +501,8 @@
     const row = (test) => el("tr", {},
       el("th", { scope: "row" }, test.test), number(String(test.n)), el("td", {}, bar(test.n / most)));
     return place.replaceChildren(
-      el("p", {}, `${frame.found.length} ${frame.found.length === 1 ? "candidate" : "candidates"}: ${used.length - started} given to tracks, ${started} started one, ${frame.found.length - used.length} dropped.`),
-      frame.dropped.length ? table(`Funnel of ${run.name}`, ["Dropped by", "Number", "Share"], frame.dropped.map(row)) : el("p", { class: "soft" }, "No test dropped anything."));
+      el("p", {}, `${frame.found.length} ${frame.found.length === 1 ? "candidate" : "candidates"} of the detectors: ${used.length - started} given to tracks, ${started} started tracks, ${frame.found.length - used.length} dropped. The tests of the detectors drop places before they become candidates; the table counts these, too.`),
+      frame.dropped.length ? table(`Funnel of ${run.name}`, ["Dropped by", "Number", "As a bar (square root)"], frame.dropped.map(row)) : el("p", { class: "soft" }, "No test dropped anything."));
   };
 
   const bar = (part) => {
@@ -633,9 +652,10 @@
     ask({ box: [point.x - half, point.y - half, 2 * half, 2 * half], text: `At column ${Math.round(point.x)}, row ${Math.round(point.y)}:` });
   };
 
+  const atPerson = (person) => `At annotated person ${person}:`;
   const askPerson = (person) => {
     pause();
-    ask({ box: person.box, text: `At annotated person ${person.id}:`, person: person.id });
+    ask({ box: person.box, text: atPerson(person.id), person: person.id });
   };
 
   // Keeps the question on the annotated person while time goes on.
@@ -643,6 +663,10 @@
     if (!state.question || state.question.person === undefined) return;
     const person = truthAt(state.at).find((other) => other.id === state.question.person && other.box);
     if (person) state.question.box = person.box;
+    const text = person ? atPerson(state.question.person)
+      : `Annotated person ${state.question.person} is not in this frame; at the last place:`;
+    // The same text again would be read out again.
+    if (id("question").textContent !== text) id("question").textContent = text;
   };
 
   const missedButtons = () => {
@@ -734,6 +758,7 @@
       funnel(run, id(`funnel-${number}`));
       explain(run, id(`why-${number}`));
     });
+    drawLegends();
     missedButtons();
     moveHeads();
     markEvents();
@@ -856,7 +881,8 @@
     addEventListener("hashchange", () => show(openAt()));
     id("legend-missed").hidden = !data.truth;
     id("legend-drive").hidden = id("drive").hidden;
-    data.runs.forEach((run, number) => { id(`zones-${number}`).hidden = !run.robot; });
+    data.runs.forEach(fitZones);
+    drawLegends();
   };
   const strips = () => data.runs.forEach(drawStrip);
 
