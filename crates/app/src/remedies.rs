@@ -128,7 +128,7 @@ impl Remedies {
             };
             format!("decided by {}{further}", Setting::in_words(&found))
         };
-        format!("the test \"{test}\" dropped the candidate ({}); {settings}", remedy.look)
+        format!("the test \"{test}\" dropped the candidate; {settings}: {}", remedy.look)
     }
 
     /// Returns the changes of a resolved config that are offered for its plugins; none of them has
@@ -436,11 +436,11 @@ mod tests {
         let resolved: Table = toml::from_str(config).unwrap();
         assert_eq!(
             remedies.sentence("too blue", &resolved),
-            "the test \"too blue\" dropped the candidate (the sky); decided by [[detectors]] plugin = \
-             \"own\", config = { a = 1, b = 2 } and 1 more"
+            "the test \"too blue\" dropped the candidate; decided by [[detectors]] plugin = \
+             \"own\", config = { a = 1, b = 2 } and 1 more: the sky"
         );
         let without = remedies.sentence("too blue", &Table::new());
-        assert!(without.ends_with("; no setting decides it"), "{without}");
+        assert!(without.ends_with("; no setting decides it: the sky"), "{without}");
         assert_eq!(
             remedies.sentence("unknown", &resolved),
             "the test \"unknown\" dropped the candidate"

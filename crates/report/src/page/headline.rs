@@ -97,7 +97,7 @@ impl Page<'_> {
             }
         };
         let caption = html! {
-            "Means over logs with 95 % intervals " (place_where(place)) ". "
+            "Means over logs, " (place_where(place)) ", with 95\u{a0}% intervals. "
             span class="best" { "★ best" } " of the pipelines with the most logs."
         };
         table(&format!("Results {}", place_where(place)), &caption, &head, &body)

@@ -134,7 +134,7 @@ impl Page<'_> {
         html! {
             details class="moment" {
                 summary {
-                    (moment.log) ", frame " (moment.frame) " at " (number(moment.t_s, 2)) " s"
+                    (moment.log) ", frame " (moment.frame) " at " (number(moment.t_s, 2)) "\u{a0}s"
                     span class="aside" {
                         @if names.len() == 1 { "person " } @else { "people " } (names.join(", ")) " missed by " (counted(by.len(), "pipeline"))
                     }

@@ -33,7 +33,7 @@ impl Page<'_> {
                 strong { "Clear" } " means p below 0.05, which takes six logs at least"
                 @if self.view.pipelines.len() > 2 {
                     ", after Holm's correction for all pairs that are compared by the same figure: "
-                    "of twenty pairs one is below 0.05 by chance"
+                    "without it, one of twenty pairs would be below 0.05 by chance"
                 }
                 ". The figures are not corrected for each other: choose the one that matters before looking."
             }
@@ -65,11 +65,12 @@ impl Page<'_> {
         let all: u64 = worse.0.values().sum();
         let costly = worse.0.iter().max_by_key(|(test, count)| (**count, std::cmp::Reverse(*test)));
         if let Some((test, count)) = costly {
+            let misses = format!("{count} of the {all} misses of {}", worse.2);
             let why = match *test {
-                NO_CANDIDATE => "had no candidate".to_owned(),
-                test => format!("were dropped by the test {test}"),
+                NO_CANDIDATE => format!("{misses} had no candidate"),
+                test => format!("in {misses} the test \"{test}\" dropped the candidate"),
             };
-            line += &format!("; {count} of the {all} misses of {} {why}", worse.2);
+            line += &format!("; {why}");
         }
         Some(line)
     }

@@ -89,8 +89,8 @@ fn task(pipeline: &str, log: &str, level: f64, seed: u64, place: u64) -> TaskRes
         .into(),
         reasons: [(
             "margin".to_owned(),
-            "the test \"margin\" dropped the candidate (faces away); decided by \
-             [[verifiers]] config.least_margin = 0.2"
+            "the test \"margin\" dropped the candidate; decided by \
+             [[verifiers]] config.least_margin = 0.2: faces away"
                 .to_owned(),
         )]
         .into(),
