@@ -15,9 +15,13 @@ for program in node npm "$chromium"; do
 done
 
 if [ ! -d "$node/node_modules/axe-core" ]; then
+    # Beside its place first: another script may begin meanwhile, and must not find a half of it.
     mkdir -p "$node"
-    (cd "$node" && timeout 300 npm install --silent --no-save --no-audit --no-fund --prefix . \
+    part=$(mktemp -d "$node/part.XXXXXX")
+    (cd "$part" && timeout 300 npm install --silent --no-save --no-audit --no-fund --prefix . \
         html-validate@9.7.1 axe-core@4.10 playwright-core@1.55)
+    [ -d "$node/node_modules" ] || mv "$part/node_modules" "$node/"
+    rm -rf "$part"
 fi
 
 home=$(mktemp -d)
