@@ -3,6 +3,23 @@
 //! Depth becomes metres along the optical axis, with NaN for "no reading": 0 and 65535 of integer
 //! depth, and 0, negative, infinite and NaN values of floating depth (REP 117 and 118 give
 //! infinities a meaning of their own, which no detector here uses).
+//!
+//! Images make the frames of a log, so that a new message type with images takes more places than
+//! a sensor beside them (`crates/log/src/sensors`):
+//!
+//! 1. `msgs`: a struct with the fields of the ROS message in their order, and its definition as a
+//!    file in `crates/log/msgs`.
+//! 2. Here: a file that decodes the pixels, and reads their size without decoding them.
+//! 3. `scan.rs`: a variant of `Type`, its name in `Type::of`, and a `take_...` that reads encoding
+//!    and size from the first message.
+//! 4. `topics/kinds.rs`: `is_image`, and `is_picture` if it is no depth: the uses of the topic.
+//! 5. `source/intake.rs` (`payload`) for the stamp, `source/assemble.rs` (`AnyImage` and `read`) for
+//!    the pixels, `source/restamp.rs` for times of recording.
+//! 6. Live: `listen` in `bridges/ros2/src/network.rs`. Copies without faces:
+//!    `crates/cli/src/commands/blur/topics.rs`. For users: the table of inputs in `docs/logs.md`.
+//!
+//! The compiler names the matches over `Type` in `scan.rs` and `restamp.rs`, and those over
+//! `AnyImage`. The others have an arm for the rest, and leave a forgotten type unread.
 
 mod bayer;
 mod cloud;

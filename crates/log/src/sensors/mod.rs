@@ -8,10 +8,13 @@
 //! 2. `crates/log/src/sensors/NAME.rs`: the message (a struct with the fields of the ROS message in
 //!    their order), a [`SensorReader`] that makes the data of it, and the entry for [`SENSORS`].
 //!
+//! Live on a robot it also takes an arm of `listen` in `bridges/ros2/src/network.rs`, and for users a
+//! row in `docs/logs.md`.
+//!
 //! `laser.rs` and `points.rs` take the message nearest in time (`recent.rs`), `detections.rs` pairs one
 //! message with each frame.
 //! A topic is found by type, or named as `topics.NAME` under `[input]`. Images are no entries: they
-//! make the frames, and their calibrations the cameras.
+//! make the frames, and their calibrations the cameras (`crates/log/src/images`).
 
 mod box_layout;
 mod detections;
