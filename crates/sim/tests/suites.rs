@@ -2,12 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail")]
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tagalong_sim::{ApproachBy, CameraKind, Event, Scene, Shot, Simulation, Split, Variant};
 
 fn suites() -> Vec<(String, String)> {
-    fn name(path: &PathBuf) -> String {
+    fn name(path: &Path) -> String {
         path.file_stem().unwrap().to_string_lossy().into_owned()
     }
 

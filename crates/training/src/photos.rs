@@ -87,14 +87,14 @@ fn photograph(path: &Path) -> String {
 /// Returns the groups of crops: photographs with consecutive numbers were taken one after the
 /// other, and often show the same people.
 fn runs(crops: &[PathBuf]) -> Vec<u64> {
-    fn numbered(path: &PathBuf) -> (String, u64) {
+    fn numbered(path: &Path) -> (String, u64) {
         let name = photograph(path);
         let series = name.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
         let number = name[series.len()..].parse().unwrap_or(0_u64);
         (series, number)
     }
 
-    let taken: BTreeSet<(String, u64)> = crops.iter().map(numbered).collect();
+    let taken: BTreeSet<(String, u64)> = crops.iter().map(|crop| numbered(crop)).collect();
     let first = |crop: &PathBuf| {
         let (series, number) = numbered(crop);
         let first = std::iter::successors(Some(number), |number: &u64| {
