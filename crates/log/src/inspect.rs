@@ -243,7 +243,7 @@ impl Inspection {
         let facts = &self.facts;
         if facts.width == 0 {
             writeln!(f, "\nno camera: each laser scan makes a frame")?;
-            return writeln!(f, "\na pipeline can use: {}", self.usable.join(", "));
+            return self.write_usable(f);
         }
         writeln!(f, "\ncamera")?;
         writeln!(f, "  {}x{}, focal {:.1} px", facts.width, facts.height, facts.focal_px)?;
@@ -261,7 +261,12 @@ impl Inspection {
         if let Some(skew) = self.skew {
             writeln!(f, "  depth {:+.1} ms after colour", 1e3 * skew.median_s)?;
         }
-        writeln!(f, "\na pipeline can use: {}", self.usable.join(", "))
+        self.write_usable(f)
+    }
+
+    fn write_usable(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let usable = self.usable.join(", ");
+        writeln!(f, "\na pipeline can use: {}", if usable.is_empty() { "nothing" } else { &usable })
     }
 }
 

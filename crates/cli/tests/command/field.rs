@@ -318,6 +318,9 @@ fn a_scan_that_cannot_be_is_refused_by_its_field() {
     let doctor = self::ran("doctor", "extends = \"laser-follow.toml\"\n", &log, &[]);
     doctor.says(&["angle_increment is 0", "/scan: no usable scan", "0 frames of 60"]);
     doctor.says(&["the config needs laser; nothing in the log can be used"]);
+    let inspected = tagalong().arg("inspect").arg(&log).output().unwrap();
+    let listed = text(&inspected.stdout);
+    assert!(listed.contains("a pipeline can use: nothing\n"), "{listed}");
     for untrue in ["over 0 degrees", "nothing to complain about"] {
         assert!(!doctor.said.contains(untrue), "{}", doctor.said);
     }
