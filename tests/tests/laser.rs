@@ -70,7 +70,7 @@ fn a_scanner_that_tf_does_not_know_is_at_the_origin() {
     assert!(source.notes().iter().any(|note| note.contains("scanner sits at the robot's origin")));
 }
 
-/// The detector `laser-legs` as it is by default: the shipped configs give up people who stand, for
+/// The detector `laser-legs` as it is by default: the shipped configs give up people standing, for
 /// fewer false positives.
 const LEGS: &str = "[[detectors]]\nplugin = \"laser-legs\"\n[filter]\nplugin = \"ekf\"\n\
                     [manager]\nplugin = \"manage-sprt\"\n";

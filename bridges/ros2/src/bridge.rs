@@ -567,7 +567,7 @@ impl Bridge {
 
     /// Publishes the results.
     fn publish(&mut self, found: &LogFrame, report: &FrameReport) {
-        // Without odometry the frame `odom` does not exist, and a viewer could place nobody in it.
+        // Without odometry the frame `odom` does not exist, and a viewer could place no person in it.
         let world = if self.source.has_odometry() { &self.odom_frame } else { &self.base_frame };
         let record = FrameRecord {
             index: report.index,

@@ -292,7 +292,7 @@ fn try_config(
     if settings.suits.odometry && !source.has_odometry() {
         return Err(Failure::failed("no odometry").into());
     }
-    // A pair with a wide base sees nobody near, one with a narrow base nobody far away.
+    // A pair with a wide base sees no people nearby, one with a narrow base none far away.
     if let Some(baseline_m) = source.facts().baseline_m
         && settings.suits.baseline_off_m(baseline_m) > 0.0
     {

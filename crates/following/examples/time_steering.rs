@@ -81,7 +81,7 @@ fn scan_at(frame: usize, x: f64, rays: usize) -> LaserScan {
     LaserScan::of_ranges(mount, -PI, step_rad, [0.1, 12.0], ranges)
 }
 
-/// Returns a person who stands beside the way.
+/// Returns a person standing beside the way.
 fn person() -> Track {
     let person = Person { position: [2.5, 1.0, 1.6].into(), velocity: Vector3::zeros().xy() };
     let estimate =

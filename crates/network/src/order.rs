@@ -1,5 +1,5 @@
 //! Order of the corners of boxes in a list: x before y, or y before x as some exports of SSD have it. Shapes and
-//! ranges are those of both; people tell, who stand and walk.
+//! ranges are those of both; people tell, standing and walking.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

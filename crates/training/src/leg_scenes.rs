@@ -1,4 +1,4 @@
-//! Simulated laser scans for the trainer of `laser-legs`: rooms with people who stand and walk among
+//! Simulated laser scans for the trainer of `laser-legs`: rooms with people standing and walking among
 //! furniture, seen by scanners of many heights, resolutions and amounts of noise.
 
 use std::sync::Arc;

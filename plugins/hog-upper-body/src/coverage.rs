@@ -14,7 +14,7 @@ pub enum Coverage {
     /// Head, trunk and hips: people whose legs are hidden or outside of the image are found.
     #[default]
     UpperBody,
-    /// Head to feet: fewer false alarms among people who stand free. For trees only.
+    /// Head to feet: fewer false alarms among people standing free. For trees only.
     WholeBody,
 }
 

@@ -359,7 +359,7 @@ fn text_of(output: &std::process::Output) -> String {
     text(&output.stderr)
 }
 
-/// A coat stand nearby, and a person who walks past behind it.
+/// A coat stand nearby, and a person walking past behind it.
 const PASSING: &str = "
 seed = 3
 duration_s = 5.0

@@ -8,7 +8,7 @@ use super::{Alternative, better};
 /// Boxes below which shares mean little.
 const FEW_BOXES: usize = 5;
 
-/// Shares of idle boxes that are a warning, and a serious one: more than one person who sits among
+/// Shares of idle boxes that are a warning, and a serious one: more than one person sitting among
 /// others.
 const IDLE: (f64, f64) = (0.1, 0.65);
 

@@ -198,7 +198,7 @@ mod tests {
         (seen.misplaced(), seen.lying())
     }
 
-    /// Returns people who walk through the image: middle and size of each box.
+    /// Returns people walking through the image: middle and size of each box.
     fn people() -> Vec<[f64; 4]> {
         (0..10).map(|step| [100.0 + 45.0 * f64::from(step), 250.0, 90.0, 300.0]).collect()
     }
@@ -210,7 +210,7 @@ mod tests {
         let near: Vec<[f64; 4]> =
             people().iter().map(|[x, ..]| [*x, 300.0, 250.0, 700.0]).collect();
         assert_eq!(told(&near), (None, None));
-        // One who walks away at the left: farther away the box is narrower, and nearer to the middle.
+        // One walking away at the left: farther away the box is narrower, and nearer to the middle.
         let leaves: Vec<[f64; 4]> = (0..10)
             .map(|step| {
                 let part = 1.0 / (1.0 + 0.1 * f64::from(step));
@@ -240,7 +240,7 @@ mod tests {
             .collect();
         let (misplaced, _) = told(&corners);
         assert!(misplaced.unwrap().contains("are two corners"), "{corners:?}");
-        // People who stay at the left.
+        // People staying at the left.
         let at_left: Vec<[f64; 4]> = (0..10)
             .map(|step| {
                 let left = 20.0 + 12.0 * f64::from(step);

@@ -54,7 +54,7 @@ fn image(turned: f64, people: &[Detection]) -> GreyImage {
     })
 }
 
-/// Two people who stand side by side, as a camera with this heading sees them.
+/// Two people standing side by side, as a camera with this heading sees them.
 fn people(turned: f64) -> Vec<Detection> {
     let seen = |y: f64| {
         let place = Rotation2::new(-turned) * Vector2::new(6.0, y);

@@ -1,6 +1,6 @@
 //! Numbers of people across tracks.
 //!
-//! A track is not a person: one who leaves and comes back gets another track, and behind another
+//! A track is not a person: one that ends and a later one may be of the same person, and behind another
 //! person a track may change over. This stage remembers the appearance of each person, and decides
 //! which number a track is reported with. It changes nothing else: detection, association and
 //! filter work on tracks.
