@@ -27,6 +27,8 @@ pub struct Package {
     pub license: Option<String>,
     /// The folder with its manifest is the parent of this.
     pub manifest_path: PathBuf,
+    /// Registries that it may be published in: none if it is empty, all without such a list.
+    pub publish: Option<Vec<String>>,
     /// Direct dependencies.
     pub dependencies: Vec<Dependency>,
     /// Targets that are built from it.
@@ -77,6 +79,11 @@ impl Package {
         let manifest = self.manifest_path.canonicalize().ok()?;
         let folder = manifest.parent()?.strip_prefix(root).ok()?;
         Some(folder.to_string_lossy().replace('\\', "/"))
+    }
+
+    /// True if it is for this repository alone.
+    pub fn is_private(&self) -> bool {
+        self.publish.as_ref().is_some_and(Vec::is_empty)
     }
 
     /// True if it builds a program.

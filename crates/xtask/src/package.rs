@@ -7,11 +7,9 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 
+use crate::metadata::Metadata;
 use crate::workspace::{Workspace, copy_file, remove_folder, succeed};
 
-/// Crates of this repository alone, which no other crate needs.
-const NOT_PACKAGED: &[&str] =
-    &["tagalong-tests", "tagalong-benches", "tagalong-fuzz", "tagalong-xtask"];
 /// Examples of the library that the stranger builds.
 const EXAMPLES: &[&str] = &["follow", "log_to_tracks", "own_arrays", "own_detector", "own_sensor"];
 /// Those of them that need no file.
@@ -33,8 +31,9 @@ pub fn try_out(workspace: &Workspace, run: bool) -> Result<()> {
     eprintln!("package: every crate is packaged");
     let mut cargo = Command::new("cargo");
     cargo.args(["package", "--workspace", "--no-verify", "--allow-dirty", "--quiet"]);
-    for name in NOT_PACKAGED {
-        cargo.args(["--exclude", name]);
+    let metadata = Metadata::of(workspace)?;
+    for package in metadata.members(workspace.root()).values().filter(|it| it.is_private()) {
+        cargo.args(["--exclude", &package.name]);
     }
     succeed(cargo.current_dir(workspace.root()).env("CARGO_TARGET_DIR", &target))?;
     let stranger = env::temp_dir().join(format!("tagalong-stranger-{}", std::process::id()));
