@@ -145,6 +145,13 @@ pub fn is_run(folder: &Path) -> bool {
     ["tracks.mcap", "report.json"].iter().all(|name| folder.join(name).is_file())
 }
 
+/// Returns the runs in a folder, by name; none for a path that is no folder.
+pub fn runs_in(folder: &Path) -> Vec<PathBuf> {
+    let mut runs = files_in(folder).unwrap_or_default();
+    runs.retain(|path| is_run(path));
+    runs
+}
+
 /// Returns the MCAP files of a folder, by name.
 ///
 /// # Errors

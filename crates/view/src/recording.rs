@@ -1,6 +1,5 @@
 //! Run as it was recorded: frames with tracks, candidates and funnel, and its config.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::page::moment::{Moment, TrackState};
@@ -8,7 +7,7 @@ use serde::Deserialize;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::Failure;
-use tagalong_app::suggest::is_run;
+use tagalong_app::suggest::{is_run, runs_in};
 use tagalong_config::{FileLimit, read_text};
 use tagalong_log::msgs::{StringMsg, decode};
 use tagalong_log::{Limits, LogFile, LogWalker, read_attachment};
@@ -237,19 +236,6 @@ fn no_run(folder: &Path) -> Failure {
     })
 }
 
-/// Returns the runs in a folder, by name.
-fn runs_in(folder: &Path) -> Vec<PathBuf> {
-    let mut runs = Vec::new();
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        if is_run(&entry.path()) {
-            runs.push(entry.path());
-        }
-    }
-    // The order of a directory depends on the file system.
-    runs.sort();
-    runs
-}
-
 /// Reads a JSON file.
 ///
 /// # Errors
@@ -348,6 +334,8 @@ fn is_kept(moment: &Moment, every: u64) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     /// Numbers of the frames that a window keeps of nine a second apart.

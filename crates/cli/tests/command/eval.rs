@@ -63,6 +63,23 @@ fn a_run_is_scored_in_the_image_and_on_the_floor() {
 }
 
 #[test]
+fn paths_in_each_others_place_are_refused_with_the_cure() {
+    let folder = home();
+    fs::create_dir(folder.path().join("runs")).unwrap();
+    fs::rename(folder.path().join("out"), folder.path().join("runs/walk")).unwrap();
+    for (truth, tracks, cure) in [
+        ("walk.people.csv", "runs", "name one of them, as `--tracks runs/walk`"),
+        ("runs/walk", "walk.people.csv", "--truth and --tracks are swapped"),
+        ("runs/walk/tracks.csv", "walk.people.csv", "--truth and --tracks are swapped"),
+        ("walk.mcap", "runs/walk", "`--truth walk.people.csv`"),
+    ] {
+        let told = in_home(folder.path(), &["--truth", truth, "--tracks", tracks]);
+        let why = text(&told.stderr);
+        assert!(code(&told) == 2 && why.contains(cure), "{truth} {tracks}: {why}");
+    }
+}
+
+#[test]
 fn tracks_without_what_is_compared_are_refused_with_the_remedy() {
     let folder = home();
     let truth = ["--truth", "walk.people.csv", "--tracks"];
@@ -297,14 +314,16 @@ fn rules_odd_boxes_and_constant_scores_are_said() {
     let notes = said["notes"].as_array().unwrap();
     let has = |words: &str| notes.iter().any(|note| note.as_str().unwrap().contains(words));
     assert!(has("1 of 3 boxes have no area (the first in line 3)"), "{notes:?}");
-    assert!(has("LAMR and AP mean nothing") && notes.len() == 2, "{notes:?}");
+    assert!(has("30 frames a second are assumed"), "{notes:?}");
+    assert!(has("LAMR and AP mean nothing") && notes.len() == 3, "{notes:?}");
     let printed = scored(&truth_with("1"), &tracks, &[]);
     let printed = text(&printed.stdout);
     assert!(printed.contains("\nnote: tracks.txt: 1 of 3 boxes have no area"), "{printed}");
     assert!(printed.contains("LAMR and AP mean nothing") && printed.contains("MOT17"), "{printed}");
-    // Scores with an order: no note is needed.
+    // Scores with an order, and a rate: no note is needed.
     let ordered = TRACKS.replacen("90,1,", "90,0.5,", 1);
-    let said = json(&scored(&truth_with("1"), &ordered, &["--format", "json"]));
+    let options = ["--rate", "30", "--format", "json"];
+    let said = json(&scored(&truth_with("1"), &ordered, &options));
     assert!(said["notes"].as_array().unwrap().is_empty(), "{said}");
 }
 
