@@ -314,16 +314,14 @@ fn rules_odd_boxes_and_constant_scores_are_said() {
     let notes = said["notes"].as_array().unwrap();
     let has = |words: &str| notes.iter().any(|note| note.as_str().unwrap().contains(words));
     assert!(has("1 of 3 boxes have no area (the first in line 3)"), "{notes:?}");
-    assert!(has("30 frames a second are assumed"), "{notes:?}");
-    assert!(has("LAMR and AP mean nothing") && notes.len() == 3, "{notes:?}");
+    assert!(has("LAMR and AP mean nothing") && notes.len() == 2, "{notes:?}");
     let printed = scored(&truth_with("1"), &tracks, &[]);
     let printed = text(&printed.stdout);
     assert!(printed.contains("\nnote: tracks.txt: 1 of 3 boxes have no area"), "{printed}");
     assert!(printed.contains("LAMR and AP mean nothing") && printed.contains("MOT17"), "{printed}");
-    // Scores with an order, and a rate: no note is needed.
+    // Scores with an order: no note is needed.
     let ordered = TRACKS.replacen("90,1,", "90,0.5,", 1);
-    let options = ["--rate", "30", "--format", "json"];
-    let said = json(&scored(&truth_with("1"), &ordered, &options));
+    let said = json(&scored(&truth_with("1"), &ordered, &["--format", "json"]));
     assert!(said["notes"].as_array().unwrap().is_empty(), "{said}");
 }
 
@@ -356,6 +354,9 @@ fn tracks_that_go_on_without_a_known_end_are_said() {
     assert_eq!(said["frames"].as_u64(), Some(9));
     let notes = said["notes"].to_string();
     assert!(notes.contains("goes on to frame 9, and the last frame known is 2"), "{notes}");
+    assert!(notes.contains("30 frames a second are assumed"), "{notes}");
+    let stated = json(&in_home(folder.path(), &[&files[..], &["--rate", "30"]].concat()));
+    assert!(!stated["notes"].to_string().contains("assumed"), "{stated}");
 }
 
 #[test]

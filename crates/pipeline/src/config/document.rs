@@ -228,11 +228,17 @@ fn base_at(
 /// Returns "; did you mean `NAME.toml`?" for a base that is missing, with the nearest config of its
 /// folder or built-in one; nothing if none is near.
 fn hint(missing: &Path) -> String {
+    let wanted = missing.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    if builtin::OF_A_FILE.contains(&wanted) {
+        return format!(
+            "; `{wanted}` runs the network of a file, and is not built in: extend the config of an \
+             installed network by its path"
+        );
+    }
     let hint = model_hint(missing, &[]);
     if !hint.is_empty() {
         return hint;
     }
-    let wanted = missing.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     let best = nearest(wanted, builtin::builtin_names());
     best.map_or(String::new(), |best| format!("; did you mean `{best}.{ENDING}`?"))
 }
@@ -400,6 +406,8 @@ mod tests {
         assert!(missing.contains("own.toml:2:11: cannot extend "), "{missing}");
         let mistyped = table("extends = 'depth-ekff.toml'\n", &[]).unwrap_err();
         assert!(mistyped.contains("; did you mean `depth-ekf.toml`?"), "{mistyped}");
+        let network = table("extends = 'colour-net.toml'\n", &[]).unwrap_err();
+        assert!(network.contains("`colour-net` runs the network of a file"), "{network}");
         let own = table("extends = 'robt.toml'\n", &[("robot.toml", "")]).unwrap_err();
         assert!(own.contains("; did you mean `robot.toml`?"), "{own}");
         // A plain name without a file is that of a built-in config.
