@@ -61,7 +61,7 @@ pub fn not_a_config(path: &Path) -> Option<String> {
     let is_log = if path.is_dir() {
         LogFiles::of(path).is_ok()
     } else {
-        path.is_file() && (LOG_ENDINGS.contains(&&*ending) || starts_as_log(path))
+        path.is_file() && (LOG_ENDINGS.contains(&ending.as_str()) || starts_as_log(path))
     };
     if is_log {
         return Some(format!("{shown} is a log, not a config: the order is CONFIG LOG"));

@@ -98,7 +98,7 @@ fn an_installed_network_has_a_name() {
     let why = text(&taken.stderr);
     assert!(why.contains("another network is installed as `blob-finder`"), "{why}");
     let named = text(&run(&["model", "blob-finder"]).stderr);
-    assert!(named.contains("is installed already: ") && !named.contains("mean"), "{named}");
+    assert!(named.contains("is installed already: ") && !named.contains("did you mean"), "{named}");
     // The same file again: what was edited stays, unless it is asked for.
     let again = ["model", "--install", &file, "--name", "blob-finder"];
     assert_eq!(code(&run(&again)), 0, "nothing was edited");
