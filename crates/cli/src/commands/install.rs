@@ -60,15 +60,15 @@ impl Install<'_> {
             }
         }
         make_own_folder(&folder)?;
-        write_file(&files.onnx, &bytes)?;
-        write_file(&files.card, self.card(&name, &sha256, bytes.len(), published))?;
+        write_own(&files.onnx, &bytes)?;
+        write_own(&files.card, self.card(&name, &sha256, bytes.len(), published))?;
         let mut out = format!("installed: {}\n", files.onnx.display());
         match self.known {
             Known::Detector(known) => {
                 for (path, text) in configs {
-                    write_file(path, text)?;
+                    write_own(path, text)?;
                 }
-                write_file(&files.default, format!("{name}\n"))?;
+                write_own(&files.default, format!("{name}\n"))?;
                 let family = known.family.networks();
                 let ms = known.call_ms;
                 let _ = writeln!(out, "family {} ({family}), {ms:.0} ms a call", known.family);
@@ -226,6 +226,14 @@ fn make_own_folder(folder: &Path) -> Result<(), Failure> {
     })
 }
 
+/// Writes a file into the folder of installed networks.
+fn write_own(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+    write_file(path, content).map_err(|why| Failure {
+        message: format!("{}; {DATA_FOLDER} can name another folder for networks", why.message),
+        ..why
+    })
+}
+
 /// Returns true for a file whose text is another one than that which was written into it.
 fn is_edited(path: &Path, written: &str) -> bool {
     // The time of a call is another one each time.
@@ -287,6 +295,9 @@ mod tests {
         fs::write(home.path().join("file"), "").unwrap();
         let why = make_own_folder(&home.path().join("file/networks")).unwrap_err().message;
         assert!(why.contains(DATA_FOLDER) && !why.contains("-o"), "{why}");
+        // A folder in the place of the file cannot be written either.
+        let why = write_own(home.path(), "").unwrap_err().message;
+        assert!(why.contains(DATA_FOLDER), "{why}");
     }
 
     #[test]
