@@ -86,6 +86,8 @@ pub struct Fittings {
     refusals: Vec<Refusal>,
     /// A line about lost data; nothing for a whole log.
     damage: String,
+    /// Camera that was asked for.
+    camera: Option<String>,
 }
 
 /// A pipeline that does not fit a log.
@@ -105,6 +107,9 @@ impl Fittings {
             self.account.lines().iter().map(|line| format!("\n  {line}")).collect();
         let account = if account.is_empty() { account } else { format!("\nits topics:{account}") };
         let log = log.display();
+        if let Some(why) = self.missing_camera() {
+            return Failure::failed(format!("{log}: {why}"));
+        }
         if let Some(why) = self.common_reason() {
             let whole = format!("{log}: {why}\n{}", self.damage);
             return Failure::failed(whole.trim_end());
@@ -117,6 +122,15 @@ impl Fittings {
         Failure::failed(format!(
             "{log}: no built-in pipeline fits:{refusals}{account}\n{damage}{hint}"
         ))
+    }
+
+    /// Returns the reason of refusals for a camera that was asked for and is not in the log. Pipelines
+    /// without a camera have another one, which would not help.
+    fn missing_camera(&self) -> Option<String> {
+        let missing = format!("no camera `{}`", self.camera.as_ref()?);
+        let refusal = self.refusals.iter().find(|refusal| refusal.why.contains(&missing))?;
+        // The key of a config is the option of the command line here.
+        Some(refusal.why.replace("`camera` under [input]", "--camera"))
     }
 
     /// Returns the reason of all refusals, if it is the same, as of a file that is no log.
@@ -215,7 +229,7 @@ fn damage(found: &Inspection) -> String {
 
 /// Returns the first pipelines that fit a log, at most `most`, by trying each on its first frame.
 pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -> Fittings {
-    let mut found = Fittings::default();
+    let mut found = Fittings { camera: args.camera.clone(), ..Fittings::default() };
     let input = args.applied(OuterSettings::default()).input;
     // Of a log that cannot be read the trials tell why.
     if let Ok(inspected) = tagalong_log::inspect(log, &input, &Limits::default()) {
@@ -304,4 +318,27 @@ fn try_config(
     }
     let stepped = pipeline.step(&item.frame).map(drop);
     stepped.map_err(|error| Misfit { why: Failure::failed(error), required })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_that_is_not_in_the_log_is_one_cause_and_not_ten() {
+        fn refusal(config: &'static str, why: &str) -> Refusal {
+            Refusal { config, why: why.to_owned(), required: None }
+        }
+
+        let why = "the log has no camera `/back`; `camera` under [input] can be one of: /front";
+        let refusals = vec![refusal("lidar", "the log has no points"), refusal("mono", why)];
+        let camera = Some("/back".to_owned());
+        let mut found = Fittings { refusals, camera, ..Fittings::default() };
+        let message = found.none_fits(Path::new("robot.mcap")).message;
+        let expected = "robot.mcap: the log has no camera `/back`; --camera can be one of: /front";
+        assert_eq!(message, expected);
+        found.camera = None;
+        let message = found.none_fits(Path::new("robot.mcap")).message;
+        assert!(message.contains("no built-in pipeline fits"), "{message}");
+    }
 }

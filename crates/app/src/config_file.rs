@@ -14,7 +14,7 @@ use tagalong_pipeline::{BuildError, ConfigSource, Pipeline, ResolvedConfig};
 
 use crate::installed;
 use crate::outcome::Failure;
-use crate::suggest::config_hint;
+use crate::suggest::{config_hint, not_a_config};
 
 /// Config that is used where neither a config nor a log is given.
 const DEFAULT: &str = "depth-ekf";
@@ -196,6 +196,11 @@ impl From<BuildError> for Failure {
             && let Some(remedy) = path.to_str().and_then(installed::missing_network)
         {
             return Self::usage(remedy);
+        }
+        if let BuildError::Unreadable { path, .. } = &error
+            && let Some(why) = not_a_config(path)
+        {
+            return Self::usage(why);
         }
         let hint = match &error {
             // A config in the directory is suggested: `x` stands for any name in it.

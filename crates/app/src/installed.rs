@@ -12,6 +12,9 @@ use tagalong_network::networks_folder;
 
 /// Name of the config of the default network.
 pub const NETWORK: &str = "network";
+/// Table of networks that are known to work, as TOML. Its figures are those of the command that it
+/// names.
+pub const KNOWN_NETWORKS: &str = include_str!("networks.toml");
 /// File with the name of the default network.
 const DEFAULT: &str = "default";
 /// Config of the repository that joins the network of a file with depth.
@@ -74,6 +77,14 @@ pub fn missing_network(name: &str) -> Option<String> {
 }
 
 fn remedy(installed: &[String], name: &str) -> Option<String> {
+    let network = name.strip_suffix(WITH_DEPTH).unwrap_or(name);
+    let is_installed = installed.iter().any(|known| known == network);
+    if let Some(file) = known_file(network).filter(|_| !is_installed) {
+        return Some(format!(
+            "`{name}` runs a network that is known, and not installed: `tagalong model --install \
+             {file}` installs it, and `tagalong model --list` tells where to get the file"
+        ));
+    }
     if name != NETWORK && !OF_A_FILE.contains(&name) {
         return None;
     }
@@ -88,6 +99,14 @@ fn remedy(installed: &[String], name: &str) -> Option<String> {
         "`{name}` runs the neural network of a file, and is not built in: name one that is installed, as \
          `{first}{with_depth}`"
     ))
+}
+
+/// Returns the name of the file of a known network.
+fn known_file(name: &str) -> Option<String> {
+    let table: toml::Table = toml::from_str(KNOWN_NETWORKS).ok()?;
+    let networks = table.get("network")?.as_array()?;
+    let named = networks.iter().find(|it| it.get("name").and_then(|it| it.as_str()) == Some(name));
+    named?.get("file")?.as_str().map(str::to_owned)
 }
 
 /// Returns the names of the installed networks that have a config, in the order of the alphabet.
@@ -177,6 +196,16 @@ mod tests {
         assert_eq!(config(NETWORK), Some(folder.join("movenet.toml")));
         assert_eq!(installed_in(folder), ["movenet", "yolox"]);
         assert_eq!(onnx_files(folder, false), ["alone"]);
+    }
+
+    #[test]
+    fn a_known_network_that_is_not_installed_is_told_apart_from_a_mistyped_name() {
+        for name in ["yolox-nano", "yolox-nano-depth"] {
+            let why = remedy(&["other".to_owned()], name).unwrap();
+            assert!(why.contains("`tagalong model --install yolox_nano.onnx`"), "{why}");
+        }
+        assert_eq!(remedy(&[], "yolox-nan"), None);
+        assert_eq!(remedy(&["yolox-nano".to_owned()], "yolox-nano-depth"), None);
     }
 
     #[test]

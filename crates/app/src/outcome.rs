@@ -108,6 +108,9 @@ impl From<LogError> for Failure {
 /// Result of a command.
 pub type Outcome = Result<Ended, Failure>;
 
+/// Remedy for a folder of results that cannot be made.
+pub const ANOTHER_OUTPUT: &str = "choose another with -o";
+
 /// Makes a folder for results, with its parents.
 ///
 /// # Errors
@@ -118,7 +121,7 @@ pub fn make_folder(folder: &Path) -> Result<(), Failure> {
         if is_full(&error) {
             disk_full(why)
         } else {
-            Failure::usage(format!("{why}; choose another with -o"))
+            Failure::usage(format!("{why}; {ANOTHER_OUTPUT}"))
         }
     })
 }

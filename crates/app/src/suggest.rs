@@ -1,7 +1,7 @@
 //! Suggestions for a mistyped or unusable path.
 
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use tagalong_config::nearest;
@@ -13,6 +13,11 @@ use crate::outcome::Failure;
 
 /// Endings of logs.
 pub const LOG_ENDINGS: [&str; 3] = ["mcap", "db3", "bag"];
+
+/// First bytes of MCAP files, of SQLite files and of ROS 1 bags.
+const LOG_MAGICS: [&[u8]; 3] = [b"\x89MCAP", b"SQLite format 3\0", b"#ROSBAG"];
+/// Length of the longest of [`LOG_MAGICS`], bytes.
+const LONGEST_MAGIC: u64 = 16;
 
 /// Returns "; did you mean `configs/depth-ekf.toml`?", or the names of the configs that there are. A
 /// single path that is no config may also be a mistyped log.
@@ -48,6 +53,35 @@ pub fn config_hint(wanted: &Path) -> String {
     }
 }
 
+/// Returns the problem and the remedy of a log or a network in the place of a config; `None` for any
+/// other path.
+pub fn not_a_config(path: &Path) -> Option<String> {
+    let shown = path.display();
+    let ending = ending_of(path).unwrap_or_default();
+    let is_log = if path.is_dir() {
+        LogFiles::of(path).is_ok()
+    } else {
+        path.is_file() && (LOG_ENDINGS.contains(&ending.as_str()) || starts_as_log(path))
+    };
+    if is_log {
+        return Some(format!("{shown} is a log, not a config: the order is CONFIG LOG"));
+    }
+    (ending == "onnx" && path.is_file()).then(|| {
+        format!(
+            "{shown} is a network, not a config: `tagalong model --install {shown}` makes a config of \
+             it, and prints its name"
+        )
+    })
+}
+
+/// Returns true for a file that begins as the files of recorders do.
+fn starts_as_log(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else { return false };
+    let mut start = Vec::new();
+    let read = file.take(LONGEST_MAGIC).read_to_end(&mut start);
+    read.is_ok() && LOG_MAGICS.iter().any(|magic| start.starts_with(magic))
+}
+
 /// Returns the config of an installed network whose name is nearest to a mistyped one; `None` if that
 /// of another config is as near.
 fn nearest_installed<'a>(
@@ -77,11 +111,16 @@ pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
 /// Refuses a path that cannot be a log, with a remedy.
 ///
 /// # Errors
-/// A missing file, or a directory that is not one log.
+/// A missing file, the folder of a run, or a directory that is not one log.
 pub fn check_log_path(path: &Path) -> Result<(), Failure> {
     let shown = path.display();
     if !path.exists() {
         return Err(Failure::failed(format!("{shown}: no such file{}", log_hint(path))));
+    }
+    if is_run(path) {
+        return Err(Failure::usage(format!(
+            "{shown} is a run, not a log: `tagalong view {shown}` shows it"
+        )));
     }
     if path.is_dir() {
         // Accepts a folder whose files are the parts of one log.
@@ -99,6 +138,18 @@ pub fn check_log_path(path: &Path) -> Result<(), Failure> {
         return Err(Failure::failed(message));
     }
     Ok(())
+}
+
+/// Returns true for the folder of a run, as `tagalong run` writes it.
+pub fn is_run(folder: &Path) -> bool {
+    ["tracks.mcap", "report.json"].iter().all(|name| folder.join(name).is_file())
+}
+
+/// Returns the runs in a folder, by name; none for a path that is no folder.
+pub fn runs_in(folder: &Path) -> Vec<PathBuf> {
+    let mut runs = files_in(folder).unwrap_or_default();
+    runs.retain(|path| is_run(path));
+    runs
 }
 
 /// Returns the MCAP files of a folder, by name.
@@ -194,6 +245,27 @@ mod tests {
     }
 
     #[test]
+    fn a_log_and_a_network_in_the_place_of_a_config_are_named() {
+        let home = tempfile::tempdir().unwrap();
+        let files: [(&str, &[u8], &str); 4] = [
+            ("net.onnx", b"x", "`tagalong model --install "),
+            ("robot.mcap", b"", "the order is CONFIG LOG"),
+            ("copy", b"\x89MCAP0\r\n", "the order is CONFIG LOG"),
+            ("ros1", b"#ROSBAG V2.0\n", "the order is CONFIG LOG"),
+        ];
+        for (name, start, expected) in files {
+            let path = home.path().join(name);
+            assert_eq!(not_a_config(&path), None, "a missing file is mistyped");
+            fs::write(&path, start).unwrap();
+            let why = not_a_config(&path).unwrap();
+            assert!(why.contains(name) && why.contains(expected), "{why}");
+        }
+        let config = home.path().join("own.toml");
+        fs::write(&config, "seed = 1\n").unwrap();
+        assert_eq!(not_a_config(&config), None);
+    }
+
+    #[test]
     fn a_mistyped_ending_of_a_log_is_answered_with_the_log() {
         let home = tempfile::tempdir().unwrap();
         fs::write(home.path().join("robot.mcap"), "").unwrap();
@@ -219,6 +291,16 @@ mod tests {
         assert!(refused().contains("it holds no .mcap and no .db3"), "{}", refused());
         fs::write(home.path().join("1.JPG"), "").unwrap();
         assert!(refused().contains("`tagalong import images "), "{}", refused());
+    }
+
+    #[test]
+    fn the_folder_of_a_run_is_no_log() {
+        let home = tempfile::tempdir().unwrap();
+        fs::write(home.path().join("tracks.mcap"), "x").unwrap();
+        assert!(check_log_path(home.path()).is_ok(), "a folder of one file is one log");
+        fs::write(home.path().join("report.json"), "{}").unwrap();
+        let failure = check_log_path(home.path()).unwrap_err();
+        assert!(failure.message.contains("is a run, not a log: `tagalong view "), "{failure:?}");
     }
 
     #[test]

@@ -304,17 +304,31 @@ fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
     for log in args.logs_dir.as_deref().map_or(Ok(Vec::new()), mcap_files)? {
         match annotated(&log)? {
             Some(annotated) => found.push(annotated),
-            None => say(&format!("note: left out: {} has no truth", log.display())),
+            None => {
+                let shown = log.display();
+                say(&format!(
+                    "note: left out: {shown} has no truth; `tagalong annotate {shown}` makes one"
+                ));
+            }
         }
     }
     found.iter_mut().for_each(|log| log.drops_doubled_ids = args.drop_doubled_ids);
     if found.is_empty() {
-        return Err(Failure::usage("no log with truth; name some with --logs or --logs-dir"));
+        return Err(Failure::usage(
+            "no log with truth; name some with --logs or --logs-dir, and make truth with `tagalong \
+             annotate LOG`",
+        ));
     }
     Ok(found)
 }
 
 fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    if folder.is_file() {
+        let file = folder.display();
+        return Err(Failure::usage(format!(
+            "--logs-dir is a folder of logs, and {file} is a file: `--logs {file}`"
+        )));
+    }
     suggest::mcap_files(folder)
         .map_err(|error| Failure::failed(format!("cannot read {}: {error}", folder.display())))
 }
@@ -327,10 +341,10 @@ pub fn with_truth(log: &Path) -> Result<Annotated, Failure> {
     annotated(log)?.ok_or_else(|| {
         let stem = log.with_extension("");
         let stem = stem.display();
+        let shown = log.display();
         Failure::usage(format!(
-            "{} has no truth: neither {stem}.people.csv nor {stem}.truth.jsonl nor \
-             {stem}.boxes.csv nor a channel {} in it",
-            log.display(),
+            "{shown} has no truth: neither {stem}.people.csv nor {stem}.truth.jsonl nor \
+             {stem}.boxes.csv nor a channel {} in it; `tagalong annotate {shown}` makes one",
             tagalong_log::TRUTH_TOPIC
         ))
     })
@@ -397,5 +411,19 @@ fn hash_of_file(path: &Path) -> io::Result<String> {
             0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
             count => hash.update(&buffer[..count]),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_in_the_place_of_a_folder_of_logs_is_answered_with_the_option_for_it() {
+        let home = tempfile::tempdir().unwrap();
+        let log = home.path().join("walk.mcap");
+        std::fs::write(&log, "").unwrap();
+        let why = mcap_files(&log).unwrap_err().message;
+        assert!(why.contains(&format!("`--logs {}`", log.display())), "{why}");
     }
 }

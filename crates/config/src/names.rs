@@ -20,7 +20,8 @@ pub fn nearest<'a>(wanted: &str, available: impl IntoIterator<Item = &'a str>) -
 }
 
 /// Returns "; did you mean `NAME`?" for a file that is missing, with the nearest name among the files of
-/// its folder that have its extension and among `others`; nothing if none is near.
+/// its folder that have its extension and among `others` that are not written as it is; nothing if none
+/// is near.
 ///
 /// ```
 /// use tagalong_config::model_hint;
@@ -42,7 +43,8 @@ pub fn model_hint(missing: &Path, others: &[String]) -> String {
     files.sort();
     // Without the extension, which is common to all of them and would make any two alike.
     let stems = files.iter().filter_map(|file| file.file_stem()?.to_str());
-    let Some(best) = nearest(wanted, others.iter().map(String::as_str).chain(stems)) else {
+    let others = others.iter().map(String::as_str).filter(|name| missing.to_str() != Some(*name));
+    let Some(best) = nearest(wanted, others.chain(stems)) else {
         return String::new();
     };
     let file = files.iter().find(|file| file.file_stem().is_some_and(|stem| stem == best));
@@ -93,5 +95,7 @@ mod tests {
         assert_eq!(hint("people.onnx"), "; did you mean `peopel.onnx`?");
         assert_eq!(hint("yolox-nan"), "; did you mean `yolox-nano`?", "the name of no file");
         assert_eq!(hint("zebra.toml"), "");
+        let itself = model_hint("yolox-nano".as_ref(), &["yolox-nano".to_owned()]);
+        assert_eq!(itself, "", "the name was not mistyped");
     }
 }

@@ -10,7 +10,7 @@ use tagalong_render::Animation;
 
 use crate::ViewArgs;
 use crate::assemble::{stamps, times};
-use crate::recording::Recording;
+use crate::recording::{Recording, no_frames};
 
 /// Writes the animation of a run.
 ///
@@ -21,7 +21,7 @@ pub fn write(args: &ViewArgs, file: &Path) -> Outcome {
     spare(file, args.overwrite)?;
     let shown = stamps(&run);
     if shown.is_empty() {
-        return Err(Failure::usage("no frame lies between --from and --to"));
+        return Err(no_frames(&run));
     }
     let chosen = paced(&times(&shown), args.fps);
     let wanted: Vec<u64> = chosen.into_iter().map(|at| shown[at]).collect();

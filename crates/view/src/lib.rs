@@ -44,7 +44,7 @@ use tagalong_math::counted;
 
 use crate::assemble::{run_data, stamps, times};
 use crate::film::Film;
-use crate::recording::{Recording, RideFacts, Span, Window};
+use crate::recording::{Recording, RideFacts, Span, Window, no_frames};
 use crate::truth::PageTruth;
 
 pub use crate::live::{Live, parse_address};
@@ -189,7 +189,7 @@ impl Page {
         let mut notes = Vec::new();
         let all = stamps(runs);
         if all.is_empty() {
-            return Err(Failure::usage("no frame lies between --from and --to"));
+            return Err(no_frames(runs));
         }
         let budget = args.megabytes() * 1_000_000;
         let (stamps, run_data) = thinned(runs, all, budget / 2, remedies, &mut notes);

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::Failure;
+use tagalong_app::suggest::{is_run, runs_in};
 use tagalong_config::{FileLimit, read_text};
 use tagalong_log::msgs::{StringMsg, decode};
 use tagalong_log::{Limits, LogFile, LogWalker, read_attachment};
@@ -30,6 +31,8 @@ pub struct Recording {
     pub moments: Vec<Moment>,
     /// One frame in so many is there.
     pub every: u64,
+    /// Time of the last frame of the run, in the window or not, s since the first.
+    pub length_s: f64,
 }
 
 /// Part of a log, s since its first frame.
@@ -183,11 +186,11 @@ impl Recording {
         // Only the images need it, and they may be found without it.
         let origin = read_json(&folder.join("origin.json")).unwrap_or_default();
         let mut frames = Frames::open(&tracks)?;
-        let (moments, every) = gather(|| frames.next_moment(), window)?;
+        let (moments, every, length_s) = gather(|| frames.next_moment(), window)?;
         let config = read_attachment(&tracks, "config.toml", &Limits::default())?;
         let text = config.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
         let config = toml::from_str(&text).unwrap_or_default();
-        Ok(Self { folder: folder.to_owned(), report, origin, config, moments, every })
+        Ok(Self { folder: folder.to_owned(), report, origin, config, moments, every, length_s })
     }
 
     /// Returns the name of its config without the ending.
@@ -204,6 +207,23 @@ fn tracks_of(folder: &Path) -> Result<PathBuf, Failure> {
 /// Returns the failure of a path that is not the folder of a run.
 fn no_run(folder: &Path) -> Failure {
     let shown = folder.display();
+    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let parent = parent.unwrap_or(Path::new("."));
+    if folder.is_file() && is_run(parent) {
+        let run = parent.display();
+        return Failure::usage(format!(
+            "{shown} is a file of a run: `tagalong view {run}` shows it"
+        ));
+    }
+    let runs = runs_in(folder);
+    if let Some(first) = runs.first() {
+        let names: Vec<String> = runs.iter().map(|run| run.display().to_string()).collect();
+        let first = first.display();
+        return Failure::usage(format!(
+            "{shown} is a folder of runs: name one of them, as `tagalong view {first}`; there are: {}",
+            names.join(", ")
+        ));
+    }
     Failure::usage(if folder.is_file() {
         format!(
             "{shown} is a file, not the folder of a run; `tagalong run {shown}` makes one, \
@@ -275,14 +295,25 @@ impl Frames {
     }
 }
 
-/// Gathers the frames of a window, and returns one in how many that is.
+/// Returns the failure of a window without a frame.
+pub fn no_frames(runs: &[Recording]) -> Failure {
+    let length_s = runs.iter().map(|run| run.length_s).fold(0.0, f64::max);
+    Failure::usage(format!(
+        "no frame lies between --from and --to: the last one of the run is at {length_s:.1} s"
+    ))
+}
+
+/// Gathers the frames of a window, and returns them, one in how many that is, and the time of the last
+/// frame of all, s since the first.
 fn gather(
     mut next: impl FnMut() -> Result<Option<Moment>, Failure>,
     window: &Window,
-) -> Result<(Vec<Moment>, u64), Failure> {
+) -> Result<(Vec<Moment>, u64, f64), Failure> {
     let mut kept = Vec::new();
     let mut every = 1;
+    let mut last_ns = window.first_ns;
     while let Some(moment) = next()? {
+        last_ns = last_ns.max(moment.notes.stamp_ns);
         if !window.contains(moment.notes.stamp_ns) || !is_kept(&moment, every) {
             continue;
         }
@@ -293,7 +324,7 @@ fn gather(
         }
     }
     kept.sort_by_key(|moment| moment.notes.stamp_ns);
-    Ok((kept, every))
+    Ok((kept, every, (last_ns - window.first_ns) as f64 * 1e-9))
 }
 
 /// Tells by the number of a frame, so that two runs of one log keep the same frames.
@@ -303,6 +334,8 @@ fn is_kept(moment: &Moment, every: u64) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     /// Numbers of the frames that a window keeps of nine a second apart.
@@ -312,8 +345,32 @@ mod tests {
             ..Moment::default()
         });
         let window = Window { span, first_ns: 1_000_000_000, most };
-        let (moments, every) = gather(|| Ok(frames.next()), &window).unwrap();
+        let (moments, every, length_s) = gather(|| Ok(frames.next()), &window).unwrap();
+        assert_eq!(length_s, 8.0, "of the whole run, whatever the window");
         (moments.iter().map(|moment| moment.notes.frame).collect(), every)
+    }
+
+    #[test]
+    fn a_file_of_a_run_and_a_folder_of_runs_lead_to_the_run() {
+        let home = tempfile::tempdir().unwrap();
+        let run = home.path().join("walk");
+        fs::create_dir(&run).unwrap();
+        assert!(no_run(home.path()).message.contains("no tracks.mcap"));
+        for name in ["tracks.mcap", "report.json", "tracks.csv"] {
+            fs::write(run.join(name), "").unwrap();
+        }
+        let command = format!("`tagalong view {}`", run.display());
+        for path in [home.path().to_owned(), run.join("tracks.mcap"), run.join("tracks.csv")] {
+            let why = no_run(&path).message;
+            assert!(why.contains(&command), "{why}");
+        }
+    }
+
+    #[test]
+    fn a_window_without_a_frame_tells_the_length_of_the_run() {
+        let run = Recording { length_s: 12.34, ..Recording::default() };
+        let why = no_frames(&[Recording::default(), run]).message;
+        assert!(why.contains("12.3 s"), "{why}");
     }
 
     #[test]

@@ -70,10 +70,10 @@ pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
     }
     let Results { mut rides } = read_json(&folder.join(RESULTS))?;
     rides.sort_by(|a, b| worse_first(&a.facts, &b.facts));
-    spare(&index, args.overwrite)?;
     for ride in &rides {
-        spare(&folder.join(ride.folder(folder)?).join(PAGE), args.overwrite)?;
+        spare_page(&folder.join(ride.folder(folder)?).join(PAGE), args.overwrite)?;
     }
+    spare(&index, args.overwrite)?;
     let forecast = Forecast::new(rides.len(), "rides");
     for ride in &rides {
         let run = folder.join(ride.folder(folder)?);
@@ -95,6 +95,17 @@ pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
         counted(rides.len(), "ride")
     ))?;
     Ok(Ended::Well)
+}
+
+/// Refuses to replace the page of a ride, which has its place whatever the list is called.
+fn spare_page(page: &Path, overwrite: bool) -> Result<(), Failure> {
+    if page.exists() && !overwrite {
+        let shown = page.display();
+        return Err(Failure::usage(format!(
+            "{shown} exists: --overwrite replaces the pages of the rides and their list"
+        )));
+    }
+    Ok(())
 }
 
 /// Orders rides: those with a contact first, then those in which the robot never moved, then by the
@@ -303,6 +314,17 @@ mod tests {
         let page = list(Path::new("rides"), None, &rides);
         assert!(page.contains("no; the robot never moved (silent)"), "{page}");
         assert!(rides[1].facts.summary().contains("the robot never moved (silent)"));
+    }
+
+    #[test]
+    fn the_page_of_a_ride_is_replaced_on_request_alone() {
+        let home = tempfile::tempdir().unwrap();
+        let page = home.path().join(PAGE);
+        assert!(spare_page(&page, false).is_ok());
+        std::fs::write(&page, "").unwrap();
+        let why = spare_page(&page, false).unwrap_err().message;
+        assert!(why.contains("--overwrite") && !why.contains("-o,"), "{why}");
+        assert!(spare_page(&page, true).is_ok());
     }
 
     #[test]

@@ -64,7 +64,7 @@ impl Kind {
     }
 }
 
-/// Writes the crate, its lines in the workspace and the catalog, and a config.
+/// Writes the crate, its lines in the workspace and the catalog, and a config that is built in.
 /// Nothing is written if anything is in the way.
 pub fn create(workspace: &Workspace, kind: Kind, name: &str) -> Result<()> {
     // All checks come first, so that a wrong name leaves nothing behind.
@@ -94,7 +94,8 @@ pub fn format(workspace: &Workspace, name: &str) -> Result<()> {
 pub fn what_now(kind: Kind, name: &str) -> String {
     let verb = kind.template().verb.0;
     format!(
-        "plugins/{name} is written, listed in crates/catalog and used by configs/{name}.toml.\n\
+        "plugins/{name} is written, listed in crates/catalog and used by configs/{name}.toml, which is built\n\
+         in. Say in its first line for what it is to be taken.\n\
          Write the method in plugins/{name}/src/{verb}.rs, its settings in src/config.rs, then\n\
          \n    cargo test -p tagalong-{name} && cargo test -p tagalong-tests --test conformance\n    \
          cargo run --release -- run configs/{name}.toml LOG.mcap --overlay\n"
@@ -130,8 +131,11 @@ fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
     Ok(())
 }
 
-/// The files that list all plugins, with the new one in its place.
-fn lists_with(workspace: &Workspace, name: &str) -> Result<[(&'static str, String); 3]> {
+/// The file that lists the configs of the program.
+const BUILT_IN: &str = "crates/pipeline/src/config/builtin.rs";
+
+/// The files that list all plugins and their configs, with the new one in its place.
+fn lists_with(workspace: &Workspace, name: &str) -> Result<[(&'static str, String); 4]> {
     let list = |path, line: String, is_sibling: fn(&str) -> bool| -> Result<_> {
         let text = insert_sorted(&workspace.read(path)?, &line, is_sibling);
         Ok((path, text.with_context(|| format!("{path}: no place for the line `{line}`"))?))
@@ -147,6 +151,10 @@ fn lists_with(workspace: &Workspace, name: &str) -> Result<[(&'static str, Strin
         })?,
         list("crates/catalog/src/lib.rs", register, |line| {
             line.starts_with("    tagalong_") && line.ends_with("::register(registry);")
+        })?,
+        list(BUILT_IN, format!("    \"{name}\""), |line| {
+            // The lines of the macro, and none of a list with commas.
+            line.starts_with("    \"") && line.ends_with('"')
         })?,
     ])
 }
@@ -198,6 +206,8 @@ mod tests {
         workspace.write("crates/catalog/Cargo.toml", "tagalong-b.workspace = true\n").unwrap();
         let register = "fn f() {\n    tagalong_b::register(registry);\n}\n";
         workspace.write("crates/catalog/src/lib.rs", register).unwrap();
+        let configs = "const BUILT_IN: &[C] = configs! {\n    \"b\"\n};\n";
+        workspace.write(BUILT_IN, configs).unwrap();
         (folder, workspace)
     }
 
@@ -213,6 +223,8 @@ mod tests {
         let root = workspace.read("Cargo.toml").unwrap();
         assert!(root.starts_with(&(dependency("a-filter") + "\n")), "{root}");
         assert!(workspace.read("plugins/a-filter/src/filter.rs").unwrap().contains("AFilter"));
+        let configs = workspace.read(BUILT_IN).unwrap();
+        assert!(configs.contains("{\n    \"a-filter\"\n    \"b\"\n    \"c\"\n}"), "{configs}");
     }
 
     #[test]
@@ -220,6 +232,8 @@ mod tests {
         let (_folder, workspace) = workspace();
         for (kind, name) in Kind::value_variants().iter().zip(["d", "v", "a", "f", "m", "e"]) {
             create(&workspace, *kind, name).unwrap();
+            let config = workspace.read(format!("configs/{name}.toml")).unwrap();
+            assert!(config.starts_with("# Take this ") && !config.contains('@'), "{config}");
             let verb = format!("src/{}.rs", kind.template().verb.0);
             for file in ["Cargo.toml", "README.md", "src/lib.rs", "src/config.rs", &verb] {
                 let text = workspace.read(format!("plugins/{name}/{file}")).unwrap();

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::outcome::Failure;
+use crate::suggest::runs_in;
 use serde::Deserialize;
 use tagalong_eval::Report;
 use tagalong_eval::formats::{Timeline, kitti, metres, mot};
@@ -52,6 +53,11 @@ impl Tracks {
         let text = read_text(path)?;
         let name = path.display().to_string();
         let first = text.lines().next().unwrap_or_default();
+        if ["ub_x", "head_x"].iter().any(|column| first.contains(column)) {
+            return Err(Failure::usage(format!(
+                "{name} is a truth, and no tracks: name it as --truth"
+            )));
+        }
         // Of all formats, only `tracks-metres.csv` begins with this column.
         if first.starts_with("stamp_ns") {
             let reports = places(&text, &name, length)?;
@@ -86,6 +92,13 @@ impl Tracks {
     }
 
     fn of_run(folder: &Path, length: Option<u32>) -> Result<Self, Failure> {
+        if let Some(first) = runs_in(folder).first() {
+            let first = first.display();
+            let shown = folder.display();
+            return Err(Failure::usage(format!(
+                "{shown} is a folder of runs: name one of them, as `--tracks {first}`"
+            )));
+        }
         let file = |name: &str| -> Result<(String, String), Failure> {
             let path: PathBuf = folder.join(name);
             Ok((read_text(&path)?, path.display().to_string()))

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::outcome::Failure;
+use crate::suggest::is_run;
 use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3};
 use tagalong_eval::formats::mot::{self, SequenceInfo};
@@ -118,6 +119,12 @@ impl TruthFile {
     /// # Errors
     /// A file that cannot be read; names the file and the line.
     pub fn read(path: &Path, options: TruthOptions) -> Result<Self, Failure> {
+        if is_run(path) || is_of_run(path) {
+            let shown = path.display();
+            return Err(Failure::usage(format!(
+                "{shown} is that which a run found, and no truth: perhaps --truth and --tracks are swapped"
+            )));
+        }
         let mut truth = match kind_of(path)? {
             Kind::Log => Self::of_log(path)?,
             Kind::Lines => Self::of_frames(Kind::Lines, read_truth_lines(path)?),
@@ -254,9 +261,7 @@ impl TruthFile {
     }
 
     fn of_log(path: &Path) -> Result<Self, Failure> {
-        let frames = read_truth(path, &Limits::default())?.ok_or_else(|| {
-            Failure::failed(format!("{} has no truth: no channel {TRUTH_TOPIC}", path.display()))
-        })?;
+        let frames = read_truth(path, &Limits::default())?.ok_or_else(|| without_truth(path))?;
         Ok(Self::of_frames(Kind::Log, frames))
     }
 
@@ -387,6 +392,27 @@ impl TruthPosition {
             }
         }
     }
+}
+
+/// Returns true for the tracks in the folder of a run.
+fn is_of_run(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with("tracks") && path.parent().is_some_and(is_run)
+}
+
+/// Returns the failure of a log without truth, with the file of truth beside it.
+fn without_truth(log: &Path) -> Failure {
+    let shown = log.display();
+    for ending in ["people.csv", "truth.jsonl", "boxes.csv"] {
+        let beside = log.with_extension(ending);
+        if beside.is_file() {
+            let beside = beside.display();
+            return Failure::usage(format!(
+                "{shown} has no truth in it, and {beside} is beside it: `--truth {beside}`"
+            ));
+        }
+    }
+    Failure::failed(format!("{shown} has no truth: no channel {TRUTH_TOPIC}"))
 }
 
 fn of_person(person: &TruthPerson) -> (Truth, TruthPosition) {

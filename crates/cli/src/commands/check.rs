@@ -117,13 +117,14 @@ fn told(distances: &SafetyDistances) -> String {
         slowdown_ratio,
     } = distances;
     let mut lines = format!(
-        "  at {speed_mps} m/s it stops within {stopping_m:.2} m, and brakes for things from \
+        "  distances from the edge of the footprint (see docs/safety.md):\n  \
+         at {speed_mps} m/s it stops within {stopping_m:.2} m, and brakes for things from \
          {before_things_m:.2} m on\n  \
-         people who come need {separation_m:.2} m at that speed; nearer than {least_separation_m:.2} m \
-         it stands\n  \
-         it stops {followed_m:.2} m before the followed person; a turn sweeps a radius of \
-         {turning_radius_m:.2} m\n  \
-         (all but the radius from the footprint; see docs/safety.md)\n"
+         near people it drives at {speed_mps} m/s only while they are {separation_m:.2} m away; it is \
+         slower where they are nearer, and stands below {least_separation_m:.2} m\n  \
+         it stops {followed_m:.2} m before the followed person\n  \
+         when it turns, its corners sweep a circle with a radius of {turning_radius_m:.2} m around \
+         the middle of the robot\n"
     );
     if let Some(ahead_m) = stop_polygon_m {
         let _ = writeln!(
@@ -220,5 +221,35 @@ fn in_words(needs: &[&str], uses: &[&str]) -> String {
         format!("needs {needs}")
     } else {
         format!("needs {needs}; uses {} where the log has it", uses.join(" and "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_say_from_where_they_are() {
+        let distances = SafetyDistances {
+            speed_mps: 0.5,
+            stopping_m: 0.4,
+            before_things_m: 0.6,
+            separation_m: 3.0,
+            least_separation_m: 0.9,
+            followed_m: 0.8,
+            turning_radius_m: 0.25,
+            stop_polygon_m: None,
+            slowdown_polygon_m: None,
+            slowdown_ratio: 1.0,
+        };
+        let lines = told(&distances);
+        for part in [
+            "distances from the edge of the footprint",
+            "only while they are 3.00 m away",
+            "stands below 0.90 m",
+            "a radius of 0.25 m around the middle of the robot",
+        ] {
+            assert!(lines.contains(part), "{part}: {lines}");
+        }
     }
 }

@@ -165,6 +165,9 @@ fn refused(args: &EvalArgs, error: &EvalError) -> Failure {
     Failure::failed(format!("{}: {}", file.display(), with_remedy(error)))
 }
 
+/// Frames per second where nothing states them.
+const USUAL_HZ: f64 = 30.0;
+
 /// Note on tracks for which LAMR and AP are meaningless.
 const CONSTANT_SCORES: &str = "all reports have the same score; LAMR and AP mean nothing then: \
                                no threshold tells sure reports from unsure ones";
@@ -215,6 +218,7 @@ fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
     notes.extend(truth.early_end(&args.truth.display().to_string(), &shots));
     notes.extend(longer(args, truth.last(&shots).max(shots.last()), &tracks));
     notes.extend(tracks.notes);
+    notes.extend(assumed_rate(args, &truth, &shots));
     let rate = rate(args, &truth)?;
     let name = args.truth.display().to_string();
     let sequence = assemble(&name, &truth, &shots, tracks.reports, rate);
@@ -231,8 +235,20 @@ fn longer(args: &EvalArgs, known: u32, tracks: &Tracks) -> Option<String> {
     })
 }
 
+/// Returns a note on a rate that no file and no option states. That of KITTI is always the same.
+fn assumed_rate(args: &EvalArgs, truth: &TruthFile, shots: &Shots) -> Option<String> {
+    let is_known =
+        args.rate.is_some() || truth.info.is_some() || truth.is_kitti() || shots.first().is_some();
+    (!is_known).then(|| {
+        format!(
+            "{USUAL_HZ} frames a second are assumed, as no log was found: give --rate HZ, --log LOG, or \
+             the folder of the run as --tracks"
+        )
+    })
+}
+
 fn rate(args: &EvalArgs, truth: &TruthFile) -> Result<Rate, Failure> {
-    let usual = if truth.is_kitti() { 10.0 } else { 30.0 };
+    let usual = if truth.is_kitti() { 10.0 } else { USUAL_HZ };
     let stated = truth.info.as_ref().map(|info| info.rate_hz);
     let rate = args.rate.or(stated).unwrap_or(usual);
     if rate > 0.0 && rate.is_finite() {

@@ -9,12 +9,17 @@ use tagalong_app::config_file::ConfigFile;
 use tagalong_app::installed::{
     NetworkFiles, WITH_DEPTH, default_network, installed_embeddings, installed_networks,
 };
-use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, write_file};
-use tagalong_config::{FileLimit, nearest, read_bytes};
+use tagalong_app::outcome::{
+    ANOTHER_OUTPUT, Ended, Failure, Outcome, make_folder, print, write_file,
+};
+use tagalong_config::{FileLimit, nearest, read_bytes, read_text};
 use tagalong_network::{About, DATA_FOLDER, Limits, networks_folder};
 
 use super::model::{Known, NetworkConfig, as_text};
 use super::networks::{self, KnownNetwork};
+
+/// Start of the line of a config with the time of a call.
+const TIME: &str = "# time ";
 
 /// Network that a user installs.
 pub(super) struct Install<'a> {
@@ -25,14 +30,16 @@ pub(super) struct Install<'a> {
     pub(super) about: &'a About,
     /// The family, or the length of a vector, after a first call.
     pub(super) known: &'a Known<'a>,
+    /// Replace configs that were edited.
+    pub(super) overwrite: bool,
 }
 
 impl Install<'_> {
     /// Copies the file into the folder of the user, with its config and its card.
     ///
     /// # Errors
-    /// A name that is no plain word, or that another network has; files that cannot be read or
-    /// written.
+    /// A name that is no plain word, or that another network has; a config that was edited, without
+    /// `overwrite`; files that cannot be read or written.
     pub(super) fn run(&self) -> Outcome {
         let bytes = read_network(self.file)
             .map_err(|why| Failure::failed(format!("{}: {why}", self.file.display())))?;
@@ -42,20 +49,26 @@ impl Install<'_> {
         let folder = folder()?;
         let files = NetworkFiles::of(&folder, &name);
         check_free(&files.onnx, &name, &sha256)?;
-        make_folder(&folder)?;
-        write_file(&files.onnx, &bytes)?;
-        write_file(&files.card, self.card(&name, &sha256, bytes.len(), published))?;
+        let configs = self.configs(&files);
+        for (path, text) in &configs {
+            if !self.overwrite && is_edited(path, text) {
+                let shown = path.display();
+                return Err(Failure::usage(format!(
+                    "{shown} was edited, or written by another version: --overwrite replaces it, and \
+                     another --name keeps it"
+                )));
+            }
+        }
+        make_own_folder(&folder)?;
+        write_own(&files.onnx, &bytes)?;
+        write_own(&files.card, self.card(&name, &sha256, bytes.len(), published))?;
         let mut out = format!("installed: {}\n", files.onnx.display());
         match self.known {
             Known::Detector(known) => {
-                let file = PathBuf::from(files.onnx.file_name().unwrap_or_default());
-                for (path, config) in [
-                    (&files.config, NetworkConfig::Colour),
-                    (&files.depth_config, NetworkConfig::Depth),
-                ] {
-                    write_file(path, as_text(&file, self.about, Some(self.known), config))?;
+                for (path, text) in configs {
+                    write_own(path, text)?;
                 }
-                write_file(&files.default, format!("{name}\n"))?;
+                write_own(&files.default, format!("{name}\n"))?;
                 let family = known.family.networks();
                 let ms = known.call_ms;
                 let _ = writeln!(out, "family {} ({family}), {ms:.0} ms a call", known.family);
@@ -78,6 +91,21 @@ impl Install<'_> {
         }
         print(&out)?;
         Ok(Ended::Well)
+    }
+
+    /// Returns the configs of the network with their texts; none for re-identification.
+    fn configs<'b>(&self, files: &'b NetworkFiles) -> Vec<(&'b Path, String)> {
+        if matches!(self.known, Known::Embedding(_)) {
+            return Vec::new();
+        }
+        let file = PathBuf::from(files.onnx.file_name().unwrap_or_default());
+        let mut configs = Vec::new();
+        for (path, config) in
+            [(&files.config, NetworkConfig::Colour), (&files.depth_config, NetworkConfig::Depth)]
+        {
+            configs.push((&**path, as_text(&file, self.about, Some(self.known), config)));
+        }
+        configs
     }
 
     fn name_or(&self, published: Option<&KnownNetwork>) -> Result<String, Failure> {
@@ -187,6 +215,36 @@ fn folder() -> Result<PathBuf, Failure> {
     })
 }
 
+/// Makes the folder of installed networks. No option names it.
+fn make_own_folder(folder: &Path) -> Result<(), Failure> {
+    make_folder(folder).map_err(|why| Failure {
+        message: why.message.replace(
+            ANOTHER_OUTPUT,
+            &format!("set the variable {DATA_FOLDER} to a folder that can be written"),
+        ),
+        ..why
+    })
+}
+
+/// Writes a file into the folder of installed networks.
+fn write_own(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+    write_file(path, content).map_err(|why| Failure {
+        message: format!("{}; {DATA_FOLDER} can name another folder for networks", why.message),
+        ..why
+    })
+}
+
+/// Returns true for a file whose text is another one than that which was written into it.
+fn is_edited(path: &Path, written: &str) -> bool {
+    // The time of a call is another one each time.
+    fn lasting(text: &str) -> Vec<&str> {
+        text.lines().filter(|line| !line.starts_with(TIME)).collect()
+    }
+
+    let Ok(present) = read_text(path, FileLimit::Config) else { return path.exists() };
+    lasting(&present) != lasting(written)
+}
+
 /// Refuses a name that another network has.
 fn check_free(file: &Path, name: &str, sha256: &str) -> Result<(), Failure> {
     match read_network(file) {
@@ -220,6 +278,27 @@ fn name_of(file: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_config_is_edited_where_more_than_the_time_of_a_call_differs() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("net.toml");
+        assert!(!is_edited(&path, "a = 1\n"), "a file that is not there");
+        fs::write(&path, "# time     3.1 ms a call\na = 1\n").unwrap();
+        assert!(!is_edited(&path, "# time     2.9 ms a call\na = 1\n"));
+        assert!(is_edited(&path, "# time     3.1 ms a call\na = 2\n"));
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_names_its_variable() {
+        let home = tempfile::tempdir().unwrap();
+        fs::write(home.path().join("file"), "").unwrap();
+        let why = make_own_folder(&home.path().join("file/networks")).unwrap_err().message;
+        assert!(why.contains(DATA_FOLDER) && !why.contains("-o"), "{why}");
+        // A folder in the place of the file cannot be written either.
+        let why = write_own(home.path(), "").unwrap_err().message;
+        assert!(why.contains(DATA_FOLDER), "{why}");
+    }
 
     #[test]
     fn a_file_gives_a_plain_name() {

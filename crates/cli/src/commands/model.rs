@@ -5,6 +5,7 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::{Value, json};
 use tagalong_app::format::Format;
+use tagalong_app::installed::{NetworkFiles, missing_network};
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, spare, write_file};
 use tagalong_app::serialize::to_json;
 use tagalong_config::Registry;
@@ -12,7 +13,7 @@ use tagalong_core::RgbImage;
 use tagalong_geometry::Rect;
 use tagalong_network::{
     About, Choices, Colours, EmbeddingNetwork, Family, Fit, InputSize, Limits, PersonNetwork, Port,
-    Preparation, inspect,
+    Preparation, inspect, networks_folder,
 };
 
 use super::export::Export;
@@ -70,7 +71,8 @@ pub struct ModelArgs {
     /// Write the config that runs the network into this file, and name the network relative to it.
     #[arg(short, long, value_name = "CONFIG", conflicts_with_all = ["export", "format"])]
     output: Option<PathBuf>,
-    /// Replace a config, or an exported network with its card, that exists.
+    /// Replace a config, one of an installed network that was edited, or an exported network with its
+    /// card, that exists.
     #[arg(long)]
     overwrite: bool,
     /// Write the network of this plugin into the file, and its card beside it, instead of reading
@@ -137,6 +139,9 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
         let overwrite = args.overwrite;
         return Export { plugin, file, weights, sample, overwrite }.run(registry);
     }
+    if let Some(why) = name_for_file(file) {
+        return Err(Failure::usage(why));
+    }
     let size = args.size.as_deref().and_then(|size| <[usize; 2]>::try_from(size).ok());
     let shown = file.display();
     let refused = |why: String| Failure::failed(format!("{shown}: {why}"));
@@ -145,7 +150,14 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
     let known = known(file, &about, size, &limits);
     if args.install {
         let known = known.map_err(refused)?;
-        return Install { file, name: args.name.as_deref(), about: &about, known: &known }.run();
+        return Install {
+            file,
+            name: args.name.as_deref(),
+            about: &about,
+            known: &known,
+            overwrite: args.overwrite,
+        }
+        .run();
     }
     if let Some(config) = &args.output {
         let known = known.map_err(refused)?;
@@ -164,6 +176,19 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
         Format::Json => to_json("the network", &as_json(&about, known.as_ref().ok()))?,
     })?;
     known.map(|_| Ended::Well).map_err(refused)
+}
+
+/// Returns the remedy for the name of a network in the place of its file; `None` for any other path.
+fn name_for_file(file: &Path) -> Option<String> {
+    let name = file.to_str().filter(|_| !file.exists())?;
+    if let Some(folder) = networks_folder() {
+        let NetworkFiles { onnx, .. } = NetworkFiles::of(&folder, name);
+        if onnx.is_file() && !name.contains(['/', '\\']) {
+            let path = onnx.display();
+            return Some(format!("`{name}` is installed already: {path} is its file"));
+        }
+    }
+    missing_network(name)
 }
 
 /// Returns a path from the root on.

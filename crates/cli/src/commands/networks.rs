@@ -5,10 +5,9 @@ use std::sync::LazyLock;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use tagalong_app::installed::{default_network, installed_embeddings, installed_networks};
-
-/// Table of the networks. Its figures are those of the command that it names.
-const TABLE: &str = include_str!("networks.toml");
+use tagalong_app::installed::{
+    KNOWN_NETWORKS, default_network, installed_embeddings, installed_networks,
+};
 
 /// Network that its authors publish, with its figures.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -55,7 +54,7 @@ struct Table {
 
 #[expect(clippy::expect_used, reason = "the table is part of the program, and a test reads it")]
 static KNOWN: LazyLock<Table> =
-    LazyLock::new(|| toml::from_str(TABLE).expect("the built-in table is right"));
+    LazyLock::new(|| toml::from_str(KNOWN_NETWORKS).expect("the built-in table is right"));
 
 /// Returns the known network whose file has this SHA-256.
 pub(super) fn known_by_hash(sha256: &str) -> Option<&'static KnownNetwork> {

@@ -52,6 +52,19 @@ fn every_third_frame_is_kept_with_its_truth() {
 }
 
 #[test]
+fn a_copy_is_written_into_the_current_folder() {
+    let folder = home();
+    let here = tempfile::tempdir().unwrap();
+    let log = folder.path().join("walk.mcap").display().to_string();
+    let done = alter(here.path(), &[&log, "--every", "6"]);
+    assert_eq!(code(&done), 0, "{}", text(&done.stderr));
+    for name in ["walk-altered.mcap", "walk-altered.people.csv"] {
+        assert!(here.path().join(name).is_file(), "{name}");
+        assert!(!folder.path().join(name).exists(), "{name}");
+    }
+}
+
+#[test]
 fn a_mirrored_log_mirrored_again_is_the_log() {
     let folder = home();
     for (log, copy) in [("walk.mcap", "once.mcap"), ("once.mcap", "twice.mcap")] {

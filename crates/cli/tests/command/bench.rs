@@ -228,6 +228,7 @@ fn a_log_that_lacks_depth_is_skipped_with_the_reason() {
     Drawn::of(3).write(&home.path("logs/bare.mcap"));
     let told = ok(home.bench(&["--logs-dir", "logs", "-o", "out"]));
     assert!(told.contains("bare.mcap has no truth"), "{told}");
+    assert!(told.contains("`tagalong annotate "), "{told}");
     let skipped: Vec<Value> =
         home.plan("out").into_iter().filter(|task| task["skip"].is_string()).collect();
     assert_eq!(skipped.len(), 2, "{skipped:?}");

@@ -63,6 +63,23 @@ fn a_run_is_scored_in_the_image_and_on_the_floor() {
 }
 
 #[test]
+fn paths_in_each_others_place_are_refused_with_the_cure() {
+    let folder = home();
+    fs::create_dir(folder.path().join("runs")).unwrap();
+    fs::rename(folder.path().join("out"), folder.path().join("runs/walk")).unwrap();
+    for (truth, tracks, cure) in [
+        ("walk.people.csv", "runs", "name one of them, as `--tracks runs/walk`"),
+        ("runs/walk", "walk.people.csv", "--truth and --tracks are swapped"),
+        ("runs/walk/tracks.csv", "walk.people.csv", "--truth and --tracks are swapped"),
+        ("walk.mcap", "runs/walk", "`--truth walk.people.csv`"),
+    ] {
+        let told = in_home(folder.path(), &["--truth", truth, "--tracks", tracks]);
+        let why = text(&told.stderr);
+        assert!(code(&told) == 2 && why.contains(cure), "{truth} {tracks}: {why}");
+    }
+}
+
+#[test]
 fn tracks_without_what_is_compared_are_refused_with_the_remedy() {
     let folder = home();
     let truth = ["--truth", "walk.people.csv", "--tracks"];
@@ -337,6 +354,9 @@ fn tracks_that_go_on_without_a_known_end_are_said() {
     assert_eq!(said["frames"].as_u64(), Some(9));
     let notes = said["notes"].to_string();
     assert!(notes.contains("goes on to frame 9, and the last frame known is 2"), "{notes}");
+    assert!(notes.contains("30 frames a second are assumed"), "{notes}");
+    let stated = json(&in_home(folder.path(), &[&files[..], &["--rate", "30"]].concat()));
+    assert!(!stated["notes"].to_string().contains("assumed"), "{stated}");
 }
 
 #[test]

@@ -256,6 +256,9 @@ fn each_camera_has_a_run_of_its_own() {
         let folder = home.path().join(format!("runs/two-depth-ekf-{camera}"));
         assert!(folder.join("report.json").exists(), "{said}");
     }
+    let (_, said) = ran(&["run", "two.mcap", "--camera", "/back"]);
+    assert!(said.contains("no camera `/back`; --camera can be one of: "), "{said}");
+    assert!(said.contains("/rear") && !said.contains("no built-in pipeline fits"), "{said}");
     let (code, said) = ran(&["run", "two.mcap", "--each-camera", "--camera", "/rear"]);
     assert!(code == 2 && said.contains("cannot be used with"), "{said}");
 }

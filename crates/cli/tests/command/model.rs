@@ -97,6 +97,20 @@ fn an_installed_network_has_a_name() {
     let taken = run(&["model", "--install", &other, "--name", "blob-finder"]);
     let why = text(&taken.stderr);
     assert!(why.contains("another network is installed as `blob-finder`"), "{why}");
+    let named = text(&run(&["model", "blob-finder"]).stderr);
+    assert!(named.contains("is installed already: ") && !named.contains("did you mean"), "{named}");
+    // The same file again: what was edited stays, unless it is asked for.
+    let again = ["model", "--install", &file, "--name", "blob-finder"];
+    assert_eq!(code(&run(&again)), 0, "nothing was edited");
+    let config = place("data/networks/blob-finder.toml");
+    let edited = fs::read_to_string(&config).unwrap() + "# mine\n";
+    fs::write(&config, &edited).unwrap();
+    let kept = run(&again);
+    let why = text(&kept.stderr);
+    assert!(code(&kept) == 2 && why.contains("--overwrite"), "{why}");
+    assert_eq!(fs::read_to_string(&config).unwrap(), edited);
+    assert_eq!(code(&run(&[&again[..], &["--overwrite"]].concat())), 0);
+    assert!(!fs::read_to_string(&config).unwrap().contains("# mine"));
     let odd = run(&["model", "--install", &other, "--name", "a/b"]);
     assert_eq!(code(&odd), 2, "{}", text(&odd.stderr));
     let builtin = run(&["model", "--install", &other, "--name", "mono"]);

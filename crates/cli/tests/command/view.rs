@@ -86,13 +86,31 @@ fn only_runs_of_one_log_are_compared() {
 #[test]
 fn what_is_no_run_is_answered_with_the_command_that_makes_one() {
     let home = home();
-    for (argument, said) in [("walk.mcap", "is a file"), (".", "no tracks.mcap"), ("x", "no such")]
-    {
+    fs::create_dir(home.path().join("empty")).unwrap();
+    let answers = [("walk.mcap", "is a file"), ("empty", "no tracks.mcap"), ("x", "no such")];
+    for (argument, said) in answers {
         let output = view(home.path(), &[argument]);
         assert_eq!(code(&output), 2, "{argument}");
         let message = text(&output.stderr);
         assert!(message.contains(said) && message.contains("tagalong run"), "{message}");
     }
+}
+
+#[test]
+fn what_belongs_to_a_run_is_answered_with_the_command_that_shows_it() {
+    let home = home();
+    for (argument, said) in
+        [(".", "tagalong view ./one`"), ("one/tracks.mcap", "`tagalong view one`")]
+    {
+        let output = view(home.path(), &[argument]);
+        assert_eq!(code(&output), 2, "{argument}");
+        assert!(text(&output.stderr).contains(said), "{}", text(&output.stderr));
+    }
+    let late = view(home.path(), &["one", "--from", "99"]);
+    assert!(text(&late.stderr).contains("the last one of the run is at "), "{late:?}");
+    let run = own_plugin().current_dir(home.path()).args(["run", "one"]).output().unwrap();
+    let why = text(&run.stderr);
+    assert!(why.contains("one is a run, not a log: `tagalong view one`"), "{why}");
 }
 
 #[test]

@@ -279,7 +279,11 @@ fn wanted_rigs<'a>(
         let called: Vec<&Rig> = all.iter().filter(|rig| rig.is_called(camera)).collect();
         if called.is_empty() {
             let names: Vec<&str> = all.iter().map(|rig| rig.label.as_str()).collect();
-            let hint = format!("; `camera` under [input] can be one of: {}", names.join(", "));
+            let hint = if names.is_empty() {
+                "; it has no images of a camera".to_owned()
+            } else {
+                format!("; `camera` under [input] can be one of: {}", names.join(", "))
+            };
             return Err(missing(scan, format!("camera `{camera}`"), hint));
         }
         // The name that the account gives a rig means that one alone.

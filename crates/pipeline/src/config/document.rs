@@ -6,7 +6,7 @@ use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use tagalong_config::{ConfigError, FileLimit, read_text};
+use tagalong_config::{ConfigError, FileLimit, model_hint, nearest, read_text};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -217,8 +217,30 @@ fn base_at(
         ));
     }
     let text = read_base(&path).or_else(|error| builtin_base(name, error));
-    let text = text.map_err(|error| format!("cannot extend {}: {error}", path.display()))?;
+    let text = text.map_err(|error| {
+        let hint =
+            if error.kind() == io::ErrorKind::NotFound { hint(&path) } else { String::new() };
+        format!("cannot extend {}: {error}{hint}", path.display())
+    })?;
     Ok(Base { path, padded: "\n".repeat(start) + &text, start })
+}
+
+/// Returns "; did you mean `NAME.toml`?" for a base that is missing, with the nearest config of its
+/// folder or built-in one; nothing if none is near.
+fn hint(missing: &Path) -> String {
+    let wanted = missing.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    if builtin::OF_A_FILE.contains(&wanted) {
+        return format!(
+            "; `{wanted}` runs the network of a file, and is not built in: extend the config of an \
+             installed network by its path"
+        );
+    }
+    let hint = model_hint(missing, &[]);
+    if !hint.is_empty() {
+        return hint;
+    }
+    let best = nearest(wanted, builtin::builtin_names());
+    best.map_or(String::new(), |best| format!("; did you mean `{best}.{ENDING}`?"))
 }
 
 /// Returns true for a file that is a config by its name. The mistakes of a base are shown with their
@@ -382,6 +404,12 @@ mod tests {
     fn circles_and_missing_bases_are_refused_with_their_line() {
         let missing = table("a = 1\nextends = 'b.toml'\n", &[]).unwrap_err();
         assert!(missing.contains("own.toml:2:11: cannot extend "), "{missing}");
+        let mistyped = table("extends = 'depth-ekff.toml'\n", &[]).unwrap_err();
+        assert!(mistyped.contains("; did you mean `depth-ekf.toml`?"), "{mistyped}");
+        let network = table("extends = 'colour-net.toml'\n", &[]).unwrap_err();
+        assert!(network.contains("`colour-net` runs the network of a file"), "{network}");
+        let own = table("extends = 'robt.toml'\n", &[("robot.toml", "")]).unwrap_err();
+        assert!(own.contains("; did you mean `robot.toml`?"), "{own}");
         // A plain name without a file is that of a built-in config.
         let builtin = table("extends = 'mono.toml'\n", &[]).unwrap();
         assert!(builtin.contains_key("filter"), "{builtin:?}");

@@ -36,7 +36,7 @@ const BOXES: &str = "boxes.csv";
 pub struct AlterArgs {
     /// The log.
     log: PathBuf,
-    /// The copy [default: LOG-altered.mcap, beside the log].
+    /// The copy [default: LOG-altered.mcap in the current folder].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Keep every n-th frame, from the first one on.

@@ -39,7 +39,7 @@ const JPEG_QUALITY: u8 = 90;
 pub struct BlurArgs {
     /// The log.
     log: PathBuf,
-    /// The copy [default: LOG-blurred.mcap, beside the log].
+    /// The copy [default: LOG-blurred.mcap in the current folder].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Folder of a run over this log; its people are blurred [default: a new run by the pipeline for
