@@ -43,7 +43,10 @@ fn unset(topic: &str, used: StampSource, is_replaced: bool) -> Finding {
     };
     let measured = format!("no message of {topic} is stamped later than the one before: {taken}");
     Finding::new("stamps", severity, measured)
-        .why("times of recording contain the delays of transport: the motion of people is less exact")
+        .why(
+            "times of recording contain the delays of transport, so that motion is less exact; without any \
+             times there is none",
+        )
         .remedy(
             "let the driver set header.stamp when it takes the image; until then\n\
              [input] stamps = \"recording\"",
