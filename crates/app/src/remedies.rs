@@ -110,10 +110,19 @@ impl Remedies {
         self.drop.iter().find(|remedy| remedy.is_for(test))
     }
 
+    /// Returns the remedy for a test in a resolved config: that of a plugin that the config has, or else
+    /// that of the pipeline.
+    pub fn of_config(&self, test: &str, resolved: &Table) -> Option<&Remedy> {
+        let of_plugins = self.drop.iter().filter(|remedy| remedy.plugin.is_some());
+        let mut fitting = of_plugins.filter(|remedy| remedy.is_for(test));
+        let fitting = fitting.find(|remedy| !remedy.settings_in(resolved).is_empty());
+        fitting.or_else(|| self.of(test))
+    }
+
     /// Returns the sentence that says why a test dropped a person, and the settings that decide it, by
     /// which each page and `doctor` explain it. Settings are those of a resolved config, two at most.
     pub fn sentence(&self, test: &str, resolved: &Table) -> String {
-        let Some(remedy) = self.of(test) else {
+        let Some(remedy) = self.of_config(test, resolved) else {
             return format!("the test \"{test}\" dropped the candidate");
         };
         let mut found = remedy.settings_in(resolved);
@@ -445,6 +454,25 @@ mod tests {
             remedies.sentence("unknown", &resolved),
             "the test \"unknown\" dropped the candidate"
         );
+    }
+
+    #[test]
+    fn each_manager_names_its_settings_for_a_track_that_is_not_confirmed() {
+        let remedies = Remedies::new(&registry());
+        let sprt: Table = toml::from_str(
+            "[manager]\nplugin = 'manage-sprt'\n[manager.config]\ntentative_misses = 2\n\
+             confirm_log_odds = 4.6\n",
+        )
+        .unwrap();
+        let told = remedies.sentence("track: not confirmed", &sprt);
+        assert!(told.contains("{ tentative_misses = 2, confirm_log_odds = 4.6 }"), "{told}");
+        let m_of_n: Table = toml::from_str(
+            "[manager]\nplugin = 'manage-m-of-n'\n[manager.config]\ntentative_misses = 2\n\
+             confirm_hits = 3\n",
+        )
+        .unwrap();
+        let told = remedies.sentence("track: not confirmed", &m_of_n);
+        assert!(told.contains("{ tentative_misses = 2, confirm_hits = 3 }"), "{told}");
     }
 
     #[test]

@@ -412,7 +412,7 @@ fn deciding(
     let config = pipeline.config().values();
     let mut deciding = BTreeMap::new();
     for test in result.missed.iter().filter_map(|missed| missed.test.as_ref()) {
-        if let Some(remedy) = remedies.of(test) {
+        if let Some(remedy) = remedies.of_config(test, config) {
             deciding.entry(test.clone()).or_insert_with(|| remedy.lines(config));
         }
     }

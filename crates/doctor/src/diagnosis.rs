@@ -159,7 +159,7 @@ fn funnel(
     let entries = trial.funnel.entries().iter();
     let mut drops: Vec<Drop> = entries
         .map(|entry| {
-            let remedy = remedies.of(entry.test);
+            let remedy = remedies.of_config(entry.test, resolved);
             Drop {
                 test: entry.test,
                 count: entry.count,

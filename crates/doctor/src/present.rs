@@ -3,8 +3,10 @@
 use toml::{Table, Value};
 
 /// Words that lead to a setting, and lead nowhere without one.
-const LEADS: &[&str] =
-    &["; else", "; until then", ", believe tracks by evidence", ", or", "; or", "else", "or"];
+const LEADS: &[&str] = &["; else", "; until then", BY_EVIDENCE, ", or", "; or", "else", "or"];
+
+/// Words before the setting of a track manager.
+pub const BY_EVIDENCE: &str = "; where they are things, believe tracks by evidence:";
 
 /// Removes the lines of a remedy that set what a resolved config has already, or what the plugin of
 /// a section does not know. Returns `None` if nothing is left.
@@ -102,6 +104,15 @@ mod tests {
         );
         assert_eq!(differing("[input] depth_offset_px = [3, -2]", &resolved()), None);
         assert!(differing("[input] depth_offset_px = [4, -2]", &resolved()).is_some());
+    }
+
+    #[test]
+    fn the_words_before_a_setting_go_with_it() {
+        let resolved: Table = toml::from_str("[manager]\nplugin = 'manage-sprt'\n").unwrap();
+        let remedy =
+            format!("look at the pictures{BY_EVIDENCE}\n[manager] plugin = \"manage-sprt\"");
+        assert_eq!(differing(&remedy, &resolved).unwrap(), "look at the pictures");
+        assert_eq!(differing(&remedy, &Table::new()), Some(remedy));
     }
 
     #[test]

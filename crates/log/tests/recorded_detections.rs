@@ -92,6 +92,25 @@ fn detections_that_the_settings_name_are_listed_as_usable() {
 }
 
 #[test]
+fn detections_that_no_setting_names_come_with_the_command_that_uses_them() {
+    for (topic, lines) in [
+        (TOPIC, &["`tagalong run recorded LOG` uses them"][..]),
+        ("/boxes", &["`extends = \"recorded.toml\"`", "`input.detections_topic = \"/boxes\"`"]),
+    ] {
+        let mut log = started();
+        log.message(topic, stamp(0), &array(stamp(0), &["person"]));
+        log.colour(stamp(0));
+        let saved = log.save();
+        let input = InputSettings::default();
+        let found = tagalong_log::inspect(&saved.path, &input, &Default::default()).unwrap();
+        let told = found.inputs.topics.iter().find(|told| told.topic == topic).unwrap();
+        let remedy = told.remedy.as_ref().unwrap();
+        assert!(lines.iter().all(|line| remedy.contains(line)), "{remedy}");
+        assert_eq!(remedy.contains("detections_topic"), topic != TOPIC, "{remedy}");
+    }
+}
+
+#[test]
 fn boxes_that_cannot_be_are_lost_with_the_cause() {
     let nan = f64::NAN;
     for (x, y, width, height, counter) in [

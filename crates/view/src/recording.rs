@@ -107,7 +107,7 @@ pub struct RideFacts {
     pub time_s: f64,
     /// Time in which the person was in view, s.
     pub in_view_s: f64,
-    /// Time in which another person or a thing was followed, s.
+    /// Time in which the lock was on another person or a thing, s; also while the robot stood.
     pub wrong_s: f64,
     /// Time in which the person was followed and walked slowly, s ...
     pub slow_s: f64,
@@ -148,7 +148,8 @@ impl RideFacts {
         let stands = stands.map_or(String::new(), |why| format!("; the robot never moved ({why})"));
         format!(
             "{}{stands}{}; least room to people {}, to things {}; distance kept for {share} of the time in \
-             which the person was followed and walked slowly; followed another person for {:.1} s",
+             which the person was followed and walked slowly; the lock was on another person or a thing for \
+             {:.1} s",
             if self.kept { "the person was kept" } else { "the person was not kept" },
             if self.touches() { "; the robot touched something" } else { "" },
             metres(self.clearance_people_m),

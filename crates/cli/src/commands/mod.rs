@@ -22,4 +22,5 @@ pub use eval::{EvalArgs, SimilarityChoice, eval, eval_json};
 pub use inspect::inspect;
 pub use list::list;
 pub use model::{ModelArgs, model};
+pub(crate) use networks::is_known_network;
 pub use shell::{completions, man};

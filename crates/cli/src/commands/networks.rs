@@ -61,6 +61,11 @@ pub(super) fn known_by_hash(sha256: &str) -> Option<&'static KnownNetwork> {
     KNOWN.network.iter().find(|network| network.sha256 == sha256)
 }
 
+/// Returns true if the table has figures of a network of this name.
+pub(crate) fn is_known_network(name: &str) -> bool {
+    KNOWN.network.iter().any(|network| network.name == name)
+}
+
 /// Returns the known and the installed networks as a text.
 pub(super) fn as_text() -> String {
     let mut out = String::from("Networks that are known to work, to be had from their authors:\n");

@@ -7,6 +7,8 @@ use tagalong_app::installed::{WITH_DEPTH, default_network};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_config::Registry;
 
+use crate::commands::is_known_network;
+
 /// Returns the pipeline for a log, and says which and why.
 ///
 /// # Errors
@@ -32,10 +34,7 @@ pub(super) fn choose(
     {
         let joined = format!("{network}{WITH_DEPTH}");
         if ConfigFile::named(&joined).is_some() {
-            say(&format!(
-                "`tagalong run {joined} LOG` finds more people, and takes a call of the network per \
-                 frame longer"
-            ));
+            say(&joined_line(&joined, is_known_network(&network)));
         }
     }
     if name == WITHOUT_NETWORK {
@@ -45,4 +44,29 @@ pub(super) fn choose(
         );
     }
     Ok(config)
+}
+
+/// Returns the line about the config that joins a network with depth. Only networks with figures on
+/// recorded logs are said to find more.
+fn joined_line(joined: &str, has_figures: bool) -> String {
+    let gain = if has_figures { "finds more people" } else { "joins your network with depth" };
+    format!("`tagalong run {joined} LOG` {gain}, and takes a call of the network per frame longer")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_networks_with_figures_are_said_to_find_more_people() {
+        assert!(is_known_network("yolox-nano") && !is_known_network("own"));
+        let known = joined_line("yolox-nano-depth", true);
+        assert!(
+            known.starts_with("`tagalong run yolox-nano-depth LOG` finds more people"),
+            "{known}"
+        );
+        let own = joined_line("own-depth", false);
+        assert!(own.contains("joins your network with depth"), "{own}");
+        assert!(!own.contains("more people"), "{own}");
+    }
 }

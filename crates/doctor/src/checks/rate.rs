@@ -8,7 +8,7 @@ const WALK_MPS: f64 = 1.4;
 
 impl Evidence {
     /// Returns the topic that makes the frames.
-    fn primary(&self) -> Option<&TopicFacts> {
+    pub(super) fn primary(&self) -> Option<&TopicFacts> {
         let facts = &self.inspection.facts;
         let images = facts.colour_topic.as_ref().or(facts.depth_topic.as_ref());
         self.inspection.topic(images.or(facts.laser_topic.as_ref())?)

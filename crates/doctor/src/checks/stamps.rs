@@ -1,4 +1,4 @@
-use tagalong_log::Timing;
+use tagalong_log::{StampSource, Timing};
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
@@ -14,11 +14,43 @@ impl Evidence {
     }
 }
 
-/// Checks for gaps, and clocks that jump.
+/// Checks for gaps, clocks that jump, and stamps that were never set.
 pub fn stamps(evidence: &Evidence) -> Option<Finding> {
+    if let Some(topic) =
+        evidence.primary().filter(|topic| topic.count > 1 && topic.timing.is_none())
+    {
+        return Some(unset(
+            &topic.topic,
+            evidence.input.stamps,
+            evidence.inspection.counters.contains_key(REPLACED),
+        ));
+    }
     let judged = evidence.timings().map(|(topic, timing)| judge(topic, &timing));
     // With equal severity the first topic wins: `max_by` alone would return the last.
     judged.max_by(|a, b| a.severity.cmp(&b.severity).then(std::cmp::Ordering::Greater))
+}
+
+/// Counter of the reader for a log whose stamps it replaces by the times of recording.
+const REPLACED: &str = "logs_without_stamps";
+
+/// Returns the finding for a topic without a stamp that is later than the one before.
+fn unset(topic: &str, used: StampSource, is_replaced: bool) -> Finding {
+    let recording = "the times of recording are taken in place of all stamps";
+    let (severity, taken) = match used {
+        StampSource::Recording => (Severity::Ok, recording),
+        StampSource::Auto if is_replaced => (Severity::Warn, recording),
+        StampSource::Auto | StampSource::Header => (Severity::Bad, "no other times are taken"),
+    };
+    let measured = format!("no message of {topic} is stamped later than the one before: {taken}");
+    Finding::new("stamps", severity, measured)
+        .why(
+            "times of recording contain the delays of transport, so that motion is less exact; without any \
+             times there is none",
+        )
+        .remedy(
+            "let the driver set header.stamp when it takes the image; until then\n\
+             [input] stamps = \"recording\"",
+        )
 }
 
 /// Returns the worst problem with the stamps of a topic.
@@ -55,4 +87,22 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
             .remedy("[input] reorder_frames = 8");
     }
     finding(Severity::Ok, format!("in order, the longest pause is {:.2} s", timing.longest_gap_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stamps_that_were_never_set_are_told_with_the_times_that_are_taken() {
+        let told = unset("/camera", StampSource::Auto, true);
+        assert_eq!((told.id, told.severity), ("stamps", Severity::Warn));
+        assert!(told.measured.contains("the times of recording are taken"), "{}", told.measured);
+        assert!(told.remedy.unwrap().contains("[input] stamps = \"recording\""));
+        let told = unset("/camera", StampSource::Auto, false);
+        assert_eq!(told.severity, Severity::Bad);
+        assert!(told.measured.contains("no other times are taken"), "{}", told.measured);
+        assert_eq!(unset("/camera", StampSource::Header, false).severity, Severity::Bad);
+        assert_eq!(unset("/camera", StampSource::Recording, false).severity, Severity::Ok);
+    }
 }

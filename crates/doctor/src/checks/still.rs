@@ -3,6 +3,7 @@ use tagalong_math::counted;
 use super::super::coverage::STILL_S;
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
+use super::super::present::BY_EVIDENCE;
 use super::{Alternative, better};
 
 /// Boxes below which shares mean little.
@@ -61,8 +62,7 @@ fn remedy(evidence: &Evidence) -> String {
             100.0 * coverage.idle()
         ),
         None => format!(
-            "look at the pictures (-o DIR); where they are things, {}\n\
-             [manager] plugin = \"manage-sprt\"",
+            "look at the pictures (-o DIR){}\n[manager] plugin = \"manage-sprt\"",
             other_config(evidence)
         ),
     }
@@ -73,7 +73,11 @@ fn other_config(evidence: &Evidence) -> String {
     let usable = &evidence.inspection.usable;
     let fits =
         usable.contains(&"colour") && usable.contains(&"depth") && evidence.config != VERIFIED;
-    if fits { format!("take {VERIFIED}, or") } else { "believe tracks by evidence:".to_owned() }
+    if fits {
+        format!("; where they are things, take {VERIFIED}, or")
+    } else {
+        BY_EVIDENCE.to_owned()
+    }
 }
 
 /// Config whose verifiers drop things.

@@ -276,8 +276,7 @@ impl Judge<'_> {
         }
         let is_named = self.input.topic_of(sensor.input).is_some();
         if sensor.rank.is_none() && !is_named {
-            let remedy =
-                format!("`tagalong run recorded LOG` uses them, with `{key} = \"{name}\"`");
+            let remedy = recorded_remedy(&key, name);
             return ("recorded detections are read if they are named".to_owned(), Some(remedy));
         }
         if !self.inputs.uses(sensor.input) {
@@ -285,6 +284,21 @@ impl Judge<'_> {
         }
         (format!("no {} are used", sensor.wanted), Some(takes))
     }
+}
+
+/// Topic that the built-in config `recorded` names.
+const RECORDED_TOPIC: &str = "/detections";
+
+/// Returns the command that uses recorded detections, with the config that it takes for a topic that the
+/// built-in config does not name.
+fn recorded_remedy(key: &str, name: &str) -> String {
+    if name == RECORDED_TOPIC {
+        return "`tagalong run recorded LOG` uses them".to_owned();
+    }
+    format!(
+        "`tagalong run own.toml LOG` uses them, with these two lines in own.toml: \
+         `extends = \"recorded.toml\"` and `input.{key} = \"{name}\"`"
+    )
 }
 
 fn is_scaled(info: &crate::msgs::CameraInfo, size: (u32, u32)) -> bool {

@@ -15,7 +15,7 @@ pub use crowd::CrowdMeasures;
 use enable::StuckEnable;
 pub use judge::{Episode, Ridden, RideJudge};
 use tagalong_config::Registry;
-use tagalong_core::{Command, Frame, Reason, Stamp, WheelSpeeds};
+use tagalong_core::{Command, Frame, Input, Reason, Stamp, WheelSpeeds};
 use tagalong_pipeline::{FrameReport, Pipeline, SourceKind, Sources};
 use tagalong_sim::{
     ApproachInView, ApproachState, Clearance, CrowdView, Event, ROBOT_RADIUS_M, Scene,
@@ -140,7 +140,7 @@ impl Ride {
             let message = format!("{} has no [controller]: nothing can follow", contender.name);
             return Err(TrialError::Config(message));
         }
-        Self::check_obstacle_sources(scene, &pipeline, &contender.name)?;
+        Self::check_sensors(scene, &pipeline, &contender.name)?;
         // The simulated base executes the commands.
         pipeline.set_driving(true);
         let mut draw = Draw::live(scene, 1);
@@ -189,12 +189,27 @@ impl Ride {
         Ok(ride)
     }
 
+    /// Refuses a pipeline that requires a laser scanner where the robot of the scene has none, or that has
+    /// a source of obstacles that the robot does not have.
+    ///
+    /// # Errors
+    /// [`TrialError::Config`] names the sensor and the remedy.
+    pub fn check_sensors(scene: &Scene, pipeline: &Pipeline, name: &str) -> Result<(), TrialError> {
+        if pipeline.inputs().requires(Input::Laser) && scene.laser.is_none() {
+            return Err(TrialError::Config(format!(
+                "{name}: it requires laser scans, and the robot of the scene has no laser scanner; add \
+                 it with `--set 'laser={{}}'`"
+            )));
+        }
+        Self::check_obstacle_sources(scene, pipeline, name)
+    }
+
     /// Refuses a pipeline with a source of obstacles that the robot of the scene does not have: without a
     /// reading of it the robot would never move.
     ///
     /// # Errors
     /// [`TrialError::Config`] names the source and the remedy.
-    pub fn check_obstacle_sources(
+    fn check_obstacle_sources(
         scene: &Scene,
         pipeline: &Pipeline,
         name: &str,

@@ -23,7 +23,8 @@ pub fn tests<'a>(
     let names: BTreeSet<&str> = notes.flat_map(dropping_tests).collect();
     let mut tests = BTreeMap::new();
     for name in names {
-        let settings = remedies.of(name).map_or_else(Vec::new, |remedy| remedy.lines(config));
+        let remedy = remedies.of_config(name, config);
+        let settings = remedy.map_or_else(Vec::new, |remedy| remedy.lines(config));
         let why = remedies.sentence(name, config);
         tests.insert(name.to_owned(), TestData { settings, why });
     }

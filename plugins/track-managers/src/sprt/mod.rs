@@ -32,6 +32,11 @@ const REMEDIES: &[Remedy] = &[
         look: "a thing at the same place was disproved before",
     },
     Remedy {
+        test: "track: not confirmed",
+        settings: &["tentative_misses", "confirm_log_odds"],
+        look: "people seen in too few frames, or doubtful to the detectors and verifiers",
+    },
+    Remedy {
         test: "track: never moved",
         settings: &[
             "undecided_s",

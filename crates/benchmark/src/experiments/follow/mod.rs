@@ -27,7 +27,7 @@ use tagalong_app::threads::threads;
 use tagalong_config::Registry;
 use tagalong_pipeline::LooksSettings;
 use tagalong_report::Table;
-use tagalong_sim::{InjectedFault, Scene, ScheduledFault, Seeds, Split, Variant};
+use tagalong_sim::{FaultKind, InjectedFault, Scene, ScheduledFault, Seeds, Split, Variant};
 use tagalong_simulate::scenes;
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
@@ -37,6 +37,11 @@ use crate::experiments::contender::contender;
 const RESULTS: [&str; 3] = ["follow.json", "follow.md", "likeness.csv"];
 /// Folder and name prefix of the default scenes.
 const SCENES: (&str, &str) = ("configs/scenes", "follow-");
+
+/// The built-in config that follows where none is named.
+const CONFIG: &str = "follow-depth";
+/// Time of a ride after the begin of a fault, s, that is proposed.
+const LONGER_S: f64 = 20.0;
 
 /// Arguments of `tagalong follow`.
 #[derive(Args, Debug)]
@@ -248,10 +253,8 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
                     let mut variant = variant(args, seed);
                     variant.set.extend(value.clone());
                     let mut scene = tagalong_simulate::read(&path, &variant)?;
-                    scene.faults.inject.extend(args.inject.iter().cloned());
-                    scene.check_faults().map_err(Failure::usage)?;
-                    Ride::check_obstacle_sources(&scene, pipeline, &contender.name)
-                        .map_err(failure)?;
+                    inject(&mut scene, &args.inject)?;
+                    Ride::check_sensors(&scene, pipeline, &contender.name).map_err(failure)?;
                     let suite = suite.clone();
                     let swept = swept.clone();
                     let contender = contender.clone();
@@ -263,6 +266,23 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
     Ok(jobs)
 }
 
+/// Adds the faults of `--inject` to a scene.
+fn inject(scene: &mut Scene, faults: &[InjectedFault]) -> Result<(), Failure> {
+    for fault in faults {
+        if let Some(at_s) = fault.at_s.filter(|at_s| *at_s >= scene.duration_s) {
+            let kind = fault.kind.map_or("random", FaultKind::name);
+            let ends_s = scene.duration_s;
+            return Err(Failure::usage(format!(
+                "--inject {kind}@{at_s}: the ride ends at {ends_s:.1} s, and the fault would never begin; \
+                 give an earlier time, or a longer ride with `--set duration_s={:.1}`",
+                at_s + LONGER_S
+            )));
+        }
+    }
+    scene.faults.inject.extend(faults.iter().cloned());
+    scene.check_faults().map_err(Failure::usage)
+}
+
 /// Returns the values of `--sweep` with their key; `None` once without it.
 fn swept(args: &FollowArgs) -> Vec<Option<(String, String)>> {
     let Some((key, values)) = &args.sweep else { return vec![None] };
@@ -272,16 +292,48 @@ fn swept(args: &FollowArgs) -> Vec<Option<(String, String)>> {
 fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, Failure> {
     let mut contenders = Vec::new();
     for path in std::iter::once(&args.config).chain(&args.against) {
+        if is_scene(path) {
+            return Err(scene_in_place_of_config(path, args));
+        }
         let file = ConfigFile::read(path)?;
         let (pipeline, _) = file.pipeline(registry, None)?;
         if !pipeline.has_controller() {
             let shown = path.display();
-            let message = format!("{shown} has no [controller]: it steers no robot");
-            return Err(Failure::usage(message));
+            let steering = steering_configs(registry).join(", ");
+            return Err(Failure::usage(format!(
+                "{shown} has no [controller]: it steers no robot; built-in configs with one: {steering}"
+            )));
         }
         contenders.push(contender(&file));
     }
     Ok(contenders)
+}
+
+/// Returns true for the name or the file of a built-in scene that is no config as well.
+fn is_scene(path: &Path) -> bool {
+    let is_config = path.to_str().is_some_and(|name| ConfigFile::named(name).is_some());
+    scenes::built_in(path).is_some() && !is_config
+}
+
+/// Returns the failure of a scene that is given where the config belongs.
+fn scene_in_place_of_config(path: &Path, args: &FollowArgs) -> Failure {
+    let shown = path.display();
+    let mut given = args.scenes.iter().filter_map(|path| path.to_str());
+    let config = given.find(|name| ConfigFile::named(name).is_some()).unwrap_or(CONFIG);
+    Failure::usage(format!("{shown} is a scene: `tagalong follow {config} {shown}`"))
+}
+
+/// Returns the names of the built-in configs that steer a robot.
+fn steering_configs(registry: &Registry) -> Vec<&'static str> {
+    let mut steering = Vec::new();
+    for name in ConfigFile::built_in_names() {
+        let Some(file) = ConfigFile::named(name) else { continue };
+        // One that needs a file of the user is no advice.
+        if file.pipeline(registry, None).is_ok_and(|(pipeline, _)| pipeline.has_controller()) {
+            steering.push(name);
+        }
+    }
+    steering
 }
 
 /// Returns the named scenes, or all default ones.

@@ -101,7 +101,8 @@ fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
              person was ever out of its reach",
             judge.most_wrong_s, judge.refind_s
         ),
-        "wrong: share of the time in which the robot followed another person or a thing".into(),
+        "wrong: share of the time of the lock in which it was on another person or a thing, also while \
+         the robot stood".into(),
         "contacts: rides in which the robot touched a person or a thing, and the least clearance".into(),
         "ms/frame: 95th percentile of the processor time of the pipeline's thread".into(),
     ]

@@ -76,3 +76,51 @@ fn a_source_of_obstacles_that_the_scene_lacks_is_named_before_the_ride() {
     assert!(refused.contains("--set 'bumpers=[{name=\"hazards\"}]'"), "{refused}");
     assert!(ride("bumpers = [{ name = \"hazards\" }]").is_ok());
 }
+
+/// Returns the refusal of an argument line, whose paths are those of a clone.
+fn refusal(line: &[&str]) -> String {
+    let mut registry = Registry::default();
+    tagalong_catalog::register(&mut registry);
+    let args = Cli::parse_from(std::iter::once(&"follow").chain(line)).follow;
+    let seeds = args.split.seeds(0, args.seeds).unwrap();
+    match jobs(&args, seeds, &registry) {
+        Ok(_) => String::new(),
+        Err(failure) => failure.message,
+    }
+}
+
+#[test]
+fn a_laser_scanner_that_the_pipeline_requires_is_asked_for_before_the_ride() {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/robots/turtlebot3.toml");
+    let line = [config.to_str().unwrap(), "follow-passing"];
+    let refused = refusal(&line);
+    assert!(refused.contains("add it with `--set 'laser={}'`"), "{refused}");
+    assert_eq!(refusal(&[line[0], line[1], "--set", "laser={}"]), "");
+}
+
+#[test]
+fn a_fault_after_the_end_of_the_ride_is_refused() {
+    let line = ["follow-depth", "follow-passing", "--inject", "drop@500"];
+    let refused = refusal(&line);
+    assert!(refused.contains("--inject drop@500: the ride ends at "), "{refused}");
+    assert!(refused.contains("`--set duration_s=520.0`"), "{refused}");
+    assert_eq!(refusal(&[line[0], line[1], "--inject", "drop@5"]), "");
+}
+
+#[test]
+fn a_scene_in_place_of_the_config_leads_to_the_command_that_was_meant() {
+    for (line, command) in [
+        (&["follow-passing"][..], "`tagalong follow follow-depth follow-passing`"),
+        (&["follow-passing", "follow-low"], "`tagalong follow follow-low follow-passing`"),
+    ] {
+        let refused = refusal(line);
+        assert!(refused.ends_with(&format!("is a scene: {command}")), "{refused}");
+    }
+}
+
+#[test]
+fn a_config_without_a_controller_leads_to_those_with_one() {
+    let refused = refusal(&["depth-ekf", "follow-passing"]);
+    assert!(refused.contains("built-in configs with one: "), "{refused}");
+    assert!(refused.contains("follow-depth") && !refused.contains("depth-verified"), "{refused}");
+}

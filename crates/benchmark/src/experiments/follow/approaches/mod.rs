@@ -17,7 +17,7 @@ use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
-use tagalong_math::{RandomSource, SplitMix64};
+use tagalong_math::{RandomSource, SplitMix64, counted};
 use tagalong_report::Table;
 use tagalong_sim::{InjectedFault, Scene, Seeds, Split};
 use tagalong_trials::{
@@ -25,7 +25,7 @@ use tagalong_trials::{
 };
 
 use super::log::RideLog;
-use super::{FollowArgs, contenders, failure, run_files, swept, variant};
+use super::{FollowArgs, contenders, failure, folder_name, inject, run_files, swept, variant};
 
 /// Files of results, beside the logs of the approaches.
 const RESULTS: [&str; 2] = ["approaches.json", "approaches.md"];
@@ -78,6 +78,9 @@ pub struct Outlived {
     /// Course of the ride, as text.
     #[serde(skip)]
     pub story: Vec<String>,
+    /// Log of the ride, if it was kept.
+    #[serde(skip)]
+    pub log: Option<PathBuf>,
 }
 
 /// Content of the JSON output.
@@ -182,7 +185,7 @@ fn read_scene(job: &Job<'_>, args: &FollowArgs) -> Result<Scene, Failure> {
         )));
     };
     let arrives_s = approach.arrives_s();
-    scene.faults.inject.extend(args.inject.iter().cloned());
+    inject(&mut scene, &args.inject)?;
     if args.faults == ApproachFaults::One {
         let mut random = SplitMix64::new(job.seed);
         let last_s = arrives_s.max(FAULT_FROM_S);
@@ -251,6 +254,7 @@ fn ride(
         pipeline: job.contender.name.clone(),
         story: story::story(scene, &ride, &judge, &approached),
         approached,
+        log: file.map(Path::to_owned),
     }))
 }
 
@@ -298,7 +302,21 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Outlived]) -> Result<(), F
         }
     }
     let Some(folder) = &args.output else { return Ok(()) };
-    let contacts = results.iter().filter(|one| one.approached.contact.is_some()).count();
-    say(&format!("the logs of {contacts} contacts, and the tables, are in {}", folder.display()));
+    say(&kept(folder, results));
     Ok(())
+}
+
+/// Returns the line about the files of the rides that were kept, with the command that shows one.
+fn kept(folder: &Path, results: &[Outlived]) -> String {
+    let logged = results.iter().filter_map(|one| one.log.as_deref());
+    let rides: Vec<String> =
+        logged.map(|log| folder.join(folder_name(log)).display().to_string()).collect();
+    let shown = folder.display();
+    let Some(first) = rides.first() else {
+        return format!(
+            "the tables are in {shown}; no robot moved at a contact, so no log was kept"
+        );
+    };
+    let count = counted(rides.len(), "ride");
+    format!("the tables and the logs of {count} are in {shown}; `tagalong view {first}` shows one")
 }

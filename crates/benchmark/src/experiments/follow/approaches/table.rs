@@ -241,7 +241,7 @@ mod tests {
         };
         let suite = "approach".into();
         let pipeline = "config".into();
-        Outlived { suite, pipeline, approached, story: Vec::new() }
+        Outlived { suite, pipeline, approached, story: Vec::new(), log: None }
     }
 
     #[test]

@@ -149,6 +149,16 @@ fn a_replay_tells_what_came_from_where() {
     let jobs = jobs(&args, &contenders, &paths, seeds(&args).unwrap());
     let [job] = &jobs[..] else { panic!("one job") };
     let told = approach(job, &args, &registry(), &Signals::default()).unwrap().unwrap();
+    assert_eq!(
+        kept(Path::new("rep"), std::slice::from_ref(&told)),
+        "the tables are in rep; no robot moved at a contact, so no log was kept"
+    );
+    let log = Some(PathBuf::from("rep/approach-follow-2000000003.mcap"));
+    assert_eq!(
+        kept(Path::new("rep"), &[Outlived { log, ..told.clone() }]),
+        "the tables and the logs of 1 ride are in rep; `tagalong view rep/approach-follow-2000000003` \
+         shows one"
+    );
     assert_eq!(told.approached, ridden("clear-follow", 4, "--approaches 4 --faults one", 1)[3]);
     let story = told.story.join("\n");
     assert!(story.starts_with("seed 2000000003: a "), "{story}");
