@@ -213,6 +213,13 @@ fn cases() -> Vec<Case> {
             "use_sim_time",
         ),
         case(
+            "stamps that were never set",
+            Changes { stamp: Some(|_| FIRST_NS), ..Changes::default() },
+            "stamps",
+            "warn",
+            "header.stamp",
+        ),
+        case(
             "a pause",
             Changes {
                 stamp: Some(
