@@ -206,8 +206,12 @@ fn mistakes_are_named_by_file_and_line() {
     assert_eq!(code(&none), 1);
     assert!(text(&none.stderr).contains("none.csv"), "{}", text(&none.stderr));
     let log = in_home(folder.path(), &["--truth", "walk.mcap", "--tracks", "out"]);
-    assert_eq!(code(&log), 1);
-    assert!(text(&log.stderr).contains("/truth/people"), "{}", text(&log.stderr));
+    assert_eq!(code(&log), 2);
+    assert!(text(&log.stderr).contains("`--truth walk.people.csv`"), "{}", text(&log.stderr));
+    fs::copy(folder.path().join("walk.mcap"), folder.path().join("alone.mcap")).unwrap();
+    let alone = in_home(folder.path(), &["--truth", "alone.mcap", "--tracks", "out"]);
+    assert_eq!(code(&alone), 1);
+    assert!(text(&alone.stderr).contains("/truth/people"), "{}", text(&alone.stderr));
     assert_eq!(code(&eval(&["--truth", "a", "--tracks", "b", "--similarity", "feet"])), 2);
 }
 
