@@ -57,8 +57,7 @@ pub use installed::{DATA_FOLDER, Variables, model_file, networks_folder, network
 pub use limits::{LimitSettings, Limits};
 pub use names::ClassNames;
 pub use network::{Network, Runtime, check_file, rten};
-pub use order::BoxOrder;
 pub use preparation::{Colours, Fit, InputSize, Placement, Preparation};
 pub use runtime::RtenNetwork;
 pub use tensor::{Element, Port, Tensor};
-pub use values::BoxUnit;
+pub use values::{BoxOrder, BoxUnit};

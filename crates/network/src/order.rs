@@ -1,9 +1,6 @@
 //! Order of the corners of boxes in a list: x before y, or y before x as some exports of SSD have it. Shapes and
 //! ranges are those of both; people tell, standing and walking.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use crate::ScoredBox;
 
 /// Number of boxes from which their shapes tell the order.
@@ -15,28 +12,6 @@ const MOST_BOXES: u32 = 300;
 const NEARLY_ALL: f64 = 0.95;
 /// Ratio of width to height from which on a box is wide.
 const WIDE: f64 = 1.5;
-
-/// Order of the numbers of corners in a list of boxes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum BoxOrder {
-    /// Left, top, right, bottom.
-    #[default]
-    Xyxy,
-    /// Top, left, bottom, right.
-    Yxyx,
-}
-
-impl BoxOrder {
-    /// Returns four numbers as left, top, right and bottom.
-    pub(crate) fn sorted(self, corners: &[f32]) -> [f32; 4] {
-        let places = match self {
-            Self::Xyxy => [0, 1, 2, 3],
-            Self::Yxyx => [1, 0, 3, 2],
-        };
-        places.map(|k| corners[k])
-    }
-}
 
 /// Shapes of the boxes of people that a network found until now.
 #[derive(Debug, Default)]

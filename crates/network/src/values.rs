@@ -128,6 +128,28 @@ const LEAST_SPREAD: f64 = 0.25;
 /// Part of the boxes of a grid that have a size. Networks without distributions make some below zero.
 const MOST: f64 = 0.9;
 
+/// Order of the numbers of corners in a list of boxes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum BoxOrder {
+    /// Left, top, right, bottom.
+    #[default]
+    Xyxy,
+    /// Top, left, bottom, right.
+    Yxyx,
+}
+
+impl BoxOrder {
+    /// Returns four numbers as left, top, right and bottom.
+    pub(crate) fn sorted(self, corners: &[f32]) -> [f32; 4] {
+        let places = match self {
+            Self::Xyxy => [0, 1, 2, 3],
+            Self::Yxyx => [1, 0, 3, 2],
+        };
+        places.map(|k| corners[k])
+    }
+}
+
 /// Unit of the boxes of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

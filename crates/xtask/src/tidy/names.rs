@@ -9,6 +9,9 @@ const KNOWING: &[&str] = &["crates/catalog/", "crates/fuzz/", "crates/xtask/"];
 /// Files with names of configs that are those of plugins, too.
 const MAY_NAME: &[(&str, &str)] = &[
     ("crates/app/src/installed.rs", "onnx"), // and the ending of files
+    ("crates/app/src/suggest.rs", "onnx"),   // the ending alone
+    ("crates/network/src/installed.rs", "onnx"), // the ending alone
+    ("crates/pipeline/src/config/builtin.rs", "onnx"),
     ("crates/app/src/choice.rs", "laser-legs"),
     ("crates/pipeline/src/config/builtin.rs", "joint-particle"),
     ("crates/pipeline/src/config/builtin.rs", "laser-legs"),
