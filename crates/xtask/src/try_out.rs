@@ -36,18 +36,6 @@ const EXAMPLE: &[&str] = &[
     "--",
 ];
 
-/// Settings for crates that are built for this alone: the tests of the new plugins are small, and the crates
-/// from outside stay as they are lent.
-const UNOPTIMISED: [&str; 7] = [
-    "profile.dev.opt-level=0",
-    "profile.dev.package.\"*\".opt-level=1",
-    "profile.dev.package.tagalong-depth-net.opt-level=1",
-    "profile.dev.package.tagalong-depth-template.opt-level=1",
-    "profile.dev.package.tagalong-sim.opt-level=1",
-    "profile.dev.package.tagalong-stereo.opt-level=1",
-    "profile.dev.package.tagalong-vision.opt-level=1",
-];
-
 /// Runs the whole trial.
 pub fn try_out(workspace: &Workspace) -> Result<()> {
     let copy = copy_of(workspace)?;
@@ -74,7 +62,6 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
             Some(at) => args.split_at(at),
             None => (args, &[][..]),
         };
-        cargo.args(UNOPTIMISED.map(|setting| format!("--config={setting}")));
         cargo.args(before).args(packages).args(after);
         cargo.current_dir(copy.root()).env("CARGO_TARGET_DIR", workspace.root().join(BUILD));
         succeed(&mut cargo)
