@@ -89,26 +89,22 @@ impl Workspace {
             if from.is_file() {
                 copy_file(&from, &folder.join(&path))?;
             } else if from.is_dir() {
-                // A link to a folder, whose files the crate embeds.
-                copy_folder(&from, &folder.join(&path))?;
+                // A link to a folder, whose files the crate embeds: those that are added to the copy, too.
+                let target = fs::read_link(&from)
+                    .with_context(|| format!("{} is no link", from.display()))?;
+                link(&target, &folder.join(&path))?;
             }
         }
         Ok(())
     }
 }
 
-/// Copies a folder with everything in it.
-fn copy_folder(from: &Path, to: &Path) -> Result<()> {
-    for entry in fs::read_dir(from).with_context(|| format!("cannot list {}", from.display()))? {
-        let entry = entry?;
-        let there = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy_folder(&entry.path(), &there)?;
-        } else {
-            copy_file(&entry.path(), &there)?;
-        }
+/// Makes a link to a folder, with the folders above it.
+fn link(target: &Path, to: &Path) -> Result<()> {
+    if let Some(folder) = to.parent() {
+        fs::create_dir_all(folder)?;
     }
-    Ok(())
+    std::os::unix::fs::symlink(target, to).with_context(|| format!("cannot link {}", to.display()))
 }
 
 /// Copies a file, and makes the folders above it.
