@@ -87,7 +87,8 @@ fn column<'a>(table: &'a str, title: &str) -> Result<Vec<(&'a str, f64)>> {
     Ok(figures.collect())
 }
 
-fn cells(line: &str) -> Vec<&str> {
+/// Returns the cells of a row of a table.
+pub fn cells(line: &str) -> Vec<&str> {
     line.trim().trim_matches('|').split('|').map(str::trim).collect()
 }
 

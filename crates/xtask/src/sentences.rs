@@ -8,6 +8,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result};
 
+use crate::accuracy::cells;
 use crate::workspace::Workspace;
 
 const BEGIN: &str = "<!-- figure: ";
@@ -67,7 +68,7 @@ fn cell<'a>(page: &'a str, name: &str, column: &str) -> Option<&'a str> {
             head = None;
             continue;
         }
-        let cells: Vec<&str> = line.trim().trim_matches('|').split('|').map(str::trim).collect();
+        let cells = cells(line);
         let Some(titles) = &head else {
             head = Some(cells);
             continue;
