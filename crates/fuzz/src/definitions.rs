@@ -16,12 +16,7 @@ const BETWEEN: &[u8] = b"\n---\n";
 /// Types that are read by the definition in the log.
 const TYPES: [&str; 2] = ["yolo_msgs/msg/DetectionArray", "vision_msgs/msg/Detection2DArray"];
 
-const YOLO: &str = "std_msgs/Header header\nyolo_msgs/Detection[] detections\n====\n\
-    MSG: yolo_msgs/Detection\nint32 class_id\nstring class_name\nfloat64 score\nstring id\n\
-    yolo_msgs/BoundingBox2D bbox\n====\nMSG: yolo_msgs/BoundingBox2D\nyolo_msgs/Pose2D center\n\
-    yolo_msgs/Vector2 size\n====\nMSG: yolo_msgs/Pose2D\nyolo_msgs/Point2D position\n\
-    float64 theta\n====\nMSG: yolo_msgs/Point2D\nfloat64 x\nfloat64 y\n====\n\
-    MSG: yolo_msgs/Vector2\nfloat64 x\nfloat64 y\n";
+const YOLO: &str = include_str!("../../log/msgs/DetectionArray-yolo.msg");
 const FOXY: &str = include_str!("../../log/msgs/Detection2DArray-foxy.msg");
 
 fn header() -> Header {

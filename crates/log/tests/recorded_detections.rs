@@ -388,12 +388,7 @@ fn a_class_without_a_name_is_that_of_its_number() {
     }
 }
 
-const YOLO: &str = "std_msgs/Header header\nyolo_msgs/Detection[] detections\n====\n\
-    MSG: yolo_msgs/Detection\nint32 class_id\nstring class_name\nfloat64 score\nstring id\n\
-    yolo_msgs/BoundingBox2D bbox\n====\nMSG: yolo_msgs/BoundingBox2D\nyolo_msgs/Pose2D center\n\
-    yolo_msgs/Vector2 size\n====\nMSG: yolo_msgs/Pose2D\nyolo_msgs/Point2D position\n\
-    float64 theta\n====\nMSG: yolo_msgs/Point2D\nfloat64 x\nfloat64 y\n====\n\
-    MSG: yolo_msgs/Vector2\nfloat64 x\nfloat64 y\n";
+const YOLO: &str = include_str!("../msgs/DetectionArray-yolo.msg");
 
 /// Returns a message as ROS 1 Noetic writes it, with a number as the class.
 fn noetic(class: i64) -> Vec<u8> {
