@@ -2,19 +2,7 @@ use serde::Serialize;
 use tagalong_sim::Seeds;
 
 use crate::lab::SimulatedScene;
-use crate::{
-    Lab, ReproduceError, Table, joint_particle, laser, omni_appearance, rgbd_compressive, stereo,
-};
-
-/// All systems, in the order of the papers.
-pub const SYSTEMS: &[System] = &[
-    stereo::STEREO_EKF,
-    rgbd_compressive::SYSTEM,
-    joint_particle::SYSTEM,
-    stereo::STEREO_SVM_EKF,
-    omni_appearance::SYSTEM,
-    laser::SYSTEM,
-];
+use crate::{Lab, ReproduceError, Table};
 
 /// A published system.
 #[derive(Clone, Copy, Debug)]
@@ -110,15 +98,8 @@ impl From<Table> for Findings {
     }
 }
 
-/// Returns the system of this name.
-pub fn system(name: &str) -> Option<&'static System> {
-    SYSTEMS.iter().find(|system| system.name == name)
-}
-
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
     use tagalong_sim::Split;
 
     use super::*;
@@ -166,17 +147,5 @@ mod tests {
         assert_eq!(json["simulated"][0]["seeds"]["first"], 30);
         let none = Experiment { run: |_| Ok(Table::default().into()), ..experiment };
         assert_eq!(none.find(&lab).unwrap().findings.tables[0].notes, [""; 0]);
-    }
-
-    #[test]
-    fn every_name_means_one_thing() {
-        let names: BTreeSet<&str> = SYSTEMS.iter().map(|system| system.name).collect();
-        assert_eq!(names.len(), SYSTEMS.len());
-        for each in SYSTEMS {
-            let names: BTreeSet<&str> = each.experiments.iter().map(|e| e.name).collect();
-            assert_eq!(names.len(), each.experiments.len(), "{}", each.name);
-            assert!(system(each.name).is_some() && !each.experiments.is_empty());
-        }
-        assert!(system("perpetuum-mobile").is_none());
     }
 }

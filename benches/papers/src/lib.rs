@@ -27,6 +27,7 @@ mod recorded;
 mod rgbd_compressive;
 mod scatter;
 mod stereo;
+mod systems;
 mod triangulate;
 mod variant;
 pub mod webcams;
@@ -39,6 +40,7 @@ pub fn register(registry: &mut Registry) {
     printed::register(registry);
 }
 
-pub use findings::{Experiment, ExperimentFindings, Findings, Picture, SYSTEMS, System, system};
+pub use findings::{Experiment, ExperimentFindings, Findings, Picture, System};
 pub use lab::{Lab, Progress, ReproduceError, SimulatedScene, SimulatedScenes};
+pub use systems::{SYSTEMS, system};
 pub use tagalong_report::{Cell, Row, Table};
