@@ -197,7 +197,8 @@ mod tests {
     }
 
     const SEVERAL: &str = "# a\n\n**early**\n\n|  |  | kept |\n| --- | --- | --- |\n| um | b | 0.125 |\n\
-                           | um | c | 2.5 |\n\n## late\n\n|  |  | kept |\n| --- | --- | --- |\n| um | c | 3.5 |\n";
+                           | um | c | 2.5 |\n\n## late\n\n|  |  | kept |\n| --- | --- | --- |\n| um | c | 3.5 |\n\
+                           | fil | c | 4.5 |\n";
 
     fn print(source: &str) -> Result<String> {
         printed(&Workspace::at(std::env::temp_dir()), SEVERAL, source)
@@ -209,6 +210,7 @@ mod tests {
         assert_eq!(print("; um & c; kept").unwrap(), "2.5");
         assert_eq!(print("#late; um & c; kept").unwrap(), "3.5");
         assert!(print("#early; um & d; kept").is_err());
+        assert!(print("#early; fil; kept").is_err(), "it is below the next title");
         assert_eq!(print("#a; um & c; kept").unwrap(), "2.5", "a heading has the titles below it");
         let other = print("#late; um & b; kept").unwrap_err().to_string();
         assert!(other.contains("no row `um & b`"), "{other}");
