@@ -51,6 +51,8 @@ struct Headline {
     column: &'static str,
     published: f64,
     digits: usize,
+    /// The largest value that it can have; the least is 0.
+    most: f64,
     of: fn(Trial) -> Result<Headlines, TrialError>,
 }
 
@@ -77,7 +79,13 @@ const OF_P1: Forms = Forms {
     has_real: true,
     scene: "square-walk",
     scenes: stereo::walks,
-    headline: Headline { column: "frame, ms", published: 70.0, digits: 0, of: frame_ms },
+    headline: Headline {
+        column: "frame, ms",
+        published: 70.0,
+        digits: 0,
+        most: f64::INFINITY,
+        of: frame_ms,
+    },
     otherwise: None,
     notes: &[
         ON_A_PAIR,
@@ -96,7 +104,13 @@ const OF_P2: Forms = Forms {
     otherwise: None,
     scene: "static-high",
     scenes: rgbd_compressive::static_scenes,
-    headline: Headline { column: "frames/s", published: 23.8, digits: 0, of: frames_a_second },
+    headline: Headline {
+        column: "frames/s",
+        published: 23.8,
+        digits: 0,
+        most: f64::INFINITY,
+        of: frames_a_second,
+    },
     notes: &[
         "Trained on: the detectors of faces and upper bodies on photographs alone. A threshold of \
          the last row was chosen while looking at real logs.",
@@ -117,6 +131,7 @@ const OF_P3: Forms = Forms {
         column: "success across, %",
         published: 97.1,
         digits: 0,
+        most: 100.0,
         of: joint_particle::successes,
     },
     otherwise: Some(Reading {
@@ -143,6 +158,7 @@ const OF_P4: Forms = Forms {
         column: "walker, frame of the start, m",
         published: 0.125,
         digits: 3,
+        most: f64::INFINITY,
         of: stereo::walker_errors_m,
     },
     notes: &[
@@ -167,6 +183,7 @@ const OF_P5: Forms = Forms {
         column: "error of all answers, m",
         published: 0.145,
         digits: 3,
+        most: f64::INFINITY,
         of: omni_appearance::answers_m,
     },
     otherwise: None,
@@ -295,7 +312,7 @@ impl Forms {
         let ours = self
             .rows()
             .into_iter()
-            .map(|(name, at)| Row::ours(name, cells(at, real, simulated, digits)));
+            .map(|(name, at)| Row::ours(name, cells(at, real, simulated, &self.headline)));
         Table {
             title: format!("{}: published, as printed, corrected and ours", self.paper),
             columns: columns.map(String::from).to_vec(),
@@ -327,7 +344,7 @@ impl Forms {
 }
 
 /// Returns the cells of one form.
-fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], digits: usize) -> Vec<Cell> {
+fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], headline: &Headline) -> Vec<Cell> {
     let tallies = |of: &[Vec<Form>]| of.iter().map(|forms| forms[at].tally.clone()).collect();
     let (logs, draws): (Vec<Tally>, Vec<Tally>) = (tallies(real), tallies(simulated));
     // Three rooms bear no interval.
@@ -346,10 +363,10 @@ fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], digits: usize) 
     vec![
         real(|scores| scores.idf1),
         real(|scores| scores.hota),
-        pooled(&draws, 3, |scores| scores.idf1),
-        pooled(&draws, 3, |scores| scores.mota),
-        mean(|form| &form.errors_m, 3),
-        mean(|form| &form.headline, digits),
+        pooled(&draws, 3, |scores| scores.idf1).within(0.0, 1.0),
+        pooled(&draws, 3, |scores| scores.mota).within(f64::NEG_INFINITY, 1.0),
+        mean(|form| &form.errors_m, 3).within(0.0, f64::INFINITY),
+        mean(|form| &form.headline, headline.digits).within(0.0, headline.most),
     ]
 }
 
@@ -432,6 +449,9 @@ mod tests {
         let table = OF_P3.table(&[], &[draw]);
         let headlines: Vec<_> = table.rows.iter().map(|row| row.cells[5].value.unwrap()).collect();
         assert_eq!(headlines, [97.1, 0.0, 29.0, 88.0, 100.0]);
+        let draws = [0.0, 100.0, 100.0].map(|kept| self::draw([(1, 0, &[kept])]));
+        let cells = cells(0, &[], &draws, &OF_P3.headline);
+        assert_eq!(cells[5].interval, Some([0.0, 100.0]), "a share is no more than all");
         assert!(table.rows[2].name.starts_with("as printed, read otherwise: one window"));
         assert_eq!(
             OF_P4.with_otherwise((OF_P4.contenders)(&lab, &OF_P4.configs).unwrap()).unwrap().len(),

@@ -78,6 +78,14 @@ impl Cell {
         Self::estimate(clustered_share(clusters), digits + 2).percent()
     }
 
+    /// Cuts the interval to the range of values that the number can have: Student's interval of a
+    /// share may reach beyond 1.
+    #[must_use]
+    pub fn within(self, least: f64, most: f64) -> Self {
+        let interval = self.interval.map(|[lower, upper]| [lower.max(least), upper.min(most)]);
+        Self { interval, ..self }
+    }
+
     /// Converts a fraction to per cent.
     #[must_use]
     pub fn percent(self) -> Self {
@@ -217,6 +225,19 @@ mod tests {
         assert_eq!(cell.text(), "2.0 \u{b1} 1.0");
         assert_eq!(Cell::mean(&[], 1), Cell::default());
         assert_eq!(Cell::number(f64::NAN, 1).text(), "-");
+    }
+
+    #[test]
+    fn an_interval_ends_where_the_figures_do() {
+        fn share() -> Cell {
+            Cell::estimate(tagalong_math::mean_interval(&[0.0, 1.0, 1.0]), 2)
+        }
+
+        assert_eq!(share().text(), "0.67 [-0.77, 2.10]");
+        assert_eq!(share().within(0.0, 1.0).text(), "0.67 [0.00, 1.00]");
+        assert_eq!(share().within(0.0, 1.0).percent().text(), "67 [0, 100]");
+        assert_eq!(share().within(f64::NEG_INFINITY, 1.0).text(), "0.67 [-0.77, 1.00]");
+        assert_eq!(Cell::number(0.5, 1).within(0.0, 1.0), Cell::number(0.5, 1));
     }
 
     #[test]

@@ -77,6 +77,18 @@ pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
     Ok(())
 }
 
+/// Fills the figures in sentences of all documents, and runs no command.
+pub fn fill_sentences(workspace: &Workspace) -> Result<()> {
+    for document in documents(workspace)? {
+        let filled = sentences::filled(workspace, &document.path, &document.text)?;
+        if filled != document.text {
+            workspace.write(&document.path, &filled)?;
+            eprintln!("docs: {} is filled anew", document.path.display());
+        }
+    }
+    Ok(())
+}
+
 /// Fills the one part whose command contains `part` with a file that the command printed elsewhere.
 pub fn fill_from(workspace: &Workspace, part: &str, file: &Path) -> Result<()> {
     let text = fs::read_to_string(file).with_context(|| file.display().to_string())?;

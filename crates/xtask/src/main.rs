@@ -57,6 +57,9 @@ enum Command {
         /// that they were printed from, instead.
         #[arg(long, conflicts_with = "slow")]
         stale: bool,
+        /// Fill the figures in sentences alone, for which no program is built.
+        #[arg(long, conflicts_with_all = ["slow", "stale"])]
+        sentences: bool,
     },
     /// Prints the table of faults with the tests that cover them
     Faults {
@@ -125,6 +128,7 @@ fn run(command: Command) -> Result<()> {
         }
         Command::NewPlugin(_) => try_out::try_out(&workspace),
         Command::Docs { stale: true, .. } => docs::list_stale_tables(&workspace),
+        Command::Docs { sentences: true, .. } => docs::fill_sentences(&workspace),
         Command::Docs { slow: Some(part), printed: Some(file), .. } => {
             docs::fill_from(&workspace, &part, &file)
         }

@@ -193,7 +193,7 @@ fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceE
     for (way, (name, ..)) in WAYS.iter().enumerate() {
         let cell = |column: &Vec<Vec<Vec<f64>>>| {
             let draws: Vec<Vec<f64>> = column.iter().map(|room| room[way].clone()).collect();
-            over_draws(&draws, 3)
+            over_draws(&draws, 3).within(0.0, f64::INFINITY)
         };
         rows.push(Row::ours(*name, columns.iter().map(cell).collect()));
     }
@@ -237,7 +237,7 @@ fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceE
 fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
     // The deviation over rooms is not that of samples, which the other tables show.
     fn cell(draws: &[Vec<f64>]) -> Cell {
-        Cell { deviation: None, ..over_draws(draws, 3) }
+        Cell { deviation: None, ..over_draws(draws, 3) }.within(-1.0, 1.0)
     }
 
     let mut parts = Vec::new();

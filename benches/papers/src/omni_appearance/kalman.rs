@@ -175,7 +175,7 @@ fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
         walks.iter().map(|walk| walk.of_filters[first + at].clone()).collect()
     };
     for (at, (name, _)) in FILTERS.iter().enumerate() {
-        let error = over_draws(&draws(at), 3);
+        let error = over_draws(&draws(at), 3).within(0.0, f64::INFINITY);
         if at == 0 {
             rows.push(Row::ours(*name, with_empty(error)));
             continue;
@@ -228,8 +228,8 @@ fn steps(walks: &[Walk]) -> Table {
         };
         let found: Vec<Vec<f64>> = walks.iter().map(found).collect();
         let cells = vec![
-            Cell { deviation: None, ..over_draws(&found, 1) },
-            over_draws(&draws(at), 3),
+            Cell { deviation: None, ..over_draws(&found, 1) }.within(0.0, 100.0),
+            over_draws(&draws(at), 3).within(0.0, f64::INFINITY),
             if at == 0 { Cell::default() } else { gain(at) },
         ];
         Row::ours(name, cells)

@@ -65,10 +65,15 @@ fn judged(trial: Trial) -> Result<Vec<PipelineResult>, TrialError> {
 fn table(title: &str, trials: &[Vec<PipelineResult>]) -> Table {
     let row = |(at, name): (usize, &&str)| {
         let tallies: Vec<&Tally> = trials.iter().map(|done| &done[at].tally).collect();
-        let share = |of| pooled(&tallies, 3, of).percent();
+        let share = |of, least| pooled(&tallies, 3, of).within(least, 1.0).percent();
         let swaps = Cell::number(Tally::combine(tallies.iter().copied()).scores().idsw as f64, 0);
         let errors: Vec<Vec<f64>> = trials.iter().map(|done| done[at].errors_m.clone()).collect();
-        let cells = vec![share(|s| s.idf1), share(|s| s.mota), swaps, over_draws(&errors, 3)];
+        let cells = vec![
+            share(|s| s.idf1, 0.0),
+            share(|s| s.mota, f64::NEG_INFINITY),
+            swaps,
+            over_draws(&errors, 3).within(0.0, f64::INFINITY),
+        ];
         Row::ours(*name, cells)
     };
     let columns = ["IDF1, %", "MOTA, %", "renamed", "position error, m"];

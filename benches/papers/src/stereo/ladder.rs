@@ -13,6 +13,14 @@ const SUITES: [&str; 5] =
 /// A score of one contender on one draw.
 type Figure = fn(&Judged) -> f64;
 
+/// A score with its digits after the point and the range of its values.
+#[derive(Clone, Copy)]
+struct Score {
+    digits: usize,
+    range: [f64; 2],
+    of: Figure,
+}
+
 /// Compares the three pipelines, with the gain of each step.
 ///
 /// # Errors
@@ -29,11 +37,21 @@ pub fn ladder(lab: &Lab) -> Result<Findings, ReproduceError> {
         1e3 * errors.iter().sum::<f64>() / errors.len() as f64
     };
     let tables = vec![
-        table("IDF1: are all people found, each under one number?", &draws, 3, |j| {
-            j.tally.identity.idf1()
-        }),
-        table("MOTA: misses, false alarms, switched numbers", &draws, 3, |j| j.tally.clear.mota()),
-        table("Mean error of matched places, robot frame, mm", &draws, 0, error),
+        table(
+            "IDF1: are all people found, each under one number?",
+            &draws,
+            Score { digits: 3, range: [0.0, 1.0], of: |j| j.tally.identity.idf1() },
+        ),
+        table(
+            "MOTA: misses, false alarms, switched numbers",
+            &draws,
+            Score { digits: 3, range: [f64::NEG_INFINITY, 1.0], of: |j| j.tally.clear.mota() },
+        ),
+        table(
+            "Mean error of matched places, robot frame, mm",
+            &draws,
+            Score { digits: 0, range: [0.0, f64::INFINITY], of: error },
+        ),
     ];
     Ok(Findings { tables, pictures: Vec::new() })
 }
@@ -42,14 +60,14 @@ fn judged(trial: Trial) -> Result<Vec<Judged>, TrialError> {
     trial.runs.iter().map(|run| Judge::default().judge(&trial, run)).collect()
 }
 
-fn table(title: &str, draws: &[Vec<Vec<Judged>>], digits: usize, figure: Figure) -> Table {
+fn table(title: &str, draws: &[Vec<Vec<Judged>>], score: Score) -> Table {
     let mut rows: Vec<Row> = SUITES
         .iter()
         .zip(draws)
-        .map(|(suite, draws)| Row::ours(*suite, cells(draws, digits, figure)))
+        .map(|(suite, draws)| Row::ours(*suite, cells(draws, score)))
         .collect();
     let all: Vec<Vec<Judged>> = draws.concat();
-    rows.push(Row::ours("all", cells(&all, digits, figure)));
+    rows.push(Row::ours("all", cells(&all, score)));
     let columns = ["printed", "corrected", "best", "corrected - printed", "best - corrected"];
     Table {
         title: title.into(),
@@ -67,7 +85,8 @@ fn table(title: &str, draws: &[Vec<Vec<Judged>>], digits: usize, figure: Figure)
 }
 
 /// Returns the cells of the three pipelines, and of the two steps between them on the same draws.
-fn cells(draws: &[Vec<Judged>], digits: usize, figure: Figure) -> Vec<Cell> {
+fn cells(draws: &[Vec<Judged>], score: Score) -> Vec<Cell> {
+    let Score { digits, range: [least, most], of: figure } = score;
     let scores: Vec<Vec<f64>> =
         draws.iter().map(|draw| draw.iter().map(figure).collect()).collect();
     // A draw without a score of one pipeline cannot be paired.
@@ -75,7 +94,7 @@ fn cells(draws: &[Vec<Judged>], digits: usize, figure: Figure) -> Vec<Cell> {
         scores.iter().filter(|draw| draw.iter().all(|v| v.is_finite())).collect();
     let of = |at: usize| known.iter().map(|draw| draw[at]).collect::<Vec<f64>>();
     let all = [of(0), of(1), of(2)];
-    let mean = |at: usize| Cell::estimate(mean_interval(&all[at]), digits);
+    let mean = |at: usize| Cell::estimate(mean_interval(&all[at]), digits).within(least, most);
     let step = |from: usize| {
         let gain = paired_gain(&all[from], &all[from + 1]);
         Cell::estimate(gain.map(|gain| gain.difference), digits)
@@ -94,11 +113,13 @@ mod tests {
     #[test]
     fn steps_are_paired_and_draws_that_say_nothing_are_left_out() {
         let draws = [draw([0.3, 0.2, 0.1]), draw([0.5, 0.4, 0.2]), draw([f64::NAN, 0.0, 0.0])];
-        let cells = cells(&draws, 1, |judged| judged.errors_in_robot_m[0]);
+        let error: Figure = |judged| judged.errors_in_robot_m[0];
+        let cells = cells(&draws, Score { digits: 1, range: [0.0, f64::INFINITY], of: error });
         let values: Vec<f64> = cells.iter().map(|cell| cell.value.unwrap()).collect();
         let expected = [0.4, 0.3, 0.15, -0.1, -0.15];
         assert!(values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{values:?}");
         assert_eq!(cells[3].interval, None, "both steps are the same");
+        assert_eq!(cells[0].interval.unwrap()[0], 0.0, "no error is below zero");
         let [lower, upper] = cells[4].interval.unwrap();
         let half = 12.7062 * 0.05; // Student's with one degree of freedom
         assert!((upper - lower - 2.0 * half).abs() < 1e-4, "{lower} {upper}");

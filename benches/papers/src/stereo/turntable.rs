@@ -47,21 +47,19 @@ pub fn directions(lab: &Lab) -> Result<Findings, ReproduceError> {
     let subsets: Vec<Contender> =
         SUBSETS.iter().map(|subset| detector(lab, subset)).collect::<Result<_, _>>()?;
     let turns = turns(lab, &ONE_STEREO_TURN, &subsets)?;
+    let mut rows = Vec::new();
+    for (which, subset) in SUBSETS.iter().enumerate() {
+        rows.push(Row::ours(subset.join(", "), found(&turns, which)));
+    }
     Ok(Table {
         title: "Directions of a turning body in which it is found, % (P1, Fig. 4; P4, Fig. 3)"
             .into(),
         columns: columns(),
-        rows: (0..SUBSETS.len())
-            .map(|which| Row::ours(SUBSETS[which].join(", "), found(&turns, which)))
-            .collect(),
         notes: vec![
-            format!(
-                "{} images, one each 15 degrees; every image by itself; intervals: 95 %, with the \
-                 spread between turns",
-                turns.iter().map(Vec::len).sum::<usize>()
-            ),
+            conditions(&turns, &rows),
             "The papers show pictures. Which three directions they use is not said.".into(),
         ],
+        rows,
     }
     .into())
 }
@@ -78,26 +76,34 @@ pub fn background(lab: &Lab) -> Result<Findings, ReproduceError> {
         .map(|percentile| with(&printed, &[(PERCENTILE, *percentile)]))
         .collect::<Result<_, _>>()?;
     let turns = turns(lab, &ONE_STEREO_TURN, &percentiles)?;
+    let mut rows = Vec::new();
+    for (which, percentile) in PERCENTILES.iter().enumerate() {
+        rows.push(Row::ours(format!("K = {percentile}"), found(&turns, which)));
+    }
     Ok(Table {
         title: "Directions of a turning body in which the printed comparison finds it, %, by the \
                 percentile K of the background (P4, section II-A)"
             .into(),
         columns: columns(),
-        rows: (0..PERCENTILES.len())
-            .map(|which| Row::ours(format!("K = {}", PERCENTILES[which]), found(&turns, which)))
-            .collect(),
         notes: vec![
-            format!(
-                "{} images, one each 15 degrees; every image by itself; intervals: 95 %, with the \
-                 spread between turns",
-                turns.iter().map(Vec::len).sum::<usize>()
-            ),
+            conditions(&turns, &rows),
             "The paper takes K = 90 and shows no other. The threshold of the sum stays that of \
              K = 90, for which it was fitted."
                 .into(),
         ],
+        rows,
     }
     .into())
+}
+
+/// Returns the note of a table of directions. One turn in a place has no interval.
+fn conditions(turns: &[Vec<TurntableImage>], rows: &[Row]) -> String {
+    let images = turns.iter().map(Vec::len).sum::<usize>();
+    let mut note = format!("{images} images, one each 15 degrees; every image by itself");
+    if rows.iter().flat_map(|row| &row.cells).any(|cell| cell.interval.is_some()) {
+        note += "; intervals: 95 %, with the spread between turns";
+    }
+    note
 }
 
 /// Measures bias and spread of the depth of the head.

@@ -188,10 +188,13 @@ fn things_table(tallies: &[Tally]) -> Table {
         title: "False sightings by what stands there".into(),
         columns: std::iter::once(format!("{}: sightings", PIPELINES[0])).chain(removed).collect(),
         rows: kinds.into_iter().map(row).collect(),
-        notes: vec![format!(
-            "Shaped to be taken for people: {}.",
-            LOOK_ALIKES.map(FurnitureKind::name).join(", ")
-        )],
+        notes: vec![
+            format!(
+                "Shaped to be taken for people: {}.",
+                LOOK_ALIKES.map(FurnitureKind::name).join(", ")
+            ),
+            "Wilson intervals take sightings as independent: they are too narrow.".into(),
+        ],
     }
 }
 
