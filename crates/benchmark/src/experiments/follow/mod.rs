@@ -4,6 +4,7 @@ mod approaches;
 mod crowd_table;
 mod fit;
 mod log;
+mod reasons;
 mod ride_bar;
 mod run_files;
 mod story;
@@ -440,6 +441,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
                 print(&(one.story.join("\n") + "\n\n"))?;
             }
             print(&joined(Table::text))?;
+            print(&format!("\n{}\n", reasons::lines(results).join("\n")))?;
         }
     }
     if let Some(looks) = looks.filter(|_| args.format != TableFormat::Json) {
