@@ -32,7 +32,7 @@ use tagalong_sim::{FaultKind, InjectedFault, Scene, ScheduledFault, Seeds, Split
 use tagalong_simulate::scenes;
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
-use crate::experiments::contender::contender;
+use crate::experiments::contender::{contender, unsuited};
 
 /// Files of results, beside the logs of the rides.
 const RESULTS: [&str; 3] = ["follow.json", "follow.md", "likeness.csv"];
@@ -262,6 +262,13 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
                     jobs.push(Job { suite, swept, scene, contender, is_told: *is_told });
                 }
             }
+        }
+    }
+    for ((contender, _), pipeline) in contenders.iter().zip(&pipelines) {
+        let own = jobs.iter().filter(|job| job.contender.name == contender.name);
+        let scenes = own.map(|job| (job.suite.as_str(), &job.scene));
+        if let Some(note) = unsuited(&contender.name, &pipeline.config().suits, scenes) {
+            say(&format!("note: {note}"));
         }
     }
     Ok(jobs)
