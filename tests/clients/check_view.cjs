@@ -31,6 +31,21 @@ const checkKeys = async (page, last) => {
   assert.equal(await frameNow(page), last, "End");
 };
 
+// Of two people at one place both IDs can be read.
+const checkIds = async (page, number) => {
+  const texts = await page.$$eval(`#plan-${number} .plan-text`, (all) => all.map((text) => {
+    const { x, y, width, height } = text.getBBox();
+    return { id: text.textContent, x: x + width / 2, y: y + height / 2, width, height };
+  }));
+  for (const [at, a] of texts.entries()) {
+    for (const b of texts.slice(0, at)) {
+      // A line of text is higher than its digits.
+      const isOver = Math.abs(a.x - b.x) < 0.4 * (a.width + b.width) && Math.abs(a.y - b.y) < 0.25 * (a.height + b.height);
+      assert.ok(!isOver, `in the plan the ID ${a.id} is over ${b.id}`);
+    }
+  }
+};
+
 const checkScrubbing = async (page, data) => {
   const middle = Math.floor((data.t.length - 1) / 2);
   await scrub(page, middle);
@@ -45,6 +60,7 @@ const checkScrubbing = async (page, data) => {
     assert.deepEqual(people, frame.tracks.map((track) => track.id), "the table of the frame");
     const tests = await page.$$eval(`#funnel-${number} tbody th`, (all) => all.map((th) => th.textContent));
     assert.deepEqual(tests, frame.dropped.map((test) => test.test), "the funnel of the frame");
+    await checkIds(page, number);
   }
   const strip = await page.locator("#strip-0").boundingBox();
   await page.mouse.click(strip.x + 0.25 * strip.width, strip.y + 0.5 * strip.height);

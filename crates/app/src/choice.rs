@@ -7,7 +7,8 @@ use tagalong_log::{FrameSource, Input, InputAccount, Inputs, Inspection, Limits}
 
 use crate::config_file::{ConfigFile, OuterSettings};
 use crate::input_args::InputArgs;
-use crate::installed::NETWORK;
+use crate::installed::{NETWORK, missing_network};
+use crate::misfit::Traits;
 use crate::outcome::Failure;
 
 /// The config for a camera below a conical mirror.
@@ -18,6 +19,15 @@ pub const WITHOUT_NETWORK: &str = "mono";
 
 /// The config for colour and depth, with which an installed network can be joined.
 pub const COLOUR_AND_DEPTH: &str = "depth-verified";
+
+/// The configs for depth. Of these one that suits the height of the camera comes first.
+const OF_DEPTH: [&str; 3] = [COLOUR_AND_DEPTH, "depth-alone", "depth-net-ekf"];
+
+/// Reason for which a pipeline is not taken where a camera was asked for.
+const WITHOUT_CAMERA: &str = "it uses no camera, and --camera names one";
+
+/// End of the reason of a log without any camera.
+const NO_IMAGES: &str = "it has no images of a camera";
 
 /// A pipeline for logs of one kind.
 #[derive(Clone, Copy, Debug)]
@@ -130,7 +140,9 @@ impl Fittings {
         let missing = format!("no camera `{}`", self.camera.as_ref()?);
         let refusal = self.refusals.iter().find(|refusal| refusal.why.contains(&missing))?;
         // The key of a config is the option of the command line here.
-        Some(refusal.why.replace("`camera` under [input]", "--camera"))
+        let why = refusal.why.replace("`camera` under [input]", "--camera");
+        let remedy = format!("{NO_IMAGES}: leave out --camera");
+        Some(why.replace(NO_IMAGES, &remedy))
     }
 
     /// Returns the reason of all refusals, if it is the same, as of a file that is no log.
@@ -159,6 +171,20 @@ impl Fittings {
             usable
         } else {
             format!("{usable}, and also {} that cannot be used", unusable.join(", "))
+        }
+    }
+
+    /// Returns the reason why no pipeline with a neural network is among those that fit, with the command
+    /// that installs one where none is installed; `None` if one is, and where a network has nothing to see.
+    pub fn without_network(&self) -> Option<String> {
+        if self.fitting.iter().any(|fitting| fitting.choice.config == NETWORK) {
+            return None;
+        }
+        let has_colour = self.account.usable().contains(&Input::Colour.name());
+        match self.refusals.iter().find(|refusal| refusal.config == NETWORK) {
+            Some(refusal) => Some(refusal.why.clone()),
+            None if has_colour => missing_network(NETWORK),
+            None => None,
         }
     }
 
@@ -212,6 +238,11 @@ fn words_of(input: &str) -> &str {
     }
 }
 
+/// Returns true if a pipeline uses images of a camera.
+pub fn uses_camera(inputs: Inputs) -> bool {
+    [Input::Colour, Input::Depth, Input::Right].into_iter().any(|input| inputs.uses(input))
+}
+
 /// Returns the inputs that a pipeline cannot do without.
 fn required(inputs: Inputs) -> Vec<Input> {
     let known = Input::ALL.into_iter().chain([Input::POINTS]);
@@ -236,13 +267,19 @@ pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -
         found.damage = damage(&inspected);
         found.account = inspected.inputs;
     }
+    // Pipelines of depth for a camera at another height.
+    let mut unsuited = Vec::new();
     for choice in CHOICES {
         let Some(config) = ConfigFile::named(choice.config) else { continue };
-        if found.fitting.len() == most {
+        if !OF_DEPTH.contains(&choice.config) {
+            found.fitting.append(&mut unsuited);
+        }
+        if found.fitting.len() >= most {
             break;
         }
         match try_config(&config, log, registry, args) {
-            Ok(()) => found.fitting.push(Fitting { choice, config }),
+            Ok(true) => found.fitting.push(Fitting { choice, config }),
+            Ok(false) => unsuited.push(Fitting { choice, config }),
             Err(misfit) => found.refusals.push(Refusal {
                 config: choice.config,
                 why: reason(log, &misfit.why),
@@ -250,6 +287,8 @@ pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -
             }),
         }
     }
+    found.fitting.append(&mut unsuited);
+    found.fitting.truncate(most);
     found
 }
 
@@ -275,15 +314,19 @@ fn reason(log: &Path, why: &Failure) -> String {
     reason.replacen(&format!("`{log}` "), "the log ", 1).replacen(&format!("`{log}`: "), "", 1)
 }
 
-/// Takes the first frame of a log through a pipeline.
+/// Takes the first frame of a log through a pipeline; returns false for a camera at another height or
+/// with another pitch than those that the config is for.
 fn try_config(
     config: &ConfigFile,
     log: &Path,
     registry: &Registry,
     args: &InputArgs,
-) -> Result<(), Misfit> {
+) -> Result<bool, Misfit> {
     let (mut pipeline, settings) = config.pipeline(registry, None)?;
     let required = Some(required(pipeline.inputs()));
+    if args.camera.is_some() && !uses_camera(pipeline.inputs()) {
+        return Err(Failure::failed(WITHOUT_CAMERA).into());
+    }
     let outer = args.applied(config.outer_for(&pipeline)?);
     let opened = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs());
     let mut source =
@@ -316,13 +359,25 @@ fn try_config(
         ))
         .into());
     }
-    let stepped = pipeline.step(&item.frame).map(drop);
-    stepped.map_err(|error| Misfit { why: Failure::failed(error), required })
+    let is_suited = Traits::of(&source).misfits(&settings.suits).is_empty();
+    match pipeline.step(&item.frame) {
+        Ok(_) => Ok(is_suited),
+        Err(error) => Err(Misfit { why: Failure::failed(error), required }),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_network_that_is_not_taken_has_its_reason() {
+        let why = "the log has no colour";
+        let refusal = Refusal { config: NETWORK, why: why.to_owned(), required: None };
+        let found = Fittings { refusals: vec![refusal], ..Fittings::default() };
+        assert_eq!(found.without_network().as_deref(), Some(why));
+        assert_eq!(Fittings::default().without_network(), None, "it would see nothing");
+    }
 
     #[test]
     fn a_camera_that_is_not_in_the_log_is_one_cause_and_not_ten() {
@@ -337,6 +392,13 @@ mod tests {
         let message = found.none_fits(Path::new("robot.mcap")).message;
         let expected = "robot.mcap: the log has no camera `/back`; --camera can be one of: /front";
         assert_eq!(message, expected);
+        found.refusals[1].why =
+            "the log has no camera `/back`; it has no images of a camera".into();
+        let message = found.none_fits(Path::new("scans.mcap")).message;
+        assert!(
+            message.ends_with("; it has no images of a camera: leave out --camera"),
+            "{message}"
+        );
         found.camera = None;
         let message = found.none_fits(Path::new("robot.mcap")).message;
         assert!(message.contains("no built-in pipeline fits"), "{message}");

@@ -151,9 +151,23 @@ impl ConfigFile {
         if let Some(most) = threads {
             builder = builder.threads(most);
         }
-        let pipeline = builder.build(&self.source)?;
+        let pipeline = builder.build(&self.source).map_err(|error| self.explained(error))?;
         let config = pipeline.config().clone();
         Ok((pipeline, config))
+    }
+
+    /// Returns the failure of a config that cannot be built, with the command that installs a known network
+    /// that it names.
+    fn explained(&self, error: BuildError) -> Failure {
+        let settings = self.source.document().and_then(|document| document.table());
+        let remedy = settings.ok().as_ref().and_then(installed::missing_model);
+        let failure = Failure::from(error);
+        match remedy {
+            Some(remedy) => {
+                Failure { message: format!("{}\n{remedy}", failure.message), ..failure }
+            }
+            None => failure,
+        }
     }
 
     /// Returns its text with those of the configs that it extends.
@@ -245,6 +259,24 @@ mod tests {
     use tagalong_log::{ObstacleKind, ObstacleTopic};
 
     use super::*;
+
+    #[test]
+    fn a_known_network_that_is_not_installed_is_answered_with_its_command() {
+        let mut registry = Registry::default();
+        tagalong_catalog::register(&mut registry);
+        let folder = tempfile::tempdir().unwrap();
+        let refusal = |model: &str| {
+            let text = format!(
+                "[[detectors]]\nplugin = 'onnx'\nconfig = {{ model = '{model}' }}\n\
+                 [filter]\nplugin = 'image-kalman'\n"
+            );
+            let config = ConfigFile::of_text(text, folder.path());
+            config.pipeline(&registry, None).err().unwrap().message
+        };
+        let why = refusal("movenet-multipose");
+        assert!(why.contains("`tagalong model --install movenet-multipose.onnx`"), "{why}");
+        assert!(!refusal("own").contains("--install"), "{}", refusal("own"));
+    }
 
     #[test]
     fn sources_of_obstacles_reach_the_input() {

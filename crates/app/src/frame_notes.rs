@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Isometry2, Point3};
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Funnel, Reason};
+use tagalong_core::Funnel;
 use tagalong_geometry::{Camera, Rect};
 use tagalong_pipeline::{Candidate, Fate, FrameReport, ObstaclePoint};
 
@@ -148,20 +148,11 @@ impl DriveNote {
             reason_about: command.reason.about().to_owned(),
             forward_mps: rounded(command.twist.linear_mps, 1e3),
             turn_rps: rounded(command.twist.angular_rps, 1e3),
-            motion: motion(command.reason).to_owned(),
+            motion: command.reason.effect().to_owned(),
             things_cm: cells_cm(&report.obstacles, false, odom_from_robot),
             movers_cm: cells_cm(&report.obstacles, true, odom_from_robot),
         })
     }
-}
-
-/// Returns the effect of a command's reason in one word.
-fn motion(reason: Reason) -> &'static str {
-    if !reason.moves() {
-        return "stands";
-    }
-    // Limits of speed and acceleration apply in every ride; they say nothing about its surroundings.
-    if matches!(reason, Reason::Follow | Reason::Limited) { "drives" } else { "slower" }
 }
 
 /// Returns the middles of the cells with obstacles that move, or that stand, each once.
@@ -274,12 +265,6 @@ mod tests {
         let turned = Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2);
         assert_eq!(cells_cm(&obstacles, false, &turned), [95, 105], "two readings of one cell");
         assert_eq!(cells_cm(&obstacles, true, &turned), [95, 205]);
-    }
-
-    #[test]
-    fn a_command_drives_is_slower_or_stands() {
-        let words = [Reason::Limited, Reason::Near, Reason::Stopping, Reason::Blocked].map(motion);
-        assert_eq!(words, ["drives", "slower", "slower", "stands"]);
     }
 
     #[test]

@@ -101,6 +101,32 @@ fn remedy(installed: &[String], name: &str) -> Option<String> {
     ))
 }
 
+/// Returns the remedy for settings that name, as the `model` of a network, a known one that is not
+/// installed; `None` if there is none.
+pub fn missing_model(settings: &toml::Table) -> Option<String> {
+    let installed = [installed_networks(), installed_embeddings()].concat();
+    models(settings).into_iter().find_map(|model| {
+        let is_missing = known_file(model).is_some() && !installed.iter().any(|it| it == model);
+        is_missing.then(|| remedy(&installed, model))?
+    })
+}
+
+/// Returns the values of all keys `model`, in tables within tables, too.
+fn models(settings: &toml::Table) -> Vec<&str> {
+    let mut found = Vec::new();
+    for (key, value) in settings {
+        match value {
+            toml::Value::String(name) if key == "model" => found.push(name.as_str()),
+            toml::Value::Table(table) => found.extend(models(table)),
+            toml::Value::Array(items) => {
+                found.extend(items.iter().filter_map(toml::Value::as_table).flat_map(models));
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
 /// Returns the name of the file of a known network.
 fn known_file(name: &str) -> Option<String> {
     let table: toml::Table = toml::from_str(KNOWN_NETWORKS).ok()?;
@@ -206,6 +232,13 @@ mod tests {
         }
         assert_eq!(remedy(&[], "yolox-nan"), None);
         assert_eq!(remedy(&["yolox-nano".to_owned()], "yolox-nano-depth"), None);
+    }
+
+    #[test]
+    fn a_model_is_found_in_any_table_of_a_config() {
+        let text = "model = 'a'\nnamed = 'b'\n[appearance]\nmodel = 'c'\n[[detectors]]\n\
+                    [detectors.config]\nmodel = 'd'\n";
+        assert_eq!(models(&text.parse().unwrap()), ["c", "d", "a"]);
     }
 
     #[test]

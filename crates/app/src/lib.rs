@@ -24,6 +24,7 @@ pub mod format;
 pub mod frame_notes;
 pub mod input_args;
 pub mod installed;
+pub mod misfit;
 pub mod origin;
 pub mod outcome;
 pub mod progress;

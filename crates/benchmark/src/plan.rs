@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
+use tagalong_app::misfit::{COMPARE, Traits, misfit_note};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::scoring::TruthFile;
 use tagalong_app::suggest::{self, check_log_path, toml_files};
 use tagalong_config::{Registry, path_text};
 use tagalong_log::{COPY_OF, FrameSource, Inputs, Limits, LogError, read_attachment};
-use tagalong_pipeline::Tunable;
+use tagalong_pipeline::{Suits, Tunable};
 
 use super::args::PlanArgs;
 
@@ -72,6 +73,8 @@ pub struct PlannedConfig {
     pub inputs: Inputs,
     /// Its settings that may be fitted.
     pub tune: Vec<Tunable>,
+    /// Robots and cameras for which it is made.
+    suits: Suits,
 }
 
 impl PlannedConfig {
@@ -122,14 +125,22 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
     unique("logs", logs.iter().map(|log| log.name.clone()))?;
     let version = version()?;
     let mut tasks = Vec::new();
+    let mut unsuited = vec![Vec::new(); configs.len()];
     for log in &logs {
-        let mut tried = BTreeMap::new();
-        for config in &configs {
+        let mut tried: BTreeMap<String, Opened> = BTreeMap::new();
+        for (config, unsuited) in configs.iter().zip(&mut unsuited) {
             let key = config.reading();
             // Opening a log is slow, so the answer is shared by configs that read it the same way.
-            let skip = match tried.get(&key) {
-                Some(known) => Option::clone(known),
-                None => tried.entry(key).or_insert(why_not(config, log)?).clone(),
+            let opened = match tried.get(&key) {
+                Some(known) => known.clone(),
+                None => tried.entry(key).or_insert(opened(config, log)?).clone(),
+            };
+            let skip = match opened {
+                Ok(traits) => {
+                    unsuited.push((log.name.clone(), traits.misfits(&config.suits)));
+                    None
+                }
+                Err(why) => Some(why),
             };
             for offset in 0..args.seeds {
                 let seed = config.first_seed.wrapping_add(offset);
@@ -137,6 +148,11 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
                 (task.k, task.skip) = (tasks.len() + 1, skip.clone());
                 tasks.push(task);
             }
+        }
+    }
+    for (config, unsuited) in configs.iter().zip(&unsuited) {
+        if let Some(note) = misfit_note(&config.file.stem(), unsuited) {
+            say(&format!("note: {note}; {COMPARE}"));
         }
     }
     Ok(tasks)
@@ -227,13 +243,21 @@ fn config_hash(config: &PlannedConfig, seed: u64, registry: &Registry) -> Result
     Ok(sha256(resolved.to_toml().as_bytes()))
 }
 
+/// Properties of a log that a config can read, or the reason why it cannot.
+type Opened = Result<Traits, String>;
+
 /// Returns the reason for which the config cannot run on the log, if there is one.
 ///
 /// # Errors
 /// A log that cannot be read at all.
 pub fn why_not(config: &PlannedConfig, log: &Annotated) -> Result<Option<String>, Failure> {
+    Ok(opened(config, log)?.err())
+}
+
+/// Opens a log as a config reads it.
+fn opened(config: &PlannedConfig, log: &Annotated) -> Result<Opened, Failure> {
     match config.open(&log.log) {
-        Ok(_) => Ok(None),
+        Ok(source) => Ok(Ok(Traits::of(&source))),
         Err(
             error @ (LogError::Missing { .. }
             | LogError::UnknownTopic { .. }
@@ -243,7 +267,7 @@ pub fn why_not(config: &PlannedConfig, log: &Annotated) -> Result<Option<String>
             // The first line names the problem, the others give advice; the folder must not reach
             // the report.
             let first = text.lines().next().unwrap_or_default();
-            Ok(Some(first.replace(&log.log.display().to_string(), &log.name)))
+            Ok(Err(first.replace(&log.log.display().to_string(), &log.name)))
         }
         Err(error) => Err(error.into()),
     }
@@ -291,8 +315,9 @@ pub fn candidate(path: &Path, registry: &Registry) -> Result<PlannedConfig, Fail
     let outer = file.outer()?;
     let first_seed = settings.seed;
     let tune = settings.tune;
+    let suits = settings.suits;
     let inputs = pipeline.inputs();
-    Ok(PlannedConfig { file, path: path.to_owned(), first_seed, outer, inputs, tune })
+    Ok(PlannedConfig { file, path: path.to_owned(), first_seed, outer, inputs, tune, suits })
 }
 
 fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {

@@ -137,6 +137,15 @@ impl Reason {
         }
     }
 
+    /// Returns the effect in one word: `drives` as the controller asks, `slower`, or `stands`.
+    pub fn effect(self) -> &'static str {
+        if !self.moves() {
+            return "stands";
+        }
+        // Limits of speed and acceleration apply in every ride; they say nothing about its surroundings.
+        if matches!(self, Self::Follow | Self::Limited) { "drives" } else { "slower" }
+    }
+
     /// Returns true if the robot may move for this reason.
     pub fn moves(self) -> bool {
         matches!(
@@ -255,6 +264,16 @@ mod tests {
         Reason::Expired,
         Reason::Fault,
     ];
+
+    #[test]
+    fn a_command_drives_is_slower_or_stands() {
+        let effects =
+            [Reason::Limited, Reason::Near, Reason::Stopping, Reason::Blocked].map(Reason::effect);
+        assert_eq!(effects, ["drives", "slower", "slower", "stands"]);
+        for reason in ALL {
+            assert_eq!(reason.effect() == "stands", !reason.moves(), "{reason}");
+        }
+    }
 
     #[test]
     fn the_robot_moves_for_nine_reasons_and_stands_for_the_others() {

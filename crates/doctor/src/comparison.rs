@@ -22,9 +22,12 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
     }
     let contents = found.contents();
     let better = found.better();
+    let network = found.without_network();
     let mut rows = Vec::new();
     let mut first = None;
     for Fitting { choice, config } in found.fitting {
+        // The checks are those of the first.
+        let scope = Scope { with_samples: first.is_none(), ..scope };
         let visit = Visit::make(config, scope, registry)?;
         if let Some(folder) = &args.output {
             snapshots::write(&visit, scope, &folder.join(choice.config))?;
@@ -46,5 +49,6 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
     let first =
         Diagnosis::of(&visit, name.into(), args, folder.as_deref(), &Remedies::new(registry))?;
     let pictures = args.output.clone();
-    Ok(Diagnosis { pipelines: rows, contents, better, alternatives: shown, pictures, ..first })
+    let pipelines = rows;
+    Ok(Diagnosis { pipelines, contents, better, network, alternatives: shown, pictures, ..first })
 }

@@ -36,6 +36,9 @@ pub struct Diagnosis {
     /// Better pipeline that a topic would make possible, with the remedy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub better: Option<String>,
+    /// Reason why no pipeline with a neural network is compared, with the remedy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network: Option<String>,
     /// Use of each image, scan, detection and odometry topic, with the reasons for those not used.
     pub inputs: InputAccount,
     /// Results of the checks.
@@ -131,6 +134,7 @@ impl Diagnosis {
             pipelines: Vec::new(),
             contents: String::new(),
             better: None,
+            network: None,
             inputs: evidence.inspection.inputs.clone(),
             findings: findings.collect(),
             coverage: evidence.coverage.clone(),

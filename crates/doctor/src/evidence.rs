@@ -1,5 +1,6 @@
 //! Input of the checks: gathered once, in one pass over the frames.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -12,6 +13,7 @@ use tagalong_vision::quality::Exposure;
 use tagalong_vision::registration::{EdgeOverlap, OverlapSettings};
 
 use super::coverage::{Alternative, Coverage};
+use super::depth_unit::JudgedDepth;
 use super::trial::Trial;
 
 /// Number of measured frames, spread over those that are read.
@@ -47,6 +49,8 @@ pub struct Evidence {
     pub inputs: Inputs,
     /// Measurements in frames.
     pub samples: Samples,
+    /// Judgement of the depth in them; made by the first check that needs it.
+    pub depth: OnceCell<Option<JudgedDepth>>,
     /// Frames that could be made, and those that could not.
     pub reading: Reading,
     /// Way of the robot.

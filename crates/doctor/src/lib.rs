@@ -29,6 +29,7 @@ mod args;
 mod checks;
 mod comparison;
 mod coverage;
+mod depth_unit;
 mod diagnosis;
 mod evidence;
 mod finding;
@@ -77,6 +78,7 @@ pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
         frames: args.frames,
         with_pictures: args.output.is_some(),
         is_named: config.is_some(),
+        with_samples: true,
     };
     let diagnosis = match config {
         Some(config) => diagnose(config, args, scope, registry)?,

@@ -53,6 +53,9 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
         let failure = failure.iter().map(|why| format!(": failed, {why}")).collect::<String>();
         let _ = writeln!(out, "  {}  {frame_ms:>7.1}  {config}{mark}{failure}", figures(coverage));
     }
+    if let Some(why) = &diagnosis.network {
+        let _ = writeln!(out, "  {:>w$}  {:>7}  network: {why}", "-", "-", w = heading().len());
+    }
     let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
     if let Some(taken) = diagnosis.pipelines.iter().find(|row| row.taken) {
         let contents = &diagnosis.contents;

@@ -1,5 +1,6 @@
 //! One pass of a pipeline over a log, with all measurements.
 
+use std::cell::OnceCell;
 use std::path::Path;
 
 use tagalong::logs::sources_of;
@@ -45,6 +46,8 @@ pub struct Scope<'a> {
     pub with_pictures: bool,
     /// True if the user names the config.
     pub is_named: bool,
+    /// True if light, depth, floor and scans are measured, as the checks need them.
+    pub with_samples: bool,
 }
 
 impl Visit {
@@ -72,6 +75,7 @@ impl Visit {
         let mut evidence = Evidence {
             config: config.stem(),
             samples: Samples::of(expected),
+            depth: OnceCell::new(),
             inspection: found.inspection,
             refusal: found.refusal,
             missing: None,
@@ -128,7 +132,9 @@ fn look(
         if out.reading.made == scope.frames {
             out.reading.wanted = item.frame.index;
         }
-        out.samples.take(number, &item);
+        if scope.with_samples {
+            out.samples.take(number, &item);
+        }
         out.driven.take(&item.frame);
         views.take(number, &item);
         // Without its inputs the pipeline cannot run, but the images can still be measured.

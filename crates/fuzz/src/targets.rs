@@ -56,6 +56,12 @@ const CVAT: [&str; 2] = [
      <attribute name=\"id\">3</attribute></box></image></annotations>",
 ];
 
+const PERSON_BOXES: [&str; 2] = [
+    "{\"images\":[{\"id\":1,\"file_name\":\"a.jpg\"}],\"annotations\":[{\"image_id\":1,\"category_id\":1,\
+     \"bbox\":[1,2,30,40],\"track_id\":3}],\"categories\":[{\"id\":1,\"name\":\"person\"}]}",
+    "image,track_id,class,bbox\na.jpg,3,person,\"[1, 2, 30, 40]\"\n",
+];
+
 /// Returns all parsers.
 pub fn targets() -> Vec<Target> {
     let model = |name, text: &str, parse| Target {
@@ -224,6 +230,12 @@ pub fn targets() -> Vec<Target> {
             about: "annotations of CVAT",
             seeds: CVAT.map(|file| file.as_bytes().to_vec()).to_vec(),
             parse: |bytes, _| as_text(bytes, |text| drop(tagalong_import::people_of_cvat(text))),
+        },
+        Target {
+            name: "person-boxes",
+            about: "boxes of people in a folder of images",
+            seeds: PERSON_BOXES.map(|file| file.as_bytes().to_vec()).to_vec(),
+            parse: |bytes, _| as_text(bytes, |text| drop(tagalong_import::person_boxes(text))),
         },
         text("follow-bench", FOLLOW_BENCH, |bytes, _| {
             as_text(bytes, |text| drop(tagalong_import::scene_of_follow_bench(text, "x")));

@@ -70,6 +70,11 @@ pub struct ImportArgs {
     /// images: metres per unit of depth.
     #[arg(long, value_name = "M", default_value_t = 0.001, requires = "depth", value_parser = positive)]
     pub depth_unit: f64,
+    /// images: boxes of whole people in them, as JSON of COCO (image_id, bbox, track_id) or as a CSV with
+    /// a header (image, x, y, w, h or image, xmin, ymin, xmax, ymax, and track_id): writes
+    /// NAME.boxes.csv beside the log.
+    #[arg(long, value_name = "FILE")]
+    pub boxes: Option<PathBuf>,
     /// cvat: boxes are of whole bodies, of which the upper bodies are compared: writes
     /// NAME.boxes.csv.
     #[arg(long)]

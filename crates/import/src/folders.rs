@@ -7,15 +7,23 @@ use tagalong_config::{FileLimit, read_text};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
 use super::args::{ImportArgs, MAX_HZ};
+use super::boxes;
 use super::recorded;
 use super::sequence::{Eye, Sequence, pictures, size, steady, text};
+use super::truth::boxes_csv;
 
 /// Reads a folder of images, with one of depth if the options say so.
 ///
 /// # Errors
 /// Folders that cannot be read, or do not hold the same number of images.
 pub fn images(args: &ImportArgs) -> Result<Sequence, Failure> {
-    let mut sequence = of_files(args, pictures(&args.path)?, args.fps)?;
+    let files = pictures(&args.path)?;
+    let annotated = args.boxes.as_ref().map(|boxes| boxes::read(boxes, &files)).transpose()?;
+    let mut sequence = of_files(args, files, args.fps)?;
+    if let Some((bodies, notes)) = annotated {
+        sequence.beside.push(("boxes.csv", boxes_csv(&bodies)));
+        sequence.notes.extend(notes);
+    }
     let Some(folder) = &args.depth else { return Ok(sequence) };
     let depth = pictures(folder)?;
     // Images are paired by their order, so the counts must agree.

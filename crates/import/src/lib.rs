@@ -14,6 +14,7 @@
 //! ```
 
 mod args;
+mod boxes;
 mod cvat;
 mod folders;
 mod follow_bench;
@@ -36,6 +37,7 @@ use tagalong_config::PathText;
 use tagalong_math::counted;
 
 pub use self::args::{ImportArgs, Kind};
+pub use self::boxes::{PersonBox, person_boxes};
 pub use self::cvat::people_of_cvat;
 pub use self::follow_bench::scene_of_follow_bench;
 use self::sequence::Sequence;
@@ -50,6 +52,11 @@ pub fn import(args: &ImportArgs) -> Outcome {
     if !path.exists() {
         return Err(Failure::failed(format!("{}: no such file or folder", path.display())));
     }
+    if args.boxes.is_some() && args.kind != Kind::Images {
+        let message =
+            "--boxes is for a folder of images: `tagalong import images FOLDER --boxes FILE`";
+        return Err(Failure::usage(message));
+    }
     match args.kind {
         Kind::Cvat => return cvat::import(args),
         Kind::LegTracker => return leg_bags::import(args),
@@ -60,9 +67,7 @@ pub fn import(args: &ImportArgs) -> Outcome {
     let signals = Signals::listen()?;
     spare(&log, args.overwrite)?;
     if !path.is_dir() {
-        let message =
-            format!("{} is a file; give the folder that holds the sequence", path.display());
-        return Err(Failure::failed(message));
+        return Err(Failure::failed(file_for_folder(path)));
     }
     let sequence = read(args)?;
     make_room_for(&log)?;
@@ -93,6 +98,21 @@ pub fn import(args: &ImportArgs) -> Outcome {
         }
     })?;
     Ok(Ended::Well)
+}
+
+/// Returns the message on a file in the place of a folder of images.
+fn file_for_folder(path: &Path) -> String {
+    let shown = path.display();
+    let ending = path.extension().and_then(|it| it.to_str()).unwrap_or_default().to_lowercase();
+    let remedy = match ending.as_str() {
+        "json" | "csv" => format!(
+            ": `tagalong import images FOLDER --boxes {shown}` takes its boxes, if it is JSON of COCO or a \
+             CSV with a header"
+        ),
+        "xml" => format!(": `tagalong import cvat {shown}` reads annotations of CVAT"),
+        _ => String::new(),
+    };
+    format!("{shown} is a file; give the folder that holds the sequence{remedy}")
 }
 
 fn read(args: &ImportArgs) -> Result<Sequence, Failure> {

@@ -17,6 +17,9 @@ const FAR_M: f32 = 8.0;
 /// Colour of dropped candidates.
 pub const DROPPED: Ink = Ink::solid([215, 215, 215]).faint(0.7);
 
+/// Part of the box of a predicted person that has to be in the image for a label.
+const LABELLED: f64 = 0.25;
+
 const TITLE: Ink = Ink::solid([255, 255, 255]);
 
 /// Camera's image with all overlays, enlarged.
@@ -80,7 +83,8 @@ pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize, style: Ov
         let region = style.region(scene, track);
         // A person that another sensor sees has no box. A label at the border for a predicted person
         // outside of the image explains nothing there.
-        if region.width <= 0.0 || !track.seen && region.intersection(&area).area() <= 0.0 {
+        let inside = region.intersection(&area).area();
+        if region.width <= 0.0 || !track.seen && inside < LABELLED * region.area() {
             continue;
         }
         let region = scaled(&region, by as f64);
@@ -249,11 +253,10 @@ fn dropped(scene: &OverlayData) -> Vec<(Rect, String)> {
 
 /// Returns the number of a track, its state, and its distance from the robot.
 fn name_of(track: &Track) -> String {
-    let state = match (track.confirmed, track.seen, track.occluded) {
-        (false, _, _) => "?",
-        (true, true, _) => "",
-        (true, false, true) => " hidden",
-        (true, false, false) => " unseen",
+    let state = match (track.confirmed, track.seen) {
+        (false, _) => "?",
+        (true, true) => "",
+        (true, false) => " predicted",
     };
     let distance = track.estimate.person.position.xy().coords.norm();
     format!("{}{state} {distance:.1} m", track.id)

@@ -203,7 +203,7 @@ mod tests {
         ) {
             let mut labels = Labels::within(area(), Vec::new());
             for (i, (x, y, side)) in boxes.iter().enumerate() {
-                let text = format!("{i} unseen 3.0 m");
+                let text = format!("{i} predicted 3.0 m");
                 labels.add(&Rect::new(*x, *y, *side, *side), text, Lettering::Large, WHITE);
             }
             let bars = labels.bars();

@@ -79,7 +79,7 @@ enum Sample {
 fn entries(scene: &OverlayData, style: OverlayStyle) -> Vec<(Sample, &'static str)> {
     if !style.is_debug() {
         return vec![
-            (Sample::Seen, "seen, distance from the robot"),
+            (Sample::Seen, "seen: ID and distance"),
             (Sample::Predicted, "predicted"),
             (Sample::Trail, "trail of 2 s"),
             (Sample::Velocity, "position in 1 s"),

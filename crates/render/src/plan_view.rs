@@ -17,6 +17,9 @@ const REACH_AROUND_M: [f64; 2] = [5.0, 4.0];
 /// Half the side of the square around a person that labels spare, pixels.
 const MARK_PX: f64 = 8.0;
 
+/// Colour of the plan behind all marks.
+const GROUND: Ink = Ink::solid(GROUND_RGB);
+const GROUND_RGB: [u8; 3] = [24, 24, 28];
 const GRID: Ink = Ink::solid([60, 60, 68]);
 const AXIS: Ink = Ink::solid([150, 150, 160]);
 const SCAN: Ink = Ink::solid([200, 160, 90]);
@@ -70,7 +73,7 @@ impl Plan {
 /// Renders the people from above, `height` pixels high.
 pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: usize) -> Canvas {
     let plan = Plan::new(height, scene.is_around);
-    let mut canvas = Canvas::new(width_px(height), height, [24, 24, 28]);
+    let mut canvas = Canvas::new(width_px(height), height, GROUND_RGB);
     draw_grid(&mut canvas, &plan);
     // A frame without an image has a camera that sees nothing.
     if !scene.camera.is_blind() && !scene.is_around {
@@ -80,6 +83,9 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: u
         canvas.disc(plan.pixel(point.x, point.y), 1.0, SCAN);
     }
     canvas.disc(plan.robot, 5.0, AXIS);
+    for (place, text) in notes(&plan) {
+        canvas.text(Point2::new(place.x, place.y), text, AXIS);
+    }
     for (id, trail) in trails.in_robot(scene) {
         let points: Vec<_> = trail.iter().map(|p| plan.of(p)).collect();
         canvas.thick_path(&points, colour_of(id).faint(0.7));
@@ -91,20 +97,43 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: u
             draw_uncertainty(&mut canvas, &plan, track);
         }
     }
-    let mut labels = labels(scene, &plan, style, height);
-    for track in style.tracks(scene).filter(|track| plan.shows(track, height)) {
-        let text =
-            if is_target(track) { format!("{} target", track.id) } else { track.id.to_string() };
-        labels.add(&plan.mark(track), text, Lettering::Bold, colour(track));
-    }
-    labels.paint(&mut canvas);
+    labels(scene, &plan, style, height).paint(&mut canvas);
     canvas
 }
 
-/// Returns the place for the labels, which spare the marks of all tracks.
+/// Returns the IDs of all tracks at their places, which spare the marks of all.
 fn labels(scene: &OverlayData, plan: &Plan, style: OverlayStyle, height: usize) -> Labels {
     let marks = style.tracks(scene).map(|track| plan.mark(track)).collect();
-    Labels::within(Rect::new(0.0, 0.0, plan.width, height as f64), marks)
+    let mut labels = Labels::within(Rect::new(0.0, 0.0, plan.width, height as f64), marks);
+    for (place, _) in notes(plan) {
+        labels.reserve(place);
+    }
+    for track in style.tracks(scene).filter(|track| plan.shows(track, height)) {
+        let is_target = scene.report.target == Some(track.id);
+        let text = if is_target { format!("{} target", track.id) } else { track.id.to_string() };
+        labels.add(&plan.mark(track), text, Lettering::Bold, colour(track));
+    }
+    labels
+}
+
+/// Returns the IDs of a scene as they are placed.
+#[cfg(test)]
+pub fn placed_ids(scene: &OverlayData, style: OverlayStyle, height: usize) -> Labels {
+    labels(scene, &Plan::new(height, scene.is_around), style, height)
+}
+
+/// Returns the words that explain the view, with their places.
+fn notes(plan: &Plan) -> [(Rect, &'static str); 2] {
+    let above = "from above";
+    let robot = "robot";
+    let [above_px, height] = Lettering::Small.size_px(above);
+    let [robot_px, _] = Lettering::Small.size_px(robot);
+    let left = (plan.robot.x - 0.5 * robot_px).floor();
+    let below = (plan.robot.y + MARK_PX).floor();
+    [
+        (Rect::new(plan.width - above_px - 2.0, 2.0, above_px, height), above),
+        (Rect::new(left, below, robot_px, height), robot),
+    ]
 }
 
 /// Renders a line every metre, its number every second one.
@@ -144,10 +173,21 @@ fn draw_track(canvas: &mut Canvas, plan: &Plan, track: &Track, target: bool) {
     let person = &track.estimate.person;
     let at = plan.of(&person.position);
     let opacity = if track.seen { 1.0 } else { 0.5 };
-    canvas.disc(at, if target { 7.0 } else { 5.0 }, ink.faint(opacity));
+    let radius = if target { 7.0 } else { 5.0 };
+    if track.seen {
+        canvas.disc(at, radius, ink);
+    } else {
+        draw_ring(canvas, at, radius, ink);
+    }
     // The line ends where the person will be in one second.
     let soon = person.position.xy() + person.velocity;
     canvas.line(at, plan.pixel(soon.x, soon.y), ink.faint(opacity));
+}
+
+/// Renders the mark of a person who is predicted.
+pub(super) fn draw_ring(canvas: &mut Canvas, at: Point2<f64>, radius: f64, ink: Ink) {
+    canvas.disc(at, radius, ink);
+    canvas.disc(at, radius - 2.0, GROUND);
 }
 
 /// Renders the ellipse of two standard deviations.

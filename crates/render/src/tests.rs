@@ -154,7 +154,7 @@ fn the_labels_of_two_people_side_by_side_do_not_overlap() {
     let labels = image_view::placed_labels(&scene, DEBUG);
     let bars = labels.bars();
     let texts: Vec<&str> = bars.iter().map(|(_, text)| *text).collect();
-    assert_eq!(texts, ["1 3.0 m", "2 unseen 3.0 m", "3 3.0 m", "head width"]);
+    assert_eq!(texts, ["1 3.0 m", "2 predicted 3.0 m", "3 3.0 m", "head width"]);
     for (i, (bar, text)) in bars.iter().enumerate() {
         assert!(bar.height >= 16.0, "{text}");
         assert_eq!(bar.clipped(640, 480), *bar, "{text} leaves the image");
@@ -165,13 +165,48 @@ fn the_labels_of_two_people_side_by_side_do_not_overlap() {
 }
 
 #[test]
+fn the_ids_of_two_people_at_one_place_can_both_be_read_in_the_plan() {
+    let scene = scene(&[1, 12, 3, 4, 5, 6], Vec::new());
+    let labels = plan_view::placed_ids(&scene, CALM, 480);
+    let bars = labels.bars();
+    assert_eq!(bars.len(), 6, "{bars:?}");
+    for (i, (bar, text)) in bars.iter().enumerate() {
+        for (other, name) in &bars[..i] {
+            assert_eq!(bar.intersection(other).area(), 0.0, "{text} is over {name}");
+        }
+    }
+}
+
+#[test]
+fn a_predicted_person_is_a_ring_in_the_plan() {
+    let mut scene = scene(&[1], Vec::new());
+    scene.report.tracks[0].estimate.person.velocity = Vector2::zeros();
+    let middle = |scene: &OverlayData| {
+        let plan = plan_view::draw(scene, &Trails::default(), CALM, 480).into_image();
+        // The person is 3 m ahead and 0.4 m to the left; 480 rows show 9 m.
+        plan.get(192 - 21, 427 - 160)
+    };
+    let seen = middle(&scene);
+    scene.report.tracks[0].seen = false;
+    assert_ne!(middle(&scene), seen);
+    assert_eq!(middle(&scene), Some([24, 24, 28]));
+}
+
+#[test]
 fn a_predicted_person_outside_of_the_image_has_no_label() {
     let mut scene = scene(&[1, 2], Vec::new());
-    scene.report.tracks[0].estimate.region.x = -500.0;
+    let side = scene.report.tracks[0].estimate.region.width;
     scene.report.tracks[0].seen = false;
-    let labels = image_view::placed_labels(&scene, DEBUG);
-    let texts: Vec<&str> = labels.bars().into_iter().map(|(_, text)| text).collect();
-    assert_eq!(texts, ["2 3.0 m"]);
+    for (x, expected) in [
+        (-500.0, &["2 3.0 m"][..]),
+        (-0.9 * side, &["2 3.0 m"]),
+        (-0.5 * side, &["1 predicted 3.0 m", "2 3.0 m"]),
+    ] {
+        scene.report.tracks[0].estimate.region.x = x;
+        let labels = image_view::placed_labels(&scene, DEBUG);
+        let texts: Vec<&str> = labels.bars().into_iter().map(|(_, text)| text).collect();
+        assert_eq!(texts, expected);
+    }
 }
 
 fn dropped(test: &'static str) -> Candidate {

@@ -58,7 +58,7 @@ pub use judge::{Judge, Judged};
 pub use occlusion::{Occlusion, Outcome, occlusions, outcome};
 pub use parallel::{each, in_order};
 pub use ride::{
-    ApproachJudge, ApproachWatch, Approached, Contact, CrowdMeasures, Episode, Ridden, Ride,
-    RideJudge, Side, Tick, Touched, Witness,
+    ApproachJudge, ApproachWatch, Approached, Contact, CrowdMeasures, Episode, ReasonShare, Ridden,
+    Ride, RideJudge, Side, Tick, Touched, Witness,
 };
 pub use trial::{Moment, Run, Trial, TrialError};

@@ -449,8 +449,35 @@ fn kind_of(path: &Path) -> Result<Kind, Failure> {
         _ if first.contains("x_laser_m") => Kind::Floor,
         _ if first.contains("ub_x") || first.contains("head_x") => Kind::People,
         _ if !first.contains(',') && has_class(&blank_separated) => Kind::Kitti,
-        _ => Kind::Mot,
+        _ => match foreign(first) {
+            Some(remedy) => return Err(Failure::failed(remedy.replace("FILE", &shown(path)))),
+            None => Kind::Mot,
+        },
     })
+}
+
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// Returns the problem and the remedy of annotations that an importer reads, by their first line; `None`
+/// for any other file.
+fn foreign(first: &str) -> Option<&'static str> {
+    match first.trim_start().chars().next()? {
+        '{' | '[' => Some(
+            "FILE is JSON, and no truth of a log: of COCO `tagalong import images FOLDER --boxes FILE` \
+             makes a log with truth",
+        ),
+        '<' => Some(
+            "FILE is XML, and no truth of a log: of CVAT `tagalong import cvat FILE -o LOG.people.csv` makes \
+             one",
+        ),
+        letter if letter.is_alphabetic() && first.contains([',', ';', '\t']) => Some(
+            "FILE has columns of another format, and is no truth of a log: with image and box `tagalong \
+             import images FOLDER --boxes FILE` makes a log with truth; see docs/logs.md for people.csv",
+        ),
+        _ => None,
+    }
 }
 
 /// Returns the `seqinfo.ini` of a MOTChallenge folder: beside `gt.txt` or above `gt`.
@@ -473,6 +500,21 @@ mod tests {
         let lens =
             Pinhole { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, distortion: Distortion::None };
         Camera::mounted(lens, 640, 480, 1.0, 0.0, 0.0)
+    }
+
+    #[test]
+    fn annotations_of_other_tools_lead_to_their_importer() {
+        let home = tempfile::tempdir().unwrap();
+        for (text, part) in [
+            ("{\"images\": []}", "import images FOLDER --boxes "),
+            ("<annotations/>", "import cvat "),
+            ("filename,xmin,ymin,xmax,ymax\na.jpg,1,2,3,4\n", "import images FOLDER --boxes "),
+        ] {
+            let path = home.path().join("boxes");
+            std::fs::write(&path, text).unwrap();
+            let why = TruthFile::read(&path, TruthOptions::default()).err().unwrap().message;
+            assert!(why.contains(&format!("{part}{}", path.display())), "{why}");
+        }
     }
 
     #[test]

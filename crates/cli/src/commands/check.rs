@@ -4,6 +4,7 @@ use std::path::Path;
 use tagalong::logs::sources_of;
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
+use tagalong_app::misfit::Traits;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::{PathText, Registry};
@@ -38,9 +39,9 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     let fit = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
     let blind_zone = fit.as_ref().and_then(|fit| fit.blind_zone);
     let data_lost = fit.as_ref().is_some_and(|fit| fit.data_lost);
-    let seen_m = fit.as_ref().and_then(|fit| fit.camera_height_m);
+    let seen_m = fit.as_ref().and_then(|fit| fit.traits.camera_height_m);
     let height_m = seen_m.or_else(|| outer.input.mount().map(|mount| mount.height_m));
-    let unsuited = height_m.and_then(|height_m| unsuited(height_m, &suits));
+    let unsuited = unsuited(height_m, fit.as_ref(), &suits);
     let (topics, notes) = fit.map(|fit| (fit.topics, fit.notes)).unzip();
     print(&match format {
         Format::Text => {
@@ -85,19 +86,21 @@ struct Fit {
     notes: Vec<String>,
     /// Part of the log was lost.
     data_lost: bool,
-    /// Height of the camera above the floor, m, where its pose is known.
-    camera_height_m: Option<f64>,
+    /// Properties that `[suits]` may exclude.
+    traits: Traits,
     /// Region that the camera of the log does not see, for a config with a controller.
     blind_zone: Option<BlindZone>,
 }
 
-/// Returns the warning of a camera that is lower or higher than those of `[suits]`.
-fn unsuited(height_m: f64, suits: &Suits) -> Option<String> {
-    let [low_m, high_m] = suits.camera_height_m?;
-    (suits.height_off_m(height_m) > Suits::HEIGHT_TOLERANCE_M).then(|| {
+/// Returns the warning of a log, or of the camera of a config alone, that `[suits]` excludes.
+fn unsuited(camera_height_m: Option<f64>, fit: Option<&Fit>, suits: &Suits) -> Option<String> {
+    let alone = Traits { has_odometry: true, ..Traits::default() };
+    let traits = fit.map_or(alone, |fit| fit.traits);
+    let misfits = Traits { camera_height_m, ..traits }.misfits(suits);
+    (!misfits.is_empty()).then(|| {
         format!(
-            "warning: the camera is {height_m:.2} m high, and the config is for {low_m} to {high_m} m: \
-             take one for this height, see the first table of configs/README.md"
+            "warning: {}: take another config, see the first table of configs/README.md",
+            misfits.join("; ")
         )
     })
 }
@@ -162,14 +165,10 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit
         .map_err(|why| Failure::failed(format!("`{}`: {why}", log.display())))?;
     let mut tried = 0;
     let mut blind_zone = None;
-    let mut camera_height_m = None;
     while tried < FRAMES
         && let Some(item) = source.next_frame()
     {
-        let camera = &item.frame.camera;
-        blind_zone = pipeline.blind_zone(camera);
-        let is_known = !camera.is_blind() && !is_pose_assumed(&source);
-        camera_height_m = is_known.then(|| camera.height_m());
+        blind_zone = pipeline.blind_zone(&item.frame.camera);
         pipeline.step(&item.frame).map_err(Failure::failed)?;
         tried += 1;
     }
@@ -180,12 +179,8 @@ fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit
     let used = source.account().topics.iter().filter(|topic| topic.used_as.is_some());
     let topics = used.map(ToString::to_string).collect();
     let notes = source.notes().to_vec();
-    Ok(Fit { topics, notes, data_lost: source.data_lost(), camera_height_m, blind_zone })
-}
-
-/// Returns true if the log tells nothing about the pose of the camera.
-fn is_pose_assumed(source: &FrameSource) -> bool {
-    source.notes().iter().any(|note| note.contains("comes from an assumption"))
+    let traits = Traits::of(&source);
+    Ok(Fit { topics, notes, data_lost: source.data_lost(), traits, blind_zone })
 }
 
 /// Returns the names of the inputs that a log has to have, or that are used where it has them.

@@ -22,9 +22,11 @@ use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
 use summary::{doctor, quoted};
 use tagalong::logs::sources_of;
+use tagalong_app::choice::uses_camera;
 use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
 use tagalong_app::format::Format;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
+use tagalong_app::misfit::{COMPARE, Traits, misfit_note};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, say};
 use tagalong_app::progress::Progress;
@@ -37,7 +39,7 @@ use tagalong_app::timings::Timings;
 use tagalong_app::unable::unable;
 use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
-use tagalong_log::{FrameSource, Input, InputAccount};
+use tagalong_log::{FrameSource, Input, InputAccount, Inputs, Usage};
 use tagalong_pipeline::{FrameReport, MissingSource, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
@@ -134,6 +136,9 @@ impl Job {
         // A picture shows colour, whether or not the pipeline uses it.
         let wants_pictures = args.overlay.is_some() || args.with_images || args.serve.is_some();
         let inputs = if wants_pictures { inputs.accept(Input::Colour) } else { inputs };
+        if args.input.camera.is_some() && !uses_camera(inputs) {
+            return Err(camera_for_nothing(&config, inputs));
+        }
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
             .map_err(|error| refused_log(error, pipeline.config()))?;
         // A config that the program chose is for the tracks alone; no robot follows its commands.
@@ -149,9 +154,9 @@ impl Job {
         if !args.quiet {
             report.inputs.lines().iter().for_each(|line| say(line));
         }
-        if settings.suits.odometry && !source.has_odometry() {
-            report.notes.push(without_odometry(&config));
-        }
+        let misfits = Traits::of(&source).misfits(&settings.suits);
+        let misfit = misfit_note(&config.name(), &[(log_name(args), misfits)]);
+        report.notes.extend(misfit.map(|note| format!("{note}; {COMPARE}")));
         let remedies = Remedies::new(registry);
         Ok(Self { pipeline, outer, source, resolved, folder, report, remedies })
     }
@@ -167,13 +172,14 @@ fn unsteered(log: &Path, why: &MissingSource) -> Failure {
     ))
 }
 
-/// Returns the note on a config for a robot with odometry and a log without.
-fn without_odometry(config: &ConfigFile) -> String {
-    format!(
-        "{} is for a robot with odometry ([suits]), and the log has none: things that the robot \
-         passes seem to move; without a config `tagalong run LOG` takes one that does without",
-        config.name()
-    )
+/// Returns the failure of `--camera` with a pipeline that uses none.
+fn camera_for_nothing(config: &ConfigFile, inputs: Inputs) -> Failure {
+    let used: Vec<&str> = inputs.of(Usage::Required).map(|input| input.name()).collect();
+    Failure::usage(format!(
+        "--camera names a camera, and {} uses none, but {}: leave out --camera, or take another config",
+        config.stem(),
+        used.join(" and ")
+    ))
 }
 
 /// Returns `runs/LOG-CONFIG`, or `runs/LOG-CONFIG-CAMERA` for a camera that is asked for.

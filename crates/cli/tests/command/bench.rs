@@ -54,6 +54,18 @@ impl Home {
     }
 }
 
+#[test]
+fn a_config_for_other_cameras_is_named_once_with_its_logs() {
+    let home = Home::new();
+    home.config("high", "[suits]\ncamera_height_m = [2.0, 3.0]\n");
+    let output = home.bench(&["plan", "--logs-dir", "logs", "-o", "out"]);
+    let said = text(&output.stderr);
+    let expected = "note: high is by its [suits] not made for long (the camera is 1.20 m high, and the \
+                    config is for 2 to 3 m), short (";
+    assert_eq!(said.matches(expected).count(), 1, "{said}");
+    assert_eq!(said.matches("is by its [suits]").count(), 1, "{said}");
+}
+
 /// All files of a folder that are not times, by name.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();

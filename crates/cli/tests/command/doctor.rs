@@ -424,7 +424,7 @@ fn without_a_config_each_pipeline_that_fits_is_tried() {
     let folder = home.path().join("checkup");
     let doctor = || {
         let mut command = tagalong();
-        command.arg("doctor").arg(good());
+        command.arg("doctor").arg(good()).env("TAGALONG_HOME", home.path());
         command
     };
     let output = doctor().args(["--format", "json", "-o"]).arg(&folder).output().unwrap();
@@ -442,6 +442,9 @@ fn without_a_config_each_pipeline_that_fits_is_tried() {
     let printed = text(&doctor().output().unwrap().stdout);
     assert!(printed.contains("depth-verified (taken by `run`)"), "{printed}");
     assert!(printed.contains("`tagalong run` takes depth-verified, because"), "{printed}");
+    let network = said["network"].as_str().unwrap();
+    assert!(network.contains("`tagalong model --install FILE.onnx` installs one"), "{network}");
+    assert!(printed.contains(&format!("  network: {network}\n")), "{printed}");
 }
 
 /// Every setting that is tried differs from the present one.

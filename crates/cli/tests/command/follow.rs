@@ -39,6 +39,22 @@ fn a_person_who_walks_is_followed_the_same_way_on_any_number_of_threads() {
 }
 
 #[test]
+fn the_text_tells_why_the_robot_stood_or_drove_slower() {
+    let folder = tempfile::tempdir().unwrap();
+    // No camera height of [suits] is as low.
+    let output = follow(folder.path(), "follow-depth.toml", &["--set", "camera.height_m=0.6"]);
+    let told = text(&output.stdout);
+    let line = told.lines().find(|line| line.starts_with("  walk: follow-depth, seed ")).unwrap();
+    assert!(line.contains("stands ") && line.contains(" %"), "{line}");
+    let said = text(&output.stderr);
+    assert_eq!(
+        said.matches("is by its [suits] not made for walk (the camera").count(),
+        1,
+        "{said}"
+    );
+}
+
+#[test]
 fn another_first_seed_rides_elsewhere_and_the_tables_name_it() {
     let folder = tempfile::tempdir().unwrap();
     let [near, far] = ["3", "4"].map(|first| {

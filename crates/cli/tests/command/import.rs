@@ -176,6 +176,32 @@ fn a_folder_of_images_has_the_camera_of_the_options() {
 }
 
 #[test]
+fn boxes_of_a_folder_of_images_become_its_truth() {
+    let home = tempfile::tempdir().unwrap();
+    for i in 1..4u8 {
+        colour(&home.path().join(format!("photos/img{i}.png")), SMALL, i);
+    }
+    let coco = r#"{"images": [{"id": 1, "file_name": "img3.png"}, {"id": 2, "file_name": "img1.png"}],
+        "annotations": [{"image_id": 1, "bbox": [2, 3, 10, 20], "track_id": 7},
+        {"image_id": 2, "bbox": [4, 5, 10, 20], "track_id": 7}]}"#;
+    let csv = "filename,xmin,ymin,xmax,ymax,track_id\nimg3.png,2,3,12,23,7\nimg1.png,4,5,14,25,7\n";
+    for (name, text) in [("boxes.json", coco), ("boxes.csv", csv)] {
+        fs::write(home.path().join(name), text).unwrap();
+        let args = ["images", "photos", "--boxes", name, "-o", "p.mcap", "--overwrite"];
+        let (code, said) = import(home.path(), &args);
+        assert_eq!(code, 0, "{said}");
+        assert!(said.contains("truth is in p.boxes.csv"), "{said}");
+        let truth = fs::read_to_string(home.path().join("p.boxes.csv")).unwrap();
+        assert_eq!(truth, "1,1,4,5,10,20,1,1,1\n3,1,2,3,10,20,1,1,1\n", "{name}");
+        // The file is the path by mistake.
+        let (code, said) = import(home.path(), &["images", name]);
+        assert!(code == 1 && said.contains(&format!("--boxes {name}`")), "{said}");
+    }
+    let (code, said) = import(home.path(), &["mot", "photos", "--boxes", "boxes.csv"]);
+    assert!(code == 2 && said.contains("--boxes is for a folder of images"), "{said}");
+}
+
+#[test]
 fn a_mot_sequence_brings_its_truth() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("MOT17-99");

@@ -176,6 +176,24 @@ fn check_says_what_is_needed_and_what_is_used() {
 }
 
 #[test]
+fn a_low_camera_gets_the_pipeline_of_depth_that_suits_it() {
+    let home = tempfile::tempdir().unwrap();
+    for (height_m, expected) in [("0.4", "depth-net-ekf"), ("1.2", "depth-alone")] {
+        let scene = format!(
+            "duration_s = 1.0\n[camera]\nwidth = 120\nheight = 90\ncolour = false\n\
+             height_m = {height_m}\n[[people]]\npath = [[3.2, 3.0], [8.0, 3.0]]\n"
+        );
+        fs::write(home.path().join("scene.toml"), scene).unwrap();
+        let simulate = ["simulate", "scene.toml", "-o", "walk.mcap", "--overwrite"];
+        let made = tagalong().args(simulate).current_dir(&home).output().unwrap();
+        assert_eq!(code(&made), 0, "{}", text(&made.stderr));
+        let ran = ["run", "walk.mcap", "-o", "out", "--overwrite"];
+        let told = text(&tagalong().args(ran).current_dir(&home).output().unwrap().stderr);
+        assert!(told.contains(&format!("taking {expected}, because")), "{height_m}: {told}");
+    }
+}
+
+#[test]
 fn a_log_of_a_scanner_alone_gets_a_pipeline_by_its_odometry() {
     for (log, expected) in [("laser-moving", "laser-legs"), ("laser-following", "laser-follow")] {
         let Some(path) = tagalong_conformance::testdata::find(&format!("laser/{log}.mcap")) else {
@@ -210,6 +228,25 @@ fn a_config_that_asks_for_odometry_says_where_there_is_none() {
     assert!(said.contains("the log has no odometry"), "{said}");
     let (_, said) = ran(&["run", "laser-follow", "-o", "other"]);
     assert!(!said.contains("is for a robot with odometry"), "{said}");
+}
+
+#[test]
+fn a_camera_for_a_log_of_scans_is_refused_with_the_way_out() {
+    let Some(log) = tagalong_conformance::testdata::find("laser/laser-following.mcap") else {
+        return;
+    };
+    let home = tempfile::tempdir().unwrap();
+    let refusal = |args: &[&str]| {
+        let mut command = tagalong();
+        command.arg("run").args(args).arg(&log).args(["--camera", "/front"]);
+        let output = command.current_dir(&home).output().unwrap();
+        assert_ne!(code(&output), 0, "{}", text(&output.stdout));
+        text(&output.stderr)
+    };
+    let why = refusal(&[]);
+    assert!(why.contains("no camera `/front`") && why.contains("leave out --camera"), "{why}");
+    let why = refusal(&["laser-follow"]);
+    assert!(why.contains("laser-follow uses none, but laser: leave out --camera"), "{why}");
 }
 
 /// Writes a log with a second camera, /rear, that sees the same as the first, and with a third one

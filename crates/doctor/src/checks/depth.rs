@@ -4,11 +4,11 @@ use tagalong_core::DepthImage;
 use tagalong_geometry::Camera;
 use tagalong_math::median;
 use tagalong_vision::ground::{
-    Ground, GroundSettings, PLAUSIBLE_FACTORS, ROBOT_HEIGHTS_M, factor_of_depth, ground_of_depth,
-    written_unit_m,
+    Ground, GroundSettings, ROBOT_HEIGHTS_M, factor_of_depth, ground_of_depth, written_unit_m,
 };
 use tagalong_vision::quality::DepthQuality;
 
+use super::super::depth_unit::{JudgedDepth, Unit};
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
@@ -24,7 +24,7 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
     if images.is_empty() {
         return None;
     }
-    let Some(quality) = DepthQuality::of(images.iter().map(AsRef::as_ref)) else {
+    let Some(JudgedDepth { quality, measured_factor, unit }) = judged(evidence) else {
         let finding = Finding::new("depth", Severity::Bad, "not one pixel has a reading")
             .why("without depth nobody has a place");
         return Some(finding.remedy(
@@ -32,8 +32,6 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
         ));
     };
     let is_disparity = is_disparity(evidence);
-    let measured_factor = if is_disparity { None } else { measured_factor(evidence) };
-    let unit = unit_by(evidence, &quality, measured_factor);
     let step = quality.step_m.unwrap_or(0.0);
     // The steps of stereo depth grow with the square of the distance.
     let coarse = step / quality.median_m.powi(2).max(0.1);
@@ -41,7 +39,7 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
         .severity()
         .max(Severity::beyond(quality.without, 0.6, 0.9))
         .max(Severity::beyond(coarse, 0.02, 0.1));
-    let by_floor = match (measured_factor, &unit) {
+    let by_floor = match (measured_factor, unit) {
         (Some(factor), _) => format!(
             ", the floor at {:.2} of the distance that the height of the camera says",
             1.0 / factor
@@ -62,7 +60,7 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
         .figure("median_m", quality.median_m)
         .figure("without", quality.without)
         .figure("step_m", step);
-    Some(match unit {
+    Some(match *unit {
         Unit::Plausible | Unit::NearFloor(_) => finding
             .why("people in holes, or between coarse steps, have no shape")
             .remedy("dark or shiny surfaces, sunlight, the camera's own range: look at the pictures; a stereo config may do better"),
@@ -87,36 +85,17 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
     })
 }
 
-/// Evidence on the unit of depth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Unit {
-    /// Nothing speaks against it.
-    Plausible,
-    /// The floor lies where the height of the camera, which is known, says with readings times this.
-    Measured(f64),
-    /// The floor lies as far below a camera of unknown height as below no robot's.
-    OffFloor(Ground),
-    /// The floor lies as far below a camera of unknown height as below that of a robot, and what is
-    /// seen is nearer or farther than usual.
-    NearFloor(Ground),
-    /// No floor is seen, and the readings are those of no room.
-    OffMedian,
-    /// No floor is seen, and the readings are nearer or farther than usual.
-    Unusual,
+/// Returns the judgement of depth; `None` where no pixel has a reading. Several checks need it, and the
+/// fits of the floor behind it are slow, so it is made once.
+fn judged(evidence: &Evidence) -> Option<&JudgedDepth> {
+    evidence.depth.get_or_init(|| judge(evidence)).as_ref()
 }
 
-impl Unit {
-    fn by_factor(factor: f64) -> Self {
-        if PLAUSIBLE_FACTORS.contains(&factor) { Self::Plausible } else { Self::Measured(factor) }
-    }
-
-    fn severity(self) -> Severity {
-        match self {
-            Self::Plausible | Self::NearFloor(_) => Severity::Ok,
-            Self::Unusual => Severity::Warn,
-            Self::Measured(_) | Self::OffFloor(_) | Self::OffMedian => Severity::Bad,
-        }
-    }
+fn judge(evidence: &Evidence) -> Option<JudgedDepth> {
+    let quality = DepthQuality::of(evidence.samples.depths.iter().map(AsRef::as_ref))?;
+    let factor = if is_disparity(evidence) { None } else { measured_factor(evidence) };
+    let unit = unit_by(evidence, &quality, factor);
+    Some(JudgedDepth { quality, measured_factor: factor, unit })
 }
 
 /// Judges the unit by the floor, and where none is seen by the median of the readings.
@@ -260,10 +239,7 @@ fn floor_of(depths: &[Arc<DepthImage>], camera: &Camera, median_m: f64) -> Optio
 /// lies where that of a robot does, with a camera whose height nothing else tells.
 pub(super) fn is_unit_in_doubt(evidence: &Evidence) -> bool {
     let samples = &evidence.samples;
-    let factor = if is_disparity(evidence) { None } else { measured_factor(evidence) };
-    if let Some(quality) = DepthQuality::of(samples.depths.iter().map(AsRef::as_ref))
-        && unit_by(evidence, &quality, factor).severity() > Severity::Ok
-    {
+    if judged(evidence).is_some_and(|judged| judged.unit.severity() > Severity::Ok) {
         return true;
     }
     let is_told = evidence.input.depth_unit_m.is_some() || is_float(evidence);

@@ -5,8 +5,8 @@ use tagalong_config::{ConfigError, Value, parse_settings};
 /// Name of the table.
 pub(super) const TABLE: &str = "suits";
 
-/// Cameras and robots that a config was fitted to and tried on. A run with others goes on, with a note
-/// on missing odometry; `tagalong doctor` warns of them.
+/// Cameras and robots that a config was fitted to and tried on. A run with others goes on, with a note;
+/// `tagalong doctor` warns of them, too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Suits {

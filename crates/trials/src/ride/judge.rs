@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point2, Vector2};
 use serde::Serialize;
-use tagalong_core::{Reason, Track};
+use tagalong_core::Track;
 use tagalong_pipeline::{FrameReport, Likeness};
 use tagalong_sim::{Clearance, Truth};
 
@@ -64,6 +64,17 @@ pub struct Episode {
     pub found_s: Option<f64>,
 }
 
+/// Commands of one reason in a ride.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReasonShare {
+    /// Name of the reason; `no command` while the enable lets nothing move.
+    pub reason: &'static str,
+    /// Effect on the robot: `drives`, `slower` or `stands`.
+    pub effect: &'static str,
+    /// Share of the time of the ride, 0 to 1.
+    pub share: f64,
+}
+
 /// Result of a ride.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Ridden {
@@ -75,6 +86,9 @@ pub struct Ridden {
     /// Commonest reason of the commands of a ride in which the robot never moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub never_moved: Option<&'static str>,
+    /// Reasons of the commands, the commonest first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<ReasonShare>,
     /// Length of the ride, s.
     pub time_s: f64,
     /// The person was in view, s.
@@ -158,6 +172,7 @@ impl RideJudge {
             seed: ride.seed,
             kept: keeps_track && !stays_behind,
             never_moved,
+            reasons: reasons(&ride.ticks),
             time_s: sum(&|_| true),
             in_view_s: sum(&|look| look.in_view),
             right_s: sum(&|look| look.whom == Whom::Right),
@@ -333,11 +348,22 @@ fn never_moved(ticks: &[Tick]) -> Option<&'static str> {
     if ticks.iter().any(|tick| tick.body_mps() > MOVES_MPS) {
         return None;
     }
-    let mut counts: BTreeMap<&'static str, usize> = BTreeMap::new();
+    reasons(ticks).first().map(|commonest| commonest.reason)
+}
+
+/// Returns the reasons of the commands with their shares, the commonest first.
+fn reasons(ticks: &[Tick]) -> Vec<ReasonShare> {
+    let mut counts: BTreeMap<(&'static str, &'static str), usize> = BTreeMap::new();
     for tick in ticks {
-        *counts.entry(tick.reason.map_or("no command", Reason::name)).or_default() += 1;
+        let reason = tick.reason.map_or(("no command", "stands"), |it| (it.name(), it.effect()));
+        *counts.entry(reason).or_default() += 1;
     }
-    counts.into_iter().max_by_key(|(_, count)| *count).map(|(reason, _)| reason)
+    let mut shares = Vec::new();
+    for ((reason, effect), count) in counts {
+        shares.push(ReasonShare { reason, effect, share: count as f64 / ticks.len() as f64 });
+    }
+    shares.sort_by(|a, b| b.share.total_cmp(&a.share));
+    shares
 }
 
 /// Returns the time at which a robot that moved had the least room, s since the start.
@@ -376,7 +402,7 @@ fn jerk(ticks: &[Tick]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_core::TrackId;
+    use tagalong_core::{Reason, TrackId};
 
     use super::*;
     use crate::testing::trial;
@@ -432,6 +458,11 @@ mod tests {
         let silent = Some(Reason::Silent);
         let ticks = [tick(0.0, 0.0, None), tick(0.0, 0.0, silent), tick(0.01, 0.0, silent)];
         assert_eq!(never_moved(&ticks), Some("silent"));
+        let shares = reasons(&[ticks.as_slice(), &[tick(0.2, 0.0, Some(Reason::Near))]].concat());
+        let shares: Vec<_> = shares.iter().map(|it| (it.reason, it.effect, it.share)).collect();
+        let expected =
+            [("silent", "stands", 0.5), ("near", "slower", 0.25), ("no command", "stands", 0.25)];
+        assert_eq!(shares, expected);
         assert_eq!(never_moved(&[ticks[0], tick(0.2, 0.0, silent)]), None, "it drives");
         assert_eq!(never_moved(&[ticks[0], tick(0.0, 0.9, silent)]), None, "it turns");
         let kept = |range_m: f64, speed_mps: f64| {

@@ -13,7 +13,7 @@ use cpu_time::ThreadTime;
 pub use approach::{ApproachJudge, ApproachWatch, Approached, Contact, Side, Touched};
 pub use crowd::CrowdMeasures;
 use enable::StuckEnable;
-pub use judge::{Episode, Ridden, RideJudge};
+pub use judge::{Episode, ReasonShare, Ridden, RideJudge};
 use tagalong_config::Registry;
 use tagalong_core::{Command, Frame, Input, Reason, Stamp, WheelSpeeds};
 use tagalong_pipeline::{FrameReport, Pipeline, SourceKind, Sources};

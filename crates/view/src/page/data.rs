@@ -131,7 +131,7 @@ pub struct DriveData {
 pub struct TrackData {
     /// Number.
     pub id: u32,
-    /// State: `seen`, `hidden`, `unseen` or `tentative`.
+    /// State: `seen`, `predicted`, `hidden` (predicted, behind another person) or `tentative`.
     pub state: &'static str,
     /// Upper-body square, pixels.
     #[serde(rename = "box")]

@@ -67,7 +67,7 @@ fn track_data(track: &TrackState, heading: f64) -> TrackData {
             (false, _, _) => "tentative",
             (true, true, _) => "seen",
             (true, false, true) => "hidden",
-            (true, false, false) => "unseen",
+            (true, false, false) => "predicted",
         },
         box_px: track.upper_body_px.map(|v| rounded(v, 10.0)),
         at: [x, y].map(|v| rounded(v, 1e3)),
@@ -231,7 +231,7 @@ mod tests_of_data {
             ..TrackState::default()
         };
         let data = track_data(&track, std::f64::consts::FRAC_PI_2);
-        assert_eq!((data.v, data.d, data.state), ([0.0, 1.0], 5.0, "unseen"));
+        assert_eq!((data.v, data.d, data.state), ([0.0, 1.0], 5.0, "predicted"));
     }
 
     #[test]

@@ -162,7 +162,7 @@ fn mark(class: &str, text: &str) -> Markup {
 fn image_marks() -> Markup {
     html! {
         (mark("box-seen", "seen"))
-        (mark("box-guess", "not seen: predicted"))
+        (mark("box-guess", "predicted"))
         (mark("box-tentative", "not confirmed yet"))
         span data-layer="truth" { (mark("box-truth", "annotated")) }
         span data-layer="truth" { (mark("box-miss", "missed")) }
@@ -174,7 +174,7 @@ fn image_marks() -> Markup {
 fn plan_marks() -> Markup {
     html! {
         (mark("dot", "seen"))
-        (mark("dot ring", "not seen"))
+        (mark("dot ring", "predicted"))
         span data-layer="truth" { (mark("spot", "annotated")) }
         span data-layer="truth" { (mark("spot missed", "missed")) }
         span data-layer="dropped" { (mark("crossed", "dropped")) }
@@ -198,7 +198,7 @@ fn strip_legend() -> Markup {
     html! {
         p class="legend" {
             (mark("life", "person with ID, seen"))
-            (mark("life weak", "not seen"))
+            (mark("life weak", "predicted"))
             span id="legend-missed" class="group" { (mark("gap", "missed")) }
             span id="legend-drive" class="group" {
                 "Robot: " (mark("drives", "drives")) (mark("slower", "slower")) (mark("stands", "stands"))

@@ -111,7 +111,10 @@
   };
 
   const shownBox = (track) => track.whole || track.box;
-  const STATES = { seen: "", hidden: " hidden", unseen: " unseen", tentative: " ?" };
+  const STATES = { seen: "", hidden: " predicted", predicted: " predicted", tentative: " ?" };
+  // The same in full.
+  const stateOf = (track) => (track.state === "hidden" ? "predicted, hidden by another person"
+    : track.state === "tentative" ? "not confirmed yet" : track.state);
   const trackKind = (track) =>
     track.state === "seen" ? colour(track.id)
       : track.state === "tentative" ? "tentative" : `${colour(track.id)} guess`;
@@ -168,7 +171,7 @@
   };
 
   const describe = (track) =>
-    `person ${track.id}, ${track.state}, ${fixed(track.d, 1)} m away, ${fixed(Math.hypot(...track.v), 1)} m/s`;
+    `person ${track.id}, ${stateOf(track)}, ${fixed(track.d, 1)} m away, ${fixed(Math.hypot(...track.v), 1)} m/s`;
 
   // ---- plan ------------------------------------------------------------------------------------
 
@@ -320,8 +323,33 @@
       svg("title", {}, describe(track)),
       id("show-trails").checked && track.state !== "tentative" ? planTrail(run, track, k) : null,
       track.state === "tentative" ? null : svg("line", { class: `speed ${colour(track.id)}`, ...ahead, "stroke-width": 2.5 * k }),
-      svg("circle", { class: `person ${kind}`, cx: x, cy: y, r, "stroke-width": 2 * k }),
-      svg("text", { class: "plan-text", x: x + 0.8 * r + 3 * k, y: y - 0.8 * r, "font-size": 13 * k, "stroke-width": 3 * k }, String(track.id)));
+      svg("circle", { class: `person ${kind}`, cx: x, cy: y, r, "stroke-width": 2 * k }));
+  };
+
+  // IDs at the first free place around their circle, or farther out with a line to it: of two people at one
+  // place both can be read.
+  const planIds = (tracks, k) => {
+    const size = 13 * k;
+    const taken = [];
+    return tracks.map((track) => {
+      const [x, y] = [track.at[0], -track.at[1]];
+      const text = String(track.id);
+      const [w, h] = [0.62 * size * text.length, 0.8 * size];
+      const r = Math.min(Math.max(0.2, 5 * k), 9 * k);
+      const placeAt = (far) => {
+        const [right, left] = [x + 0.8 * r + 3 * k + far, x - 0.8 * r - 3 * k - far - w];
+        const [above, below] = [y - 0.8 * r - h - far, y + 0.8 * r + far];
+        return [[right, above], [right, below], [left, above], [left, below]];
+      };
+      const places = [0, 1.2 * size, 2.4 * size, 3.6 * size]
+        .flatMap((far) => placeAt(far).map(([px, py]) => ({ x: px, y: py, w, h, far })));
+      const place = places.find((other) => !taken.some((known) => overlaps(known, other))) || places[0];
+      taken.push(place);
+      const middle = { x2: place.x + w / 2, y2: place.y + h / 2 };
+      return svg("g", {},
+        place.far ? svg("line", { class: `lead ${colour(track.id)}`, x1: x, y1: y, ...middle, "stroke-width": k }) : null,
+        svg("text", { class: "plan-text", x: place.x, y: place.y + h, "font-size": size, "stroke-width": 3 * k }, text));
+    });
   };
 
   const truthSpots = (run, k) => truthAt(state.at).filter((person) => person.at).map((person) => {
@@ -354,6 +382,7 @@
         }
       }
       parts.push(...[...frame.tracks].reverse().map((track) => personMark(run, track, k)));
+      parts.push(...planIds(frame.tracks, k));
     }
     target.replaceChildren(...parts.filter(Boolean));
   };
@@ -483,7 +512,7 @@
     if (!tracks.length) return place.replaceChildren(el("p", { class: "soft" }, "Nobody is tracked."));
     const row = (track) => el("tr", {},
       el("th", { scope: "row" }, el("span", { class: `swatch ${colour(track.id)}` }), String(track.id)),
-      el("td", {}, track.state), number(`${fixed(track.d, 2)} m`), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
+      el("td", {}, stateOf(track)), number(`${fixed(track.d, 2)} m`), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
     return place.replaceChildren(table(`People of ${run.name}`, ["Person", "State", "Distance", "Speed", "Probability"], tracks.map(row)));
   };
 
@@ -600,9 +629,9 @@
     const here = run.frames[state.at] ? freeTracks(run, state.at, question) : tracksNear(frame, question);
     const [track] = here.sort((a, b) => (a.state === "tentative") - (b.state === "tentative"));
     if (track && track.state !== "tentative" && isMissed(run, state.at, question.person)) {
-      return `Person ${track.id} is tracked near here, ${track.state}; its box does not overlap the annotated one enough.`;
+      return `Person ${track.id} is tracked near here, ${stateOf(track)}; its box does not overlap the annotated one enough.`;
     }
-    if (track && track.state !== "tentative") return `Not missed: person ${track.id} is tracked here, ${track.state}.`;
+    if (track && track.state !== "tentative") return `Not missed: person ${track.id} is tracked here, ${stateOf(track)}.`;
     if (track) {
       return `Tracked here, and not confirmed yet: track ${track.id}, probability ${fixed(track.p, 2)}. It is reported once the track manager confirms it.`;
     }

@@ -4,6 +4,7 @@ mod approaches;
 mod crowd_table;
 mod fit;
 mod log;
+mod reasons;
 mod ride_bar;
 mod run_files;
 mod story;
@@ -31,7 +32,7 @@ use tagalong_sim::{FaultKind, InjectedFault, Scene, ScheduledFault, Seeds, Split
 use tagalong_simulate::scenes;
 use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
-use crate::experiments::contender::contender;
+use crate::experiments::contender::{contender, unsuited};
 
 /// Files of results, beside the logs of the rides.
 const RESULTS: [&str; 3] = ["follow.json", "follow.md", "likeness.csv"];
@@ -263,6 +264,13 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
             }
         }
     }
+    for ((contender, _), pipeline) in contenders.iter().zip(&pipelines) {
+        let own = jobs.iter().filter(|job| job.contender.name == contender.name);
+        let scenes = own.map(|job| (job.suite.as_str(), &job.scene));
+        if let Some(note) = unsuited(&contender.name, &pipeline.config().suits, scenes) {
+            say(&format!("note: {note}"));
+        }
+    }
     Ok(jobs)
 }
 
@@ -440,6 +448,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
                 print(&(one.story.join("\n") + "\n\n"))?;
             }
             print(&joined(Table::text))?;
+            print(&format!("\n{}\n", reasons::lines(results).join("\n")))?;
         }
     }
     if let Some(looks) = looks.filter(|_| args.format != TableFormat::Json) {

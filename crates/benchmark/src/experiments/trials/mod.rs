@@ -9,7 +9,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::format::TableFormat;
-use tagalong_app::outcome::{Ended, Failure, Outcome, print};
+use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::progress::Forecast;
 use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
@@ -17,7 +17,7 @@ use tagalong_config::Registry;
 use tagalong_sim::{Scene, Seeds, Split, Variant};
 use tagalong_trials::Contender;
 
-use crate::experiments::contender::contender;
+use crate::experiments::contender::{contender, unsuited};
 
 /// Scenes on which no pipeline should be perfect.
 const HARD: [&str; 6] = [
@@ -73,6 +73,15 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let scenes = or_default(&args.scenes, "configs/scenes", &HARD);
     let suites =
         scenes.iter().map(|path| suite(path, args, seeds)).collect::<Result<Vec<_>, _>>()?;
+    for contender in &contenders {
+        let suits = contender.pipeline(registry, 0).map_err(Failure::usage)?.config().suits;
+        let all = suites
+            .iter()
+            .flat_map(|(name, scenes)| scenes.iter().map(|scene| (name.as_str(), scene)));
+        if let Some(note) = unsuited(&contender.name, &suits, all) {
+            say(&format!("note: {note}"));
+        }
+    }
     let trials = suites.iter().map(|(_, scenes)| scenes.len()).sum();
     let bar = bar(trials);
     let forecast = Forecast::new(trials, "trials");
