@@ -36,7 +36,7 @@ const DETECTED: Observation = Observation::Detected { log_odds: SURE };
 
 fn person(y: f64, log_odds: f64) -> Detection {
     let place = Point3::new(3.0, y, 1.6);
-    Detection { score: log_odds, ..sighting(&place, &level(), 0.02, &mut SplitMix64::new(4)) }
+    sighting(&place, &level(), 0.02, &mut SplitMix64::new(4)).with_score(log_odds)
 }
 
 impl Run {
@@ -54,16 +54,12 @@ impl Run {
         self.started += 1;
         let person = Person { position: detection.position, velocity: Vector2::zeros() };
         let covariance = SMatrix::<f64, 5, 5>::identity() * 0.01;
-        let track = Track {
+        let track = Track::new(
             id,
-            estimate: Estimate { person, covariance, region: detection.rect_in(&level()) },
-            seen: true,
-            occluded: false,
-            confirmed: health.confirmed,
-            age: 0,
-            unseen_s: 0.0,
-            score: health.log_odds,
-        };
+            Estimate::new(person, covariance, detection.rect_in(&level())),
+            health.log_odds,
+        )
+        .with_confirmed(health.confirmed);
         self.tracks.insert(id, track);
         Some(id)
     }

@@ -105,9 +105,7 @@ impl Associations {
 /// # use nalgebra::{Matrix3, SMatrix, zero};
 /// # let person = Person { position: [2.0, 0.0, 1.6].into(), velocity: zero() };
 /// # let (covariance, region) = (SMatrix::identity(), tagalong_geometry::Rect::default());
-/// # let (id, estimate) = (TrackId(1), Estimate { person, covariance, region });
-/// # let (seen, occluded, confirmed, age, unseen_s, score) = (true, false, true, 9, 0.0, 1.0);
-/// # let track = Track { id, estimate, seen, occluded, confirmed, age, unseen_s, score };
+/// # let track = Track::new(TrackId(1), Estimate::new(person, covariance, region), 1.0);
 /// # let covariance = Matrix3::identity();
 /// let found = [5.0, 2.5].map(|x| {
 ///     let position = [x, 0.0, 1.6].into();

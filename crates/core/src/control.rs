@@ -194,11 +194,9 @@ pub struct Scene<'a> {
 /// # let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
 /// # let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, Sensors::default());
 /// # let person = Person { position: [0.0, 2.0, 1.6].into(), velocity: zero() };
-/// # let estimate = Estimate { person, covariance: SMatrix::identity(), region: Rect::default() };
-/// # let (id, seen, occluded, confirmed) = (TrackId(1), true, false, true);
-/// # let (age, unseen_s, score) = (9, 0.0, 1.0);
+/// # let estimate = Estimate::new(person, SMatrix::identity(), Rect::default());
 /// // The person stands at the robot's left, 2 m away.
-/// let track = Track { id, estimate, seen, occluded, confirmed, age, unseen_s, score };
+/// let track = Track::new(TrackId(1), estimate, 1.0);
 /// let tracks = std::slice::from_ref(&track);
 /// let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
 /// let scene = Scene { frame: &frame, target: Some(&track), tracks, wheels, max_speed_mps: 1.0 };

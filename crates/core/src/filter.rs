@@ -107,10 +107,9 @@ pub struct FilterRequirements {
 ///     }
 ///
 ///     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
-///         let estimate = |position: &Point3<f64>| Estimate {
-///             person: Person { position: *position, velocity: Vector2::zeros() },
-///             covariance: SMatrix::identity(),
-///             region: camera.upper_body(position),
+///         let estimate = |position: &Point3<f64>| {
+///             let person = Person { position: *position, velocity: Vector2::zeros() };
+///             Estimate::new(person, SMatrix::identity(), camera.upper_body(position))
 ///         };
 ///         self.0.iter().map(|(id, position)| (*id, estimate(position))).collect()
 ///     }

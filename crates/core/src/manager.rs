@@ -109,11 +109,8 @@ pub struct TrackChanges {
 /// assert!(health.confirmed);
 ///
 /// # let (covariance, region) = (SMatrix::identity(), tagalong_geometry::Rect::default());
-/// # let estimate = Estimate { person: Person { position, velocity: zero() }, covariance, region };
-/// # let (id, score, unseen_s) = (TrackId(1), health.log_odds, 0.1);
-/// # let track = Track {
-/// #     id, estimate, seen: false, occluded: false, confirmed: true, age: 1, unseen_s, score,
-/// # };
+/// # let estimate = Estimate::new(Person { position, velocity: zero() }, covariance, region);
+/// # let track = Track::new(TrackId(1), estimate, health.log_odds).with_seen(false);
 /// let missed = ObservedTrack { track: &track, observation: Observation::Missed };
 /// assert_eq!(Credulous.manage(&[missed]).ends, [(TrackId(1), "track: missed")]);
 /// ```

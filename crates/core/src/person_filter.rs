@@ -149,7 +149,7 @@ mod tests {
         fn estimate(&self, state: &Point3<f64>, camera: &Camera) -> Estimate {
             let person = Person { position: *state, velocity: Vector2::zeros() };
             let region = camera.upper_body(state);
-            Estimate { person, covariance: SMatrix::identity(), region }
+            Estimate::new(person, SMatrix::identity(), region)
         }
     }
 

@@ -329,7 +329,7 @@ mod tests {
         let mut track = target(x, y, Vector2::zeros());
         track.estimate.person.position.z = 1.6;
         track.estimate.region = camera().upper_body(&track.estimate.person.position);
-        Track { id: TrackId(id), seen: true, confirmed: true, occluded: false, ..track }
+        track.with_id(TrackId(id)).with_seen(true).with_confirmed(true).with_occluded(false)
     }
 
     /// Two people behind each other, one to the left, one that is not confirmed, one not seen.
@@ -338,8 +338,8 @@ mod tests {
             track(1, 2.0, 0.0),
             track(2, 4.0, 0.0),
             track(3, 3.0, 1.0),
-            Track { confirmed: false, ..track(4, 3.0, -1.0) },
-            Track { seen: false, ..track(5, 4.0, -1.8) },
+            track(4, 3.0, -1.0).with_confirmed(false),
+            track(5, 4.0, -1.8).with_seen(false),
         ];
         View::new(&tracks, &camera(), Stamp::from_nanos(1_500_000_000))
     }

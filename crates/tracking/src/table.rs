@@ -114,16 +114,14 @@ impl TrackTable {
 
     fn track(&self, id: TrackId, estimate: Estimate) -> Option<Track> {
         let record = self.records.get(&id)?;
-        Some(Track {
-            id,
-            estimate,
-            seen: record.observation.is_supported(),
-            occluded: record.observation == Observation::Occluded,
-            confirmed: record.health.confirmed,
-            age: record.age,
-            unseen_s: record.unseen_s,
-            score: record.health.log_odds,
-        })
+        Some(
+            Track::new(id, estimate, record.health.log_odds)
+                .with_seen(record.observation.is_supported())
+                .with_occluded(record.observation == Observation::Occluded)
+                .with_confirmed(record.health.confirmed)
+                .with_age(record.age)
+                .with_unseen_s(record.unseen_s),
+        )
     }
 }
 

@@ -65,7 +65,7 @@ impl OwnBand {
         let image = Some(ImageBox::upper_body(camera.upper_body(&position)));
         // The height is assumed, and people differ by a decimetre.
         let covariance = Matrix3::from_diagonal(&[0.01, 0.01, 0.01].into());
-        Some(Detection { image, ..Detection::new("own-band", position, covariance, 1.0) })
+        Some(Detection::new("own-band", position, covariance, 1.0).with_image(image))
     }
 }
 

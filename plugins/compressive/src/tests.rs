@@ -73,17 +73,8 @@ impl World {
 fn track(head: Point3<f64>, seen: bool) -> Track {
     let person = Person { position: head, velocity: Vector2::zeros() };
     let covariance = SMatrix::identity() * 0.01;
-    let estimate = Estimate { person, covariance, region: camera().upper_body(&head) };
-    Track {
-        id: TrackId(3),
-        estimate,
-        seen,
-        occluded: false,
-        confirmed: true,
-        age: 5,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    let estimate = Estimate::new(person, covariance, camera().upper_body(&head));
+    Track::new(TrackId(3), estimate, 2.0).with_seen(seen).with_age(5)
 }
 
 fn near(

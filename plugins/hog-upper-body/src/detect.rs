@@ -389,16 +389,8 @@ mod tests {
         };
         let region = Rect::new(30.0, 30.0, 40.0, 40.0);
         let person = Person { position: Point3::new(2.0, 0.0, 1.3), velocity: Vector2::zeros() };
-        let track = Track {
-            id: TrackId(1),
-            estimate: Estimate { person, covariance: SMatrix::identity(), region },
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 1.0,
-        };
+        let track = Track::new(TrackId(1), Estimate::new(person, SMatrix::identity(), region), 1.0)
+            .with_age(9);
         assert!(dropped(config.clone(), None, None).1 > 1);
         assert_eq!(dropped(config, None, Some(&track)).1, 1);
     }

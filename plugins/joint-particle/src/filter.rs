@@ -180,11 +180,11 @@ impl JointParticle {
         let velocity = Vector2::new(m[3], m[4]);
         let floor = m.fixed_rows::<2>(0) + velocity * self.ahead_s;
         let position = Point3::new(floor.x, floor.y, m[2]);
-        Estimate {
-            person: Person { position, velocity },
-            covariance: moments.covariance,
-            region: camera.upper_body(&position),
-        }
+        Estimate::new(
+            Person { position, velocity },
+            moments.covariance,
+            camera.upper_body(&position),
+        )
     }
 }
 
@@ -349,7 +349,7 @@ mod tests {
         let config = Config { method: Method::Kde, ..Config::default() };
         let mut filter = JointParticle::new(config.clone(), 1).unwrap();
         let frame = frame();
-        let farther = Detection { position: Point3::new(3.0, 0.1, 1.6), ..detection() };
+        let farther = detection().with_position(Point3::new(3.0, 0.1, 1.6));
         filter.start(TrackId(1), &detection(), &frame.camera);
         filter.start(TrackId(2), &farther, &frame.camera);
         filter.predict(&frame.motion, &frame.camera);

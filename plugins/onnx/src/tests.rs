@@ -146,17 +146,8 @@ fn track(confirmed: bool) -> Track {
     let found = detect(&mut detector(config(Family::Yolox)), &frame(1, 240)).remove(0);
     let person = Person { position: found.position, velocity: Vector2::zeros() };
     let region = found.rect().unwrap();
-    let estimate = Estimate { person, covariance: Matrix5::identity() * 0.01, region };
-    Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed,
-        age: 3,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    let estimate = Estimate::new(person, Matrix5::identity() * 0.01, region);
+    Track::new(TrackId(1), estimate, 2.0).with_confirmed(confirmed).with_age(3)
 }
 
 /// The scores of the networks rise from 0 to 1 around a brightness of 0.7.

@@ -60,7 +60,7 @@ impl RecordedDetections {
         if is_shown(&frame.camera, &detection) {
             return Some(detection);
         }
-        let seen_elsewhere = Detection { image: None, ..detection };
+        let seen_elsewhere = detection.with_image(None);
         (self.config.outside_image && seen_elsewhere.is_sane()).then_some(seen_elsewhere)
     }
 }

@@ -199,17 +199,8 @@ fn a_search_near_a_track_finds_the_right_box_first() {
     let mut detector = of_file(&text, Config::default()).unwrap();
     let person = Person { position: right, velocity: Vector2::zeros() };
     let region = camera().upper_body(&right);
-    let estimate = Estimate { person, covariance: Matrix5::identity() * 0.01, region };
-    let track = Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 3,
-        unseen_s: 0.0,
-        score: 2.0,
-    };
+    let estimate = Estimate::new(person, Matrix5::identity() * 0.01, region);
+    let track = Track::new(TrackId(1), estimate, 2.0).with_age(3);
     let near = Query::Track(&track);
     let found = detector.detect(&frame(2, None), &near, &mut Funnel::default()).unwrap();
     assert_eq!(found.len(), 1);
@@ -238,17 +229,8 @@ fn mistakes_are_named_by_file_and_line() {
 fn track_at(head: Point3<f64>) -> Track {
     let person = Person { position: head, velocity: Vector2::zeros() };
     let region = camera().upper_body(&head);
-    let estimate = Estimate { person, covariance: Matrix5::identity() * 0.01, region };
-    Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 3,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    let estimate = Estimate::new(person, Matrix5::identity() * 0.01, region);
+    Track::new(TrackId(1), estimate, 2.0).with_age(3)
 }
 
 /// Returns true if a search near a track 3 m ahead finds a position from the log.

@@ -81,7 +81,7 @@ impl PersonFilter for Kalman {
             _ => {}
         }
         let person = Person { position, velocity: Vector2::new(mean[3], mean[4]) };
-        Estimate { person, covariance, region: camera.upper_body(&position) }
+        Estimate::new(person, covariance, camera.upper_body(&position))
     }
 }
 

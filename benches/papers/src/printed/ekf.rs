@@ -83,7 +83,7 @@ impl PrintedEkf {
             return (&self.corrected, detection.clone());
         }
         let covariance = Matrix3::identity() * self.config.sigma_v_m.powi(2);
-        (&self.exact, Detection { covariance, ..detection.clone() })
+        (&self.exact, detection.clone().with_covariance(covariance))
     }
 }
 

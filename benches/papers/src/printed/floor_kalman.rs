@@ -123,11 +123,11 @@ impl PrintedFloorKalman {
         covariance[(2, 2)] = state.height_m2;
         covariance[(3, 3)] = INITIAL_SPEED_M2;
         covariance[(4, 4)] = INITIAL_SPEED_M2;
-        Estimate {
-            person: Person { position, velocity: turn * state.velocity },
+        Estimate::new(
+            Person { position, velocity: turn * state.velocity },
             covariance,
-            region: camera.upper_body(&position),
-        }
+            camera.upper_body(&position),
+        )
     }
 }
 

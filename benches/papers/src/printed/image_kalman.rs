@@ -149,7 +149,7 @@ mod tests {
         let sliding: Vec<Detection> = (0..60)
             .map(|i| {
                 let rect = Rect { x: first.x + 120.0 * DT_S * f64::from(i), ..first };
-                Detection { image: Some(ImageBox::upper_body(rect)), ..start.clone() }
+                start.clone().with_image(ImageBox::upper_body(rect))
             })
             .collect();
         let last = sliding[59].rect().unwrap().centre().x;

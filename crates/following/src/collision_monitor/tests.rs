@@ -363,7 +363,7 @@ fn a_person_is_kept_away_from_and_with_the_separation_off_is_a_thing() {
 fn the_followed_person_is_not_run_over() {
     fn before(x: f64, unseen_s: f64) -> f64 {
         let mut monitor = monitor();
-        let track = Track { unseen_s, seen: false, ..target(x, 0.0, Vector2::zeros()) };
+        let track = target(x, 0.0, Vector2::zeros()).with_unseen_s(unseen_s).with_seen(false);
         for index in 0..20 {
             let frame =
                 frame(index, EgoMotion::at_rest(0.1), Some(depth_at(index, 0.0, 0.0)), None);

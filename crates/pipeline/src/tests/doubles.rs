@@ -57,7 +57,7 @@ pub fn person(x: f64, y: f64) -> Detection {
 }
 
 pub fn scored(score: f64, detection: Detection) -> Detection {
-    Detection { score, ..detection }
+    detection.with_score(score)
 }
 
 type ScriptedDetections = BTreeMap<(usize, u64), Vec<Detection>>;
@@ -242,11 +242,11 @@ impl PersonFilter for Steady {
     }
 
     fn estimate(&self, state: &State, camera: &Camera) -> Estimate {
-        Estimate {
-            person: state.person,
-            covariance: SMatrix::identity() * (0.02 + 0.3 * state.age_s),
-            region: camera.upper_body(&state.person.position),
-        }
+        Estimate::new(
+            state.person,
+            SMatrix::identity() * (0.02 + 0.3 * state.age_s),
+            camera.upper_body(&state.person.position),
+        )
     }
 }
 
@@ -287,7 +287,7 @@ impl Filter for Odd {
             let position = Point3::new(x, f64::from(id.0), 1.6);
             let person = Person { position, velocity: Vector2::zeros() };
             let covariance = SMatrix::identity() * variance;
-            (*id, Estimate { person, covariance, region: camera.upper_body(&position) })
+            (*id, Estimate::new(person, covariance, camera.upper_body(&position)))
         };
         let forgets = self.config.how == "forgets";
         self.ids.iter().filter(|_| !forgets).map(estimate).collect()

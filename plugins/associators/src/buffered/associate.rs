@@ -120,7 +120,7 @@ mod tests {
     }
 
     fn detection(x: f64, score: f64) -> Detection {
-        Detection { score, ..detection_in(at(x)) }
+        detection_in(at(x)).with_score(score)
     }
 
     fn track(id: u32, x: f64) -> Track {
@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn confirmed_tracks_may_go_first() {
-        let tracks = [track(1, 6.0), Track { confirmed: false, ..track(2, 0.0) }];
+        let tracks = [track(1, 6.0), track(2, 0.0).with_confirmed(false)];
         let with = |confirmed_first: bool| {
             let stages = StageSettings { confirmed_first, ..StageSettings::default() };
             let config = Config { stages, ..Config::default() };

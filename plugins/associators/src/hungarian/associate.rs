@@ -63,10 +63,10 @@ mod tests {
     #[test]
     fn pairs_that_are_probably_no_person_are_not_formed() {
         let mut hungarian = Hungarian::new(Config::default()).unwrap();
-        let doubtful = Detection { score: -2.0, ..detection_at(3.0, 0.0) };
+        let doubtful = detection_at(3.0, 0.0).with_score(-2.0);
         let at = track(3.0, 0.0, 0.01);
         let mut pairs = |score: f64| {
-            let track = Track { score, ..at.clone() };
+            let track = at.clone().with_score(score);
             hungarian.associate(&[track], std::slice::from_ref(&doubtful), &GATE).pairs.len()
         };
         assert_eq!((pairs(1.9), pairs(2.1)), (0, 1), "log-odds add up");

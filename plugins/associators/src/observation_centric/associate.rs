@@ -126,7 +126,7 @@ mod tests {
     }
 
     fn detection(region: Rect, score: f64) -> Detection {
-        Detection { score, ..detection_in(region) }
+        detection_in(region).with_score(score)
     }
 
     fn associator(config: Config) -> ObservationCentric {
@@ -176,7 +176,7 @@ mod tests {
     fn a_tentative_track_gets_what_the_confirmed_ones_leave() {
         let stages = StageSettings { confirmed_first: true, ..StageSettings::default() };
         let config = Config { stages, ..Config::default() };
-        let tentative = Track { confirmed: false, ..track_in(1, at(0.0, 0.0)) };
+        let tentative = track_in(1, at(0.0, 0.0)).with_confirmed(false);
         let mut associator = associator(config);
         let found = [detection(at(1.0, 0.0), 3.0)];
         assert_eq!(pairs(&associator.associate(&[tentative], &found, &GATE)), [(0, 0)]);
@@ -234,8 +234,7 @@ mod tests {
 
     #[test]
     fn confirmed_tracks_may_go_first() {
-        let tracks =
-            [track_in(1, at(6.0, 0.0)), Track { confirmed: false, ..track_in(2, at(0.0, 0.0)) }];
+        let tracks = [track_in(1, at(6.0, 0.0)), track_in(2, at(0.0, 0.0)).with_confirmed(false)];
         let found = [detection(at(0.0, 0.0), 3.0)];
         let answer = |confirmed_first: bool| {
             let stages = StageSettings { confirmed_first, ..StageSettings::default() };

@@ -82,7 +82,7 @@ mod tests {
     use crate::{Fusion, GateSettings, hungarian};
 
     fn detection(y: f64, score: f64) -> Detection {
-        Detection { score, ..detection_at(3.0, y) }
+        detection_at(3.0, y).with_score(score)
     }
 
     fn track(id: u32, y: f64) -> Track {

@@ -271,7 +271,7 @@ fn four_states_are_those_of_a_filter_written_down() {
     let sighting = |x: f64, y: f64| {
         let mut covariance = Matrix3::from_diagonal_element(0.02);
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&r);
-        Detection { covariance, ..sighting(x, y) }
+        sighting(x, y).with_covariance(covariance)
     };
     let mut room_from_robot = Isometry2::new(Vector2::zeros(), -30.0_f64.to_radians());
     filter.start(ID, &sighting(2.0, 1.0), &camera());

@@ -305,15 +305,15 @@ impl State {
         let height = self.image[4] * self.shape.aspect;
         let left = self.image[0] - 0.5 * width;
         let top = self.image[1] - 0.5 * height;
-        Estimate {
-            person: Person { position: place.position, velocity: place.velocity.xy() },
-            covariance: symmetric(covariance),
-            region: match (self.behind, self.observed) {
+        Estimate::new(
+            Person { position: place.position, velocity: place.velocity.xy() },
+            symmetric(covariance),
+            match (self.behind, self.observed) {
                 (Some(_), _) => Rect::default(),
                 (None, Some(observed)) => observed,
                 (None, None) => Rect::new(left, top, width, height),
             },
-        }
+        )
     }
 
     /// Returns the head in image coordinates and range.

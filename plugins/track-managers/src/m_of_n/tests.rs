@@ -14,7 +14,7 @@ pub(crate) fn person(x: f64, y: f64) -> Detection {
 }
 
 pub(crate) fn scored(score: f64, detection: Detection) -> Detection {
-    Detection { score, ..detection }
+    detection.with_score(score)
 }
 
 /// A manager with the bookkeeping that the tracker does for it.
@@ -41,18 +41,9 @@ impl Rig {
         };
         self.started += 1;
         let person = Person { position: detection.position, velocity: Vector2::zeros() };
-        let estimate =
-            Estimate { person, covariance: SMatrix::identity(), region: detection.rect().unwrap() };
-        self.tracks.push(Track {
-            id,
-            estimate,
-            seen: true,
-            occluded: false,
-            confirmed: health.confirmed,
-            age: 0,
-            unseen_s: 0.0,
-            score: health.log_odds,
-        });
+        let estimate = Estimate::new(person, SMatrix::identity(), detection.rect().unwrap());
+        self.tracks
+            .push(Track::new(id, estimate, health.log_odds).with_confirmed(health.confirmed));
         id
     }
 

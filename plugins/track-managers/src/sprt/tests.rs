@@ -44,16 +44,14 @@ impl Scene {
                 self.started += 1;
                 let person = Person { position: seen.position, velocity: Vector2::zeros() };
                 let covariance = SMatrix::identity() * 0.0025;
-                self.track = Some(Track {
-                    id,
-                    estimate: Estimate { person, covariance, region: seen.rect().unwrap() },
-                    seen: true,
-                    occluded: false,
-                    confirmed: health.confirmed,
-                    age: 0,
-                    unseen_s: 0.0,
-                    score: health.log_odds,
-                });
+                self.track = Some(
+                    Track::new(
+                        id,
+                        Estimate::new(person, covariance, seen.rect().unwrap()),
+                        health.log_odds,
+                    )
+                    .with_confirmed(health.confirmed),
+                );
             }
         }
     }

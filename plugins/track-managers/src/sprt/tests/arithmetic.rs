@@ -49,16 +49,9 @@ impl Bench {
     fn without_track(config: Config) -> Self {
         let person = Person { position: Point3::origin(), velocity: Vector2::zeros() };
         let covariance = SMatrix::identity() * 1e-4;
-        let track = Track {
-            id: ID,
-            estimate: Estimate { person, covariance, region: Rect::new(0.0, 0.0, 9.0, 9.0) },
-            seen: true,
-            occluded: false,
-            confirmed: false,
-            age: 0,
-            unseen_s: 0.0,
-            score: 0.0,
-        };
+        let track =
+            Track::new(ID, Estimate::new(person, covariance, Rect::new(0.0, 0.0, 9.0, 9.0)), 0.0)
+                .with_confirmed(false);
         Self { manager: Sprt::new(config).unwrap(), track }
     }
 
