@@ -25,6 +25,7 @@ pub struct NoSettings {}
 /// An error in a config, with its place in the text.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{message}")]
+#[non_exhaustive]
 pub struct ConfigError {
     /// Description of the error and of valid values.
     pub message: String,

@@ -49,7 +49,7 @@ impl Run {
     fn offer(&mut self, detection: &Detection) -> Option<TrackId> {
         let id = TrackId(self.started + 1);
         let log_odds = detection.score;
-        let new = Unassociated { detection, detector_log_odds: log_odds, discovered: true };
+        let new = Unassociated::new(detection, log_odds, true);
         let Initiation::Start(health) = self.manager.initiate(id, &new) else { return None };
         self.started += 1;
         let person = Person { position: detection.position, velocity: Vector2::zeros() };
@@ -91,7 +91,7 @@ impl Run {
             .values()
             .map(|track| {
                 let observation = observed.get(&track.id).copied();
-                ObservedTrack { track, observation: observation.unwrap_or(Observation::Occluded) }
+                ObservedTrack::new(track, observation.unwrap_or(Observation::Occluded))
             })
             .collect();
         let changes = self.manager.manage(&list);

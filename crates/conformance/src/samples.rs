@@ -16,7 +16,7 @@ use tagalong_geometry::{ImageBox, Rect};
 use crate::scenes::{DT_S, level, track};
 
 /// Gate of two frames that are 0.1 s apart, without an appearance memory.
-pub const GATE: Gate<'static> = Gate { dt_s: DT_S, start_log_odds: 0.0, appearance: &[] };
+pub const GATE: Gate<'static> = Gate::new(DT_S, 0.0);
 
 /// Height of the heads, m.
 const HEAD_M: f64 = 1.6;

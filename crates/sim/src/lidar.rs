@@ -160,7 +160,7 @@ impl LidarSettings {
     pub fn cloud(&self, points: &[[f32; 3]]) -> PointCloud {
         let scanner = Point3::new(0.0, 0.0, self.height_m);
         let points = points.iter().map(|point| scanner + Vector3::from(point.map(f64::from)));
-        PointCloud { scanner, points: points.collect() }
+        PointCloud::new(scanner, points.collect::<Vec<_>>())
     }
 }
 

@@ -56,11 +56,7 @@ impl DetectionSet {
     pub(crate) fn matched(&self) -> Vec<Matched<'_>> {
         self.pairs
             .iter()
-            .map(|(id, index, weight)| Matched {
-                id: *id,
-                detection: &self.all[*index].detection,
-                weight: *weight,
-            })
+            .map(|(id, index, weight)| Matched::weighted(*id, &self.all[*index].detection, *weight))
             .collect()
     }
 
@@ -326,14 +322,14 @@ mod tests {
     #[test]
     fn a_detection_goes_to_the_track_that_it_is_most_probably_of() {
         fn pair(track: usize, detection: usize, weight: f64) -> Association {
-            Association { track, detection, weight }
+            Association::new(track, detection, weight)
         }
 
         let mut set = DetectionSet::default();
         let detections = [person(2.0, 0.0), person(3.0, 0.0), person(4.0, 0.0), person(5.0, 0.0)];
         set.add(detections.map(|detection| PendingDetection::new(detection, 0, true)));
         let pairs = vec![pair(0, 0, 0.6), pair(0, 1, 0.3), pair(1, 1, 0.5)];
-        let answer = Associations { pairs, spent: vec![2] };
+        let answer = Associations::new(pairs).with_spent(vec![2]);
         set.take_over(&answer, &tracks(&[7, 9]), &[0, 1, 2, 3]);
         let fates: Vec<_> = (0..4).map(|i| set.get(i).fate).collect();
         let first = Fate::Matched(TrackId(7));

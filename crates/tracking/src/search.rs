@@ -175,7 +175,7 @@ mod tests {
 
     impl Detector for Scored {
         fn capabilities(&self) -> Capabilities {
-            Capabilities { inputs: Inputs::NONE, discovers: false, tracks: true, weighs: false }
+            Capabilities::new(Inputs::NONE).tracking()
         }
 
         fn detect(&mut self, _: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {

@@ -129,7 +129,7 @@ impl TrackTable {
 mod tests {
     use super::*;
 
-    const HEALTH: TrackHealth = TrackHealth { confirmed: false, log_odds: 1.0 };
+    const HEALTH: TrackHealth = TrackHealth::new(false, 1.0);
 
     #[test]
     fn a_number_is_never_used_twice() {
@@ -151,7 +151,7 @@ mod tests {
         let mut table = TrackTable::default();
         for confirmed in [false, true, false] {
             let id = table.next_id().unwrap();
-            table.start(id, TrackHealth { confirmed, ..HEALTH }, 0);
+            table.start(id, TrackHealth::new(confirmed, 1.0), 0);
         }
         assert_eq!(table.tentative_ids(), [TrackId(1), TrackId(3)]);
     }
@@ -161,7 +161,7 @@ mod tests {
         let mut table = TrackTable::default();
         for log_odds in [1.0, 3.0, 1.0, 2.0] {
             let id = table.next_id().unwrap();
-            table.start(id, TrackHealth { log_odds, ..HEALTH }, 0);
+            table.start(id, TrackHealth::new(false, log_odds), 0);
         }
         assert_eq!(table.too_many(2), [TrackId(3), TrackId(1)]);
         assert_eq!(table.too_many(4), []);

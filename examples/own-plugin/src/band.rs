@@ -72,7 +72,7 @@ impl OwnBand {
 impl Detector for OwnBand {
     fn capabilities(&self) -> Capabilities {
         let inputs = Inputs::NONE.require(Input::Depth);
-        Capabilities { inputs, discovers: true, ..Capabilities::default() }
+        Capabilities::new(inputs).discovering()
     }
 
     fn detect(

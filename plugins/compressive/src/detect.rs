@@ -400,12 +400,7 @@ fn sighting(
 
 impl Detector for Compressive {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Colour).accept(Input::Depth),
-            discovers: false,
-            tracks: true,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Colour).accept(Input::Depth)).tracking()
     }
 
     fn detect(

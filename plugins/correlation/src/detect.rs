@@ -170,12 +170,7 @@ pub(crate) fn sighting(
 
 impl Detector for Correlation {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Colour).require(Input::Depth),
-            discovers: false,
-            tracks: true,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Colour).require(Input::Depth)).tracking()
     }
 
     fn detect(

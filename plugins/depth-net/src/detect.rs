@@ -101,15 +101,11 @@ impl Eyes<'_> {
 
 impl Detector for DepthNet {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(match self.config.source {
-                Source::Depth => Input::Depth,
-                Source::Points => Input::POINTS,
-            }),
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        let input = match self.config.source {
+            Source::Depth => Input::Depth,
+            Source::Points => Input::POINTS,
+        };
+        Capabilities::new(Inputs::NONE.require(input)).discovering().tracking()
     }
 
     fn detect(

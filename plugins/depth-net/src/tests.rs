@@ -246,10 +246,8 @@ mod training {
     fn people(truth: &[Truth]) -> Vec<AnnotatedPerson> {
         truth
             .iter()
-            .map(|person| AnnotatedPerson {
-                head: person.head_in_robot,
-                counts: true,
-                visible: person.visible_fraction,
+            .map(|person| {
+                AnnotatedPerson::new(person.head_in_robot).with_visible(person.visible_fraction)
             })
             .collect()
     }

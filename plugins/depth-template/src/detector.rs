@@ -322,12 +322,7 @@ impl DepthTemplate {
 
 impl Detector for DepthTemplate {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Depth),
-            discovers: true,
-            tracks: true,
-            weighs: true,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Depth)).discovering().tracking().weighing()
     }
 
     fn detect(

@@ -101,12 +101,9 @@ impl FaceRgbd {
 
 impl Detector for FaceRgbd {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Colour).accept(Input::Depth),
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Colour).accept(Input::Depth))
+            .discovering()
+            .tracking()
     }
 
     fn detect(

@@ -181,12 +181,8 @@ impl<'a> Proposer<'a> {
 impl Detector for HogUpperBody {
     fn capabilities(&self) -> Capabilities {
         let grey = Inputs::NONE.require(Input::Colour);
-        Capabilities {
-            inputs: if self.config.depth_proposals { grey.accept(Input::Depth) } else { grey },
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        let inputs = if self.config.depth_proposals { grey.accept(Input::Depth) } else { grey };
+        Capabilities::new(inputs).discovering().tracking()
     }
 
     fn detect(
@@ -320,7 +316,7 @@ mod tests {
 
     fn detector(config: Config) -> HogUpperBody {
         let wheels = tagalong_core::DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-        let context = Context { seed: 1, base_dir: ".".into(), wheels };
+        let context = Context::new(1, ".", wheels);
         HogUpperBody::new(config, &context).unwrap()
     }
 

@@ -198,7 +198,7 @@ fn ids(group: &Group) -> BTreeSet<TrackId> {
 impl Filter for JointParticle {
     fn requirements(&self) -> FilterRequirements {
         let inputs = Inputs::NONE.accept(Input::Colour);
-        FilterRequirements { inputs, likelihood: true, searches: true, image_box: false }
+        FilterRequirements::new(inputs).with_likelihood().with_search()
     }
 
     fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
@@ -336,7 +336,7 @@ mod tests {
         let mut is_seen = |matched: &[Matched<'_>]| {
             filter.predict(&frame.motion, &frame.camera);
             let likelihood: Option<&dyn Likelihood> = Some(&flattering);
-            let evidence = Evidence { frame: &frame, matched, unmatched: &[], likelihood };
+            let evidence = Evidence::new(&frame, matched).with_likelihood(likelihood);
             filter.update(&evidence).unwrap().contains_key(&id)
         };
         let seen: Vec<bool> = (0..12).map(|_| is_seen(&[])).collect();
@@ -354,7 +354,7 @@ mod tests {
         filter.start(TrackId(2), &farther, &frame.camera);
         filter.predict(&frame.motion, &frame.camera);
         let likelihood: Option<&dyn Likelihood> = Some(&Flattering(3.0));
-        let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
+        let evidence = Evidence::new(&frame, &[]).with_likelihood(likelihood);
         filter.update(&evidence).unwrap();
         let before = filter.estimates(&frame.camera);
         let shown = filter.visualise(&evidence).unwrap().unwrap();

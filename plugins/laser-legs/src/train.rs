@@ -183,7 +183,7 @@ impl Trainer for LegTrainer {
         let model = Model { trees: self.grow(best.trees, |_| true), slope, offset };
         progress(1.0);
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { figures: self.figures(&trials, &model), model: text, ..Fitted::default() })
+        Ok(Fitted::new(text, self.figures(&trials, &model)))
     }
 }
 

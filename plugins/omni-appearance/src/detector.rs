@@ -121,12 +121,7 @@ impl OmniAppearance {
 
 impl Detector for OmniAppearance {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Colour),
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Colour)).discovering().tracking()
     }
 
     fn detect(

@@ -28,7 +28,7 @@ fn models() -> PathBuf {
 
 fn context() -> Context {
     let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-    Context { seed: 1, base_dir: models(), wheels }
+    Context::new(1, models(), wheels)
 }
 
 fn config(family: Family) -> Config {

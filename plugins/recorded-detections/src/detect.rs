@@ -68,12 +68,8 @@ impl RecordedDetections {
 impl Detector for RecordedDetections {
     fn capabilities(&self) -> Capabilities {
         let depth = Inputs::NONE.accept(Input::Depth);
-        Capabilities {
-            inputs: if self.boxes.is_some() { depth } else { depth.require(Input::Detections) },
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        let inputs = if self.boxes.is_some() { depth } else { depth.require(Input::Detections) };
+        Capabilities::new(inputs).discovering().tracking()
     }
 
     fn detect(

@@ -121,7 +121,7 @@ impl PersonFilter for PrintedEkf {
         // A coordinate that was not measured is not counted, whatever the variance of all is.
         let variances = detection.covariance.diagonal();
         let dof = variances.iter().filter(|variance| **variance < UNMEASURED_M2).count();
-        Update { nis: update.nis.map(|(nis, _)| (nis, dof as u32)) }
+        Update::new(update.nis.map(|(nis, _)| (nis, dof as u32)))
     }
 
     fn merge(&self, alternatives: &[(f64, State)]) -> State {

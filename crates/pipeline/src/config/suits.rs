@@ -59,7 +59,7 @@ pub(super) fn read(table: Option<Value<'_>>) -> Result<Suits, ConfigError> {
     for (key, range) in ranges {
         if range.is_some_and(|[low, high]| low.is_nan() || high.is_nan() || low > high) {
             let message = format!("`{key}` is the lowest and the highest value, in this order");
-            return Err(ConfigError { message, span: place });
+            return Err(ConfigError::new(message).or_at(place));
         }
     }
     Ok(suits)

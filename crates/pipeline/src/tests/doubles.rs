@@ -141,9 +141,11 @@ impl Detector for Script {
             "perhaps depth" => Inputs::NONE.accept(Input::Depth),
             _ => Inputs::NONE,
         };
-        let discovers = self.config.how != "track";
-        let tracks = self.config.how != "discover";
-        Capabilities { inputs, discovers, tracks, weighs: self.config.how == "weigh" }
+        let mut capabilities = Capabilities::new(inputs);
+        capabilities.discovers = self.config.how != "track";
+        capabilities.tracks = self.config.how != "discover";
+        capabilities.weighs = self.config.how == "weigh";
+        capabilities
     }
 
     fn detect(
@@ -238,7 +240,7 @@ impl PersonFilter for Steady {
         state.person.velocity += 0.5 * off / state.age_s.max(0.01);
         state.person.position = detection.position;
         state.age_s = 0.0;
-        Update { nis: Some((off.norm_squared(), 3)) }
+        Update::new(Some((off.norm_squared(), 3)))
     }
 
     fn estimate(&self, state: &State, camera: &Camera) -> Estimate {
@@ -258,11 +260,12 @@ struct Odd {
 
 impl Filter for Odd {
     fn requirements(&self) -> FilterRequirements {
-        let how = self.config.how.as_str();
-        let image_box = how == "boxes";
-        let likelihood = how == "weighs";
-        let searches = likelihood;
-        FilterRequirements { inputs: Inputs::NONE, image_box, likelihood, searches }
+        let none = FilterRequirements::new(Inputs::NONE);
+        match self.config.how.as_str() {
+            "boxes" => none.with_image_box(),
+            "weighs" => none.with_likelihood().with_search(),
+            _ => none,
+        }
     }
 
     fn start(&mut self, id: TrackId, _: &Detection, _: &Camera) {
@@ -274,7 +277,7 @@ impl Filter for Odd {
 
     fn update(&mut self, _: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         let nis = Some((f64::NAN, 3));
-        Ok([(TrackId(4711), Update { nis })].into())
+        Ok([(TrackId(4711), Update::new(nis))].into())
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
@@ -308,7 +311,7 @@ impl Associator for Weighs {
 
     fn associate(&mut self, tracks: &[Track], found: &[Detection], _: &Gate) -> Associations {
         fn pair(track: usize, detection: usize, weight: f64) -> Association {
-            Association { track, detection, weight }
+            Association::new(track, detection, weight)
         }
 
         let pairs = match self.0.how.as_str() {
@@ -317,7 +320,7 @@ impl Associator for Weighs {
                 .map(|track| pair(track, track, weight.parse().unwrap()))
                 .collect(),
         };
-        Associations { pairs, spent: Vec::new() }
+        Associations::new(pairs)
     }
 }
 

@@ -116,7 +116,7 @@ struct RadarDetector;
 impl Detector for RadarDetector {
     fn capabilities(&self) -> Capabilities {
         let inputs = Inputs::NONE.require(Radar::INPUT);
-        Capabilities { inputs, discovers: true, ..Capabilities::default() }
+        Capabilities::new(inputs).discovering()
     }
 
     fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {

@@ -78,7 +78,7 @@ mod tests {
         let tracks = [0.1, -0.1].map(|y| track(3.0, y, 0.02));
         let seen = [detection_at(3.0, 0.11), detection_at(3.0, -0.11)];
         let mut given = |appearance: &[Vec<f64>]| {
-            let answer = hungarian.associate(&tracks, &seen, &Gate { appearance, ..GATE });
+            let answer = hungarian.associate(&tracks, &seen, &GATE.with_appearance(appearance));
             pairs(&answer).into_iter().map(|(_, detection)| detection).collect::<Vec<_>>()
         };
         assert_eq!(given(&[]), [0, 1]);
@@ -100,7 +100,7 @@ mod tests {
         let given = |fusion: Fusion, fusion_gate: f64| {
             let gating = GateSettings { fusion, fusion_gate, ..GateSettings::default() };
             let config = Config { cost: Cost::Overlap, gating, ..Config::default() };
-            let gate = Gate { appearance: &looks, ..GATE };
+            let gate = GATE.with_appearance(&looks);
             pairs(&Hungarian::new(config).unwrap().associate(&tracks, &seen, &gate))
         };
         assert_eq!(given(Fusion::Minimum, 0.5), [(0, 1), (1, 0)]);

@@ -110,7 +110,7 @@ impl Associator for ObservationCentric {
             }
         }
         let spent = staged.left(|at| !strong(at));
-        Associations { spent, ..Associations::one_to_one(staged.given().iter().copied()) }
+        Associations::one_to_one(staged.given().iter().copied()).with_spent(spent)
     }
 }
 
@@ -264,7 +264,7 @@ mod tests {
             pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, gate))
         };
         assert_eq!(answer(&GATE), [(0, 0)]);
-        assert_eq!(answer(&Gate { appearance: &appearance, ..GATE }), [(0, 1)]);
+        assert_eq!(answer(&GATE.with_appearance(&appearance)), [(0, 1)]);
     }
 
     #[test]
@@ -274,7 +274,7 @@ mod tests {
         let answer = |fusion: Fusion| {
             let stages = StageSettings { fusion, ..StageSettings::default() };
             let mut associator = associator(Config { stages, ..Config::default() });
-            let gate = Gate { appearance: &appearance, ..GATE };
+            let gate = GATE.with_appearance(&appearance);
             pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, &gate))
         };
         assert_eq!((answer(Fusion::Minimum), answer(Fusion::Sum)), (vec![(0, 0)], vec![(0, 1)]));

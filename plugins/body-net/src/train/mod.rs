@@ -161,11 +161,7 @@ impl Trainer for NetTrainer {
         let net = self.network(&everything, &mut |part| progress(first + (1.0 - first) * part))?;
         let Line { slope, offset } = platt(&said);
         let model = Model { net, slope: thousandths(slope), offset: thousandths(offset) };
-        Ok(Fitted {
-            model: model.to_text(),
-            figures: self.figures(&said, &model),
-            ..Fitted::default()
-        })
+        Ok(Fitted::new(model.to_text(), self.figures(&said, &model)))
     }
 }
 

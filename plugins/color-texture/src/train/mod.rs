@@ -156,7 +156,7 @@ impl Trainer for TreeTrainer {
         progress(1.0);
         let figures = self.figures(&trials, &model);
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { model: text, figures, ..Fitted::default() })
+        Ok(Fitted::new(text, figures))
     }
 }
 

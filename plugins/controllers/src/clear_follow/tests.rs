@@ -30,7 +30,7 @@ fn command(
     let images = Images { depth: depth.map(Arc::new), ..Images::default() };
     let frame = Frame::new(1, Stamp::default(), camera(), motion, images);
     let tracks = target.map_or(&[][..], std::slice::from_ref);
-    let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
+    let scene = Scene::new(&frame, tracks, WHEELS, MAX_MPS).with_target(target);
     WHEELS.wheels_within(controller.command(&scene), MAX_MPS)
 }
 
@@ -230,7 +230,7 @@ fn the_person_is_no_obstacle_and_others_are() {
         let frame = Frame::new(1, Stamp::default(), camera(), EgoMotion::at_rest(0.1), images);
         let target = Some(&person);
         let tracks = &tracks[..];
-        let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
+        let scene = Scene::new(&frame, tracks, WHEELS, MAX_MPS).with_target(target);
         (0..30).map(|_| controller.command(&scene)).last().unwrap()
     };
     let free = settled(None, None);
@@ -268,7 +268,7 @@ fn a_drive_that_cannot_be_is_not_steered() {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let target = Some(&person);
         let tracks = &[][..];
-        let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
+        let scene = Scene::new(&frame, tracks, wheels, max_speed_mps).with_target(target);
         controller.command(&scene) != Twist::STOP
     };
     assert!(drives(0.167, 0.9));

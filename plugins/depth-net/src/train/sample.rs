@@ -192,7 +192,7 @@ mod tests {
         let images = World::with(&[Figure::at(2.5, 0.4)]).draw(&camera);
         let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
         let head = Point3::new(2.5, 0.4, 1.6);
-        let person = AnnotatedPerson { head, counts: true, visible: 1.0 };
+        let person = AnnotatedPerson::new(head);
         Sample::new(&frame, &[person], None, 0).unwrap()
     }
 

@@ -137,7 +137,9 @@ mod tests {
     /// the visible part.
     fn sample(people: &[([f64; 2], bool, f64)]) -> Sample {
         fn person(([x, y], counts, visible): &([f64; 2], bool, f64)) -> AnnotatedPerson {
-            AnnotatedPerson { head: Point3::new(*x, *y, 1.6), counts: *counts, visible: *visible }
+            AnnotatedPerson::new(Point3::new(*x, *y, 1.6))
+                .with_counts(*counts)
+                .with_visible(*visible)
         }
 
         let lens =

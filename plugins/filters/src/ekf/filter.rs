@@ -121,7 +121,7 @@ impl PersonFilter for Ekf {
         let gain: Matrix5x3 = p.fixed_columns::<3>(0) * inverted;
         state.mean += gain * innovation;
         state.covariance = corrected(&p, &gain, &r);
-        Update { nis: Some((nis, measured)) }
+        Update::new(Some((nis, measured)))
     }
 
     fn merge(&self, alternatives: &[(f64, State)]) -> State {

@@ -117,7 +117,7 @@ impl Filter for FloorKalman {
             if height < UNMEASURED_M2 {
                 state.correct_height(detection.position.z, height);
             }
-            supported.insert(id, Update { nis: nis.map(|nis| (nis, 2)) });
+            supported.insert(id, Update::new(nis.map(|nis| (nis, 2))));
         }
         Ok(supported)
     }

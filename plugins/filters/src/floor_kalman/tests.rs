@@ -30,7 +30,7 @@ fn sighting(x: f64, y: f64) -> Detection {
 fn see(filter: &mut FloorKalman, detection: &Detection) -> (f64, u32) {
     let matched = [Matched::certain(ID, detection)];
     let frame = frame();
-    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    let evidence = Evidence::new(&frame, &matched);
     filter.update(&evidence).unwrap()[&ID].nis.unwrap()
 }
 
@@ -462,7 +462,7 @@ fn who_is_stopped_is_forgotten_and_a_stranger_gives_no_support() {
     let frame = frame();
     let detection = sighting(2.0, 0.1);
     let matched = [Matched::certain(other, &detection)];
-    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    let evidence = Evidence::new(&frame, &matched);
     assert!(filter.update(&evidence).unwrap().is_empty());
     filter.stop(other);
     assert_eq!(filter.estimates(&camera()).len(), 1);

@@ -203,7 +203,7 @@ impl State {
         self.stay_in_range();
         self.observed = config.observed_boxes.then(|| seen.rect_in(camera));
         let parts = [by_box.map(|nis| (nis, 3)), by_range.map(|nis| (nis, 1))];
-        Update { nis: parts.into_iter().flatten().reduce(|a, b| (a.0 + b.0, a.1 + b.1)) }
+        Update::new(parts.into_iter().flatten().reduce(|a, b| (a.0 + b.0, a.1 + b.1)))
     }
 
     /// Returns true for a person behind the camera, whose box means nothing.

@@ -210,8 +210,7 @@ fn sightings_that_make_no_sense_leave_finite_numbers() {
             filter.predict(&moves, &camera());
             let frame = Frame::new(1, Stamp::default(), camera(), moves, Images::default());
             let matched = [Matched::certain(TrackId(1), seen)];
-            let evidence =
-                Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+            let evidence = Evidence::new(&frame, &matched);
             filter.update(&evidence).unwrap();
             let estimate = &filter.estimates(&camera())[&TrackId(1)];
             assert!(estimate.is_sane(), "{odd:?}: {estimate:?}");
@@ -443,7 +442,7 @@ fn only_whoever_is_tracked_is_supported_and_a_stopped_one_is_gone() {
     };
     let frame = frame(&camera);
     let matched = [1, 2].map(|id| Matched::certain(TrackId(id), &seen));
-    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    let evidence = Evidence::new(&frame, &matched);
     let supports = filter.update(&evidence).unwrap();
     assert_eq!(supports.keys().collect::<Vec<_>>(), [&TrackId(1)]);
     filter.stop(TrackId(1));
@@ -525,8 +524,7 @@ fn after_a_gap(reupdate: bool, reached: u32) -> f64 {
         let stamp = Stamp::default();
         let frame = Frame::new(index.into(), stamp, Arc::clone(&camera), motion, Images::default());
         let matched = [Matched::certain(TrackId(1), &found)];
-        let evidence =
-            Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+        let evidence = Evidence::new(&frame, &matched);
         filter.update(&evidence).unwrap();
     }
     let place = filter.estimates(&camera)[&TrackId(1)].region.x;
@@ -557,8 +555,7 @@ fn without_a_gap_nothing_is_filtered_anew() {
             let stamp = Stamp::default();
             let frame = Frame::new(index, stamp, Arc::clone(&camera), motion, Images::default());
             let matched = [Matched::certain(TrackId(1), &seen)];
-            let evidence =
-                Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+            let evidence = Evidence::new(&frame, &matched);
             filter.update(&evidence).unwrap();
         }
         filter.estimates(&camera)[&TrackId(1)].clone()

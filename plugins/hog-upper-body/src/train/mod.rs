@@ -371,7 +371,7 @@ impl Trainer for HogTrainer {
             figures.insert("rooms".into(), in_rooms.into());
         }
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { model: text, figures, without })
+        Ok(Fitted::new(text, figures).with_rooms_left_out(without))
     }
 }
 

@@ -113,7 +113,7 @@ impl Trainer for PatchTrainer {
         progress(1.0);
         let figures = self.figures(&trials, best, &model, fitted);
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { model: text, figures, ..Fitted::default() })
+        Ok(Fitted::new(text, figures))
     }
 }
 

@@ -34,8 +34,7 @@ impl Rig {
     fn start(&mut self, score: f64, y: f64) -> TrackId {
         let detection = scored(score, person(3.0, y));
         let id = TrackId(self.started + 1);
-        let new =
-            Unassociated { detection: &detection, detector_log_odds: score, discovered: true };
+        let new = Unassociated::new(&detection, score, true);
         let Initiation::Start(health) = self.manager.initiate(id, &new) else {
             panic!("{score} starts no track")
         };
@@ -61,9 +60,8 @@ impl Rig {
 
     fn manage(&mut self, observations: &[Observation]) -> TrackChanges {
         let pairs = self.tracks.iter().zip(observations);
-        let observed: Vec<ObservedTrack<'_>> = pairs
-            .map(|(track, observation)| ObservedTrack { track, observation: *observation })
-            .collect();
+        let observed: Vec<ObservedTrack<'_>> =
+            pairs.map(|(track, observation)| ObservedTrack::new(track, *observation)).collect();
         let changes = self.manager.manage(&observed);
         for (id, health) in &changes.health {
             for track in self.tracks.iter_mut().filter(|track| track.id == *id) {
@@ -206,7 +204,7 @@ fn candidates_are_dropped_by_the_test_that_they_fail() {
     let test = |score: f64, detector_log_odds: f64, discovered: bool| {
         let mut manager = MOfN::new(Config { doubt_s: 3.0, ..Config::default() }).unwrap();
         let seen = scored(score, person(3.0, 0.0));
-        let new = Unassociated { detection: &seen, detector_log_odds, discovered };
+        let new = Unassociated::new(&seen, detector_log_odds, discovered);
         match manager.initiate(TrackId(1), &new) {
             Initiation::Start(_) => "started",
             Initiation::Drop(test) => test,
@@ -227,7 +225,7 @@ fn candidates_are_dropped_by_the_test_that_they_fail() {
 fn a_place_that_was_rejected_is_doubted_until_a_reset() {
     fn initiate(manager: &mut MOfN, score: f64) -> Initiation {
         let seen = scored(score, person(3.0, 0.0));
-        let new = Unassociated { detection: &seen, detector_log_odds: 5.0, discovered: true };
+        let new = Unassociated::new(&seen, 5.0, true);
         manager.initiate(TrackId(1), &new)
     }
 

@@ -29,7 +29,7 @@ impl TrackCount {
     }
 
     pub(crate) fn health(&self) -> TrackHealth {
-        TrackHealth { confirmed: self.confirmed, log_odds: self.score }
+        TrackHealth::new(self.confirmed, self.score)
     }
 
     /// Adds the observation of the track in one frame, `dt_s` after the last one.

@@ -62,7 +62,7 @@ impl Evidence {
     }
 
     pub(crate) fn health(&self, config: &Config) -> TrackHealth {
-        TrackHealth { confirmed: self.confirmed, log_odds: self.log_odds(config) }
+        TrackHealth::new(self.confirmed, self.log_odds(config))
     }
 
     /// Returns the log-odds that the track is a person.
