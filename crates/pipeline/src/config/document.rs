@@ -85,7 +85,7 @@ impl Document {
     ///
     /// # Errors
     /// None for a config that was read.
-    pub fn root(&self) -> Result<DeTable<'_>, ConfigError> {
+    pub(crate) fn root(&self) -> Result<DeTable<'_>, ConfigError> {
         // From the far end: each config knows then which plugins it inherits.
         let mut inherited = DeTable::new();
         for base in self.bases.iter().rev() {
