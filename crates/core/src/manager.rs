@@ -48,8 +48,9 @@ pub enum Initiation {
     Drop(&'static str),
 }
 
-/// Observation of one track in one frame.
+/// Observation of one track in one frame. A manager takes one that it does not know for no evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Observation {
     /// The track started in this frame.
     Started,

@@ -17,6 +17,7 @@ const PERSON_WIDTH_M: f64 = 0.63;
 /// Part of the body that a box encloses, and box that is tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum BoxedBody {
     /// The whole person, from head to feet; its upper-body square is tracked.
     Full,

@@ -22,6 +22,7 @@ const CROSSES_MPS: f64 = 0.4;
 /// Rule by which a target is chosen while there is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum ChoiceRule {
     /// The nearest person in front.
     #[default]

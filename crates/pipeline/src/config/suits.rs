@@ -9,6 +9,7 @@ pub(super) const TABLE: &str = "suits";
 /// on missing odometry; `tagalong doctor` warns of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Suits {
     /// Lowest and highest camera above the floor, m.
     pub camera_height_m: Option<[f64; 2]>,

@@ -41,7 +41,8 @@ impl TrackCount {
             Observation::Missed => self.miss(dt_s, settings),
             Observation::NotSearched => self.missed_s += dt_s,
             Observation::Occluded => self.clear_misses(),
-            Observation::Started | Observation::OutOfView => {}
+            // `Started`, `OutOfView`, and what a later version adds, are no evidence.
+            _ => {}
         }
     }
 

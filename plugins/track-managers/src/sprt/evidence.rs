@@ -122,7 +122,8 @@ impl Evidence {
                 self.misses = self.misses.saturating_add(1);
             }
             Observation::NotSearched => self.missed_s += dt_s,
-            Observation::Started | Observation::OutOfView => {}
+            // `Started`, `OutOfView`, and what a later version adds, are no evidence.
+            _ => {}
         }
         if track.seen {
             self.add_motion(track, config);
