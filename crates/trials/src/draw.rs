@@ -236,7 +236,9 @@ impl Draw {
             return self.unwrapping.apply(panorama, &images).unwrap_or(images);
         }
         // Recorded depth has whole millimetres.
-        let round = |depth: Arc<DepthImage>| Arc::new(depth.map(|z| (1000.0 * z).round() * 0.001));
+        fn round(depth: Arc<DepthImage>) -> Arc<DepthImage> {
+            Arc::new(depth.map(|z| (1000.0 * z).round() * 0.001))
+        }
         Images { depth: images.depth.map(round), ..images }
     }
 

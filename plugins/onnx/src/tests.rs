@@ -213,7 +213,9 @@ fn a_config_without_a_model_says_so_in_the_funnel() {
 
 #[test]
 fn the_preparation_is_that_of_the_family_but_for_the_settings() {
-    let prepare = |config: Config| config.preparation(Family::NanoDet).unwrap();
+    fn prepare(config: Config) -> tagalong_network::Preparation {
+        config.preparation(Family::NanoDet).unwrap()
+    }
     assert_eq!(prepare(Config::default()), Family::NanoDet.preparation());
     let rgb = prepare(Config { colours: OrAuto::Chosen(Colours::Rgb), ..Config::default() });
     assert_eq!((rgb.colours, rgb.mean), (Colours::Rgb, [123.675, 116.28, 103.53]));

@@ -116,7 +116,9 @@ impl NetTrainer {
     }
 
     fn figures(&self, said: &[(f64, bool)], model: &Model) -> toml::Table {
-        let number = |n: usize| toml::Value::Integer(n as i64);
+        fn number(n: usize) -> toml::Value {
+            toml::Value::Integer(n as i64)
+        }
         let people = self.examples.iter().filter(|example| example.is_person).count();
         let groups: std::collections::BTreeSet<u64> =
             self.examples.iter().map(|example| example.group).collect();

@@ -107,7 +107,9 @@ impl Score {
 
     /// Returns the figures for a card.
     pub fn figures(&self) -> toml::Table {
-        let rounded = |value: f64| toml::Value::from((value * 1e3).round() / 1e3);
+        fn rounded(value: f64) -> toml::Value {
+            toml::Value::from((value * 1e3).round() / 1e3)
+        }
         let (recall, wrong) = self.at(0.0);
         let off: Vec<f64> =
             self.found.iter().filter(|(l, is, _)| *is && *l >= 0.0).map(|(.., off)| *off).collect();

@@ -436,10 +436,10 @@ fn only_whoever_is_tracked_is_supported_and_a_stopped_one_is_gone() {
     let mut filter = ImageKalman::new(Config::default()).unwrap();
     filter.start(TrackId(1), &seen, &camera);
     let camera = Arc::new(camera);
-    let frame = |camera: &Arc<Camera>| {
+    fn frame(camera: &Arc<Camera>) -> Frame {
         let motion = EgoMotion::at_rest(0.1);
         Frame::new(1, Stamp::default(), Arc::clone(camera), motion, Images::default())
-    };
+    }
     let frame = frame(&camera);
     let matched = [1, 2].map(|id| Matched::certain(TrackId(id), &seen));
     let evidence = Evidence::new(&frame, &matched);

@@ -74,7 +74,9 @@ impl PatchTrainer {
         let people = self.samples.iter().filter(|s| s.example.is_person).count();
         let groups: std::collections::BTreeSet<u64> =
             self.samples.iter().map(|s| s.example.group).collect();
-        let number = |n: usize| toml::Value::Integer(n as i64);
+        fn number(n: usize) -> toml::Value {
+            toml::Value::Integer(n as i64)
+        }
         let mut figures = toml::Table::new();
         figures.insert("people".into(), number(people));
         figures.insert("others".into(), number(self.samples.len() - people));

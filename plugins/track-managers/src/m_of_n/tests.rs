@@ -201,7 +201,7 @@ fn time_without_a_search_counts_once_there_are_misses() {
 
 #[test]
 fn candidates_are_dropped_by_the_test_that_they_fail() {
-    let test = |score: f64, detector_log_odds: f64, discovered: bool| {
+    fn test(score: f64, detector_log_odds: f64, discovered: bool) -> &'static str {
         let mut manager = MOfN::new(Config { doubt_s: 3.0, ..Config::default() }).unwrap();
         let seen = scored(score, person(3.0, 0.0));
         let new = Unassociated::new(&seen, detector_log_odds, discovered);
@@ -209,7 +209,7 @@ fn candidates_are_dropped_by_the_test_that_they_fail() {
             Initiation::Start(_) => "started",
             Initiation::Drop(test) => test,
         }
-    };
+    }
     assert_eq!(test(1.0, 1.0, true), "started");
     assert_eq!(test(-1.0, -1.0, true), "score");
     assert_eq!(test(-1.0, 1.0, true), "verifier");

@@ -105,7 +105,7 @@ fn a_blink_is_no_reason_for_doubt() {
 
 #[test]
 fn somebody_who_came_near_may_have_been_taken_for_the_person() {
-    let states = |away_m: f64| {
+    fn states(away_m: f64) -> Vec<LockState> {
         let mut lock = new_lock(settings());
         steps(&mut lock, 20, &tall(1.6));
         let other = somebody(2, 2.0, away_m);
@@ -113,7 +113,7 @@ fn somebody_who_came_near_may_have_been_taken_for_the_person() {
         let gone = other.with_seen(false);
         let states = (0..9).map(|_| step(&mut lock, &[tall(1.9), gone.clone()]).state);
         states.collect::<Vec<_>>()
-    };
+    }
     assert_eq!(states(0.81), [LockState::Locked; 9]);
     assert!(states(0.79).contains(&LockState::Lost));
 }
